@@ -1,5 +1,5 @@
 # make run    installs ctrlgen into .venv and solves, generates and compares the 20 um circle
-# make test   installs ctrlgen with its test tools and runs the tests (minutes); make test-long also the long ones
+# make test   installs ctrlgen with its test tools and runs the tests (minutes); make test-long runs them all (an hour)
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -13,12 +13,14 @@ test: $(VENV)/installed-test
 	$(BIN)/python -m pytest -n auto --dist loadfile -m "not long"
 
 test-long: $(VENV)/installed-test
-	$(BIN)/python -m pytest
+	$(BIN)/python -m benchmarks diagnosis --repeat 1
+	$(BIN)/python -m pytest -n auto --dist worksteal
 
-# make bench    times ctrlgen against named peers in the same run (minutes); REPEAT=1 is one round
+# make bench    times ctrlgen against named peers in the same run (minutes); REPEAT=1 is one round, NAMES="online job" these alone
 REPEAT ?= 5
+NAMES ?=
 bench: $(VENV)/installed-test
-	$(BIN)/python -m benchmarks --repeat $(REPEAT)
+	$(BIN)/python -m benchmarks $(NAMES) --repeat $(REPEAT)
 
 # make battery SIZE=ci|small|full SEED=1: concealed cases (hours for full), diagnosed and scored; goes on where it was stopped
 # CLASSES=messy,memory,null draws these classes alone

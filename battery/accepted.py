@@ -74,19 +74,44 @@ TRUTHS: dict[str, dict[tuple[str, ...], Value]] = {
     "temperature_sensitivity": {("sensitivity", "gain", "slope"): lambda t: t["amplitude"]},
     "quadratic_damping": {("c2", "coefficient", "drag", "damping"): lambda t: t["amplitude"]},
     "vibration": {("frequency",): lambda t: t["shape"]["frequency"]},
-    "step": {("amplitude", "size", "height", "force"): lambda t: t["amplitude"], ("moment", "time"): lambda t: _middle(t, ARRIVING)},
-    "lost_beams": {("share", "fraction", "lost"): lambda t: t["amplitude"], ("moment", "time"): lambda t: _middle(t, BREAKING)},
+    "step": {
+        ("amplitude", "size", "height", "force"): lambda t: t["amplitude"],
+        ("moment", "time"): lambda t: _middle(t, ARRIVING),
+    },
+    "lost_beams": {
+        ("share", "fraction", "lost"): lambda t: t["amplitude"],
+        ("moment", "time"): lambda t: _middle(t, BREAKING),
+    },
     "resonance": {("frequency",): lambda t: t["shape"]["frequency"]},
     "heat_crosstalk": {("share",): lambda t: t["amplitude"]},
     "frame_turn": {("angle",): lambda t: t["amplitude"]},
-}  # fmt: skip
+}
 # In messy cases and with memory
 ROUGH_TRUTHS: dict[str, dict[tuple[str, ...], Value]] = TRUTHS | {
     "backlash": {("gap",): lambda t: t["amplitude"]},
     "free_play": {("gap",): lambda t: t["amplitude"]},
 }
-BASE = {"": 1.0, "1": 1.0, "%": 1e-2, "m": 1.0, "s": 1.0, "Hz": 1.0, "N": 1.0, "V": 1.0, "A": 1.0, "W": 1.0, "K": 1.0, "kg": 1.0,
-        "g": 1e-3, "rad": 1.0, "deg": math.pi / 180, "degC": 1.0, "min": 60.0, "ohm": 1.0, "Pa": 1.0}  # fmt: skip
+BASE = {
+    "": 1.0,
+    "1": 1.0,
+    "%": 1e-2,
+    "m": 1.0,
+    "s": 1.0,
+    "Hz": 1.0,
+    "N": 1.0,
+    "V": 1.0,
+    "A": 1.0,
+    "W": 1.0,
+    "K": 1.0,
+    "kg": 1.0,
+    "g": 1e-3,
+    "rad": 1.0,
+    "deg": math.pi / 180,
+    "degC": 1.0,
+    "min": 60.0,
+    "ohm": 1.0,
+    "Pa": 1.0,
+}
 PREFIX = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9, "p": 1e-12}
 
 

@@ -50,9 +50,14 @@ def draw_axis(rng: Rng, loop: bool) -> tuple[Axis, Axis]:
     """True numbers, and those its maker states: off by the stated standard deviation."""
     if loop:
         true = Axis(
-            float(rng.uniform(60, 120)), float(rng.uniform(150, 300)), 0.0, float(rng.uniform(25, 40)), 0.3, 10.0,
+            float(rng.uniform(60, 120)),
+            float(rng.uniform(150, 300)),
+            0.0,
+            float(rng.uniform(25, 40)),
+            0.3,
+            10.0,
             Loop(160.0, 243.0),
-        )  # fmt: skip
+        )
     else:
         mass, f_0, ratio = rng.uniform(0.2, 1.0), rng.uniform(40, 120), rng.uniform(0.04, 0.3)
         w = 2 * np.pi * f_0
@@ -176,9 +181,7 @@ def _scene(axis: Axis, fit: Array, noise: float, span: float, dt: float) -> Scen
     q = simulate(axis, fit, scene=Scene(axis, sample_time=dt))
     v = np.gradient(q, dt)
     drive_peak = float(np.abs(fit).max()) if axis.loop is None else 5.0
-    return Scene(
-        axis, float(q.std()), float(v.std()), float(np.abs(q).max()), drive_peak, span, noise, dt
-    )  # fmt: skip
+    return Scene(axis, float(q.std()), float(v.std()), float(np.abs(q).max()), drive_peak, span, noise, dt)
 
 
 def with_spikes(rng: Rng, bench: Bench) -> Bench:
@@ -211,19 +214,42 @@ def device_text(stated: Axis) -> str:
     if stated.stiffness == 0:
         entry["stiffness"] = 'stiffness = "0 N/um"'
     lines = [
-        'kind = "axis"', 'name = "stage"', 'title = "A stage on one axis"', 'source = "data sheet"', "", "[mechanics]",
-        entry["mass"], entry["damping"], entry["stiffness"], f'stroke = "{stated.stroke * 1e6:g} um"', "", "[actuator]",
-        entry["force_constant"], f'drive_limit = "{stated.drive_limit:g} V"',
-    ]  # fmt: skip
+        'kind = "axis"',
+        'name = "stage"',
+        'title = "A stage on one axis"',
+        'source = "data sheet"',
+        "",
+        "[mechanics]",
+        entry["mass"],
+        entry["damping"],
+        entry["stiffness"],
+        f'stroke = "{stated.stroke * 1e6:g} um"',
+        "",
+        "[actuator]",
+        entry["force_constant"],
+        f'drive_limit = "{stated.drive_limit:g} V"',
+    ]
     if stated.loop:
         g = stated.loop
-        lines += ["", "[loop]", 'measures = "displacement"', f'position_gain = "{g.position_gain:g} 1/s"',
-                  f'velocity_gain = "{g.velocity_gain:g} V/(m/s)"', f'integral_gain = "{g.integral_gain:g} V/(m*s)"']  # fmt: skip
+        lines += [
+            "",
+            "[loop]",
+            'measures = "displacement"',
+            f'position_gain = "{g.position_gain:g} 1/s"',
+            f'velocity_gain = "{g.velocity_gain:g} V/(m/s)"',
+            f'integral_gain = "{g.integral_gain:g} V/(m*s)"',
+        ]
     return "\n".join(lines) + "\n"
 
 
-def write_bench(folder: Path, bench: Bench, planted: list[Planted], device: str | None = None, length: bool = False,
-                stated: float = 1.0) -> None:  # fmt: skip
+def write_bench(
+    folder: Path,
+    bench: Bench,
+    planted: list[Planted],
+    device: str | None = None,
+    length: bool = False,
+    stated: float = 1.0,
+) -> None:
     """device.toml (as text, else of the axis), recording.toml and one CSV per take.
 
     `length`: the command is one; `stated`: the stated noise over the true one.
@@ -232,9 +258,16 @@ def write_bench(folder: Path, bench: Bench, planted: list[Planted], device: str 
     (folder / "device.toml").write_text(device or device_text(bench.stated))
     drive_unit, factor = ("um", 1e6) if length or bench.axis.loop is not None else ("V", 1.0)
     noise = f', noise = "{bench.scene.noise * stated * 1e9:.3g} nm"' if bench.noise_stated else ""
-    lines = ['title = "Recording of a stage"', 'device = "stage"', 'source = "bench"', 'kind = "series"', "", "[columns]",
-             f'"drive.axis" = {{ column = "u", unit = "{drive_unit}" }}',
-             f'"reading.axis" = {{ column = "y", unit = "um"{noise} }}']  # fmt: skip
+    lines = [
+        'title = "Recording of a stage"',
+        'device = "stage"',
+        'source = "bench"',
+        'kind = "series"',
+        "",
+        "[columns]",
+        f'"drive.axis" = {{ column = "u", unit = "{drive_unit}" }}',
+        f'"reading.axis" = {{ column = "y", unit = "um"{noise} }}',
+    ]
     dt = bench.scene.sample_time
     for k, (take, y) in enumerate(zip(bench.takes, readings(bench, planted), strict=True)):
         name = f"record_{k + 1}.csv"
@@ -244,8 +277,15 @@ def write_bench(folder: Path, bench: Bench, planted: list[Planted], device: str 
         header = "t,u,y" + (",T" if take.ambient is not None else "")
         formats = ["%.4f", "%.9g", "%.6f", "%.4f"][: len(columns)]
         np.savetxt(folder / name, np.column_stack(columns), fmt=formats, delimiter=",", header=header, comments="")
-        lines += ["", "[[record]]", f'file = "{name}"', f'role = "{take.role}"', 'time = { column = "t", unit = "s" }',
-                  f'start = "{take.start:g} s"', f'between_samples = "{"linear" if bench.linear else "held"}"']  # fmt: skip
+        lines += [
+            "",
+            "[[record]]",
+            f'file = "{name}"',
+            f'role = "{take.role}"',
+            'time = { column = "t", unit = "s" }',
+            f'start = "{take.start:g} s"',
+            f'between_samples = "{"linear" if bench.linear else "held"}"',
+        ]
         if take.ambient is not None:
             lines.append('conditions = { ambient = { column = "T", unit = "degC" } }')
     (folder / "recording.toml").write_text("\n".join(lines) + "\n")

@@ -21,11 +21,37 @@ from battery.seal import seal
 from battery.size import OWN, Ruler, left_over
 
 SINGLE = (
-    "stiffening", "hysteresis", "log_creep", "creep", "backlash", "coulomb", "stribeck", "viscous", "quadratic_damping",
-    "end_stop", "resonance", "softening", "cyclic", "bow", "drift", "temperature_sensitivity", "low_pass", "delay",
-    "quantisation", "saturation", "dead_zone", "lost_beams", "degradation", "thermal_lag", "vibration", "step",
-    "drive_gain", "sensor_gain", "stiffness", "home_offset",
-)  # fmt: skip
+    "stiffening",
+    "hysteresis",
+    "log_creep",
+    "creep",
+    "backlash",
+    "coulomb",
+    "stribeck",
+    "viscous",
+    "quadratic_damping",
+    "end_stop",
+    "resonance",
+    "softening",
+    "cyclic",
+    "bow",
+    "drift",
+    "temperature_sensitivity",
+    "low_pass",
+    "delay",
+    "quantisation",
+    "saturation",
+    "dead_zone",
+    "lost_beams",
+    "degradation",
+    "thermal_lag",
+    "vibration",
+    "step",
+    "drive_gain",
+    "sensor_gain",
+    "stiffness",
+    "home_offset",
+)
 FIXED = ("low_pass", "delay", "stuck")  # drawn at a size a bench would see, not scaled
 WEAK = tuple(n for n in SINGLE if n not in (*FIXED, *OWN, "quantisation", "end_stop"))
 # A mixture takes one from each of two or three
@@ -65,8 +91,13 @@ def plan(seed: int, size: str, classes: Sequence[str] = CLASSES) -> list[Order]:
     rng = np.random.default_rng([seed, 0])
     rows: list[tuple[str, tuple[str, ...]]] = []
     for kind, count in zip(CLASSES, COUNTS[size], strict=True):
-        pool = {"single": SINGLE, "weak": WEAK, "outside": laws.STRANGE, "hexapod_single": tuple(hexapod_cases.FAULTS),
-                "confusable": ("slow", "gain", "quasi-static", "commuting")}.get(kind)  # fmt: skip
+        pool = {
+            "single": SINGLE,
+            "weak": WEAK,
+            "outside": laws.STRANGE,
+            "hexapod_single": tuple(hexapod_cases.FAULTS),
+            "confusable": ("slow", "gain", "quasi-static", "commuting"),
+        }.get(kind)
         if kind in ROUGH:
             names = rough_cases.plan(kind, rng, count)
         elif kind == "multiple":
@@ -173,25 +204,34 @@ def _confusable(order: Order, rng: Rng) -> tuple[Callable[[Path], None], dict[st
         if apart < 0.3:
             truth = [_truth(law, size, f"{laws.PLACE.get(law.name, 'stage')}:axis")]
             return (lambda d, b=bench, p=law: axis_cases.write_bench(d, b, [p])), axis_cases.describe(bench) | {
-                "planted": truth, "rivals": [n for n in pair if n != law.name], "apart": apart,
-            }  # fmt: skip
+                "planted": truth,
+                "rivals": [n for n in pair if n != law.name],
+                "apart": apart,
+            }
     raise RuntimeError(f"case {order.number} ({order.wanted}): no inseparable pair drawn")
 
 
 def _inseparable(which: str, rng: Rng, seconds: float) -> tuple[axis_cases.Bench, tuple[str, str]]:
     """A bench on which a pair of causes looks the same."""
     bench = axis_cases.draw_bench(rng, seconds, ambient=False)
-    pair = {"slow": ("drift", "degradation"), "gain": ("sensor_gain", "drive_gain"), "quasi-static": ("bow", "stiffening"),
-            "commuting": ("thermal_lag", "creep")}[which]  # fmt: skip
+    pair = {
+        "slow": ("drift", "degradation"),
+        "gain": ("sensor_gain", "drive_gain"),
+        "quasi-static": ("bow", "stiffening"),
+        "commuting": ("thermal_lag", "creep"),
+    }[which]
     level = float(np.abs(bench.fit.drive).max())
     if which == "slow":  # one level held: a falling gain is a drift
         bench = _redriven(bench, lambda n, role: level * np.minimum(np.arange(n) / (200 if role == "fit" else 400), 1))
     if which == "quasi-static":  # slow and one-sided: every smooth curve over a short stretch is a parabola
         bench = _redriven(
             bench,
-            lambda n, role: level * np.minimum(np.arange(n) / 300, 1)
-            * (0.9 + 0.1 * np.sin(2 * np.pi * np.arange(n) / (1000 if role == "fit" else 1700))),
-        )  # fmt: skip
+            lambda n, role: (
+                level
+                * np.minimum(np.arange(n) / 300, 1)
+                * (0.9 + 0.1 * np.sin(2 * np.pi * np.arange(n) / (1000 if role == "fit" else 1700)))
+            ),
+        )
     return bench, pair
 
 
@@ -228,8 +268,14 @@ def make_case(order: Order, folder: Path) -> str:
     return name
 
 
-def make(folder: Path, seed: int, size: str, jobs: int = 2, progress: Callable[[int, int], None] | None = None,
-         classes: Sequence[str] = CLASSES) -> None:  # fmt: skip
+def make(
+    folder: Path,
+    seed: int,
+    size: str,
+    jobs: int = 2,
+    progress: Callable[[int, int], None] | None = None,
+    classes: Sequence[str] = CLASSES,
+) -> None:
     """All cases of these `classes` of a battery into an empty or new `folder`."""
     if (folder / "answers").exists():
         raise FileExistsError(f"{folder} already holds a battery; give another folder or remove it")

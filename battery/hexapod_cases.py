@@ -16,9 +16,12 @@ from plants.numbers import MEMS_HEXAPOD, read
 Rng = np.random.Generator
 # Shares, stated in the device file
 SD = {
-    "hexapod.platform_radius": 0.003, "hexapod.base_radius": 0.003, "hexapod.height": 0.003,
-    "actuator.thermal_resistance": 0.02, "stage.half_stage_stiffness": 0.03,
-}  # fmt: skip
+    "hexapod.platform_radius": 0.003,
+    "hexapod.base_radius": 0.003,
+    "hexapod.height": 0.003,
+    "actuator.thermal_resistance": 0.02,
+    "stage.half_stage_stiffness": 0.03,
+}
 SECTION = {"hexapod": "mechanism", "actuator": "actuator", "stage": "stage"}
 
 
@@ -83,14 +86,14 @@ FAULTS: dict[str, Callable[[Rng], Fault]] = {
     "bow": _on_sensor("bow", "bow", 2e-4, 2e-3),
     "swapped": _swapped,
     "parameter": _parameter,
-    "heat_crosstalk": lambda rng: (
-        lambda a: Fault("heat_crosstalk", "actuator:all", a, Faults(crosstalk=a), {})
-    )(float(rng.uniform(0.004, 0.03))),
-    "frame_turn": lambda rng: (
-        lambda a: Fault("frame_turn", "mechanism:all", a, Faults(turn=a), {})
-    )(_signed(rng, 0.003, 0.03)),
+    "heat_crosstalk": lambda rng: (lambda a: Fault("heat_crosstalk", "actuator:all", a, Faults(crosstalk=a), {}))(
+        float(rng.uniform(0.004, 0.03))
+    ),
+    "frame_turn": lambda rng: (lambda a: Fault("frame_turn", "mechanism:all", a, Faults(turn=a), {}))(
+        _signed(rng, 0.003, 0.03)
+    ),
     "finite_rotation": lambda rng: Fault("finite_rotation", "mechanism:all", 1.0, Faults(finite=1.0), {}),
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)
@@ -152,8 +155,17 @@ def write_bench(folder: Path, bench: PoseBench, fault: Fault | None) -> None:
     write_poses(folder, device_text(), "mems_hexapod", columns, "W", bench, readings(bench, fault))
 
 
-def write_poses(folder: Path, text: str, device: str, columns: dict[str, str], unit: str, bench: PoseBench,
-                read: dict[str, Array], dwell: float | None = None, period: float | None = None) -> None:  # fmt: skip
+def write_poses(
+    folder: Path,
+    text: str,
+    device: str,
+    columns: dict[str, str],
+    unit: str,
+    bench: PoseBench,
+    read: dict[str, Array],
+    dwell: float | None = None,
+    period: float | None = None,
+) -> None:
     """The device's `text`, recording.toml and a CSV per role with drives in `columns` (name: axis) and the poses `read`.
 
     `dwell` [s] of a settled pose; `period` [s] of a series whose drive is linear between samples.

@@ -10,8 +10,18 @@ import numpy as np
 from battery.accepted import in_si, is_right, place_is_right
 
 # Events, lines and slow or periodic curves: each fits something of whatever is left.
-ARTEFACTS = ("force_step", "sensor_step", "lost_beams", "stuck", "vibration", "drift", "degradation", "cyclic", "raised_point",
-             "stitching_error")  # fmt: skip
+ARTEFACTS = (
+    "force_step",
+    "sensor_step",
+    "lost_beams",
+    "stuck",
+    "vibration",
+    "drift",
+    "degradation",
+    "cyclic",
+    "raised_point",
+    "stitching_error",
+)
 NEAR = 0.05  # a share is right within five points
 EQUAL = 0.1  # dominant causes whose shares differ by less may come in either order
 

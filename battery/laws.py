@@ -22,9 +22,21 @@ PLACE = {
     **dict.fromkeys(("drive_gain", "saturation", "dead_zone", "lost_beams", "degradation", "thermal_lag"), "actuator"),
     **dict.fromkeys(("vibration", "step"), "disturbance"),
     **dict.fromkeys(
-        ("cyclic", "bow", "drift", "temperature_sensitivity", "low_pass", "delay", "quantisation", "stuck", "sensor_gain",
-         "home_offset"), "sensor"),
-}  # fmt: skip
+        (
+            "cyclic",
+            "bow",
+            "drift",
+            "temperature_sensitivity",
+            "low_pass",
+            "delay",
+            "quantisation",
+            "stuck",
+            "sensor_gain",
+            "home_offset",
+        ),
+        "sensor",
+    ),
+}
 
 
 def build(planted: Sequence[Planted], scene: Scene) -> list[Hooks]:
@@ -38,9 +50,15 @@ def draw(name: str, rng: np.random.Generator, scene: Scene) -> Planted:
 
 
 def simulate(
-    axis: Axis, drive: Any, planted: Sequence[Planted] = (), scene: Scene | None = None, start: float = 0.0,
-    ambient: Any = None, noise: Any = 0.0, linear: bool = False,
-) -> np.ndarray:  # fmt: skip
+    axis: Axis,
+    drive: Any,
+    planted: Sequence[Planted] = (),
+    scene: Scene | None = None,
+    start: float = 0.0,
+    ambient: Any = None,
+    noise: Any = 0.0,
+    linear: bool = False,
+) -> np.ndarray:
     """The reading (n,) [m] under `drive` (n,), begun at rest at `start` [s] of the clock, `noise` (n,) [m] added before the converter."""
     scene = scene or Scene(axis)
     hooks = build(planted, scene)

@@ -16,10 +16,16 @@ from scipy.signal import fftconvolve, lfilter
 from battery.plant_axis import Array
 
 FAMILY = {
-    "bouc_wen_motion": "hysteresis", "play_stack": "hysteresis", "preisach": "hysteresis",
-    "free_play": "backlash", "worn_play": "backlash", "loose_joints": "backlash",
-    "three_relaxations": "creep", "power_creep": "creep", "sinh_creep": "creep",
-}  # fmt: skip
+    "bouc_wen_motion": "hysteresis",
+    "play_stack": "hysteresis",
+    "preisach": "hysteresis",
+    "free_play": "backlash",
+    "worn_play": "backlash",
+    "loose_joints": "backlash",
+    "three_relaxations": "creep",
+    "power_creep": "creep",
+    "sinh_creep": "creep",
+}
 
 
 def bouc_wen_motion(t: Array, x: Array, a: float, reach: float, loop: float, power: float) -> Array:
@@ -167,7 +173,9 @@ def draw_shape(name: str, rng: np.random.Generator, travel: float, clock: float)
     if name in {"three_relaxations", "power_creep", "sinh_creep"}:
         start = {"tau": clock * between(0.2, 1.0)}
     more = {
-        "worn_play": {"scale": travel, "wear": between(0.1, 0.3)}, "loose_joints": {"spread": between(0.05, 0.2)},
-        "power_creep": {"power": between(0.15, 0.4)}, "sinh_creep": {"scale": travel * between(0.7, 1.5)},
-    }  # fmt: skip
+        "worn_play": {"scale": travel, "wear": between(0.1, 0.3)},
+        "loose_joints": {"spread": between(0.05, 0.2)},
+        "power_creep": {"power": between(0.15, 0.4)},
+        "sinh_creep": {"scale": travel * between(0.7, 1.5)},
+    }
     return start | more.get(name, {})

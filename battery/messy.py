@@ -32,15 +32,40 @@ CAUSES = (
     ("resonance",),
 )
 KNOWN = (
-    "stiffening", "hysteresis", "log_creep", "creep", "backlash", "coulomb", "viscous", "quadratic_damping", "bow", "cyclic",
-    "drift", "thermal_lag", "delay", "low_pass", "vibration", "degradation", "resonance", "dead_zone",
-)  # fmt: skip
+    "stiffening",
+    "hysteresis",
+    "log_creep",
+    "creep",
+    "backlash",
+    "coulomb",
+    "viscous",
+    "quadratic_damping",
+    "bow",
+    "cyclic",
+    "drift",
+    "thermal_lag",
+    "delay",
+    "low_pass",
+    "vibration",
+    "degradation",
+    "resonance",
+    "dead_zone",
+)
 FOREIGN = (*laws.STRANGE, "bouc_wen_motion", "preisach", "worn_play", "power_creep", "sinh_creep")
 # Laws that need no inertia
 ON_SERVO = (
     ("bow", "cyclic", "drift", "thermal_lag", "degradation", "dead_zone", "creep", "backlash"),
-    ("telegraph", "clock_jitter", "turning_points", "bouc_wen_motion", "preisach", "worn_play", "power_creep", "sinh_creep"),
-)  # fmt: skip
+    (
+        "telegraph",
+        "clock_jitter",
+        "turning_points",
+        "bouc_wen_motion",
+        "preisach",
+        "worn_play",
+        "power_creep",
+        "sinh_creep",
+    ),
+)
 
 
 def mixture(rng: Rng, count: int) -> tuple[str, ...]:
@@ -101,8 +126,9 @@ def dominant(
     return found
 
 
-def background(rng: Rng, draw: Draw, gauge: Gauge, largest: float, pools: tuple[Sequence[str], Sequence[str]],
-               taken: Sequence[str]) -> list[tuple[Any, float]]:  # fmt: skip
+def background(
+    rng: Rng, draw: Draw, gauge: Gauge, largest: float, pools: tuple[Sequence[str], Sequence[str]], taken: Sequence[str]
+) -> list[tuple[Any, float]]:
     """Five to ten small laws and their sizes; `pools`: kinds that libraries have, and others, half of each.
 
     `largest`: the size of the dominant cause; no law is of the kind or family of those `taken`.

@@ -28,8 +28,15 @@ Series = tuple[Array, Array]
 def read_case(case: Path) -> tuple[Axis, dict[str, Series], bool]:
     """The axis as stated, {role: (u [V], y [um])} and whether the drive is linear between samples, from the case's own files."""
     d = tomllib.loads((case / "device.toml").read_text())
-    number = {k: float(d[s][k]["value"].split(" ")[0]) for s, k in
-              (("mechanics", "mass"), ("mechanics", "damping"), ("mechanics", "stiffness"), ("actuator", "force_constant"))}  # fmt: skip
+    number = {
+        k: float(d[s][k]["value"].split(" ")[0])
+        for s, k in (
+            ("mechanics", "mass"),
+            ("mechanics", "damping"),
+            ("mechanics", "stiffness"),
+            ("actuator", "force_constant"),
+        )
+    }
     axis = Axis(**number, stroke=1e-4, drive_limit=float(d["actuator"]["drive_limit"].split(" ")[0]))
     recording = tomllib.loads((case / "recording.toml").read_text())
     series = {}

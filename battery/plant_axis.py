@@ -120,7 +120,7 @@ def fine_rise(drive: Array, linear: bool) -> Array:
 
 @dataclass(frozen=True)
 class Motion:
-    """On the fine grid: `time` [s, common clock], `position` [m], `speed` [m/s], `drive` [V] after the drive laws."""
+    """The motion on the fine grid: `time` [s, common clock], `position` [m], `speed` [m/s], `drive` [V] after the drive laws."""
 
     time: Array
     position: Array
@@ -128,16 +128,27 @@ class Motion:
     drive: Array
 
 
-def move(axis: Axis, drive: Array, hooks: Sequence[Hooks] = (), start: float = 0.0, scene: Scene | None = None,
-         linear: bool = False) -> Motion:  # fmt: skip
+def move(
+    axis: Axis,
+    drive: Array,
+    hooks: Sequence[Hooks] = (),
+    start: float = 0.0,
+    scene: Scene | None = None,
+    linear: bool = False,
+) -> Motion:
     """Motion from rest under `drive` [V], or under a reference [m] where the axis has a loop."""
     if axis.mass == 0:
         return _follow(axis, np.asarray(drive, dtype=float), hooks, start, scene or Scene(axis), linear)
     h = (scene or Scene(axis)).step
     a11, a12, a21, a22, b1, b2, r1, r2 = exact_step(axis, h)
     m, c, k, k_f, limit, loop = (
-        axis.mass, axis.damping, axis.stiffness, axis.force_constant, axis.drive_limit, axis.loop,
-    )  # fmt: skip
+        axis.mass,
+        axis.damping,
+        axis.stiffness,
+        axis.force_constant,
+        axis.drive_limit,
+        axis.loop,
+    )
     on_drive = [(x.drive, x.direct) for x in hooks if x.drive]
     on_force = [x.force for x in hooks if x.force]
     q = v = summed = asked = 0.0

@@ -81,8 +81,16 @@ def actuator_stiffness(a: Any) -> Array:
 def notch(s: Any) -> Array:
     """Circular notch about its free end, the two printed couplings averaged. S1 eq. (7)."""
     n = s.notch
-    C = np.diag([n.delta_x_per_F_x, n.delta_y_per_F_y, n.delta_z_per_F_z, n.theta_x_per_M_x, n.theta_y_per_M_y,
-                 n.theta_z_per_M_z])  # fmt: skip
+    C = np.diag(
+        [
+            n.delta_x_per_F_x,
+            n.delta_y_per_F_y,
+            n.delta_z_per_F_z,
+            n.theta_x_per_M_x,
+            n.theta_y_per_M_y,
+            n.theta_z_per_M_z,
+        ]
+    )
     C[1, 5] = C[5, 1] = (n.theta_z_per_F_y + n.delta_y_per_M_z) / 2
     C[2, 4] = C[4, 2] = (n.theta_y_per_F_z + n.delta_z_per_M_y) / 2
     return C

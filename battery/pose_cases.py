@@ -80,12 +80,27 @@ def meso_jacobian(n: Any) -> Array:
 
 
 MACHINES = {
-    "mems": Machine("mems_hexapod", MEMS_HEXAPOD, AXES, "W", hexapod_cases.SD,
-                    lambda n, u: (lambda p: p.displacement(p.temperature(u)))(Hexapod(n)),
-                    lambda n, d: Hexapod(n).pose(d), (1, 0, 3, 2, 5, 4)),
-    "meso": Machine("meso_hexapod", MESO_HEXAPOD, MESO_AXES, "um", MESO_SD,
-                    lambda n, u: u, lambda n, d: d @ meso_jacobian(n).T, (5, 2, 1, 4, 3, 0)),
-}  # fmt: skip
+    "mems": Machine(
+        "mems_hexapod",
+        MEMS_HEXAPOD,
+        AXES,
+        "W",
+        hexapod_cases.SD,
+        lambda n, u: (lambda p: p.displacement(p.temperature(u)))(Hexapod(n)),
+        lambda n, d: Hexapod(n).pose(d),
+        (1, 0, 3, 2, 5, 4),
+    ),
+    "meso": Machine(
+        "meso_hexapod",
+        MESO_HEXAPOD,
+        MESO_AXES,
+        "um",
+        MESO_SD,
+        lambda n, u: u,
+        lambda n, d: d @ meso_jacobian(n).T,
+        (5, 2, 1, 4, 3, 0),
+    ),
+}
 
 
 @dataclass(frozen=True)
@@ -184,7 +199,7 @@ def draw_act(name: str, rng: Rng, bench: Bench, gauge: PoseGauge) -> Act:
         "root": (stage, "stage", only(k, lambda x: np.sign(x[:, k]) * np.sqrt(np.abs(x[:, k]) * s))),
         "ripple": (stage, "stage", only(k, lambda x: s * np.sin(7 * x[:, k] / s + place))),
         "wander": (sensor, "pose", lambda x, a, r: a * _wander(x.shape, c, seeds[r]) * width),
-    }  # fmt: skip
+    }
     location, at, change = made[name]
     # A command in displacement that is too small and a lever that is too short are one
     if name == "drive_gain" and machine.unit == "um":

@@ -96,13 +96,23 @@ def table(judged: Sequence[Judgement]) -> list[Row]:
         share("coverage, autocorrelated noise", [c[2] for c in colour], "90-98 %", 0.90, 0.98),
         number("held-out error / floor, median", ratios, 0.5, "<= 1.05", 1.05),
         number("held-out error / floor, 95th percentile", ratios, 0.95, "<= 1.3", 1.3),
-        number("time of a case with one effect, longest [s]", [j.seconds for j in single if j.seconds], 1.0, "<= 60", 60),
-        number("time of a case with two or three, longest [s]", [j.seconds for j in of("multiple") if j.seconds], 1.0, "<= 180", 180),
-        share("confusable, said to be so with the truth in the set", [j.admitted for j in of("confusable")], "none set"),
+        number(
+            "time of a case with one effect, longest [s]", [j.seconds for j in single if j.seconds], 1.0, "<= 60", 60
+        ),
+        number(
+            "time of a case with two or three, longest [s]",
+            [j.seconds for j in of("multiple") if j.seconds],
+            1.0,
+            "<= 180",
+            180,
+        ),
+        share(
+            "confusable, said to be so with the truth in the set", [j.admitted for j in of("confusable")], "none set"
+        ),
         share("confusable, wrong name", [j.wrong for j in of("confusable")], "none set"),
         *rough_rows(judged),
         share("crashed, refused or out of time", [j.verdict == "failed" for j in judged], "0 %", most=0.0),
-    ]  # fmt: skip
+    ]
 
 
 def confusion(judged: Sequence[Judgement]) -> Counter[tuple[str, str]]:
@@ -163,8 +173,15 @@ def figure(path: Path, judged: Sequence[Judgement]) -> None:
     fig.savefig(path, dpi=150)
 
 
-def run(folder: Path, command: Sequence[str], jobs: int = 2, timeout: float = 600.0, again: bool = False, opponents: int = 0,
-        progress: Callable[[int, int], None] | None = None) -> Result:  # fmt: skip
+def run(
+    folder: Path,
+    command: Sequence[str],
+    jobs: int = 2,
+    timeout: float = 600.0,
+    again: bool = False,
+    opponents: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> Result:
     """Diagnose all cases, judge, and write table.md, table.json, confusion.png into `folder`."""
     names = sorted(p.name for p in (folder / "cases").iterdir())
     states: dict[str, Any] = {}

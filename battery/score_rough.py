@@ -16,8 +16,11 @@ def rough_rows(judged: Sequence[Judgement]) -> list[Row]:
     memory = [j for j in judged if j.kind == "memory"]
     null = [j for j in judged if j.kind == "null"]
     best = [j.rough.over_best for j in messy if j.rough.over_best is not None]
-    parts = [(f"{room}, {how}", [j for j in memory if (j.series, j.alone) == (room == "series", how == "single")])
-             for room in ("series", "poses") for how in ("single", "messy")]  # fmt: skip
+    parts = [
+        (f"{room}, {how}", [j for j in memory if (j.series, j.alone) == (room == "series", how == "single")])
+        for room in ("series", "poses")
+        for how in ("single", "messy")
+    ]
     return [
         share("messy, dominant cause first", [j.rough.first for j in messy], ">= 90 %", 0.90),
         share("messy, dominant cause first or an alternative of it", [j.rough.in_set for j in messy], UNSET),

@@ -58,20 +58,36 @@ def draw_bench(rng: Rng, seconds: float = 30.0) -> Bench:
         takes.append(Take(role, drive, draw_noise(rng, sd, phi, len(drive)), None, clock))
         clock += len(drive) * SAMPLE_TIME + 5
     q = fit * 0.9 * reach
-    scene = Scene(true, float(q.std()), float(np.gradient(q, SAMPLE_TIME).std()), float(np.abs(q).max()), float(scale), clock, sd,
-                  SAMPLE_TIME)  # fmt: skip
+    scene = Scene(
+        true,
+        float(q.std()),
+        float(np.gradient(q, SAMPLE_TIME).std()),
+        float(np.abs(q).max()),
+        float(scale),
+        clock,
+        sd,
+        SAMPLE_TIME,
+    )
     return Bench(true, stated, scene, tuple(takes), True, bool(rng.uniform() < 0.5), {"sd": sd, "phi": phi})
 
 
 def device_text(stated: Axis) -> str:
     """device.toml as a maker would write it."""
-    lines = ['kind = "servo"', 'name = "stage"', 'title = "A piezo stage on one axis"', 'source = "data sheet"',
-             f'travel = "{stated.stroke * 1e6:g} um"']  # fmt: skip
+    lines = [
+        'kind = "servo"',
+        'name = "stage"',
+        'title = "A piezo stage on one axis"',
+        'source = "data sheet"',
+        f'travel = "{stated.stroke * 1e6:g} um"',
+    ]
     if not commanded(stated):
         gain = stated.force_constant / stated.stiffness * 1e6
-        lines += ["", "[transducer]",
-                  f'gain = {{ value = "{gain:.6g} um/V", sd = "{GAIN_SD * gain:.3g} um/V", source = "data sheet" }}',
-                  f'drive_limit = "{stated.drive_limit:g} V"']  # fmt: skip
+        lines += [
+            "",
+            "[transducer]",
+            f'gain = {{ value = "{gain:.6g} um/V", sd = "{GAIN_SD * gain:.3g} um/V", source = "data sheet" }}',
+            f'drive_limit = "{stated.drive_limit:g} V"',
+        ]
     return "\n".join(lines) + "\n"
 
 

@@ -79,8 +79,9 @@ class Gauge(ABC):
 class Ruler(Gauge):
     """Measures laws on one record: `drive`, `start`, `ambient`, `noise` as in `simulate`."""
 
-    def __init__(self, axis: Axis, scene: Scene, drive: Array, start: float, ambient: Array | None, noise: Array,
-                 linear: bool) -> None:  # fmt: skip
+    def __init__(
+        self, axis: Axis, scene: Scene, drive: Array, start: float, ambient: Array | None, noise: Array, linear: bool
+    ) -> None:
         self.axis, self.scene = axis, scene
         self._run = lambda axis, planted=(): simulate(axis, drive, planted, scene, start, ambient, noise, linear)
         self.plain = self._run(axis)

@@ -44,8 +44,9 @@ def refit(observed: Array, model: Callable[[Array], Array], columns: Array) -> A
     return best
 
 
-def attribute(observed: Pair, model: Callable[[frozenset[int], Array, int], Array], columns: Array, causes: int,
-              zeros: bool) -> Attribution:  # fmt: skip
+def attribute(
+    observed: Pair, model: Callable[[frozenset[int], Array, int], Array], columns: Array, causes: int, zeros: bool
+) -> Attribution:
     """The attribution of `causes` dominant causes.
 
     model(S, x, record): readings (n, channels) of record 0 (to fit) or 1 (held out) with the causes S and the numbers x, over the

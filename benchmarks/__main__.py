@@ -10,9 +10,14 @@ from benchmarks.measure import Count, Line, Note, print_table
 from benchmarks.samples import Disagreement
 
 BENCHMARKS = {
-    "trajectory": trajectory, "online": online, "target": target, "job": job, "mechanism": mechanism, "budget": budget,
+    "trajectory": trajectory,
+    "online": online,
+    "target": target,
+    "job": job,
+    "mechanism": mechanism,
+    "budget": budget,
     "diagnosis": diagnosis,
-}  # fmt: skip
+}
 
 
 def main() -> int:

@@ -36,9 +36,16 @@ def sqp(samples: Samples, tolerance: float = TOLERANCE) -> ca.Function:
     problem = {"x": y, "p": target, "f": 0.5 * ca.sumsqr(samples.pose_error), "g": samples.balance}
     quiet_qp = {"print_iter": False, "print_header": False, "print_info": False, "error_on_fail": False}
     options = {
-        "qpsol": "qrqp", "qpsol_options": quiet_qp, "tol_pr": tolerance, "tol_du": 10 * tolerance, "max_iter": 50,
-        "print_header": False, "print_iteration": False, "print_time": False, "print_status": False,
-    }  # fmt: skip
+        "qpsol": "qrqp",
+        "qpsol_options": quiet_qp,
+        "tol_pr": tolerance,
+        "tol_du": 10 * tolerance,
+        "max_iter": 50,
+        "print_header": False,
+        "print_iteration": False,
+        "print_time": False,
+        "print_status": False,
+    }
     solver = ca.nlpsol("sqp_solver", "sqpmethod", problem, options)
     low, high = samples.bounds
     nearest = lambda before, wanted: solver(x0=before, p=wanted, lbx=low, ubx=high, lbg=0, ubg=0)["x"]  # noqa: E731

@@ -153,7 +153,7 @@ def _dense(folder: Path) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def _compile(code: str, library: Path) -> None:
-    """With the flags of ours. Raises Disagreement."""
+    """Compiles a peer with the flags of ours. Raises Disagreement."""
     source = library.with_suffix(".c")
     source.write_text(code)
     command = [str(compiled.compiler()), *compiled.FLAGS, str(source), "-o", str(library), "-lm"]

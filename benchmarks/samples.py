@@ -14,7 +14,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
-from ctrlgen.controller.feedforward import Controller
+from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.discretisation import held_step
@@ -53,7 +53,7 @@ class Samples:
         self.model: Model = build_model(self.scenario.device)
         self.solution: Solution = solve(self.scenario, self.model)
         self.command = self.solution.command
-        self.controller = Controller(self.model, self.scenario.file.follow, self.scenario.sample_time)
+        self.controller = controller_of(self.model, self.scenario.file.follow, self.scenario.sample_time)
         self.axes = len(self.model.axes)
         if self.model.x.numel() != self.axes or not self.scenario.closed:
             raise Disagreement("the peers are written for a closed path and one state per actuator")

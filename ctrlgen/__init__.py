@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ctrlgen.budget.robust import solve
     from ctrlgen.calibration.calibrate import Calibration, calibrate
     from ctrlgen.controller.feedforward import Controller, ControllerStatus, ControllerStep
+    from ctrlgen.controller.motion_feedforward import controller_of
     from ctrlgen.core.errors import CtrlgenError, Fault, Infeasibility, InputError, SolverError, ToolError, Unreachable
     from ctrlgen.devices import Device, load_device
     from ctrlgen.devices.user.user_device import user_device
@@ -89,6 +90,7 @@ _EXPORTS = {
         "ControllerStatus",
         "ControllerStep",
     ),
+    "controller.motion_feedforward": ("controller_of",),
     "model.model": ("Model",),
     "model.simulation": (
         "Trace",
@@ -168,6 +170,7 @@ __all__ = [
     "build_model",
     "calibrate",
     "compare",
+    "controller_of",
     "diagnose",
     "error_budget",
     "fastest",

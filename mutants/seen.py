@@ -38,7 +38,7 @@ class Seen:
     breadth: dict[str, int] = field(default_factory=dict)
 
     def add(self, found: dict) -> None:
-        """What one file of tests has shown."""
+        """Adds what one file of tests has shown."""
         for test, seconds in found["seconds"].items():
             self.seconds[test] = seconds
         names = found["tests"]
@@ -51,7 +51,7 @@ class Seen:
                     self.breadth[test] = self.breadth.get(test, 0) + 1
 
     def tests(self, file: str, line: int) -> list[str]:
-        """Those that can see the line, most specific and fastest first."""
+        """The tests that can see the line, most specific and fastest first."""
         first, last = self._statement(file, line)
         lines = self.by_line.get(file, {})
         tests: set[str] = set().union(*(lines.get(k, set()) for k in range(first, last + 1)))
@@ -131,7 +131,7 @@ class Seen:
 
 
 def code_hash(root: Path, tests: Path | None = None) -> str:
-    """Of everything that decides which of the `tests` executes what: the code, what they share, and their own file."""
+    """Hash of everything that decides which of the `tests` executes what: the code, what they share, and their own file."""
     digest = hashlib.sha256()
     for path in sorted({p for pattern in CODE for p in root.glob(pattern) if p.is_file()}):
         if not path.name.startswith("test_") or path == tests:
@@ -140,7 +140,7 @@ def code_hash(root: Path, tests: Path | None = None) -> str:
 
 
 def seen(root: Path, tests: Iterable[Path], cache: Path, jobs: int, done: Callable[[], None]) -> Seen:
-    """By the files of `tests`, from the `cache` where the code is the same; `done` is called after each file."""
+    """What each file of `tests` executes, from the `cache` where the code is the same; `done` is called after each file."""
     cache.mkdir(parents=True, exist_ok=True)
 
     def one(path: Path) -> dict:
@@ -160,16 +160,34 @@ def seen(root: Path, tests: Iterable[Path], cache: Path, jobs: int, done: Callab
 
 
 def _measured(root: Path, path: Path, folder: Path) -> dict:
-    """One file of tests under coverage; tests that fail or are skipped say nothing, nor the long ones where together they take too long."""
+    """What one file of tests executes, under coverage.
+
+    Tests that fail or are skipped say nothing, nor the long ones where together they take too long.
+    """
     data, times = folder / f"{path.stem}.coverage", folder / f"{path.stem}.times"
     environment = os.environ | {"COVERAGE_FILE": str(data), "MUTANTS_TIMES": str(times), "PYTHONPATH": str(root)}
     rows: dict[str, dict] = {}
     data.unlink(missing_ok=True)  # of a run that was stopped
-    for marked in ("not long", "long"):
+    for marked in ("not long", "long and not exhaustive"):
         command = [
-            sys.executable, "-m", "pytest", "-q", "-m", marked, "-p", "mutants.timing", "-p", "no:cacheprovider", "-p", "no:xdist",
-            "--cov=ctrlgen", "--cov-append", "--cov-context=test", "--cov-report=", str(path),
-        ]  # fmt: skip
+            sys.executable,
+            "-m",
+            "pytest",
+            "-q",
+            "-m",
+            marked,
+            "-p",
+            "mutants.timing",
+            "-p",
+            "no:cacheprovider",
+            "-p",
+            "no:xdist",
+            "--cov=ctrlgen",
+            "--cov-append",
+            "--cov-context=test",
+            "--cov-report=",
+            str(path),
+        ]
         with contextlib.suppress(subprocess.TimeoutExpired):
             subprocess.run(command, cwd=root, env=environment, capture_output=True, timeout=LONGEST)
         if times.exists():

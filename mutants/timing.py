@@ -18,5 +18,5 @@ def pytest_runtest_logreport(report: Any) -> None:
 
 
 def pytest_sessionfinish() -> None:
-    """Writes what was found."""
+    """Writes how long each test took."""
     Path(os.environ["MUTANTS_TIMES"]).write_text(json.dumps(_times))

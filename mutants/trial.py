@@ -45,7 +45,7 @@ class Copy:
             (self._folder / "shared").symlink_to(shared.resolve())
 
     def remove(self) -> None:
-        """From the disk."""
+        """Deletes the copy from the disk."""
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def tried(self, mutant: Mutant, tests: Sequence[str], seconds: dict[str, float], limit: float) -> Outcome:
@@ -86,8 +86,14 @@ class Copy:
         ]
         environment = os.environ | {"PYTHONPATH": str(self.root), "MPLBACKEND": "Agg"}
         process = subprocess.Popen(
-            command, cwd=self.root, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True,
-        )  # fmt: skip
+            command,
+            cwd=self.root,
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+        )
         try:
             text, _ = process.communicate(timeout=limit)
         except subprocess.TimeoutExpired:

@@ -77,9 +77,15 @@ def rows(device: MesoHexapod | None = None) -> list[PrintedNumber]:
     printed, recordings = load_s0()
     used = device or printed
     return [
-        *_table_1(used), *_table_2(printed, recordings), *_equation_14(used, recordings), *_equation_16(recordings),
-        *_counts(recordings), *_norms(recordings), *_table_3(recordings), *_table_4(used, recordings),
-    ]  # fmt: skip
+        *_table_1(used),
+        *_table_2(printed, recordings),
+        *_equation_14(used, recordings),
+        *_equation_16(recordings),
+        *_counts(recordings),
+        *_norms(recordings),
+        *_table_3(recordings),
+        *_table_4(used, recordings),
+    ]
 
 
 def _table_1(device: MesoHexapod) -> list[PrintedNumber]:
@@ -100,9 +106,15 @@ def _table_1(device: MesoHexapod) -> list[PrintedNumber]:
             chord, slack = 2 * r * sin(gap / 2), r * sin(radians(1.0))  # two angles known to half a degree
             reason = RADIUS if end == "a" else "angles are printed to the degree"
             found.append(
-                _row(f"Table 1, {name} from {radius} and its angles", text, "mm", from_si(chord, "mm"),
-                     extra=from_si(slack, "mm"), reason=reason)
-            )  # fmt: skip
+                _row(
+                    f"Table 1, {name} from {radius} and its angles",
+                    text,
+                    "mm",
+                    from_si(chord, "mm"),
+                    extra=from_si(slack, "mm"),
+                    reason=reason,
+                )
+            )
         a, b = float(first), float(second)
         R = sqrt((a * a + a * b + b * b) / 3)  # circle through a hexagon of alternate sides a and b
         slack = ((2 * a + b) + (a + 2 * b)) * 0.5 / (6 * R)
@@ -252,9 +264,15 @@ def _table_3(data: PaperRecordings) -> list[PrintedNumber]:
     for k, (name, i) in enumerate((name, i) for name in TABLE_3 for i in range(6)):
         reason = ROUNDED + ("; it is that of the absolute errors" if name == "standard deviation" else "")
         found.append(
-            _row(f"Table 3, {name}, {CHANNELS[i]}", TABLE_3[name][i], UNITS[i], ours[start + k],
-                 extra=extra[start + k], reason=reason)
-        )  # fmt: skip
+            _row(
+                f"Table 3, {name}, {CHANNELS[i]}",
+                TABLE_3[name][i],
+                UNITS[i],
+                ours[start + k],
+                extra=extra[start + k],
+                reason=reason,
+            )
+        )
     return found
 
 

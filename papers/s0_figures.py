@@ -66,13 +66,24 @@ def draw_distribution(model: PoseErrors, calibrated: PoseErrors, part: str) -> F
             shown = from_si(values, unit)
             low, high = np.percentile(shown, BOX)
             boxes.append(
-                {"label": channel, "med": np.median(shown), "mean": shown.mean(), "q1": low, "q3": high,
-                 "whislo": shown.min(), "whishi": shown.max()}
-            )  # fmt: skip
+                {
+                    "label": channel,
+                    "med": np.median(shown),
+                    "mean": shown.mean(),
+                    "q1": low,
+                    "q3": high,
+                    "whislo": shown.min(),
+                    "whishi": shown.max(),
+                }
+            )
         axes.bxp(
-            boxes, showfliers=False, showmeans=True, boxprops={"color": colour}, medianprops={"color": colour},
+            boxes,
+            showfliers=False,
+            showmeans=True,
+            boxprops={"color": colour},
+            medianprops={"color": colour},
             meanprops={"marker": "x", "markeredgecolor": colour},
-        )  # fmt: skip
+        )
         axes.set_title(f"{title}; bar: median, cross: mean", fontsize=8)
     panels[0].set_ylabel(f"absolute error [{unit}]")
     return figure
@@ -94,16 +105,29 @@ def draw_single(parts: list[Parasitic]) -> Figure:
         for channel, values in zip(part.channels, part.others.T, strict=True):
             turning = channel.startswith("theta")
             (right if turning else length).plot(
-                command, from_si(values, _unit(channel)), "o-" if turning else "s--", ms=3, lw=0.9,
-                color=COLOURS[CHANNELS.index(channel)], label=channel,
-            )  # fmt: skip
+                command,
+                from_si(values, _unit(channel)),
+                "o-" if turning else "s--",
+                ms=3,
+                lw=0.9,
+                color=COLOURS[CHANNELS.index(channel)],
+                label=channel,
+            )
         right.set_xlabel(f"commanded {part.channel} [{unit}]")
         right.set_ylabel("rotation [deg], solid", color=RED)
         length.set_ylabel("translation [um], dashed", color=BLUE)
         lines = [*right.get_lines(), *length.get_lines()]
         names = [line.get_label() for line in lines]
-        right.legend(lines, names, fontsize=7, ncols=5, loc="lower center", bbox_to_anchor=(0.5, 1.0),
-                     columnspacing=0.8, handlelength=1.5)  # fmt: skip
+        right.legend(
+            lines,
+            names,
+            fontsize=7,
+            ncols=5,
+            loc="lower center",
+            bbox_to_anchor=(0.5, 1.0),
+            columnspacing=0.8,
+            handlelength=1.5,
+        )
     return figure
 
 

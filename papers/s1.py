@@ -6,7 +6,7 @@ from typing import cast
 
 import numpy as np
 
-from ctrlgen.controller.feedforward import Controller
+from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.core.shipped_files import shipped
 from ctrlgen.devices import load_device
 from ctrlgen.devices.mems_hexapod import MemsHexapod, matrices
@@ -108,7 +108,7 @@ def _poses(model: Model) -> list[np.ndarray]:
 def _signs(device: MemsHexapod) -> list[PrintedNumber]:
     """The signs of the six forces of eq. (19): those of the forces that hold the poses of Table 3, in the paper's axes."""
     model = build_model(device)
-    displacement = Controller(model, "pose", None).static.displacement
+    displacement = ControllerKernels(model, "pose", None).static.displacement
     d = [displacement(model.rest, 0, pose).full().ravel() for pose in _poses(model)]
     p = device.values()
     forces = device.in_paper_axes(np.array([[float(xy_stage.force(x, p.stage, p.actuator)) for x in row] for row in d]))

@@ -23,8 +23,13 @@ ROOT = Path(__file__).resolve().parent.parent
 CHANNELS = ("theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z")
 # S1 Table 3: what each pose is commanded in besides delta_z = 30 um, and the printed error [%].
 COUPLED = (
-    ("delta_z", 2.39), ("delta_x", 4.12), ("delta_y", 4.25), ("theta_x", 2.34), ("theta_y", 4.69), ("theta_z", 4.56),
-)  # fmt: skip
+    ("delta_z", 2.39),
+    ("delta_x", 4.12),
+    ("delta_y", 4.25),
+    ("theta_x", 2.34),
+    ("theta_y", 4.69),
+    ("theta_z", 4.56),
+)
 CIRCLE = {"delta_x": 3.94, "delta_y": 3.65, "delta_z": 2.55}  # S1 section 6.3, printed mean errors [%]
 PARASITIC = {"theta_x": 5.28e-6, "theta_y": 1.395e-5, "theta_z": 4.23e-6}  # the same, mean of the absolute value [rad]
 NEAR_ZERO = 0.5  # um; a commanded coordinate smaller than this has no meaningful error in percent

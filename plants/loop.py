@@ -54,7 +54,7 @@ class Loop:
 
 
 class Steps:
-    """One line a step on stderr, with the time since the start."""
+    """Writes one line a step to stderr, with the time since the start."""
 
     COUNT = 12
 

@@ -182,7 +182,7 @@ def plain(stage: Stage) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Story:
-    """All of it: what the budget expects, the stages, diagnosis.json, and `facts`, a sentence for each further step."""
+    """The whole loop: what the budget expects, the stages, diagnosis.json, and `facts`, a sentence for each further step."""
 
     expected: Expected
     stages: tuple[Stage, ...]
@@ -211,7 +211,7 @@ def report(story: Story, out: Path) -> None:
 
 
 def _page(story: Story, picture: bytes, moving: bytes) -> str:
-    """One self-contained page."""
+    """The loop as one self-contained page."""
     first, last = story.stages[0].measured, story.stages[-1].measured
     cells = [[html.escape(cell) for cell in row] for row in rows(story.stages)]
     table = "".join(f"<tr><td>{'</td><td>'.join(row)}</td></tr>\n" for row in cells)

@@ -8,7 +8,9 @@ import subprocess
 import sys
 import tempfile
 from functools import cache
+from multiprocessing.forkserver import ensure_running
 from pathlib import Path
+from unittest.mock import patch
 
 # What the commands import when they do it
 WORK = (
@@ -39,9 +41,11 @@ def ctrlgen(*words: object, **environment: str) -> subprocess.CompletedProcess[s
 
 @cache
 def _server() -> multiprocessing.context.ForkServerContext:
-    os.environ["COLUMNS"] = "200"  # read where the consoles are made, at import
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["ctrlgen.app.commands.cli", *WORK])
+    # Read where the consoles are made, at import: in that process alone, so that no other test depends on this one
+    with patch.dict(os.environ, COLUMNS="200"):
+        ensure_running()
     return context
 
 

@@ -16,6 +16,8 @@ from ctrlgen.trajectory.solution_plots import draw_all
 ROOT = Path(__file__).resolve().parent.parent
 SCENARIOS = ROOT / "scenarios"
 DEVICES = SCENARIOS / "devices"
+# Measurements that may not be copied stand beside the repository, or nowhere: their tests are then skipped
+RECORDINGS = ROOT.parent / "shared" / "recordings"
 DEVICE, AXIS_FILE, MESO_FILE = (DEVICES / f"{name}.toml" for name in ("mems_hexapod", "flexure_axis", "meso_hexapod"))
 
 
@@ -25,6 +27,14 @@ os.environ.setdefault("CTRLGEN_JOBS", "1")
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--update-golden", action="store_true", help="write codegen/golden anew instead of comparing")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What is exhaustive is long too: `-m "not long"` leaves out both."""
+    for item in items:
+        if item.get_closest_marker("exhaustive"):
+            item.add_marker("long")
 
 
 @pytest.fixture
@@ -53,6 +63,12 @@ def circle():
     """The solved circle scenario."""
     scenario = load_scenario(SCENARIOS / "circle20")
     return solve(scenario, build_model(scenario.device))
+
+
+@pytest.fixture(scope="session")
+def circle_c(circle, tmp_path_factory) -> CFolder:
+    """The C of the circle; who changes a file changes one of a copy."""
+    return generate(circle.scenario, circle.model, tmp_path_factory.mktemp("circle_c"), circle)
 
 
 @pytest.fixture(scope="session")

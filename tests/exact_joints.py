@@ -14,15 +14,17 @@ def jointed() -> str:
     """Two bodies on two such flexures, askew; one is pushed from the ground, the other from the first."""
     text = HEAD + '[[body]]\nname = "a"\n[[body]]\nname = "b"\n'
     for name, first, to, at, along in (
-        ("k_a", "ground", "a", [3e-3, 1e-3, 2e-3], [1, 0.3, 0.2]), ("k_b", "a", "b", [14e-3, 2e-3, -3e-3], [0.4, 1, -0.3]),
-    ):  # fmt: skip
+        ("k_a", "ground", "a", [3e-3, 1e-3, 2e-3], [1, 0.3, 0.2]),
+        ("k_b", "a", "b", [14e-3, 2e-3, -3e-3], [0.4, 1, -0.3]),
+    ):
         text += f'[[element]]\nkind = "compliance"\nname = "{name}"\nfrom = "{first}"\nto = "{to}"\nat = {place(at)}\n'
         text += f"along = {along}\nacross = [0, 0, 1]\n"
         text += "".join(f'theta_{x}_per_M_{x} = "{v} rad/(N*m)"\n' for x, v in zip("xyz", (3, 1, 2), strict=True))
         text += "".join(f'delta_{x}_per_F_{x} = "{v} um/N"\n' for x, v in zip("xyz", (90, 150, 60), strict=True))
     for name, against, on, at, along in (
-        ("one", "ground", "a", [8e-3, -4e-3, 5e-3], [0.3, 1, 0.4]), ("two", "a", "b", [21e-3, 6e-3, -2e-3], [-0.5, 0.3, 1]),
-    ):  # fmt: skip
+        ("one", "ground", "a", [8e-3, -4e-3, 5e-3], [0.3, 1, 0.4]),
+        ("two", "a", "b", [21e-3, 6e-3, -2e-3], [-0.5, 0.3, 1]),
+    ):
         text += f'[[actuator]]\nname = "{name}"\nkind = "force"\non = "{on}"\nagainst = "{against}"\nat = {place(at)}\nalong = {along}\n'
         text += 'gain = "1 N/V"\nlow = "-9 V"\nhigh = "9 V"\ntravel = "50 um"\n'
     return text + '[output]\nbody = "b"\nat = ["0 mm", "0 mm", "0 mm"]\nchannels = ["delta_x", "delta_z"]\n'

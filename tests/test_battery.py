@@ -265,9 +265,10 @@ def test_all_wrong_misses_every_goal_that_a_name_can_miss():
     rows = measured(fabricated("wrong"))
     held = {r.what for r in rows.values() if r.met}
     assert held == {
-        "time of a case with one effect, longest [s]", "time of a case with two or three, longest [s]",
+        "time of a case with one effect, longest [s]",
+        "time of a case with two or three, longest [s]",
         "crashed, refused or out of time",
-    }  # fmt: skip
+    }
     assert rows["false alarms on clean records"].hits == 1
 
 

@@ -223,8 +223,15 @@ def test_a_piezo_is_written_in_volts_or_in_its_own_displacement(tmp_path):
     assert units == {"um", "V"}
 
 
-PLAY = {"name": "worn_play", "family": "backlash", "location": "stage:axis", "amplitude": 1e-6, "shape": {}, "share": 0.7,
-        "share_varying": 0.6}  # fmt: skip
+PLAY = {
+    "name": "worn_play",
+    "family": "backlash",
+    "location": "stage:axis",
+    "amplitude": 1e-6,
+    "shape": {},
+    "share": 0.7,
+    "share_varying": 0.6,
+}
 BOW = {
     "name": "bow",
     "family": None,
@@ -235,8 +242,16 @@ BOW = {
     "share_varying": 0.3,
 }
 LINE = {"name": "vibration", "location": "disturbance:axis", "amplitude": 1e-3, "shape": {"frequency": 50.0}}
-ANSWER = {"case": "case_1", "class": "messy", "planted": [PLAY, BOW], "background": [LINE], "noise": {"sd": 1e-8, "phi": 0.5},
-          "device": "axis", "rough": True, "least_error": 3.0}  # fmt: skip
+ANSWER = {
+    "case": "case_1",
+    "class": "messy",
+    "planted": [PLAY, BOW],
+    "background": [LINE],
+    "noise": {"sd": 1e-8, "phi": 0.5},
+    "device": "axis",
+    "rough": True,
+    "least_error": 3.0,
+}
 
 
 def found(effect, location, share, *rivals):

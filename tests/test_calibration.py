@@ -14,11 +14,12 @@ import pytest
 from command_line import ctrlgen
 from conftest import SCENARIOS
 
-from ctrlgen import Controller, InputError, build_model, calibrate, error_budget, load_device, load_scenario
+from ctrlgen import InputError, build_model, calibrate, error_budget, load_device, load_scenario
 from ctrlgen.calibration.budgets_compared import budgets
 from ctrlgen.calibration.calibrate import CalibratedConstant, Calibration, sd_of_bounds, with_held
 from ctrlgen.calibration.calibration_page import write_calibration
 from ctrlgen.calibration.device_file import NAME, write_calibrated_device
+from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.core.units import to_si
 from ctrlgen.devices.run_time import RunTimeConstant
 from ctrlgen.model.simulation import trace
@@ -57,7 +58,7 @@ def record_lag(folder: Path, tau: float, resistance: float, seed: int) -> tuple[
     assert ambient in text
     (folder / "device.toml").write_text(text.replace(ambient, "").replace('input = "actuator.ambient"', ""))
     model = build_model(load_device(folder / "device.toml"))
-    settle = Controller(model, "pose", None).static.settle
+    settle = ControllerKernels(model, "pose", None).static.settle
     rng, decay, noise = np.random.default_rng(seed), np.exp(-1e-3 / tau), np.array([1e-6] * 3 + [5e-9] * 3)
     for role in ("fit", "hold_out"):
         powers = np.repeat(rng.uniform(0, 0.29, (20, 6)), 10, axis=0)

@@ -48,10 +48,18 @@ def beam(ratio: float, what: str) -> float:
 
 
 EXACT = [
-    (c.c1, "alpha", E), (c.c2, "bend", E), (c.c3, "stretch", E), (c.c4, "shear", G),
-    (c.c11, "alpha", E), (c.c12, "bend", E), (c.c13, "stretch", E), (c.c14, "shear", G),
-    (c.c18, "alpha", E), (c.c19, "bend", E), (c.c20, "stretch", E),
-]  # fmt: skip
+    (c.c1, "alpha", E),
+    (c.c2, "bend", E),
+    (c.c3, "stretch", E),
+    (c.c4, "shear", G),
+    (c.c11, "alpha", E),
+    (c.c12, "bend", E),
+    (c.c13, "stretch", E),
+    (c.c14, "shear", G),
+    (c.c18, "alpha", E),
+    (c.c19, "bend", E),
+    (c.c20, "stretch", E),
+]
 
 
 @pytest.mark.parametrize(("law", "what", "modulus"), EXACT, ids=[law.__name__ for law, *_ in EXACT])

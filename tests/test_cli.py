@@ -196,8 +196,11 @@ def test_an_interruption_at_any_moment_leaves_nothing_behind(tmp_path, stop, aft
     out = tmp_path / "out"
     process = subprocess.Popen(
         [sys.executable, "-m", "ctrlgen", "run", str(SCENARIOS / "spiral"), "--out", str(out)],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
-    )  # fmt: skip
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
     while not Path(f"/proc/{process.pid}/cmdline").read_bytes().count(b"ctrlgen"):
         time.sleep(0.005)
     time.sleep(0.1 + after)
@@ -259,9 +262,12 @@ def test_a_device_without_dynamics_has_no_frequency_response(tmp_path):
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "across", "says"),
-    [("mems_hexapod", "delta_z [um]", "delta_z 20 um"), ("meso_hexapod", "delta_z [um]", "delta_z 20 um"),
-     ("rrr_case2", "theta_z [urad]", "theta_z -2195 urad")],
-)  # fmt: skip
+    [
+        ("mems_hexapod", "delta_z [um]", "delta_z 20 um"),
+        ("meso_hexapod", "delta_z [um]", "delta_z 20 um"),
+        ("rrr_case2", "theta_z [urad]", "theta_z -2195 urad"),
+    ],
+)
 def test_the_workspace_of_any_device_is_mapped_by_one_command(tmp_path, name, across, says):
     out = tmp_path / "w"
     done = ctrlgen("workspace", DEVICES / f"{name}.toml", "--out", out)
@@ -329,9 +335,13 @@ def test_bode_draws_a_picture(tmp_path, suffix):
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("words", "says"),
-    [(("--out", "b.pdf"), ".svg or .png"), (("--out", "b.svg", "--at", "delta_z"), "channel=value"),
-     (("--out", "b.svg", "--at", "delta_q=1um"), "delta_q"), (("--out", "b.svg", "--at", "delta_z=900um"), "not an equilibrium"),
-     (("--out", "b.svg", "--at", "delta_z=3V"), "wrong unit")],
-)  # fmt: skip
+    [
+        (("--out", "b.pdf"), ".svg or .png"),
+        (("--out", "b.svg", "--at", "delta_z"), "channel=value"),
+        (("--out", "b.svg", "--at", "delta_q=1um"), "delta_q"),
+        (("--out", "b.svg", "--at", "delta_z=900um"), "not an equilibrium"),
+        (("--out", "b.svg", "--at", "delta_z=3V"), "wrong unit"),
+    ],
+)
 def test_bode_refuses_what_it_cannot_draw(words, says):
     refused(ctrlgen("bode", DEVICE, *words), says)

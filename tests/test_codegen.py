@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 from conftest import ROOT, SCENARIOS
 
-from ctrlgen import Controller, CtrlgenError, __version__, build_model, load_scenario
+from ctrlgen import CtrlgenError, __version__, build_model, load_scenario
+from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.firmware.c.cprint import print_function
 from ctrlgen.firmware.c.elementary import elementary_text
 from ctrlgen.firmware.c.real import Real
@@ -124,7 +125,7 @@ def test_the_shipped_test_of_reference_vectors_passes_and_can_fail(folder, compi
 @pytest.mark.long
 @pytest.mark.parametrize(
     "option",
-    [*(pytest.param(word, marks=pytest.mark.long) for word in ("-ffast-math", "-Ofast")), "-ffinite-math-only"],
+    [*(pytest.param(word, marks=pytest.mark.exhaustive) for word in ("-ffast-math", "-Ofast")), "-ffinite-math-only"],
 )
 def test_every_generated_source_refuses_arithmetic_without_nan(folder, circle, compiler, tmp_path, option):
     """A header may be included from code that is compiled so: it holds declarations only."""
@@ -149,10 +150,10 @@ def test_every_generated_source_refuses_arithmetic_without_nan(folder, circle, c
 
 def test_casadis_own_c_is_a_second_reference(circle, compiler, tmp_path):
     """CasADi's generator and ours from the same graph, in double: roots are ours, and numbers that multiply are gathered."""
-    controller = Controller(circle.model, "pose", 1e-3)
+    controller = controller_of(circle.model, "pose", 1e-3)
     generator = ca.CodeGenerator("reference.c")
-    kernels = [getattr(controller.moving, part) for part in ("displacement", "state", "drive", "advance")] + [
-        controller.composite_ratio
+    kernels = [getattr(controller.kernels.moving, part) for part in ("displacement", "state", "drive", "advance")] + [
+        controller.kernels.composite_ratio
     ]
     for kernel in kernels:
         generator.add(kernel)

@@ -11,10 +11,36 @@ from ctrlgen.numerics.columnwise import MOST, OPERATIONS, ColumnWise
 
 ROUNDING = 4e-16  # relative: elementary functions of two libraries
 UNARY = (
-    ca.OP_ASSIGN, ca.OP_NEG, ca.OP_SQ, ca.OP_TWICE, ca.OP_INV, ca.OP_SQRT, ca.OP_EXP, ca.OP_LOG, ca.OP_LOG1P, ca.OP_EXPM1, ca.OP_SIN,
-    ca.OP_COS, ca.OP_TAN, ca.OP_ASIN, ca.OP_ACOS, ca.OP_ATAN, ca.OP_SINH, ca.OP_COSH, ca.OP_TANH, ca.OP_ASINH, ca.OP_ACOSH, ca.OP_ATANH,
-    ca.OP_ERF, ca.OP_ERFINV, ca.OP_FABS, ca.OP_SIGN, ca.OP_FLOOR, ca.OP_CEIL, ca.OP_NOT,
-)  # fmt: skip
+    ca.OP_ASSIGN,
+    ca.OP_NEG,
+    ca.OP_SQ,
+    ca.OP_TWICE,
+    ca.OP_INV,
+    ca.OP_SQRT,
+    ca.OP_EXP,
+    ca.OP_LOG,
+    ca.OP_LOG1P,
+    ca.OP_EXPM1,
+    ca.OP_SIN,
+    ca.OP_COS,
+    ca.OP_TAN,
+    ca.OP_ASIN,
+    ca.OP_ACOS,
+    ca.OP_ATAN,
+    ca.OP_SINH,
+    ca.OP_COSH,
+    ca.OP_TANH,
+    ca.OP_ASINH,
+    ca.OP_ACOSH,
+    ca.OP_ATANH,
+    ca.OP_ERF,
+    ca.OP_ERFINV,
+    ca.OP_FABS,
+    ca.OP_SIGN,
+    ca.OP_FLOOR,
+    ca.OP_CEIL,
+    ca.OP_NOT,
+)
 
 
 def applied(op: int, a: ca.SX, b: ca.SX) -> ca.SX:

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import re
+import shutil
+from dataclasses import replace
 
 import pytest
 
 from ctrlgen import ToolError
 from ctrlgen.firmware.c import toolchains
 from ctrlgen.firmware.c.real import Real
-from ctrlgen.firmware.folder import generate
 from ctrlgen.verification.comparison import compare
 
 pytestmark = pytest.mark.long
 
 
 @pytest.fixture
-def folder(tmp_path, circle, compiler):
-    return generate(circle.scenario, circle.model, tmp_path, circle)
+def folder(tmp_path, circle_c, compiler):
+    """The circle's C, to be spoilt."""
+    shutil.copytree(circle_c.path, tmp_path, dirs_exist_ok=True)
+    return replace(circle_c, path=tmp_path)
 
 
 def spoil(folder, real: Real, kind: str, pattern: str, replacement: str) -> None:

@@ -10,9 +10,15 @@ from ctrlgen.app import console
 
 COLUMNS = (("what was found", "left"), ("place", "left"), ("value", "right"), ("bound", "right"))
 ROWS = (
-    ("parameter of the mechanism", "mechanism:platform_angles[0]", "-1.234567e-05 N*s/um", "22 degC", "or coupling at stage:2y"),
+    (
+        "parameter of the mechanism",
+        "mechanism:platform_angles[0]",
+        "-1.234567e-05 N*s/um",
+        "22 degC",
+        "or coupling at stage:2y",
+    ),
     ("asymmetric_viscous, the friction of one direction", "stage:axis", "23.45 nm", "550 MPa", "<- tightest"),
-)  # fmt: skip
+)
 
 
 @pytest.mark.parametrize("width", [20, 60, 80, 110, 300])

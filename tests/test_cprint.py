@@ -25,10 +25,19 @@ def random_law(rng: np.random.Generator, depth: int, numbers: bool = True):
         return lambda a, b: (a, b, ca.SX(number))[pick]
     left, right = random_law(rng, depth - 1), random_law(rng, depth - 1)
     operation = (
-        lambda x, y: x + y, lambda x, y: x - y, lambda x, y: 0.5 * x * y, lambda x, y: x / (1.5 + y * y), lambda x, y: ca.fmin(x, y),
-        lambda x, y: ca.fmax(x, -y), lambda x, y: ca.sqrt(1 + x * x) - y, lambda x, y: ca.fabs(x) * 0.3 + y, lambda x, y: ca.sin(x) - 2 * y,
-        lambda x, y: ca.if_else(x < y, x, 0.25 * y), lambda x, y: -(x + 0.7) * 3.0, lambda x, y: (0.1 + x * x) ** 1.5 / (2 + y * y),
-    )[rng.integers(12)]  # fmt: skip
+        lambda x, y: x + y,
+        lambda x, y: x - y,
+        lambda x, y: 0.5 * x * y,
+        lambda x, y: x / (1.5 + y * y),
+        lambda x, y: ca.fmin(x, y),
+        lambda x, y: ca.fmax(x, -y),
+        lambda x, y: ca.sqrt(1 + x * x) - y,
+        lambda x, y: ca.fabs(x) * 0.3 + y,
+        lambda x, y: ca.sin(x) - 2 * y,
+        lambda x, y: ca.if_else(x < y, x, 0.25 * y),
+        lambda x, y: -(x + 0.7) * 3.0,
+        lambda x, y: (0.1 + x * x) ** 1.5 / (2 + y * y),
+    )[rng.integers(12)]
     return lambda a, b: operation(left(a, b), right(a, b))
 
 
@@ -41,10 +50,15 @@ def random_function(rng: np.random.Generator) -> ca.Function:
     mixed = ca.mtimes(matrix, own)
     tables = ca.vertcat(*(other(rng.uniform(1, 2) * x[i], y[0]) for i in range(N)))
     rows = (
-        own, mixed, tables, ca.mtimes(matrix, x), ca.vertcat(*(outer(mixed[i], own[0]) for i in range(N))),
-        ca.vertcat(*(outer(own[i // 2], tables[i]) for i in range(N))), ca.vertcat(x[3], x[0] + y[1], law(x[2], y[3]), 2.0),
+        own,
+        mixed,
+        tables,
+        ca.mtimes(matrix, x),
+        ca.vertcat(*(outer(mixed[i], own[0]) for i in range(N))),
+        ca.vertcat(*(outer(own[i // 2], tables[i]) for i in range(N))),
+        ca.vertcat(x[3], x[0] + y[1], law(x[2], y[3]), 2.0),
         ca.vertcat(*(own[(i + 1) % N] - x[i] for i in range(N))),
-    )[rng.integers(8)]  # fmt: skip
+    )[rng.integers(8)]
     return ca.Function("f", [x, y], [ca.densify(rows)], ["x", "y"], ["r"], {"cse": True})
 
 
@@ -79,9 +93,10 @@ def test_random_functions_compute_what_casadi_does_also_in_place_and_iterated(co
         if not np.all(np.abs(again) < 1e6):
             continue
         kernels = [
-            printer.kernel(f, f"plain{k}"), printer.kernel(f, f"place{k}", may_be_result=["x", "y"]),
+            printer.kernel(f, f"plain{k}"),
+            printer.kernel(f, f"place{k}", may_be_result=["x", "y"]),
             printer.kernel(f, f"steps{k}", steps=("x", STEPS)),
-        ]  # fmt: skip
+        ]
         data = f"const double y[{N}] = {listed(y)}; double x[{N}] = {listed(x)}; double r[{N}];"
         for kernel, result in zip(kernels, ("r", "x", "r"), strict=True):
             show = f'for (k = 0; k < {N}; k++) {{ (void)printf("%.17g\\n", {result}[k]); }}'
@@ -211,10 +226,17 @@ def value_of(node: Node, given: float) -> float:
         return given
     symbols = [ca.SX.sym("s") for _ in node.operands]
     apply = {
-        ca.OP_ADD: lambda a, b: a + b, ca.OP_SUB: lambda a, b: a - b, ca.OP_MUL: lambda a, b: a * b, ca.OP_DIV: lambda a, b: a / b,
-        ca.OP_EXP: ca.exp, ca.OP_TANH: ca.tanh, ca.OP_TWICE: lambda a: 2 * a, ca.OP_NEG: lambda a: -a, ca.OP_INV: lambda a: 1 / a,
+        ca.OP_ADD: lambda a, b: a + b,
+        ca.OP_SUB: lambda a, b: a - b,
+        ca.OP_MUL: lambda a, b: a * b,
+        ca.OP_DIV: lambda a, b: a / b,
+        ca.OP_EXP: ca.exp,
+        ca.OP_TANH: ca.tanh,
+        ca.OP_TWICE: lambda a: 2 * a,
+        ca.OP_NEG: lambda a: -a,
+        ca.OP_INV: lambda a: 1 / a,
         ca.OP_SQ: lambda a: a * a,
-    }  # fmt: skip
+    }
     f = ca.Function("f", symbols, [apply[node.operation](*symbols)])
     return float(f(*(value_of(part, given) for part in node.operands)))
 
@@ -222,10 +244,16 @@ def value_of(node: Node, given: float) -> float:
 @pytest.mark.parametrize(
     "law",
     [
-        lambda p: ca.exp(p) - 1, lambda p: ca.exp(p) + 1, lambda p: ca.exp(p) + (-1.0), lambda p: ca.exp(p) - (-1.0),
-        lambda p: 1 - ca.exp(p), lambda p: ca.exp(p) - 2, lambda p: ca.exp(-2 * p) - 1, lambda p: ca.sin(p) * 0 + p - 1,
+        lambda p: ca.exp(p) - 1,
+        lambda p: ca.exp(p) + 1,
+        lambda p: ca.exp(p) + (-1.0),
+        lambda p: ca.exp(p) - (-1.0),
+        lambda p: 1 - ca.exp(p),
+        lambda p: ca.exp(p) - 2,
+        lambda p: ca.exp(-2 * p) - 1,
+        lambda p: ca.sin(p) * 0 + p - 1,
     ],
-)  # fmt: skip
+)
 @pytest.mark.parametrize("given", [0.3, 1.7])
 def test_what_follows_from_a_number_given_at_the_start_has_its_value(law, given):
     """exp(y) - 1 is printed in another form, for its digits where y is small."""

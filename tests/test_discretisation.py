@@ -25,10 +25,16 @@ ROUNDING = 1e-12  # of the largest value: what double precision leaves after som
 def pushed(*effects: dict, rates=None, force=None, tau: str = "5 ms", **parameters):
     """A stage in balance on a spring of 1 N/m, pushed by x' = (u - x)/tau, or by the `rates` and `force` given."""
     return ctrlgen.user_device(
-        "pushed", parameters={"tau": tau, "spring": "1 N/m", **parameters}, drive={"motor": "1 N"}, axes={"way": "1 m"},
-        state={"push": "1 N"}, rates=rates or (lambda u, x, p: (u.motor - x.push) / p.tau),
-        force=force or (lambda x: x.push), restoring_force=lambda d, p: p.spring * d.way, effect=list(effects),
-    )  # fmt: skip
+        "pushed",
+        parameters={"tau": tau, "spring": "1 N/m", **parameters},
+        drive={"motor": "1 N"},
+        axes={"way": "1 m"},
+        state={"push": "1 N"},
+        rates=rates or (lambda u, x, p: (u.motor - x.push) / p.tau),
+        force=force or (lambda x: x.push),
+        restoring_force=lambda d, p: p.spring * d.way,
+        effect=list(effects),
+    )
 
 
 def walked(model, u: np.ndarray, h: float, linear: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -144,9 +150,14 @@ def test_a_chain_of_lags_under_a_linear_drive_is_exact(h):
 def test_what_follows_a_displacement_that_follows_at_once_is_exact(linear):
     """Creep of a stage whose force is the drive itself: nothing but the displacement tells it of the drive."""
     stage = ctrlgen.user_device(
-        "direct", parameters={"spring": "2 N/m"}, drive={"motor": "1 N"}, axes={"way": "1 m"},
-        force=lambda u: u.motor, restoring_force=lambda d, p: p.spring * d.way, effect=list(CHAIN[1:2]),
-    )  # fmt: skip
+        "direct",
+        parameters={"spring": "2 N/m"},
+        drive={"motor": "1 N"},
+        axes={"way": "1 m"},
+        force=lambda u: u.motor,
+        restoring_force=lambda d, p: p.spring * d.way,
+        effect=list(CHAIN[1:2]),
+    )
     u = broken_line(30)
     x, z = walked(build_model(stage), u[:, None], H, linear)
     A, B = np.diag([-1 / 11e-3, -1 / 44e-3]), np.array([0.5 / 11e-3, 0.5 / 44e-3])

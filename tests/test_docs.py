@@ -133,14 +133,16 @@ def test_the_pages_of_settings_and_priors_hold_every_entry(monkeypatch):
     assert set(Effect.library) == set(re.findall(r"^\| `(\w+)` ", pages.priors_page(), re.MULTILINE))
 
 
-@pytest.mark.long
+# `make docs`, which .ci/run runs, does the same
+@pytest.mark.exhaustive
 def test_the_documentation_builds_without_a_warning(tmp_path):
     """Links between pages, to files and to functions included."""
     pytest.importorskip("sphinx", reason="the documentation's generator is not installed: pip install '.[docs]'")
     done = subprocess.run(
         [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html", str(DOCS), str(tmp_path)],
-        capture_output=True, text=True,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0, done.stderr
 
 

@@ -13,6 +13,7 @@ import pytest
 from effect_cases import SAMPLE_TIME, Law, device_of, every_effect, place_of, shapes, size, tables, written
 
 from ctrlgen import Controller, build_model, simulate
+from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.effects import Effect, Place
 from ctrlgen.firmware.c.cprint import print_function
 from ctrlgen.firmware.c.elementary import elementary_text
@@ -26,7 +27,7 @@ def compiled(compiler, tmp_path_factory):
     functions = {f"{kind}_law": Law(effect, 1e-2).whole for kind, effect in Effect.library.items()}
     for effect in CONTROLLED:
         for mode in ("static", "moving"):
-            inverse = getattr(controller_with(effect), mode)
+            inverse = getattr(controller_with(effect).kernels, mode)
             for part in ("displacement", "state", "drive", "advance"):
                 functions[f"{effect.kind}_{mode}_{part}"] = getattr(inverse, part)
     folder = tmp_path_factory.mktemp("laws")
@@ -84,7 +85,7 @@ def test_c_equals_python(effect, compiled, rng):
         assert worst_difference(function, kernel, c, given) < 1e-13
     if effect not in CONTROLLED:
         return
-    m = controller_with(effect).nominal
+    m = controller_with(effect).kernels.nominal
     scale = {
         "x": m.x_scale,
         "z": m.z_scale,
@@ -121,7 +122,7 @@ def controller_with(effect: type[Effect]) -> Controller:
     where = places[len(places) // 2]
     shape = shapes(effect, where)
     values = {**shape[len(shape) // 2], effect.amplitude().name: size(effect, where, np.random.default_rng(3))}
-    return Controller(
+    return controller_of(
         build_model(device_of(table, written(effect, where, values)), sample_time=SAMPLE_TIME), "pose", SAMPLE_TIME
     )
 
@@ -141,7 +142,7 @@ def test_the_inverse_follows_without_knowing_the_effect(effect):
         assert step.status == 0
         state = step.state
         drives.append(step.drive)
-    reached = simulate(controller.model, np.array(drives), SAMPLE_TIME, *start).signals["pose"]
+    reached = simulate(controller.kernels.model, np.array(drives), SAMPLE_TIME, *start).signals["pose"]
     error = np.abs(reached - targets)
     # The issue's own limits. A drive that fades with time is held constant within a sample: a tenth of a nanometre.
     fades = effect.place is Place.DRIVE and any(s.clock for s in effect.states)

@@ -26,17 +26,40 @@ PRECISE = np.finfo(EXACT).eps < 1e-18  # where it is no longer than a double, do
 PI_2 = EXACT("1.5707963267948966192313216916397514420985846996875529")
 KIND = {Real.DOUBLE: np.float64, Real.FLOAT: np.float32}
 ONE = {
-    "square_root": np.sqrt, "exponential": np.exp, "logarithm": np.log, "sine": np.sin, "cosine": np.cos, "tangent": np.tan,
-    "arctangent": np.arctan, "arcsine": np.arcsin, "arccosine": np.arccos, "hyperbolic_tangent": np.tanh,
-    "hyperbolic_sine": np.sinh, "hyperbolic_cosine": np.cosh, "whole_below": np.floor, "whole_above": np.ceil,
-}  # fmt: skip
+    "square_root": np.sqrt,
+    "exponential": np.exp,
+    "logarithm": np.log,
+    "sine": np.sin,
+    "cosine": np.cos,
+    "tangent": np.tan,
+    "arctangent": np.arctan,
+    "arcsine": np.arcsin,
+    "arccosine": np.arccos,
+    "hyperbolic_tangent": np.tanh,
+    "hyperbolic_sine": np.sinh,
+    "hyperbolic_cosine": np.cosh,
+    "whole_below": np.floor,
+    "whole_above": np.ceil,
+}
 TWO = {"arctangent2": np.arctan2, "power": np.power}
 # Largest errors in units of the last place, a little above what random search finds (0.85, 0.95, 0.92, 0.91 ...).
 ULP = {
-    "square_root": 0.5, "exponential": 1.1, "logarithm": 1.1, "sine": 1.1, "cosine": 1.1, "tangent": 1.9, "arctangent": 1.1,
-    "arcsine": 2.0, "arccosine": 1.6, "hyperbolic_tangent": 1.6, "hyperbolic_sine": 1.9, "hyperbolic_cosine": 1.6,
-    "whole_below": 0.0, "whole_above": 0.0, "arctangent2": 1.8,
-}  # fmt: skip
+    "square_root": 0.5,
+    "exponential": 1.1,
+    "logarithm": 1.1,
+    "sine": 1.1,
+    "cosine": 1.1,
+    "tangent": 1.9,
+    "arctangent": 1.1,
+    "arcsine": 2.0,
+    "arccosine": 1.6,
+    "hyperbolic_tangent": 1.6,
+    "hyperbolic_sine": 1.9,
+    "hyperbolic_cosine": 1.6,
+    "whole_below": 0.0,
+    "whole_above": 0.0,
+    "arctangent2": 1.8,
+}
 ZERO_AT_ZERO = (
     "square_root",
     "sine",
@@ -276,8 +299,11 @@ def test_only_what_is_called_is_printed_and_no_library(real, compiler, tmp_path)
     for name in [*ONE, *TWO]:
         text = elementary_text([name], real)
         assert set(re.findall(r"\b([a-z_]+)\(", re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL))) <= {
-            *re.findall(rf"^static (?:{real.value}|int32_t) (\w+)\(", text, flags=re.M), "if", "defined", "__asm__",
-        }  # fmt: skip
+            *re.findall(rf"^static (?:{real.value}|int32_t) (\w+)\(", text, flags=re.M),
+            "if",
+            "defined",
+            "__asm__",
+        }
         (tmp_path / "a.c").write_text(
             f"#include <stdint.h>\n{text}\n"
             f"{real.value} used({'' if name in ONE else f'{real.value} b, '}{real.value} a);\n"

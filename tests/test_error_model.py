@@ -12,13 +12,7 @@ from scipy.integrate import quad
 from scipy.signal import lfilter
 from scipy.stats import norm
 
-from ctrlgen.estimation.error_model import (
-    ErrorModel,
-    correlation_time,
-    error_model,
-    huber,
-    huber_curvature,
-)
+from ctrlgen.estimation.error_model import ErrorModel, correlation_time, error_model, huber, huber_curvature
 from ctrlgen.estimation.misfit import misfit
 
 CORNER = np.array([3.0])

@@ -15,6 +15,8 @@ from conftest import ROOT, SCENARIOS
 
 from ctrlgen import InputError, load_device, load_scenario
 from ctrlgen.app.shipped_examples import copy_examples, examples
+from ctrlgen.core.errors import CtrlgenError
+from ctrlgen.core.shipped_files import shipped_package
 from ctrlgen.version import program
 
 FOLDERS = {path.parent.name for kind in ("scenario", "recording", "run_a") for path in SCENARIOS.glob(f"*/{kind}.toml")}
@@ -68,6 +70,13 @@ def test_the_examples_are_listed_one_a_line_and_a_wrong_use_says_what_is_right(t
         done = ctrlgen(*words)
         assert done.returncode == 1 and says in done.stderr, done.stderr
     assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_comes_with_clone_and_wheel_alone_is_missed_in_words():
+    with pytest.raises(
+        CtrlgenError, match="absent is missing: absent comes with a clone of ctrlgen and with its wheel"
+    ):
+        shipped_package("absent")
 
 
 @pytest.mark.long

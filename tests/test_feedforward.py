@@ -9,7 +9,8 @@ import pytest
 from conftest import DEVICE
 from scipy.optimize import lsq_linear
 
-from ctrlgen import Controller, ControllerStatus, build_model, simulate, user_device
+from ctrlgen import ControllerStatus, build_model, simulate, user_device
+from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
 from ctrlgen.model.inverse import ExpansionPoint, solve_by_blocks
@@ -19,7 +20,7 @@ NM, H = 1e-9, 1e-3
 
 @pytest.fixture(scope="module")
 def controller(model):
-    return Controller(model, "pose", H)
+    return controller_of(model, "pose", H)
 
 
 def limits_kept(model, x, z, u) -> bool:
@@ -111,7 +112,7 @@ def test_the_temperature_limit_is_kept_where_the_stroke_would_allow_more():
     table = tomllib.loads(DEVICE.read_text())
     table["actuator"]["temperature_limit"]["value"] = "120 degC"
     model = build_model(validate(Device.library["mems_hexapod"], table, "cooler"))
-    controller = Controller(model, "displacement", H)
+    controller = controller_of(model, "displacement", H)
     step = controller.step(controller.rest(), np.full(6, 30e-6), settle=True)
     assert step.status == ControllerStatus.STATE
     assert step.actuator_state == pytest.approx(np.full(6, 393.15), abs=1e-9)
@@ -130,12 +131,12 @@ def test_the_cheap_bound_of_the_stress_is_never_below_it_and_exact_for_a_lift(mo
     z = rng.uniform(*(bound[0] for bound in model.z_bounds), size=(6, 2000))
     z[:, ::2] *= rng.uniform(0, 1, (6, 1000))
     cold = np.tile(model.rest[:, None], (1, 2000))
-    shares = controller.composite_ratio.map(2000)(cold, 0 * z, z).full().ravel()
-    bounds = controller.composite_bound.map(2000)(z).full().ravel()
+    shares = controller.kernels.composite_ratio.map(2000)(cold, 0 * z, z).full().ravel()
+    bounds = controller.kernels.composite_bound.map(2000)(z).full().ravel()
     assert np.all(bounds >= shares) and shares.max() > 1
-    lift = controller.static.displacement(model.rest, np.zeros(6), [0, 0, 0, 0, 0, 2e-5])
-    share = float(controller.composite_ratio(model.rest, np.zeros(6), lift))
-    assert share == pytest.approx(float(controller.composite_bound(lift)), abs=1e-4) and share > 0.3
+    lift = controller.kernels.static.displacement(model.rest, np.zeros(6), [0, 0, 0, 0, 0, 2e-5])
+    share = float(controller.kernels.composite_ratio(model.rest, np.zeros(6), lift))
+    assert share == pytest.approx(float(controller.kernels.composite_bound(lift)), abs=1e-4) and share > 0.3
 
 
 @pytest.mark.parametrize(("low", "high"), [("-30 um", "0 um"), ("-30 um", "1 um"), ("0 um", "30 um")])
@@ -146,7 +147,7 @@ def test_a_stress_is_limited_whatever_the_signs_of_the_displacements(low, high):
         axes=dict.fromkeys("xy", (low, high)), force=lambda u, p: p.gain * u.vector, restoring_force=lambda d, p: p.stiffness * d.vector,
         limits={"stress": (lambda d, p: 1e13 * ca.sum1(ca.fabs(d.vector)), "250 MPa")},
     )  # fmt: skip
-    controller = Controller(build_model(device), "pose", H)
+    controller = controller_of(build_model(device), "pose", H)
     target = np.array([25e-6, 20e-6]) * (-1 if low.startswith("-") else 1)
     step = controller.step(controller.rest(), target, settle=True)
     assert step.status == ControllerStatus.COMPOSITE
@@ -161,7 +162,7 @@ def test_a_target_beyond_the_drives_is_approached_as_far_as_they_reach(model, co
         assert step.status & ControllerStatus.DRIVE
         low, high = model.u_bounds
         assert min(np.min(high - step.drive), np.min(step.drive - low)) < 1e-3 * (high - low)[0]
-        goal = controller.moving.displacement(*settled, target).full().ravel().clip(*model.z_bounds)
+        goal = controller.kernels.moving.displacement(*settled, target).full().ravel().clip(*model.z_bounds)
         way = (step.displacement - settled[1]) @ (goal - settled[1]) / np.sum((goal - settled[1]) ** 2)
         assert step.displacement == pytest.approx(settled[1] + way * (goal - settled[1]), abs=1e-12)
 
@@ -171,7 +172,7 @@ def test_temperatures_that_the_stroke_implies_are_not_limited_online(controller)
     table = tomllib.loads(DEVICE.read_text())
     table["actuator"]["temperature_limit"]["value"] = "120 degC"
     cooler = build_model(validate(Device.library["mems_hexapod"], table, "cooler"))
-    assert Controller(cooler, "pose", H).state_can_be_limited
+    assert controller_of(cooler, "pose", H).state_can_be_limited
 
 
 def test_beyond_the_range_the_nearest_target_inside_is_taken(model, controller, rng):
@@ -185,7 +186,7 @@ def test_beyond_the_range_the_nearest_target_inside_is_taken(model, controller, 
     for beyond in rng.uniform(low - high, 2 * high, size=(200, 6)):
         exact = lsq_linear(W * high, W @ beyond, (low / high, 1.0)).x * high
         off = np.linalg.norm(W @ (exact - beyond))
-        found = controller.nearest(beyond).full().ravel()
+        found = controller.kernels.nearest(beyond).full().ravel()
         assert np.all((found >= low) & (found <= high))
         ratios.append(np.linalg.norm(W @ (found - beyond)) / off)
         clipped.append(np.linalg.norm(W @ (np.clip(beyond, low, high) - beyond)) / off)
@@ -193,7 +194,7 @@ def test_beyond_the_range_the_nearest_target_inside_is_taken(model, controller, 
     step = controller.step(controller.rest(), np.array([0, 0, 0, 1e-5, 0, -2e-6]), settle=True)
     assert step.status == ControllerStatus.DISPLACEMENT
     inside = rng.uniform(0, 3e-5, 6)
-    assert np.array_equal(controller.nearest(inside).full().ravel(), inside)
+    assert np.array_equal(controller.kernels.nearest(inside).full().ravel(), inside)
 
 
 def test_a_lost_state_gets_the_safe_drive_until_one_starts_again_from_rest(controller):
@@ -203,17 +204,19 @@ def test_a_lost_state_gets_the_safe_drive_until_one_starts_again_from_rest(contr
         lost = x.copy()
         lost[3] = bad
         step = controller.step((lost, z), target)
-        assert step.status == ControllerStatus.LOST and np.all(step.drive == controller.safe_drive)
+        assert step.status == ControllerStatus.LOST and np.all(step.drive == controller.kernels.safe_drive)
         for again in (controller.step(step.state, target), controller.step(step.state, target, settle=True)):
             assert again.status == ControllerStatus.LOST
     assert controller.step(controller.rest(), target, settle=True).status == 0
-    edge = np.max(controller.nominal.x_bounds[1])
+    edge = np.max(controller.kernels.nominal.x_bounds[1])
     # Every state within its limits is one
-    assert not controller.is_lost(np.full(6, edge), controller.nominal.z_bounds[1])
+    assert not controller.is_lost(np.full(6, edge), controller.kernels.nominal.z_bounds[1])
 
 
 def test_a_state_is_lost_beyond_four_times_its_range_in_the_root_mean_square(controller):
-    hottest, farthest = (bound[1][0] for bound in (controller.nominal.x_bounds, controller.nominal.z_bounds))
+    hottest, farthest = (
+        bound[1][0] for bound in (controller.kernels.nominal.x_bounds, controller.kernels.nominal.z_bounds)
+    )
     for x, z, lost in ((3.99, 3.99, False), (4.01, 0.0, True), (0.0, 4.01, True)):
         assert controller.is_lost(np.full(6, x * hottest), np.full(6, z * farthest)) == lost
     one = np.zeros(6)
@@ -222,7 +225,7 @@ def test_a_state_is_lost_beyond_four_times_its_range_in_the_root_mean_square(con
 
 
 def test_limits_that_the_stroke_implies_are_not_computed_online(controller):
-    assert [limit.name for limit in controller.guarded_limits] == ["wire_stress"]
+    assert [limit.name for limit in controller.kernels.guarded_limits] == ["wire_stress"]
 
 
 def test_a_saturated_sample_is_made_up_for_as_soon_as_the_limits_allow(model, controller):
@@ -244,7 +247,7 @@ def test_the_inverse_is_wrong_when_the_model_behind_it_is(model):
     """The round trip can fail: invert a model that is 1 % stiffer than the plant."""
     table = tomllib.loads(DEVICE.read_text())
     table["stage"]["half_stage_stiffness"]["value"] = "0.05209277 N/um"
-    other = Controller(build_model(validate(Device.library["mems_hexapod"], table, "stiffer")), "pose", H)
+    other = controller_of(build_model(validate(Device.library["mems_hexapod"], table, "stiffer")), "pose", H)
     pose = np.array([0, 0, 0, 0, 0, 2e-5])
     drive = other.step(other.rest(), pose, settle=True).drive
     reached = simulate(model, np.tile(drive, (200, 1)), H).signals["pose"][-1]
@@ -254,7 +257,7 @@ def test_the_inverse_is_wrong_when_the_model_behind_it_is(model):
 def test_equations_that_hang_together_are_solved_together(model):
     """A drive that also pushes directly, quadratically: temperature and drive need Newton on one block."""
     direct = replace(model, balance=model.balance + 1e-3 * model.u**2)
-    controller = Controller(direct, "pose", H)
+    controller = controller_of(direct, "pose", H)
     pose = np.array([0, 0, 0, 2e-6, 1e-6, 2e-5])
     step = controller.step(controller.rest(), pose, settle=True)
     reached = simulate(direct, np.tile(step.drive, (300, 1)), H).signals["pose"][-1]

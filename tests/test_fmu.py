@@ -11,7 +11,8 @@ import pytest
 from conftest import SCENARIOS
 from fmu_units import Unit, apart, fmpy, opened, run_plant
 
-from ctrlgen import Controller, ControllerStatus, InputError, build_model, load_scenario, simulate
+from ctrlgen import ControllerStatus, InputError, build_model, load_scenario, simulate
+from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.firmware.fmi.fmu import write_fmus
 
 
@@ -44,7 +45,7 @@ def test_the_same_input_gives_the_same_bytes(units, tmp_path):
 
 
 def test_the_controller_answers_as_the_reference(units, circle, tmp_path):
-    controller, (path, _) = Controller(circle.model, "pose", 1e-3), units
+    controller, (path, _) = controller_of(circle.model, "pose", 1e-3), units
     state, ours, expected = controller.rest(), [], []
     with opened(path, tmp_path / "unit") as unit:
         unit.begin("target", circle.command[0])

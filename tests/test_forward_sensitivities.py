@@ -23,9 +23,11 @@ H, N = 1e-3, 300
 AXIS = AXIS_FILE.read_text()
 LOOP = '\n[loop]\nposition_gain = "60 1/s"\nvelocity_gain = "20 V/(m/s)"\nintegral_gain = "5e4 V/(m*s)"\n'
 SHAPES = {
-    "creep": {"gain": 0.05, "tau": 0.1, "slow": 0.2}, "bouc_wen": {"stiffness": 1e4, "reach": 3e-5, "loop": 0.9},
-    "resonance": {"stiffness": 2e4, "frequency": 160.0, "damping": 0.1}, "coulomb": {"force": 0.5, "reach": 1e-6, "smoothing": 1e-3},
-}  # fmt: skip
+    "creep": {"gain": 0.05, "tau": 0.1, "slow": 0.2},
+    "bouc_wen": {"stiffness": 1e4, "reach": 3e-5, "loop": 0.9},
+    "resonance": {"stiffness": 2e4, "frequency": 160.0, "damping": 0.1},
+    "coulomb": {"force": 0.5, "reach": 1e-6, "smoothing": 1e-3},
+}
 
 
 def simulator(text, effects, linear, folder) -> tuple[Simulator, np.ndarray]:

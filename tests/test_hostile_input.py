@@ -205,8 +205,10 @@ def test_a_full_disk_is_named_with_the_folder_and_leaves_nothing(tmp_path):
     """A limit on the size of files is the full disk that a test can have: the system refuses the write."""
     done = subprocess.run(
         [sys.executable, "-m", "ctrlgen", "generate", SCENARIOS / "spiral", "--out", tmp_path / "out"],
-        capture_output=True, text=True, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000)),
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000)),
+    )
     refused(done, "cannot be written: File too large; raise the limit", "mems_hexapod_online_f64.h")
     assert not list(tmp_path.iterdir())
 

@@ -236,8 +236,13 @@ def test_a_double_constant_in_float_code_costs_more_and_changes_bits(small, comp
     reference, c = small
     (plain,) = run_in_loop(c, reference).runs
     old = r"    uint32_t status = 0U;\n    int limited = 0;"
-    bad = spoil_on_target(c, tmp_path / "c", old, "    uint32_t status = 0U;\n    int limited = 0;\n"
-                          "    out->displacement[0] = (float)(out->displacement[0] * 1.0000001);")  # fmt: skip
+    bad = spoil_on_target(
+        c,
+        tmp_path / "c",
+        old,
+        "    uint32_t status = 0U;\n    int limited = 0;\n"
+        "    out->displacement[0] = (float)(out->displacement[0] * 1.0000001);",
+    )
     found = run_in_loop(bad, reference)
     if found.runs:  # zig links a library for double
         (run,) = found.runs
@@ -284,8 +289,9 @@ def test_without_cross_compilers_each_is_named_with_its_remedy(small, compiler, 
     monkeypatch.setattr(cores.shutil, "which", lambda name: None)
     found = run_in_loop(small[1], small[0])
     assert found.runs == () and dict(found.not_run) == {
-        "zig": "pip install ziglang", "arm-none-eabi-gcc": "apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi",
-    }  # fmt: skip
+        "zig": "pip install ziglang",
+        "arm-none-eabi-gcc": "apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi",
+    }
 
 
 @pytest.fixture

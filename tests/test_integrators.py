@@ -17,9 +17,11 @@ H, N = 1e-3, 400
 TIME = H * np.arange(N)
 DRIVES = {
     "several frequencies": np.sin(2 * np.pi * 11 * TIME) + 0.5 * np.sin(2 * np.pi * 67 * TIME + 1),
-    "ramps, where it sticks": np.interp(TIME, np.linspace(0, N * H, 9), [0, 0.2, -0.1, -0.15, 0.3, 0.25, -0.3, 0.1, 0.12]),
+    "ramps, where it sticks": np.interp(
+        TIME, np.linspace(0, N * H, 9), [0, 0.2, -0.1, -0.15, 0.3, 0.25, -0.3, 0.1, 0.12]
+    ),
     "steps, where it sticks": np.repeat([0.1, 0.3, -0.2, -0.25, 0.05, 0.0, 0.2, 0.21], N // 8),
-}  # fmt: skip
+}
 
 
 def simulated(effect: str, drive: np.ndarray, folder) -> tuple[np.ndarray, integrators.ExponentialIntegrator]:
@@ -143,10 +145,14 @@ def test_an_impact_is_stable_and_right_to_a_hundredth_of_itself(tmp_path, stiffn
 def test_a_law_that_ends_within_the_typical_travel_is_simulated_inside():
     """sqrt(1 - d/0.8) has no value at the whole typical travel of 1 m: no steps are asked for there."""
     device = ctrlgen.user_device(
-        "stub", parameters={"mass": "1 kg", "spring": "100 N"}, drive={"motor": "1 N"}, axes={"way": "1 m"},
-        mass=lambda p: p.mass, force=lambda u, p: u.motor,
+        "stub",
+        parameters={"mass": "1 kg", "spring": "100 N"},
+        drive={"motor": "1 N"},
+        axes={"way": "1 m"},
+        mass=lambda p: p.mass,
+        force=lambda u, p: u.motor,
         restoring_force=lambda d, p: p.spring * (1 - ca.sqrt(1 - d.way / 0.8)),
-    )  # fmt: skip
+    )
     model = build_model(device)
     assert not np.isfinite(integrators.slope_at_rest(model, displacement=1.0)).all()
     found = simulate(model, np.full((200, 1), 0.5), H).signals["displacement"]

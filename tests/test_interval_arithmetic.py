@@ -10,13 +10,27 @@ from ctrlgen.numerics.interval_arithmetic import bounds
 
 a, b = ca.SX.sym("a"), ca.SX.sym("b")
 EXPRESSIONS = {
-    "sum": a + b, "difference": a - b, "product": a * b, "quotient": a / (b + 5), "negative": -a,
-    "square": a**2 * b, "twice": 2 * a,
-    "inverse": 1 / (b - 9), "root": ca.sqrt(a**2 + 1), "magnitude": ca.fabs(a) * b, "least": ca.fmin(a, b), "most": ca.fmax(a, 0.3),
-    "exponential": ca.exp(a), "saturated": ca.tanh(b), "wave": ca.sin(a) + ca.cos(b), "sign": ca.sign(a),
+    "sum": a + b,
+    "difference": a - b,
+    "product": a * b,
+    "quotient": a / (b + 5),
+    "negative": -a,
+    "square": a**2 * b,
+    "twice": 2 * a,
+    "inverse": 1 / (b - 9),
+    "root": ca.sqrt(a**2 + 1),
+    "magnitude": ca.fabs(a) * b,
+    "least": ca.fmin(a, b),
+    "most": ca.fmax(a, 0.3),
+    "exponential": ca.exp(a),
+    "saturated": ca.tanh(b),
+    "wave": ca.sin(a) + ca.cos(b),
+    "sign": ca.sign(a),
     "choice": ca.if_else(a < b, a, 2 * b),
-    "logic": ca.logic_and(a < b, ca.logic_not(a)), "unknown": ca.atan2(a, b), "pole": a / b,
-}  # fmt: skip
+    "logic": ca.logic_and(a < b, ca.logic_not(a)),
+    "unknown": ca.atan2(a, b),
+    "pole": a / b,
+}
 
 
 @pytest.mark.parametrize("name", EXPRESSIONS)

@@ -14,8 +14,11 @@ every_parameter = pytest.mark.parametrize(
 )
 # Shares of something that there is by itself once, and a metal's resistance, which rises
 ONE_WAY = {
-    "finite_rotation": (-2.0, 4.0), "link_load": (-2.0, 4.0), "low_pass": (-0.5, 1.5), "heater_resistance": (-1e-3, 1e-2),
-}  # fmt: skip
+    "finite_rotation": (-2.0, 4.0),
+    "link_load": (-2.0, 4.0),
+    "low_pass": (-0.5, 1.5),
+    "heater_resistance": (-1e-3, 1e-2),
+}
 
 
 @pytest.mark.parametrize("law", Effect.library.values(), ids=Effect.library)

@@ -14,11 +14,19 @@ from ctrlgen.estimation.simulator import Simulator
 
 H = 0.01
 TESTED = {
-    "kind": "tested_axis", "name": "tested", "title": "an axis in a test machine", "source": "round numbers",
+    "kind": "tested_axis",
+    "name": "tested",
+    "title": "an axis in a test machine",
+    "source": "round numbers",
     "mechanics": {
-        "mass": "2 kg", "damping": "30 N*s/m", "stiffness": "5 N/mm", "stroke": "10 mm", "speed": "100 mm/s", "force": "60 N",
+        "mass": "2 kg",
+        "damping": "30 N*s/m",
+        "stiffness": "5 N/mm",
+        "stroke": "10 mm",
+        "speed": "100 mm/s",
+        "force": "60 N",
     },
-}  # fmt: skip
+}
 SERVO = {"kind": "servo", "name": "servo", "title": "an axis", "source": "round numbers", "travel": "100 um"}
 PLAY = {"kind": "backlash", "at": "axis", "gap": "10 um"}
 CREEP = {"kind": "creep", "at": "axis", "gain": "0.2", "tau": "0.3 s", "slow": "0"}

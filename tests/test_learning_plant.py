@@ -41,7 +41,7 @@ def test_without_a_diagnosis_three_runs_bring_the_circle_below_a_twentieth_of_a_
     never_worse(learnt)
 
 
-@pytest.mark.long
+@pytest.mark.exhaustive
 def test_with_friction_and_hysteresis_three_runs_bring_it_as_far(scenario, tmp_path):
     learnt = learn(Imperfect(friction=2e-4, hysteresis=0.05), scenario, tmp_path)
     errors = [m.overall for m in learnt.runs]
@@ -55,10 +55,14 @@ def never_worse(learnt: Learnt) -> None:
     assert all(then < now + 2e-3 + 0.1 * now for now, then in pairwise(largest))
 
 
-@pytest.mark.long
+# test_learning has the same on a simulated bench
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(
     ("bench", "names"),
-    [(Imperfect(reversed=(0,)), "drive.1X"), (Imperfect(exchanged=(2, 3)), "drive.2X, drive.2Y")],
+    [
+        (Imperfect(reversed=(0,)), "drive.1X"),
+        (Imperfect(exchanged=(2, 3)), "drive.2X, drive.2Y"),
+    ],
     ids=["reversed", "exchanged"],
 )
 def test_an_actuator_that_is_wired_wrongly_is_refused_by_name_after_the_first_step(scenario, tmp_path, bench, names):
@@ -66,7 +70,7 @@ def test_an_actuator_that_is_wired_wrongly_is_refused_by_name_after_the_first_st
     assert len(learnt.runs) == 2 and names in learnt.refused and "Traceback" not in learnt.refused
 
 
-@pytest.mark.long
+@pytest.mark.exhaustive
 def test_from_the_diagnosed_device_one_run_is_enough(tmp_path):
     record(MemsHexapod(), tmp_path / "recording")
     ctrlgen("diagnose", str(DEVICE), str(tmp_path / "recording"), "--out", str(tmp_path / "diagnosis"), "--seed", "0")

@@ -11,10 +11,11 @@ import gzip
 import json
 import shutil
 import subprocess
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import casadi as ca
 import coverage
@@ -23,6 +24,7 @@ import pytest
 
 from ctrlgen import Controller, ControllerStatus
 from ctrlgen.controller import feedforward
+from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.controller.named_inverse import NamedInverses
 from ctrlgen.devices import Limit
 from ctrlgen.firmware.c.real import Real
@@ -93,19 +95,37 @@ DEVICES = (
 )
 
 
-class Scripted(Controller):
-    """A controller whose kernels and limits are given."""
+@dataclass(frozen=True, eq=False)
+class Scripted(ControllerKernels):
+    """Kernels and limits that are given, in place of those of a model."""
 
-    @property
-    def composite_rounds(self) -> int:
-        return self.__dict__["rounds"]
+    nominal: Any = None
+    static: Any = None
+    moving: Any = None
+    named: Any = None
+    newton_steps: Any = NEWTON_STEPS
+    input_limits: Any = None
+    safe_drive: Any = None
+    guarded_limits: Any = None
+    composite_shares: Any = None
+    composite_bound: Any = None
+    composite_rounds: Any = None
+    nearest_slopes: Any = None
+    has_state_limits: bool = True
 
-    def slacks_of(self, slack: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        assert slack == SLACK  # in double the C has the slack of the controller
-        return self.slacks
+    def slacks(self, share: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        # in double the C has the slack of the controller
+        assert share == SLACK
+        return np.full(N, SLACK), np.full(self.nominal.n_states, SLACK), np.full(N, SLACK)
+
+    def state_can_be_limited(self, share: float) -> bool:
+        return self.has_state_limits
+
+    def drive_can_be_limited(self, share: float) -> tuple[bool, bool]:
+        return True, True
 
 
-def controller_of(device: Device) -> Scripted:
+def scripted(device: Device) -> Controller:
     x, z, target, wanted, u = (
         ca.SX.sym(name, count) for name, count in
         (("x", device.n_x), ("z", N), ("target", N), ("wanted", N), ("drive", N))
@@ -147,60 +167,32 @@ def controller_of(device: Device) -> Scripted:
         signals={"drive": signal, "displacement": signal, "state": signal if device.states else None},
         redundant=False, device=SimpleNamespace(title="scripted", source="none", given_at_start=(), run_time=None),
     )  # fmt: skip
-    controller = Scripted(nominal, "displacement", 1e-3 if device.moving else None, SLACK)
-    controller.__dict__["named"] = NamedInverses(
-        inverse(0.0),
-        inverse(0.25) if device.moving else None,
-        SimpleNamespace(laws=()),
-        [],
-    )
-    controller.__dict__["newton_steps"] = NEWTON_STEPS
-    guarded = device.composite != "none"
-    controller.__dict__.update(
-        nominal=nominal, rounds=device.rounds, drive_can_be_limited=(True, True), state_can_be_limited=device.states and device.limited,
-        static=inverse(0.0), moving=inverse(0.25) if device.moving else None, input_limits=TARGET_LIMIT, safe_drive=np.zeros(N),
-        slacks=(np.full(N, SLACK), np.full(device.n_s, SLACK), np.full(N, SLACK)),
+    guarded, moving = device.composite != "none", inverse(0.25) if device.moving else None
+    kernels = Scripted(
+        nominal,
+        "displacement",
+        1e-3 if device.moving else None,
+        nominal=nominal,
+        static=inverse(0.0),
+        moving=moving,
+        named=NamedInverses(inverse(0.0), moving, SimpleNamespace(laws=()), []),
+        input_limits=TARGET_LIMIT,
+        safe_drive=np.zeros(N),
         guarded_limits=(SimpleNamespace(label="share"),) if guarded else (),
         composite_shares=kernel("shares", [x, z, wanted], ["x", "z", "wanted"], ratio**2),
-        nearest_slopes=np.array([[1, 0.25, 0.0625], [0.25, 1, -0.125], [0.0625, -0.125, 1]]) if device.coupled else None,
-        composite_bound=kernel("bounded", [wanted], ["wanted"], 2 - wanted[1]) if device.composite == "bounded" else None,
-    )  # fmt: skip
-    assert device.rated == (controller.rate is not None)
-    # Worked out before the kernels are recorded
-    assert controller.examined_first == (
-        device.memory,
-        device.memory or device.moving,
+        composite_bound=kernel("bounded", [wanted], ["wanted"], 2 - wanted[1])
+        if device.composite == "bounded"
+        else None,
+        composite_rounds=device.rounds,
+        nearest_slopes=np.array([[1, 0.25, 0.0625], [0.25, 1, -0.125], [0.0625, -0.125, 1]])
+        if device.coupled
+        else None,
+        has_state_limits=device.states and device.limited,
     )
+    controller = Controller(kernels, SLACK)
+    assert device.rated == (controller.rate is not None)
+    assert kernels.examined_first == (device.memory, device.memory or device.moving)
     return controller
-
-
-@dataclass
-class Recorded:
-    """A kernel that writes down what it answered."""
-
-    name: str
-    kernel: ca.Function
-    calls: list = field(default_factory=list)
-
-    def __call__(self, *arguments):
-        result = self.kernel(*arguments)
-        self.calls.append((self.name, result.full().ravel()))
-        return result
-
-
-def recorded(controller: Scripted) -> tuple[Scripted, list]:
-    """The same controller, and the list that its kernels write their answers to."""
-    calls: list = []
-    twin = Scripted(controller.model, controller.follow, controller.sample_time, controller.slack)
-    twin.__dict__.update(controller.__dict__)
-    for mode in ("static", "moving"):
-        k = getattr(controller, mode)
-        if k is not None:
-            twin.__dict__[mode] = Inverse(**{n: Recorded(n, getattr(k, n), calls) for n in vars(k)})
-    for name in ("composite_ratio", "composite_bound"):
-        if getattr(controller, name):
-            twin.__dict__[name] = Recorded(name, getattr(controller, name), calls)
-    return twin, calls
 
 
 def outcome(value: np.ndarray, low: np.ndarray, high: np.ndarray) -> str:
@@ -266,15 +258,12 @@ def sample(
     return x, z, wanted - (0.25 if mode == "step" else 0.0) * z
 
 
-def last_drive(rng: np.random.Generator, controller: Scripted, case: tuple) -> list[np.ndarray]:
+def last_drive(rng: np.random.Generator, controller: Controller, case: tuple) -> list[np.ndarray]:
     """Drives before a case (mode, x, z, target) from which it asks for changes within rates, within their slack, or beyond."""
     if controller.rate is None:
         return []
     mode, x, z, target = case
-    unrated = Scripted(controller.model, controller.follow, controller.sample_time, controller.slack)
-    # It judges the last drive too
-    known = {name: value for name, value in controller.__dict__.items() if name != "plausible"}
-    unrated.__dict__.update(known | {"rate": None})
+    unrated = replace(controller, keeps_rates=False)
     wanted = unrated.step((x, z), target, settle=mode == "settle").drive
     fall, rise = np.maximum(FALL, -1.0), np.minimum(RISE, 1.0)
     change = np.array([rng.uniform(fall, rise), rng.uniform(-1, 1, N)][int(rng.integers(2))])
@@ -407,7 +396,7 @@ int main(void)
 """
 
 
-def run_c(device: Device, controller: Scripted, records: np.ndarray, folder: Path) -> np.ndarray:
+def run_c(device: Device, controller: Controller, records: np.ndarray, folder: Path) -> np.ndarray:
     """The answers of the generated C, built so that its branches are counted."""
     context = online_context(NOWHERE, controller, Real.DOUBLE, "limiter")
     for end in ("h", "c"):
@@ -468,8 +457,9 @@ def test_limiter_in_c_and_in_python_agree_on_every_combination_of_branches(devic
     for program in ("gcc", "gcov"):
         if not shutil.which(program):
             pytest.skip(f"{program} is missing: the branches of the generated limiter were not counted")
-    controller = controller_of(device)
-    twin, calls = recorded(controller)
+    controller = scripted(device)
+    calls: list = []
+    observed = replace(controller, observe=lambda what, answered: calls.append((what, answered)))
     rng = np.random.default_rng(14)
     missing, records, answers, growing = device.combinations(), [], [], set()
 
@@ -477,7 +467,7 @@ def test_limiter_in_c_and_in_python_agree_on_every_combination_of_branches(devic
         with np.errstate(invalid="ignore"):
             last = list(last) or last_drive(rng, controller, (mode, x, z, target))
             calls.clear()
-            step = twin.step((x, z, *last), target, settle=mode == "settle")
+            step = observed.step((x, z, *last), target, settle=mode == "settle")
         records.append(np.concatenate([[float(mode == "step")], x, z, target, *last]))
         answers.append(answer(step))
         return step
@@ -512,7 +502,7 @@ def test_samples_of_these_devices_take_every_branch_of_the_limiter_in_python(tmp
     rng = np.random.default_rng(15)
     with measured.collect():
         for device in DEVICES:
-            controller = controller_of(device)
+            controller = scripted(device)
             for wish in sorted(device.combinations()):
                 x, z, target = sample(rng, device, wish)
                 last = last_drive(rng, controller, (wish[0], x, z, target))

@@ -45,7 +45,7 @@ def loop(tmp_path_factory) -> Loop:
     return close(tmp_path_factory.mktemp("loop"))
 
 
-@pytest.mark.long
+@pytest.mark.exhaustive
 def test_the_corrected_c_errs_less_than_half_a_percent(loop):
     """S1 prints 3.38 % against its own finite elements; the plant without the correction gives 3.97 %."""
     before, after = loop.stage("as described"), loop.stage("diagnosed")
@@ -55,7 +55,7 @@ def test_the_corrected_c_errs_less_than_half_a_percent(loop):
         assert value < before.largest[name] / 5, name
 
 
-@pytest.mark.long
+@pytest.mark.exhaustive
 def test_the_missing_physics_is_named(loop):
     """Stages that stiffen and struts that turn are in the plant; which number of the lever is off, poses alone cannot tell."""
     diagnosis = loop.story.diagnosis
@@ -64,34 +64,34 @@ def test_the_missing_physics_is_named(loop):
     assert {("link_load", "stage:all"), ("finite_rotation", "mechanism:all")} <= found
 
 
-@pytest.mark.long
+@pytest.mark.exhaustive
 def test_the_corrected_device_is_one_that_ctrlgen_reads(loop, tmp_path_factory):
     (path,) = {p.resolve() for p in tmp_path_factory.getbasetemp().glob("loop*/after/circle20/device.toml")}
     assert load_device(path).effect
 
 
-@pytest.mark.long
+@pytest.mark.exhaustive
 def test_the_error_is_within_what_the_budget_expects(loop):
     """The 95 % band is of the stated uncertainties; the plant's own physics is not among them, but smaller."""
     assert max(loop.stage("as described").largest.values()) < loop.story.expected.translation
     assert max(loop.stage("as described").parasitic_largest.values()) < loop.story.expected.rotation
 
 
-@pytest.mark.long
+@pytest.mark.exhaustive
 def test_a_short_recording_calibrates_the_same_c_for_another_chip(loop):
     """Its heaters have 4 % more thermal resistance, and a third of a percent among them, which one constant does not see."""
     other, calibrated = loop.stage("another chip"), loop.stage("calibrated")
     assert other.distance > 0.5 and calibrated.distance < other.distance / 5
 
 
-@pytest.mark.long
+@pytest.mark.exhaustive
 def test_what_is_left_is_learnt(loop):
     """5 nm are 0.05 % of the circle's radius."""
     learnt = loop.stage("learnt")
     assert learnt.overall < 0.05 and learnt.distance < loop.stage("calibrated").distance / 5
 
 
-@pytest.mark.long
+@pytest.mark.exhaustive
 def test_the_fastest_circle_keeps_what_is_asked(loop):
     """By hand, heaters whose force is proportional to their temperature cool in time for 23.5 turns a second, 43 ms; the law of the stage
     stiffens, which makes it some tenth faster."""

@@ -7,18 +7,7 @@ import numpy as np
 import pytest
 from command_line import ctrlgen as run_command
 from conftest import DEVICE
-from mechanism_files import (
-    HEAD,
-    PARALLELOGRAM,
-    REST,
-    SILICON,
-    SPRING,
-    TWO_BODIES,
-    dm,
-    loaded,
-    vector,
-    with_values,
-)
+from mechanism_files import HEAD, PARALLELOGRAM, REST, SILICON, SPRING, TWO_BODIES, dm, loaded, vector, with_values
 
 from ctrlgen import InputError, build_model, load_scenario, solve
 from ctrlgen.devices.mechanism.condensed import Condensed
@@ -64,17 +53,24 @@ def test_a_mechanism_is_solved_and_its_stress_limit_kept(tmp_path):
         ('low = "-1 A"', 'low = "2 A"', "low = '2 A' is not below high"),
         ('channels = ["delta_x"]', 'channels = ["delta_x", "theta_z"]', "2 channels, 1 actuators"),
         ('body = "stage"', 'body = "table"', "output.body: 'table' is no body"),
-        ('[[body]]\nname = "stage"', '[[body]]\nname = "stage"\n[[body]]\nname = "free"', "nothing joins free to the ground"),
+        (
+            '[[body]]\nname = "stage"',
+            '[[body]]\nname = "stage"\n[[body]]\nname = "free"',
+            "nothing joins free to the ground",
+        ),
         ('width = "8 mm"', 'width = "0.1 mm"', "thickness = '0.2 mm' is above width = '0.1 mm'"),
         ('channels = ["delta_x"]', 'channels = ["delta_z"]', "no actuator moves delta_z"),
         ('name = "coil"', 'name = "coil"\npattern = "arm"', "actuator[0].pattern: 'arm' is no pattern"),
-        ('travel = "300 um"', 'travel = "300 um"\ntime_constant = "1 ms"\n[[actuator]]\nname = "b"\nkind = "force"\non = "stage"\n'
-         'at = ["0 mm", "0 mm", "0 mm"]\nalong = [0, 1, 0]\ngain = "2 N/A"\nlow = "-1 A"\nhigh = "1 A"\ntravel = "300 um"',
-         "actuator: some have a time_constant and some do not"),
+        (
+            'travel = "300 um"',
+            'travel = "300 um"\ntime_constant = "1 ms"\n[[actuator]]\nname = "b"\nkind = "force"\non = "stage"\n'
+            'at = ["0 mm", "0 mm", "0 mm"]\nalong = [0, 1, 0]\ngain = "2 N/A"\nlow = "-1 A"\nhigh = "1 A"\ntravel = "300 um"',
+            "actuator: some have a time_constant and some do not",
+        ),
         ('to = "stage"\nat', 'too = "stage"\nat', "did you mean 'to'"),
         ('from = "ground"', 'form = "ground"', "did you mean 'from'"),
     ],
-)  # fmt: skip
+)
 def test_what_does_not_fit_together_is_said(tmp_path, old, new, says):
     assert old in PARALLELOGRAM
     with pytest.raises(InputError) as caught:

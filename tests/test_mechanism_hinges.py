@@ -4,13 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mechanism_files import (
-    HINGE,
-    dm,
-    hinged,
-    loaded,
-    with_values,
-)
+from mechanism_files import HINGE, dm, hinged, loaded, with_values
 from scipy.integrate import quad
 
 from ctrlgen import build_model

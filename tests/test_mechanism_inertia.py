@@ -178,11 +178,16 @@ def test_check_says_how_far_the_condensed_modes_are(tmp_path):
     [
         (PARALLELOGRAM.replace("[output]", DYNAMICS + "[output]"), "the actuators move no mass in some direction"),
         (moving('[dynamics]\ndamping_ratio = "3 Hz"\n'), "dynamics.damping_ratio"),
-        (moving('[dynamics]\n'), "dynamics.damping_ratio"),
-        (HEAD + TWO_BODIES.removeprefix(HEAD) + '[[actuator]]\nname = "s"\nkind = "displacement"\non = "k_b"\nalong = [1, 0, 0]\n'
-         'gain = "1 um/V"\nlow = "0 V"\nhigh = "9 V"\ntravel = "9 um"\n' + DYNAMICS + OUTPUT, "inertia needs actuators that push"),
+        (moving("[dynamics]\n"), "dynamics.damping_ratio"),
+        (
+            HEAD
+            + TWO_BODIES.removeprefix(HEAD)
+            + '[[actuator]]\nname = "s"\nkind = "displacement"\non = "k_b"\nalong = [1, 0, 0]\n'
+            'gain = "1 um/V"\nlow = "0 V"\nhigh = "9 V"\ntravel = "9 um"\n' + DYNAMICS + OUTPUT,
+            "inertia needs actuators that push",
+        ),
     ],
-)  # fmt: skip
+)
 def test_dynamics_that_cannot_be_is_refused(tmp_path, text, says):
     with pytest.raises(InputError) as caught:
         loaded(tmp_path, text)

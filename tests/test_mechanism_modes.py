@@ -5,16 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import DEVICE
-from mechanism_files import (
-    HEAD,
-    PARALLELOGRAM,
-    REST,
-    SILICON,
-    blade,
-    dm,
-    loaded,
-    with_values,
-)
+from mechanism_files import HEAD, PARALLELOGRAM, REST, SILICON, blade, dm, loaded, with_values
 
 from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.devices.mechanism.modes import freedoms, natural_frequencies

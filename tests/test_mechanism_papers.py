@@ -6,16 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from conftest import DEVICE
-from mechanism_files import (
-    HEAD,
-    dm,
-    loaded,
-    mems_hexapod_text,
-    number,
-    place,
-    vector,
-    with_values,
-)
+from mechanism_files import HEAD, dm, loaded, mems_hexapod_text, number, place, vector, with_values
 
 from ctrlgen import load_device
 from ctrlgen.devices.mechanism.condensed import Condensed

@@ -117,7 +117,7 @@ def test_a_sensor_may_stand_on_a_reading_and_c_is_generated_beside_it(tmp_path):
         (EDGE + "about = [0, 0, 1]\n", "give either along"),
         (EDGE + 'pattern = "leg"\n', "reading[0].pattern: 'leg' is no pattern"),
     ],
-)  # fmt: skip
+)
 def test_a_reading_that_cannot_be_is_refused(tmp_path, reading, says):
     with pytest.raises(InputError) as caught:
         loaded(tmp_path, PARALLELOGRAM + reading)

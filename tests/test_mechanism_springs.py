@@ -135,12 +135,12 @@ def test_every_number_of_a_cubic_spring_may_be_free(tmp_path):
 @pytest.mark.parametrize(
     ("numbers", "says"),
     [
-        ('along = [1, 0, 0]', "gives no stiffness; add one"),
+        ("along = [1, 0, 0]", "gives no stiffness; add one"),
         ('F_x_per_delta_x = "-5 N/mm"', "F_x_per_delta_x"),
         ('F_x_per_delta_x3 = "5 N/mm"', "has the wrong unit: N/um^3"),
         ('F_x_per_delta_x3 = "-1e-3 N/um^3"', "soften"),
     ],
-)  # fmt: skip
+)
 def test_a_spring_that_cannot_be_is_refused(tmp_path, numbers, says):
     with pytest.raises(InputError) as caught:
         build_model(loaded(tmp_path, chain(numbers)))

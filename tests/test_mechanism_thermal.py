@@ -166,14 +166,22 @@ def test_s1s_axis_moved_by_its_thermal_actuator_is_near_s1s_scalar_law(tmp_path)
     [
         ('on = "beams"', 'on = "load"', "'load' is no bent_beam"),
         ('on = "beams"', 'on = "bams"', "'bams' is no element"),
-        (f'expansion = {number(SPECIAL.actuator.expansion, "1/K")}\nexpansion_slope', "expansion_slope", "belong together"),
-        (material()[material().index("expansion"):], "", "give the material of 'beams' its expansion"),
+        (
+            f"expansion = {number(SPECIAL.actuator.expansion, '1/K')}\nexpansion_slope",
+            "expansion_slope",
+            "belong together",
+        ),
+        (material()[material().index("expansion") :], "", "give the material of 'beams' its expansion"),
         ("[output]", '[dynamics]\ndamping_ratio = "1 %"\n[output]', "belongs to actuators that push by force"),
         ('temperature_limit = "', 'temperature_limit = "-', "temperature_limit"),
-        ("[output]", '[[actuator]]\nname = "coil"\nkind = "force"\non = "bar"\nat = ["0 mm", "0 mm", "0 mm"]\nalong = [0, 1, 0]\n'
-         'gain = "1 N/V"\nlow = "0 V"\nhigh = "1 V"\ntravel = "1 um"\n[output]', "give one kind"),
+        (
+            "[output]",
+            '[[actuator]]\nname = "coil"\nkind = "force"\non = "bar"\nat = ["0 mm", "0 mm", "0 mm"]\nalong = [0, 1, 0]\n'
+            'gain = "1 N/V"\nlow = "0 V"\nhigh = "1 V"\ntravel = "1 um"\n[output]',
+            "give one kind",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_heater_that_cannot_be_is_refused(tmp_path, old, new, says):
     assert old in BAR
     with pytest.raises(InputError) as caught:

@@ -25,8 +25,11 @@ def elastica(load: float, guided: bool) -> tuple[float, float]:
     solution = solve_bvp(
         lambda _, v: np.array([v[1], -load * np.cos(v[0]), np.sin(v[0]), np.cos(v[0])]),
         lambda a, b: np.array([a[0], b[0] if guided else b[1], a[2], a[3]]),
-        s, np.array([load / 2 * s * (1 - s), load * (0.5 - s), 0 * s, s]), tol=1e-10, max_nodes=100_000,
-    )  # fmt: skip
+        s,
+        np.array([load / 2 * s * (1 - s), load * (0.5 - s), 0 * s, s]),
+        tol=1e-10,
+        max_nodes=100_000,
+    )
     assert solution.success
     return float(solution.y[2, -1]), 1 - float(solution.y[3, -1])
 

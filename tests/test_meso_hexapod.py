@@ -62,8 +62,17 @@ def differentiated(h, directions) -> tuple[np.ndarray, np.ndarray]:
 
 def test_the_device_file_carries_table_1_and_both_equations_as_printed(p) -> None:
     h = p.hexapod
-    lengths = (h.platform_radius, h.base_radius, h.platform_thickness, h.height, h.strut_length, h.base_near,
-               h.base_far, h.platform_near, h.platform_far)  # fmt: skip
+    lengths = (
+        h.platform_radius,
+        h.base_radius,
+        h.platform_thickness,
+        h.height,
+        h.strut_length,
+        h.base_near,
+        h.base_far,
+        h.platform_near,
+        h.platform_far,
+    )
     assert np.allclose(np.array(lengths) * 1e3, (81.44, 138.92, 13.2, 221.93, 240, 20, 230, 20, 100), rtol=1e-15)
     assert np.allclose(np.degrees(h.platform_angles), (189, 171, 69, 51, -51, -69), rtol=1e-15)
     assert np.allclose(np.degrees(h.base_angles), (236, 124, 116, 4, -4, -116), rtol=1e-15)

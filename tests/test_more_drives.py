@@ -10,7 +10,8 @@ from scipy.optimize import linprog, minimize, nnls
 from three_stacks import HIGH, LOW, RANGE, WEIGHTS, B, W, can_push, circle, forces, heavy, loaded, reference, stage
 
 from ctrlgen import InputError, Unreachable, build_model, solve, user_device
-from ctrlgen.controller.feedforward import Controller, ControllerStatus
+from ctrlgen.controller.feedforward import ControllerStatus
+from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.trajectory.inverse.drive_programmes import diagonal, least_worst, limited_rows
 from ctrlgen.trajectory.inverse.redundant import motion_inverse, path_inverse
 
@@ -262,7 +263,7 @@ def test_with_inertia_the_held_drives_have_the_least_effort_within_the_limits(tm
 
 def test_the_reference_controller_takes_the_least_effort_and_keeps_the_drives_limits():
     model = build_model(stage(drive_weight=WEIGHTS))
-    controller = Controller(model, "pose", 1e-3)
+    controller = controller_of(model, "pose", 1e-3)
     R = np.diag(RANGE / np.sqrt(W))
     state = controller.rest()
     for target in (np.array([12e-6, -2e-6]), np.array([5e-6, 1e-6])):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import ctrlgen
-from ctrlgen import Controller, ControllerStatus, build_model, generate, load_scenario, simulate, solve
+from ctrlgen import ControllerStatus, build_model, generate, load_scenario, simulate, solve
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.online.vectors import vectors
@@ -72,7 +72,7 @@ def answers(controller, targets, settle=False):
 
 
 def test_drives_go_toward_the_target_on_a_straight_line_as_fast_as_the_slowest_may():
-    controller = Controller(build_model(stage()), "pose", T)
+    controller = controller_of(build_model(stage()), "pose", T)
     targets = np.random.default_rng(3).uniform(0, 28e-6, (60, 2)).repeat(4, axis=0)
     last = np.zeros(2)
     for step, target in zip(answers(controller, targets), targets, strict=True):
@@ -85,7 +85,7 @@ def test_drives_go_toward_the_target_on_a_straight_line_as_fast_as_the_slowest_m
 
 
 def test_a_target_beyond_every_limit_keeps_ranges_and_rates():
-    controller = Controller(build_model(stage()), "pose", T)
+    controller = controller_of(build_model(stage()), "pose", T)
     targets = np.random.default_rng(4).normal(size=(300, 2)) * 60e-6
     found = answers(controller, targets)
     drive = np.array([np.zeros(2), *(step.drive for step in found)])
@@ -95,14 +95,14 @@ def test_a_target_beyond_every_limit_keeps_ranges_and_rates():
 
 
 def test_settling_takes_as_many_calls_as_the_drive_takes_samples():
-    controller = Controller(build_model(stage()), "pose", T)
+    controller = controller_of(build_model(stage()), "pose", T)
     found = answers(controller, [np.array([20e-6, 4e-6])] * 12, settle=True)  # 100 V and 20 V, 10 V a sample
     assert [step.status for step in found] == [RATE] * 9 + [0] * 3
     assert np.allclose([step.drive for step in found[:9]], np.outer(np.arange(1, 10), [10.0, 2.0]), rtol=0, atol=1e-12)
 
 
 def test_what_is_no_target_leads_to_the_safe_drives_as_fast_as_they_may_and_a_lost_state_at_once():
-    controller = Controller(build_model(stage()), "pose", T)
+    controller = controller_of(build_model(stage()), "pose", T)
     state = answers(controller, [np.array([6e-6, 3e-6])] * 4)[-1].state
     assert np.allclose(state[2], [30.0, 15.0])
     for expected in ([25.0, 12.5], [20.0, 10.0]):  # the fall of x, 5 V, is the slower
@@ -118,7 +118,7 @@ def test_what_is_no_target_leads_to_the_safe_drives_as_fast_as_they_may_and_a_lo
 def test_a_state_that_passes_its_limit_because_the_drive_falls_too_slowly_is_told_and_comes_back():
     """Heating to 100 K at full power, which would end at 300 K: from 30 W to 10 W takes 20 ms, a time constant."""
     model = build_model(heated())
-    controller = Controller(model, "pose", T)
+    controller = controller_of(model, "pose", T)
     hot, cold = np.array([9.9e-6, 2e-6]), np.array([1e-6, 1e-6])
     targets = [hot] * 150 + [cold] * 100 + [hot] * 60
     found = answers(controller, targets)

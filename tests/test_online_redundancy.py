@@ -10,7 +10,6 @@ from three_stacks import HIGH, LOW, RANGE, WEIGHTS, B, W, can_push, circle, forc
 
 from ctrlgen import InputError, build_model, generate, load_scenario, solve
 from ctrlgen.controller.controller_step import ControllerStatus
-from ctrlgen.controller.feedforward import Controller
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.controller.null_motion import null_motion
 from ctrlgen.firmware.c.real import Real
@@ -34,7 +33,7 @@ def pairs(**other):
 
 @pytest.mark.parametrize("weights", [None, WEIGHTS])
 def test_the_drives_are_those_of_the_quadratic_programme_wherever_there_are_any(weights):
-    controller = Controller(build_model(stage(drive_weight=weights)), "pose", T)
+    controller = controller_of(build_model(stage(drive_weight=weights)), "pose", T)
     rng, state, acted = np.random.default_rng(5), controller.rest(), 0
     for _ in range(80):
         target = rng.uniform(-26e-6, 26e-6, 2)
@@ -57,7 +56,7 @@ def test_the_drives_are_those_of_the_quadratic_programme_wherever_there_are_any(
 def test_the_null_space_keeps_a_rate_wherever_drives_keep_it_and_push_as_wanted():
     """Whether there are such drives is what a linear programme over range and rate says."""
     model = build_model(stage(drive_rate={"a": "30 V/ms", "b": "60 V/ms"}))
-    controller, rng = Controller(model, "pose", T), np.random.default_rng(6)
+    controller, rng = controller_of(model, "pose", T), np.random.default_rng(6)
     rise = np.array([30.0, 60.0, np.inf])
     state, kept, spared = controller.rest(), 0, 0
     target = np.zeros(2)
@@ -84,7 +83,7 @@ def test_pairs_that_act_on_axes_of_their_own_are_chosen_each_by_itself():
     motion = null_motion(model)
     assert motion.groups == ((0, 1), (2, 3))
     assert np.allclose(OPPOSED @ motion.direction, 0.0, atol=1e-15)
-    controller = Controller(model, "pose", T)
+    controller = controller_of(model, "pose", T)
     for target in np.random.default_rng(7).uniform(-1, 1, (40, 2)) * [25e-6, 12e-6]:
         step = controller.step(controller.rest(), target)
         f = forces(target)

@@ -92,10 +92,19 @@ def test_the_readmes_example_compiles_and_runs(packages, unsolved, compiler, tmp
 def test_the_readme_states_units_limits_statuses_costs_and_provenance(packages, circle):
     c = packages["circle20"]
     text = (c.path / "README.md").read_text()
-    for words in ("3: delta_x [m]", "0: 1X [W]", "temperature_3Y [K]", "wire flexure stress <= 550 MPa", "_DRIVE` 8",
-                  "called every 0.001 s (1000 Hz)",
-                  f"{c.operations} arithmetic operations", f"{c.worst_operations} at most", circle.scenario.digest["device"],
-                  "Mech. Mach. Theory", "calls on one state must not"):  # fmt: skip
+    for words in (
+        "3: delta_x [m]",
+        "0: 1X [W]",
+        "temperature_3Y [K]",
+        "wire flexure stress <= 550 MPa",
+        "_DRIVE` 8",
+        "called every 0.001 s (1000 Hz)",
+        f"{c.operations} arithmetic operations",
+        f"{c.worst_operations} at most",
+        circle.scenario.digest["device"],
+        "Mech. Mach. Theory",
+        "calls on one state must not",
+    ):
         assert words in text, words
     pictures = re.findall(r"!\[.*?\]\((.*?)\)", text)
     assert len(pictures) == 5 and all((c.path / picture).read_text().startswith("<svg") for picture in pictures)

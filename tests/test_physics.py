@@ -337,8 +337,13 @@ def test_the_stage_is_as_stiff_as_its_frame_of_notches_and_levers(p: SimpleNames
 def test_with_ideal_hinges_and_rigid_levers_the_stage_is_as_stiff_as_its_force_law_says(p: SimpleNamespace) -> None:
     s, n, r, tiny = p.stage, p.stage.notch, p.stage.notch_radius, 1e-4
     c = n.theta_z_per_M_z
-    hinge = replaced(n, theta_z_per_F_y=c * r, delta_y_per_M_z=c * r, delta_y_per_F_y=c * r**2 * (1 + 0.05 * tiny),
-                     delta_x_per_F_x=n.delta_x_per_F_x * tiny)  # fmt: skip
+    hinge = replaced(
+        n,
+        theta_z_per_F_y=c * r,
+        delta_y_per_M_z=c * r,
+        delta_y_per_F_y=c * r**2 * (1 + 0.05 * tiny),
+        delta_x_per_F_x=n.delta_x_per_F_x * tiny,
+    )
     ideal = replaced(
         s, notch=hinge, lever_width=s.lever_width / tiny, half_stage_stiffness=s.half_stage_stiffness / tiny
     )

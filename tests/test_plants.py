@@ -278,7 +278,7 @@ def test_circle(whole):
     assert list(case.parasitic().values()) == pytest.approx([5.67e-6, 5.66e-6, 4.36e-6], rel=0.03)
 
 
-@pytest.mark.long
+@pytest.mark.exhaustive
 def test_the_program_prints_table_3_and_the_circle(monkeypatch, capsys):
     monkeypatch.setattr(program, "stage_forces", lambda: None)  # seconds, and nothing of the two tables
     monkeypatch.setattr("sys.argv", ["plants"])

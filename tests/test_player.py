@@ -15,12 +15,7 @@ from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.toolchains import FLAGS
 from ctrlgen.firmware.folder import generate
 from ctrlgen.firmware.player import spline
-from ctrlgen.firmware.player.compression import (
-    INSTRUCTION_BUDGET,
-    TOLERANCE_SHARE,
-    compress,
-    instructions,
-)
+from ctrlgen.firmware.player.compression import INSTRUCTION_BUDGET, TOLERANCE_SHARE, compress, instructions
 from ctrlgen.model.simulation import simulate
 from ctrlgen.trajectory.playback import ANGLE_TOLERANCE, LENGTH_TOLERANCE
 
@@ -125,10 +120,13 @@ def test_the_choice_is_the_shortest_within_tolerance_and_budget_and_both_are_rec
     assert [x.kind for x in c.candidates] == ["table", "cubic"]
     assert sum(x.chosen for x in c.candidates) == 1 and all(x.remark for x in c.candidates)
     good = [
-        x for x in c.candidates
-        if x.bytes and x.instructions <= INSTRUCTION_BUDGET
-        and x.length <= TOLERANCE_SHARE * LENGTH_TOLERANCE and x.angle <= TOLERANCE_SHARE * ANGLE_TOLERANCE
-    ]  # fmt: skip
+        x
+        for x in c.candidates
+        if x.bytes
+        and x.instructions <= INSTRUCTION_BUDGET
+        and x.length <= TOLERANCE_SHARE * LENGTH_TOLERANCE
+        and x.angle <= TOLERANCE_SHARE * ANGLE_TOLERANCE
+    ]
     assert c.chosen.bytes == min(x.bytes for x in good) == c.curve.bytes(real)
     assert c.chosen.remark == "fewest bytes"
     assert all(x.chosen or x.remark == f"more bytes than the {c.chosen.kind}" for x in good)

@@ -92,9 +92,12 @@ def test_a_toml_file_changes_numbers_of_a_python_file_and_adds_effects(folder):
         (STAGE.replace('("0 V", "150 V")', '("0 V",)'), "must be the lowest and the highest value"),
         (STAGE.replace('"250 MPa")},', '"250 MPa"), "other": 3},'), "limits.other: must be (law, largest value)"),
         (STAGE.replace("1e13 * d.x", "1e7 + 1e13 * d.x"), "limits.stress: is 1e+07 at home"),
-        (STAGE.replace("1e13 * d.x", "1e13 * d.z"), "limits.stress: raised AttributeError: the displacement has no 'z'"),
+        (
+            STAGE.replace("1e13 * d.x", "1e13 * d.z"),
+            "limits.stress: raised AttributeError: the displacement has no 'z'",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_is_wrong_with_a_python_file_is_said(folder, text, says):
     (folder / "stage.py").write_text(text)
     with pytest.raises(InputError) as caught:
@@ -116,9 +119,13 @@ def test_a_toml_file_that_names_no_python_file_or_an_unknown_number_is_refused(f
 
 def with_ports(drive, axes, force):
     return ctrlgen.user_device(
-        "stage", parameters={"k": "1 N/um", "g": "0.2 N/V"}, drive=dict.fromkeys(drive, "100 V"), axes=dict.fromkeys(axes, "30 um"),
-        force=force, restoring_force=lambda d, p: p.k * d.vector,
-    )  # fmt: skip
+        "stage",
+        parameters={"k": "1 N/um", "g": "0.2 N/V"},
+        drive=dict.fromkeys(drive, "100 V"),
+        axes=dict.fromkeys(axes, "30 um"),
+        force=force,
+        restoring_force=lambda d, p: p.k * d.vector,
+    )
 
 
 @pytest.mark.parametrize(
@@ -150,9 +157,13 @@ def test_more_or_fewer_drives_than_axes_are_refused_and_what_is_left_is_said(fol
 )
 def test_every_path_is_also_one_of_angles(tmp_path, path):
     device = ctrlgen.user_device(
-        "mirror", parameters={"k": "1 N*m/rad", "g": "1 mN*m/V"}, drive={"a": "10 V", "b": "10 V"},
-        axes={"tip": "20 mrad", "tilt": "20 mrad"}, force=lambda u, p: p.g * u.vector, restoring_force=lambda d, p: p.k * d.vector,
-    )  # fmt: skip
+        "mirror",
+        parameters={"k": "1 N*m/rad", "g": "1 mN*m/V"},
+        drive={"a": "10 V", "b": "10 V"},
+        axes={"tip": "20 mrad", "tilt": "20 mrad"},
+        force=lambda u, p: p.g * u.vector,
+        restoring_force=lambda d, p: p.k * d.vector,
+    )
     file = tmp_path / "scenario.toml"
     file.write_text(
         f'title = "t"\ndevice = "mirror"\nsample_rate = "1 kHz"\nduration = "0.1 s"\n[path]\n{path}\nplane = ["tip", "tilt"]\n'

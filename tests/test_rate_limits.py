@@ -40,9 +40,12 @@ def stage(rate=None, **other):
 def lagging(rate):
     """The same with amplifiers that follow within 1 ms."""
     return stage(
-        rate, parameters={"gain": "0.2 N/V", "k": "1 N/um", "tau": "1 ms"}, state={"a": "150 V", "b": "150 V"},
-        force=lambda x, p: [p.gain * x.a, p.gain * x.b], rates=lambda u, x, p: [(u.x - x.a) / p.tau, (u.y - x.b) / p.tau],
-    )  # fmt: skip
+        rate,
+        parameters={"gain": "0.2 N/V", "k": "1 N/um", "tau": "1 ms"},
+        state={"a": "150 V", "b": "150 V"},
+        force=lambda x, p: [p.gain * x.a, p.gain * x.b],
+        rates=lambda u, x, p: [(u.x - x.a) / p.tau, (u.y - x.b) / p.tau],
+    )
 
 
 def solved(folder, device, path=CIRCLE, duration=f"{PERIOD} s", rate=f"{N / PERIOD:g} Hz"):
@@ -114,10 +117,16 @@ def test_a_device_with_inertia_keeps_its_rates(tmp_path):
 
     def coil(rate):
         return ctrlgen.user_device(
-            "coil", parameters={"m": "0.5 kg", "c": "30 N*s/m", "k": "0.2 N/um", "f": "10 N/A"}, axes={"axis": "100 um"},
-            drive={"coil": "4 A"}, drive_rate=rate, force=lambda u, p: p.f * u.coil, restoring_force=lambda d, p: p.k * d.axis,
-            damping_force=lambda v, p: p.c * v.axis, mass=lambda p: p.m,
-        )  # fmt: skip
+            "coil",
+            parameters={"m": "0.5 kg", "c": "30 N*s/m", "k": "0.2 N/um", "f": "10 N/A"},
+            axes={"axis": "100 um"},
+            drive={"coil": "4 A"},
+            drive_rate=rate,
+            force=lambda u, p: p.f * u.coil,
+            restoring_force=lambda d, p: p.k * d.axis,
+            damping_force=lambda v, p: p.c * v.axis,
+            mass=lambda p: p.m,
+        )
 
     free = solved(tmp_path, coil(None), path, "0.1 s", "5 kHz")
     rest = STIFFNESS / 5 * -20e-6 / 10.0  # A
@@ -254,10 +263,16 @@ def test_where_a_path_is_too_fast_the_optimum_follows_it_as_near_as_the_rate_all
 def test_before_a_motion_with_inertia_stands_the_drive_that_holds_its_start(tmp_path):
     """So that its first step counts, although the motion itself starts gently."""
     device = ctrlgen.user_device(
-        "mass", parameters={"m": "0.5 kg", "c": "30 N*s/m", "k": "0.2 N/um", "f": "10 N/A"}, axes={"axis": "100 um"},
-        drive={"coil": "4 A"}, drive_rate={"coil": "1 kA/s"}, force=lambda u, p: p.f * u.coil, mass=lambda p: p.m,
-        restoring_force=lambda d, p: p.k * d.axis, damping_force=lambda v, p: p.c * v.axis,
-    )  # fmt: skip
+        "mass",
+        parameters={"m": "0.5 kg", "c": "30 N*s/m", "k": "0.2 N/um", "f": "10 N/A"},
+        axes={"axis": "100 um"},
+        drive={"coil": "4 A"},
+        drive_rate={"coil": "1 kA/s"},
+        force=lambda u, p: p.f * u.coil,
+        mass=lambda p: p.m,
+        restoring_force=lambda d, p: p.k * d.axis,
+        damping_force=lambda v, p: p.c * v.axis,
+    )
     n, moved = 20, np.zeros((3, 20, 1))
     moved[2] = 5.0  # m/s^2 at every sample, the first too
     motion = Motion(np.full((n, 1), -20e-6), moved[1:])

@@ -28,8 +28,9 @@ def test_the_printed_output_is_the_programs(tmp_path, compiler):
     out = tmp_path / "circle20"
     done = subprocess.run(
         [sys.executable, "-m", "ctrlgen", "run", str(ROOT / "scenarios" / "circle20"), "--out", str(out)],
-        capture_output=True, text=True,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0, done.stderr
     shown, printed = same(block("text", FIRMWARE)), same(done.stdout.replace(str(out), "out"))
     # Which compilers there are

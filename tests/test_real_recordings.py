@@ -12,7 +12,7 @@ import tomllib
 
 import numpy as np
 import pytest
-from conftest import ROOT
+from conftest import RECORDINGS, ROOT
 
 import ctrlgen
 from ctrlgen.core.errors import InputError
@@ -21,15 +21,21 @@ from ctrlgen.recordings.pose_errors import PoseErrors
 from ctrlgen.recordings.reader import load_recordings
 
 SCENARIOS = ROOT / "scenarios"
-DATA = ROOT.parent / "shared" / "recordings"
+
+
+def more(*cases):
+    """Further records of a machine of which one is diagnosed for every change."""
+    return [
+        pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=pytest.mark.exhaustive) for case in cases
+    ]
 
 
 def diagnosed(folder: str, name: str = "recording.toml", device: str = "device.toml"):
     """The diagnosis of one scenario; skips where its data are not on this machine."""
     model = ctrlgen.load_device(SCENARIOS / folder / device)
     path = SCENARIOS / folder / name
-    if "shared/recordings" in path.read_text() and not (DATA / folder).is_dir():
-        pytest.skip(f"{DATA / folder} is not here: its data may not be copied into this repository")
+    if "shared/recordings" in path.read_text() and not (RECORDINGS / folder).is_dir():
+        pytest.skip(f"{RECORDINGS / folder} is not here: its data may not be copied into this repository")
     return ctrlgen.diagnose(model, load_recordings([path], build_model(model)))
 
 
@@ -114,7 +120,7 @@ def test_a_hash_of_no_file_of_the_recording_is_a_fault(tmp_path):
         load_recordings([tmp_path / "run_a.toml"], model)
 
 
-@pytest.mark.long
+@pytest.mark.exhaustive
 def test_the_meso_hexapod_is_wired_and_built_otherwise_than_printed():
     """Held out: better than 36 free numbers fitted alike (1.63 um, 0.00103 deg)."""
     found = diagnosed("nist_hexapod", device="../devices/meso_hexapod.toml")
@@ -150,7 +156,7 @@ def test_emps_has_dry_friction_and_a_drive_that_counts_later():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["recording", "recording_split2", "recording_half_rate"])
+@pytest.mark.parametrize("name", ["recording_split2", *more("recording", "recording_half_rate")])
 def test_the_rack_has_friction_or_a_zero_that_is_off_and_two_clocks(name):
     """The motion never reverses, so that friction and a zero of the load cell are nearly one: the answer says so."""
     found = diagnosed("rack_pinion", f"{name}.toml")
@@ -162,7 +168,7 @@ def test_the_rack_has_friction_or_a_zero_that_is_off_and_two_clocks(name):
     assert left(found, "reading.force") < 0.35
 
 
-@pytest.mark.long
+@pytest.mark.exhaustive
 @pytest.mark.parametrize("name", ["recording", "recording_half_rate"])
 def test_the_axes_of_the_manipulator_share_a_spring(name):
     found = diagnosed("flexure_2dof", f"{name}.toml")
@@ -173,7 +179,7 @@ def test_the_axes_of_the_manipulator_share_a_spring(name):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["recording", "recording_split2"])
+@pytest.mark.parametrize("name", ["recording_split2", *more("recording")])
 def test_the_servo_motor_has_dry_friction(name):
     found = diagnosed("servo_motor", f"{name}.toml")
     force = found.findings[0].parameters["force"]
@@ -183,7 +189,7 @@ def test_the_servo_motor_has_dry_friction(name):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["recording", "recording_split2"])
+@pytest.mark.parametrize("name", ["recording_split2", *more("recording")])
 def test_the_piezo_ceramic_draws_a_butterfly(name):
     found = diagnosed("piezo_pnzt", f"{name}.toml")
     assert found.findings[0].effect == "butterfly" and found.findings[0].share.value > 0.4
@@ -191,7 +197,7 @@ def test_the_piezo_ceramic_draws_a_butterfly(name):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("run, limit, period", [("a", 0.15, 90.0), ("b", 0.15, None), ("c", 0.1, 180.0)])
+@pytest.mark.parametrize("run, limit, period", [("a", 0.15, 90.0), *more(("b", 0.15, None), ("c", 0.1, 180.0))])
 def test_the_rotary_axis_comes_late_and_its_resolver_has_harmonics(run, limit, period):
     found = diagnosed("rotary_axis", f"run_{run}.toml")
     effects = {f.effect for f in found.findings}

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-import os
-from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import MESO_FILE, ROOT, SCENARIOS
+from conftest import MESO_FILE, RECORDINGS, SCENARIOS
 from recorded import AXES, COLUMNS, N, csv_text, described, refused, samples, two
 
 from ctrlgen import build_model, load_device
@@ -16,8 +14,6 @@ from ctrlgen.recordings.formats import read_table
 from ctrlgen.recordings.outliers import outliers, stuck_samples
 from ctrlgen.recordings.reader import load_recordings
 from papers.s0_data import load_s0
-
-MEASURED = Path(os.environ.get("CTRLGEN_RECORDINGS", ROOT.parent / "shared" / "recordings"))
 
 
 @pytest.fixture(scope="module")
@@ -314,7 +310,7 @@ def test_the_poses_of_nist_are_a_recording(meso):
     "name", ["emps/DATA_EMPS.mat", "friction_damper/ds2_1Hz_36lb_1in.json", "rotary_axis/run_a.csv"]
 )
 def test_real_files_are_read_and_nothing_in_them_is_marked(name):
-    path = MEASURED / name
+    path = RECORDINGS / name
     if not path.exists():
         pytest.skip(f"{path} is not there: the real recording was not read")
     drive, read = {".mat": ("vir", "qm"), ".json": (1, 2), ".csv": ("commanded_deg", "measured_deg")}[path.suffix]

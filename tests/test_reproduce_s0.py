@@ -96,8 +96,12 @@ def test_the_errors_of_both_models_are_the_check_figures(data) -> None:
         (calibrated, 1.585, 3.951, 0.00092, 0.00274, (3, 3, 5, 5)),
         (model, 9.32, 19.93, 0.0037, 0.0122, (2, 2, 4, 4)),
     ):
-        ours = (errors.translation.mean() / UM, errors.translation.max() / UM, errors.rotation.mean() / DEG,
-                errors.rotation.max() / DEG)  # fmt: skip
+        ours = (
+            errors.translation.mean() / UM,
+            errors.translation.max() / UM,
+            errors.rotation.mean() / DEG,
+            errors.rotation.max() / DEG,
+        )
         for value, known, places in zip(ours, (mean, largest, mean_turn, largest_turn), digits, strict=True):
             assert abs(value - known) <= 0.5 * 10.0**-places  # half a unit of PHYSICS.md
 
@@ -304,9 +308,11 @@ def test_what_follows_from_the_device_as_printed_is_not(rows) -> None:
         row.where for row in rows if row.where.startswith("Table 1") and row.status is ReproductionStatus.DIFFERS
     ]
     assert differing == [
-        "Table 1, L from eq. (1)", "Table 1, c_3 from r_a and its angles", "Table 1, c_4 from r_a and its angles",
+        "Table 1, L from eq. (1)",
+        "Table 1, c_3 from r_a and its angles",
+        "Table 1, c_4 from r_a and its angles",
         "Table 1, r_a from c_3 and c_4",
-    ]  # fmt: skip
+    ]
 
 
 @pytest.mark.skipif(not SEED.is_file(), reason="no shared source texts beside the repository")

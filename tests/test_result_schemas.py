@@ -17,18 +17,33 @@ from ctrlgen.reporting.result_file import SCHEMAS, origin
 from ctrlgen.version import __version__
 
 EMPTY = {
-    "excess": 0.1, "by_reading": [], "by_actuator": [],
+    "excess": 0.1,
+    "by_reading": [],
+    "by_actuator": [],
     "coordinates": {"participation_ratio": {}, "explained_by_one": {}, "located_in": "cannot be told from one reading"},
-    "by_frequency": [], "by_travel": {}, "by_direction": {}, "by_time": [], "by_temperature": [], "spectral_lines": [],
+    "by_frequency": [],
+    "by_travel": {},
+    "by_direction": {},
+    "by_time": [],
+    "by_temperature": [],
+    "spectral_lines": [],
     "statements": [],
-}  # fmt: skip
+}
 RECORD = {
     **origin({"device.toml": "0" * 64}, 7, ("a note",)),
-    "verdict": "consistent", "sentence": "Consistent.", "findings": [], "shares": None, "empirical_terms": [],
+    "verdict": "consistent",
+    "sentence": "Consistent.",
+    "findings": [],
+    "shares": None,
+    "empirical_terms": [],
     "attribution": {"explained": 0.0, "rest": None, "held_out": True},
-    "residual_location": {"before": EMPTY, "after": EMPTY}, "held_out": {},
-    "spikes": {}, "detectability": {"smallest": {}, "undetectable": []}, "next_experiment": None, "search_history": [],
-}  # fmt: skip
+    "residual_location": {"before": EMPTY, "after": EMPTY},
+    "held_out": {},
+    "spikes": {},
+    "detectability": {"smallest": {}, "undetectable": []},
+    "next_experiment": None,
+    "search_history": [],
+}
 
 
 def test_the_schemas_that_are_shipped_are_those_of_the_models(tmp_path):
@@ -62,11 +77,17 @@ def test_a_record_without_one_of_its_keys_does_not_conform(key):
 @pytest.mark.parametrize(
     "path, value",
     [
-        (("verdict",), "perhaps"), (("schema_version",), 2), (("inputs", "device.toml"), "0" * 63), (("seed",), "7"),
-        (("where",), {}), (("program", "name"), "other"), (("residual_location", "before", "excess"), "much"),
-        (("residual_location", "before", "said"), []), (("detectability", "smallest"), []),
+        (("verdict",), "perhaps"),
+        (("schema_version",), 2),
+        (("inputs", "device.toml"), "0" * 63),
+        (("seed",), "7"),
+        (("where",), {}),
+        (("program", "name"), "other"),
+        (("residual_location", "before", "excess"), "much"),
+        (("residual_location", "before", "said"), []),
+        (("detectability", "smallest"), []),
     ],
-)  # fmt: skip
+)
 def test_a_record_with_another_key_or_kind_of_value_does_not_conform(path, value):
     record = deepcopy(json.loads(json.dumps(RECORD)))
     node = record

@@ -24,7 +24,7 @@ from ctrlgen.budget.linear import propagate
 from ctrlgen.budget.robust import ChanceConstraint
 from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.budget.uncertainty import load_uncertainties
-from ctrlgen.controller.feedforward import Controller
+from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.devices.changed_numbers import changed
 from ctrlgen.firmware.folder import generate
 from ctrlgen.trajectory import solution as described
@@ -212,7 +212,7 @@ def test_draws_break_limits_of_the_plain_path_and_not_of_the_robust_one(plain, r
     assert robust.scenario.home["delta_z"] < -5e-6  # lower is colder: the error is less
 
 
-@pytest.mark.long
+@pytest.mark.exhaustive
 def test_of_a_hundred_thousand_draws_as_few_break_limits_as_is_stated():
     scenario = load_scenario(EXAMPLE)
     model = model_of(scenario)
@@ -275,7 +275,7 @@ def test_a_simulated_device_at_the_quantile_keeps_the_stroke_on_the_robust_path_
 
 @pytest.mark.long
 def test_the_generated_controller_keeps_the_tightened_limits(robust, plain, tmp_path):
-    controller = Controller(robust.model, "pose", robust.scenario.sample_time)
+    controller = controller_of(robust.model, "pose", robust.scenario.sample_time)
     target = robust.command[0].copy()
     target[robust.model.signals["pose"].channels.index("delta_z")] = 80e-6  # above the workspace
     step = controller.step((robust.trace.x[0], robust.trace.z[0]), target, settle=True)

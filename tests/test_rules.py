@@ -14,8 +14,9 @@ import pytest
 import three_stacks
 from conftest import SCENARIOS, effect_device
 
-from ctrlgen import Controller, build_model, load_scenario
+from ctrlgen import build_model, load_scenario
 from ctrlgen.controller.feedforward import ControllerStatus
+from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.firmware.c.cprint import print_function
 from ctrlgen.firmware.c.deviations import DEVIATIONS, permits
 from ctrlgen.firmware.c.elementary import elementary_text
@@ -126,7 +127,7 @@ def test_the_list_of_deviations_is_exact_with_a_player(circle, tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("kind", ["creep", "hysteresis"])
+@pytest.mark.parametrize("kind", ["creep", pytest.param("hysteresis", marks=pytest.mark.exhaustive)])
 def test_controllers_of_devices_with_effects_break_no_rule_and_survive_hostile_calls(kind, tmp_path):
     effects = {
         "creep": {"kind": "creep", "at": "1X", "tau": "0.03 s", "gain": 0.02, "slow": 0.3},
@@ -298,7 +299,7 @@ def test_from_a_state_of_garbage_c_and_python_answer_alike_and_admissibly(
         *map(str, folder.sources(Real.DOUBLE)),
     ]
     subprocess.run([*words, "-o", str(program)], check=True)
-    controller = Controller(model, scenario.file.follow, scenario.sample_time)
+    controller = controller_of(model, scenario.file.follow, scenario.sample_time)
     x, z = controller.rest()
     (x if part == "x" else z)[0] = garbage
     target = scenario.command(model)[:3]

@@ -6,7 +6,7 @@ import ctypes
 import struct
 import subprocess
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import casadi as ca
@@ -18,6 +18,7 @@ from ctrlgen import Controller, InputError, build_model, load_device, load_scena
 from ctrlgen.calibration.calibrate import CalibratedConstant, Calibration
 from ctrlgen.calibration.constants_files import binary
 from ctrlgen.controller.controller_step import ControllerStatus
+from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.controller.run_time_check import check_run_time
 from ctrlgen.devices.changed_numbers import changed
@@ -133,28 +134,26 @@ def libraries(tmp_path_factory):
 @pytest.fixture(scope="module")
 def controller(libraries):
     device = libraries[Real.DOUBLE].scenario.device
-    return Controller(build_model(device), "pose", 1e-3)
+    return controller_of(build_model(device), "pose", 1e-3)
 
 
 def test_a_controller_with_another_slack_has_the_same_kernels_and_limits_of_its_own(controller):
-    wide = controller.with_slack(4e-6)
-    pairs = list(zip((controller, *controller.variants), (wide, *wide.variants), strict=True))
-    assert len(pairs) > 10
-    assert all(one.static is other.static and one.moving is other.moving for one, other in pairs)
-    for own, other in zip(wide.slacks, controller.slacks_of(4e-6), strict=True):
+    wide = replace(controller, slack=4e-6)
+    assert wide.kernels is controller.kernels and len(wide.kernels.variants) > 10
+    for own, other in zip(wide.slacks, controller.kernels.slacks(4e-6), strict=True):
         np.testing.assert_array_equal(own, other)
     assert wide.slacks[0].max() > 1000 * controller.slacks[0].max()
 
 
 def test_the_same_controller_of_a_model_is_made_once(controller):
-    one, again = (controller_of(controller.model, "pose", 1e-3) for _ in range(2))
+    one, again = (controller_of(controller.kernels.model, "pose", 1e-3) for _ in range(2))
     assert one is again
-    assert controller_of(controller.model, "pose", 2e-3) is not one
+    assert controller_of(controller.kernels.model, "pose", 2e-3) is not one
 
 
 def chosen(controller: Controller) -> list[dict[str, float]]:
     """The file's constants, both ends, and some drawn between."""
-    stated = controller.model.device.given_at_start
+    stated = controller.kernels.model.device.given_at_start
     rng = np.random.default_rng(3)
     drawn = [{c.path: rng.uniform(c.low, c.high) for c in stated} for _ in range(3)]
     return [{}, {c.path: c.low for c in stated}, {c.path: c.high for c in stated}, *drawn]
@@ -178,8 +177,8 @@ def test_the_c_with_other_constants_is_the_controller_of_a_device_file_with_thes
     limit = {Real.DOUBLE: 1e-9, Real.FLOAT: 2e-3}[real]
     acted = ControllerStatus(0)
     for values in chosen(controller):
-        device = changed(controller.model.device, values).model_copy(update={"run_time": None})
-        reference = Controller(build_model(device), "pose", 1e-3)
+        device = changed(controller.kernels.model.device, values).model_copy(update={"run_time": None})
+        reference = controller_of(build_model(device), "pose", 1e-3)
         assert library.init(values) == 0
         state = reference.rest()
         for k, target in enumerate(targets(controller)):
@@ -189,7 +188,7 @@ def test_the_c_with_other_constants_is_the_controller_of_a_device_file_with_thes
             expected = np.concatenate([step.drive / 12.2, step.displacement / 55e-6, step.actuator_state / 800])
             found = answer / np.repeat([12.2, 55e-6, 800], 6)
             acted |= step.status
-            assert np.all(answer[:6] >= 0) and np.all(answer[:6] <= reference.nominal.u_bounds[1] * (1 + 1e-6))
+            assert np.all(answer[:6] >= 0) and np.all(answer[:6] <= reference.kernels.nominal.u_bounds[1] * (1 + 1e-6))
             # In float the line search may accept another trial, an equally good answer.
             if real is Real.DOUBLE or not step.status & ControllerStatus.DRIVE:
                 assert np.max(np.abs(found - expected)) < limit, (values, k, found - expected)
@@ -203,7 +202,7 @@ def test_the_c_with_other_constants_is_the_controller_of_a_device_file_with_thes
 def test_an_ambient_that_changes_acts_from_the_next_sample_on(libraries, controller, real):
     library = libraries[real]
     assert library.init({}) == 0
-    cold, warm = (controller.at({"actuator.ambient": 273.15 + degC}) for degC in (22, 31))
+    cold, warm = (controller.kernels.at({"actuator.ambient": 273.15 + degC}) for degC in (22, 31))
     target = np.array([0, 0, 0, 2e-6, 0, 20e-6])
     state = cold.step(cold.rest(), target, settle=True).state
     library.call("settle", target)
@@ -314,13 +313,13 @@ def test_what_is_reserved_of_limits_is_reserved_of_those_that_follow_from_the_co
     """A path whose limits hold for what is uncertain, `robust`: the bounds at other constants, less the same reserve."""
     device = load_device(SCENARIOS / "devices" / "mems_hexapod_run_time.toml")
     plain = build_model(device)
-    robust = Controller(plain.tightened(RESERVES, 0.999), "pose", 1e-3)
+    robust = ControllerKernels(plain.tightened(RESERVES, 0.999), "pose", 1e-3)
     for values in (
         {},
         {"actuator.ambient": 288.15},
         {"actuator.ambient": 303.15, "actuator.thermal_resistance": 460.0},
     ):
-        own, other = Controller(plain, "pose", 1e-3).at(values).model, robust.at(values).model
+        own, other = ControllerKernels(plain, "pose", 1e-3).at(values).model, robust.at(values).model
         p = [values.get(path, number) for number, path in robust.given.numbers]
         for variable, below, above in (("x", 3.0, 12.0), ("u", 0.0, 0.05)):
             low, high = getattr(own, f"{variable}_bounds")
@@ -339,13 +338,13 @@ def test_the_c_of_a_robust_path_keeps_its_reserves_whatever_constants_it_is_give
     made = generate(scenario, model, tmp_path / "c")
     library, controller = (
         Library(scenario, made.path, Real.DOUBLE, made.online[Real.DOUBLE]),
-        Controller(model, "pose", 1e-3),
+        controller_of(model, "pose", 1e-3),
     )
-    size = float(np.abs(controller.nominal.u_bounds[1]).max())
+    size = float(np.abs(controller.kernels.nominal.u_bounds[1]).max())
     met = ControllerStatus(0)
     for values in chosen(controller)[:4]:
         assert library.init(values) == 0
-        reference = controller.at(values)
+        reference = Controller(controller.kernels.at(values))
         state = reference.rest()
         for target in targets(controller):
             step = reference.step(state, target)
@@ -355,7 +354,7 @@ def test_the_c_of_a_robust_path_keeps_its_reserves_whatever_constants_it_is_give
             assert np.max(np.abs(answer[:6] - step.drive)) < 1e-9 * size
             library.write_state(step.state)  # each sample from one state: a path drifts where a limit acts
             state = library.read_state()
-            assert np.all(state[0] <= reference.nominal.x_bounds[1] + 1e-6)  # K: the tightened 490 degC
+            assert np.all(state[0] <= reference.kernels.nominal.x_bounds[1] + 1e-6)  # K: the tightened 490 degC
     assert met & ControllerStatus.DISPLACEMENT
 
 
@@ -364,7 +363,7 @@ def test_a_constant_that_acts_on_what_is_compiled_in_is_refused_by_name(tmp_path
     text = '\n[run_time]\nconstants = ["stage.stroke", "stage.lever_long", "actuator.time_constant"]\n'
     scenario = scenario_of(tmp_path, text)
     with pytest.raises(InputError) as refused:
-        check_run_time(Controller(build_model(scenario.device), "pose", 1e-3))
+        check_run_time(ControllerKernels(build_model(scenario.device), "pose", 1e-3))
     told = str(refused.value)
     assert "stage.stroke: acts on the displacement range" in told and "stage.lever_long: acts on" in told
     assert "time_constant" not in told
@@ -381,4 +380,4 @@ def test_a_stage_with_inertia_is_refused(tmp_path):
     model = build_model(load_device(tmp_path / "device.toml"))
     assert model.inertial
     with pytest.raises(InputError, match="stage without inertia"):
-        check_run_time(controller_of(model, "displacement", 1e-3))
+        check_run_time(controller_of(model, "displacement", 1e-3).kernels)

@@ -72,9 +72,15 @@ def test_the_report_is_one_file_that_refers_to_nothing_outside(circle, tmp_path)
 
 @pytest.mark.parametrize(
     ("name", "says"),
-    [("force.9X.max", "channel"), ("colour.1X.max", "signals are"), ("force.1X", "CHANNEL.max"), ("margin.taste", "limits are"),
-     ("force.1X[100000]", "samples"), ("force", "write SIGNAL")],
-)  # fmt: skip
+    [
+        ("force.9X.max", "channel"),
+        ("colour.1X.max", "signals are"),
+        ("force.1X", "CHANNEL.max"),
+        ("margin.taste", "limits are"),
+        ("force.1X[100000]", "samples"),
+        ("force", "write SIGNAL"),
+    ],
+)
 def test_an_expectation_of_something_that_does_not_exist_is_refused(circle, name, says):
     with pytest.raises(ValueError, match=says):
         metric(circle, name)

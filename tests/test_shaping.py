@@ -37,8 +37,14 @@ def solved(folder, *given, **words):
 def driven(drive, more=0, start=(0.0, 0.0)):
     """(n + more + 1, 2) position and speed of the stage, the last drive held: exact for held drives."""
     A, B, *_ = cont2discrete(
-        (np.array([[0, 1], [-STIFFNESS / MASS, -DAMPING / MASS]]), np.array([[0], [FORCE / MASS]]), np.eye(2), np.zeros((2, 1))), H
-    )  # fmt: skip
+        (
+            np.array([[0, 1], [-STIFFNESS / MASS, -DAMPING / MASS]]),
+            np.array([[0], [FORCE / MASS]]),
+            np.eye(2),
+            np.zeros((2, 1)),
+        ),
+        H,
+    )
     u, y = np.append(drive, np.full(more, drive[-1])), [np.array(start)]
     for each in u:
         y.append(A @ y[-1] + B[:, 0] * each)
@@ -65,9 +71,10 @@ def impulses(kind, frequency, ratio):
     """Times and amplitudes as the paper prints them."""
     K = np.exp(-np.pi * ratio / np.sqrt(1 - ratio**2))
     amplitudes = {
-        "ZV": np.array([1, K]) / (1 + K), "ZVD": np.array([1, 2 * K, K**2]) / (1 + 2 * K + K**2),
+        "ZV": np.array([1, K]) / (1 + K),
+        "ZVD": np.array([1, 2 * K, K**2]) / (1 + 2 * K + K**2),
         "ZVDD": np.array([1, 3 * K, 3 * K**2, K**3]) / (1 + 3 * K + 3 * K**2 + K**3),
-    }[kind]  # fmt: skip
+    }[kind]
     return np.arange(len(amplitudes)) / (2 * frequency * np.sqrt(1 - ratio**2)), amplitudes
 
 
@@ -146,12 +153,34 @@ def test_with_inertia_feedforward_a_shaped_path_is_followed_exactly(tmp_path):
 @pytest.mark.parametrize(
     ("words", "what"),
     [
-        ({"shaping": 'shaping = { kind = "ZV" }', "path": 'kind = "circle"\ndiameter = "8 mrad"\nplane = ["theta_x", "theta_y"]\n',
-          "device": AXIS.parent / "tripod.toml"}, "periodic: write from_rest"),
-        ({"shaping": 'shaping = { kind = "ZV" }', "feedforward": "inertia", "path": 'kind = "line"\nend = { delta_z = "10 um" }\n',
-          "device": AXIS.parent / "mems_hexapod.toml", "rate": "1 kHz", "duration": "0.5 s"}, "no inertia, so that no mode vibrates"),
-        ({"path": 'kind = "line"\nend = { delta_z = "10 um" }\n', "device": AXIS.parent / "mems_hexapod.toml", "rate": "1 kHz",
-          "duration": "0.5 s"}, "the device has no inertia; leave it out"),
+        (
+            {
+                "shaping": 'shaping = { kind = "ZV" }',
+                "path": 'kind = "circle"\ndiameter = "8 mrad"\nplane = ["theta_x", "theta_y"]\n',
+                "device": AXIS.parent / "tripod.toml",
+            },
+            "periodic: write from_rest",
+        ),
+        (
+            {
+                "shaping": 'shaping = { kind = "ZV" }',
+                "feedforward": "inertia",
+                "path": 'kind = "line"\nend = { delta_z = "10 um" }\n',
+                "device": AXIS.parent / "mems_hexapod.toml",
+                "rate": "1 kHz",
+                "duration": "0.5 s",
+            },
+            "no inertia, so that no mode vibrates",
+        ),
+        (
+            {
+                "path": 'kind = "line"\nend = { delta_z = "10 um" }\n',
+                "device": AXIS.parent / "mems_hexapod.toml",
+                "rate": "1 kHz",
+                "duration": "0.5 s",
+            },
+            "the device has no inertia; leave it out",
+        ),
         ({"shaping": 'shaping = { kind = "zv" }'}, "ZVD"),
         ({"shaping": 'shaping = { kind = "ZV", frequency = "-3 Hz" }'}, "frequency"),
         ({"shaping": 'shaping = { kind = "ZV", damping_ratio = "120 %" }'}, "damping_ratio"),
@@ -159,7 +188,7 @@ def test_with_inertia_feedforward_a_shaped_path_is_followed_exactly(tmp_path):
         ({"shaping": 'shaping = { kind = "ZV", frequency = "1 mHz" }'}, "1e\\+07 samples longer, but at most 1000000"),
         ({"shaping": 'shaping = { kind = "ZV", frequency = "11 kHz" }'}, "above half the sample_rate, 10000 Hz"),
     ],
-)  # fmt: skip
+)
 def test_what_cannot_be_shaped_is_a_fault(tmp_path, words, what):
     with pytest.raises(InputError, match=what):
         solved(tmp_path, **words)
@@ -168,11 +197,20 @@ def test_what_cannot_be_shaped_is_a_fault(tmp_path, words, what):
 @pytest.mark.parametrize(
     ("more", "what"),
     [
-        ('[[effect]]\nkind = "thermal_lag"\nat = "axis"\nshare = "0.2"\ntau = "0.01 s"\nsecond = "0.3"\n', "effects with memories,"),
-        ('[loop]\nposition_gain = "50 1/s"\nvelocity_gain = "100 V/(m/s)"\nintegral_gain = "0 V/(m*s)"\n', "a feedback loop"),
-        ('[[effect]]\nkind = "coulomb"\nat = "axis"\nforce = "1 N"\nreach = "0.1 um"\nsmoothing = "1 um/s"\n', "and dry friction"),
+        (
+            '[[effect]]\nkind = "thermal_lag"\nat = "axis"\nshare = "0.2"\ntau = "0.01 s"\nsecond = "0.3"\n',
+            "effects with memories,",
+        ),
+        (
+            '[loop]\nposition_gain = "50 1/s"\nvelocity_gain = "100 V/(m/s)"\nintegral_gain = "0 V/(m*s)"\n',
+            "a feedback loop",
+        ),
+        (
+            '[[effect]]\nkind = "coulomb"\nat = "axis"\nforce = "1 N"\nreach = "0.1 um"\nsmoothing = "1 um/s"\n',
+            "and dry friction",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_drive_that_depends_on_the_motion_is_not_static(tmp_path, more, what):
     (tmp_path / "device.toml").write_text(AXIS.read_text() + more)
     with pytest.raises(InputError, match=f"feedforward: is static, but .*{what}"):

@@ -40,9 +40,13 @@ def signals():
     rng = np.random.default_rng(11)
     x, y, u = (np.sin(multisine(rng)) for _ in range(3))  # within limits that every stretch reaches
     return Signals(
-        time=T, sample_time=H, position={"x": x, "y": y}, drive={"u": u}, reading={"x": x, "y": y},
+        time=T,
+        sample_time=H,
+        position={"x": x, "y": y},
+        drive={"u": u},
+        reading={"x": x, "y": y},
         temperature=np.sin(multisine(rng, low=0.2, high=0.8)),
-    )  # fmt: skip
+    )
 
 
 def planted(function, rng, part=PART):

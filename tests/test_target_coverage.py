@@ -111,6 +111,6 @@ def test_a_device_whose_limits_have_no_cheap_bound_has_vectors_too():
     """With stages that yield less to the struts as they stiffen the wire stress is not of the first degree in the displacement."""
     model = build_model(effect_device({"kind": "link_load", "at": "all", "share": "1.15"}))
     controller = controller_of(model, "pose", 1e-3)
-    assert controller.guarded_limits and controller.composite_bound is None
+    assert controller.kernels.guarded_limits and controller.kernels.composite_bound is None
     fresh = controller_of(model, "pose", 1e-3)  # nothing of which is worked out yet
     assert {call.settle for call in limiter_calls(fresh, 2.0**-24, 8)} == {True, False}

@@ -14,13 +14,21 @@ from ctrlgen.model.assembly import build_model
 from ctrlgen.model.simulation import trace
 
 SECOND = {
-    "mass": "2 kg*m^2", "damping": "3 N*m*s/rad", "stiffness": "50 N*m/rad", "stroke": "0.1 rad", "speed": "1 rad/s", "force": "5 N*m",
-}  # fmt: skip
+    "mass": "2 kg*m^2",
+    "damping": "3 N*m*s/rad",
+    "stiffness": "50 N*m/rad",
+    "stroke": "0.1 rad",
+    "speed": "1 rad/s",
+    "force": "5 N*m",
+}
 FIRST = {**SECOND, "mass": "1 kg*m^2", "damping": "0 N*m*s/rad", "stiffness": "100 N*m/rad"}
 PAIR = {
-    "kind": "tested_axes", "name": "pair", "title": "two rotary axes", "source": "round numbers",
+    "kind": "tested_axes",
+    "name": "pair",
+    "title": "two rotary axes",
+    "source": "round numbers",
     "axis": [{"name": "a", **FIRST}, {"name": "b", **SECOND}],
-}  # fmt: skip
+}
 H, N = 1e-3, 400
 T = H * np.arange(N)
 A, B = 2 * np.pi * 5, 2 * np.pi * 8
@@ -48,11 +56,14 @@ def test_each_axis_takes_its_own_torque():
 @pytest.mark.parametrize(
     "effect, expected",
     [
-        ({"kind": "quadratic_damping", "at": "a", "damping": "1 N*m*s^2/rad^2"}, lambda: np.abs(SPEED[:, 0]) * SPEED[:, 0]),
+        (
+            {"kind": "quadratic_damping", "at": "a", "damping": "1 N*m*s^2/rad^2"},
+            lambda: np.abs(SPEED[:, 0]) * SPEED[:, 0],
+        ),
         ({"kind": "stiffening", "at": "a", "k3": "1000 N*m/rad^3"}, lambda: 1000 * ANGLE[:, 0] ** 3),
     ],
     ids=lambda value: value["kind"] if isinstance(value, dict) else "",
-)  # fmt: skip
+)
 def test_a_law_acts_on_the_axis_where_it_stands(effect, expected):
     """It adds its torque there, by that axis' own motion, and nothing to the other axis."""
     added = torque(device_of(effect)) - torque(device_of())

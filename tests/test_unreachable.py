@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from conftest import DEVICE
 from scipy.optimize import linprog
+from unreachable_paths import ABOVE, BACKLASH, CASES, CIRCLE, CREEP, OTHERS
 
 import ctrlgen
 from ctrlgen import Unreachable, build_model, load_scenario, solve
@@ -16,48 +17,6 @@ from ctrlgen.trajectory.inverse.violations import violations
 from ctrlgen.trajectory.optimisation import TrajectoryProgramme
 
 DEVICES = DEVICE.parent
-BACKLASH = '\n[[effect]]\nkind = "backlash"\nat = "2X"\ngap = "0.3 um"\n'
-CREEP = '\n[[effect]]\nkind = "creep"\nat = "all"\ngain = "3 %"\ntau = "0.5 s"\nslow = "30 %"\n'
-ABOVE, RRR = 'centre = { delta_z = "20 um" }', 'centre = { theta_z = "-2 mrad" }'
-CIRCLE, SPIRAL = 'kind = "circle"\ndiameter = "{}"\n', 'kind = "spiral"\ndiameter = "{}"\nturns = 5\n'
-RASTER = 'kind = "raster"\nlength = "{}"\nspacing = "1 um"\nlines = 11\n'
-
-# Device, effects, rate, duration, path, what is said
-CASES = {
-    "circle without height": ("mems_hexapod", "", 1000, 1.0, CIRCLE.format("20 um"), "only pushes"),
-    "spiral without height": ("mems_hexapod", "", 1000, 1.5, SPIRAL.format("16 um"), "only pushes"),
-    "raster without height": ("mems_hexapod", "", 500, 2.64, RASTER.format("10 um"), "only pushes"),
-    "circle too large": ("mems_hexapod", "", 1000, 1.0, CIRCLE.format("60 um") + ABOVE, "only pushes"),
-    "circle a hundred times too large": ("mems_hexapod", "", 1000, 1.0, CIRCLE.format("5 mm") + ABOVE, "only pushes"),
-    "circle too fast": ("mems_hexapod", "", 1000, 0.012, CIRCLE.format("20 um") + ABOVE, "cannot cool faster"),
-    "circle just too fast": ("mems_hexapod", "", 1000, 0.035, CIRCLE.format("20 um") + ABOVE, "cannot cool faster"),
-    "line beyond the stroke": (
-        "mems_hexapod", "", 1000, 1.0, 'kind = "line"\nstart = { delta_z = "10 um" }\nend = { delta_z = "90 um" }', "stroke ends",
-    ),
-    "line too steep": (
-        "mems_hexapod", "", 1000, 0.004, 'kind = "line"\nstart = { delta_z = "40 um" }\nend = { delta_z = "5 um" }', "cannot cool faster",
-    ),
-    "tilt that the wires do not stand": (
-        "mems_hexapod", "", 200, 0.5, 'kind = "line"\nstart = { delta_z = "30 um" }\nend = { theta_y = "-4.1 mrad", delta_z = "30 um" }',
-        "wire flexure stress",
-    ),
-    "lissajous without height": (
-        "mems_hexapod", "", 500, 0.6, 'kind = "lissajous"\namplitudes = ["8 um", "6 um"]\nperiods = [3, 2]', "only pushes",
-    ),
-    "upright circle": (
-        "mems_hexapod", "", 500, 0.6, 'kind = "circle"\ndiameter = "30 um"\nplane = ["delta_x", "delta_z"]\ncentre = { delta_z = "10 um" }',
-        "only pushes",
-    ),
-    "circle with backlash": ("mems_hexapod", BACKLASH, 500, 1.0, CIRCLE.format("60 um") + ABOVE, "only pushes"),
-    "circle with creep": ("mems_hexapod", CREEP, 500, 1.0, CIRCLE.format("60 um") + ABOVE, "only pushes"),
-    "fast circle with creep": ("mems_hexapod", CREEP, 1000, 0.012, CIRCLE.format("20 um") + ABOVE, "cannot cool faster"),
-    "3-RRR, 5 mm": ("rrr_case2", "", 5000, 0.2, CIRCLE.format("5 mm") + RRR, "stroke ends"),
-    "3-RRR, 200 um": ("rrr_case2", "", 5000, 0.1, CIRCLE.format("200 um") + RRR, "stroke ends"),
-    "3-RRR, other way round": ("rrr_case2", "", 5000, 0.1, CIRCLE.format("20 um") + 'centre = { theta_z = "2 mrad" }', "stroke ends"),
-    "3-RRR without bias": ("rrr_case1", "", 5000, 0.1, CIRCLE.format("20 um"), "stroke ends"),
-    "meso hexapod, 40 mm": ("meso_hexapod", "", 100, 2.0, CIRCLE.format("40 mm"), "stroke ends"),
-    "meso hexapod, far line": ("meso_hexapod", "", 100, 2.0, 'kind = "line"\nend = { delta_z = "9 mm" }', "stroke ends"),
-}  # fmt: skip
 
 
 def written(folder, device: str, effects: str, rate: float, duration: float, path: str):
@@ -99,20 +58,8 @@ def test_a_path_that_cannot_be_followed_is_explained(tmp_path, name):
             assert np.linalg.norm(static.optimum()[0].unreachable_by, axis=1).max() < FEASIBILITY_TOLERANCE, what
 
 
-STAGE = {"x": "80 um", "y": "80 um"}
 SQUARE_B = 0.2 * np.array([[1.0, 0.5, 0.0], [0.0, -0.5, 1.0]])  # N/V
 VOLTS = [(-100.0, 100.0), (0.0, 150.0), (-20.0, 130.0)]
-IN_PLANE = 'plane = ["x", "y"]\n'
-LINE = 'kind = "line"\nstart = {{ {0} = "{1}" }}\nend = {{ {0} = "{2}" }}\n'
-
-
-def stacks(rate=None):
-    """Three stacks on two axes of 1 N/um."""
-    return ctrlgen.user_device(
-        "stacks", parameters={"g": "0.2 N/V", "k": "1 N/um"}, axes=STAGE, drive_rate=None if rate is None else {"a": rate},
-        drive={"a": "100 V", "b": ("0 V", "150 V"), "c": ("-20 V", "130 V")}, restoring_force=lambda d, p: p.k * d.vector,
-        force=lambda u, p: [p.g * (u.a + 0.5 * u.b), p.g * (u.c - 0.5 * u.b)],
-    )  # fmt: skip
 
 
 def pushed(path, rate, h, closed):
@@ -122,10 +69,15 @@ def pushed(path, rate, h, closed):
     step = np.eye(n) - np.roll(np.eye(n), 1, axis=0)
     change = np.kron(step if closed else step[1:], [[1.0, 0.0, 0.0]])
     allowed = np.full(len(change), np.inf if rate is None else rate * h * (1 + 1e-6))
-    return linprog(
-        np.zeros(3 * n), A_eq=np.kron(np.eye(n), SQUARE_B), b_eq=1e6 * held.ravel(), bounds=VOLTS * n,
-        A_ub=np.vstack([change, -change]) if rate else None, b_ub=np.tile(allowed, 2) if rate else None,
-    ).status == 0  # fmt: skip
+    found = linprog(
+        np.zeros(3 * n),
+        A_eq=np.kron(np.eye(n), SQUARE_B),
+        b_eq=1e6 * held.ravel(),
+        bounds=VOLTS * n,
+        A_ub=np.vstack([change, -change]) if rate else None,
+        b_ub=np.tile(allowed, 2) if rate else None,
+    )
+    return found.status == 0
 
 
 def moved(path, h, mass, damping, stiffness, force, limit):
@@ -134,30 +86,6 @@ def moved(path, h, mass, damping, stiffness, force, limit):
     v = np.gradient(d, h)
     drive = (mass * np.gradient(v, h) + damping * v + stiffness * d) / force
     return np.abs(drive).max() <= 1.01 * limit  # the differences' error
-
-
-AXIS = (0.5, 30.0, 0.2e6, 10.0, 4.0)  # of flexure_axis.toml: kg, N*s/m, N/m, N/V, V
-# Device, what of its file is written anew, rate, duration, path, what is said, whether an alternative can be followed
-OTHERS = {
-    "lever stage, 150 V do not reach": (
-        "xy_lever_stage", (), 2000, 0.1, CIRCLE.format("90 um") + 'centre = { delta_x = "-40 um", delta_y = "-40 um" }', "drive of", None,
-    ),
-    "lever stage, rate of its amplifiers": (
-        "xy_lever_stage", ('low = "0 V"\n', 'low = "0 V"\nrate = "0.5 V/ms"\n'), 2000, 0.1,
-        CIRCLE.format("40 um") + 'centre = { delta_x = "-40 um", delta_y = "-40 um" }', "the path is too fast", None,
-    ),
-    "mirror without bias": ("tip_tilt_mirror", (), 1000, 0.2, CIRCLE.format("0.6 mrad") + 'plane = ["theta_x", "theta_y"]\n', "leg_", None),
-    "mirror, 100 V do not reach": (
-        "tip_tilt_mirror", (), 1000, 0.2, LINE.format("delta_z", "2 um", "25 um"), "amplifier output of leg", None,
-    ),
-    "axis with inertia, beyond its drive": ("flexure_axis", (), 5000, 0.1, LINE.format("axis", "0 um", "500 um"), "axis", AXIS),
-    "axis with inertia, too fast": ("flexure_axis", (), 20000, 0.0016, LINE.format("axis", "0 um", "90 um"), "drive of axis", AXIS),
-    "more drives than axes, too large": (stacks(), (), 1000, 0.2, CIRCLE.format("60 um") + IN_PLANE, "drive of", None),
-    "more drives than axes, rate": (stacks("0.3 V/ms"), (), 1000, 0.3, CIRCLE.format("22 um") + IN_PLANE, "the path is too fast", 300.0),
-    "more drives than axes, rate on a line": (
-        stacks("0.2 V/ms"), (), 1000, 0.25, 'kind = "line"\nend = { x = "26 um", y = "6 um" }\n', "the path is too fast", 200.0,
-    ),
-}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", OTHERS)
@@ -253,9 +181,12 @@ def test_memories_are_carried_until_a_closed_path_repeats_or_is_seen_not_to(tmp_
 def pair(folder, points, timing="", more="", **words):
     """Two axes in balance with a stiffness of 1 N/um, along listed points."""
     given = dict(
-        parameters={"k": "1 N/um"}, drive={"a": "200 N", "b": "200 N"}, axes={"x": ("-10 um", "50 um"), "y": ("-50 um", "50 um")},
-        force=lambda u: u.vector, restoring_force=lambda d, p: p.k * d.vector,
-    )  # fmt: skip
+        parameters={"k": "1 N/um"},
+        drive={"a": "200 N", "b": "200 N"},
+        axes={"x": ("-10 um", "50 um"), "y": ("-50 um", "50 um")},
+        force=lambda u: u.vector,
+        restoring_force=lambda d, p: p.k * d.vector,
+    )
     device = ctrlgen.user_device("pair", **(given | words))
     listed = ", ".join(f'{{ x = "{float(x)!r} um", y = "{float(y)!r} um" }}' for x, y in points)
     (folder / "scenario.toml").write_text(
@@ -318,9 +249,11 @@ def test_of_a_jump_beyond_the_stroke_the_stroke_alone_is_the_cause(tmp_path):
     timing = 'sample_rate = "100 Hz"\n'
     for y, causes in ((0, {"x"}), (48, {"x", "b"})):
         scenario, model = pair(
-            tmp_path, [(10, 0), (10, 0), (60, 0), (60, 0), (10, 0), (10, 0), (10, 0), (10, y), (10, y)], timing,
+            tmp_path,
+            [(10, 0), (10, 0), (60, 0), (60, 0), (10, 0), (10, 0), (10, 0), (10, y), (10, y)],
+            timing,
             drive={"a": "55 N", "b": "45 N"},
-        )  # fmt: skip
+        )
         needed = PathInverse(model, "pose", scenario.sample_time).trajectory(scenario.command(model), False)
         broken = needed.violations(model, scenario.sample_time, False)
         assert "a" in {v.limit.channels[v.channel] for v in broken}

@@ -18,7 +18,7 @@ from markupsafe import escape
 from result_files import faults
 from typer.testing import CliRunner
 
-from ctrlgen import ToolError, generate
+from ctrlgen import ToolError
 from ctrlgen.app import scenario_pipeline as pipeline
 from ctrlgen.app.commands import controllers  # noqa: F401, it registers the command
 from ctrlgen.app.commands.app import app
@@ -33,9 +33,24 @@ from ctrlgen.verification.in_loop import Cost, InLoop, Stopped, TargetRun
 pytestmark = pytest.mark.long
 
 KEYS = {
-    "scenario", "inputs", "passed", "failures", "not_run", "interface", "budgets", "errors_along_the_trajectory", "targets",
-    "stopped", "checks", "comparison", "compilers", "margins", "expected", "c", "program",
-}  # fmt: skip
+    "scenario",
+    "inputs",
+    "passed",
+    "failures",
+    "not_run",
+    "interface",
+    "budgets",
+    "errors_along_the_trajectory",
+    "targets",
+    "stopped",
+    "checks",
+    "comparison",
+    "compilers",
+    "margins",
+    "expected",
+    "c",
+    "program",
+}
 TOOLS = {
     "cppcheck --addon=misra",
     "clang-tidy",
@@ -113,15 +128,16 @@ def test_the_same_input_gives_the_same_numbers_on_a_page_twice(example, tmp_path
 
 
 @pytest.fixture(scope="module")
-def example(circle, tmp_path_factory) -> Build:
+def example(circle, circle_c) -> Build:
     """A build of six drives in which all is well."""
-    c = generate(circle.scenario, circle.model, tmp_path_factory.mktemp("c"), circle)
     cost = Cost("step, along the scenario", 10, 500.0, 601, 601)
     run = TargetRun("Cortex-M4F", "zig 0.13", Real.FLOAT, (cost,), 256, 1000, 100, 0, 500, 0, 0, "")
     rows = (ComparisonRow("gcc double", "scenario, online C - CasADi", "drive", "W", 0.0, 0.0, 1.0, 10, None),)
     errors = {"online C": {real: np.full((5, 6), 1e-12) for real in Real}}
     check = Check("clang-tidy", "14", (("x.c", Real.FLOAT),), "passed")
-    return Build(circle, c, (), Comparison(rows, {"gcc": "gcc 12"}, ()), InLoop((run,), (), ()), (check,), errors)
+    return Build(
+        circle, circle_c, (), Comparison(rows, {"gcc": "gcc 12"}, ()), InLoop((run,), (), ()), (check,), errors
+    )
 
 
 def shown(build: Build, out: Path) -> str:
@@ -216,7 +232,8 @@ def test_c_that_a_compiler_refuses_leaves_nothing_behind(stubbed, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.long
+# .ci/run does this at the command line
+@pytest.mark.exhaustive
 def test_the_circle_passes_everything_that_is_there(compiler, tmp_path):
     build = pipeline.verify(SCENARIOS / "circle20", tmp_path / "out")
     assert build.passed, build.failures

@@ -97,10 +97,21 @@ def test_an_interferometer_on_the_meso_hexapod_counts_the_way():
 
 def test_the_mems_hexapod_takes_a_sensor_with_numbers_of_its_own():
     own = {
-        "kind": "displacement", "at": "theta_z", "arm": "1.5 mm", "sensitivity": "1 um/V", "gain": 1, "bandwidth": "1 kHz",
-        "noise": "6 mV", "filtered_noise": "2 mV", "filter_cutoff": "10 Hz", "offset_rate": "0 V/delta_degC",
-        "calibrated_at": "22 degC", "low": "0 V", "high": "5 V", "adc": {"low": "0 V", "high": "5.12 V", "bits": 9},
-    }  # fmt: skip
+        "kind": "displacement",
+        "at": "theta_z",
+        "arm": "1.5 mm",
+        "sensitivity": "1 um/V",
+        "gain": 1,
+        "bandwidth": "1 kHz",
+        "noise": "6 mV",
+        "filtered_noise": "2 mV",
+        "filter_cutoff": "10 Hz",
+        "offset_rate": "0 V/delta_degC",
+        "calibrated_at": "22 degC",
+        "low": "0 V",
+        "high": "5 V",
+        "adc": {"low": "0 V", "high": "5.12 V", "bits": 9},
+    }
     (sensor,) = with_sensors("mems_hexapod", own).device.sensor
     assert sensor.figures().step == pytest.approx(10e-9 / 1.5e-3) and sensor.figures().high == pytest.approx(
         2.5e-6 / 1.5e-3

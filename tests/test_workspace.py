@@ -6,7 +6,8 @@ import pytest
 from conftest import DEVICES
 
 from ctrlgen import InputError, build_model, load_device, simulate
-from ctrlgen.controller.feedforward import Controller
+from ctrlgen.controller.kernels import ControllerKernels
+from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.trajectory.workspace import Workspace
 
 UM = 1e-6
@@ -23,7 +24,7 @@ def at(dz: float) -> np.ndarray:
 
 def test_without_stress_the_workspace_is_the_strokes_seen_through_the_jacobian(workspace, model):
     """Low down only the pushing directions bind: pure translation needs d = R(psi)' delta + the lift's share >= 0."""
-    lift = Controller(model, "pose", None).static.displacement(model.rest, 0, at(10)).full().ravel()
+    lift = ControllerKernels(model, "pose", None).static.displacement(model.rest, 0, at(10)).full().ravel()
     ranges = workspace.ranges(at(10))
     turns = np.deg2rad([0, -120, 120])
     x_needs = np.array([[np.cos(t), -np.sin(t)] for t in turns]).ravel()  # d per unit of delta_x on (1X, 1Y, 2X, ...)
@@ -33,7 +34,7 @@ def test_without_stress_the_workspace_is_the_strokes_seen_through_the_jacobian(w
 
 
 def test_its_boundary_is_where_the_controller_begins_to_report(workspace, model, rng):
-    controller = Controller(model, "pose", None)
+    controller = controller_of(model, "pose", None)
     directions = rng.normal(size=(40, 6)) * np.array(model.signals["pose"].scale)
     far = workspace.reach(at(20), directions)
     for way, direction in zip(far, directions, strict=True):

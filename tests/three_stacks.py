@@ -33,8 +33,11 @@ def heavy(**other):
     """The same with mass and damping, without hardening."""
     return stage(
         parameters={"g": "0.2 N/V", "k": "1 N/um", "m": "1 kg", "c": "100 N*s/m"},
-        restoring_force=lambda d, p: p.k * d.vector, damping_force=lambda v, p: p.c * v.vector, mass=lambda p: [p.m, p.m], **other,
-    )  # fmt: skip
+        restoring_force=lambda d, p: p.k * d.vector,
+        damping_force=lambda v, p: p.c * v.vector,
+        mass=lambda p: [p.m, p.m],
+        **other,
+    )
 
 
 def circle(micrometres, x=0.0, y=0.0):
@@ -59,10 +62,14 @@ def reference(f, weights):
         return np.sum(weights * s**2)
 
     found = minimize(
-        effort, start, jac=lambda s: 2 * weights * s, bounds=list(zip(LOW / RANGE, HIGH / RANGE, strict=True)),
-        constraints={"type": "eq", "fun": lambda s: (S @ s - f), "jac": lambda s: S}, method="SLSQP",
+        effort,
+        start,
+        jac=lambda s: 2 * weights * s,
+        bounds=list(zip(LOW / RANGE, HIGH / RANGE, strict=True)),
+        constraints={"type": "eq", "fun": lambda s: S @ s - f, "jac": lambda s: S},
+        method="SLSQP",
         options={"ftol": 1e-12, "maxiter": 500},
-    )  # fmt: skip
+    )
     assert found.success
     return found.x * RANGE
 

@@ -6,21 +6,115 @@ It has no feedback: what it keeps of the device is the state that its own model 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
+import casadi as ca
 import numpy as np
 
 from ctrlgen.controller.controller_step import ControllerStatus, ControllerStep, State, clamp, row
+from ctrlgen.controller.drive_rate import FREE, RateLimiter
 from ctrlgen.controller.kernels import ControllerKernels
+from ctrlgen.controller.limit_reach import Slacks
+from ctrlgen.controller.lost_state import Groups, is_beyond
+from ctrlgen.controller.null_motion import of_least_effort
 from ctrlgen.model.inverse import Inverse
 
+SLACK = 1e-9  # of a signal's typical size: an excess below this is clipped without being reported
 SECANT_STEPS = 3  # of the line search toward a target that the drives cannot reach in one sample
 SECANT_FRACTION = 1 - 2**-8  # of the secant estimate is taken, because the drive is not linear along the line
 
 
+def unobserved(what: str, answer: np.ndarray) -> None:
+    """Takes no notice of an answer."""
+
+
 @dataclass(frozen=True)
-class Controller(ControllerKernels):
-    """One device, one followed signal, one sample time (None: equilibria only)."""
+class Controller:
+    """The limiter around the kernels of one device.
+
+    `slack`, of a signal's typical size, is the excess over a limit that is clipped without report. Without `keeps_rates` drives change as
+    fast as they are asked to. Each answer of a kernel that a decision is taken on is told to `observe` with its name: "displacement",
+    "state", "drive", "composite_bound", "composite_ratio", and "rate" with whether the rates change the drives, and by more than the slack.
+    """
+
+    kernels: ControllerKernels
+    slack: float = SLACK
+    keeps_rates: bool = True
+    observe: Callable[[str, np.ndarray], object] = unobserved
+
+    @cached_property
+    def slacks(self) -> Slacks:
+        """Excess over a limit that is clipped without report, for displacement, actuator state and drive."""
+        return self.kernels.slacks(self.slack)
+
+    @cached_property
+    def state_can_be_limited(self) -> bool:
+        """Whether a displacement in range can need an actuator state beyond its limits."""
+        return self.kernels.state_can_be_limited(self.slack)
+
+    @cached_property
+    def drive_can_be_limited(self) -> tuple[bool, bool]:
+        """Whether a displacement in range can need a drive beyond its limits, to settle there and to step there."""
+        return self.kernels.drive_can_be_limited(self.slack)
+
+    @cached_property
+    def rate(self) -> RateLimiter | None:
+        """What keeps the limits on rates of drives; None for a device without, and where no time passes."""
+        k = self.kernels
+        if k.sample_time is None or not (k.rated and self.keeps_rates):
+            return None
+        fall, rise = (np.clip(bound * k.sample_time, -FREE, FREE) for bound in k.nominal.rate_bounds)
+        return RateLimiter(fall, rise, self.slacks[2])
+
+    @cached_property
+    def plausible(self) -> Groups:
+        """What a state is judged by."""
+        return self.kernels.plausible(self.rate is not None)
+
+    def is_lost(self, *state: np.ndarray) -> bool:
+        """Whether a state cannot be one that the controller left."""
+        return is_beyond(self.plausible, *state)
+
+    def rest(self) -> State:
+        """State of a device at rest at ambient temperature, its drives off."""
+        m = self.kernels.nominal
+        still = m.rest.copy(), np.zeros(len(m.axes))
+        return still if self.rate is None else (*still, self.kernels.safe_drive.copy())
+
+    def drive(self, k: Inverse, state: State, wanted: np.ndarray, state_wanted: np.ndarray) -> np.ndarray:
+        """(n_u,) the drives that displacement and actuator state need, by the kernels `k`; beyond limits where none keep them."""
+        return self.chosen(self._answer("drive", k.drive, *state[:2], wanted, state_wanted), state)
+
+    def chosen(self, drive: np.ndarray, state: State) -> np.ndarray:
+        """Of all drives (n_u,) that push as `drive`, those of least effort within limits."""
+        return of_least_effort(drive, self.kernels.redundancy, self.rate, *state[2:])
+
+    def drive_rounding(
+        self, before: State, target: np.ndarray, step: ControllerStep, settle: bool, share: float
+    ) -> float:
+        """By how much the drives of a `step` from the state `before` to `target` change where displacement and actuator state do
+        by this `share` of themselves."""
+        k = self._inverse(settle)
+        reached = (step.displacement, step.actuator_state)
+        off = self.drive(k, before, *(value * (1 + share) for value in reached)) - self.drive(k, before, *reached)
+        return float(np.max(np.abs(off)))
+
+    def _inverse(self, settle: bool) -> Inverse:
+        return self.kernels.modes[not settle]
+
+    def _toward(self, rate: RateLimiter, last: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, float, bool, bool]:
+        """`RateLimiter.toward`, observed."""
+        drive, share, touched, held = rate.toward(last, wanted)
+        self.observe("rate", np.array([touched, held]))
+        return drive, share, touched, held
+
+    def _answer(self, what: str, kernel: ca.Function, *arguments: object) -> np.ndarray:
+        """The answer of a kernel on which a decision is taken."""
+        answer = row(kernel(*arguments))
+        self.observe(what, answer)
+        return answer
 
     def step(self, state: State, target: np.ndarray, *, settle: bool = False) -> ControllerStep:
         """Drives that bring the followed signal to `target` (channels,) [SI] at the next sample, from `state` (as `rest`).
@@ -32,27 +126,27 @@ class Controller(ControllerKernels):
         A target that the drives cannot reach in one sample is approached along the straight line of displacements, on
         which convex limits hold.
         """
-        m, (x, z) = self.nominal, state[:2]
-        first = self.examined_first[not settle and self.moving is not None]
+        kernels, m, (x, z) = self.kernels, self.kernels.nominal, state[:2]
+        k = self._inverse(settle)
+        n, static = m.n_states, k is kernels.static
+        first = kernels.examined_first[not static]
         if np.all(np.isnan(np.concatenate(state))) or (first and self.is_lost(*state)):
             return self._without_state()
-        k = self.static if settle or self.moving is None else self.moving
-        n, static = m.n_states, k is self.static
         z_slack, _, u_slack = self.slacks
-        wanted, status = row(k.displacement(x, z, target)), ControllerStatus(0)
+        wanted, status = self._answer("displacement", k.displacement, x, z, target), ControllerStatus(0)
         if not np.all((wanted >= m.z_bounds[0]) & (wanted <= m.z_bounds[1])):  # a NaN is not inside either
-            usable = np.all(np.abs(target) <= self.input_limits[: len(target)])
+            usable = np.all(np.abs(target) <= kernels.input_limits[: len(target)])
             if not usable:
                 lost = not first and self.is_lost(*state)
                 return self._without_state() if lost else self._without_target(k, state)
             beyond = wanted
             wanted, hit = clamp(beyond, *m.z_bounds, z_slack)
             if hit:
-                wanted = row(self.nearest(beyond))
+                wanted = row(kernels.nearest(beyond))
                 status |= ControllerStatus.DISPLACEMENT
         state_wanted, hit = self._limited_state(k, x, z, wanted)
         if hit:
-            wanted = row(k.settle(np.concatenate([state_wanted, x[n:]]), wanted, self.safe_drive))
+            wanted = row(k.settle(np.concatenate([state_wanted, x[n:]]), wanted, kernels.safe_drive))
             status |= ControllerStatus.STATE
         wanted, worst = self._limit_composite(x, z, wanted)
         if worst > 1:
@@ -70,7 +164,7 @@ class Controller(ControllerKernels):
             status |= ControllerStatus.DRIVE
         held = False
         if self.rate is not None:
-            u, share, touched, held = self.rate.toward(state[2], u)
+            u, share, touched, held = self._toward(self.rate, state[2], u)
             if touched and not first and self.is_lost(*state):
                 return self._without_state()
             u = np.clip(u, *m.u_bounds)
@@ -82,47 +176,50 @@ class Controller(ControllerKernels):
         x_next = row(k.advance(x, wanted if static else z, u))
         z_next = row(k.settle(x_next, wanted, u)) if limited else wanted
         if held:
-            status |= self._passed(x_next, z_next) if self.limits_can_be_passed else status
+            status |= self._passed(x_next, z_next) if kernels.limits_can_be_passed else status
             state_wanted = x_next[:n]
         return ControllerStep(status, z_next, state_wanted, u, (x_next, z_next, *last))
 
     def _passed(self, x: np.ndarray, z: np.ndarray) -> ControllerStatus:
         """The limits beyond which a device is that has come to (x, z) with its drives as fast as they may change."""
-        found, n, (low, high) = ControllerStatus(0), self.nominal.n_states, self.nominal.x_bounds
-        if clamp(z, *self.nominal.z_bounds, self.slacks[0])[1]:
-            found |= ControllerStatus.DISPLACEMENT
+        m, status = self.kernels.nominal, ControllerStatus(0)
+        n, (low, high) = m.n_states, m.x_bounds
+        if clamp(z, *m.z_bounds, self.slacks[0])[1]:
+            status |= ControllerStatus.DISPLACEMENT
         if self.state_can_be_limited and clamp(x[:n], low[:n], high[:n], self.slacks[1])[1]:
-            found |= ControllerStatus.STATE
-        return found | (ControllerStatus.COMPOSITE if self._limit_composite(x, z, z)[1] > 1 + self.slack else found)
+            status |= ControllerStatus.STATE
+        return status | (ControllerStatus.COMPOSITE if self._limit_composite(x, z, z)[1] > 1 + self.slack else status)
 
     def _without_state(self) -> ControllerStep:
         """The safe drive, where nothing is known of the device; a device that is left alone comes to rest."""
         rest, home = self.rest()[:2]
         lost = tuple(np.full_like(part, np.nan) for part in self.rest())
-        return ControllerStep(ControllerStatus.LOST, home, rest[: self.nominal.n_states], self.safe_drive, lost)
+        n = self.kernels.nominal.n_states
+        return ControllerStep(ControllerStatus.LOST, home, rest[:n], self.kernels.safe_drive, lost)
 
     def _without_target(self, k: Inverse, state: State) -> ControllerStep:
         """The safe drive, or the way to it that rates allow, and what the device does under it for one sample."""
-        (x, z, *last), u = state, self.safe_drive
+        (x, z, *last), m, u = state, self.kernels.nominal, self.kernels.safe_drive
         if self.rate is not None:
-            u = np.clip(self.rate.toward(last[0], u)[0], *self.nominal.u_bounds)
+            u = np.clip(self._toward(self.rate, last[0], u)[0], *m.u_bounds)
             last = [u]
         x_next = row(k.advance(x, z, u))
         z_next = row(k.settle(x_next, z, u))
-        return ControllerStep(ControllerStatus.INPUT, z, x[: self.nominal.n_states], u, (x_next, z_next, *last))
+        return ControllerStep(ControllerStatus.INPUT, z, x[: m.n_states], u, (x_next, z_next, *last))
 
     def _limited_state(self, k: Inverse, x: np.ndarray, z: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, bool]:
         """The actuator state that displacement `wanted` needs, limited to its range, and whether that changed it."""
-        n, (low, high) = self.nominal.n_states, self.nominal.x_bounds
-        state = row(k.state(x, z, wanted))
+        n, (low, high) = self.kernels.nominal.n_states, self.kernels.nominal.x_bounds
+        state = self._answer("state", k.state, x, z, wanted)
         return clamp(state, low[:n], high[:n], self.slacks[1]) if self.state_can_be_limited else (state, False)
 
     def _limit_composite(self, x: np.ndarray, z: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, float]:
         """`wanted` scaled toward home where it breaks a guarded limit, and the largest share of a limit seen (0: none looked at)."""
-        worst = 0.0
-        if self.guarded_limits and (self.composite_bound is None or not float(self.composite_bound(wanted)) <= 1):
-            for _ in range(self.composite_rounds):
-                ratio = float(self.composite_ratio(x, z, wanted))
+        kernels, worst = self.kernels, 0.0
+        bound = kernels.composite_bound
+        if kernels.guarded_limits and (bound is None or not self._answer("composite_bound", bound, wanted)[0] <= 1):
+            for _ in range(kernels.composite_rounds):
+                ratio = float(self._answer("composite_ratio", kernels.composite_ratio, x, z, wanted)[0])
                 if ratio > 1:  # not for NaN
                     worst, wanted = max(worst, ratio), wanted / ratio
         return wanted, worst
@@ -135,7 +232,7 @@ class Controller(ControllerKernels):
         `SECANT_STEPS` secants of the drive that is first at its limit, each shortened to `SECANT_FRACTION`; the origin
         itself where its drives are inadmissible. `at_target`: the drives at `target`.
         """
-        (low, high), slack = self.nominal.u_bounds, self.slacks[2]
+        (low, high), slack = self.kernels.nominal.u_bounds, self.slacks[2]
 
         def answer(displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             state, _ = self._limited_state(k, now[0], now[1], displacement)

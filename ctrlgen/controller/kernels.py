@@ -13,10 +13,9 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.controller.composite_bound import composite_bound, worst_in_range
-from ctrlgen.controller.controller_step import ControllerStep, State, row
-from ctrlgen.controller.drive_rate import FREE, RateLimiter
-from ctrlgen.controller.limit_reach import drive_beyond, state_beyond
-from ctrlgen.controller.lost_state import Groups, is_beyond, plausible_sums
+from ctrlgen.controller.controller_step import row
+from ctrlgen.controller.limit_reach import Slacks, drive_beyond, state_beyond
+from ctrlgen.controller.lost_state import Groups, plausible_sums
 from ctrlgen.controller.named_inverse import NamedInverses, given_inverses, named_inverses
 from ctrlgen.controller.nearest_displacement import coupling, nearest_displacement
 from ctrlgen.controller.null_motion import NullMotion, null_motion
@@ -27,22 +26,17 @@ from ctrlgen.model.assembly import build_model
 from ctrlgen.model.inverse import NEWTON_STEPS, Inverse
 from ctrlgen.model.model import Model
 
-SLACK = 1e-9  # of a signal's typical size: an excess below this is clipped without being reported
 # The memory of an effect does not scale with the displacement, so its share of the excess is removed over several rounds.
 COMPOSITE_ROUNDS = 8
-
-# what a controller works out that depends on its slack
-OF_SLACK = frozenset({"slack", "slacks", "state_can_be_limited", "drive_can_be_limited", "rate", "variants"})
 
 
 @dataclass(frozen=True)
 class ControllerKernels:
-    """One device, one followed signal, one sample time (None: equilibria only)."""
+    """Those of one device, one followed signal, one sample time (None: equilibria only), each worked out when it is first asked for."""
 
     model: Model
     follow: str
     sample_time: float | None
-    slack: float = SLACK
 
     @cached_property
     def static(self) -> Inverse:
@@ -74,29 +68,21 @@ class ControllerKernels:
         return replace(found, model=found.model.limited_as(self.model))
 
     def at(self, values: dict[str, float]) -> Self:
-        """The controller of the device with its run-time constants at `values` [SI, by path]; the others as the file has them. What is
+        """The kernels of the device with its run-time constants at `values` [SI, by path]; the others as the file has them. What is
         reserved of limits is the same."""
         model = build_model(with_constants(self.model.device, values)).limited_as(self.model)
-        return type(self)(model, self.follow, self.sample_time, self.slack)
-
-    def with_slack(self, slack: float) -> Self:
-        """The same controller with another slack; the kernels, and what else does not depend on it, are this one's."""
-        _ = self.static, self.moving  # worked out now, for both
-        other = replace(self, slack=slack)
-        other.__dict__.update({name: value for name, value in self.__dict__.items() if name not in OF_SLACK})
-        other.__dict__["variants"] = tuple(variant.with_slack(slack) for variant in self.variants)
-        return other
+        return type(self)(model, self.follow, self.sample_time)
 
     @cached_property
     def variants(self) -> tuple[Self, ...]:
-        """The controllers of devices with other run-time constants, within their ranges
+        """The kernels of devices with other run-time constants, within their ranges
         (`ctrlgen.controller.run_time_choices`): decisions that are taken before the C runs hold for all of them."""
         return tuple(self.at(values) for values in choices(self.model.device.given_at_start))
 
     @cached_property
     def newton_steps(self) -> int:
         """Steps to the displacement that balances the forces: one where the balance is linear in it."""
-        return max(c._own_newton_steps for c in (self, *self.variants))
+        return max(k._own_newton_steps for k in (self, *self.variants))
 
     @cached_property
     def _own_newton_steps(self) -> int:
@@ -178,25 +164,24 @@ class ControllerKernels:
         cold = np.tile(m.rest[:, None], (1, count))
         return self.composite_ratio.map(count)(cold, 0 * displacements, displacements).full().ravel()
 
-    @cached_property
-    def state_can_be_limited(self) -> bool:
-        """Whether a displacement in range can need an actuator state beyond its limits (`ctrlgen.controller.limit_reach`)."""
-        if self.rate is not None:
+    def state_can_be_limited(self, share: float) -> bool:
+        """Whether a displacement in range can need an actuator state beyond its limits (`ctrlgen.controller.limit_reach`), by more than
+        the slacks of this share."""
+        if self.rated:
             return bool(np.any(np.isfinite([bound[: self.nominal.n_states] for bound in self.nominal.x_bounds])))
-        return any(state_beyond(c.nominal, *c._kernels, c._own_slacks(c.slack)) for c in (self, *self.variants))
+        return any(state_beyond(k.nominal, *k.modes, k.own_slacks(share)) for k in (self, *self.variants))
 
-    @cached_property
-    def drive_can_be_limited(self) -> tuple[bool, bool]:
+    def drive_can_be_limited(self, share: float) -> tuple[bool, bool]:
         """Whether a displacement in range can need a drive beyond its limits to settle there, or to step there, from any state
         (`ctrlgen.controller.limit_reach`). An actuator that never does for an equilibrium needs no line search to settle."""
-        if self.rate is not None:
+        if self.rated:
             return True, True
-        found = [drive_beyond(c.nominal, *c._kernels, c._own_slacks(c.slack)) for c in (self, *self.variants)]
-        return any(settle for settle, _ in found), any(step for _, step in found)
+        reached = [drive_beyond(k.nominal, *k.modes, k.own_slacks(share)) for k in (self, *self.variants)]
+        return any(settle for settle, _ in reached), any(step for _, step in reached)
 
     @property
-    def _kernels(self) -> tuple[Inverse, Inverse]:
-        """Those to settle and those to step."""
+    def modes(self) -> tuple[Inverse, Inverse]:
+        """The inverse to settle and the one to step."""
         return self.static, self.moving or self.static
 
     @property
@@ -209,40 +194,19 @@ class ControllerKernels:
         """(channels,) largest |target| that is accepted as a command: 1e5 typical sizes, far outside any range."""
         return 1e5 * np.array(self.target.scale)
 
-    def drive_rounding(
-        self,
-        before: State,
-        target: np.ndarray,
-        step: ControllerStep,
-        settle: bool,
-        share: float,
-    ) -> float:
-        """By how much the drives of a `step` from the state `before` to `target` change where displacement and actuator state do
-        by this `share` of themselves."""
-        k = self.static if settle or self.moving is None else self.moving
-        reached = (step.displacement, step.actuator_state)
-        off = self.drive(k, before, *(value * (1 + share) for value in reached)) - self.drive(k, before, *reached)
-        return float(np.max(np.abs(off)))
-
     @cached_property
     def safe_drive(self) -> np.ndarray:
         """(n_u,) the drive without a usable target: zero, or the admissible value nearest to it. A heater that is off cools passively."""
         return np.clip(0.0, *self.nominal.u_bounds)
 
-    @cached_property
-    def slacks(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Excess over a limit that is clipped without report, for displacement, actuator state and drive.
-
-        That of the drive is what the other two change it by.
-        """
-        return self.slacks_of(self.slack)
-
-    def slacks_of(self, slack: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """`slacks` for this share of a signal's typical size."""
-        z_slack, state_slack, u_slacks = zip(*(c._own_slacks(slack) for c in (self, *self.variants)), strict=True)
+    def slacks(self, share: float) -> Slacks:
+        """Excess over a limit that is clipped without report: for displacement and actuator state this share of a typical size, for the
+        drive what the other two change it by."""
+        z_slack, state_slack, u_slacks = zip(*(k.own_slacks(share) for k in (self, *self.variants)), strict=True)
         return z_slack[0], state_slack[0], np.max(u_slacks, axis=0)
 
-    def _own_slacks(self, share: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def own_slacks(self, share: float) -> Slacks:
+        """The same without regard of run-time constants."""
         m, n = self.nominal, self.nominal.n_states
         z_slack, state_slack = share * m.z_scale, share * m.x_scale[:n]
         x, z = self.model.rest, np.zeros(len(self.model.axes))
@@ -250,11 +214,9 @@ class ControllerKernels:
         drives = [row(kernel(x, z, z + side * z_slack, x[:n] + side * state_slack)) for side in (-1, 0, 1)]
         return z_slack, state_slack, np.max(np.abs(np.diff(drives, axis=0)), axis=0)
 
-    @cached_property
-    def plausible(self) -> Groups:
-        """What a state is judged by, see `plausible_sums`."""
-        rated = self.rate is not None
-        own, *others = (plausible_sums(c.nominal, rated) for c in (self, *self.variants))
+    def plausible(self, with_drive: bool) -> Groups:
+        """What a state is judged by, which holds the last drive or not, see `plausible_sums`."""
+        own, *others = (plausible_sums(k.nominal, with_drive) for k in (self, *self.variants))
         wider = [{those: most for those, most in sums} for sums in others]
         return tuple((those, max(most, *(w.get(those, most) for w in wider), most)) for those, most in own)
 
@@ -263,13 +225,13 @@ class ControllerKernels:
         """Whether the state is examined before it is used, to settle and to step: where the displacement of a target depends on it, or
         effects remember. Else it is examined where a limit is met: till then one that is lost would show in the drives, or none of its
         numbers enters the answer and all are written anew."""
-        settle, step = zip(*(c._own_examined_first for c in (self, *self.variants)), strict=True)
+        settle, step = zip(*(k._own_examined_first for k in (self, *self.variants)), strict=True)
         return any(settle), any(step)
 
     @cached_property
     def _own_examined_first(self) -> tuple[bool, bool]:
         m = self.nominal
-        kernels = [k.displacement for k in self._kernels]
+        kernels = [k.displacement for k in self.modes]
         targets = [ca.SX.sym("target", k.size1_in("target")) for k in kernels]
         settle, step = (
             m.x.numel() > m.n_states or ca.depends_on(k(m.x, m.z, target), ca.vertcat(m.x, m.z))
@@ -282,36 +244,13 @@ class ControllerKernels:
         """What keeps more drives than axes within their limits; None where there are as many."""
         return null_motion(self.nominal)
 
-    def drive(self, k: Inverse, state: State, wanted: np.ndarray, state_wanted: np.ndarray) -> np.ndarray:
-        """(n_u,) the drives that displacement and actuator state need, by the kernels `k`; beyond limits where none keep them."""
-        return self.chosen(row(k.drive(*state[:2], wanted, state_wanted)), state)
-
-    def chosen(self, drive: np.ndarray, state: State) -> np.ndarray:
-        """Of all drives (n_u,) that push as `drive`, those of least effort within limits."""
-        if self.redundancy is None:
-            return drive
-        window = () if self.rate is None else (state[2] + self.rate.fall, state[2] + self.rate.rise)
-        return self.redundancy.within(drive, *window)
-
-    @cached_property
-    def rate(self) -> RateLimiter | None:
-        """What keeps the limits on rates of drives; None for a device without, and where no time passes."""
-        if self.sample_time is None or not self.nominal.rate_limits:
-            return None
-        fall, rise = (np.clip(bound * self.sample_time, -FREE, FREE) for bound in self.nominal.rate_bounds)
-        return RateLimiter(fall, rise, self.slacks[2])
-
-    def is_lost(self, *state: np.ndarray) -> bool:
-        """Whether a state cannot be one that the controller left."""
-        return is_beyond(self.plausible, *state)
-
-    def rest(self) -> State:
-        """State of a device at rest at ambient temperature, its drives off."""
-        still = self.model.rest.copy(), np.zeros(len(self.model.axes))
-        return still if self.rate is None else (*still, self.safe_drive.copy())
+    @property
+    def rated(self) -> bool:
+        """Whether drives may change only so fast, over a sample time."""
+        return self.sample_time is not None and bool(self.nominal.rate_limits)
 
     @property
     def limits_can_be_passed(self) -> bool:
         """Whether a drive that may not turn back faster can lead the device beyond a limit: where actuators or effects remember, or the
         forces are not linear in the displacement, so that between two admissible drives there may be one that is not."""
-        return self.rate is not None and (self.nominal.x.numel() > 0 or self.newton_steps > 1)
+        return self.rated and (self.nominal.x.numel() > 0 or self.newton_steps > 1)

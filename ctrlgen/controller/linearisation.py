@@ -7,13 +7,14 @@ import control
 import numpy as np
 
 from ctrlgen.controller.feedforward import Controller, ControllerStatus
+from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.model.model import Model
 
 
 def equilibrium(model: Model, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(x, z, u) at rest at `pose` (n_components,), SI. Raises InputError where a limit of the device does not allow it."""
-    controller = Controller(model, "pose", None)
+    controller = Controller(ControllerKernels(model, "pose", None))
     step = controller.step(controller.rest(), pose)
     if step.status:
         broken = ", ".join(flag.name.lower() for flag in ControllerStatus if flag in step.status and flag.name)

@@ -15,6 +15,7 @@ import numpy as np
 
 from ctrlgen.controller.controller_step import State
 from ctrlgen.controller.feedforward import Controller, ControllerStatus, ControllerStep
+from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.model.assembly import TYPICAL_RATE
 from ctrlgen.model.inverse_dynamics import InverseDynamics, inverse_dynamics
@@ -22,10 +23,9 @@ from ctrlgen.model.model import Model, Signal
 
 
 @dataclass(frozen=True)
-class MotionController(Controller):
-    """One device with inertia, one followed signal, one sample time. A target is (channels * (order + 1),): first the followed
-    signal, then its first derivative by time, and so on. Raises InputError for a device with states that a target does not determine,
-    such as memories of effects."""
+class MotionKernels(ControllerKernels):
+    """Those of one device with inertia. A target is (channels * (order + 1),): first the followed signal, then its first derivative by
+    time, and so on. Raises InputError for a device with states that a target does not determine, such as memories of effects."""
 
     def __post_init__(self) -> None:
         if self.dynamics.internal:
@@ -65,63 +65,10 @@ class MotionController(Controller):
             for name, value in parts.items()
         }
 
-    @cached_property
-    def state_can_be_limited(self) -> bool:
+    def state_can_be_limited(self, share: float) -> bool:
         """Whether actuator states have limits: a motion can need any state."""
         n = self.nominal.n_states
         return bool(np.any(np.isfinite([bound[:n] for bound in self.nominal.x_bounds])))
-
-    def step(self, state: State, target: np.ndarray, *, settle: bool = False) -> ControllerStep:
-        """Drives for the motion that `target` says, or with `settle` for the equilibrium at its position. `state` (as `rest`) is kept
-        where the target is no command; else that of the motion follows. A state that is lost is answered with the safe drive."""
-        usable = bool(np.all(np.abs(target) <= self.input_limits))
-        if (not settle or not usable) and self.is_lost(*state):
-            return self._without_state()
-        if not usable:
-            return self._without_target(self.static, state)
-        position = target[: len(self.model.signals[self.follow].channels)]
-        if settle:
-            return super().step(state, position, settle=True)
-        z, x, u = (self.motion[name](target).full().ravel() for name in ("displacement", "state", "drive"))
-        if broken := self._broken(x, z):
-            held = super().step(state, position, settle=True)
-            return ControllerStep(held.status | broken, held.displacement, held.actuator_state, held.drive, held.state)
-        u, (low, high) = self.chosen(u, state), self.nominal.u_bounds
-        slack = self.slacks[2]
-        status = ControllerStatus(0) if np.all((u >= low - slack) & (u <= high + slack)) else ControllerStatus.DRIVE
-        u = np.clip(u, low, high)
-        if self.rate is not None:
-            u, _, _, too_fast = self.rate.toward(state[2], u)
-            u = np.clip(u, low, high)
-            status |= ControllerStatus.RATE if too_fast else status
-        last = () if self.rate is None else (u,)
-        return ControllerStep(status, z, x[: self.nominal.n_states], u, (x, z, *last))
-
-    def _broken(self, x: np.ndarray, z: np.ndarray) -> ControllerStatus:
-        """Which limits beside those of the drives a motion breaks."""
-        m, n, (z_slack, x_slack, _) = self.nominal, self.nominal.n_states, self.slacks
-        found = ControllerStatus(0)
-        if not np.all((z >= m.z_bounds[0] - z_slack) & (z <= m.z_bounds[1] + z_slack)):
-            found |= ControllerStatus.DISPLACEMENT
-        elif self.guarded_limits and not float(self.composite_ratio(x, z, z)) <= 1 + self.slack:
-            found |= ControllerStatus.COMPOSITE
-        low, high = (bound[:n] for bound in m.x_bounds)
-        if self.state_can_be_limited and not np.all((x[:n] >= low - x_slack) & (x[:n] <= high + x_slack)):
-            found |= ControllerStatus.STATE
-        return found
-
-    def drive_rounding(
-        self,
-        before: State,
-        target: np.ndarray,
-        step: ControllerStep,
-        settle: bool,
-        share: float,
-    ) -> float:
-        """By how much the drives change where the target does by this `share` of itself, each number of it alone."""
-        if settle:
-            return super().drive_rounding(before, target, step, settle, share)
-        return self.drive_sensitivity(target) * share
 
     def drive_sensitivity(self, target: np.ndarray) -> float:
         """The largest change of a drive where each number of the target changes by as much as it is."""
@@ -133,7 +80,65 @@ class MotionController(Controller):
         return ca.Function("slope", [target], [ca.jacobian(self.motion["drive"](target), target)])
 
 
+@dataclass(frozen=True)
+class MotionController(Controller):
+    """The limiter around the kernels of one device with inertia."""
+
+    kernels: MotionKernels
+
+    def step(self, state: State, target: np.ndarray, *, settle: bool = False) -> ControllerStep:
+        """Drives for the motion that `target` says, or with `settle` for the equilibrium at its position. `state` (as `rest`) is kept
+        where the target is no command; else that of the motion follows. A state that is lost is answered with the safe drive."""
+        kernels, m = self.kernels, self.kernels.nominal
+        usable = bool(np.all(np.abs(target) <= kernels.input_limits))
+        if (not settle or not usable) and self.is_lost(*state):
+            return self._without_state()
+        if not usable:
+            return self._without_target(kernels.static, state)
+        position = target[: len(kernels.model.signals[kernels.follow].channels)]
+        if settle:
+            return super().step(state, position, settle=True)
+        z, x, u = (kernels.motion[name](target).full().ravel() for name in ("displacement", "state", "drive"))
+        if broken := self._broken(x, z):
+            held = super().step(state, position, settle=True)
+            return ControllerStep(held.status | broken, held.displacement, held.actuator_state, held.drive, held.state)
+        u, (low, high) = self.chosen(u, state), m.u_bounds
+        slack = self.slacks[2]
+        status = ControllerStatus(0) if np.all((u >= low - slack) & (u <= high + slack)) else ControllerStatus.DRIVE
+        u = np.clip(u, low, high)
+        if self.rate is not None:
+            u, _, _, too_fast = self._toward(self.rate, state[2], u)
+            u = np.clip(u, low, high)
+            status |= ControllerStatus.RATE if too_fast else status
+        last = () if self.rate is None else (u,)
+        return ControllerStep(status, z, x[: m.n_states], u, (x, z, *last))
+
+    def _broken(self, x: np.ndarray, z: np.ndarray) -> ControllerStatus:
+        """Which limits beside those of the drives a motion breaks."""
+        kernels, m, (z_slack, x_slack, _) = self.kernels, self.kernels.nominal, self.slacks
+        n, broken = m.n_states, ControllerStatus(0)
+        if not np.all((z >= m.z_bounds[0] - z_slack) & (z <= m.z_bounds[1] + z_slack)):
+            broken |= ControllerStatus.DISPLACEMENT
+        elif kernels.guarded_limits:
+            ratio = self._answer("composite_ratio", kernels.composite_ratio, x, z, z)[0]
+            broken |= ControllerStatus.COMPOSITE if not ratio <= 1 + self.slack else broken
+        low, high = (bound[:n] for bound in m.x_bounds)
+        if self.state_can_be_limited and not np.all((x[:n] >= low - x_slack) & (x[:n] <= high + x_slack)):
+            broken |= ControllerStatus.STATE
+        return broken
+
+    def drive_rounding(
+        self, before: State, target: np.ndarray, step: ControllerStep, settle: bool, share: float
+    ) -> float:
+        """By how much the drives change where the target does by this `share` of itself, each number of it alone."""
+        if settle:
+            return super().drive_rounding(before, target, step, settle, share)
+        return self.kernels.drive_sensitivity(target) * share
+
+
 @lru_cache(maxsize=4)  # generation and each check of what was generated ask for the same one; its kernels take long
 def controller_of(model: Model, follow: str, sample_time: float | None) -> Controller:
     """The feedforward controller of a device; one with inertia takes derivatives too."""
-    return (MotionController if model.inertial else Controller)(model, follow, sample_time)
+    if model.inertial:
+        return MotionController(MotionKernels(model, follow, sample_time))
+    return Controller(ControllerKernels(model, follow, sample_time))

@@ -17,6 +17,7 @@ import casadi as ca
 import numpy as np
 import scipy
 
+from ctrlgen.controller.drive_rate import RateLimiter
 from ctrlgen.model.allocation import INDEPENDENT
 from ctrlgen.model.model import Model
 
@@ -55,6 +56,17 @@ class NullMotion:
             ends = (low[i] - drive[i]) * (1 / self.direction[i]), (high[i] - drive[i]) * (1 / self.direction[i])
             least, most = max(least, min(ends)), min(most, max(ends))
         return min(max(t, least), most)
+
+
+def of_least_effort(
+    drive: np.ndarray, redundancy: NullMotion | None, rate: RateLimiter | None, *last: np.ndarray
+) -> np.ndarray:
+    """Of all drives (n_u,) that push as `drive`, those of least effort within limits, and where there is a `rate` within it from the
+    `last` ones as far as these allow."""
+    if redundancy is None:
+        return drive
+    window = () if rate is None else (last[0] + rate.fall, last[0] + rate.rise)
+    return redundancy.within(drive, *window)
 
 
 def why_no_null_motion(model: Model) -> str | None:

@@ -9,6 +9,8 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
 
+from ctrlgen.core.errors import CtrlgenError
+
 
 def shipped(name: str) -> Path:
     """The folder `name` of the repository: its copy in an installed package, `_NAME`, or that of a checkout.
@@ -23,15 +25,16 @@ def shipped(name: str) -> Path:
 def shipped_package(name: str) -> ModuleType:
     """The Python package `name` beside ctrlgen in a checkout, or its copy `ctrlgen._NAME` in an installed package.
 
-    Raises ImportError where neither is there.
+    Raises CtrlgenError where neither is there.
     """
     folder = shipped(name)
     if folder.name != name:
         return import_module(f"ctrlgen.{folder.name}")
     if name not in sys.modules:
-        spec = spec_from_file_location(name, folder / "__init__.py", submodule_search_locations=[str(folder)])
-        if spec is None or spec.loader is None:
-            raise ImportError(f"{folder} is missing: {name} comes with a checkout of ctrlgen and with its wheel")
+        first = folder / "__init__.py"
+        spec = spec_from_file_location(name, first, submodule_search_locations=[str(folder)])
+        if spec is None or spec.loader is None or not first.is_file():
+            raise CtrlgenError(f"{folder} is missing: {name} comes with a clone of ctrlgen and with its wheel")
         module = sys.modules[name] = module_from_spec(spec)
         spec.loader.exec_module(module)
     return sys.modules[name]

@@ -117,7 +117,7 @@ def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Real,
         "nu": model.u.numel(),
         "nx": model.x.numel(),
         "n_s": model.n_states,
-        "m": len(controller.target.channels),
+        "m": len(controller.kernels.target.channels),
         "rated": controller.rate is not None,
         "rate": scenario.sample_time is not None,
     }

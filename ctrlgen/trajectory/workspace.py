@@ -12,7 +12,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from ctrlgen.controller.feedforward import Controller
+from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import same_dimension
 from ctrlgen.model.model import Model
@@ -108,7 +108,7 @@ class Workspace:
     def _excess(self) -> ca.Function:
         """pose -> the largest violation of a limit over its range, and its gradient; negative inside, zero on the boundary."""
         m = self.model
-        inverse = Controller(m, "pose", None).static
+        inverse = ControllerKernels(m, "pose", None).static
         pose = ca.SX.sym("pose", len(m.signals["pose"].channels))
         x, z = ca.DM(m.rest), ca.DM.zeros(m.z.numel())
         d = inverse.displacement(x, z, pose)

@@ -131,15 +131,15 @@ def interface(build: Build) -> dict[str, Any]:
     """The arguments and results of the C, in SI, and the values that its status can have."""
     model, scenario = build.solution.model, build.solution.scenario
     controller = controller_of(model, scenario.file.follow, scenario.sample_time)
-    m = controller.nominal
-    follow, drive, state = controller.target, m.signals["drive"], m.signals.get("state")
+    m = controller.kernels.nominal
+    follow, drive, state = controller.kernels.target, m.signals["drive"], m.signals.get("state")
 
     def channels(signal: Any) -> list[str]:
         return [f"{c} [{base_unit(u)}]" for c, u in zip(signal.channels, signal.units, strict=True)]
 
     possible = [
         s for s in ControllerStatus
-        if not (s is ControllerStatus.COMPOSITE and not controller.guarded_limits)
+        if not (s is ControllerStatus.COMPOSITE and not controller.kernels.guarded_limits)
         and not (s is ControllerStatus.STATE and not controller.state_can_be_limited)
         and not (s is ControllerStatus.RATE and controller.rate is None)
     ]  # fmt: skip

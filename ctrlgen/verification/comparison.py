@@ -18,7 +18,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.controller.feedforward import SECANT_FRACTION, ControllerStatus
-from ctrlgen.controller.motion_feedforward import MotionController
+from ctrlgen.controller.motion_feedforward import MotionKernels
 from ctrlgen.core.units import from_si, same_dimension
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.toolchains import COMPILERS, find_compilers
@@ -145,7 +145,7 @@ def _rows(
         status, expected = answer[:, 0].astype(int), reference[:, 0].astype(int)
         # the slack in float is wider: what is within it is RATE in double alone
         if real is Real.FLOAT and ref.controller.rate is not None:
-            slack = ref.controller.slacks_of(FLOAT_SLACK)[2]
+            slack = ref.controller.kernels.slacks(FLOAT_SLACK)[2]
             same = np.all(np.abs(answer[:, signals[0][1]] - reference[:, signals[0][1]]) <= slack, axis=1)
             status, expected = (np.where(same, s & ~ControllerStatus.RATE, s) for s in (status, expected))
         rows.append(_row(build, what, "status", "1", (status - expected)[:, None], 0.0))
@@ -330,10 +330,10 @@ def _float_limit(model: Model, role: str, size: float, ref: ReferenceAnswers) ->
     if role != "drive":
         return ROUNDINGS * eps * size
     off, first, states = 1 + ROUNDINGS / 2 * eps, 1 + model.u.numel(), 1 + model.u.numel() + len(model.axes)
-    if isinstance(ref.controller, MotionController):
-        rounded = (ref.controller.drive_sensitivity(target) for target in ref.command[::37])
+    if isinstance(ref.controller.kernels, MotionKernels):
+        rounded = (ref.controller.kernels.drive_sensitivity(target) for target in ref.command[::37])
         return max(max(rounded) * ROUNDINGS / 2 * eps, ROUNDINGS * eps * size)
-    kernels = ref.controller.moving or ref.controller.static
+    kernels = ref.controller.kernels.moving or ref.controller.kernels.static
     worst = 0.0
     for before, row in zip(ref.followed[:-1:37], ref.followed[1::37], strict=False):
         x = np.concatenate([before[states:], model.rest[model.n_states :]])

@@ -76,22 +76,22 @@ def check_hostile(
 
 def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> dict[str, Any]:
     controller = controller_of(model, scenario.file.follow, scenario.sample_time)
-    nominal = controller.nominal
+    kernels, nominal = controller.kernels, controller.kernels.nominal
     bits = ControllerStatus.DISPLACEMENT | ControllerStatus.DRIVE | ControllerStatus.INPUT | ControllerStatus.LOST
     bits |= (ControllerStatus.STATE if nominal.n_states else bits) | (
-        ControllerStatus.COMPOSITE if controller.guarded_limits else bits
+        ControllerStatus.COMPOSITE if kernels.guarded_limits else bits
     )
     bits |= ControllerStatus.RATE if controller.rate else bits
     samples = len(scenario.command(model))
     return {
         "real": real, "online": folder.online[real], "player": folder.player.get(real) if folder.player else None,
         "n": len(nominal.axes), "nu": nominal.u.numel(), "nx": nominal.x.numel(), "n_s": nominal.n_states,
-        "m": len(controller.input_limits),
+        "m": len(kernels.input_limits),
         "rate": scenario.sample_time is not None, "bits": int(bits),
-        "input_limits": controller.input_limits, "u_low": nominal.u_bounds[0], "u_high": nominal.u_bounds[1],
+        "input_limits": kernels.input_limits, "u_low": nominal.u_bounds[0], "u_high": nominal.u_bounds[1],
         # limits that follow from constants of the start are computed by the C, to a few of its roundings
-        "drive_room": 4 * real.epsilon if controller.given else 0.0,
-        "u_safe": controller.safe_drive, "z_typical": nominal.z_scale, "x_typical": np.maximum(np.abs(nominal.rest), nominal.x_scale),
+        "drive_room": 4 * real.epsilon if kernels.given else 0.0,
+        "u_safe": kernels.safe_drive, "z_typical": nominal.z_scale, "x_typical": np.maximum(np.abs(nominal.rest), nominal.x_scale),
         "samples": samples, "duration": samples * (scenario.sample_time or 0.0), **rates_in_c(controller),
     }  # fmt: skip
 

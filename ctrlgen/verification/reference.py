@@ -61,7 +61,7 @@ class ReferenceAnswers:
     @property
     def cancelling(self) -> float:
         """The largest sum [m] of the terms whose difference is the displacement of a random target."""
-        kernel, rest = self.controller.static.displacement, self.model.rest
+        kernel, rest = self.controller.kernels.static.displacement, self.model.rest
         target = ca.MX.sym("target", self.positions.shape[1])
         slope = ca.jacobian(kernel(rest, 0 * self.model.z_scale, target), target)
         size = np.abs(ca.Function("slope", [target], [slope])(0).full())
@@ -73,14 +73,14 @@ class ReferenceAnswers:
         low, high = m.z_bounds
         z = rng.uniform(low, high, size=(RANDOM_TARGETS // 2, len(m.axes)))
         cold = np.tile(m.rest[:, None], (1, len(z)))
-        ratio = self.controller.composite_ratio.map(len(z))(cold, 0 * z.T, z.T).full().ravel()
+        ratio = self.controller.kernels.composite_ratio.map(len(z))(cold, 0 * z.T, z.T).full().ravel()
         z = z / np.maximum(ratio, 1.0)[:, None]
         x, u = np.tile(m.rest, (len(z), 1)), np.zeros((len(z), m.u.numel()))
         signal = self.scenario.file.follow
         reachable = trace(m, np.zeros(len(z)), x, z, u).signals[signal]
         anywhere = rng.normal(size=(RANDOM_TARGETS // 2, reachable.shape[1])) * 50 * np.array(m.signals[signal].scale)
         positions = np.vstack([reachable, anywhere])
-        still = np.zeros((len(positions), len(self.controller.target.channels) - positions.shape[1]))
+        still = np.zeros((len(positions), len(self.controller.kernels.target.channels) - positions.shape[1]))
         return np.hstack([positions, still])
 
     @property
@@ -93,7 +93,7 @@ class ReferenceAnswers:
         rng = np.random.default_rng(21)
         targets = rng.permutation(self.random)[: RANDOM_TARGETS // 8].repeat(2, axis=0)
         first = self.positions.shape[1]
-        targets[:, first:] = rng.normal(size=targets[:, first:].shape) * self.controller.target.scale[first:]
+        targets[:, first:] = rng.normal(size=targets[:, first:].shape) * self.controller.kernels.target.scale[first:]
         targets[::7] *= 10 ** rng.uniform(0, 3, (len(targets[::7]), 1))
         targets[50], targets[51, 0], targets[52] = np.nan, np.inf, -1e300
         return targets
@@ -105,7 +105,7 @@ class ReferenceAnswers:
         if self.scenario.closed:
             return [solution.drive[-1]]
         untimed = controller_of(self.model, self.scenario.file.follow, None)
-        start = np.zeros(len(untimed.target.channels))
+        start = np.zeros(len(untimed.kernels.target.channels))
         start[: solution.command.shape[1]] = solution.command[0]
         return [untimed.step(untimed.rest(), start, settle=True).drive]
 

@@ -78,9 +78,11 @@ def _from_the_side(axes, platform, base, thickness, height) -> None:
     turn = np.linspace(np.radians(110), np.radians(200), 30)
     axes.plot(0.8 * np.cos(turn), 0.8 * np.sin(turn), color="C0", lw=1.2)
     axes.annotate(
-        "", 0.8 * np.array([np.cos(turn[0]), np.sin(turn[0])]), 0.8 * np.array([np.cos(turn[3]), np.sin(turn[3])]),
+        "",
+        0.8 * np.array([np.cos(turn[0]), np.sin(turn[0])]),
+        0.8 * np.array([np.cos(turn[3]), np.sin(turn[3])]),
         arrowprops={"arrowstyle": "-|>", "color": "C0"},
-    )  # fmt: skip
+    )
     axes.text(-1.15, 0.75, "θy", color="C0", ha="center", va="center")
     axes.set(aspect="equal", xlabel="mm", title="from the side: the pose of the top face's centre")
     axes.title.set_fontsize(10)

@@ -17,7 +17,7 @@ from pydantic.json_schema import GenerateJsonSchema
 
 
 class DescribedSchema(GenerateJsonSchema):
-    """For `model_json_schema(schema_generator=DescribedSchema)`."""
+    """Generator of schemas for `model_json_schema(schema_generator=DescribedSchema)`."""
 
     def model_schema(self, schema: Any) -> dict[str, Any]:
         """The schema of a table, its keys described."""
@@ -43,6 +43,9 @@ def _docstrings(cls: type) -> dict[str, str]:
     return {
         line.target.id: inspect.cleandoc(below.value.value)
         for line, below in pairwise(body.body)
-        if isinstance(line, ast.AnnAssign) and isinstance(line.target, ast.Name)
-        and isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant) and isinstance(below.value.value, str)
-    }  # fmt: skip
+        if isinstance(line, ast.AnnAssign)
+        and isinstance(line.target, ast.Name)
+        and isinstance(below, ast.Expr)
+        and isinstance(below.value, ast.Constant)
+        and isinstance(below.value.value, str)
+    }

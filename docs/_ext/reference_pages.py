@@ -35,14 +35,21 @@ def literal_docstring(app: Any, what: str, name: str, member: Any, options: Any,
 
 
 def write_all() -> None:
-    """Every generated page."""
+    """Writes every generated page."""
     OUT.mkdir(parents=True, exist_ok=True)
     pages = {
-        "devices": device_page(), "scenario": scenario_page(), "recording": recording_page(), "effects": effects_page(),
+        "devices": device_page(),
+        "scenario": scenario_page(),
+        "recording": recording_page(),
+        "effects": effects_page(),
         "uncertainty": uncertainty_page(),
-        "commands": commands_page(), "results": results_page(), "settings": settings_page(), "python": python_page(),
-        "equations": equations_page(), "priors": priors_page(),
-    }  # fmt: skip
+        "commands": commands_page(),
+        "results": results_page(),
+        "settings": settings_page(),
+        "python": python_page(),
+        "equations": equations_page(),
+        "priors": priors_page(),
+    }
     for name, text in pages.items():
         path = OUT / f"{name}.md"
         if not path.exists() or path.read_text(encoding="utf-8") != text:  # so that Sphinx reads only what is new
@@ -133,17 +140,22 @@ def equations_page() -> str:
     package = Path(inspect.getfile(__import__("ctrlgen"))).parent
     rows = {
         (place, f"ctrlgen/physics/{path.name}", name, what)
-        for path in sorted((package / "physics").glob("*.py")) for place, name, what in sourced(path)
-    }  # fmt: skip
+        for path in sorted((package / "physics").glob("*.py"))
+        for place, name, what in sourced(path)
+    }
 
     def in_order(row: tuple[str, ...]) -> tuple[Any, ...]:
         return row[0][:2], [int(n) for n in re.findall(r"\d+", row[0][2:])], row
 
     lines = [
-        GENERATED, "# Equations of the papers", "",
-        "S0 to S3 are the papers that describe the devices; [the conventions](../../conventions.md) name them.", "",
-        "| equation | file | function | what it gives |", "|---|---|---|---|",
-    ]  # fmt: skip
+        GENERATED,
+        "# Equations of the papers",
+        "",
+        "S0 to S3 are the papers that describe the devices; [the conventions](../../conventions.md) name them.",
+        "",
+        "| equation | file | function | what it gives |",
+        "|---|---|---|---|",
+    ]
     lines += [
         f"| {place} | `{file}` | `{name}` | {cell(what)} |" for place, file, name, what in sorted(rows, key=in_order)
     ]
@@ -156,15 +168,20 @@ def priors_page() -> str:
     from ctrlgen.estimation import priors
 
     lines = [
-        GENERATED, "# Priors of the laws", "",
+        GENERATED,
+        "# Priors of the laws",
+        "",
         "What the diagnosis believes of each [law](effects.md) before it sees a recording; "
-        "`ctrlgen/estimation/priors.py` states it.", "",
+        "`ctrlgen/estimation/priors.py` states it.",
+        "",
         "- *Odds*: how many times commoner the law is than a wrong gain; it decides among causes that explain alike.",
         "- *Form error*: what the law's form leaves after its parameters are fitted, as a share of what the law explains.",
         "- *Family*: laws that are forms of one physics. A place has at most one of a family.",
-        "- *Nested case*: the simpler law inside this one, named as an alternative where the fit does not exclude it.", "",
-        "| law | odds | form error | family | nested case | reason |", "|---|---|---|---|---|---|",
-    ]  # fmt: skip
+        "- *Nested case*: the simpler law inside this one, named as an alternative where the fit does not exclude it.",
+        "",
+        "| law | odds | form error | family | nested case | reason |",
+        "|---|---|---|---|---|---|",
+    ]
     for kind, law in sorted(Effect.library.items()):
         prior = priors.prior_of(law)
         nested = f"`{prior.nested_case.effect}`" if prior.nested_case else ""
@@ -227,15 +244,19 @@ def device_page() -> str:
     from ctrlgen.devices.sensor import DisplacementSensor, InterferometerSensor
 
     lines = [
-        GENERATED, "# device.toml", "",
+        GENERATED,
+        "# device.toml",
+        "",
         "A device file describes one stage: `kind` chooses the equations, `name` is a C identifier, `title` and `source` are "
         "for readers. Every number is text with its unit, or a table "
         '`{ value = "40 um", sd = "0.5 um", source = "data sheet" }`: `sd` is the standard deviation of what is not known '
         'exactly, a difference or a share of the value (`"3 %"`), '
         "`source` where the number comes from. Unknown keys are errors; all faults of a file are reported at once.",
-        "", "Any device file may hold `[[sensor]]` tables, and `[[effect]]` tables for the [physical effects](effects.md) that "
-        "its kind leaves out.", "",
-    ]  # fmt: skip
+        "",
+        "Any device file may hold `[[sensor]]` tables, and `[[effect]]` tables for the [physical effects](effects.md) that "
+        "its kind leaves out.",
+        "",
+    ]
     for kind, device in sorted(Device.library.items()):
         lines += model_section(device, f'kind = "{kind}"', passed_over=PASSED_OVER, prefix=f"{kind} ")
     lines += ["## [[sensor]]", ""]
@@ -245,21 +266,21 @@ def device_page() -> str:
 
 
 def scenario_page() -> str:
-    """scenario.toml."""
+    """The page of scenario.toml."""
     from ctrlgen.trajectory.scenario_file import ScenarioFile
 
     return "\n".join([GENERATED, *model_section(ScenarioFile, "scenario.toml", level=1)])
 
 
 def recording_page() -> str:
-    """recording.toml."""
+    """The page of recording.toml."""
     from ctrlgen.recordings.schema import RecordingFile
 
     return "\n".join([GENERATED, *model_section(RecordingFile, "recording.toml", level=1)])
 
 
 def uncertainty_page() -> str:
-    """uncertainty.toml."""
+    """The page of uncertainty.toml."""
     from ctrlgen.budget.uncertainty import UncertaintyFile
 
     return "\n".join([GENERATED, *model_section(UncertaintyFile, "uncertainty.toml", level=1)])
@@ -270,12 +291,15 @@ def effects_page() -> str:
     from ctrlgen.effects import Effect
 
     lines = [
-        GENERATED, "# Physical effects", "",
+        GENERATED,
+        "# Physical effects",
+        "",
         "Each is one file in `ctrlgen/effects/`, written into a device file as an `[[effect]]` table with `kind`, `at` (the "
-        "channel it acts on, or `\"all\"`), `of` for effects that couple two channels, and its parameters. In a unit, "
+        'channel it acts on, or `"all"`), `of` for effects that couple two channels, and its parameters. In a unit, '
         "`channel` stands for the unit of the signal the effect acts on, `travel` for that of the stage displacement and "
-        "`partner` for that of the other channel.", "",
-    ]  # fmt: skip
+        "`partner` for that of the other channel.",
+        "",
+    ]
     for kind, law in sorted(Effect.library.items()):
         lines += [f"## {kind}", "", f"Acts on: {law.place.value}. Source: {law.source}", "", "```text"]
         lines += [inspect.cleandoc(law.__doc__ or ""), "```", ""]
@@ -291,7 +315,7 @@ def commands_page() -> str:
     """The `--help` of every command."""
     from typer.testing import CliRunner
 
-    from ctrlgen.app import cli
+    from ctrlgen.app.commands import cli
 
     runner, environment = CliRunner(), {"COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb"}
     lines = [GENERATED, "# Commands", "", *_help(runner, cli.app, [], environment)]
@@ -312,12 +336,15 @@ def results_page() -> str:
 
     folder = Path(reporting.__file__).parent / "schemas"
     lines = [
-        GENERATED, "# Result files", "",
+        GENERATED,
+        "# Result files",
+        "",
         "`summary.json` (of `run` and `solve`), `build.json` (of `verify`), `diagnosis.json` (of `diagnose`), `budget.json` (of "
         "`budget`), `fastest.json` (of `fastest`) and `learning.json` (of `learn`) hold every "
         "result for programs. Each states the version of its schema, the program's version, the sha256 of its inputs and the "
-        "seed. The JSON Schemas are shipped with the package in `ctrlgen/reporting/schemas/`.", "",
-    ]  # fmt: skip
+        "seed. The JSON Schemas are shipped with the package in `ctrlgen/reporting/schemas/`.",
+        "",
+    ]
     for path in sorted(folder.glob("*.schema.json")):
         schema = json.loads(path.read_text(encoding="utf-8"))
         definitions = schema.get("$defs", {})
@@ -368,10 +395,13 @@ def python_page() -> str:
     import ctrlgen
 
     lines = [
-        GENERATED, "# Python", "",
-        "`import ctrlgen` gives these names. Numbers are SI; arrays are NumPy's, expressions CasADi's `SX`.", "",
+        GENERATED,
+        "# Python",
+        "",
+        "`import ctrlgen` gives these names. Numbers are SI; arrays are NumPy's, expressions CasADi's `SX`.",
+        "",
         "```{eval-rst}",
-    ]  # fmt: skip
+    ]
     for name in ctrlgen.__all__:
         member = getattr(ctrlgen, name)
         if inspect.isclass(member):

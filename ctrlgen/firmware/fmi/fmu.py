@@ -136,11 +136,11 @@ def _controller_unit(scenario: Scenario, model: Model, sample_time: float, folde
     """The online controller's C in `folder`, and the unit around it."""
     check_online(scenario, model)
     controller = controller_of(model, scenario.file.follow, sample_time)
-    m, core = controller.nominal, f"{scenario.controller_name}_online_{Real.DOUBLE.suffix}"
+    m, core = controller.kernels.nominal, f"{scenario.controller_name}_online_{Real.DOUBLE.suffix}"
     context = online_context(scenario, controller, Real.DOUBLE, core)
     for end in ("h", "c"):
         write(f"online.{end}", context, folder / f"{core}.{end}")
-    followed, drive, displacement = controller.target, m.signals["drive"], m.signals["displacement"]
+    followed, drive, displacement = controller.kernels.target, m.signals["drive"], m.signals["displacement"]
     inputs = _variables("target", followed, "input", "discrete", 1, np.zeros(len(followed.channels)))
     low, high = m.u_bounds
     outputs = _variables("drive", drive, "output", "discrete", 1 + len(inputs), bounds=(low, high))
@@ -156,7 +156,7 @@ def _controller_unit(scenario: Scenario, model: Model, sample_time: float, folde
         "controller", core, f"online controller of {m.device.title}", inputs, outputs, status,
         _settled(status.reference + 1, "the first target"),
         {"groups": groups, "n": len(m.axes), "nu": m.u.numel(), "n_s": m.n_states,
-         "drive_start": [Real.DOUBLE.literal(v) for v in controller.safe_drive],
+         "drive_start": [Real.DOUBLE.literal(v) for v in controller.kernels.safe_drive],
          "rated": controller.rate is not None, "most_settling": controller.rate.samples(*m.u_bounds) if controller.rate else 0},
     )  # fmt: skip
 

@@ -10,8 +10,9 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.controller.feedforward import SECANT_FRACTION, SECANT_STEPS, Controller
+from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.controller.lost_state import FAR
-from ctrlgen.controller.motion_feedforward import MotionController
+from ctrlgen.controller.motion_feedforward import MotionKernels
 from ctrlgen.controller.nearest_displacement import SWEEPS
 from ctrlgen.controller.run_time_check import check_run_time
 from ctrlgen.core.units import base_unit, show, show_difference
@@ -33,16 +34,15 @@ UNLIMITED = 1e18  # SI: written for the bound of an actuator state that has none
 
 def online_context(scenario: Scenario, controller: Controller, real: Real, prefix: str) -> dict[str, Any]:
     """The context of online.c.j2 and online.h.j2."""
-    check_run_time(controller)
-    model = controller.nominal
+    kernels = controller.kernels
+    check_run_time(kernels)
+    model = kernels.nominal
     n = len(model.axes)
     (z_low, z_high), (x_low, x_high), (u_low, u_high) = model.z_bounds, model.x_bounds, model.u_bounds
     s_low, s_high = np.maximum(x_low[: model.n_states], -UNLIMITED), np.minimum(x_high[: model.n_states], UNLIMITED)
     x_range, u_range = (
         (np.min([low for low, _ in ends], axis=0), np.max([high for _, high in ends], axis=0))
-        for ends in zip(
-            *((c.nominal.x_bounds, c.nominal.u_bounds) for c in (controller, *controller.variants)), strict=True
-        )
+        for ends in zip(*((c.nominal.x_bounds, c.nominal.u_bounds) for c in (kernels, *kernels.variants)), strict=True)
     )
     s_range = (
         np.maximum(x_range[0][: model.n_states], -UNLIMITED),
@@ -51,14 +51,14 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     ranges = {  # of the kernels' arguments; a target has none
         "z": model.z_bounds, "wanted": model.z_bounds, "x": x_range, "state": s_range, "drive": u_range,
     }  # fmt: skip
-    inverses, given = controller.named, given_ranges(controller)
-    own = controller.given  # kernels in terms of the constants of the start, where there are some
-    static, moving = (own.static or controller.static, own.moving) if own else (controller.static, controller.moving)
+    inverses, given = kernels.named, given_ranges(kernels)
+    own = kernels.given  # kernels in terms of the constants of the start, where there are some
+    static, moving = (own.static or kernels.static, own.moving) if own else (kernels.static, kernels.moving)
     laws = printed_laws(own.model if own else model, inverses.model)
     printer = Printer(
         real, ranges, {"p": inverses.numbers}, laws, given, {"p": own.numbers} if own else {}, f"{prefix}_derived"
     )
-    printed = _Kernels(printer, kernel_comments(controller))
+    printed = _Kernels(printer, kernel_comments(kernels))
 
     modes: list[dict[str, Any]] = []
     for name, inverse, formulas, z in (
@@ -81,29 +81,29 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
             )
             modes.append({
                 "name": name, "z": z, "uses_state": uses_state,
-                "examined_first": controller.examined_first[name == "step"],
+                "examined_first": kernels.examined_first[name == "step"],
                 "drive_can_be_limited": controller.drive_can_be_limited[name == "step"], **named,
             })  # fmt: skip
     motion = {}
-    if isinstance(controller, MotionController):
+    if isinstance(kernels, MotionKernels):
         motion = {
             part: printed.kernel(kernel, ("motion", part), (f"motion_{part}",))
-            for part, kernel in controller.motion.items()
+            for part, kernel in kernels.motion.items()
         }
-    iterated = ("z", controller.newton_steps) if controller.newton_steps > 1 else None
+    iterated = ("z", kernels.newton_steps) if kernels.newton_steps > 1 else None
     balance = printed.kernel(
         static.newton, "balance", ("balance_displacement",), steps=iterated,
         named=None if inverses.static is None else inverses.static.newton,
     )  # fmt: skip
     shares = bound = None
-    if controller.guarded_limits:
-        shares = printed.kernel(controller.composite_shares, "shares", ("composite_shares",))
-    if controller.composite_bound:
-        bound = printed.kernel(controller.composite_bound, "bound", ("composite_bound",), returned=True)
-    z_slack, s_slack, u_slack = controller.slacks_of(controller.slack if real is Real.DOUBLE else FLOAT_SLACK)
-    drive, follow = model.signals["drive"], controller.target
+    if kernels.guarded_limits:
+        shares = printed.kernel(kernels.composite_shares, "shares", ("composite_shares",))
+    if kernels.composite_bound:
+        bound = printed.kernel(kernels.composite_bound, "bound", ("composite_bound",), returned=True)
+    z_slack, s_slack, u_slack = kernels.slacks(controller.slack if real is Real.DOUBLE else FLOAT_SLACK)
+    drive, follow = model.signals["drive"], kernels.target
     limited = _limits_in_c(controller, printer, real, u_slack)
-    start = start_context(controller, printer)
+    start = start_context(kernels, printer)
     called = printed.calls | ({"square_root"} if shares else set()) | set(start_calls(start))
     return {
         "prefix": prefix, "real": real, "version": __version__, "program": program(), "title": comment(model.device.title),
@@ -111,29 +111,29 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         "device_sha256": scenario.device_sha256, "n": n, "nu": len(drive.channels), "m": len(follow.channels),
         "axes": model.axes, "follow": follow, "drive": drive,
         "drive_unit": drive.units[0], "state": model.signals.get("state"), "n_s": model.n_states,
-        "rate": _number(1 / controller.sample_time) if controller.sample_time else None,
+        "rate": _number(1 / kernels.sample_time) if kernels.sample_time else None,
         "si": _si_text, "limits": [_limit_text(limit) for limit in (*model.limits, *(model.rate_limits if controller.rate else ()))],
         "reserved_for": None if model.probability is None else f"{100 * model.probability:.10g} % along {scenario.name}",
-        "composite": ", ".join(limit.label for limit in controller.guarded_limits) or "none",
+        "composite": ", ".join(limit.label for limit in kernels.guarded_limits) or "none",
         "x_names": [f"{name} [{unit}]" for name, unit in zip(model.x_names, model.x_units, strict=True)],
-        "elementary": elementary_text(called, real), "bound": bound, "nearest_slopes": controller.nearest_slopes, "sweeps": SWEEPS,
+        "elementary": elementary_text(called, real), "bound": bound, "nearest_slopes": kernels.nearest_slopes, "sweeps": SWEEPS,
         "constants": printer.constants, "laws": printer.laws_text, "kernels": printed.kernels,
         "modes": modes, "motion": motion, "shares": shares,
-        "shares_count": controller.composite_shares.size1_out(0) if shares else 0,
+        "shares_count": kernels.composite_shares.size1_out(0) if shares else 0,
         "balance": balance, "secant_steps": SECANT_STEPS, "secant_fraction": SECANT_FRACTION,
-        "composite_rounds": controller.composite_rounds,
+        "composite_rounds": kernels.composite_rounds,
         "shares_use_state": shares is not None and bool({"x", "z"} & set(shares.arguments)),
         "state_limited": controller.state_can_be_limited,
         "relative_slack": FLOAT_SLACK if real is Real.FLOAT else controller.slack,
         "cost": _cost(controller, modes[-1], motion, balance, bound, shares),
-        "input_limits": controller.input_limits,
+        "input_limits": kernels.input_limits,
         "plausible": [([_member(i, model) for i in those], most) for those, most in controller.plausible],
         "rest": model.rest,
         "z_low": z_low, "z_high": z_high, "z_slack": z_slack,
         "s_low": s_low, "s_high": s_high, "s_slack": s_slack,
         "u_low": u_low, "u_high": u_high, "u_slack": u_slack,
-        "u_safe": controller.safe_drive, "ready": READY, "far": FAR, **limited, **start, **rates_in_c(controller),
-        "redundancy": controller.redundancy, "unlimited": UNLIMITED,
+        "u_safe": kernels.safe_drive, "ready": READY, "far": FAR, **limited, **start, **rates_in_c(controller),
+        "redundancy": kernels.redundancy, "unlimited": UNLIMITED,
     }  # fmt: skip
 
 
@@ -194,20 +194,20 @@ def printed_laws(model: Model, symbolic: Model) -> list[Law]:
     return found
 
 
-def kernel_comments(controller: Controller) -> dict[Any, str]:
+def kernel_comments(kernels: ControllerKernels) -> dict[Any, str]:
     """What each kernel computes, in words, by mode and part or by name."""
     m, follow, drive = (
-        controller.nominal,
-        controller.model.signals[controller.follow],
-        controller.nominal.signals["drive"],
+        kernels.nominal,
+        kernels.model.signals[kernels.follow],
+        kernels.nominal.signals["drive"],
     )
-    state, within = m.signals.get("state"), f"one sample of {controller.sample_time} s"
+    state, within = m.signals.get("state"), f"one sample of {kernels.sample_time} s"
     holds = f"the {state.label}s `state`" if state and m.n_states else "the displacement `wanted`"
     states = ", ".join(f"{name} [{unit}]" for name, unit in zip(m.x_names, m.x_units, strict=True))
-    steps = "the step" if controller.newton_steps == 1 else f"{controller.newton_steps} Newton steps"
+    steps = "the step" if kernels.newton_steps == 1 else f"{kernels.newton_steps} Newton steps"
     found: dict[Any, str] = {
         "balance": f"Displacement at which the forces balance, g(x, z, drive) = 0: {steps} z - g/(dg/dz) from z.",
-        "shares": f"The square of each {', '.join(limit.label for limit in controller.guarded_limits)} over its limit at displacement "
+        "shares": f"The square of each {', '.join(limit.label for limit in kernels.guarded_limits)} over its limit at displacement "
         "`wanted`.",
         "bound": "A cheap upper bound of the root of the largest of these shares: no more than 1 means that every limit is kept.",
     }
@@ -231,8 +231,9 @@ def _cost(
     shares: Kernel | None,
 ) -> dict[str, int]:  # fmt: skip
     """Operations of the physics: of a "step" that no limit touches, and of the "worst"."""
-    n = len(controller.nominal.axes)
-    advance = [] if controller.nominal.x.numel() == controller.nominal.n_states else ["advance"]
+    kernels = controller.kernels
+    n = len(kernels.nominal.axes)
+    advance = [] if kernels.nominal.x.numel() == kernels.nominal.n_states else ["advance"]
     step = sum(mode[part].operations for part in ("displacement", "state", "drive", *advance) if part in mode)
     step += bound.operations if bound else 0
     if motion:  # what breaks a limit is answered by settling
@@ -240,11 +241,11 @@ def _cost(
     again = sum(mode[part].operations for part in ("state", "drive") if part in mode)
     worst = step + (2 if controller.state_can_be_limited else 1) * balance.operations
     worst += again * (SECANT_STEPS + 3 if mode["drive_can_be_limited"] else 1)
-    worst += controller.composite_rounds * (shares.operations + 1) if shares else 0
+    worst += kernels.composite_rounds * (shares.operations + 1) if shares else 0
     worst += mode["advance"].operations if "advance" in mode and not advance else 0
-    worst += 2 * n * n * (1 + SWEEPS) if controller.nearest_slopes is not None else 0
-    if controller.limits_can_be_passed:
-        worst += controller.composite_rounds * (shares.operations + 1) if shares else 0
+    worst += 2 * n * n * (1 + SWEEPS) if kernels.nearest_slopes is not None else 0
+    if kernels.limits_can_be_passed:
+        worst += kernels.composite_rounds * (shares.operations + 1) if shares else 0
         worst += bound.operations if bound else 0
     return {"step": step, "worst": worst}
 
@@ -253,7 +254,7 @@ def rates_in_c(controller: Controller) -> dict[str, Any]:
     """What the C needs to keep limits on the rates of drives."""
     if (rate := controller.rate) is None:
         return {"rated": False, "passing": False}
-    return {"rated": True, "passing": controller.limits_can_be_passed, "fall": rate.fall, "rise": rate.rise}
+    return {"rated": True, "passing": controller.kernels.limits_can_be_passed, "fall": rate.fall, "rise": rate.rise}
 
 
 def _member(i: int, model: Model) -> str:
@@ -289,7 +290,11 @@ def _s_bounds(m: Model) -> tuple[ca.SX, ca.SX]:
 
 def _limits_in_c(controller: Controller, printer: Printer, real: Real, u_slack: np.ndarray) -> dict[str, Any]:
     """Middles and squared half widths as C, by "z_middle", ..., and where each table of limits is found, by its name in "arrays"."""
-    model, tables, limited = controller.nominal, Tables(controller, printer), any(controller.drive_can_be_limited)
+    model, tables, limited = (
+        controller.kernels.nominal,
+        Tables(controller.kernels, printer),
+        any(controller.drive_can_be_limited),
+    )
     (u_low, u_high), n_s = model.u_bounds, model.n_states
     s_low, s_high = np.maximum(model.x_bounds[0][:n_s], -UNLIMITED), np.minimum(model.x_bounds[1][:n_s], UNLIMITED)
     arrays = {

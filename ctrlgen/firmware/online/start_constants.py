@@ -12,7 +12,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ctrlgen.controller.feedforward import Controller
+from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.devices.run_time import RunTimeConstant
 from ctrlgen.firmware.c.c_constants import Derived
@@ -28,9 +28,9 @@ FIRST = 64  # bit of the status for constants out of bounds, behind those of a c
 class Tables:
     """Tables of limits as C: of numbers that are known now, or members of the state that follow from the constants of the start."""
 
-    def __init__(self, controller: Controller, printer: Printer) -> None:
+    def __init__(self, kernels: ControllerKernels, printer: Printer) -> None:
         self._printer, self._real = printer, printer.real
-        self._model = None if controller.given is None else controller.given.model
+        self._model = None if kernels.given is None else kernels.given.model
 
     def rows(self, formula: Callable[[Any], ca.SX], values: np.ndarray) -> list[Node] | None:
         """The rows of a table as nodes, where one of them follows from the constants; else None. `formula` of the symbolic model."""
@@ -62,19 +62,19 @@ def _of_state(text: str) -> str:
     return text.replace("derived->", "state->derived.")
 
 
-def given_ranges(controller: Controller) -> dict[str, Interval]:
+def given_ranges(kernels: ControllerKernels) -> dict[str, Interval]:
     """Path and range of the constants of the start."""
-    return {c.path: (c.low, c.high) for c in controller.model.device.given_at_start}
+    return {c.path: (c.low, c.high) for c in kernels.model.device.given_at_start}
 
 
-def start_context(controller: Controller, printer: Printer) -> dict[str, Any]:
+def start_context(kernels: ControllerKernels, printer: Printer) -> dict[str, Any]:
     """What online.c.j2 and online.h.j2 need of the constants of the start; all kernels and tables have been printed."""
-    device, real = controller.model.device, printer.real
+    device, real = kernels.model.device, printer.real
     constants = device.given_at_start
     if not constants:
         return {"given": (), "given_numbers": 0, "derived": (), "derive": None, "changing": None}
     members = printer.derived
-    _check(controller, members, constants)
+    _check(kernels, members, constants)
     changing = None
     if device.run_time is not None and device.run_time.input is not None:
         own = next(c for c in constants if c.path == device.run_time.input)
@@ -130,7 +130,7 @@ _OPERATIONS: Mapping[int, Callable[..., Any]] = {
 }  # fmt: skip
 
 
-def _check(controller: Controller, members: Sequence[Derived], constants: Sequence[RunTimeConstant]) -> None:
+def _check(kernels: ControllerKernels, members: Sequence[Derived], constants: Sequence[RunTimeConstant]) -> None:
     """Raises InputError where what follows from constants within their bounds is no number, or none of a float."""
     for values in ({}, *({c.path: end} for c in constants for end in (c.low, c.high))):
         given = [values.get(c.path, c.default) for c in constants]
@@ -140,7 +140,7 @@ def _check(controller: Controller, members: Sequence[Derived], constants: Sequen
                 f"{c.path} = {c.shown(v)}" for c, v in zip(constants, given, strict=True) if c.path in values
             )
             what = f"the controller cannot be computed at {where or 'the file numbers'}; narrow its bounds"
-            raise InputError(controller.model.name, [Fault("run_time.constants", what)])
+            raise InputError(kernels.model.name, [Fault("run_time.constants", what)])
 
 
 def start_calls(context: Mapping[str, Any]) -> Iterable[str]:

@@ -1,20 +1,18 @@
 """Calls that lead the limiter into each of its branches: what the test that runs on the target is made of beside the command.
 
-Candidates are drawn around every limit; one is kept where the controller in Python, whose kernels are watched, decides something that
+Candidates are drawn around every limit; one is kept where the controller in Python, which is observed, decides something that
 none kept before did. A decision is an answer of a kernel against its limits: inside, within the slack, beyond, on which side.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields
-from types import SimpleNamespace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
 
 from ctrlgen.controller.feedforward import Controller, ControllerStep
-from ctrlgen.model.inverse import Inverse
 
 AROUND = 8  # displacements drawn anywhere in the range, and on its corners
 MOVED = 0.05  # of its range, by which a displacement goes beyond
@@ -68,10 +66,10 @@ def limiter_calls(controller: Controller, epsilon: float, count: int) -> list[Ca
 
 def _cases(controller: Controller) -> Iterator[Sequence[Call]]:
     """Single calls from rest, and pairs: settle somewhere, then step or settle elsewhere."""
-    m, rng = controller.nominal, np.random.default_rng(1)
+    m, rng = controller.kernels.nominal, np.random.default_rng(1)
     n, (low, high) = len(m.axes), m.z_bounds
-    signal = ca.Function("followed", [m.x, m.z, m.u], [m.signals[controller.follow].expr])
-    scale = np.array(controller.target.scale)
+    signal = ca.Function("followed", [m.x, m.z, m.u], [m.signals[controller.kernels.follow].expr])
+    scale = np.array(controller.kernels.target.scale)
 
     def target(z: np.ndarray, moving: float = 0.0) -> np.ndarray:
         at = signal(m.rest, z, np.zeros(m.u.numel())).full().ravel()
@@ -88,7 +86,7 @@ def _cases(controller: Controller) -> Iterator[Sequence[Call]]:
                 z[i] = bound + outward * by
                 beyond.append(z)
     anywhere = [*inside, *corners, *beyond]
-    still = controller.sample_time is None
+    still = controller.kernels.sample_time is None
     starts = [Call(target(z), True, True) for z in inside]
     for k, z in enumerate(anywhere):
         yield (Call(target(z), True, True),)
@@ -97,9 +95,9 @@ def _cases(controller: Controller) -> Iterator[Sequence[Call]]:
             start = starts[k % len(starts)]
             yield start, Call(target(z), False, False)
             yield start, Call(0.5 * (start.target + target(z)), False, False)
-            if controller.nominal.inertial:
+            if controller.kernels.nominal.inertial:
                 yield start, Call(target(z, 1.0), False, False)
-    if controller.nominal.inertial and not still:
+    if controller.kernels.nominal.inertial and not still:
         for driving in _driven(controller, target(middle)):
             yield starts[0], Call(driving, False, False)
     for z in anywhere[:AROUND] if controller.rate else ():
@@ -113,8 +111,8 @@ def _cases(controller: Controller) -> Iterator[Sequence[Call]]:
 
 def _driven(controller: Controller, target: np.ndarray) -> Iterator[np.ndarray]:
     """`target` with ever larger highest derivatives of one axis: only the drive limits them."""
-    scale = np.array(controller.target.scale)
-    for i in range(len(scale) - len(controller.nominal.axes), len(scale)):
+    scale = np.array(controller.kernels.target.scale)
+    for i in range(len(scale) - len(controller.kernels.nominal.axes), len(scale)):
         for size in GROWING:
             for way in (1, -1):
                 yield target + way * size * scale[i] * np.eye(len(scale))[i]
@@ -122,14 +120,8 @@ def _driven(controller: Controller, target: np.ndarray) -> Iterator[np.ndarray]:
 
 def _at_its_rate(controller: Controller, target: np.ndarray, settle: bool) -> np.ndarray:
     """The share of a `target` at which, from rest, a drive changes faster than it may by half of its slack; all of it where none does."""
-    rate, free = (
-        controller.rate,
-        type(controller)(controller.model, controller.follow, controller.sample_time, controller.slack),
-    )
+    rate, free = controller.rate, replace(controller, keeps_rates=False)
     assert rate is not None
-    free.__dict__.update(
-        {name: value for name, value in controller.__dict__.items() if name != "plausible"} | {"rate": None}
-    )
     rest = controller.rest()
     low, high = 0.0, 1.0
     for _ in range(HALVINGS):
@@ -140,74 +132,30 @@ def _at_its_rate(controller: Controller, target: np.ndarray, settle: bool) -> np
     return high * target
 
 
-class _Watch:
-    """A kernel that tells its answers to `note`."""
-
-    def __init__(self, kernel: ca.Function, note: Callable[[np.ndarray], None]) -> None:
-        self._kernel, self._note = kernel, note
-
-    def __call__(self, *arguments: object) -> ca.DM:
-        answer = self._kernel(*arguments)
-        self._note(answer.full().ravel())
-        return answer
-
-
 def _watched(controller: Controller) -> tuple[Controller, list[tuple]]:
-    """A twin of `controller`, and the list of the decisions that its kernels' answers ask for."""
-    m, n = controller.nominal, controller.nominal.n_states
-    seen: list[tuple] = []
-    # worked out from the kernels themselves, before they are watched
-    _ = (
-        controller.examined_first, controller.drive_can_be_limited, controller.state_can_be_limited, controller.slacks,
-        controller.plausible, controller.composite_bound,
-    )  # fmt: skip
+    """The `controller` with an observer, and the list of the decisions that the answers of its kernels ask for."""
+    m, n = controller.kernels.nominal, controller.kernels.nominal.n_states
     x_low, x_high = (bound[:n] for bound in m.x_bounds)
-    limits = {
-        name: (*bound, slack)
-        for name, bound, slack in zip(
-            ("displacement", "state", "drive"),
-            (m.z_bounds, (x_low, x_high), m.u_bounds),
-            controller.slacks,
-            strict=True,
-        )
-    }
+    ranges = m.z_bounds, (x_low, x_high), m.u_bounds
+    limits = dict(zip(("displacement", "state", "drive"), zip(ranges, controller.slacks, strict=True), strict=True))
+    seen: list[tuple] = []
 
-    def against(name: str) -> Callable[[np.ndarray], None]:
-        low, high, slack = limits[name]
-
-        def note(value: np.ndarray) -> None:
-            asked = sum(decision[0] == f"{name} asked" for decision in seen)
-            seen.append((f"{name} asked", asked))
-            side = np.where(value < low, -1, np.where(value > high, 1, 0))
-            far = (value < low - slack) | (value > high + slack)
-            seen.append((name, asked, bool(far.any()), bool(side.any())))
-            seen.extend((name, "side", int(s), bool(f)) for s, f in zip(side, far, strict=True))
+    def note(what: str, answer: np.ndarray) -> None:
+        if what in limits:
+            (low, high), slack = limits[what]
+            asked = sum(decision[0] == f"{what} asked" for decision in seen)
+            seen.append((f"{what} asked", asked))
+            side = np.where(answer < low, -1, np.where(answer > high, 1, 0))
+            far = (answer < low - slack) | (answer > high + slack)
+            seen.append((what, asked, bool(far.any()), bool(side.any())))
+            seen.extend((what, "side", int(s), bool(f)) for s, f in zip(side, far, strict=True))
             if asked == 0 and side.any():
-                seen.append((name, "first", int(np.flatnonzero(side)[0])))
+                seen.append((what, "first", int(np.flatnonzero(side)[0])))
+        elif what == "composite_ratio":
+            seen.append((what, bool(answer[0] > 1), bool(answer[0] > 1 + controller.slack)))
+        elif what == "composite_bound":
+            seen.append((what, bool(answer[0] <= 1)))
+        else:
+            seen.append((what, *answer.tolist()))
 
-        return note
-
-    def ratio(value: np.ndarray) -> None:
-        seen.append(("ratio", bool(value[0] > 1), bool(value[0] > 1 + controller.slack)))
-
-    twin = type(controller)(controller.model, controller.follow, controller.sample_time, controller.slack)
-    twin.__dict__.update(controller.__dict__)
-    for mode in ("static", "moving"):
-        k = getattr(controller, mode)
-        if k is not None:
-            kernels = {f.name: getattr(k, f.name) for f in fields(Inverse)}
-            twin.__dict__[mode] = Inverse(**kernels | {name: _Watch(kernels[name], against(name)) for name in limits})
-    twin.__dict__["composite_ratio"] = _Watch(controller.composite_ratio, ratio)
-    if controller.composite_bound is not None:
-        twin.__dict__["composite_bound"] = _Watch(
-            controller.composite_bound, lambda value: seen.append(("bound", bool(value[0] <= 1)))
-        )
-    if (rate := controller.rate) is not None:
-
-        def toward(last: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, float, bool, bool]:
-            answer = rate.toward(last, wanted)
-            seen.append(("rate", *answer[2:]))
-            return answer
-
-        twin.__dict__["rate"] = SimpleNamespace(fall=rate.fall, rise=rate.rise, toward=toward)
-    return twin, seen
+    return replace(controller, observe=note), seen

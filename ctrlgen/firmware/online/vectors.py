@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -27,10 +28,10 @@ def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str
     The tolerance is the change of drive that four roundings of displacement and actuator state cause, or one of a number of a target
     that a limit on stress or rotation scales.
     """
-    controller = controller if real is Real.DOUBLE else controller.with_slack(FLOAT_SLACK)
+    controller = controller if real is Real.DOUBLE else replace(controller, slack=FLOAT_SLACK)
     rng = np.random.default_rng(0)
-    scale = np.array(controller.target.scale)
-    still = controller.sample_time is None
+    scale = np.array(controller.kernels.target.scale)
+    still = controller.kernels.sample_time is None
     calls = [Call(target, k == 0 or still, k == 0) for k, target in enumerate(command[:VECTORS])]
     far = rng.normal(size=(BEYOND, command.shape[1])) * 40 * scale
     calls += [Call(target, True, False) for target in (*far, np.full(command.shape[1], 1e9))]
@@ -55,7 +56,7 @@ def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str
                     near = controller.step(before, target * (1 + rounding / 4 * unit), settle=call.settle)
                     if near.status == step.status:
                         tolerance = max(tolerance, float(np.max(np.abs(near.drive - step.drive))))
-    tolerance = max(tolerance, 1e-12 * float(np.max(controller.nominal.u_scale)))
+    tolerance = max(tolerance, 1e-12 * float(np.max(controller.kernels.nominal.u_scale)))
     return {
         "rows": rows, "tolerance": tolerance, "unusable": UNUSABLE * command.shape[1], "beyond": min(len(command), VECTORS),
         "lost": sum(part.size for part in controller.rest()) + 1,
