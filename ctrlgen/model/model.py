@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from types import SimpleNamespace
 from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
 
 from ctrlgen.devices import Device, Limit, Signal
+from ctrlgen.effects import LawInputs
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,12 +76,10 @@ class Model:
     bounds_formulas: tuple[tuple[float | ca.SX | None, float | ca.SX | None], ...]  # of each limit, in terms of p
     laws: tuple[Law, ...]  # parts of the equations that have a name
     rate_limits: tuple[Limit, ...]  # on the change by time of a drive, which is their `expr`
-    drive_weights: (
-        np.ndarray
-    )  # (n_u,) how much each drive counts where there are more than axes; none of an imposed motion
-    law_inputs: Callable[
-        ..., SimpleNamespace
-    ]  # (place, channel, partner, states, stage) -> what an effect's law reads there
+    # (n_u,) how much each drive counts where there are more than axes; none of an imposed motion
+    drive_weights: np.ndarray
+    # (place, channel, partner, states, order) -> what an effect's law reads there
+    law_inputs: Callable[..., LawInputs]
 
     # Names and typical sizes, SI, per component
     x_names: tuple[str, ...]
