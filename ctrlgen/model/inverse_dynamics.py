@@ -29,9 +29,9 @@ import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.model.allocation import allocate
-from ctrlgen.model.assembly import TYPICAL_RATE
 from ctrlgen.model.inverse import ExpansionPoint, solve_by_blocks
 from ctrlgen.model.model import Model
+from ctrlgen.model.state_vector import TYPICAL_RATE
 
 NONE = ca.SX(0, 1)  # a vector without components
 
