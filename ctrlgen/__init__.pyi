@@ -23,6 +23,7 @@ from .core.errors import ToolError as ToolError
 from .core.errors import Unreachable as Unreachable
 from .devices import Device as Device
 from .devices import load_device as load_device
+from .devices.user.user_device import UserArguments as UserArguments
 from .devices.user.user_device import user_device as user_device
 from .diagnosis.diagnosis_folder import diagnose as diagnose
 from .diagnosis.selection.diagnosis_result import Diagnosis as Diagnosis
