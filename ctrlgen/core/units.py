@@ -157,7 +157,7 @@ def parse_difference(text: str, unit: str) -> float:
 
 
 def _bounds_text(unit: str, low: float | None, high: float | None, low_open: bool) -> str:
-    """Such as '> 0 um and <= 100 um'; empty where nothing is bounded."""
+    """The bounds as text, such as '> 0 um and <= 100 um'; empty where nothing is bounded."""
     side = ">" if low_open else ">="
     parts = [] if low is None else [f"{side} {show(low, unit)}"]
     return " and ".join(parts + ([] if high is None else [f"<= {show(high, unit)}"]))

@@ -47,7 +47,7 @@ class Limit:
 
     @property
     def text(self) -> str:
-        """Such as '0 W <= heater power <= 1.2 W'."""
+        """The limit as text, such as '0 W <= heater power <= 1.2 W'."""
         low = "" if self.lower is None else f"{show(self.lower, self.unit)} <= "
         return f"{low}{self.label}" + ("" if self.upper is None else f" <= {show(self.upper, self.unit)}")
 
@@ -69,7 +69,7 @@ def rate_limit(drive: Signal, i: int, low: float, high: float, unit: str) -> Lim
 
 
 def spans(bounds: tuple[Any, Any]) -> np.ndarray:
-    """(n,) in what distances from `bounds` are counted: their range, or the size of a single one; infinite where there is none."""
+    """(n,) the ranges of `bounds`, in which distances from them are counted: of a single bound its size; infinite where there is none."""
     low, high = bounds
     return np.where(np.isfinite(high - low), abs(high - low), np.minimum(np.abs(low), np.abs(high)))
 

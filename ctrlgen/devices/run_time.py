@@ -44,7 +44,7 @@ class RunTime(Section):
 
 @dataclass(frozen=True)
 class RunTimeConstant:
-    """One of them: `path` in the file, `name` in C, default, `low` and `high` in SI, `unit` as the file writes it."""
+    """A constant that is given at the start: `path` in the file, `name` in C, default, `low` and `high` in SI, `unit` of the file."""
 
     path: str
     name: str
@@ -61,7 +61,7 @@ class RunTimeConstant:
 
     @property
     def range_text(self) -> str:
-        """Such as '450 ... 650 K/W'."""
+        """The range as text, such as '450 ... 650 K/W'."""
         ends = [show(v, self.unit).removesuffix(f" {self.unit}") for v in (self.low, self.high)]
         return f"{ends[0]} ... {ends[1]} {'' if self.unit == '1' else self.unit}".strip()
 

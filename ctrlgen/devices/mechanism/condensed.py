@@ -90,7 +90,7 @@ class Drawing(Protocol):
         ...
 
     def values(self) -> SimpleNamespace:
-        """Its numbers in SI."""
+        """The numbers of the description in SI."""
         ...
 
 

@@ -90,11 +90,11 @@ class Joining(Section):
         return None
 
     def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
-        """The uniform pieces that it consists of, from its fixed end; none of one that yields at one point, its pivot."""
+        """The uniform pieces that it consists of, from its fixed end; none where it yields at one point, its pivot."""
         return ()
 
     def pivot(self, p: SimpleNamespace) -> Any:
-        """How far from its free end toward the fixed one the point lies at which it holds its ideal directions [m]."""
+        """Distance from its free end, toward the fixed one, of the point at which it holds its ideal directions [m]."""
         return 0.0
 
     @property
@@ -126,7 +126,7 @@ class Flexible(Joining):
     """Name of its material."""
 
     def sections(self, p: SimpleNamespace) -> tuple[FlexureSection, ...]:
-        """Where it is stressed most."""
+        """The sections at which it may be stressed most."""
         raise NotImplementedError
 
     @staticmethod
@@ -144,7 +144,7 @@ class Beam(Flexible):
     """Whether it stretches where its ends are held as it bends, and an axial load makes it stiffer or softer across."""
 
     def reach(self, p: SimpleNamespace) -> Any:
-        """Its length."""
+        """The length between its ends [m]."""
         return p.length
 
     def section(self, p: SimpleNamespace) -> Sequence[Any]:
@@ -152,9 +152,9 @@ class Beam(Flexible):
         raise NotImplementedError
 
     def sections(self, p: SimpleNamespace) -> tuple[FlexureSection, ...]:
-        """Both ends."""
-        own = self.section(p)
-        return FlexureSection("free_end", 0.0, *own), FlexureSection("fixed_end", p.length, *own)
+        """The sections at both ends."""
+        section = self.section(p)
+        return FlexureSection("free_end", 0.0, *section), FlexureSection("fixed_end", p.length, *section)
 
 
 class Blade(Beam):
@@ -183,11 +183,11 @@ class Blade(Beam):
         return flexure.blade_compliance(p.length, p.thickness, p.width, m.young, m.poisson)
 
     def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
-        """One."""
+        """One piece of rectangular section."""
         return (Segment(p.length, *flexure.blade_rigidity(p.thickness, p.width, m.young, m.poisson)),)
 
     def section(self, p: SimpleNamespace) -> Sequence[Any]:
-        """Of the rectangle."""
+        """Area and section moduli of the rectangle."""
         return flexure.rectangular_section(p.thickness, p.width)
 
 
@@ -207,11 +207,11 @@ class Wire(Beam):
         return flexure.wire_compliance(p.length, p.diameter, m.young, m.poisson)
 
     def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
-        """One."""
+        """One piece of round section."""
         return (Segment(p.length, *flexure.wire_rigidity(p.diameter, m.young, m.poisson)),)
 
     def section(self, p: SimpleNamespace) -> Sequence[Any]:
-        """Of the wire."""
+        """Area and section moduli of the round section."""
         area, bending, torsion = flexure.round_section(p.diameter)
         return area, bending, bending, torsion
 
@@ -245,13 +245,13 @@ class Strut(Beam):
         return series((lower, move(rod, None, (-p.wire_length, 0, 0)), wire))
 
     def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
-        """Wire, rod, wire."""
+        """Three pieces: wire, rod, wire."""
         wire = Segment(p.wire_length, *flexure.wire_rigidity(p.wire_diameter, m.young, m.poisson))
         rod = flexure.wire_rigidity(p.rod_diameter, m.young, m.poisson)
         return wire, Segment(p.length - 2 * p.wire_length, *rod), wire
 
     def section(self, p: SimpleNamespace) -> Sequence[Any]:
-        """Of its wires."""
+        """Area and section moduli of its wires."""
         area, bending, torsion = flexure.round_section(p.wire_diameter)
         return area, bending, bending, torsion
 
@@ -293,11 +293,11 @@ class CircularHinge(Flexible):
         return _of_entries((twist, turn, plane[2, 2]), (plane[0, 0], plane[1, 1], across), plane[2, 1], coupled)
 
     def reach(self, p: SimpleNamespace) -> Any:
-        """Its length 2 R."""
+        """The length 2 R [m]."""
         return 2 * p.hinge.R
 
     def pivot(self, p: SimpleNamespace) -> Any:
-        """Its neck turns, R from its end."""
+        """R: it turns at its neck."""
         return p.hinge.R
 
     def sections(self, p: SimpleNamespace) -> tuple[FlexureSection, ...]:
@@ -388,5 +388,5 @@ class ComplianceMatrix(Joining):
         return self
 
     def compliance(self, p: SimpleNamespace, m: SimpleNamespace) -> Matrix:
-        """[C] about the free end (6, 6)."""
+        """[C] about the free end (6, 6), as the file states it."""
         return ca.DM(np.array(self.compliance_si))

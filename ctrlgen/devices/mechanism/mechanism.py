@@ -347,13 +347,13 @@ class Mechanism(Device):
 
     @property
     def _output_motion(self) -> np.ndarray:
-        """(6, n) at home."""
+        """The motion of the output point (6, n) per displacement of the axes, at home."""
         moved = ca.DM(ca.evalf(ca.SX(Condensed(self, self.values()).output_motion))).full()
         return moved[:, : len(self.placed_actuators)]
 
     @property
     def _joints(self) -> list[Element]:
-        """Who is joined to whom."""
+        """The pairs of bodies that elements join."""
         return [Element(e.first, e.second, ca.DM.eye(6)) for e in self.placed_elements]
 
     def remarks(self) -> list[str]:

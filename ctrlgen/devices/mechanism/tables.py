@@ -133,7 +133,7 @@ class Actuator(Section):
     @field_validator("rate", mode="before")
     @classmethod
     def _is_to_both_sides(cls, stated: Any) -> Any:
-        """One rate is the largest to both sides."""
+        """Reads a single rate as the largest to both sides."""
         return (f"-{stated}", stated) if isinstance(stated, str) else stated
 
     @model_validator(mode="after")
@@ -214,7 +214,7 @@ class Reading(Section):
 
     @property
     def direction(self) -> Direction:
-        """`along` or `about`."""
+        """The direction that is read: `along` or `about`."""
         return self.along or self.about or (0.0, 0.0, 0.0)
 
 
