@@ -20,19 +20,12 @@ from ctrlgen.devices.device_physics import DevicePhysics
 from ctrlgen.devices.mechanism.bent_beams import BentBeam, ThermalActuator
 from ctrlgen.devices.mechanism.condensed import MOST_STEPS, SPARE_STEPS, Condensed
 from ctrlgen.devices.mechanism.copies import Copied, Placed
-from ctrlgen.devices.mechanism.flexures import (
-    TWIST,
-    Blade,
-    CircularHinge,
-    Compliance,
-    ComplianceMatrix,
-    Flexible,
-    Strut,
-    Wire,
-)
+from ctrlgen.devices.mechanism.flexures import Blade, CircularHinge, Flexible, Strut, Wire
+from ctrlgen.devices.mechanism.joining import TWIST
 from ctrlgen.devices.mechanism.mechanism_physics import mechanism_physics
 from ctrlgen.devices.mechanism.modes import guyan_modes, inertia_remarks
 from ctrlgen.devices.mechanism.springs import Spring
+from ctrlgen.devices.mechanism.stated_compliances import Compliance, ComplianceMatrix
 from ctrlgen.devices.mechanism.tables import GROUND_NAME, Actuator, Body, Dynamics, Material, Output, Pattern, Reading
 from ctrlgen.physics import rigid_bodies as mechanism
 from ctrlgen.physics.rigid_bodies import GROUND, Element

@@ -14,7 +14,7 @@ import numpy as np
 
 from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.devices.mechanism.copies import Placed
-from ctrlgen.devices.mechanism.flexures import TWIST
+from ctrlgen.devices.mechanism.joining import TWIST
 from ctrlgen.physics import rigid_bodies as mechanism
 from ctrlgen.physics.rigid_bodies import GROUND
 from ctrlgen.physics.screw import Matrix, adjoint, inverse_adjoint

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from ctrlgen.core.units import In, Quantity, same_dimension, written_unit
-from ctrlgen.devices.mechanism.flexures import Direction, Name, Place
+from ctrlgen.devices.mechanism.joining import Direction, Name, Place
 from ctrlgen.devices.section import Section
 from ctrlgen.physics.screw import Matrix, rotation_z
 
