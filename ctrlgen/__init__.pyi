@@ -26,9 +26,9 @@ from .devices import load_device as load_device
 from .devices.user.user_device import UserArguments as UserArguments
 from .devices.user.user_device import user_device as user_device
 from .diagnosis.diagnosis_folder import diagnose as diagnose
-from .diagnosis.selection.diagnosis_result import Diagnosis as Diagnosis
-from .diagnosis.selection.diagnosis_result import Estimate as Estimate
-from .diagnosis.selection.diagnosis_result import Finding as Finding
+from .diagnosis.evidence.diagnosis_result import Diagnosis as Diagnosis
+from .diagnosis.selection.findings import Estimate as Estimate
+from .diagnosis.selection.findings import Finding as Finding
 from .firmware.folder import CFolder as CFolder
 from .firmware.folder import generate as generate
 from .learning.learn import Learning as Learning

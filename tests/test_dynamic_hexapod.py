@@ -13,9 +13,8 @@ from ctrlgen.devices.mems_hexapod import matrices, natural_frequencies
 from ctrlgen.model.quasi_static import natural_modes, quasi_static
 
 DEVICE, BALANCED = (SCENARIOS / "devices" / f"{name}_hexapod.toml" for name in ("dynamic", "mems"))
-R_A, R_B, HEIGHT, THICKNESS = 1.572e-3, 4.277e-3, 4.127e-3, 0.432e-3  # S1 Table 2
+R_A, THICKNESS = 1.572e-3, 0.432e-3  # S1 Table 2
 ALPHA = np.radians([187.3, 172.7, 67.3, 52.7, -52.7, -67.3])
-BETA = np.radians([237.3, 122.7, 117.3, 2.7, -2.7, -117.3])
 STAGE, TURN = (0, 1, 1, 2, 2, 0), np.radians([0, -120, 120])
 STAGE_MASS, PLATFORM, STRUT = 0.0575e-6, 7.81e-6, 0.446e-6  # kg
 

@@ -12,75 +12,18 @@ import pytest
 from command_line import ctrlgen as command
 from conftest import SCENARIOS
 from result_files import faults
+from robust_paths import EXAMPLE, RISK, SD, STROKE, along, axis, without
 from scipy.optimize import minimize
 from scipy.signal import cont2discrete
 from scipy.stats import norm
 
 import ctrlgen
-from ctrlgen import InputError, Unreachable, build_model, load_scenario, simulate, solve
+from ctrlgen import Unreachable, build_model, load_scenario, solve
+from ctrlgen.budget.chance_constraint import ChanceConstraint
 from ctrlgen.budget.error_budget import budget_of
-from ctrlgen.budget.limits import Margins, margins, slopes_of_limits
-from ctrlgen.budget.linear import propagate
-from ctrlgen.budget.robust import ChanceConstraint
-from ctrlgen.budget.uncertain_path import UncertainPath
+from ctrlgen.budget.limits import Margins
 from ctrlgen.budget.uncertainty import load_uncertainties
-from ctrlgen.controller.motion_feedforward import controller_of
-from ctrlgen.devices.changed_numbers import changed
-from ctrlgen.firmware.folder import generate
-from ctrlgen.trajectory import solution as described
-from ctrlgen.trajectory.scenario import model_of
 from ctrlgen.trajectory.scenario_file import Robust
-
-EXAMPLE = SCENARIOS / "circle_robust"
-RISK = 1e-3
-SD = 0.05  # of the stiffness of the one axis
-STROKE = 50e-6  # m
-
-
-def without(scenario, **other):
-    """The same path without a probability, or with another place for it."""
-    robust = scenario.file.robust.model_copy(update=other) if other else None
-    return replace(scenario, file=scenario.file.model_copy(update={"robust": robust}))
-
-
-@pytest.fixture(scope="module")
-def example():
-    """The shipped scenario with a tenth of its samples, with its model."""
-    scenario = load_scenario(EXAMPLE)
-    rate = type(scenario.file.sample_rate)(100.0, "100 Hz", None)
-    scenario = replace(scenario, file=scenario.file.model_copy(update={"sample_rate": rate}))
-    return scenario, model_of(scenario)
-
-
-@pytest.fixture(scope="module")
-def plain(example):
-    scenario, model = example
-    return solve(without(scenario), model)
-
-
-@pytest.fixture(scope="module")
-def robust(example):
-    return solve(*example)
-
-
-def axis(**limits):
-    """One axis k d = g u whose stroke has limits."""
-    return ctrlgen.user_device(
-        "axis", parameters={"g": "0.2 N/V", "k": "1 N/um"}, drive={"a": "1000 V"}, axes={"x": limits.get("x", "50 um")},
-        force=lambda u, p: [p.g * u.a], restoring_force=lambda d, p: p.k * d.vector,
-    )  # fmt: skip
-
-
-def along(folder, micrometres, device, probability='"99.9 %"', home="", sd="5 %"):
-    """A scenario of one axis, a row of equilibria."""
-    points = ", ".join(f'{{ x = "{float(v)!r} um" }}' for v in micrometres)
-    (folder / "scenario.toml").write_text(
-        f'title = "t"\ndevice = "axis"\n[robust]\nprobability = {probability}\n{home}[path]\nkind = "poses"\npoints = [{points}]\n'
-    )
-    (folder / "uncertainty.toml").write_text(
-        f'title = "u"\n[numbers]\n"mechanism.k" = {{ sd = "{sd}", source = "chosen" }}\n'
-    )
-    return load_scenario(folder, device)
 
 
 # d = g u/k: to first order a share s of the stiffness makes the same share of the displacement, so y (1 + z s) is all that is kept.
@@ -138,9 +81,13 @@ def test_no_bound_is_moved_past_what_the_path_itself_needs(tmp_path):
     """x = 40 um + g u/k with g known to 37 %: at 0 um, far from where the drive is zero, 45.7 of the 50 um to the end are taken, at 41 um
     1.1 um of 9. The controller's bound comes down to 41 um, where the path goes, not to 4.3 um."""
     device = ctrlgen.user_device(
-        "axis", parameters={"g": "0.2 N/V", "k": "1 N/um", "rest": "40 um"}, drive={"a": "1000 V"}, axes={"x": "50 um"},
-        force=lambda u, p: [p.g * u.a], restoring_force=lambda d, p: [p.k * (d.x - p.rest)],
-    )  # fmt: skip
+        "axis",
+        parameters={"g": "0.2 N/V", "k": "1 N/um", "rest": "40 um"},
+        drive={"a": "1000 V"},
+        axes={"x": "50 um"},
+        force=lambda u, p: [p.g * u.a],
+        restoring_force=lambda d, p: [p.k * (d.x - p.rest)],
+    )
     scenario = along(tmp_path, [0.0, 41.0], device)
     (tmp_path / "uncertainty.toml").write_text(
         'title = "u"\n[numbers]\n"mechanism.g" = { sd = "37 %", source = "chosen" }\n'
@@ -154,10 +101,13 @@ def test_no_bound_is_moved_past_what_the_path_itself_needs(tmp_path):
 def test_all_limits_together_have_the_probability(tmp_path):
     """Four axes of one risk each share it: 1 - p = 4 (1 - Phi(beta))."""
     device = ctrlgen.user_device(
-        "axis", parameters={f"k{i}": "1 N/um" for i in range(4)}, drive={f"u{i}": "1000 N" for i in range(4)},
-        axes={f"x{i}": "50 um" for i in range(4)}, force=lambda u, p: [u.u0, u.u1, u.u2, u.u3],
+        "axis",
+        parameters={f"k{i}": "1 N/um" for i in range(4)},
+        drive={f"u{i}": "1000 N" for i in range(4)},
+        axes={f"x{i}": "50 um" for i in range(4)},
+        force=lambda u, p: [u.u0, u.u1, u.u2, u.u3],
         restoring_force=lambda d, p: [p.k0 * d.x0, p.k1 * d.x1, p.k2 * d.x2, p.k3 * d.x3],
-    )  # fmt: skip
+    )
     for beyond in (-0.01, 0.01):
         far = 1e6 * STROKE / (1 + norm.isf(RISK / 4) * SD) + beyond
         point = ", ".join(f'x{i} = "{float(far)!r} um"' for i in range(4))
@@ -195,111 +145,16 @@ def test_what_scatters_has_a_tenth_of_the_risk_shared_by_samples_and_limits():
     assert 0.02 < np.mean((np.abs(y) > edge).any(axis=1)) < 0.1
 
 
-def broken(solution, draws, seed=3):
-    """The share of draws that break a limit anywhere on the path, and the budget."""
-    scenario = without(solution.scenario)
-    budget = budget_of(solution, load_uncertainties(scenario, solution.model), draws=draws, seed=seed)
-    return budget.broken, budget
-
-
-@pytest.mark.long
-def test_draws_break_limits_of_the_plain_path_and_not_of_the_robust_one(plain, robust):
-    share, _ = broken(plain, 2_000)
-    assert 0.01 < share < 0.1
-    share, budget = broken(robust, 10_000)
-    assert share <= RISK
-    assert all(s.kept >= 0 and s.probability >= 1 - RISK for s in budget.safeties)
-    assert robust.scenario.home["delta_z"] < -5e-6  # lower is colder: the error is less
-
-
-@pytest.mark.exhaustive
-def test_of_a_hundred_thousand_draws_as_few_break_limits_as_is_stated():
-    scenario = load_scenario(EXAMPLE)
-    model = model_of(scenario)
-    share, _ = broken(solve(scenario, model), 100_000)
-    assert share <= RISK
-    # the same where the path cannot be moved and its reserve is used up: as far up as it holds
-    held = solve(replace(without(scenario, home=()), home={"delta_z": -1.8e-6}), model)
-    share, _ = broken(held, 100_000)
-    assert RISK / 30 < share <= RISK
-
-
-def worst_numbers(solution, distance):
-    """The numbers of the device at `distance` standard uncertainties toward the end of the strokes: its design point, GUM 5."""
-    stated = load_uncertainties(solution.scenario, solution.model)
-    path = UncertainPath(solution, stated)
-    linear = propagate(path)
-    slopes = slopes_of_limits(path, linear)
-    found = margins(path, linear, slopes)
-    (own,) = (place for limit, place in path.places if limit.name == "stroke")
-    k, i = np.unravel_index(
-        int(np.argmin(found.margin[1, :, own] / found.sd[1, :, own])), found.margin[1, :, own].shape
-    )
-    g = linear.sensitivity["limits"][k, own.start + int(i)]
-    away = distance * stated.covariance @ g / math.sqrt(g @ stated.covariance @ g)
-    values = {name: number.si for name, number in solution.model.device.quantities()}
-    numbers, gain, column = {}, np.ones(solution.drive.shape[1]), 0
-    for line in stated.lines:
-        for j, name in enumerate(line.paths):
-            if line.kind == "number":
-                numbers[name] = values[name] + away[column]
-            elif line.kind == "gain":
-                gain += away[column]
-            elif line.kind == "channel gain":
-                gain[j] += away[column]
-            column += 1
-    return numbers, gain
-
-
-def farthest(solution, distance):
-    """The largest displacement [m] of that device under the drives of the solution, in the second of two periods of the simulator."""
-    numbers, gain = worst_numbers(solution, distance)
-    device = build_model(changed(solution.model.device, numbers))
-    driven = np.vstack([solution.drive, solution.drive]) * gain
-    trace = simulate(device, driven, solution.scenario.sample_time, solution.trace.x[0])
-    return float(trace.signals["displacement"][len(solution.drive) :].max())
-
-
-@pytest.mark.long
-def test_a_simulated_device_at_the_quantile_keeps_the_stroke_on_the_robust_path_alone(plain, robust):
-    z = norm.isf(RISK)
-    end = plain.model.z_bounds[1].max()
-    assert farthest(plain, z) > end > farthest(robust, z)
-    # where the plain path has its own distance from the end, it just meets it: the propagation is that of the simulator
-    stated = load_uncertainties(plain.scenario, plain.model)
-    (stroke,) = (
-        s for s in budget_of(plain, stated, draws=0).safeties if s.limit.name == "stroke" and s.side == "upper"
-    )
-    assert farthest(plain, stroke.margin / stroke.sd) == pytest.approx(end, abs=0.03 * stroke.sd)  # its second order
-
-
-@pytest.mark.long
-def test_the_generated_controller_keeps_the_tightened_limits(robust, plain, tmp_path):
-    controller = controller_of(robust.model, "pose", robust.scenario.sample_time)
-    target = robust.command[0].copy()
-    target[robust.model.signals["pose"].channels.index("delta_z")] = 80e-6  # above the workspace
-    step = controller.step((robust.trace.x[0], robust.trace.z[0]), target, settle=True)
-    assert step.status and step.displacement.max() <= robust.model.z_bounds[1].max() * (1 + 1e-9)
-    limits = {limit.name: limit for limit in robust.model.limits}
-    own = {limit.name: limit for limit in plain.model.limits}
-    assert limits["stroke"].upper < own["stroke"].upper and limits["temperature"].upper < own["temperature"].upper
-    # what the device rests at is not taken from it
-    assert limits["stroke"].lower == own["stroke"].lower and limits["temperature"].lower == own["temperature"].lower
-    c = generate(robust.scenario, robust.model, tmp_path / "c", robust)
-    (header,) = (path for path in c.path.glob("*online_f64.h"))
-    text = header.read_text()
-    assert "55 um less" in text and "99.9 % along circle_robust" in text
-    (source,) = (path for path in c.path.glob("*online_f64.c"))
-    assert repr(limits["stroke"].upper) in source.read_text() and repr(own["stroke"].upper) not in source.read_text()
-
-
 def redundant():
     """Three stacks on two axes, each with a gain of its own."""
     return ctrlgen.user_device(
-        "axis", parameters={"a": "0.2 N/V", "b": "0.1 N/V", "c": "0.2 N/V", "k": "1 N/um"},
-        drive={"u": ("-200 V", "200 V"), "v": ("-200 V", "200 V"), "w": ("-200 V", "200 V")}, axes={"x": "50 um", "y": "50 um"},
-        force=lambda u, p: [p.a * u.u + p.b * u.v, p.c * u.w - p.b * u.v], restoring_force=lambda d, p: p.k * d.vector,
-    )  # fmt: skip
+        "axis",
+        parameters={"a": "0.2 N/V", "b": "0.1 N/V", "c": "0.2 N/V", "k": "1 N/um"},
+        drive={"u": ("-200 V", "200 V"), "v": ("-200 V", "200 V"), "w": ("-200 V", "200 V")},
+        axes={"x": "50 um", "y": "50 um"},
+        force=lambda u, p: [p.a * u.u + p.b * u.v, p.c * u.w - p.b * u.v],
+        restoring_force=lambda d, p: p.k * d.vector,
+    )
 
 
 def test_a_stage_with_inertia_reserves_what_its_swinging_takes():
@@ -347,9 +202,10 @@ def test_of_redundant_drives_those_with_the_least_expected_error_are_taken(tmp_p
     )
     sds = {"a": 0.10, "b": 0.01, "c": 0.03}
     (tmp_path / "uncertainty.toml").write_text(
-        'title = "u"\n[numbers]\n' + "".join(f'"mechanism.{n}" = {{ sd = "{100 * s:g} %", source = "s" }}\n' for n, s in sds.items())
+        'title = "u"\n[numbers]\n'
+        + "".join(f'"mechanism.{n}" = {{ sd = "{100 * s:g} %", source = "s" }}\n' for n, s in sds.items())
         + '[drive]\nchannel_gain = { sd = "0.5 %", source = "s" }\n'
-    )  # fmt: skip
+    )
     scenario = load_scenario(tmp_path, redundant())
     model = build_model(scenario.device)
     found, least = solve(scenario, model), solve(without(scenario), model)
@@ -361,8 +217,12 @@ def test_of_redundant_drives_those_with_the_least_expected_error_are_taken(tmp_p
         return np.sum((B * u * sd) ** 2)
 
     reference = minimize(
-        variance, least.drive[0], constraints={"type": "eq", "fun": lambda u: B @ u - force}, method="SLSQP", options={"ftol": 1e-14}
-    ).x  # fmt: skip
+        variance,
+        least.drive[0],
+        constraints={"type": "eq", "fun": lambda u: B @ u - force},
+        method="SLSQP",
+        options={"ftol": 1e-14},
+    ).x
     assert found.drive[0] == pytest.approx(reference, abs=1e-3)  # V of 200: what SLSQP leaves
     assert variance(found.drive[0]) < 0.5 * variance(least.drive[0])
     stated = load_uncertainties(without(scenario), model)
@@ -379,14 +239,6 @@ def test_what_an_explanation_offers_can_be_followed(tmp_path):
     for what, command_ in offered.items():
         again = along(tmp_path, [float(v) for v in 1e6 * command_[:, 0]], axis())
         assert solve(again, build_model(again.device)).model.probability == pytest.approx(0.999), what
-
-
-def test_limits_as_described_are_refused_where_they_are_to_be_tightened(example, tmp_path):
-    scenario, model = example
-    for route in (lambda: described.solve(scenario, model), lambda: generate(scenario, model, tmp_path / "c")):
-        with pytest.raises(InputError, match="asks for tightened limits"):
-            route()
-    assert not (tmp_path / "c").exists()
 
 
 @pytest.mark.parametrize(

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from ctrlgen.budget.error_budget import ErrorBudget, budget_of
+from ctrlgen.budget.robust import solve
 from ctrlgen.budget.uncertainty import FILE, Uncertain, Uncertainties, load_uncertainties
 from ctrlgen.calibration.calibrate import Calibration, sd_of_bounds
 from ctrlgen.core.units import show_difference, to_si
 from ctrlgen.devices import Device
 from ctrlgen.devices.run_time import RunTimeConstant
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
-from ctrlgen.trajectory.solution import solve
 
 BOUNDS = "bounds of [run_time], uniform between them"
 
@@ -42,9 +42,9 @@ def budgets(
 
 
 def _budget(scenario: Scenario, device: Device, stated: Uncertainties, progress: Callable[[str], None]) -> ErrorBudget:
-    own = replace(scenario, device=device)
-    model = model_of(own)
-    return budget_of(solve(own, model, progress), stated, draws=0, progress=progress)
+    specimen = replace(scenario, device=device)
+    model = model_of(specimen)
+    return budget_of(solve(specimen, model, progress), stated, draws=0, progress=progress)
 
 
 def _joined(
@@ -66,8 +66,12 @@ def _joined(
         left = [i for i, path in enumerate(line.paths) if path not in paths]
         if left:  # of a list the numbers that are no constants stay
             text, steps = line.per
-            own = tuple(line.paths[i] for i in left), tuple(line.sds[i] for i in left), tuple(steps[i] for i in left)
-            kept.append(replace(line, paths=own[0], sds=own[1], per=(text, own[2])))
+            specimen = (
+                tuple(line.paths[i] for i in left),
+                tuple(line.sds[i] for i in left),
+                tuple(steps[i] for i in left),
+            )
+            kept.append(replace(line, paths=specimen[0], sds=specimen[1], per=(text, specimen[2])))
             columns += [first + i for i in left]
         first += len(line.sds)
     k, n = len(constants), len(constants) + len(columns)

@@ -49,8 +49,8 @@ def time_series(n: int, n_u: int, rate: float, seed: int) -> Iterator[Excitation
     yield ExcitationSignal("on/off cycles", "four cycles between the limits", _together(square, n_u))
     if n_u > 1:
         turns = np.minimum((s * n_u).astype(int), n_u - 1)
-        own = (s * n_u) % 1
-        wave = np.where(own < 0.25, 0.0, np.where(own < 0.6, 1.0, -1.0))
+        turn = (s * n_u) % 1
+        wave = np.where(turn < 0.25, 0.0, np.where(turn < 0.6, 1.0, -1.0))
         yield ExcitationSignal(
             "one axis at a time", "each actuator stepped and returned alone", wave[:, None] * np.eye(n_u)[turns]
         )
@@ -97,10 +97,17 @@ def admissible(
         centre = np.where(one_sided, low + half, 0.0)
         drive = np.clip(centre + half * shape.values, low, high)
         record = Record(
-            f"next: {shape.kind}", "fit", first + np.arange(n) * h, template.sample_time, drive,
-            np.zeros((n, template.observed.shape[1])), template.linear, None,
-            np.ones((n, template.observed.shape[1]), bool), poses=template.poses,
-        )  # fmt: skip
+            f"next: {shape.kind}",
+            "fit",
+            first + np.arange(n) * h,
+            template.sample_time,
+            drive,
+            np.zeros((n, template.observed.shape[1])),
+            template.linear,
+            None,
+            np.ones((n, template.observed.shape[1]), bool),
+            poses=template.poses,
+        )
         if _kept(simulator, p, record):
             best, first_left = (record, EXCITATION.strengths[middle]), middle + 1
         else:
@@ -121,9 +128,9 @@ def _kept(simulator: Simulator, p: np.ndarray, record: Record) -> bool:
     values = f(after.T, record.drive.T, np.tile(p[:, None], (1, n)), np.zeros((1, n))).full().T
     first = 0
     for limit in m.limits:
-        own = values[:, first : first + limit.expr.numel()]
+        reached = values[:, first : first + limit.expr.numel()]
         first += limit.expr.numel()
         (low, high), size = limit.bounds, max(abs(limit.lower or 0.0), abs(limit.upper or 0.0))
-        if own.min() < low - EXCITATION.limit_slack * size or own.max() > high + EXCITATION.limit_slack * size:
+        if reached.min() < low - EXCITATION.limit_slack * size or reached.max() > high + EXCITATION.limit_slack * size:
             return False
     return True

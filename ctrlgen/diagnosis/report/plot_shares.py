@@ -8,15 +8,18 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ctrlgen.core.units import difference
-from ctrlgen.diagnosis.shares.regressors import Columns, Kind
+from ctrlgen.diagnosis.shares.design import Columns, Kind
 from ctrlgen.diagnosis.shares.shares_table import ChannelShares, SharesTable
 from ctrlgen.reporting.plots import COLOURS
 
 WIDTH = 8.6
-BARS = 7  # kinds of a channel that are shown, besides the selected ones
+# kinds of a channel that are shown, besides the selected ones
+BARS = 7
 PANELS = 3
-POINTS = 600  # samples drawn in a panel: each costs a hundred bytes of the page
-SMALL = 0.01  # shares below it have no bar
+# samples drawn in a panel: each costs a hundred bytes of the page
+POINTS = 600
+# shares below it have no bar
+SMALL = 0.01
 SELECTED, OTHER, PAST, ADDED, RESIDUAL = COLOURS[0], "#c4d7e6", "#d9d9d9", COLOURS[3], "#b0b0b0"
 
 
@@ -120,7 +123,7 @@ def _abscissa(table: SharesTable, channel: ChannelShares, kind: Kind) -> tuple[n
     blocks = list(table.design.of_kind(stands_for.get(kind, kind), channel.own))
     blocks = blocks or [b for b in table.design.blocks if b.kind is Kind.TIME]
     best = max(blocks, key=lambda block: _explained(block, channel.predictions[kind]))
-    x, name = best.abscissa, best.signal.partition(" x ")[0]
+    x, name = best.abscissa, best.signal
     if kind is Kind.PITCH:
         period = channel.periods[kind]
         return (x / period) % 1.0, f"{name} in the pitch", "periods"

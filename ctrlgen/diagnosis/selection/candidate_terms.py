@@ -24,7 +24,8 @@ from ctrlgen.model.effect_terms import channels
 UNUSABLE = (CtrlgenError, ValueError, TypeError, AttributeError, LookupError, ArithmeticError, RuntimeError)
 """What a law that cannot be written down at a place may end with."""
 
-Peaks = dict[tuple[Place, int], dict[str, float]]  # by unit, SI
+# by unit, SI
+Peaks = dict[tuple[Place, int], dict[str, float]]
 REACHED = ("channel", "travel", "travel/s")
 
 
@@ -39,12 +40,13 @@ class CandidateTerm:
     terms: tuple[int, ...]
     size: float
     one_sided: int
-    range: tuple[float, float] = (-np.inf, np.inf)  # of the amplitude's change, in sizes
+    # of the amplitude's change, in sizes
+    range: tuple[float, float] = (-np.inf, np.inf)
 
 
 def signal_peaks(fitter: Fitter, fit: Fit) -> Peaks:
     """How far the signals at every place go in the records to fit."""
-    found: Peaks = {}
+    peaks: Peaks = {}
     physics = nominal_physics(fit.structure.device)
     simulators = fit.structure.simulators(fitter.recording, fitter.cache)
     reached = (Place.DRIVE, Place.FORCE, Place.DISPLACEMENT)
@@ -63,9 +65,9 @@ def signal_peaks(fitter: Fitter, fit: Fit) -> Peaks:
         )
         most = np.nan_to_num(np.abs(values.full())).max(axis=1).reshape(-1, len(REACHED))
         for where, row in zip(places, most, strict=True):
-            old = found.get(where, {})
-            found[where] = {unit: max(old.get(unit, 0.0), value) for unit, value in zip(REACHED, row, strict=True)}
-    return found
+            old = peaks.get(where, {})
+            peaks[where] = {unit: max(old.get(unit, 0.0), value) for unit, value in zip(REACHED, row, strict=True)}
+    return peaks
 
 
 class CandidateTerms:
@@ -75,12 +77,18 @@ class CandidateTerms:
     """
 
     def __init__(
-        self, laws: LawTerms, simulator: Simulator, structure: Structure, hypotheses: list[Hypothesis],
-        probes: dict[tuple[Place, int], int], seen: Callable[[Place, int], DataHints],
-    ) -> None:  # fmt: skip
+        self,
+        laws: LawTerms,
+        simulator: Simulator,
+        structure: Structure,
+        hypotheses: list[Hypothesis],
+        probes: dict[tuple[Place, int], int],
+        seen: Callable[[Place, int], DataHints],
+    ) -> None:
         self.laws, self.simulator = laws, simulator
         self.terms: list[LawTerm] = []
-        self._places: dict[LawTerm, int] = {}  # in `terms`
+        # in `terms`
+        self._places: dict[LawTerm, int] = {}
         self.columns: list[CandidateTerm] = []
         self.unusable: dict[Hypothesis, str] = {}
         for h in hypotheses:
@@ -134,8 +142,8 @@ class CandidateTerms:
         for k, term in enumerate(self.terms):
             kinds.setdefault(term.kind, []).append(k)
         return [
-            (own, self.laws.compiled([self.terms[k] for k in own], [k in self.driven for k in own]))
-            for own in kinds.values()
+            (places, self.laws.compiled([self.terms[k] for k in places], [k in self.driven for k in places]))
+            for places in kinds.values()
         ]
 
     @cached_property
@@ -154,7 +162,7 @@ class CandidateTerms:
     def start(self, time: float) -> list[np.ndarray]:
         """The laws' states before the first sample, group by group, at `time` [s]: zero, but for clocks."""
         begin = time if np.isfinite(self.simulator.sample_time) else 0.0
-        clocks = ([clock for k in own for clock in self.terms[k].clocks] for own, _ in self.groups)
+        clocks = ([clock for k in places for clock in self.terms[k].clocks] for places, _ in self.groups)
         return [np.where(np.array(each, bool), begin, 0.0) for each in clocks]
 
     def along(
@@ -166,12 +174,12 @@ class CandidateTerms:
         A pose is read with the memories at the end of its dwell.
         """
         n = len(motion[0])
-        found, ends = np.empty((n, len(self.terms))), np.empty((n, len(self.terms)))
+        slopes, ends = np.empty((n, len(self.terms))), np.empty((n, len(self.terms)))
         read, at_end = self.signals.along(p, *motion)
         after = []
-        for (own, group), memory in zip(self.groups, memories, strict=True):
+        for (places, group), memory in zip(self.groups, memories, strict=True):
             rows = self.signals.columns(group.reads)
-            states, found[:, own], jumped = group.along(memory, read[:, rows], at_end[:, rows])
-            ends[:, [k for k in own if k in self.driven]] = jumped
+            states, slopes[:, places], jumped = group.along(memory, read[:, rows], at_end[:, rows])
+            ends[:, [k for k in places if k in self.driven]] = jumped
             after.append(states)
-        return after, found, ends[:, self.driven]
+        return after, slopes, ends[:, self.driven]

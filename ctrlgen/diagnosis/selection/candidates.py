@@ -20,15 +20,15 @@ from ctrlgen.estimation.structure import Structure
 def fit_candidates(trials: Trials, current: CandidateModel, screened: Screened) -> tuple[CandidateModel, ...]:
     """All that is tried beside `current`, the promising ones fitted to their end."""
 
-    def in_other_shapes(own: Trials, t: CandidateModel) -> CandidateModel:
-        return t if current.errors.is_noise else restart_elsewhere(own, t, current, screened)
+    def in_other_shapes(branch: Trials, t: CandidateModel) -> CandidateModel:
+        return t if current.errors.is_noise else restart_elsewhere(branch, t, current, screened)
 
-    found = fit_each(trials, current.fit, significant(trials, current, screened), in_other_shapes)
-    found = (*found, *fit_other_clocks(trials, current, found))
+    candidates = fit_each(trials, current.fit, significant(trials, current, screened), in_other_shapes)
+    candidates = (*candidates, *fit_other_clocks(trials, current, candidates))
     if trials.selection.parameters_may_mask_cause(current.fit):
-        found = (*found, *_as_stated(trials, current))
-    found = (*found, *fit_subsets(trials, current, screened, found))
-    return _converge_promising(trials, current, found)
+        candidates = (*candidates, *_as_stated(trials, current))
+    candidates = (*candidates, *fit_subsets(trials, current, screened, candidates))
+    return _converge_promising(trials, current, candidates)
 
 
 def significant(trials: Trials, current: CandidateModel, screened: Screened) -> list[Suspect]:
@@ -55,10 +55,12 @@ def fit_each(
 ) -> tuple[CandidateModel, ...]:
     """Each suspect beside what is fitted, and what `finish` makes of it."""
 
-    def one(own: Trials, s: Suspect) -> list[CandidateModel]:
-        return [finish(own, t) for t in own.tried(fit.restarted.with_cause(s.hypothesis, s.start), s.hypothesis, fit)]
+    def one(branch: Trials, s: Suspect) -> list[CandidateModel]:
+        return [
+            finish(branch, t) for t in branch.tried(fit.restarted.with_cause(s.hypothesis, s.start), s.hypothesis, fit)
+        ]
 
-    return tuple(t for found in trials.each(one, suspects, lambda s: trying(s.hypothesis)) for t in found)
+    return tuple(t for fitted in trials.each(one, suspects, lambda s: trying(s.hypothesis)) for t in fitted)
 
 
 def trying(*causes: Hypothesis) -> str:
@@ -103,7 +105,7 @@ def fit_other_clocks(
     if current.errors.is_noise or trials.fitter.recording.kind == "poses" or not shifts:
         return ()
 
-    def one(own: Trials, beside: CandidateModel) -> list[CandidateModel]:
+    def one(branch: Trials, beside: CandidateModel) -> list[CandidateModel]:
         begun: list[tuple[float, Hypothesis, Structure]] = []
         for cause in shifts:
             p = cause.law.amplitude()
@@ -111,16 +113,16 @@ def fit_other_clocks(
             try:
                 for start in (2**k * h for k in range(SEARCH.clock_doublings) if low <= 2**k * h <= high):
                     structure = beside.fit.restarted.with_cause(cause, {p.name: start})
-                    begun.append((own.fitter.initial_objective(structure), cause, structure))
+                    begun.append((branch.fitter.initial_objective(structure), cause, structure))
             except FAILURES as error:
-                own.note_failure(cause, error)
+                branch.note_failure(cause, error)
         if not begun:
             return []
         _, cause, structure = min(begun, key=lambda b: b[0])
-        return own.tried(structure, cause, beside.fit)
+        return branch.tried(structure, cause, beside.fit)
 
     besides = [current, *trials.selection.ranked(singles)[: SEARCH.beside_clocks]]
-    return tuple(t for found in trials.each(one, besides, lambda _: trying(*shifts)) for t in found)
+    return tuple(t for fitted in trials.each(one, besides, lambda _: trying(*shifts)) for t in fitted)
 
 
 def _as_stated(trials: Trials, current: CandidateModel) -> tuple[CandidateModel, ...]:
@@ -144,13 +146,13 @@ def fit_subsets(
         return []
     best = max((current.fit.objective - t.fit.objective for t in singles), default=0.0)
     least = min((t.fitted.excess for t in singles), default=np.inf)
-    found: list[CandidateModel] = []
+    candidates: list[CandidateModel] = []
 
-    def one(own: Trials, suspects: Sequence[Suspect]) -> list[CandidateModel]:
+    def one(branch: Trials, suspects: Sequence[Suspect]) -> list[CandidateModel]:
         structure = current.fit.restarted
         for s in suspects:
             structure = structure.with_cause(s.hypothesis, s.start)
-        return own.tried(structure, suspects[-1].hypothesis, current.fit)
+        return branch.tried(structure, suspects[-1].hypothesis, current.fit)
 
     for size in (2, 3, 4):
         explained = least <= (1 - MODEL_SELECTION.most_of_mismatch) * current.fitted.excess
@@ -160,11 +162,11 @@ def fit_subsets(
         enough = best + max(trials.selection.required_z2(current, screened), SEARCH.subset_share * left)
         sets = _promising_sets(screened, size, enough, trials.per_round)
         tried = trials.each(one, sets, lambda suspects: trying(*(s.hypothesis for s in suspects)))
-        found += [t for fitted in tried for t in fitted]
-        sound = [t for t in found if not trials.objections(t)]
+        candidates += [t for fitted in tried for t in fitted]
+        sound = [t for t in candidates if not trials.objections(t)]
         best = max([best, *(current.fit.objective - t.fit.objective for t in sound)])
         least = min([least, *(t.fitted.excess for t in sound)])
-    return found
+    return candidates
 
 
 def _promising_sets(screened: Screened, size: int, enough: float, most: int) -> list[tuple[Suspect, ...]]:
@@ -192,5 +194,5 @@ def _converge_promising(
     early = [
         t for t in best if t.fit.objective < current.fit.objective and not trials.selection.improves_enough(current, t)
     ]
-    ends = dict(zip(map(id, early), trials.each(lambda own, t: own.converged(t), early), strict=True))
+    ends = dict(zip(map(id, early), trials.each(lambda branch, t: branch.converged(t), early), strict=True))
     return tuple(ends.get(id(t), t) for t in candidates)

@@ -16,6 +16,7 @@ import numpy as np
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, SearchResult
 from ctrlgen.diagnosis.selection.candidates import fit_candidates, restart_elsewhere
+from ctrlgen.diagnosis.selection.confusable import explains_alike
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.pruning import all_pruned, without_needless
 from ctrlgen.diagnosis.selection.rivals import rivals, simplified, swapped
@@ -52,12 +53,11 @@ class Searcher:
             if np.allclose(noise.floor, before.floor, rtol=SEARCH.same_noise):
                 break
         current = simplified(trials, self._settled(current))
-        nominal = scored(
-            trials.fitter, trials.fitter.described(device)[1]
-        )  # its numbers not bent by errors of a better model
+        # its numbers are not bent by the errors of a better model
+        nominal = scored(trials.fitter, trials.fitter.described(device)[1])
         each = range(len(current.causes))
-        bare = tuple(trials.each(lambda own, k: _without(own, current, k, nominal), each))
-        alike = tuple(trials.each(lambda own, k: rivals(own, current, k, rounds), each))
+        bare = tuple(trials.each(lambda branch, k: _without(branch, current, k, nominal), each))
+        alike = tuple(trials.each(lambda branch, k: rivals(branch, current, k, rounds), each))
         return SearchResult(trials.fitter, nominal, current, bare, alike, tuple(rounds), trials.screened(current))
 
     def _settled(self, current: CandidateModel) -> CandidateModel:
@@ -83,8 +83,9 @@ class Searcher:
                 return current
             current = without_needless(trials, swapped(trials, best, len(current.causes)))
             same = next((v for v in visited if frozenset(v.causes) == frozenset(current.causes)), None)
-            if same is not None and trials.selection.advantage(current, same) < SEARCH.rival_difference:
-                return current  # no better than when it was there before
+            if same is not None and explains_alike(trials.selection, same, current):
+                # no better than when it was there before
+                return current
             current = trials.with_noise_update(trials.with_errors(trials.converged(current)))
             visited.append(current)
 
@@ -95,7 +96,9 @@ class Searcher:
         trials = self.trials
         first = trials.selection.most_parsimonious(better)
         near = trials.close_contenders(current.fit.objective, first, [t for t in better if t is not first])
-        ends = trials.each(lambda own, t: restart_elsewhere(own, own.converged(t), current, screened), (first, *near))
+        ends = trials.each(
+            lambda branch, t: restart_elsewhere(branch, branch.converged(t), current, screened), (first, *near)
+        )
         sound = [t for t in ends if not trials.objections(t, current.causes)]
         return trials.selection.most_parsimonious(sound or [first])
 
@@ -118,5 +121,5 @@ class Searcher:
 
 def _without(trials: Trials, current: CandidateModel, k: int, nominal: CandidateModel) -> CandidateModel:
     """The model without cause k; the device as described where that cannot be simulated."""
-    found = trials.tried(current.fit.restarted.without(k), None, None)
-    return found[0] if found else nominal
+    fitted = trials.tried(current.fit.restarted.without(k), None, None)
+    return fitted[0] if fitted else nominal

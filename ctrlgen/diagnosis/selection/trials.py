@@ -118,9 +118,9 @@ class Trials:
         if known is not None and known.fit.objective <= fit.objective:
             self.fitted[key] = (known, steps)
             return replace(known, cause=cause)
-        found = scored(self.fitter, fit, cause)
-        self.fitted[key] = (found, steps)
-        return found
+        candidate = scored(self.fitter, fit, cause)
+        self.fitted[key] = (candidate, steps)
+        return candidate
 
     def tried(
         self,
@@ -151,8 +151,8 @@ class Trials:
     def converged(self, candidate: CandidateModel) -> CandidateModel:
         """The same candidate fitted until it converges, or as it was where that fails: candidates are first fitted for a few
         steps only."""
-        found = self.tried(candidate.fit.restarted, candidate.cause, steps=FIT.max_steps)
-        return found[0] if found else candidate
+        fitted = self.tried(candidate.fit.restarted, candidate.cause, steps=FIT.max_steps)
+        return fitted[0] if fitted else candidate
 
     def screened(self, candidate: CandidateModel) -> Screened:
         """The screen of what a candidate leaves."""
@@ -178,18 +178,19 @@ class Trials:
                 break
             before = self.fitter
             self.use(fitter)
-            found = self.tried(candidate.fit.restarted, candidate.cause, steps=FIT.max_steps)
-            if not found:
+            fitted = self.tried(candidate.fit.restarted, candidate.cause, steps=FIT.max_steps)
+            if not fitted:
                 self.use(before)
                 break
-            candidate = found[0]
+            candidate = fitted[0]
         return candidate
 
     def with_noise_update(self, candidate: CandidateModel) -> CandidateModel:
         """The same structure under the noise that it leaves, where nothing else tells the noise."""
         if self.fitter.noise.known.all():
             return candidate
-        for _ in range(SEARCH.most_noise_updates):  # the numbers move as the noise that holds them shrinks
+        # the numbers move as the noise that holds them shrinks
+        for _ in range(SEARCH.most_noise_updates):
             before = self.fitter.noise.sd
             self.use(self.fitter.with_noise(update_noise_size(self.fitter, candidate.fit)))
             candidate = self.converged(candidate)

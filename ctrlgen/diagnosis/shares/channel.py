@@ -20,9 +20,11 @@ from ctrlgen.diagnosis.shares.cross_validation import (
     standard_error,
     stands_out,
 )
+from ctrlgen.diagnosis.shares.design import Design, Kind
 from ctrlgen.diagnosis.shares.periodic import line_columns, pitch_columns, strongest_line, strongest_pitch
-from ctrlgen.diagnosis.shares.regressors import Design, Kind, Signals, standardised
+from ctrlgen.diagnosis.shares.regressors import standardised
 from ctrlgen.diagnosis.shares.shares_table import Share
+from ctrlgen.diagnosis.shares.signals import Signals
 
 
 class ChannelSmoothers:
@@ -88,10 +90,10 @@ class ChannelSmoothers:
             return self.fitted[key]
         columns = [self.kinds[kind] for kind in self.kinds if kind in kinds]
         chosen = np.concatenate(columns) if columns else np.zeros(0, int)
-        found = self.folds.fit(chosen, self.every_fold if targets is None else targets, free)
+        prediction = self.folds.fit(chosen, self.every_fold if targets is None else targets, free)
         if targets is None:
-            self.fitted[key] = found
-        return found
+            self.fitted[key] = prediction
+        return prediction
 
     def says_more(self, before: OutOfBlock, after: OutOfBlock) -> bool:
         """Whether a prediction says more than another one, and more than the mean and the numbers, which stand beside every
@@ -109,12 +111,13 @@ class ChannelSmoothers:
         return share_of(gain, self.energy, stands_out(gain))
 
     def _found_in_residual(self) -> tuple[list[dict[Kind, np.ndarray]], dict[Kind, float]]:
-        """By fold, the columns of own past, pitch and line; and the middle one of the folds' periods."""
+        """The columns of own past, pitch and line of each fold, and the median of the folds' periods."""
         extra: list[dict[Kind, np.ndarray]] = []
         periods: dict[Kind, list[float]] = {}
         past, positions = self._past(), [b.abscissa for b in self.design.of_kind(Kind.POSITION, self.own)]
         without = self.every_fold
-        if positions:  # the trend with position would pass for a long pitch
+        # the trend with position would pass for a long pitch
+        if positions:
             plain = self.common.with_columns([np.empty((len(self.y), 0))] * self.common.count)
             without = plain.left(plain.fit(self.kinds[Kind.POSITION], self.every_fold), self.every_fold)
         longest = max(map(len, self.parts))
@@ -123,11 +126,11 @@ class ChannelSmoothers:
             columns = {Kind.PAST: past, **rates}
             if positions and len(self.y) > 8 * SHARES.longest_pitch:
                 y = np.where(self.common.train[k], without[k], 0.0)
-                found = [strongest_pitch(x, y) for x in positions]
-                pitches = [standardised(pitch_columns(x, p)) for x, p in zip(positions, found, strict=True)]
+                spacings = [strongest_pitch(x, y) for x in positions]
+                pitches = [standardised(pitch_columns(x, p)) for x, p in zip(positions, spacings, strict=True)]
                 best = int(np.argmax([np.sum((c.T @ y) ** 2) for c in pitches]))
                 columns[Kind.PITCH] = pitches[best]
-                periods.setdefault(Kind.PITCH, []).append(found[best])
+                periods.setdefault(Kind.PITCH, []).append(spacings[best])
             if np.isfinite(self.sample_time) and longest > 4 * SHARES.line_periods:
                 frequency = strongest_line(self._without_fold(k))
                 columns[Kind.LINE] = line_columns(self.blocks.rows, frequency)
@@ -184,11 +187,11 @@ class Selection:
 def select_kinds(channel: ChannelSmoothers, kinds: Sequence[Kind]) -> Selection:
     """The kinds that say most. Where other values of the device's numbers would take away much that their stated deviations
     do not allow, these stand in for physics: they are left out where the kinds predict as well without them."""
-    found = forward_selection(channel, kinds)
+    selection = forward_selection(channel, kinds)
     if channel.base is channel.mean:
-        return found
+        return selection
     bare = forward_selection(channel.without_numbers(), kinds)
-    return bare if as_good(bare.joint, found.joint, channel.energy) else found
+    return bare if as_good(bare.joint, selection.joint, channel.energy) else selection
 
 
 def forward_selection(channel: ChannelSmoothers, kinds: Sequence[Kind]) -> Selection:
@@ -216,7 +219,8 @@ def _selected(
     """
     while len(chosen) < SHARES.most_steps and (left := [kind for kind in kinds if kind not in chosen]):
         remains = channel.folds.left(now, channel.every_fold)
-        alone = {kind: channel.without_numbers().fit([kind], remains).squares.sum() for kind in left}  # to rank them
+        # to rank them
+        alone = {kind: channel.without_numbers().fit([kind], remains).squares.sum() for kind in left}
         ranked = sorted(left, key=lambda kind: alone[kind])
         many = sum(map(len, channel.kinds.values())) > SHARES.many_columns
         few = SHARES.joint_candidates if many and chosen else None
@@ -226,7 +230,8 @@ def _selected(
             added = _best_addition(channel, chosen, now, list(combinations(ranked[:several], 2)))
         trial = _simplified(channel, [*chosen, *added], left) if added else chosen
         after = channel.fit(trial)
-        if after.squares.sum() >= now.squares.sum():  # nothing was added, or gave way to what was there before
+        # nothing was added, or gave way to what was there before
+        if after.squares.sum() >= now.squares.sum():
             break
         chosen, now = trial, after
     return chosen, now

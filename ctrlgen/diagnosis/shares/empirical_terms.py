@@ -20,9 +20,10 @@ import numpy as np
 from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.settings import SHARES
 from ctrlgen.diagnosis.shares.cross_validation import stands_out
+from ctrlgen.diagnosis.shares.design import Kind
 from ctrlgen.diagnosis.shares.gather import ResidualShares, gather
-from ctrlgen.diagnosis.shares.regressors import Kind, Signals
 from ctrlgen.diagnosis.shares.shares_table import ChannelShares, SharesTable
+from ctrlgen.diagnosis.shares.signals import Signals
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis, nominal_physics
@@ -67,10 +68,10 @@ def empirical_terms(fitter: Fitter, fit: Fit, shares: ResidualShares | None) -> 
             if (smoother.cause.effect, smoother.cause.of) in tried:
                 continue
             tried.add((smoother.cause.effect, smoother.cause.of))
-            found = _fitted(fitter, fit, smoother)
-            if (term := _confirmed(fitter, fit, found, smoother.kind, channel.channel)) is not None:
+            smoothed = _fitted(fitter, fit, smoother)
+            if (term := _confirmed(fitter, fit, smoothed, smoother.kind, channel.channel)) is not None:
                 terms.append(term)
-                fit = found
+                fit = smoothed
     return tuple(terms)
 
 
@@ -92,7 +93,8 @@ def _smoothers(fit: Fit, table: SharesTable, channel: ChannelShares, signals: Se
         if axis is None:
             continue
         law = Effect.library[_LAWS[row.kind]]
-        if not law.requires <= offered:  # of a stage without inertia the direction is what its last reversals leave
+        # of a stage without inertia the direction is what its last reversals leave
+        if not law.requires <= offered:
             law = Effect.library["empirical_history"]
         d, v = (np.concatenate(parts) for parts in _position_and_speed(signals, axis))
         ranges: dict[str, list[dict[str, float]]] = {
@@ -101,7 +103,7 @@ def _smoothers(fit: Fit, table: SharesTable, channel: ChannelShares, signals: Se
             "empirical_history": [{"reach": share * float(np.ptp(d))} for share in SHARES.reaches],
         }
         rest = {p.name: 0.0 for p in law.params} | {law.amplitude().name: channel.rms}
-        trials = tuple(rest | own for own in ranges[law.kind])
+        trials = tuple(rest | numbers for numbers in ranges[law.kind])
         yield _Smoother(row.kind, Hypothesis(law.kind, f"mechanism:{at}", at, axis), trials)
 
 
@@ -110,10 +112,15 @@ def _position_and_speed(signals: Sequence[Signals], axis: str) -> tuple[list[np.
 
 
 _LAWS = {
-    Kind.PROPORTION: "empirical_position", Kind.POSITION: "empirical_position", Kind.OTHER_AXIS: "empirical_position",
-    Kind.DRIVE: "empirical_position", Kind.DIRECTION: "empirical_speed", Kind.SPEED: "empirical_speed",
-    Kind.TRAVEL_HISTORY: "empirical_history", Kind.DRIVE_HISTORY: "empirical_history",
-}  # fmt: skip
+    Kind.PROPORTION: "empirical_position",
+    Kind.POSITION: "empirical_position",
+    Kind.OTHER_AXIS: "empirical_position",
+    Kind.DRIVE: "empirical_position",
+    Kind.DIRECTION: "empirical_speed",
+    Kind.SPEED: "empirical_speed",
+    Kind.TRAVEL_HISTORY: "empirical_history",
+    Kind.DRIVE_HISTORY: "empirical_history",
+}
 
 
 def _axis(table: SharesTable, channel: ChannelShares, kind: Kind) -> str | None:
@@ -141,7 +148,8 @@ def _fitted(fitter: Fitter, fit: Fit, smoother: _Smoother) -> Fit:
         np.concatenate([fitter.error.whiten(v, r.valid).ravel() for v, r in zip(e, records, strict=True)])
     )
     corner = np.concatenate([np.tile(fitter.error.corner, len(r.valid)) for r in records])
-    trust = np.minimum(1.0, corner / np.maximum(np.abs(whole), 1e-300))  # as in a fit, spikes bend nothing
+    # as in a fit, spikes bend nothing
+    trust = np.minimum(1.0, corner / np.maximum(np.abs(whole), 1e-300))
     best, least = fit, np.inf
     for numbers in smoother.trials:
         structure = fit.restarted.with_cause(smoother.cause, numbers)
@@ -156,13 +164,17 @@ def _fitted(fitter: Fitter, fit: Fit, smoother: _Smoother) -> Fit:
             fitter.error.whiten(Y, r.valid).reshape(-1, len(weights)) for Y, r in zip(slopes, records, strict=True)
         ]
         X = np.nan_to_num(np.vstack(white))
-        seen = np.abs(X).max(axis=1) > 0  # channels and samples that the term moves
+        # channels and samples that the term moves
+        seen = np.abs(X).max(axis=1) > 0
         c, left = ridge_regression(trust[seen, None] * X[seen], trust[seen] * whole[seen])
         if left < least:
             theta[weights] = np.clip(c, [free[k].low for k in weights], [free[k].high for k in weights])
-            found = fit.restarted.with_cause(smoother.cause, numbers | {free[k].name: float(theta[k]) for k in weights})
+            smooth = fit.restarted.with_cause(
+                smoother.cause, numbers | {free[k].name: float(theta[k]) for k in weights}
+            )
             empty = np.zeros(0)
-            best, least = replace(fit, structure=found, theta=theta, initial_states=(), residual=empty, J=empty), left
+            best = replace(fit, structure=smooth, theta=theta, initial_states=(), residual=empty, J=empty)
+            least = left
     return best
 
 
@@ -180,7 +192,7 @@ def ridge_regression(X: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float]:
         c = V @ (b / (values + ridge))
         free = 1 - float(np.sum(values / (values + ridge))) / max(float(y @ y), 1e-300)
         left = float(np.sum((y - X @ c) ** 2)) / max(free, 1e-3) ** 2
-        best = min(best, (c, left), key=lambda found: found[1])
+        best = min(best, (c, left), key=lambda pair: pair[1])
     return best
 
 

@@ -1,4 +1,4 @@
-"""What a residual may be a function of: the signals of a record, and smooth functions of them in columns.
+"""What a residual may be a function of: smooth functions of the signals of a record, in columns.
 
 A kind of regressor is a set of columns: cubic B-splines of a signal (C. de Boor, A Practical Guide to Splines (1978)), its
 sign, what play operators of several widths leave of it (rate-independent memory, as in Prandtl-Ishlinskii models), what
@@ -7,9 +7,7 @@ low-passes leave of it (memory of a time constant), or products of two signals.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from enum import Enum
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from itertools import combinations, pairwise
 
@@ -18,157 +16,11 @@ from scipy.interpolate import BSpline
 from scipy.signal import lfilter
 
 from ctrlgen.diagnosis.settings import SHARES
+from ctrlgen.diagnosis.shares.design import Columns, Design, Kind
+from ctrlgen.diagnosis.shares.signals import Signals
 
-FEW = 2  # signals of one kind, up to which each gets all its columns
-
-
-class Kind(Enum):
-    """Kinds of regressor, in the order in which they are preferred where two predict alike.
-
-    First laws that act always, the simpler before what contains it; then memory of time, products, and last what fits
-    something of any residual: a pitch, a trend, a line.
-    """
-
-    DIRECTION = "direction of motion"
-    PROPORTION = "position, in proportion"
-    POSITION = "position"
-    SPEED = "speed"
-    ACCELERATION = "acceleration"
-    RATE = "rate of the reading"
-    DRIVE = "drive"
-    TRAVEL_HISTORY = "travel history"
-    DRIVE_HISTORY = "drive history"
-    OTHER_AXIS = "other axis"
-    DRIVE_LAG = "low-passed drive"
-    PRODUCT = "product of two"
-    TEMPERATURE = "temperature"
-    RECORD = "record"
-    PITCH = "place in a pitch"
-    TIME = "time"
-    LINE = "phase of a line"
-    PAST = "own past"
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Signals:
-    """The signals of one record, each (n,) in SI.
-
-    `time` [s] on the clock of the recording, the pose's number for settled poses, whose `sample_time` is infinite; poses
-    stand in the order in which they were taken. `position` by axis, `speed` by axis where it is known (else the derivative
-    of the position is taken), `drive` by actuator, `reading`: what the model predicts, by channel, which tells the axes that
-    a channel sees. `temperature` of the surroundings. `units`: for figures, by 'position x' or 'drive x'.
-    """
-
-    time: np.ndarray
-    sample_time: float
-    position: Mapping[str, np.ndarray] = field(default_factory=dict)
-    speed: Mapping[str, np.ndarray] = field(default_factory=dict)
-    drive: Mapping[str, np.ndarray] = field(default_factory=dict)
-    reading: Mapping[str, np.ndarray] = field(default_factory=dict)
-    temperature: np.ndarray | None = None
-    units: Mapping[str, str] = field(default_factory=dict)
-
-    @property
-    def settled(self) -> bool:
-        """Whether the samples are settled poses."""
-        return not np.isfinite(self.sample_time)
-
-    def derivative(self, values: np.ndarray) -> np.ndarray:
-        """d/dt of `values` (n,); for settled poses the step from the pose before."""
-        if self.settled:
-            return np.diff(values, prepend=values[:1])
-        return np.gradient(values, self.sample_time) if len(values) > 1 else np.zeros_like(values)
-
-    def speed_of(self, axis: str) -> np.ndarray:
-        """Speed (n,) of one axis, the step from the pose before for settled poses."""
-        return self.speed[axis] if axis in self.speed else self.derivative(self.position[axis])
-
-
-@dataclass(frozen=True, eq=False)
-class Columns:
-    """Columns (N, p) of unit variance and zero mean of one kind, made of one signal, or of two.
-
-    `axes`: the axes that the signal belongs to. `signal` and `unit` name `abscissa` (N,), over which a figure shows them; if
-    `of_abscissa`, they are functions of it and are held beyond its range, else each column is clamped to its own range.
-    """
-
-    kind: Kind
-    signal: str
-    unit: str
-    axes: frozenset[str]
-    abscissa: np.ndarray
-    values: np.ndarray
-
-    @property
-    def of_abscissa(self) -> bool:
-        """Whether the columns are splines of the abscissa."""
-        return self.kind in (
-            Kind.PROPORTION,
-            Kind.POSITION,
-            Kind.SPEED,
-            Kind.ACCELERATION,
-            Kind.DRIVE,
-            Kind.TEMPERATURE,
-            Kind.TIME,
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Design:
-    """All columns at the drawn samples: X (N, P), its blocks, and the drives that are no signals of their own (`same_as`)."""
-
-    X: np.ndarray
-    blocks: tuple[Columns, ...]
-    axes: tuple[str, ...]
-    same_as: dict[str, str]
-
-    def clamped(self, train: np.ndarray, test: np.ndarray) -> np.ndarray:
-        """The columns (P, samples) at the `test` samples, none of them beyond what the `train` samples have seen."""
-        X = self.X[test].T.copy()
-        for block, places in zip(self.blocks, self.places, strict=True):
-            if block.of_abscissa:
-                x, seen = block.abscissa[test], np.flatnonzero(train)
-                for end, beyond in ((np.argmin, np.less), (np.argmax, np.greater)):
-                    last = seen[end(block.abscissa[seen])]
-                    out = beyond(x, block.abscissa[last])
-                    X[np.ix_(places, out)] = block.values[last][:, None]
-            else:
-                seen_values = block.values[train]
-                X[places] = np.clip(X[places], seen_values.min(axis=0)[:, None], seen_values.max(axis=0)[:, None])
-        return X
-
-    def one_way(self, own: frozenset[str]) -> bool:
-        """Whether the axes `own` move in one direction only, so that dry friction and an offset are one."""
-        turning = [b for b in self.of_kind(Kind.DIRECTION, own) if np.ptp(np.sign(b.abscissa)) == 2]
-        return bool(own) and not any(
-            min(np.mean(b.abscissa > 0), np.mean(b.abscissa < 0)) > SHARES.one_way for b in turning
-        )
-
-    @cached_property
-    def places(self) -> list[np.ndarray]:
-        """The columns of X of each block."""
-        ends = np.cumsum([0, *(b.values.shape[1] for b in self.blocks)])
-        return [np.arange(a, b) for a, b in pairwise(ends)]
-
-    def kinds(self, own: frozenset[str]) -> dict[Kind, np.ndarray]:
-        """Columns of X by kind, for a channel that sees the axes `own`."""
-        found: dict[Kind, list[np.ndarray]] = {}
-        for block, places in zip(self.blocks, self.places, strict=True):
-            if (kind := kind_for(block, own)) is not None:
-                found.setdefault(kind, []).append(places)
-        return {kind: np.concatenate(found[kind]) for kind in Kind if kind in found}
-
-    def of_kind(self, kind: Kind, own: frozenset[str]) -> Iterator[Columns]:
-        """The blocks of one kind, for a channel that sees the axes `own`."""
-        return (block for block in self.blocks if kind_for(block, own) is kind)
-
-
-def kind_for(block: Columns, own: frozenset[str]) -> Kind | None:
-    """The kind of a block for a channel that sees the axes `own`: what belongs to another axis counts as that; None where it
-    is not looked at."""
-    if not block.axes or block.axes & own:
-        return block.kind
-    return Kind.OTHER_AXIS if block.kind in (Kind.POSITION, Kind.SPEED, Kind.ACCELERATION) else None
+# signals of one kind, up to which each gets all its columns
+FEW = 2
 
 
 def own_axes(signals: Sequence[Signals], channel: str) -> frozenset[str]:
@@ -181,12 +33,13 @@ def own_axes(signals: Sequence[Signals], channel: str) -> frozenset[str]:
     parts, columns = [], []
     for axis in axes:
         d = np.concatenate([s.position[axis] for s in signals])
-        own = [d]
+        signals_of_axis = [d]
         if not signals[0].settled:
             v = [s.speed_of(axis) for s in signals]
-            own += [np.concatenate(v), np.concatenate([s.derivative(x) for s, x in zip(signals, v, strict=True)])]
-        columns += own
-        parts.append(len(own))
+            acceleration = [s.derivative(x) for s, x in zip(signals, v, strict=True)]
+            signals_of_axis += [np.concatenate(v), np.concatenate(acceleration)]
+        columns += signals_of_axis
+        parts.append(len(signals_of_axis))
     X = np.column_stack([standardised(c) for c in columns])
     slopes = np.linalg.lstsq(X, y - y.mean(), rcond=1e-8)[0]
     ends = np.cumsum([0, *parts])
@@ -262,7 +115,8 @@ class _Builder:
         full = {a: [s.speed_of(a) for s in signals] for a in self.axes}
         self.speed = {a: self.drawn(full[a]) for a in self.axes}
         fastest = {a: max(float(np.abs(v).max(initial=0.0)) for v in full[a]) for a in self.axes}
-        if self.settled:  # a step counts over the range
+        # a step counts over the range
+        if self.settled:
             fastest = {a: float(np.ptp(np.concatenate([s.position[a] for s in signals]))) for a in self.axes}
         self.direction = {a: direction(self.speed[a], fastest[a]) for a in self.axes}
         self.acceleration = {
@@ -303,16 +157,16 @@ class _Builder:
         """The blocks of columns, not yet standardised."""
         nothing: frozenset[str] = frozenset()
         for a in self.axes:
-            d, v, own = self.position[a], self.speed[a], frozenset([a])
+            d, v, axis = self.position[a], self.speed[a], frozenset([a])
             unit, speed_unit = self._unit("position", a), self._unit("speed", a)
-            yield Columns(Kind.PROPORTION, a, unit, own, d, d[:, None])
-            yield Columns(Kind.POSITION, a, unit, own, d, splines(d, self.count(len(self.axes))))
-            yield Columns(Kind.DIRECTION, f"speed of {a}", speed_unit, own, v, self.direction[a][:, None])
+            yield Columns(Kind.PROPORTION, a, unit, axis, d, d[:, None])
+            yield Columns(Kind.POSITION, a, unit, axis, d, splines(d, self.count(len(self.axes))))
+            yield Columns(Kind.DIRECTION, f"speed of {a}", speed_unit, axis, v, self.direction[a][:, None])
             if not self.settled:
-                yield Columns(Kind.SPEED, f"speed of {a}", speed_unit, own, v, splines(v, self.count(len(self.axes))))
+                yield Columns(Kind.SPEED, f"speed of {a}", speed_unit, axis, v, splines(v, self.count(len(self.axes))))
                 acc = self.acceleration[a]
                 values = splines(acc, SHARES.spline_columns_many)
-                yield Columns(Kind.ACCELERATION, f"acceleration of {a}", "", own, acc, values)
+                yield Columns(Kind.ACCELERATION, f"acceleration of {a}", "", axis, acc, values)
         for name, u in self.drive.items():
             unit = self._unit("drive", name)
             yield Columns(Kind.DRIVE, name, unit, nothing, u, splines(u, self.count(len(self.drive))))
@@ -334,7 +188,8 @@ class _Builder:
             kind = Kind.TRAVEL_HISTORY if what == "position" else Kind.DRIVE_HISTORY
             axes = frozenset([name] if what == "position" else [])
             values = left[:, i]
-            if not self.settled and len(names) <= 2 * FEW:  # butterflies and loops that differ by side
+            # butterflies and loops that differ by side
+            if not self.settled and len(names) <= 2 * FEW:
                 values = np.column_stack([values, values * standardised(x)[:, None], values**2])
             yield Columns(kind, name, unit, axes, x, values)
             if what == "drive":
@@ -353,21 +208,23 @@ class _Builder:
         """Products of two signals of zero mean and unit variance."""
         signals: list[tuple[str, frozenset[str], np.ndarray]] = []
         for a in self.axes:
-            own = frozenset([a])
-            signals.append((a, own, self.position[a]))
-            signals.append((f"direction of {a}", own, self.direction[a]))
+            axis = frozenset([a])
+            signals.append((a, axis, self.position[a]))
+            signals.append((f"direction of {a}", axis, self.direction[a]))
             if not self.settled:
-                signals.append((f"speed of {a}", own, self.speed[a]))
-        if len(self.drive) <= FEW:  # their number grows with the square
+                signals.append((f"speed of {a}", axis, self.speed[a]))
+        # their number grows with the square
+        if len(self.drive) <= FEW:
             signals += [(u, frozenset(), x) for u, x in self.drive.items()]
         if self.ambient is not None:
             signals.append(("temperature", frozenset(), self.ambient))
         plain = {name: standardised(x) for name, _, x in signals}
         for (one, at, x), (other, of, _) in combinations(signals, 2):
             moving = {one, other} - set(self.axes)
-            if at and of and at != of and moving:  # of two axes the positions alone
+            # of two axes the positions alone
+            if at and of and at != of and moving:
                 continue
-            yield Columns(Kind.PRODUCT, f"{one} x {other}", "", at | of, x, (plain[one] * plain[other])[:, None])
+            yield Columns(Kind.PRODUCT, one, "", at | of, x, (plain[one] * plain[other])[:, None])
 
     @cached_property
     def ambient(self) -> np.ndarray | None:

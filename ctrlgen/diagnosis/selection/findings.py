@@ -1,0 +1,146 @@
+"""The findings of a diagnosis: causes with the intervals of their numbers, shares and alternatives, and held-out errors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import Field
+
+from ctrlgen.core.units import difference, from_si
+from ctrlgen.diagnosis.selection.attribution import Attribution, ShareEntry
+from ctrlgen.diagnosis.selection.candidate_model import SearchResult
+from ctrlgen.estimation.fit import Fit
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.estimation.prediction_uncertainty import prediction_uncertainty
+from ctrlgen.estimation.profile_likelihood import Profile
+from ctrlgen.estimation.robust_covariance import robust_deviations
+from ctrlgen.estimation.settings import STATISTICS
+from ctrlgen.reporting.result_file import FiniteOrNull, Keys, Number
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number with its 95 % interval, in `unit`."""
+
+    value: float
+    ci95: tuple[float, float]
+    unit: str
+
+
+class WorthEntry(Keys):
+    """What a cause is worth in one channel, root mean square on the held-out records."""
+
+    without: FiniteOrNull = Field(description="Error without the cause, the others refitted [unit].")
+    with_it: FiniteOrNull = Field(description="Error with it [unit].")
+    unit: str = Field(description="Unit of both.")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One cause that the device file leaves out.
+
+    alternatives: other causes that explain the recording equally well in its place. share: of the mismatch, of energy, None
+    where it was read from the data. worth: by channel the held-out error without the cause and with it. source: publication
+    of the effect's law. cause: the hypothesis.
+    """
+
+    effect: str
+    location: str
+    parameters: dict[str, Estimate]
+    alternatives: tuple[Hypothesis, ...]
+    share: ShareEntry | None
+    worth: dict[str, WorthEntry]
+    source: str
+    cause: Hypothesis
+
+    @property
+    def of(self) -> str | None:
+        """The other channel of an effect between two."""
+        return self.cause.of
+
+
+class ChannelErrorEntry(Keys):
+    """Root mean square error of one channel on the held-out records."""
+
+    rms_before: FiniteOrNull = Field(description="Of the device as described, refitted within its stated uncertainty.")
+    rms_after: FiniteOrNull = Field(description="With the findings.")
+    noise_floor: Number = Field(description="Standard deviation of the noise; null where it is not known.")
+    unit: str = Field(description="Unit of all four numbers.")
+    uncertainty: Number = Field(
+        description="Prediction uncertainty that the fitted parameters alone cause; null where it is not known."
+    )
+
+
+def held_out_errors(search: SearchResult, known: np.ndarray) -> dict[str, ChannelErrorEntry]:
+    """Held-out errors of the nominal and of the chosen model by channel; `known` (n_y,) says whose noise is known."""
+    errors, fitter = {}, search.fitter
+    floor, unsure = fitter.noise.floor, prediction_uncertainty(fitter, search.chosen.fit)
+    for i, (channel, unit) in enumerate(zip(fitter.recording.channels, fitter.recording.units, strict=True)):
+        scale = difference(1.0, unit)
+        rms = []
+        for model in (search.nominal, search.chosen):
+            squares = [
+                ((r.observed - fitter.predict(model.fit, r))[:, i])[r.valid[:, i]] ** 2 for r in fitter.held_out_records
+            ]
+            rms.append(float(np.sqrt(np.mean(np.concatenate(squares)))) * scale if squares else float("nan"))
+        noise = float(floor[i] * scale) if known[i] else None
+        beside = float(unsure[i] * scale) if np.isfinite(unsure[i]) else None
+        errors[channel] = ChannelErrorEntry(
+            rms_before=rms[0], rms_after=rms[1], noise_floor=noise, unit=unit, uncertainty=beside
+        )
+    return errors
+
+
+def estimated_values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, Estimate]:
+    """Every free parameter of a fit with its 95 % interval, by path, in the unit of its file.
+
+    An interval includes the model-form error of an amplitude's law, and is at least as wide as the parameter's profile
+    likelihood gives.
+    """
+    estimates, profiled = {}, {p.path: p for p in profiles}
+    for unknown, value, s in zip(fit.structure.free_parameters, fit.theta, robust_deviations(fit), strict=True):
+        cause = fit.structure.cause_of(unknown) if unknown.amplitude else None
+        if cause is not None and cause.effect != PARAMETER:
+            s = np.hypot(s, cause.prior.model_form_error * (value - unknown.nominal))
+        ends = (value, max(value - STATISTICS.z_95 * s, unknown.low), min(value + STATISTICS.z_95 * s, unknown.high))
+        value, low, high = (float(from_si(v, unknown.unit)) for v in ends)
+        if unknown.path in profiled:
+            below, above = profiled[unknown.path].ci95
+            low, high = min(low, below), max(high, above)
+        estimates[unknown.path] = Estimate(value, (low, high), unknown.unit)
+    return estimates
+
+
+def findings(search: SearchResult, shares: Attribution, profiles: tuple[Profile, ...] = ()) -> tuple[Finding, ...]:
+    """The causes of the chosen model with intervals, shares and alternatives, that with the largest share first."""
+    fit, rows = search.chosen.fit, []
+    estimates = estimated_values(fit, profiles)
+    for k, cause in enumerate(fit.structure.causes):
+        number = cause.path.rpartition(".")[2]
+        parameters = {
+            number if cause.effect == PARAMETER else unknown.name: estimates[unknown.path]
+            for unknown in fit.structure.free_parameters
+            if unknown.cause == k
+        }
+        for p in () if cause.effect == PARAMETER else cause.law.params:
+            if fixed := cause.prior.of(p).fixed_range:
+                middle = sum(fixed) / 2
+                parameters[p.name] = Estimate(middle, (middle, middle), p.unit)
+        rivals = tuple(t.cause for t in search.rivals[k] if t.cause)
+        source = "parameter of the device file" if cause.effect == PARAMETER else cause.law.source
+        worth = _worth(search, k)
+        rows.append(Finding(cause.effect, cause.location, parameters, rivals, shares.shares[k], worth, source, cause))
+    return tuple(sorted(rows, key=lambda f: -(f.share.value if f.share else 0.0)))
+
+
+def _worth(search: SearchResult, k: int) -> dict[str, WorthEntry]:
+    """The held-out error without cause k, the others refitted, and with it, of each channel."""
+    recording, floor = search.fitter.recording, search.fitter.noise.floor
+    without, with_it = (np.sqrt(t.held_out.plain_mean) * floor for t in (search.without_cause[k], search.chosen))
+    return {
+        channel: WorthEntry(
+            without=float(a) * difference(1.0, unit), with_it=float(b) * difference(1.0, unit), unit=unit
+        )
+        for channel, unit, a, b in zip(recording.channels, recording.units, without, with_it, strict=True)
+    }
