@@ -8,7 +8,7 @@ from conftest import DEVICE
 
 from ctrlgen import InputError, build_model, load_device
 from ctrlgen.devices.changed_numbers import changed
-from ctrlgen.devices.numbers import member_at
+from ctrlgen.devices.quantities import member_at
 
 
 def faults(tmp_path, *edits: tuple[str, str]) -> dict[str, str]:

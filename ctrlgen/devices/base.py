@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from ctrlgen.core.units import Quantity
 from ctrlgen.devices.device_physics import DevicePhysics
-from ctrlgen.devices.numbers import member_at, si_namespace, walk
+from ctrlgen.devices.quantities import member_at, si_namespace, walk
 from ctrlgen.devices.run_time import RunTime, RunTimeConstant, run_time_constants
 from ctrlgen.devices.section import Section
 from ctrlgen.devices.sensor import AnySensor

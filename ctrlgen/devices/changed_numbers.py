@@ -6,7 +6,7 @@ from typing import Any
 
 from ctrlgen.core.units import Quantity, from_si, written_unit
 from ctrlgen.devices.base import Device
-from ctrlgen.devices.numbers import map_quantities
+from ctrlgen.devices.quantities import map_quantities
 from ctrlgen.effects import Effect
 
 

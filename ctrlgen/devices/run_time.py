@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, ValidationError
 
 from ctrlgen.core.units import Quantity, base_unit, parse, show, to_si, written_unit
-from ctrlgen.devices.numbers import member_at
+from ctrlgen.devices.quantities import member_at
 from ctrlgen.devices.section import Section
 from ctrlgen.effects import Effect
 

@@ -11,7 +11,7 @@ from itertools import product
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import Quantity
 from ctrlgen.devices import Device, DevicePhysics
-from ctrlgen.devices.numbers import walk
+from ctrlgen.devices.quantities import walk
 from ctrlgen.devices.section import Section
 from ctrlgen.effects import Channel, Effect, Param, Place
 from ctrlgen.estimation.priors import DEFAULT, LawPrior, prior_of
