@@ -37,8 +37,8 @@ def largest_speeds(
     places = path.places(share)
 
     def kept(speed: np.ndarray, of: ca.Function = by_speed) -> np.ndarray:
-        found = of.map(len(share))(places.T, speed[None])[0].full()
-        return np.all(np.where(np.isfinite(found), found, -1.0) >= -NEGLIGIBLE, axis=0)
+        spare = of.map(len(share))(places.T, speed[None])[0].full()
+        return np.all(np.where(np.isfinite(spare), spare, -1.0) >= -NEGLIGIBLE, axis=0)
 
     low = np.full(len(share), SLOWEST * typical)
     low[~kept(low, distances)] = 0.0

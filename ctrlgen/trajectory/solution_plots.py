@@ -18,7 +18,7 @@ from ctrlgen.trajectory.solution import Solution
 from ctrlgen.trajectory.workspace import Ball, Workspace
 
 
-def draw_all(solution: Solution) -> dict[str, str]:
+def draw_solution(solution: Solution) -> dict[str, str]:
     """Every figure that applies to this solution: name -> SVG text."""
     drawings: dict[str, Callable[[Solution], Figure]] = {"margins": draw_margins}
     state = solution.model.signals.get("state")
