@@ -7,7 +7,7 @@ import numpy as np
 
 from ctrlgen.controller.feedforward import SECANT_FRACTION, ControllerStatus
 from ctrlgen.firmware.c.real import Real
-from ctrlgen.firmware.online.online import FLOAT_SLACK
+from ctrlgen.firmware.online.limit_tables import FLOAT_SLACK
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import simulate, trace
 from ctrlgen.numerics.newton import newton_solver
