@@ -24,8 +24,8 @@ from ctrlgen.model.model import Model, Signal
 
 @dataclass(frozen=True)
 class MotionKernels(ControllerKernels):
-    """Those of one device with inertia. A target is (channels * (order + 1),): first the followed signal, then its first derivative by
-    time, and so on. Raises InputError for a device with states that a target does not determine, such as memories of effects."""
+    """The kernels of one device with inertia. A target is (channels * (order + 1),): first the followed signal, then its first derivative
+    by time, and so on. Raises InputError for a device with states that a target does not determine, such as memories of effects."""
 
     def __post_init__(self) -> None:
         if self.dynamics.internal:
