@@ -10,7 +10,13 @@
  * composite limits, of which there are SHARES), RATED (drives change only so fast), PASSING (they can lead the device beyond a
  * limit), REDUNDANT (more drives than axes, of which GROUPS can be moved without a push), COUPLED (a displacement moves several
  * channels), MOVING (kernels for the next sample), MOTION (targets with derivatives), GIVEN (constants that are given at the
- * start). SETTLE_DRIVE_LIMITED and STEP_DRIVE_LIMITED: drives beyond their limits can be needed.
+ * start). SETTLE_DRIVE_LIMITED and STEP_DRIVE_LIMITED: drives beyond their limits can be needed. SETTLE_EXAMINED_FIRST and
+ * STEP_EXAMINED_FIRST: whether a state is lost is asked before it is used. STATE_BY_MODE and DRIVE_BY_MODE: the line search calls one
+ * kernel to settle and another to step. U_BOUNDS_ONCE: one function alone reads the limits of drives.
+ *
+ * BALANCE, COMPOSITE_SHARES, SETTLE_STATE and other macros with arguments call a kernel, which may read fewer of them. Names that end
+ * in _TABLE are numbers in braces. EACH_AXIS(F), EACH_STATE(F) and EACH_DRIVE(F) are F(0) F(1) ..., one by one, because a loop costs a
+ * small core twice as much.
  */
 #include "limiter_config.h"
 
