@@ -28,9 +28,11 @@ def _s3_rows() -> list[PrintedNumber]:
 
 SOURCES = {"S0": s0.rows, "S1": s1.rows, "S2": s2.rows, "S3": _s3_rows}
 TITLES = {
-    "S0": "meso-scale hexapod: kinematics and calibration", "S1": "MEMS hexapod: stiffness model and control",
-    "S2": "hinge equations and the measuring chain", "S3": "3-RRR stage: kinetostatic model",
-}  # fmt: skip
+    "S0": "meso-scale hexapod: kinematics and calibration",
+    "S1": "MEMS hexapod: stiffness model and control",
+    "S2": "hinge equations and the measuring chain",
+    "S3": "3-RRR stage: kinetostatic model",
+}
 
 
 def _s1_figures() -> dict[str, str]:
@@ -70,11 +72,17 @@ def as_json(rows: list[PrintedNumber]) -> list[dict[str, Any]]:
     """The rows as plain dicts: source, where, printed, ours, difference, unit, status, reason."""
     return [
         {
-            "source": row.source, "where": row.where, "printed": row.printed, "ours": row.ours, "difference": row.difference,
-            "unit": row.unit, "status": row.status.value, "reason": row.reason,
+            "source": row.source,
+            "where": row.where,
+            "printed": row.printed,
+            "ours": row.ours,
+            "difference": row.difference,
+            "unit": row.unit,
+            "status": row.status.value,
+            "reason": row.reason,
         }
         for row in rows
-    ]  # fmt: skip
+    ]
 
 
 def counts(rows: list[PrintedNumber]) -> Counter[tuple[str, str]]:

@@ -20,7 +20,6 @@ ARGUED = {
     ("firmware/c/expression_graph.py", "(1 / "): "the same",
 }
 TO_GO = {
-    ("budget/robust.py", "channel gain"),
     ("calibration/calibrate.py", "acts on nothing"),
     ("calibration/calibrate.py", "as stated"),
 }

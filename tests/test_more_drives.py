@@ -101,9 +101,15 @@ def test_where_a_rate_is_limited_the_drives_are_still_the_least_by_their_weights
     """Two stacks push one axis, a + b = f in N; b costs four times as much,
     a changes by 3.5 N a sample at most: scipy's SLSQP over all samples."""
     device = user_device(
-        "two", parameters={"k": "1 N/um"}, drive={"a": "100 N", "b": "100 N"}, axes={"x": "50 um"}, drive_rate={"a": "350 N/s"},
-        drive_weight={"b": 4.0}, force=lambda u: [u.a + u.b], restoring_force=lambda d, p: p.k * d.vector,
-    )  # fmt: skip
+        "two",
+        parameters={"k": "1 N/um"},
+        drive={"a": "100 N", "b": "100 N"},
+        axes={"x": "50 um"},
+        drive_rate={"a": "350 N/s"},
+        drive_weight={"b": 4.0},
+        force=lambda u: [u.a + u.b],
+        restoring_force=lambda d, p: p.k * d.vector,
+    )
     f = 10 * np.sin(2 * np.pi * np.arange(12) / 12)
     points = ", ".join(f'{{ x = "{float(v)!r} um" }}' for v in f)
     found = solve(
@@ -111,9 +117,12 @@ def test_where_a_rate_is_limited_the_drives_are_still_the_least_by_their_weights
     )
     held = np.roll(f, -1)
     best = minimize(
-        lambda a: np.sum(a**2 + 4 * (held - a) ** 2), 0.0 * f, method="SLSQP", options={"ftol": 1e-14},
+        lambda a: np.sum(a**2 + 4 * (held - a) ** 2),
+        0.0 * f,
+        method="SLSQP",
+        options={"ftol": 1e-14},
         constraints=[{"type": "ineq", "fun": lambda a, s=s: 3.5 - s * (a - np.roll(a, 1))} for s in (1, -1)],
-    ).x  # fmt: skip
+    ).x
     assert found.drive[:, 0] == pytest.approx(best, abs=1e-3)  # N, of 8: where SLSQP ends
     assert 0.1 < np.abs(0.8 * held - best).max() < 1  # else nothing is tested
 
@@ -129,10 +138,17 @@ def test_rates_are_kept_by_the_best_drives_of_the_whole_path(tmp_path):
     D = np.kron(step, np.eye(3))[::3] * RANGE[0]
     box = list(zip(np.tile(LOW / RANGE, n), np.tile(HIGH / RANGE, n), strict=True))
     # The lowest rate with which the path can be followed at all
-    slowest = linprog(
-        np.append(np.zeros(3 * n), 1.0), A_eq=np.hstack([S, np.zeros((2 * n, 1))]), b_eq=wanted.ravel(),
-        A_ub=np.block([[D, -np.ones((n, 1))], [-D, -np.ones((n, 1))]]), b_ub=np.zeros(2 * n), bounds=[*box, (0, None)],
-    ).fun / h  # fmt: skip
+    slowest = (
+        linprog(
+            np.append(np.zeros(3 * n), 1.0),
+            A_eq=np.hstack([S, np.zeros((2 * n, 1))]),
+            b_eq=wanted.ravel(),
+            A_ub=np.block([[D, -np.ones((n, 1))], [-D, -np.ones((n, 1))]]),
+            b_ub=np.zeros(2 * n),
+            bounds=[*box, (0, None)],
+        ).fun
+        / h
+    )
     assert slowest < 0.95 * change[0]
     with pytest.raises(Unreachable, match="the path is too fast"):
         solve(*loaded(tmp_path, stage(drive_rate={"a": f"{0.99 * slowest} V/s"}), circle(20, 4, 0), timing))
@@ -173,11 +189,17 @@ def test_what_few_samples_show_of_a_rate_is_what_a_linear_programme_over_all_say
     step = sp.eye(n) - (sp.eye(n, k=-1) + (sp.eye(n, k=n - 1) if closed else 0))
     D = sp.kron(step.tocsr()[0 if closed else 1 :], [[1.0, 0.0, 0.0]])
     one = np.ones((D.shape[0], 1))
-    slowest = linprog(
-        np.append(np.zeros(3 * n), 1.0), A_eq=sp.hstack([sp.kron(sp.eye(n), B), np.zeros((2 * n, 1))]), b_eq=wanted.ravel(),
-        A_ub=sp.vstack([sp.hstack([D, -one]), sp.hstack([-D, -one])]), b_ub=np.zeros(2 * len(one)),
-        bounds=[*list(zip(LOW, HIGH, strict=True)) * n, (0, None)],
-    ).fun / h  # fmt: skip
+    slowest = (
+        linprog(
+            np.append(np.zeros(3 * n), 1.0),
+            A_eq=sp.hstack([sp.kron(sp.eye(n), B), np.zeros((2 * n, 1))]),
+            b_eq=wanted.ravel(),
+            A_ub=sp.vstack([sp.hstack([D, -one]), sp.hstack([-D, -one])]),
+            b_ub=np.zeros(2 * len(one)),
+            bounds=[*list(zip(LOW, HIGH, strict=True)) * n, (0, None)],
+        ).fun
+        / h
+    )
     inverse = [
         choose_inverse(build_model(stage(drive_rate={"a": f"{share * slowest} V/s"})), "pose", Sampled(h))
         for share in (0.5, 0.99, 0.9999, 1.0001, 1.002, 1.5)
@@ -287,11 +309,15 @@ def test_the_reference_controller_takes_the_least_effort_and_keeps_the_drives_li
         ({"force": lambda u, p: [p.g * u.a**2, p.g * (u.c - 0.5 * u.b)]}, "not linear in the drives"),
         ({"force": lambda u, p: [p.g * (u.a + u.b + u.c)] * 2}, "independently"),
         (
-            {"state": {"s": "1 V"}, "rates": lambda u, x: [u.a - x.s], "force": lambda u, x, p: [p.g * x.s, p.g * (u.c + u.b)]},
+            {
+                "state": {"s": "1 V"},
+                "rates": lambda u, x: [u.a - x.s],
+                "force": lambda u, x, p: [p.g * x.s, p.g * (u.c + u.b)],
+            },
             "states of their own",
         ),
     ],
-)  # fmt: skip
+)
 def test_what_has_no_least_effort_is_refused(tmp_path, other, what):
     with pytest.raises(InputError, match=what):
         solve(*loaded(tmp_path, stage(**other), circle(2)))

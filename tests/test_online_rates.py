@@ -51,10 +51,16 @@ def heated(**other):
 def coil():
     """An axis with inertia."""
     return ctrlgen.user_device(
-        "coil", parameters={"m": "0.5 kg", "c": "30 N*s/m", "k": "0.2 N/um", "f": "10 N/A"}, axes={"axis": "100 um"},
-        drive={"coil": "4 A"}, drive_rate={"coil": "150 A/s"}, force=lambda u, p: p.f * u.coil, mass=lambda p: p.m,
-        restoring_force=lambda d, p: p.k * d.axis, damping_force=lambda v, p: p.c * v.axis,
-    )  # fmt: skip
+        "coil",
+        parameters={"m": "0.5 kg", "c": "30 N*s/m", "k": "0.2 N/um", "f": "10 N/A"},
+        axes={"axis": "100 um"},
+        drive={"coil": "4 A"},
+        drive_rate={"coil": "150 A/s"},
+        force=lambda u, p: p.f * u.coil,
+        mass=lambda p: p.m,
+        restoring_force=lambda d, p: p.k * d.axis,
+        damping_force=lambda v, p: p.c * v.axis,
+    )
 
 
 def loaded(folder, device, path=CIRCLE, timing='sample_rate = "1 kHz"\nduration = "0.05 s"\n'):

@@ -95,15 +95,27 @@ def test_pairs_that_act_on_axes_of_their_own_are_chosen_each_by_itself():
 @pytest.mark.parametrize(
     ("device", "says"),
     [
-        (stage(drive=dict.fromkeys("abcd", "100 V"), force=lambda u, p: [p.g * (u.a + u.b + u.d), p.g * (u.c - u.b)]),
-         r"drives \(a, b, c, d\) of which 2 at a time can be chosen.*use the player"),
-        (stage(force=lambda u, d, p: [p.g * (u.a + 0.5 * u.b), p.g * (1 + d.x / 1e-3) * (u.c - 0.5 * u.b)]),
-         "slope by the drives changes.*use the player"),
-        (stage(drive={"a": "100 V", "c": "130 V"}, axes={"x": ("5 um", "30 um"), "y": "30 um"},
-               force=lambda u, p: [p.g * u.a, p.g * u.c], limits={"flexure_force": (lambda d, p: p.k * d.x, "20 N")}),
-         "moves x in a range that leaves out where it rests"),
+        (
+            stage(
+                drive=dict.fromkeys("abcd", "100 V"), force=lambda u, p: [p.g * (u.a + u.b + u.d), p.g * (u.c - u.b)]
+            ),
+            r"drives \(a, b, c, d\) of which 2 at a time can be chosen.*use the player",
+        ),
+        (
+            stage(force=lambda u, d, p: [p.g * (u.a + 0.5 * u.b), p.g * (1 + d.x / 1e-3) * (u.c - 0.5 * u.b)]),
+            "slope by the drives changes.*use the player",
+        ),
+        (
+            stage(
+                drive={"a": "100 V", "c": "130 V"},
+                axes={"x": ("5 um", "30 um"), "y": "30 um"},
+                force=lambda u, p: [p.g * u.a, p.g * u.c],
+                limits={"flexure_force": (lambda d, p: p.k * d.x, "20 N")},
+            ),
+            "moves x in a range that leaves out where it rests",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_cannot_be_chosen_online_is_refused(device, says, tmp_path):
     scenario, model = loaded(tmp_path, device, circle(10))
     with pytest.raises(InputError, match=says):

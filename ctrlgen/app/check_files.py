@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ctrlgen.app.console import out, print_recording, print_shaper
+from ctrlgen.app.console import out
+from ctrlgen.app.diagnosis_console import print_recording
+from ctrlgen.app.scenario_console import print_shaper
 from ctrlgen.core.errors import Fault, InputError, Unreachable
 from ctrlgen.core.files import read_toml
 from ctrlgen.core.units import show

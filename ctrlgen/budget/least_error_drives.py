@@ -36,7 +36,7 @@ def of_least_error(model: Model, stated: Uncertainties, follow: str) -> Model:
     by_number = by_number.reshape(n_u, len(model.axes), len(free)).transpose(1, 0, 2)
     variance = np.zeros(n_u)
     for line in stated.lines:
-        if line.kind == "channel gain":
+        if line.kind == "channel_gain":
             variance += np.array(line.sds) ** 2 * np.sum((C @ pushed) ** 2, axis=0)
         elif line.kind == "number":
             for path, sd in zip(line.paths, line.sds, strict=True):

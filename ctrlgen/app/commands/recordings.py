@@ -17,16 +17,8 @@ from ctrlgen.app.commands.app import (
     SchedulerAddress,
     app,
 )
-from ctrlgen.app.console import (
-    complain,
-    counted,
-    err,
-    out,
-    print_batch,
-    print_bootstrap,
-    print_diagnosis,
-    progress,
-)
+from ctrlgen.app.console import complain, counted, err, out, progress
+from ctrlgen.app.diagnosis_console import print_batch, print_bootstrap, print_diagnosis
 from ctrlgen.core.errors import InputError
 
 
