@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 import three_stacks
 from conftest import ROOT, SCENARIOS
+from one_kernel import print_function
 
 from ctrlgen import CtrlgenError, __version__, build_model, load_scenario
 from ctrlgen.controller.motion_feedforward import controller_of
-from ctrlgen.firmware.c.cprint import print_function
 from ctrlgen.firmware.c.elementary import elementary_text
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.templates import ABI, hertz, render

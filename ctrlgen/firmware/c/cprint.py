@@ -55,15 +55,6 @@ class Kernel:
         return f"{self.name}({', '.join(values[a] for a in self.arguments)})"
 
 
-def print_function(function: ca.Function, name: str, real: Real, ranges: Ranges | None = None) -> Kernel:
-    """`function` (SX, dense arguments, one result) as a static C function writing to its last parameter, which may be an argument too.
-
-    `ranges`: low and high of the arguments, where they are known. Raises CtrlgenError for an operation C has no
-    counterpart of.
-    """
-    return Printer(real, ranges or {}).kernel(function, name, may_be_result=function.name_in())
-
-
 @dataclass(frozen=True)
 class Law:
     """A law of every axis, (n,) in terms of the kernels' arguments, that is a C function of its own where a kernel needs it: `about`
