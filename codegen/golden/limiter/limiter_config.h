@@ -4,72 +4,6 @@
 
 #include <stddef.h>
 
-#define real float
-#define REAL(x) x ## f
-#define N 6
-#define NU 6
-#define NS 6
-#define NX 6
-#define M 6
-#define SHARES 12
-#define COMPOSITE_ROUNDS 1
-#define SWEEPS 3
-#define SECANT_STEPS 3
-#define GROUPS 0
-#define GIVEN 0
-#define STATE_LIMITED 0
-#define BOUNDED 1
-#define RATED 0
-#define PASSING 0
-#define REDUNDANT 0
-#define COUPLED 1
-#define MOVING 1
-#define MOTION 0
-#define U_BOUNDS_ONCE 0
-#define REST_GIVEN 0
-#define CHANGING 0
-#define DOUBLE 0
-#define STATE_BY_MODE 0
-#define DRIVE_BY_MODE 0
-#define SETTLE_DRIVE_LIMITED 0
-#define SETTLE_EXAMINED_FIRST 0
-#define STEP_DRIVE_LIMITED 1
-#define STEP_EXAMINED_FIRST 0
-#define Z_LOW { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }
-#define Z_HIGH { 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f }
-#define Z_SLACK { 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f }
-#define Z_HOME { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }
-#define REST { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }
-#define TARGET_LIMITS { 63.61323f, 63.61323f, 63.61323f, 0.1f, 0.1f, 0.1f }
-#define U_SLACKS { 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f }
-#define COMPOSITE_SLACK 1.000004f
-#define COMPOSITE_SLACK_SQUARED 1.000008f
-#define SECANT_FRACTION 0.99609375f
-#define UNLIMITED 1e+18f
-#define U_LOWEST { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }
-#define U_HIGHEST { 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f }
-#define NEAREST_SLOPES { \
-        { 1.0f, 0.49971864f, -0.2363756f, -0.07558483f, -0.2363756f, -0.20494296f }, \
-        { 1.1193434f, 1.0f, -0.45906138f, -0.25956145f, -0.16930602f, -0.25956145f }, \
-        { -0.2363756f, -0.20494296f, 1.0f, 0.49971864f, -0.2363756f, -0.07558483f }, \
-        { -0.16930602f, -0.25956145f, 1.1193434f, 1.0f, -0.45906138f, -0.25956145f }, \
-        { -0.2363756f, -0.07558483f, -0.2363756f, -0.20494296f, 1.0f, 0.49971864f }, \
-        { -0.45906138f, -0.25956145f, -0.16930602f, -0.25956145f, 1.1193434f, 1.0f } \
-    }
-#define LIMITED_STATE STEP_STATE
-#define LIMITED_DRIVE STEP_DRIVE
-#define BALANCE(state, x, z, drive, result) balance_displacement(x, z, result)
-#define DRIVE_INSIDE(state, value) drive_inside(value)
-#define COMPOSITE_SHARES(state, wanted, result) composite_shares(wanted, result)
-#define COMPOSITE_BOUND(wanted) composite_bound(wanted)
-#define SETTLE_DISPLACEMENT(state, target, result) wanted_displacement(target, result)
-#define SETTLE_STATE(state, wanted, result) wanted_state(wanted, result)
-#define SETTLE_DRIVE(state, wanted, limited, result) wanted_drive(limited, result)
-#define SETTLE_ADVANCE(state, z, drive, result) wanted_advance(drive, result)
-#define STEP_DISPLACEMENT(state, target, result) wanted_displacement(target, result)
-#define STEP_STATE(state, wanted, result) wanted_state(wanted, result)
-#define STEP_DRIVE(state, wanted, limited, result) step_drive(state->x, limited, result)
-#define STEP_ADVANCE(state, z, drive, result) step_advance(state->x, drive, result)
 #define EACH_AXIS(F) F(0) \
     F(1) \
     F(2) \
@@ -88,6 +22,78 @@
     F(3) \
     F(4) \
     F(5)
+#define real float
+#define REAL(x) x ## f
+#define STATE_LIMITED 0
+#define BOUNDED 1
+#define RATED 0
+#define PASSING 0
+#define REDUNDANT 0
+#define COUPLED 1
+#define MOVING 1
+#define MOTION 0
+#define U_BOUNDS_ONCE 0
+#define REST_GIVEN 0
+#define CHANGING 0
+#define DOUBLE 0
+#define STATE_BY_MODE 0
+#define DRIVE_BY_MODE 0
+#define SETTLE_DRIVE_LIMITED 0
+#define SETTLE_EXAMINED_FIRST 0
+#define STEP_DRIVE_LIMITED 1
+#define STEP_EXAMINED_FIRST 0
+#define N 6
+#define NU 6
+#define NS 6
+#define NX 6
+#define M 6
+#define SHARES 12
+#define COMPOSITE_ROUNDS 1
+#define SWEEPS 3
+#define SECANT_STEPS 3
+#define GROUPS 0
+#define GIVEN 0
+#define Z_LOW_TABLE { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }
+#define Z_HIGH_TABLE { 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f }
+#define Z_SLACK_TABLE { 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f }
+#define S_LOW_TABLE { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }
+#define S_HIGH_TABLE { 823.15f, 823.15f, 823.15f, 823.15f, 823.15f, 823.15f }
+#define S_SLACK_TABLE { 0.0004f, 0.0004f, 0.0004f, 0.0004f, 0.0004f, 0.0004f }
+#define U_LOW_TABLE { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }
+#define U_HIGH_TABLE { 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f }
+#define U_SLACK_TABLE { 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f }
+#define REST_TABLE { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }
+#define INPUT_LIMITS_TABLE { 63.61323f, 63.61323f, 63.61323f, 0.1f, 0.1f, 0.1f }
+#define HOME_TABLE { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }
+#define COMPOSITE_SLACK 1.000004f
+#define COMPOSITE_SLACK_SQUARED 1.000008f
+#define SECANT_FRACTION 0.99609375f
+#define UNLIMITED 1e+18f
+#define STATE_LOW LOW
+#define STATE_HIGH HIGH
+#define NEAREST_SLOPES { \
+        { 1.0f, 0.49971864f, -0.2363756f, -0.07558483f, -0.2363756f, -0.20494296f }, \
+        { 1.1193434f, 1.0f, -0.45906138f, -0.25956145f, -0.16930602f, -0.25956145f }, \
+        { -0.2363756f, -0.20494296f, 1.0f, 0.49971864f, -0.2363756f, -0.07558483f }, \
+        { -0.16930602f, -0.25956145f, 1.1193434f, 1.0f, -0.45906138f, -0.25956145f }, \
+        { -0.2363756f, -0.07558483f, -0.2363756f, -0.20494296f, 1.0f, 0.49971864f }, \
+        { -0.45906138f, -0.25956145f, -0.16930602f, -0.25956145f, 1.1193434f, 1.0f } \
+    }
+#define LIMITED_STATE STEP_STATE
+#define LIMITED_DRIVE STEP_DRIVE
+#define BALANCE(state, x, z, drive, result) balance_displacement(x, z, result)
+#define COMPOSITE_SHARES(state, wanted, result) composite_shares(wanted, result)
+#define SETTLE_DISPLACEMENT(state, target, result) wanted_displacement(target, result)
+#define SETTLE_STATE(state, wanted, result) wanted_state(wanted, result)
+#define SETTLE_DRIVE(state, wanted, limited, result) wanted_drive(limited, result)
+#define SETTLE_ADVANCE(state, z, drive, result) wanted_advance(drive, result)
+#define STEP_DISPLACEMENT(state, target, result) wanted_displacement(target, result)
+#define STEP_STATE(state, wanted, result) wanted_state(wanted, result)
+#define STEP_DRIVE(state, wanted, limited, result) step_drive(state->x, limited, result)
+#define STEP_ADVANCE(state, z, drive, result) step_advance(state->x, drive, result)
+#define COMPOSITE_BOUND(wanted) composite_bound(wanted)
+#define STATE_INSIDE(state, value) state_inside(value)
+#define DRIVE_INSIDE(state, value) drive_inside(value)
 
 static const float U_LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
 static const float U_HIGH[6] = { 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f }; /* W */

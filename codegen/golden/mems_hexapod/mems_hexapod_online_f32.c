@@ -418,9 +418,11 @@ static int scale_home(const mems_hexapod_online_f32_state *state, float wanted[6
             worst = (share[i] > worst) ? share[i] : worst;
         }
         if (worst > 1.0f) {
-            int scaled;
+            int scaled = 1;
             worst = square_root(worst);
-            scaled = (worst > 1.000004f) ? 2 : 1;
+            if (worst > 1.000004f) {
+                scaled = 2;
+            }
             hit = (scaled > hit) ? scaled : hit;
             for (i = 0; i < 6; i++) {
                 wanted[i] = wanted[i] / worst;
@@ -652,7 +654,9 @@ static uint32_t settle_within(mems_hexapod_online_f32_state *state, mems_hexapod
     {
         const int scaled = limit_composite(state, out->displacement);
         if (scaled > 0) {
-            status |= (scaled > 1) ? MEMS_HEXAPOD_ONLINE_F32_COMPOSITE : 0U;
+            if (scaled > 1) {
+                status |= MEMS_HEXAPOD_ONLINE_F32_COMPOSITE;
+            }
             wanted_state(out->displacement, out->state);
         }
     }
@@ -772,7 +776,9 @@ static uint32_t step_within(mems_hexapod_online_f32_state *state, mems_hexapod_o
     {
         const int scaled = limit_composite(state, out->displacement);
         if (scaled > 0) {
-            status |= (scaled > 1) ? MEMS_HEXAPOD_ONLINE_F32_COMPOSITE : 0U;
+            if (scaled > 1) {
+                status |= MEMS_HEXAPOD_ONLINE_F32_COMPOSITE;
+            }
             wanted_state(out->displacement, out->state);
         }
     }
