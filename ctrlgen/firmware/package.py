@@ -12,7 +12,7 @@ from typing import Any
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, write_text
 from ctrlgen.core.units import base_unit
-from ctrlgen.devices.base import Signal
+from ctrlgen.devices.signal import Signal
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.templates import comment, write
 from ctrlgen.firmware.player.compression import PlayerCandidate
