@@ -20,10 +20,13 @@ class Cyclic(Effect):
     params = (
         Param("amplitude", "channel", (-0.5, 0.5), "largest error", off=0.0),
         Param(
-            "period", "channel", (1e-4, 2.0), "path of one period",
+            "period",
+            "channel",
+            (1e-4, 2.0),
+            "path of one period",
         ),
         Param("phase", "deg", (-360.0, 360.0), "phase at home"),
-    )  # fmt: skip
+    )
 
     @classmethod
     def contradiction(cls, p):

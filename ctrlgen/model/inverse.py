@@ -58,15 +58,22 @@ def invert(model: Model, follow: str, sample_time: float | None, symbolic: bool 
     p = model.p if symbolic else ca.SX(ca.DM(model.p_nominal))
     now, end = ca.vertcat(x, z, u, model.p), ca.vertcat(x_1, z_1, u_1, p)
     known = ExpansionPoint.of(
-        (x, model.rest, model.x_scale), (z, 0 * model.z_scale, model.z_scale), (target, np.zeros(target.numel()), np.zeros(target.numel())),
-        (x_1, model.rest, model.x_scale), (z_1, 0 * model.z_scale, model.z_scale), (u_1, 0 * model.u_scale, model.u_scale),
-        (heat, np.zeros(heat.numel()), np.ones(heat.numel())), (model.p, model.p_nominal, np.zeros(model.p.numel())),
-    )  # fmt: skip
+        (x, model.rest, model.x_scale),
+        (z, 0 * model.z_scale, model.z_scale),
+        (target, np.zeros(target.numel()), np.zeros(target.numel())),
+        (x_1, model.rest, model.x_scale),
+        (z_1, 0 * model.z_scale, model.z_scale),
+        (u_1, 0 * model.u_scale, model.u_scale),
+        (heat, np.zeros(heat.numel()), np.ones(heat.numel())),
+        (model.p, model.p_nominal, np.zeros(model.p.numel())),
+    )
     if symbolic:
         known = replace(
-            known, parameters=model.p, with_formula=ca.vertcat(x, x_1),
+            known,
+            parameters=model.p,
+            with_formula=ca.vertcat(x, x_1),
             base_formula=ca.vertcat(model.rest_formula, model.rest_formula),
-        )  # fmt: skip
+        )
     followed, balance, rates, produced = (
         ca.substitute(e, now, end)
         for e in (model.signals[follow].expr, model.balance, model.rates_of_heat, model.heat_of_drive)

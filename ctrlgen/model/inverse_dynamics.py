@@ -96,10 +96,12 @@ def inverse_dynamics(model: Model, follow: str) -> InverseDynamics:
         what = f"of the device ({kinds}) keep the drive from moving the {follow} near rest: there is no inverse; leave them out"
         raise InputError(model.name, [Fault("effect", what)])
     known = ExpansionPoint.of(
-        (x, model.rest, model.x_scale), (z, 0 * model.z_scale, model.z_scale), (u, 0 * model.u_scale, model.u_scale),
+        (x, model.rest, model.x_scale),
+        (z, 0 * model.z_scale, model.z_scale),
+        (u, 0 * model.u_scale, model.u_scale),
         (ca.vec(target), np.zeros(target.numel()), np.zeros(target.numel())),
         *((a, 0 * model.z_scale, model.z_scale * TYPICAL_RATE ** (k + 2)) for k, (a, _) in enumerate(accelerations)),
-    )  # fmt: skip
+    )
     solution = solve_by_blocks(known, equations, unknowns)
     result = [ca.substitute(ca.substitute(e, unknowns, solution), held, at_rest) for e in (x, z, u)]
     kernel = ca.Function("inverse_dynamics", [target], result, ["target"], ["x", "z", "u"], {"cse": True})

@@ -168,9 +168,12 @@ class Model:
     def dynamics(self) -> ca.Function:
         """(x, z, u, p) -> (rates, balance)."""
         return ca.Function(
-            f"{self.name}_dynamics", [self.x, self.z, self.u, self.p], [self.rates, self.balance],
-            ["x", "z", "u", "p"], ["rates", "balance"],
-        )  # fmt: skip
+            f"{self.name}_dynamics",
+            [self.x, self.z, self.u, self.p],
+            [self.rates, self.balance],
+            ["x", "z", "u", "p"],
+            ["rates", "balance"],
+        )
 
     @cached_property
     def x_bounds(self) -> tuple[np.ndarray, np.ndarray]:
@@ -256,9 +259,8 @@ class Model:
     def composite_limits(self) -> list[Limit]:
         """Limits on an expression, such as a stress, and not on a state, displacement or drive itself."""
         return [
-            limit for limit in self.limits
-            if not any(_positions(limit, symbol) for symbol in (self.x, self.z, self.u))
-        ]  # fmt: skip
+            limit for limit in self.limits if not any(_positions(limit, symbol) for symbol in (self.x, self.z, self.u))
+        ]
 
 
 def _positions(limit: Limit, symbol: ca.SX) -> list[tuple[int, int]]:

@@ -37,13 +37,22 @@ def quasi_static(model: Model) -> Model:
 
     none = ca.SX(0, 1)
     return replace(
-        model, x=model.x[:own, :], v=none, acceleration=none, mass=ca.SX(0, 0),
-        rates_of_heat=of(model.rates_of_heat[:own, :]), sampled_rates=of(model.sampled_rates[:own, :]), balance=of(model.balance),
+        model,
+        x=model.x[:own, :],
+        v=none,
+        acceleration=none,
+        mass=ca.SX(0, 0),
+        rates_of_heat=of(model.rates_of_heat[:own, :]),
+        sampled_rates=of(model.sampled_rates[:own, :]),
+        balance=of(model.balance),
         signals={name: replace(s, expr=of(s.expr)) for name, s in model.signals.items()},
         limits=tuple(replace(limit, expr=of(limit.expr)) for limit in model.limits),
-        x_names=model.x_names[:own], x_units=model.x_units[:own], rest=model.rest[:own],
-        rest_formula=model.rest_formula[:own, :], x_scale=model.x_scale[:own],
-    )  # fmt: skip
+        x_names=model.x_names[:own],
+        x_units=model.x_units[:own],
+        rest=model.rest[:own],
+        rest_formula=model.rest_formula[:own, :],
+        x_scale=model.x_scale[:own],
+    )
 
 
 def natural_modes(model: Model, x: np.ndarray, z: np.ndarray, u: np.ndarray) -> list[tuple[float, float]]:

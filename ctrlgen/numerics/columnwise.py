@@ -30,17 +30,56 @@ def _if_else_zero(condition: Any, value: Any, out: np.ndarray) -> None:
 
 
 OPERATIONS: Mapping[int, Callable[..., Any]] = {  # each takes its operands and where the result is to stand
-    ca.OP_ASSIGN: _assign, ca.OP_ADD: np.add, ca.OP_SUB: np.subtract, ca.OP_MUL: np.multiply, ca.OP_DIV: np.divide,
-    ca.OP_NEG: np.negative, ca.OP_SQ: np.square, ca.OP_TWICE: lambda a, out: np.add(a, a, out), ca.OP_INV: np.reciprocal,
-    ca.OP_SQRT: np.sqrt, ca.OP_EXP: np.exp, ca.OP_LOG: np.log, ca.OP_LOG1P: np.log1p, ca.OP_EXPM1: np.expm1, ca.OP_POW: np.power,
-    ca.OP_CONSTPOW: np.power, ca.OP_HYPOT: np.hypot, ca.OP_SIN: np.sin, ca.OP_COS: np.cos, ca.OP_TAN: np.tan, ca.OP_ASIN: np.arcsin,
-    ca.OP_ACOS: np.arccos, ca.OP_ATAN: np.arctan, ca.OP_ATAN2: np.arctan2, ca.OP_SINH: np.sinh, ca.OP_COSH: np.cosh,
-    ca.OP_TANH: np.tanh, ca.OP_ASINH: np.arcsinh, ca.OP_ACOSH: np.arccosh, ca.OP_ATANH: np.arctanh, ca.OP_ERF: special.erf,
-    ca.OP_ERFINV: special.erfinv, ca.OP_FMIN: np.fmin, ca.OP_FMAX: np.fmax, ca.OP_FABS: np.abs, ca.OP_SIGN: np.sign,
-    ca.OP_COPYSIGN: np.copysign, ca.OP_FMOD: np.fmod, ca.OP_REMAINDER: lambda a, b, out: np.subtract(a, b * np.rint(a / b), out),
-    ca.OP_FLOOR: np.floor, ca.OP_CEIL: np.ceil, ca.OP_LT: np.less, ca.OP_LE: np.less_equal, ca.OP_EQ: np.equal, ca.OP_NE: np.not_equal,
-    ca.OP_NOT: np.logical_not, ca.OP_AND: np.logical_and, ca.OP_OR: np.logical_or, ca.OP_IF_ELSE_ZERO: _if_else_zero,
-}  # fmt: skip
+    ca.OP_ASSIGN: _assign,
+    ca.OP_ADD: np.add,
+    ca.OP_SUB: np.subtract,
+    ca.OP_MUL: np.multiply,
+    ca.OP_DIV: np.divide,
+    ca.OP_NEG: np.negative,
+    ca.OP_SQ: np.square,
+    ca.OP_TWICE: lambda a, out: np.add(a, a, out),
+    ca.OP_INV: np.reciprocal,
+    ca.OP_SQRT: np.sqrt,
+    ca.OP_EXP: np.exp,
+    ca.OP_LOG: np.log,
+    ca.OP_LOG1P: np.log1p,
+    ca.OP_EXPM1: np.expm1,
+    ca.OP_POW: np.power,
+    ca.OP_CONSTPOW: np.power,
+    ca.OP_HYPOT: np.hypot,
+    ca.OP_SIN: np.sin,
+    ca.OP_COS: np.cos,
+    ca.OP_TAN: np.tan,
+    ca.OP_ASIN: np.arcsin,
+    ca.OP_ACOS: np.arccos,
+    ca.OP_ATAN: np.arctan,
+    ca.OP_ATAN2: np.arctan2,
+    ca.OP_SINH: np.sinh,
+    ca.OP_COSH: np.cosh,
+    ca.OP_TANH: np.tanh,
+    ca.OP_ASINH: np.arcsinh,
+    ca.OP_ACOSH: np.arccosh,
+    ca.OP_ATANH: np.arctanh,
+    ca.OP_ERF: special.erf,
+    ca.OP_ERFINV: special.erfinv,
+    ca.OP_FMIN: np.fmin,
+    ca.OP_FMAX: np.fmax,
+    ca.OP_FABS: np.abs,
+    ca.OP_SIGN: np.sign,
+    ca.OP_COPYSIGN: np.copysign,
+    ca.OP_FMOD: np.fmod,
+    ca.OP_REMAINDER: lambda a, b, out: np.subtract(a, b * np.rint(a / b), out),
+    ca.OP_FLOOR: np.floor,
+    ca.OP_CEIL: np.ceil,
+    ca.OP_LT: np.less,
+    ca.OP_LE: np.less_equal,
+    ca.OP_EQ: np.equal,
+    ca.OP_NE: np.not_equal,
+    ca.OP_NOT: np.logical_not,
+    ca.OP_AND: np.logical_and,
+    ca.OP_OR: np.logical_or,
+    ca.OP_IF_ELSE_ZERO: _if_else_zero,
+}
 
 
 class ColumnWise:
@@ -60,8 +99,10 @@ class ColumnWise:
         steps = list[tuple[Callable[..., Any], tuple[Any, ...]]]()
         for k in range(function.n_instructions()):
             op, inputs, outputs = (
-                function.instruction_id(k), function.instruction_input(k), function.instruction_output(k),
-            )  # fmt: skip
+                function.instruction_id(k),
+                function.instruction_input(k),
+                function.instruction_output(k),
+            )
             if op == ca.OP_CONST:
                 at[outputs[0]] = function.instruction_constant(k)
             elif op == ca.OP_INPUT:

@@ -169,7 +169,13 @@ EQUATIONS = (
     Equation(ALPHA, "zhang_fasse", "C.10", "Zhang and Fasse (2001)", _plain(c.c10), (0.05, 0.8), OWN),
     Equation(DELTA_Y, "paros_weisbord", "C.2 + C.4", _PW, _with_shear(c.c2, c.c4), (0.05, 0.1), errors=(2, 4, 3.1)),
     Equation(
-        DELTA_Y, "paros_weisbord_simplified", "C.6 + C.8", _PW, _with_shear(c.c6, c.c8), (0.05, 0.1), errors=(3, 5.6, 4.3)
+        DELTA_Y,
+        "paros_weisbord_simplified",
+        "C.6 + C.8",
+        _PW,
+        _with_shear(c.c6, c.c8),
+        (0.05, 0.1),
+        errors=(3, 5.6, 4.3),
     ),
     Equation(DELTA_Y, "lobontiu", "C.19 + C.21", _LO, _lobontiu_y, (0.05, 0.1), errors=(2, 3.9, 2.9)),
     Equation(DELTA_Y, "wu_zhou", "C.12 + C.14", _WU, _with_shear(c.c12, c.c14), (0.05, 0.1), errors=(2, 4, 3.1)),
@@ -178,9 +184,17 @@ EQUATIONS = (
     Equation(DELTA_X, "paros_weisbord_simplified", "C.7", _PW, _plain(c.c7), None, "S3 Table 3: not recommended"),
     Equation(DELTA_X, "lobontiu", "C.20", _LO, _plain(c.c20), (0.25, 0.65), errors=(0.3, 4.9, 2.4)),
     Equation(DELTA_X, "wu_zhou", "C.13", _WU, _plain(c.c13), (0.25, 0.65), errors=(0.3, 4.9, 2.4)),
-    Equation(DELTA_X, "schotborgh", "C.24", _SC, _plain(c.c24), None, "not in S3 Table 3; includes the extension of the links"),
+    Equation(
+        DELTA_X,
+        "schotborgh",
+        "C.24",
+        _SC,
+        _plain(c.c24),
+        None,
+        "not in S3 Table 3; includes the extension of the links",
+    ),
     Equation(LOCKED, "schotborgh", "C.23", _SC, _plain(c.c23), (0.2, 0.8), OWN),
-)  # fmt: skip
+)
 BY_NAME = {(e.compliance, e.group): e for e in EQUATIONS}
 
 

@@ -12,8 +12,17 @@ from ctrlgen.physics.flexure import blade_compliance
 from ctrlgen.physics.screw import Matrix, Scalar, inverse, move, parallel, rotation_z
 
 STIFFENING = (
-    "beams", "beam_gap", "bar_width", "bar_half_height", "beam_length", "beam_width", "thickness", "beam_angle", "young", "poisson",
-)  # fmt: skip
+    "beams",
+    "beam_gap",
+    "bar_width",
+    "bar_half_height",
+    "beam_length",
+    "beam_width",
+    "thickness",
+    "beam_angle",
+    "young",
+    "poisson",
+)
 ZERO_CELSIUS = 273.15  # K; S1 Table 1 gives alpha as a function of degrees Celsius
 
 

@@ -321,7 +321,13 @@ def _package(name: str, path: Path) -> ModuleType:
 
 
 READERS: dict[str, Callable[[Path], MeasurementTable]] = {
-    ".csv": read_csv, ".dat": read_csv, ".txt": read_csv,
-    ".mat": read_mat, ".h5": read_hdf5, ".hdf5": read_hdf5, ".tdms": read_tdms, ".mf4": read_mdf4,
+    ".csv": read_csv,
+    ".dat": read_csv,
+    ".txt": read_csv,
+    ".mat": read_mat,
+    ".h5": read_hdf5,
+    ".hdf5": read_hdf5,
+    ".tdms": read_tdms,
+    ".mf4": read_mdf4,
     ".json": read_json,
-}  # fmt: skip
+}

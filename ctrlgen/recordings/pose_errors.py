@@ -100,10 +100,15 @@ def parasitic(commanded: np.ndarray, measured: np.ndarray) -> list[Parasitic]:
         rest = [k for k in range(6) if k != i]
         found.append(
             Parasitic(
-                channel, poses, commanded[poses, i], measured[poses, i], errors[poses, i],
-                errors[poses][:, rest], tuple(CHANNELS[k] for k in rest),
+                channel,
+                poses,
+                commanded[poses, i],
+                measured[poses, i],
+                errors[poses, i],
+                errors[poses][:, rest],
+                tuple(CHANNELS[k] for k in rest),
             )
-        )  # fmt: skip
+        )
     return found
 
 

@@ -162,9 +162,7 @@ class Condensed:
         R, centre = placed.turn, ca.DM.zeros(3) if own.centre is None else ca.vertcat(*own.centre)
         S = ca.skew(ca.mtimes(R, centre))
         about = ca.mtimes([R, ca.diag(ca.vertcat(*own.inertia)), R.T]) - own.mass * ca.mtimes(S, S)
-        return ca.vertcat(
-            ca.horzcat(about, own.mass * S), ca.horzcat(-own.mass * S, own.mass * ca.DM.eye(3))
-        )  # fmt: skip
+        return ca.vertcat(ca.horzcat(about, own.mass * S), ca.horzcat(-own.mass * S, own.mass * ca.DM.eye(3)))
 
     def flexure_mass(self, k: int, first: Matrix, second: Matrix) -> Matrix | None:
         """(m, m) of element k whose ends move by the twists `first` and `second` (6, m); None of one without a mass: those that are not

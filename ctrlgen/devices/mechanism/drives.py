@@ -63,8 +63,15 @@ def _proportional(c: Condensed) -> Transduction:
         return Transduction(drive, ranges, lambda u, x: gain * u, scale)
     state = Signal("state", "amplifier output", axes, units, "x_", ca.SX.sym("x", len(axes)), sizes)
     return Transduction(
-        drive, ranges, lambda u, x: gain * x, scale, state, (0.0,) * len(axes), ranges, lambda x, u: (u - x) / ca.vertcat(*lags)
-    )  # fmt: skip
+        drive,
+        ranges,
+        lambda u, x: gain * x,
+        scale,
+        state,
+        (0.0,) * len(axes),
+        ranges,
+        lambda x, u: (u - x) / ca.vertcat(*lags),
+    )
 
 
 def _heated(c: Condensed) -> Transduction:
@@ -91,10 +98,17 @@ def _heated(c: Condensed) -> Transduction:
         return u**2 / ca.vertcat(*(a.heater_resistance for a in own)) if volts else u
 
     return Transduction(
-        drive, tuple((0.0, most) for most in highest), force, hottest, state, tuple(a.ambient for a in own),
-        tuple((s.ambient.si, s.temperature_limit.si) for s in sections), rates, heat,
+        drive,
+        tuple((0.0, most) for most in highest),
+        force,
+        hottest,
+        state,
+        tuple(a.ambient for a in own),
+        tuple((s.ambient.si, s.temperature_limit.si) for s in sections),
+        rates,
+        heat,
         AxisSignal("heater power", "W", "P_", max(s.power_limit.si for s in sections)),
-    )  # fmt: skip
+    )
 
 
 def _heaters(c: Condensed, p: SimpleNamespace) -> list[SimpleNamespace]:

@@ -46,27 +46,44 @@ def mechanism_physics(c: Condensed) -> DevicePhysics:
         return linear + second.pose(d) if bent else linear
 
     common: dict[str, Any] = dict(
-        axes=axes, components=channels, pose_units=tuple("urad" if name.startswith("theta") else "um" for name in channels),
-        pose_scale=device.channel_scale, drive=acting.drive, state=acting.state, rest=acting.rest,
-        displacement_scale=max(s.travel.si for s in sections), bipolar=any(low < 0 for low, _ in acting.drive_range),
-        force_scale=acting.force_scale, force_unit="N" if c.pushes else "um",
-        restoring_force=restoring_force, restoring_force_parts=restoring_force_parts,
-        pose=pose, limits=limits, sensed=_sensed(c, second if bent else None),
+        axes=axes,
+        components=channels,
+        pose_units=tuple("urad" if name.startswith("theta") else "um" for name in channels),
+        pose_scale=device.channel_scale,
+        drive=acting.drive,
+        state=acting.state,
+        rest=acting.rest,
+        displacement_scale=max(s.travel.si for s in sections),
+        bipolar=any(low < 0 for low, _ in acting.drive_range),
+        force_scale=acting.force_scale,
+        force_unit="N" if c.pushes else "um",
+        restoring_force=restoring_force,
+        restoring_force_parts=restoring_force_parts,
+        pose=pose,
+        limits=limits,
+        sensed=_sensed(c, second if bent else None),
         second_order_kinematics=None if bent or c.cubics else second.pose,
         rate_limits=tuple(
             rate_limit(acting.drive, i, s.rate[0].si, s.rate[1].si, written_unit(s.rate[1].text))
-            for i, s in enumerate(sections) if getattr(s, "rate", None) is not None
+            for i, s in enumerate(sections)
+            if getattr(s, "rate", None) is not None
         ),
-    )  # fmt: skip
+    )
     if p.dynamics is None:
         return BalancedPhysics(
-            **common, force=lambda u, x, d: acting.force(u, x), rates=acting.rates, heating_power=acting.heat, power=acting.power
-        )  # fmt: skip
+            **common,
+            force=lambda u, x, d: acting.force(u, x),
+            rates=acting.rates,
+            heating_power=acting.heat,
+            power=acting.power,
+        )
     D = modal_damping(c.mass, c.held_stiffness, p.dynamics.damping_ratio)
     return InertialPhysics(
-        **common, mass=c.mass, dynamics=lambda u, x, d, v: (acting.force(u, x), acting.rates(x, u)),
+        **common,
+        mass=c.mass,
+        dynamics=lambda u, x, d, v: (acting.force(u, x), acting.rates(x, u)),
         damping_force=lambda v: ca.mtimes(D, v),
-    )  # fmt: skip
+    )
 
 
 def _sensed(c: Condensed, second: SecondOrder | None) -> SensedPoints | None:

@@ -34,8 +34,9 @@ def freedoms(device: Drawing) -> tuple[int, int]:
     swap = [3, 4, 5, 0, 1, 2]
     yields = {
         k: turn[:, None] * ca.DM(ca.evalf(ca.SX(C))).full()[:, swap] * turn
-        for k, C in enumerate(c.compliances) if C is not None
-    }  # fmt: skip
+        for k, C in enumerate(c.compliances)
+        if C is not None
+    }
     largest = max((float(np.linalg.eigvalsh((C + C.T) / 2).max()) for C in yields.values()), default=0.0)
     for k, e in enumerate(device.placed_elements):
         if k not in yields:

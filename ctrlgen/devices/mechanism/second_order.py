@@ -196,9 +196,10 @@ class SecondOrder:
             e = self._motions(k, between=unit)
             W, E, mixed = e.load, e.deformation(self.I, self.J), e.deformation(axis, turned)
             push(
-                placed.first, placed.second,
+                placed.first,
+                placed.second,
                 dot(W[:, u], E[:, p]) + dot(W[:, I], mixed[:, with_J]) + dot(W[:, J], mixed[:, with_I]),
-            )  # fmt: skip
+            )
         moved = ca.SX(n, m)
         if c.pushes:
             moved = self._travel(self.I, self.J)
@@ -245,9 +246,15 @@ class SecondOrder:
         return seen
 
     def _relative(
-        self, point: Matrix, first: int, second: int, a: Sequence[int], b: Sequence[int],
-        more: list[Matrix] | None = None, between: list[Matrix] | None = None,
-    ) -> Matrix:  # fmt: skip
+        self,
+        point: Matrix,
+        first: int,
+        second: int,
+        a: Sequence[int],
+        b: Sequence[int],
+        more: list[Matrix] | None = None,
+        between: list[Matrix] | None = None,
+    ) -> Matrix:
         """`relative_motion` of two bodies."""
         bodies = []
         for k, body in enumerate((first, second)):
@@ -264,9 +271,14 @@ class SecondOrder:
         return ca.vertcat(*(self._travel_of(i, x, a, b, more) for i, x in enumerate(self.c.device.placed_actuators)))
 
     def _travel_of(
-        self, i: int, placed: Placed, a: Sequence[int], b: Sequence[int],
-        more: list[Matrix] | None = None, between: list[Matrix] | None = None,
-    ) -> Matrix:  # fmt: skip
+        self,
+        i: int,
+        placed: Placed,
+        a: Sequence[int],
+        b: Sequence[int],
+        more: list[Matrix] | None = None,
+        between: list[Matrix] | None = None,
+    ) -> Matrix:
         """(1, m): that of actuator i, whose direction turns with the body against which it pushes."""
         moved = self._relative(self.c.point(placed), placed.first, placed.second, a, b, more, between)
         return ca.mtimes(self.c.directions[i].T, moved[3:, :])

@@ -165,12 +165,14 @@ class ArgumentReader:
         if "needed_force" in present:
             return present
         need = {
-            "mass": any(m in present for m in NEED_MASS) and f"is missing: {' and '.join(m for m in NEED_MASS if m in present)} "
+            "mass": any(m in present for m in NEED_MASS)
+            and f"is missing: {' and '.join(m for m in NEED_MASS if m in present)} "
             "needs the inertia of each axis, on which the forces of effects act",
             "rates": bool(state) and "is missing: a state needs its rate",
             "pose": not same and "is missing: readings that are not the axes themselves need pose(d, p)",
-            "restoring_force": "mass" not in present and "is missing: an axis without mass rests where restoring_force = force",
-        }  # fmt: skip
+            "restoring_force": "mass" not in present
+            and "is missing: an axis without mass rests where restoring_force = force",
+        }
         self.faults += [Fault(name, what) for name, what in need.items() if what and name not in present]
         if "acceleration" in present:
             for other in ("force", "restoring_force", "damping_force"):
