@@ -168,11 +168,11 @@ def solve_by_blocks(known: ExpansionPoint, equations: ca.SX, unknowns: ca.SX) ->
     solution = [ca.SX(0)] * unknowns.numel()
     solved = values = ca.SX(0, 1)
     for block in range(count):
-        own = columns[column_starts[block] : column_starts[block + 1]]
+        places = columns[column_starts[block] : column_starts[block + 1]]
         own_equations = equations[rows[row_starts[block] : row_starts[block + 1]]]
-        v = unknowns[own]
+        v = unknowns[places]
         root = _solve_block(known, ca.substitute(own_equations, solved, values), v)
-        for k, i in enumerate(own):
+        for k, i in enumerate(places):
             solution[i] = root[k]
         solved, values = ca.vertcat(solved, v), ca.vertcat(values, root)
     return ca.vertcat(*solution)

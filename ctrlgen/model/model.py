@@ -237,11 +237,11 @@ class Model:
     def tightened(self, reserves: Mapping[str, tuple[float, float]], probability: float | None) -> Model:
         """The model with the bounds of the named limits moved inward by (below, above) [SI], which then hold with the `probability`:
         whatever reads its limits keeps the tightened ones."""
-        own = [reserves.get(limit.name, (0.0, 0.0)) for limit in self.limits]
-        limits = tuple(limit.tightened(*reserve) for limit, reserve in zip(self.limits, own, strict=True))
+        reserved = [reserves.get(limit.name, (0.0, 0.0)) for limit in self.limits]
+        limits = tuple(limit.tightened(*reserve) for limit, reserve in zip(self.limits, reserved, strict=True))
         formulas = tuple(
             (None if lower is None else lower + below, None if upper is None else upper - above)
-            for (lower, upper), (below, above) in zip(self.bounds_formulas, own, strict=True)
+            for (lower, upper), (below, above) in zip(self.bounds_formulas, reserved, strict=True)
         )
         return replace(self, limits=limits, bounds_formulas=formulas, probability=probability)
 

@@ -95,7 +95,7 @@ class ColumnWise:
     def _instructions(self, function: ca.Function) -> list[tuple[Callable[..., Any], tuple[Any, ...]]]:
         """NumPy's functions in their order, with the arrays that each reads and writes."""
         at: dict[int, Any] = {}  # by slot of CasADi's work vector: an array, or a number
-        own: dict[int, np.ndarray] = {}
+        buffers: dict[int, np.ndarray] = {}
         steps = list[tuple[Callable[..., Any], tuple[Any, ...]]]()
         for k in range(function.n_instructions()):
             op, inputs, outputs = (
@@ -110,7 +110,7 @@ class ColumnWise:
             elif op == ca.OP_OUTPUT:
                 steps.append((_assign, (at[inputs[0]], self._result[outputs[1]])))
             else:
-                out = own.setdefault(outputs[0], np.zeros(self.block))
+                out = buffers.setdefault(outputs[0], np.zeros(self.block))
                 steps.append((OPERATIONS[op], (*(at[i] for i in inputs), out)))
                 at[outputs[0]] = out
         return steps
@@ -118,7 +118,7 @@ class ColumnWise:
     def __call__(self, *given: np.ndarray) -> np.ndarray:
         """(rows, n) from arguments (rows of each, n)."""
         n = given[0].shape[1]
-        found = np.empty((self.rows, n))
+        result = np.empty((self.rows, n))
         with np.errstate(all="ignore"):  # what is no number is found in the result
             for a in range(0, n, self.block):
                 b = min(a + self.block, n)
@@ -126,5 +126,5 @@ class ColumnWise:
                     values[:, : b - a] = argument[:, a:b]
                 for operation, arrays in self._steps:
                     operation(*arrays)
-                found[:, a:b] = self._result[:, : b - a]
-        return found
+                result[:, a:b] = self._result[:, : b - a]
+        return result

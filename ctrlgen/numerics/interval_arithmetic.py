@@ -82,7 +82,7 @@ def intervals(function: ca.Function, ranges: Mapping[str, tuple[np.ndarray, np.n
     `ranges`: argument (a dense column) by its name -> lower and upper bounds; arguments that are not named are unbounded.
     """
     at: dict[int, Interval] = {}  # by slot of CasADi's work vector
-    found = []
+    values = []
     for k in range(function.n_instructions()):
         op, inputs, outputs = function.instruction_id(k), function.instruction_input(k), function.instruction_output(k)
         if op == ca.OP_INPUT:
@@ -95,10 +95,10 @@ def intervals(function: ca.Function, ranges: Mapping[str, tuple[np.ndarray, np.n
             value = (function.instruction_constant(k),) * 2
         else:
             value = interval_of(op, [at[i] for i in inputs])
-        found.append(value)
+        values.append(value)
         if op != ca.OP_OUTPUT:
             at[outputs[0]] = value
-    return found
+    return values
 
 
 def bounds(function: ca.Function, ranges: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:

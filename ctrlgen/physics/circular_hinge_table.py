@@ -286,20 +286,20 @@ def planar(geometry: Geometry, equation: str | Mapping[str, str] = "auto", outsi
     definite, delta_y/F_y <= R^2 alpha_z/M_z: the two then come from theories that contradict each other.
     """
     chosen = {key: equation if isinstance(equation, str) else equation.get(key, "auto") for key in PLANAR}
-    found = {key: compliance(key, geometry, chosen[key], outside) for key in PLANAR}
+    compliances = {key: compliance(key, geometry, chosen[key], outside) for key in PLANAR}
     faults = [
         f"{key} by {one.source} is {float(one.value):.4g} {UNITS[key]} at t/R = {geometry.ratio:.4g}; "
         "a compliance must be positive and finite"
-        for key, one in found.items()
+        for key, one in compliances.items()
         if not isinstance(one.value, ca.SX) and not 0 < float(one.value) < float("inf")
     ]
-    alpha, y, x = (found[key].value for key in PLANAR)
+    alpha, y, x = (compliances[key].value for key in PLANAR)
     by_rotation: Any = geometry.R**2 * alpha
     # Without shear C.6 is exactly R^2 C.5: rounding must not decide whether the matrix is positive definite.
     if not faults and not isinstance(y - by_rotation, ca.SX) and float(y - by_rotation) <= ROUNDING * float(y):
         faults.append(
-            f"the compliance is not positive definite: delta_y/F_y by {found[DELTA_Y].source} is {float(y):.4g} m/N, at "
-            f"least {float(by_rotation):.4g} m/N follows from alpha_z/M_z by {found[ALPHA].source} at "
+            f"the compliance is not positive definite: delta_y/F_y by {compliances[DELTA_Y].source} is {float(y):.4g} m/N, at "
+            f"least {float(by_rotation):.4g} m/N follows from alpha_z/M_z by {compliances[ALPHA].source} at "
             f't/R = {geometry.ratio:.4g}; include shear (shear_factor), use equation = "auto", or take both from one source'
         )
     if faults:

@@ -46,7 +46,7 @@ def flexure_mass(
             within = s.length * (1 + node) / 2
             x = begun + within
             C = beam_compliance(within, *rigidity)
-            C += sum((move(own, None, (at - x, 0, 0)) for at, own in passed), ca.DM.zeros(6, 6))
+            C += sum((move(compliance, None, (at - x, 0, 0)) for at, compliance in passed), ca.DM.zeros(6, 6))
             here = inverse_adjoint(R, end - (length - x) * R[:, 0])
             T = ca.mtimes(here, first) + ca.mtimes([C, here, load])
             M += ca.mtimes([T.T, ca.diag(inertia * s.length * weight / 2), T])

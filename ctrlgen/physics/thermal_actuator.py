@@ -61,9 +61,11 @@ def stiffness(a: Any) -> Matrix:
 
     Entries (1, 4), (2, 5) and (3, 6) are those of the paper; its moment entries do not follow from its beam spacing.
     """
-    own = {name: getattr(a, name) for name in STIFFENING}
-    if all(isinstance(value, float) for value in own.values()):
-        return ca.DM(_stiffness_of(**own))  # a model asks for it several times, and a budget for many models
+    dimensions = {name: getattr(a, name) for name in STIFFENING}
+    if all(isinstance(value, float) for value in dimensions.values()):
+        return ca.DM(
+            _stiffness_of(**dimensions)
+        )  # a model asks for it several times, and a budget for many models
     return _stiffness(a)
 
 

@@ -91,14 +91,14 @@ def parasitic(commanded: np.ndarray, measured: np.ndarray) -> list[Parasitic]:
     measured, commanded = _two(measured, commanded)
     errors = measured - commanded
     alone = np.count_nonzero(commanded, axis=1) == 1
-    found = []
+    motions = []
     for i, channel in enumerate(CHANNELS):
         poses = np.flatnonzero(alone & (commanded[:, i] != 0))
         if not poses.size:
             continue
         poses = poses[np.argsort(commanded[poses, i], kind="stable")]
         rest = [k for k in range(6) if k != i]
-        found.append(
+        motions.append(
             Parasitic(
                 channel,
                 poses,
@@ -109,7 +109,7 @@ def parasitic(commanded: np.ndarray, measured: np.ndarray) -> list[Parasitic]:
                 tuple(CHANNELS[k] for k in rest),
             )
         )
-    return found
+    return motions
 
 
 def _two(measured: np.ndarray, expected: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -290,13 +290,13 @@ class Mechanism(Device):
     @cached_property
     def placed_actuators(self) -> tuple[Placed, ...]:
         """Every copy of every actuator; one that prescribes a displacement names an element and no bodies, a heater those of its."""
-        found, elements = [], {e.name: e for e in self.element}
+        placed, elements = [], {e.name: e for e in self.element}
         for c in self._copies(self.actuator):
             ends = (
                 (c.section, "against", "on") if c.section.kind != "thermal" else (elements[c.section.on], "from_", "to")
             )
-            found.append(self._between(c, *(getattr(ends[0], key) for key in ends[1:])))
-        return tuple(found)
+            placed.append(self._between(c, *(getattr(ends[0], key) for key in ends[1:])))
+        return tuple(placed)
 
     @cached_property
     def channel_scale(self) -> tuple[float, ...]:

@@ -28,11 +28,11 @@ def mechanism_physics(c: Condensed) -> DevicePhysics:
         return {"linear": linear, "cubic": springs - linear} if c.cubics else {}
 
     def limits(signal: SimpleNamespace) -> list[Limit]:
-        found = acting.limits(signal)
+        limited = acting.limits(signal)
         for i, (axis, s) in enumerate(zip(axes, sections, strict=True)):
             d, reach = signal.displacement[i], s.travel.si
-            found.append(Limit(f"travel_{axis}", f"travel of {axis}", (axis,), "um", d, -reach, reach))
-        return found + _flexure_limits(c, signal.mechanism_displacement)
+            limited.append(Limit(f"travel_{axis}", f"travel of {axis}", (axis,), "um", d, -reach, reach))
+        return limited + _flexure_limits(c, signal.mechanism_displacement)
 
     J, channels, second = c.jacobian, device.output.channels, SecondOrder(c)
     bent = device.second_order
@@ -103,16 +103,16 @@ def _sensed(c: Condensed, second: SecondOrder | None) -> SensedPoints | None:
 
 def _flexure_limits(c: Condensed, d: ca.SX) -> list[Limit]:
     """Rotations and stresses of the flexures with the axes displaced by `d` (n,), as they are at rest there."""
-    found = []
+    limits = []
     for k, e in enumerate(c.device.placed_elements):
         most = getattr(e.section, "rotation_limit", None)
         if most is not None:
             angle = ca.fabs(ca.mtimes(c.rotation(k), c.loads(d)))
-            found.append(Limit(f"rotation_{e.name}", f"rotation of {e.name}", (e.name,), "deg", angle, None, most.si))
+            limits.append(Limit(f"rotation_{e.name}", f"rotation of {e.name}", (e.name,), "deg", angle, None, most.si))
     for m in c.device.material:
         if m.stress_limit is not None:
             names, stress = c.stress(m.name, d, 1e-9 * m.stress_limit.si)
             if names:
                 label = f"stress of {m.name}"
-                found.append(Limit(f"stress_{m.name}", label, names, "MPa", stress, None, m.stress_limit.si))
-    return found
+                limits.append(Limit(f"stress_{m.name}", label, names, "MPa", stress, None, m.stress_limit.si))
+    return limits

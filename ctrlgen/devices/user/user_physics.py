@@ -227,7 +227,7 @@ class PhysicsBuilder:
 
     def limits(self, signal: SimpleNamespace) -> list[Limit]:
         """Drives and displacements stay within their ranges or largest sizes, states within ranges, expressions below their limits."""
-        given, found = self.given, []
+        given, limits = self.given, []
         for what, label, ports, expr in (
             ("drive", "drive", given.drive, signal.drive),
             ("axes", "travel", given.axes, signal.displacement),
@@ -238,7 +238,7 @@ class PhysicsBuilder:
                     continue
                 low, high = given.ranges.get((what, name), (-q.si, q.si))
                 unit = written_unit(q.text)
-                found.append(Limit(f"{label}_{name}", f"{label} of {name}", (name,), unit, expr[i], low, high))
+                limits.append(Limit(f"{label}_{name}", f"{label} of {name}", (name,), unit, expr[i], low, high))
         names = {"x": given.state, "d": given.axes}
         vectors = {"x": self.x, "d": signal.mechanism_displacement}
         for name, (law, q) in given.limits.items():
@@ -249,8 +249,8 @@ class PhysicsBuilder:
             }
             value, faults = evaluate_law(f"limits.{name}", law, offered | {"p": self.p}, (name,))
             given.faults.extend(fault for fault in faults if fault not in given.faults)
-            found.append(Limit(name, name, (name,), written_unit(q.text), value, -q.si, q.si))
-        return found
+            limits.append(Limit(name, name, (name,), written_unit(q.text), value, -q.si, q.si))
+        return limits
 
 
 def _units(ports: Mapping[str, Quantity]) -> tuple[str, ...]:
