@@ -24,9 +24,8 @@ from ctrlgen.physics.flexure import beam_compliance
 from ctrlgen.physics.screw import Matrix, Scalar, inverse_adjoint, move
 from ctrlgen.physics.second_order_flexure import Segment
 
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(
-    4
-)  # exact to the seventh degree; squared cubic shapes are of the sixth
+# Exact to the seventh degree; squared cubic shapes are of the sixth.
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
 def flexure_mass(

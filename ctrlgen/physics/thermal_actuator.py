@@ -63,9 +63,8 @@ def stiffness(a: Any) -> Matrix:
     """
     dimensions = {name: getattr(a, name) for name in STIFFENING}
     if all(isinstance(value, float) for value in dimensions.values()):
-        return ca.DM(
-            _stiffness_of(**dimensions)
-        )  # a model asks for it several times, and a budget for many models
+        # a model asks for it several times, and a budget for many models
+        return ca.DM(_stiffness_of(**dimensions))
     return _stiffness(a)
 
 

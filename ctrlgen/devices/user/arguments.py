@@ -12,12 +12,8 @@ from ctrlgen.core.units import Quantity, read_quantity, same_dimension, to_si, w
 from ctrlgen.devices.section import Section
 from ctrlgen.devices.user.ports import Law
 
-SECTIONS = {
-    "mechanism": "mechanism",
-    "stage": "stage",
-    "actuator": "actuator",
-    "sensor": "sensing",
-}  # domain of a parameter -> section of the device
+# Domain of a parameter -> section of the device.
+SECTIONS = {"mechanism": "mechanism", "stage": "stage", "actuator": "actuator", "sensor": "sensing"}
 PLACEHOLDER = Quantity(1.0, "1")  # for a quantity that cannot be read, so that the rest is checked too
 NEED_MASS = ("damping_force", "acceleration")
 
