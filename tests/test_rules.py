@@ -15,7 +15,7 @@ import three_stacks
 from conftest import SCENARIOS, effect_device
 
 from ctrlgen import build_model, load_scenario
-from ctrlgen.controller.feedforward import ControllerStatus
+from ctrlgen.controller.controller_step import ControllerStatus
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.firmware.c.cprint import print_function
 from ctrlgen.firmware.c.deviations import DEVIATIONS, permits

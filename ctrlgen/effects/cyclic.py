@@ -29,7 +29,7 @@ class Cyclic(Effect):
     )
 
     @classmethod
-    def contradiction(cls, p):
+    def contradiction(cls, p: dict[str, float]) -> str:
         back = 2 * math.pi * abs(p["amplitude"]) >= p["period"]
         return "its amplitude is so large beside its period that the reading would turn back" if back else ""
 

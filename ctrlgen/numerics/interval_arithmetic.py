@@ -70,7 +70,7 @@ _RULES: dict[int, Callable[..., Interval]] = {
 
 def interval_of(operation: int, operands: Sequence[Interval]) -> Interval:
     """The interval of one CasADi `operation` (such as `ca.OP_ADD`) on operands that lie in those given."""
-    rule = _RULES.get(operation, lambda *_: UNBOUNDED)
+    rule: Callable[..., Interval] = _RULES.get(operation, lambda *_: UNBOUNDED)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         value = rule(*operands)
     return UNBOUNDED if np.isnan(value).any() else value
