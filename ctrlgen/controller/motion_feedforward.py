@@ -13,12 +13,13 @@ from functools import cached_property, lru_cache
 import casadi as ca
 import numpy as np
 
-from ctrlgen.controller.controller_step import State
-from ctrlgen.controller.feedforward import Controller, ControllerStatus, ControllerStep
+from ctrlgen.controller.controller_step import ControllerStatus, ControllerStep, State
+from ctrlgen.controller.feedforward import Controller
 from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.devices import Signal
 from ctrlgen.model.inverse_dynamics import InverseDynamics, inverse_dynamics
-from ctrlgen.model.model import Model, Signal
+from ctrlgen.model.model import Model
 from ctrlgen.model.state_vector import TYPICAL_RATE
 
 

@@ -271,14 +271,24 @@ class MemsHexapod(Device):
                 Limit("force", "actuator force", self.axes, "N", signal.force, 0.0, None),
                 Limit("stroke", "stage displacement", self.axes, "um", d, 0.0, self.stage.stroke.si),
                 Limit(
-                    "notch_rotation", "notch rotation", self.axes, "deg", xy_stage.rotation(d, s),
-                    None, self.stage.notch_rotation_limit.si,
+                    "notch_rotation",
+                    "notch rotation",
+                    self.axes,
+                    "deg",
+                    xy_stage.rotation(d, s),
+                    None,
+                    self.stage.notch_rotation_limit.si,
                 ),
                 Limit(
-                    "wire_stress", "wire flexure stress", wires, "MPa", wire_stress[outermost],
-                    None, self.hexapod.stress_limit.si,
+                    "wire_stress",
+                    "wire flexure stress",
+                    wires,
+                    "MPa",
+                    wire_stress[outermost],
+                    None,
+                    self.hexapod.stress_limit.si,
                 ),
-            ]  # fmt: skip
+            ]
 
         common: dict[str, Any] = dict(
             axes=self.axes,

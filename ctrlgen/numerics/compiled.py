@@ -19,12 +19,10 @@ from pathlib import Path
 import casadi as ca
 
 FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off", "-w")
-SECONDS_PER_CHARACTER = (
-    4e-6  # of generated C, for the compiler: measured with gcc 12 to 14 on steps of an axis and a hexapod
-)
-LARGE = (
-    400_000  # characters of generated C above which it is compiled in parts: four seconds and not fifteen for a million
-)
+# Of generated C, for the compiler: measured with gcc 12 to 14 on steps of an axis and a hexapod.
+SECONDS_PER_CHARACTER = 4e-6
+# Characters of generated C above which it is compiled in parts: four seconds and not fifteen for a million.
+LARGE = 400_000
 PART = 250  # statements of a part
 FUNCTION = re.compile(
     r"^static int (?P<name>casadi_f\d+)\((?P<arguments>[^)]*)\) \{\n(?P<body>.*?)  return 0;\n\}\n", re.M | re.S

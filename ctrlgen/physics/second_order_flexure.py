@@ -22,9 +22,8 @@ import numpy as np
 from ctrlgen.physics.screw import Matrix
 
 AXIS = ca.DM([1, 0, 0])
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(
-    3
-)  # exact to the fifth degree; the strains are of the fourth along a segment
+# Exact to the fifth degree; the strains are of the fourth along a segment.
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(3)
 AWTAR_2 = ca.DM([[-1 / 700, 1 / 1400], [1 / 1400, -11 / 6300]])  # of (displacement/l, rotation): p^2 in a beam-column
 
 

@@ -91,20 +91,25 @@ def parasitic(commanded: np.ndarray, measured: np.ndarray) -> list[Parasitic]:
     measured, commanded = _two(measured, commanded)
     errors = measured - commanded
     alone = np.count_nonzero(commanded, axis=1) == 1
-    found = []
+    motions = []
     for i, channel in enumerate(CHANNELS):
         poses = np.flatnonzero(alone & (commanded[:, i] != 0))
         if not poses.size:
             continue
         poses = poses[np.argsort(commanded[poses, i], kind="stable")]
         rest = [k for k in range(6) if k != i]
-        found.append(
+        motions.append(
             Parasitic(
-                channel, poses, commanded[poses, i], measured[poses, i], errors[poses, i],
-                errors[poses][:, rest], tuple(CHANNELS[k] for k in rest),
+                channel,
+                poses,
+                commanded[poses, i],
+                measured[poses, i],
+                errors[poses, i],
+                errors[poses][:, rest],
+                tuple(CHANNELS[k] for k in rest),
             )
-        )  # fmt: skip
-    return found
+        )
+    return motions
 
 
 def _two(measured: np.ndarray, expected: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

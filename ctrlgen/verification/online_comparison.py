@@ -5,7 +5,8 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from ctrlgen.controller.feedforward import SECANT_FRACTION, ControllerStatus
+from ctrlgen.controller.controller_step import ControllerStatus
+from ctrlgen.controller.feedforward import SECANT_FRACTION
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.online.limit_tables import FLOAT_SLACK
 from ctrlgen.model.model import Model

@@ -10,6 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 
@@ -113,7 +114,7 @@ class Text:
     calls: frozenset[str]
 
     @property
-    def shape(self) -> tuple:
+    def shape(self) -> tuple[Any, ...]:
         """Equal for expressions that differ in their places only."""
         return self.lines, self.result, tuple(r.array for r in self.reads), tuple(array for array, _ in self.rows)
 
@@ -250,7 +251,7 @@ class _Body:
         """With the places numbered in the order of the text."""
         parts: dict[str, list[Node]] = {"c": [], "r": [], "d": []}
 
-        def renumbered(match: re.Match) -> str:
+        def renumbered(match: re.Match[str]) -> str:
             kind = match[1]
             if kind == "t":
                 return match[0]

@@ -132,7 +132,7 @@ class Rows:
         offset = self.parts
         self.parts += len(first.lines)
 
-        def filled(match: re.Match) -> str:
+        def filled(match: re.Match[str]) -> str:
             kind, k = match[1], int(match[2])
             if kind == "t":
                 return f"t{offset + k + 1}"

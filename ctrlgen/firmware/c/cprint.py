@@ -171,7 +171,7 @@ class Printer:
     def _law_text(self, law: Law, text: Text, arrays: Sequence[str], given: Sequence[Node]) -> str:
         T = self.real.value
 
-        def filled(match: re.Match) -> str:
+        def filled(match: re.Match[str]) -> str:
             kind, k = match[1], int(match[2])
             if kind == "t":
                 return f"t{k + 1}"

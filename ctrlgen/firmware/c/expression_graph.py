@@ -15,6 +15,7 @@ import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -89,7 +90,7 @@ class Graph:
     """Makes nodes, each of them once. `given`: path and range of the parameters that the program is given when it starts."""
 
     def __init__(self, given: Mapping[str, Interval] | None = None) -> None:
-        self._nodes: dict[tuple, Node] = {}
+        self._nodes: dict[tuple[Any, ...], Node] = {}
         self._count = 0
         self._given = {path: self.read(GIVEN, k, within) for k, (path, within) in enumerate((given or {}).items())}
 
@@ -168,7 +169,12 @@ class Graph:
         return made[row.number, named.number]
 
     def _input(
-        self, function: ca.Function, place: Sequence[int], ranges: Mapping, numbers: Mapping, renamed: Mapping[str, str]
+        self,
+        function: ca.Function,
+        place: Sequence[int],
+        ranges: Mapping[str, Any],
+        numbers: Mapping[str, Any],
+        renamed: Mapping[str, str],
     ) -> Node:
         name, row = function.name_in(place[0]), int(function.sparsity_in(place[0]).row()[place[1]])
         if name in numbers:
@@ -314,7 +320,7 @@ class Graph:
             return self._nodes[key]
         return self._make(key, op, operands=operands, within=interval_of(op, [node.within for node in operands]))
 
-    def _make(self, key: tuple, op: int, **rest: object) -> Node:
+    def _make(self, key: tuple[Any, ...], op: int, **rest: object) -> Node:
         node = Node(self._count, op, **rest)  # type: ignore[arg-type]
         self._count += 1
         self._nodes[key] = node

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ctrlgen.controller.feedforward import Controller, ControllerStatus
+from ctrlgen.controller.controller_step import ControllerStatus
+from ctrlgen.controller.feedforward import Controller
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.online.limit_tables import FLOAT_SLACK
 from ctrlgen.firmware.online.vector_cases import Call, limiter_calls
