@@ -56,8 +56,8 @@ class RunTimeConstant:
     @property
     def base_unit(self) -> str:
         """Its unit in SI, as the C has it: the file's own where that is one."""
-        own = to_si(0.0, self.unit) == 0.0 and to_si(1.0, self.unit) == 1.0
-        return self.unit if own else base_unit(self.unit)
+        is_si = to_si(0.0, self.unit) == 0.0 and to_si(1.0, self.unit) == 1.0
+        return self.unit if is_si else base_unit(self.unit)
 
     @property
     def range_text(self) -> str:

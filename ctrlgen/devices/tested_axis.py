@@ -76,8 +76,8 @@ class Mechanics(Section):
             if not same_dimension(written_unit(getattr(self, key).text), unit)
         ]
         if faults:
-            kind, own = ("rotary", "an angle") if self.rotary else ("linear", "a length")
-            raise ValueError(f"the axis is {kind}, because its stroke is {own}: {'; '.join(faults)}")
+            kind, dimension = ("rotary", "an angle") if self.rotary else ("linear", "a length")
+            raise ValueError(f"the axis is {kind}, because its stroke is {dimension}: {'; '.join(faults)}")
         return self
 
 

@@ -211,7 +211,7 @@ class Model:
     def limited_variable(self, limit: Limit, channel: int) -> Literal["x", "z", "u", "rate"] | None:
         """Whether a limit is on one of the states, displacements or drives itself, or on the rate of a drive; None where it is on an
         expression of them."""
-        if any(limit is own for own in self.rate_limits):
+        if any(limit is limited for limited in self.rate_limits):
             return "rate"
         variables: tuple[tuple[Literal["x", "z", "u"], ca.SX], ...] = (("x", self.x), ("z", self.z), ("u", self.u))
         return next((name for name, s in variables if channel in dict(_positions(limit, s))), None)

@@ -64,9 +64,9 @@ class Geometry:
             raise ValueError("R or t is a symbol; give `at`, the number t/R at which the equation is chosen")
         return float(self.t) / float(self.R)
 
-    def shear(self, own: float) -> Scalar:
+    def shear(self, by_equation: float) -> Scalar:
         """The shear factor of the geometry if it gives one, else the equation's `own`."""
-        return own if self.shear_factor is None else self.shear_factor
+        return by_equation if self.shear_factor is None else self.shear_factor
 
 
 @dataclass(frozen=True)

@@ -71,10 +71,10 @@ def _relative(point: Matrix, first: Matrix, second: Matrix, a: Sequence[int], b:
     return ca.vertcat(-cross(one[:, a], between[:, b]) / 2, turned / 2 - cross(one[:, a], moved))
 
 
-def point_flexure(own: Matrix, a: Sequence[int], b: Sequence[int]) -> Matrix:
+def point_flexure(twist: Matrix, a: Sequence[int], b: Sequence[int]) -> Matrix:
     """i (6, m) of a flexure that yields at one point, from its deformations `own` (6, k): a displacement counts in the axes halfway
     between those of both bodies, as the two are alike, -theta x delta/2."""
-    halves = cross(own[:3, a], own[3:, b]) + cross(own[:3, b], own[3:, a])
+    halves = cross(twist[:3, a], twist[3:, b]) + cross(twist[:3, b], twist[3:, a])
     return ca.vertcat(ca.DM.zeros(3, len(a)), -halves / 4)
 
 

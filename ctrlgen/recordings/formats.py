@@ -151,8 +151,8 @@ def read_tables(path: Path) -> list[MeasurementTable]:
     rows = [(line, row) for line, row in rows if any(row) and not row[0].startswith("#")]
     if not rows:
         raise InputError(path, [Fault(path.name, "has no rows; write a header and one row per sample")])
-    if len({len(row) for _, row in rows}) > 1 and (found := _runs_of_numbers(rows, path)):
-        return found
+    if len({len(row) for _, row in rows}) > 1 and (tables := _runs_of_numbers(rows, path)):
+        return tables
     width = len(rows[0][1])
     ragged = [f"line {line} has {len(row)}" for line, row in rows if len(row) != width]
     if ragged:

@@ -62,7 +62,7 @@ class PoseErrors:
 class Parasitic:
     """The poses commanded in one channel alone, in order of command: S0 Figs. 9 and 10.
 
-    `command` (n,) and `measured` (n,) of the channel itself, `own` its error, `others` (n, 5) the errors of the five
+    `command` (n,) and `measured` (n,) of the channel itself, `error` its error, `others` (n, 5) the errors of the five
     other `channels`, which are not commanded to move.
     """
 
@@ -70,7 +70,7 @@ class Parasitic:
     poses: np.ndarray
     command: np.ndarray
     measured: np.ndarray
-    own: np.ndarray
+    error: np.ndarray
     others: np.ndarray
     channels: tuple[str, ...]
 

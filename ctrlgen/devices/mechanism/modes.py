@@ -137,12 +137,12 @@ def _mass(c: Condensed) -> tuple[np.ndarray, list[int]]:
     M = np.zeros((6 * count, 6 * count))
     heavy: set[int] = set()
     for i in range(count):
-        if (own := c.body_mass(i)) is not None:
-            M[6 * i : 6 * i + 6, 6 * i : 6 * i + 6] = ca.DM(ca.evalf(ca.SX(own))).full()
+        if (inertia := c.body_mass(i)) is not None:
+            M[6 * i : 6 * i + 6, 6 * i : 6 * i + 6] = ca.DM(ca.evalf(ca.SX(inertia))).full()
             heavy |= {i}
     for k, e in enumerate(c.elements):
-        if (own := c.flexure_mass(k, ca.DM.eye(12)[:6, :], ca.DM.eye(12)[6:, :])) is not None:
-            both = ca.DM(ca.evalf(ca.SX(own))).full()
+        if (inertia := c.flexure_mass(k, ca.DM.eye(12)[:6, :], ca.DM.eye(12)[6:, :])) is not None:
+            both = ca.DM(ca.evalf(ca.SX(inertia))).full()
             ends = [(b, slice(6 * at, 6 * at + 6)) for at, b in enumerate((e.first, e.second)) if b != GROUND]
             for i, row in ends:
                 for j, column in ends:

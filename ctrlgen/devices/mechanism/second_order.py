@@ -38,7 +38,7 @@ def plain(value: Any) -> Any:
 @dataclass(frozen=True, eq=False)
 class Motions:
     """What k motions of the mechanism, the columns, do to an element at `place`, about which its frame `R` is: twists of its bodies
-    `first` and `second` (6, k) at the global origin; its deformation `own` and the `load` on its free end (6, k) in its frame. `shape`
+    `first` and `second` (6, k) at the global origin; its deformation `relative` and the `load` on its free end (6, k) in its frame. `shape`
     (6, 36) is that of `beam` per product of two components of its load; None where it yields at a point."""
 
     R: Matrix
@@ -46,7 +46,7 @@ class Motions:
     shape: Matrix | None
     first: Matrix
     second: Matrix
-    own: Matrix
+    relative: Matrix
     load: Matrix
 
     def deformation(self, a: Sequence[int], b: Sequence[int]) -> Matrix:
@@ -54,7 +54,7 @@ class Motions:
         seen = relative_motion(self.place, self.first, self.second, a, b)
         local = ca.vertcat(ca.mtimes(self.R.T, seen[:3, :]), ca.mtimes(self.R.T, seen[3:, :]))
         if self.shape is None:
-            return local + point_flexure(self.own, a, b)
+            return local + point_flexure(self.relative, a, b)
         return local + ca.mtimes(
             self.shape, ca.vertcat(*(ca.repmat(self.load[x, a], 6, 1) * self.load[:, b] for x in range(6)))
         )
@@ -158,11 +158,11 @@ class SecondOrder:
         turned = ca.SX(1, len(columns))
         for k in range(len(self.parts)):
             e = self._motions(k, self.twists)
-            E = e.own[:, n:] + e.deformation(self.I, self.J)
+            E = e.relative[:, n:] + e.deformation(self.I, self.J)
             load = self._local(k, ca.mtimes(plain(self.c.elements[k].stiffness), self._global(k, E)))
             for p, deformed in enumerate(ca.horzsplit(E)):
                 quartic[:, p] += dot(load, ca.repmat(deformed, 1, m)).T / 2
-            strained = replace(e, own=ca.horzcat(e.own[:, :n], E), load=ca.horzcat(e.load[:, :n], load))
+            strained = replace(e, relative=ca.horzcat(e.relative[:, :n], E), load=ca.horzcat(e.load[:, :n], load))
             turned += 2 * dot(e.load[:, a], strained.deformation([j for _, j, _ in columns], b))
             if len(segments := self.parts[k][1]) == 1:
                 quartic += self._beam_column(segments[0], e)
@@ -290,7 +290,10 @@ class SecondOrder:
         """
         energy = ca.SX(len(self.pairs), len(self.pairs))
         for EI, shift, turn, sign in ((s.EI_z, 4, 2, 1), (s.EI_y, 5, 1, -1)):
-            p, y = e.load[0, :] * s.length**2 / EI, ca.vertcat(e.own[shift, :] / s.length, sign * e.own[turn, :])
+            p, y = (
+                e.load[0, :] * s.length**2 / EI,
+                ca.vertcat(e.relative[shift, :] / s.length, sign * e.relative[turn, :]),
+            )
             squares = ca.sum1(y[:, self.I] * ca.mtimes(AWTAR_2, y[:, self.J]))
             energy += EI / s.length / 2 * ca.mtimes((p[:, self.I] * p[:, self.J]).T, squares)
         return energy
