@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -104,7 +105,7 @@ class Fitter:
     noise: Noise
     checkpoint: Checkpoint | None = None
     errors: ErrorModel | None = None
-    cache: dict = field(default_factory=RecentSimulators)
+    cache: dict[Any, Any] = field(default_factory=RecentSimulators)
 
     @property
     def error(self) -> ErrorModel:

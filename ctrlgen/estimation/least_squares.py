@@ -8,6 +8,7 @@ near what is stated of them.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -49,7 +50,7 @@ class LeastSquaresProblem:
     size; of a time or a speed that shapes a law, which may lie anywhere within decades, x is the logarithm.
     """
 
-    def __init__(self, structure: Structure, recording: Recording, error: ErrorModel, cache: dict) -> None:
+    def __init__(self, structure: Structure, recording: Recording, error: ErrorModel, cache: dict[Any, Any]) -> None:
         self.structure, self.error = structure, error
         self.simulators = structure.simulators(recording, cache)
         self.records = [r for r in recording.records if r.role == "fit"]

@@ -51,7 +51,7 @@ class Simulator:
         self.model: Model = build_model(device, free, self.ambient, look_back, per_record=True)
         self.poses = not self.model.inertial and (poses or np.isinf(sample_time))
         self._with_sensitivities: dict[bool, Recursion] = {}
-        self._by_pattern: dict[tuple, ca.Function] = {}
+        self._by_pattern: dict[tuple[Any, ...], ca.Function] = {}
         self.n_x, self.n_s = self.model.x.numel(), self.model.x.numel() + self.model.z.numel()
 
     @cached_property

@@ -214,7 +214,7 @@ class Structure:
                 values.append(min(max(self.starts[unknown.cause][unknown.name], unknown.low), unknown.high))
         return np.array(values)
 
-    def simulators(self, recording: Recording, cache: dict) -> dict[Timing, Simulator]:
+    def simulators(self, recording: Recording, cache: dict[Any, Any]) -> dict[Timing, Simulator]:
         """One simulator for every timing in the recording."""
         timings = {r.timing for r in recording.records}
         free = tuple(u.path for u in self.free_parameters)

@@ -98,7 +98,9 @@ class Replicate:
         return fitter.fit(_Drawn(s.device, s.causes, s.starts, stated=stated), self.theta).theta
 
 
-_COMPILED: dict[str, dict] = {}  # by bootstrap, the last one only: all its replicates integrate the same expressions
+_COMPILED: dict[
+    str, dict[Any, Any]
+] = {}  # by bootstrap, the last one only: all its replicates integrate the same expressions
 
 
 def redrawn(record: Record, predicted: np.ndarray, block: int, rng: np.random.Generator) -> np.ndarray:
