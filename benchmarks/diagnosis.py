@@ -18,7 +18,7 @@ from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, hypotheses, nominal_physics
 from ctrlgen.estimation.noise import Noise
-from ctrlgen.estimation.simulator import Simulator
+from ctrlgen.estimation.simulator import Simulator, compiled_simulator
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.model.assembly import movable
 from ctrlgen.recordings.recording import Record, Recording
@@ -61,7 +61,7 @@ def _screen(repeat: int) -> list[Line | Note]:
     columns: list[int] = []
 
     def ours() -> None:
-        fitter.cache.clear()
+        compiled_simulator.cache_clear()
         with threadpool_limits(1):  # as `diagnose` does
             screened = Screen(fitter, open_).run(fit)
         if not any(s.hypothesis == creep for s in screened.suspects[:5]):

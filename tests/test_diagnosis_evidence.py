@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from axis_records import AXIS, CACHE, KF, NOISE, SETTLING, C, H, K, M, N, axis_fitter, drive, move, record
+from axis_records import AXIS, KF, NOISE, SETTLING, C, H, K, M, N, axis_fitter, drive, move, record
 from conftest import MESO_FILE
 from scipy.signal import lfilter
 
@@ -267,7 +267,7 @@ def test_drift_and_creep_get_an_experiment_that_separates_them():
     y = y + NOISE * np.random.default_rng(9).standard_normal(len(u))
     new = Record(**{**found.record.__dict__, "observed": y[:, None]})
     parts = (*fitter.recording.records, new)
-    both = Fitter(Recording(**{**fitter.recording.__dict__, "records": parts}), fitter.noise, cache=CACHE)
+    both = Fitter(Recording(**{**fitter.recording.__dict__, "records": parts}), fitter.noise)
     gained = both.fit(drift.structure).objective - both.fit(creep.structure).objective
     assert 0.7 < gained / found.after**2 < 1.4  # measured, the proposal settles it as far as was promised
 
@@ -278,7 +278,7 @@ def test_a_drive_that_could_do_far_too_much_is_used_a_little():
     structure = Structure(AXIS.model_copy(update={"actuator": strong}))
     fitter = axis_fitter()
     template = fitter.fit_records[0]
-    simulator = structure.simulators(fitter.recording, {})[template.timing]
+    simulator = structure.simulator(fitter.recording.channels, template.timing)
     for shape in time_series(2000, 1, 1 / H, 0):
         record, strength = admissible(shape, simulator, structure.start, template, 0.0)
         assert strength < 0.02 and 0.3 < np.abs(record.drive).max() < 4.0
@@ -374,7 +374,7 @@ def test_noise_of_one_colour_is_taken_at_its_density():
     noise = Noise(
         np.array([NOISE * np.sqrt(1 - 0.9**2)]), (np.array([0.9]),), np.array([True]), ("given",), np.array([np.inf])
     )
-    fitter = Fitter(recording, noise, cache=CACHE)
+    fitter = Fitter(recording, noise)
     left = mapped(fitter)[1]
     found = estimate_unknown_input(left[0], noise, np.array([K * NOISE]))
     assert np.mean(np.abs(found.f) < 1.96 * found.sd) > 0.9

@@ -27,9 +27,9 @@ from ctrlgen.diagnosis.selection.verdict import (
     verdict,
     within_tolerance,
 )
+from ctrlgen.estimation.free_parameters import FreeParameter
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.residual_tests import ResidualTests
-from ctrlgen.estimation.structure import FreeParameter
 
 N, JUST = 1000, 1e-6
 CREEP, DRIFT, GAIN, REVERSED = (

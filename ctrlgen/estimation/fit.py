@@ -6,7 +6,7 @@ jointly, with the initial states of the records.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,7 +17,7 @@ from ctrlgen.estimation.error_model import ErrorModel, error_model
 from ctrlgen.estimation.least_squares import LeastSquaresProblem, initial_state_sd, limited, whiten_residual
 from ctrlgen.estimation.noise import Noise
 from ctrlgen.estimation.settings import DISCREPANCY, FIT, HELD_OUT_REFIT, STATISTICS
-from ctrlgen.estimation.simulator import RecentSimulators, Simulator
+from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 from ctrlgen.recordings.recording import Record, Recording
@@ -70,8 +70,9 @@ class Fit:
     def restarted(self) -> Structure:
         """Its structure with all parameters starting at their fitted values."""
         s = self.structure
-        own = {u.path: float(v) for u, v in zip(s.free_parameters, self.theta, strict=True) if u.cause is None}
-        return Structure(s.device, s.causes, tuple(self.values(k) for k in range(len(s.causes))), own)
+        own = {p.path: float(v) for p, v in zip(s.free_parameters, self.theta, strict=True) if p.cause is None}
+        starts = tuple(self.values(k) for k in range(len(s.causes)))
+        return replace(s, starts=starts, nominal_starts=own, expansion=s.expanded_at)
 
     def values(self, cause: int) -> dict[str, float]:
         """The parameters [SI] by name of one cause, by its place in the structure."""
@@ -96,15 +97,13 @@ class Fit:
 class Fitter:
     """Fits structures to one recording under the noise of its channels and the discrepancy `errors` of the models fitted.
 
-    Without `errors` there is noise alone. The compiled simulators used last are kept in `cache`, which copies share, and optima in the
-    `checkpoint` where there is one.
+    Without `errors` there is noise alone. Optima are kept in the `checkpoint` where there is one.
     """
 
     recording: Recording
     noise: Noise
     checkpoint: Checkpoint | None = None
     errors: ErrorModel | None = None
-    cache: dict = field(default_factory=RecentSimulators)
 
     @property
     def error(self) -> ErrorModel:
@@ -132,11 +131,11 @@ class Fitter:
 
     def simulator(self, structure: Structure, record: Record) -> Simulator:
         """The compiled simulator of a structure for a record's sample time and drive convention."""
-        return structure.simulators(self.recording, self.cache)[record.timing]
+        return structure.simulator(self.recording.channels, record.timing)
 
     def problem(self, structure: Structure) -> LeastSquaresProblem:
         """The least-squares problem of a structure."""
-        return LeastSquaresProblem(structure, self.recording, self.error, self.cache)
+        return LeastSquaresProblem(structure, self.recording, self.error)
 
     def fit(
         self,
@@ -204,9 +203,8 @@ class Fitter:
             return _fit_at(problem, levenberg_marquardt(problem, problem.to_scaled(start), steps))
         s, noise, corner = problem.structure, self.error.weighted, self.error.corner
         valid = [int(r.valid.sum()) for r in self.recording.records]
-        key = key_of(
-            s.causes, s.starts, sorted(s.nominal_starts.items()), start, steps, noise.sd, corner, *noise.ar, valid
-        )
+        begun = (s.starts, s.expanded_at, sorted(s.nominal_starts.items()), s.free)
+        key = key_of(s.causes, *begun, start, steps, noise.sd, corner, *noise.ar, valid)
         optimum = self.checkpoint.recall(key)
         if optimum is None:
             optimum = levenberg_marquardt(problem, problem.to_scaled(start), steps)

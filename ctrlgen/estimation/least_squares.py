@@ -12,10 +12,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from ctrlgen.estimation.error_model import ErrorModel, huber, huber_curvature
+from ctrlgen.estimation.free_parameters import FreeParameter
 from ctrlgen.estimation.noise import Noise
 from ctrlgen.estimation.settings import FIT
 from ctrlgen.estimation.simulator import Simulator
-from ctrlgen.estimation.structure import FreeParameter, Structure
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Record, Recording
 
 
@@ -49,10 +50,10 @@ class LeastSquaresProblem:
     size; of a time or a speed that shapes a law, which may lie anywhere within decades, x is the logarithm.
     """
 
-    def __init__(self, structure: Structure, recording: Recording, error: ErrorModel, cache: dict) -> None:
+    def __init__(self, structure: Structure, recording: Recording, error: ErrorModel) -> None:
         self.structure, self.error = structure, error
-        self.simulators = structure.simulators(recording, cache)
         self.records = [r for r in recording.records if r.role == "fit"]
+        self.simulators = {t: structure.simulator(recording.channels, t) for t in {r.timing for r in self.records}}
         self.initial_sd = [initial_state_sd(self.simulators[r.timing]) for r in self.records]
         self.n_initial = sum(map(len, self.initial_sd))
         parameters = structure.free_parameters

@@ -10,10 +10,8 @@ Source: H. R. Kuensch, Ann. Statist. 17 (1989) 1217.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -23,7 +21,7 @@ from ctrlgen.core.units import from_si
 from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis, Estimate
 from ctrlgen.diagnosis.settings import BOOTSTRAP
 from ctrlgen.estimation.fit import Fitter
-from ctrlgen.estimation.structure import FreeParameter, Structure
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Record, Recording
 
 Progress = Callable[[int, int], None]
@@ -50,21 +48,6 @@ class Bootstrap:
 
 
 @dataclass(frozen=True, eq=False)
-class _Drawn(Structure):
-    """A structure whose parameters have other stated values."""
-
-    stated: tuple[float, ...] = ()
-
-    @cached_property
-    def free_parameters(self) -> tuple[FreeParameter, ...]:
-        """Those of the structure, with the drawn nominal value where a standard deviation is stated."""
-        base = Structure(self.device, self.causes, self.starts).free_parameters
-        return tuple(
-            replace(u, nominal=nominal) if u.sd else u for u, nominal in zip(base, self.stated, strict=True)
-        )  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
 class Replicate:
     """The refit of one replicate as a function of its seed; it can be sent to another process."""
 
@@ -74,7 +57,6 @@ class Replicate:
     fitter: Fitter
     predicted: tuple[np.ndarray, ...]
     blocks: tuple[int, ...]
-    token: str
 
     def __call__(self, seed: list[int]) -> np.ndarray:
         """The refitted parameters [SI]."""
@@ -83,19 +65,12 @@ class Replicate:
             replace(r, observed=y + redrawn(r, y, block, rng))
             for r, y, block in zip(self.recording.records, self.predicted, self.blocks, strict=True)
         )
-        if self.token not in _COMPILED:
-            _COMPILED.clear()
-            _COMPILED[self.token] = {}
-        fitter = replace(self.fitter, recording=replace(self.recording, records=records), cache=_COMPILED[self.token])
-        s = self.structure
+        fitter = replace(self.fitter, recording=replace(self.recording, records=records))
         stated = tuple(
-            float(np.clip(value + u.sd * rng.standard_normal(), u.low, u.high)) if u.sd else u.nominal
-            for u, value in zip(s.free_parameters, self.theta, strict=True)
+            replace(p, nominal=float(np.clip(value + p.sd * rng.standard_normal(), p.low, p.high))) if p.sd else p
+            for p, value in zip(self.structure.free_parameters, self.theta, strict=True)
         )
-        return fitter.fit(_Drawn(s.device, s.causes, s.starts, stated=stated), self.theta).theta
-
-
-_COMPILED: dict[str, dict] = {}  # by bootstrap, the last one only: all its replicates integrate the same expressions
+        return fitter.fit(replace(self.structure, free=stated), self.theta).theta
 
 
 def redrawn(record: Record, predicted: np.ndarray, block: int, rng: np.random.Generator) -> np.ndarray:
@@ -147,10 +122,9 @@ def bootstrap(
         fit.structure,
         fit.theta,
         recording,
-        replace(fitter, cache={}, checkpoint=None),
+        replace(fitter, checkpoint=None),
         predicted,
         blocks,
-        os.urandom(8).hex(),
     )
     if scheduler is None and not sendable(work):
         jobs = 0

@@ -19,7 +19,7 @@ from ctrlgen.estimation.disturbance_inputs import with_disturbance_inputs
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis, nominal_physics
 from ctrlgen.estimation.settings import CANDIDATE_TERMS
-from ctrlgen.estimation.simulator import Simulator
+from ctrlgen.estimation.simulator import compiled_simulator
 from ctrlgen.recordings.recording import Record
 
 
@@ -55,17 +55,12 @@ class ScoreGradient:
         laws: LawTerms,
     ) -> None:
         self.fitter, self.record = fitter, record
-        probed, probes = with_disturbance_inputs(
-            fit.structure.device_with_causes, nominal_physics(fit.structure.device)
-        )
+        probed, probes = with_disturbance_inputs(fit.structure.expanded_device, nominal_physics(fit.structure.device))
         known = [u.path for u in fit.structure.free_parameters]
         numbers = [h for h in hypotheses if h.effect == PARAMETER]
         number_paths = [h.path for h in numbers if h.path not in known]
-        free = [*known, *number_paths, *probes.values()]
-        key = ("screen", fit.structure.causes, tuple(free), record.timing)
-        if key not in fitter.cache:
-            fitter.cache[key] = Simulator(probed, free, fitter.recording.channels, *record.timing)
-        self.simulator: Simulator = fitter.cache[key]
+        free = (*known, *number_paths, *probes.values())
+        self.simulator = compiled_simulator(probed, free, fitter.recording.channels, record.timing)
         self.p = self.simulator.model.p_nominal.copy()
         self.p[: len(known)] = fit.theta
         self.p[len(known) + len(number_paths) :] = 0.0
