@@ -30,7 +30,7 @@ from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
-from ctrlgen.estimation.noise import Noise, estimate_noise
+from ctrlgen.estimation.noise import Noise, NoiseSource, estimate_noise
 from ctrlgen.estimation.profile_likelihood import BOUNDED, profiles
 from ctrlgen.estimation.robust_covariance import robust_deviations, sandwich_over_model
 from ctrlgen.estimation.simulator import Simulator
@@ -372,7 +372,11 @@ def test_noise_of_one_colour_is_taken_at_its_density():
     parts = (record(drive(), move(drive()) + e, "fit"), record(drive(), move(drive()) + e[::-1], "hold_out", N * H))
     recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (None,), parts, ())
     noise = Noise(
-        np.array([NOISE * np.sqrt(1 - 0.9**2)]), (np.array([0.9]),), np.array([True]), ("given",), np.array([np.inf])
+        np.array([NOISE * np.sqrt(1 - 0.9**2)]),
+        (np.array([0.9]),),
+        (NoiseSource.STATED,),
+        ("given",),
+        np.array([np.inf]),
     )
     fitter = Fitter(recording, noise)
     left = mapped(fitter)[1]

@@ -15,7 +15,7 @@ import pytest
 from conftest import SCENARIOS
 
 from ctrlgen import Controller, InputError, build_model, load_device, load_scenario
-from ctrlgen.calibration.calibrate import CalibratedConstant, Calibration
+from ctrlgen.calibration.calibrate import CalibratedConstant, Calibration, Determination
 from ctrlgen.calibration.constants_files import binary
 from ctrlgen.controller.controller_step import ControllerStatus
 from ctrlgen.controller.kernels import ControllerKernels
@@ -261,7 +261,9 @@ def test_what_follows_from_the_constants_is_computed_by_the_same_operations_in_c
 def test_the_loader_reads_what_calibrate_writes_and_refuses_every_flipped_bit(libraries, real):
     library = libraries[real]
     stated = library.scenario.device.given_at_start
-    ends = [CalibratedConstant(c, c.low if k % 2 else c.high, 1.0, True) for k, c in enumerate(stated)]
+    ends = [
+        CalibratedConstant(c, c.low if k % 2 else c.high, 1.0, Determination.DETERMINED) for k, c in enumerate(stated)
+    ]
     recording = Recording("bench", "mems_hexapod", "series", (), (), (), (), ())
     calibration = Calibration(
         library.scenario.device, {"device": library.scenario.inputs["device"]}, recording, tuple(ends), np.eye(len(ends)), (), ()

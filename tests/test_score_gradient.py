@@ -17,7 +17,7 @@ from ctrlgen.diagnosis.selection.score_gradient import ScoreGradient
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis
-from ctrlgen.estimation.noise import Noise
+from ctrlgen.estimation.noise import Noise, NoiseSource
 from ctrlgen.estimation.settings import CANDIDATE_TERMS
 from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.estimation.structure import Structure
@@ -57,7 +57,7 @@ def hexapod():
         "t", HEXAPOD.name, "series", channels, ("rad",) * 3 + ("m",) * 3, (None,) * 6, tuple(records), ()
     )
     ar = tuple(np.array([0.4, -0.1]) if i % 2 else np.zeros(0) for i in range(6))
-    return Fitter(recording, Noise(sd, ar, np.ones(6, bool), ("",) * 6, np.full(6, np.inf)))
+    return Fitter(recording, Noise(sd, ar, (NoiseSource.REST,) * 6, ("",) * 6, np.full(6, np.inf)))
 
 
 def brute(slopes, start):

@@ -16,7 +16,7 @@ its spectrum is known too poorly, and differencing would give all weight to the 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -53,7 +53,7 @@ class ErrorModel:
     def weighted(self) -> Noise:
         """White noise with the deviation s in place of the noise of every channel with discrepancy."""
         sd = np.where(self.rms > 0, self.rms * np.sqrt(self.tau), self.noise.sd)
-        return Noise(sd, self.ar, self.noise.known, self.noise.notes, self.noise.count, self.noise.guessed)
+        return replace(self.noise, sd=sd, ar=self.ar)
 
     def whiten(self, values: np.ndarray, valid: np.ndarray) -> np.ndarray:
         """As `Noise.whiten`, of noise and discrepancy."""
