@@ -11,9 +11,8 @@ from conftest import DEVICE
 
 from ctrlgen import build_model, load_device
 from ctrlgen.diagnosis.selection import score_gradient as slopes_module
-from ctrlgen.diagnosis.selection.law_terms import LawTerms
 from ctrlgen.diagnosis.selection.ltv_propagation import LtvPropagation
-from ctrlgen.diagnosis.selection.score_gradient import ScoreGradient
+from ctrlgen.diagnosis.selection.score_gradient import ScoreGradient, law_terms
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis
@@ -37,6 +36,12 @@ LAWS = [
 
 def shows_nothing(place, i):
     return DataHints()
+
+
+def terms_at(record):
+    """The terms of the laws of the hexapod, that any structure shares."""
+    channels = tuple(f"reading.{name}" for name in build_model(HEXAPOD).signals["reading"].channels)
+    return law_terms(HEXAPOD, LAWS, channels, record.timing)
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +92,7 @@ def test_the_sums_of_the_screen_are_those_of_a_plain_recursion(hexapod, monkeypa
     monkeypatch.setattr(slopes_module, "CANDIDATE_TERMS", replace(CANDIDATE_TERMS, block=123))
     fit = hexapod.fit(Structure(HEXAPOD))
     record = hexapod.fit_records[0]
-    slopes = ScoreGradient(hexapod, fit, record, LAWS, shows_nothing, LawTerms(record.timing))
+    slopes = ScoreGradient(hexapod, fit, record, LAWS, shows_nothing, terms_at(record))
     white, J = fit.residual[: N * 6].reshape(N, 6), fit.J[: N * 6].reshape(N, 6, -1)
     found = slopes.sums(white, J, fit.initial_states[0])
     noise, usable = hexapod.noise, hexapod.noise.usable(record.valid)
@@ -110,7 +115,7 @@ def test_the_sums_of_the_screen_are_those_of_a_plain_recursion(hexapod, monkeypa
 def test_a_slope_is_the_difference_of_two_simulations(hexapod, law):
     fit = hexapod.fit(Structure(HEXAPOD))
     record = hexapod.fit_records[0]
-    slopes = ScoreGradient(hexapod, fit, record, [law], shows_nothing, LawTerms(record.timing))
+    slopes = ScoreGradient(hexapod, fit, record, [law], shows_nothing, terms_at(record))
     column, start = slopes.columns[-1], np.zeros(len(fit.initial_states[0]))
     name, off = law.law.amplitude().name, slopes.laws.terms[column.terms[0]].off
     slope = brute(slopes, start)[:, :, -1]
@@ -138,7 +143,7 @@ def test_a_slope_of_poses_that_have_not_settled_is_the_difference_of_two_simulat
     )  # fmt: skip
     fitter = Fitter(replace(hexapod.recording, kind="poses", records=records), hexapod.noise)
     fit = fitter.fit(Structure(HEXAPOD), steps=0)
-    slopes = ScoreGradient(fitter, fit, records[0], [law], shows_nothing, LawTerms(records[0].timing))
+    slopes = ScoreGradient(fitter, fit, records[0], [law], shows_nothing, terms_at(records[0]))
     column, start = slopes.columns[-1], np.zeros(len(fit.initial_states[0]))
     lost = np.zeros(len(slopes.laws.terms) + len(slopes.sizes), bool)
     blocks = [list(readings) for _, _, readings in slopes.blocks(start, lost)]
@@ -157,14 +162,14 @@ def test_a_slope_of_poses_that_have_not_settled_is_the_difference_of_two_simulat
 
 def test_terms_written_down_for_one_structure_serve_another(hexapod):
     """What a law reads differs between structures: before the gain of 1Y its heater is told something else than after it."""
-    record, kept = hexapod.fit_records[0], LawTerms(hexapod.fit_records[0].timing)
+    record, kept = hexapod.fit_records[0], terms_at(hexapod.fit_records[0])
     structures = [Structure(HEXAPOD), Structure(HEXAPOD).with_cause(LAWS[3], {"gain": 0.2})]
     lag = Hypothesis("second_pole", "actuator:1Y", "1Y")
     found = []
     for structure in structures:
         fit = hexapod.fit(structure, steps=0)
         white, J = fit.residual[: N * 6].reshape(N, 6), fit.J[: N * 6].reshape(N, 6, -1)
-        for laws in (kept, LawTerms(record.timing)):
+        for laws in (kept, terms_at(record)):
             slopes = ScoreGradient(hexapod, fit, record, [*LAWS[:3], lag], shows_nothing, laws)
             found.append(slopes.sums(white, J, fit.initial_states[0]))
     first, _, second, alike = (np.sqrt(np.diag(sums.SS)) for sums in found)

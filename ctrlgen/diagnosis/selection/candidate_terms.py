@@ -120,7 +120,7 @@ class CandidateTerms:
         self, law: Effect, i: int, partner: int | None, shape: dict[str, float], off: float, size: float, finite: float
     ) -> int:
         """The place in `terms` of the slope at `off`, or from there to the amplitude `finite`."""
-        term = self.laws.term(self.simulator.model, law, i, partner, shape, off, size, finite)
+        term = self.laws.term(law, i, partner, shape, off, size, finite)
         if term not in self._places:
             self._places[term] = len(self.terms)
             self.terms.append(term)

@@ -96,10 +96,14 @@ class LawTerm:
 
 
 class LawTerms:
-    """The terms of laws along motions of one timing; `symbols` of what they read."""
+    """The terms of laws along motions of one timing; `symbols` of what they read.
 
-    def __init__(self, timing: Timing) -> None:
-        self.timing = timing
+    What a law reads that is a number, such as a typical size, is that of the `described` device in every structure: a term is the
+    same whichever structure needs it first.
+    """
+
+    def __init__(self, timing: Timing, described: Model) -> None:
+        self.timing, self.described = timing, described
         self.symbols: dict[Read, ca.SX] = {}
         self._terms: dict[tuple, LawTerm] = {}
         self._compiled: dict[tuple, CompiledTerms] = {}
@@ -111,7 +115,7 @@ class LawTerms:
         return self.symbols[read]
 
     def term(
-        self, model: Model, law: Effect, index: int, partner: int | None, shape: dict[str, float],
+        self, law: Effect, index: int, partner: int | None, shape: dict[str, float],
         off: float, size: float, finite: float,
     ) -> LawTerm:  # fmt: skip
         """The slope at `off`, or from there to the amplitude `finite`, times `size`."""
@@ -121,7 +125,7 @@ class LawTerms:
             states = {s.name: ca.SX.sym(f"m{n}_{s.name}") for s in law.states}
             a = ca.SX.sym("a")
             p = SimpleNamespace(**shape, **{law.amplitude().name: a})
-            actual = model.law_inputs(law.place, index, partner, {}, law.order)
+            actual = self.described.law_inputs(law.place, index, partner, {}, law.order)
             s = _LawInputs(self, law.place, law.order, actual, states)
             new = law.after_sample(s, p)
             s.__dict__.update(new)
@@ -142,7 +146,7 @@ class LawTerms:
 
     def compiled(self, terms: Sequence[LawTerm], driven: Sequence[bool]) -> CompiledTerms:
         """`terms` as functions of what they read; those `driven` also at the end of a sample."""
-        key = (tuple(map(id, terms)), tuple(driven))
+        key = (tuple(terms), tuple(driven))
         if key not in self._compiled:
             self._compiled[key] = CompiledTerms(self, terms, driven)
         return self._compiled[key]
