@@ -64,7 +64,8 @@ def _joined(
     kept, columns, first = list[Uncertain](), list[int](), 0
     for line in others.lines:
         left = [i for i, path in enumerate(line.paths) if path not in paths]
-        if left:  # of a list the numbers that are no constants stay
+        # of a list the numbers that are no constants stay
+        if left:
             text, steps = line.per
             own = tuple(line.paths[i] for i in left), tuple(line.sds[i] for i in left), tuple(steps[i] for i in left)
             kept.append(replace(line, paths=own[0], sds=own[1], per=(text, own[2])))

@@ -39,14 +39,17 @@ def c_header(calibration: Calibration) -> str:
         f" * Made by {program()}; do not edit. In the firmware, behind the controller's header:",
         f" *   static const {name}_online_f32_constants specimen = {upper}_CONSTANTS_F32;",
         f" *   status = {name}_online_f32_init_with(&state, &specimen); */",
-        f"#ifndef {upper}_CONSTANTS_H", f"#define {upper}_CONSTANTS_H", "",
-    ]  # fmt: skip
+        f"#ifndef {upper}_CONSTANTS_H",
+        f"#define {upper}_CONSTANTS_H",
+        "",
+    ]
     for real in Real:
         macro = f"{upper}_ONLINE_{real.suffix.upper()}_DEVICE_HASH"
         lines += [
             f"#if defined({macro}) && ({macro} != 0x{number:08x}U)",
-            '#error "these constants belong to another device file than the controller; calibrate again"', "#endif",
-        ]  # fmt: skip
+            '#error "these constants belong to another device file than the controller; calibrate again"',
+            "#endif",
+        ]
     for real in Real:
         lines += ["", f"#define {upper}_CONSTANTS_{real.suffix.upper()} {{ \\"]
         rows = [f"{real.literal(inside(row, real))}" for row in calibration.constants]

@@ -232,7 +232,8 @@ class Fitter:
             return rest, y
         with_prior = np.vstack([J, np.eye(len(sd))])
         step = np.linalg.lstsq(with_prior, np.concatenate([white, rest]), rcond=None)[0]
-        for _ in range(HELD_OUT_REFIT.halvings):  # a gap or a friction threshold makes the first step useless
+        # a gap or a friction threshold makes the first step useless
+        for _ in range(HELD_OUT_REFIT.halvings):
             shifted = simulator.simulate(record, fit.theta, sd * step)
             residual = self._white(record, shifted)
             if residual @ residual + step @ step <= white @ white:

@@ -57,5 +57,6 @@ def isolated_outliers(residual: np.ndarray) -> np.ndarray:
                 continue
             neighbours = [size[k] for k in (run[0] - 1, run[-1] + 1) if 0 <= k < len(size)]
             if len(run) > OUTLIERS.widest or max(neighbours, default=0.0) > OUTLIERS.neighbour_share * size[run].max():
-                column[run] = False  # a mass that is pushed moves before and after, too
+                # a mass that is pushed moves before and after, too
+                column[run] = False
     return marked

@@ -160,9 +160,11 @@ def _of_poses(recording: Recording, i: int, settling: float) -> _ChannelNoise:
 def _of_series(recording: Recording, i: int, settling: float) -> _ChannelNoise:
     """Channel i of a time series."""
     values = np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])
-    rounding = quantisation_step(values) / np.sqrt(12.0)  # standard deviation of a uniform rounding error
+    # standard deviation of a uniform rounding error
+    rounding = quantisation_step(values) / np.sqrt(12.0)
     moving = [r for r in recording.records if r.role != "rest"]
-    sources = {  # degree of the polynomial to subtract, stretches of noise
+    # degree of the polynomial to subtract, stretches of noise
+    sources = {
         NoiseSource.REST: (1, [_at_rest(r, i) for r in recording.records if r.role == "rest"]),
         NoiseSource.PERIODS: (1, [e for r in moving for e in _period_differences(r, i)]),
         NoiseSource.DWELLS: (NOISE.dwell_degree, [e for r in moving for e in _dwells(r, i, settling)]),
@@ -291,7 +293,8 @@ def drive_period(drive: np.ndarray) -> int | None:
     for lag in lags[lags >= 50]:
         if 2 * lag > n:
             return None
-        begins = np.all(np.abs(drive[lag : lag + 32] - first) <= near)  # cheap: tried before the whole record
+        # cheap: tried before the whole record
+        begins = np.all(np.abs(drive[lag : lag + 32] - first) <= near)
         if begins and np.all(np.abs(drive[lag:] - drive[:-lag]) <= near):
             return int(lag)
     return None

@@ -132,7 +132,8 @@ class Simulator:
         if key not in self._by_pattern:
             c_f, n_s = ca.MX.sym("c_f", pattern), self.n_s
             m = pattern.size2()
-            T = ca.MX(ca.DM(np.eye(n_s + m, n_s)))  # dense: steps fill it
+            # dense: steps fill it
+            T = ca.MX(ca.DM(np.eye(n_s + m, n_s)))
             seed = ca.vertcat(ca.MX(n_s, pattern.size1()), c_f.T)
             _, T, _, Y = forward_sensitivities(self.equations, T, seed, self._symbols)
             jacobians = [part.T for values in (T, Y) for part in (values[:n_s, :], values[n_s:, :])]

@@ -81,7 +81,7 @@ class Structure:
 
     @property
     def log_prior_odds(self) -> float:
-        """The sum over its causes."""
+        """The sum of the log prior odds of its causes."""
         return sum(c.prior.log_prior_odds for c in self.causes)
 
     def cause_of(self, parameter: FreeParameter) -> Hypothesis:
@@ -114,7 +114,7 @@ class Structure:
 
     @cached_property
     def free_parameters(self) -> tuple[FreeParameter, ...]:
-        """Those given, else the device's uncertain numbers, then every parameter of every cause."""
+        """The numbers given as `free`; else the device's uncertain ones, then every parameter of every cause."""
         return tuple(free_parameters(self.device, self.causes, self.starts)) if self.free is None else self.free
 
     @cached_property

@@ -81,7 +81,8 @@ def redrawn(record: Record, predicted: np.ndarray, block: int, rng: np.random.Ge
         left = left - np.nansum(left, axis=0) / count
     n = len(left)
     begins = rng.integers(0, n, -(-n // block))
-    rows = ((begins[:, None] + np.arange(block)) % n).ravel()[:n]  # circular, so that every sample is equally likely
+    # circular, so that every sample is equally likely
+    rows = ((begins[:, None] + np.arange(block)) % n).ravel()[:n]
     return np.nan_to_num(left[rows])
 
 

@@ -24,7 +24,8 @@ from ctrlgen.model.effect_terms import channels
 UNUSABLE = (CtrlgenError, ValueError, TypeError, AttributeError, LookupError, ArithmeticError, RuntimeError)
 """What a law that cannot be written down at a place may end with."""
 
-Peaks = dict[tuple[Place, int], dict[str, float]]  # by unit, SI
+# by unit, SI
+Peaks = dict[tuple[Place, int], dict[str, float]]
 REACHED = ("channel", "travel", "travel/s")
 
 
@@ -39,7 +40,8 @@ class CandidateTerm:
     terms: tuple[int, ...]
     size: float
     one_sided: int
-    range: tuple[float, float] = (-np.inf, np.inf)  # of the amplitude's change, in sizes
+    # of the amplitude's change, in sizes
+    range: tuple[float, float] = (-np.inf, np.inf)
 
 
 def signal_peaks(fitter: Fitter, fit: Fit) -> Peaks:
@@ -74,12 +76,18 @@ class CandidateTerms:
     """
 
     def __init__(
-        self, laws: LawTerms, simulator: Simulator, structure: Structure, hypotheses: list[Hypothesis],
-        probes: dict[tuple[Place, int], int], seen: Callable[[Place, int], DataHints],
-    ) -> None:  # fmt: skip
+        self,
+        laws: LawTerms,
+        simulator: Simulator,
+        structure: Structure,
+        hypotheses: list[Hypothesis],
+        probes: dict[tuple[Place, int], int],
+        seen: Callable[[Place, int], DataHints],
+    ) -> None:
         self.laws, self.simulator = laws, simulator
         self.terms: list[LawTerm] = []
-        self._places: dict[LawTerm, int] = {}  # in `terms`
+        # in `terms`
+        self._places: dict[LawTerm, int] = {}
         self.columns: list[CandidateTerm] = []
         self.unusable: dict[Hypothesis, str] = {}
         for h in hypotheses:

@@ -89,10 +89,12 @@ class LawTerm:
         else:
             step = h * rates
         changes = zip(self.states, self.stepped, self.clocks, ca.vertsplit(step), strict=True)
-        return ca.vertcat(*(
-            new if new is not None else state + (1.0 if settled else h) if clock else state + change
-            for state, new, clock, change in changes
-        ))  # fmt: skip
+        return ca.vertcat(
+            *(
+                new if new is not None else state + (1.0 if settled else h) if clock else state + change
+                for state, new, clock, change in changes
+            )
+        )
 
 
 class LawTerms:
@@ -115,9 +117,15 @@ class LawTerms:
         return self.symbols[read]
 
     def term(
-        self, law: Effect, index: int, partner: int | None, shape: dict[str, float],
-        off: float, size: float, finite: float,
-    ) -> LawTerm:  # fmt: skip
+        self,
+        law: Effect,
+        index: int,
+        partner: int | None,
+        shape: dict[str, float],
+        off: float,
+        size: float,
+        finite: float,
+    ) -> LawTerm:
         """The slope at `off`, or from there to the amplitude `finite`, times `size`."""
         key = (law.kind, index, partner, tuple(shape.items()), off, size, finite)
         if key not in self._terms:

@@ -36,11 +36,11 @@ class Sums:
 
     @classmethod
     def none(cls, k: int, m: int) -> Sums:
-        """Of no sample."""
+        """The sums over no sample."""
         return cls(np.zeros((k, m)), np.zeros(m), np.zeros((m, m)))
 
     def plus(self, other: Sums) -> Sums:
-        """Of the samples of both."""
+        """The sums over the samples of both."""
         return Sums(self.US + other.US, self.Sr + other.Sr, self.SS + other.SS)
 
 
@@ -84,7 +84,8 @@ class ScoreGradient:
         others = [h for h in hypotheses if h.effect != PARAMETER]
         self.laws = CandidateTerms(laws, self.simulator, fit.structure, others, entered, seen)
         places = [free.index(h.path) for h in numbers]
-        self.sizes = np.array([max(abs(self.p[i]), 1e-3) * 1e-3 for i in places])  # the constant terms of numbers
+        # the terms of numbers are constant
+        self.sizes = np.array([max(abs(self.p[i]), 1e-3) * 1e-3 for i in places])
         self.columns = list(self.laws.columns)
         for k, (h, i) in enumerate(zip(numbers, places, strict=True)):
             term, size = len(self.laws.terms) + k, float(self.sizes[k])
@@ -108,7 +109,8 @@ class ScoreGradient:
                     tails[i] = Y[len(Y) - len(tails[i]) :]
                 S = noise.whiten_channel(Y, i)
                 S[~usable[a:b, i]] = 0.0
-                S *= np.minimum(1.0, corner[i] / np.maximum(np.abs(white[a:b, i]), 1e-300))[:, None]  # as in the fit
+                # as in the fit
+                S *= np.minimum(1.0, corner[i] / np.maximum(np.abs(white[a:b, i]), 1e-300))[:, None]
                 if not np.isfinite(S.sum()):
                     S = np.nan_to_num(S)
                 SS[i] += S.T @ S
@@ -136,7 +138,8 @@ class ScoreGradient:
         size = min(CANDIDATE_TERMS.block, n)
         memory = self.laws.start(record.time[0])
         for a in range(0, n, size):
-            here = np.minimum(np.arange(a, a + size + 1), n - 1)  # the last block is filled up
+            # the last block is filled up
+            here = np.minimum(np.arange(a, a + size + 1), n - 1)
             k = min(size, n - a)
             memories, found, ends = self.laws.along(self.p, memory, *(x[here] for x in seen))
             memory = [states[size - 1] for states in memories]
@@ -144,7 +147,8 @@ class ScoreGradient:
                 found[k:] = found[k - 1]
             found = np.hstack([found, np.repeat(self.sizes[None, :], size + 1, axis=0)])
             lost |= ~np.all(np.abs(found) < CANDIDATE_TERMS.diverged, axis=0)
-            found[:, lost] = 0.0  # memories that have left the numbers say nothing
+            # memories that have left the numbers say nothing
+            found[:, lost] = 0.0
             f, following = found[:k], found[1 : k + 1].copy() if series else found[:k]
             following[:, self.laws.driven] = np.where(lost[self.laws.driven], 0.0, ends[:k])
             linear = self.linear.evaluate_along(*(x[here[:size]] for x in inputs))

@@ -186,7 +186,8 @@ class Trials:
         """The same structure under the noise that it leaves, where nothing else tells the noise."""
         if self.fitter.noise.known.all():
             return candidate
-        for _ in range(SEARCH.most_noise_updates):  # the numbers move as the noise that holds them shrinks
+        # the numbers move as the noise that holds them shrinks
+        for _ in range(SEARCH.most_noise_updates):
             before = self.fitter.noise.sd
             self.use(self.fitter.with_noise(update_noise_size(self.fitter, candidate.fit)))
             candidate = self.converged(candidate)
