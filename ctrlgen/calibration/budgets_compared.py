@@ -42,9 +42,9 @@ def budgets(
 
 
 def _budget(scenario: Scenario, device: Device, stated: Uncertainties, progress: Callable[[str], None]) -> ErrorBudget:
-    own = replace(scenario, device=device)
-    model = model_of(own)
-    return budget_of(solve(own, model, progress), stated, draws=0, progress=progress)
+    specimen = replace(scenario, device=device)
+    model = model_of(specimen)
+    return budget_of(solve(specimen, model, progress), stated, draws=0, progress=progress)
 
 
 def _joined(
@@ -67,8 +67,8 @@ def _joined(
         # of a list the numbers that are no constants stay
         if left:
             text, steps = line.per
-            own = tuple(line.paths[i] for i in left), tuple(line.sds[i] for i in left), tuple(steps[i] for i in left)
-            kept.append(replace(line, paths=own[0], sds=own[1], per=(text, own[2])))
+            rest = tuple(line.paths[i] for i in left), tuple(line.sds[i] for i in left), tuple(steps[i] for i in left)
+            kept.append(replace(line, paths=rest[0], sds=rest[1], per=(text, rest[2])))
             columns += [first + i for i in left]
         first += len(line.sds)
     k, n = len(constants), len(constants) + len(columns)

@@ -14,15 +14,15 @@ from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, numbers
 def device_with_causes(device: Device, causes: Sequence[Hypothesis], values: Sequence[dict[str, float]]) -> Device:
     """`device` with the `causes` at their `values` ({parameter: SI}, one mapping a cause), as far as they can be built."""
     described = {path: number for path, _, number in numbers(device)}
-    effects, own = [], {}
+    effects, changes = [], {}
     for cause, value in zip(causes, values, strict=True):
         if cause.effect == PARAMETER:
             low, high = suspected_range(described[cause.path])
             # a stage of negative size cannot be built
-            own[cause.path] = min(max(value["value"], low), high)
+            changes[cause.path] = min(max(value["value"], low), high)
         else:
             effects.append(_effect(cause, cause.channel_on(device), value))
-    return changed(device, own).model_copy(update={"effect": (*device.effect, *effects)})
+    return changed(device, changes).model_copy(update={"effect": (*device.effect, *effects)})
 
 
 def _effect(cause: Hypothesis, channel: Channel, values: dict[str, float]) -> Effect:

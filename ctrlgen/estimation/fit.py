@@ -70,17 +70,17 @@ class Fit:
     def restarted(self) -> Structure:
         """Its structure with all parameters starting at their fitted values."""
         s = self.structure
-        own = {p.path: float(v) for p, v in zip(s.free_parameters, self.theta, strict=True) if p.cause is None}
+        nominal = {p.path: float(v) for p, v in zip(s.free_parameters, self.theta, strict=True) if p.cause is None}
         starts = tuple(self.values(k) for k in range(len(s.causes)))
-        return replace(s, starts=starts, nominal_starts=own, expansion=s.expanded_at)
+        return replace(s, starts=starts, nominal_starts=nominal, expansion=s.expanded_at)
 
     def values(self, cause: int) -> dict[str, float]:
         """The parameters [SI] by name of one cause, by its place in the structure."""
-        found = dict(self.structure.starts[cause])
+        values = dict(self.structure.starts[cause])
         for p, value in zip(self.structure.free_parameters, self.theta, strict=True):
             if p.cause == cause:
-                found[p.name] = float(value)
-        return found
+                values[p.name] = float(value)
+        return values
 
     def nested_case(self, cause: int) -> str | None:
         """The effect that the law of one cause contains as a special case, where that lies in the 95 % interval; else None."""
@@ -152,9 +152,9 @@ class Fitter:
         """
         problem = self.problem(structure)
         start = np.concatenate([structure.start if theta is None else theta, np.zeros(problem.n_initial)])
-        found = self._optimum(problem, start, steps)
-        if nested is None or found.objective <= nested.objective:
-            return found
+        first = self._optimum(problem, start, steps)
+        if nested is None or first.objective <= nested.objective:
+            return first
         near = start.copy()
         for i, p in enumerate(structure.free_parameters):
             if p.amplitude and structure.cause_of(p) not in nested.structure.causes:
@@ -166,7 +166,7 @@ class Fitter:
             if p.cause is None:
                 stated[i] = p.nominal
         again = (self._optimum(problem, x, steps) for x in (near, stated))
-        return min(found, *again, key=lambda fit: fit.objective)
+        return min(first, *again, key=lambda fit: fit.objective)
 
     def described(self, device: Device) -> tuple[Fitter, Fit]:
         """The device as described, without causes, and the fitter with the discrepancy that it leaves.
@@ -177,18 +177,18 @@ class Fitter:
         """
         fitter = self.with_errors_of(self.fit(Structure(device), steps=0))
         for _ in range(DISCREPANCY.updates):
-            before, found = fitter, fitter.fit(Structure(device))
-            fitter = fitter.with_errors_of(found)
+            before, fit = fitter, fitter.fit(Structure(device))
+            fitter = fitter.with_errors_of(fit)
             if np.allclose(fitter.error.weighted.sd, before.error.weighted.sd, rtol=DISCREPANCY.same):
                 break
-        found = fitter.fit(Structure(device))
+        fit = fitter.fit(Structure(device))
         if np.all(fitter.error.rms < FIT.poor_start_rms * self.noise.floor):
-            return fitter, found
-        for p in found.structure.free_parameters:
+            return fitter, fit
+        for p in fit.structure.free_parameters:
             for start in (p.nominal - p.sd, p.nominal + p.sd) if p.sd else ():
                 again = fitter.fit(Structure(device, nominal_starts={p.path: start}))
-                found = min(found, again, key=lambda fit: fit.objective)
-        return fitter.with_errors_of(found), found
+                fit = min(fit, again, key=lambda fit: fit.objective)
+        return fitter.with_errors_of(fit), fit
 
     def initial_objective(self, structure: Structure) -> float:
         """The objective at the structure's starting values."""

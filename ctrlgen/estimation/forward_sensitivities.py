@@ -146,6 +146,6 @@ def _step_with_jacobians(equations: SampleEquations, c_varies: bool) -> ca.Funct
 
 def _columns(M: ca.DM, wanted: list[int]) -> ca.DM:
     """M, sparse, with zeros in the other columns."""
-    found = ca.DM(*M.shape)
-    found[:, wanted] = M[:, wanted]
-    return ca.sparsify(found)
+    kept = ca.DM(*M.shape)
+    kept[:, wanted] = M[:, wanted]
+    return ca.sparsify(kept)

@@ -164,8 +164,8 @@ def hypotheses(
     `sample_time` [s] is None for settled poses; `ambient` says whether the recording has the temperature of the surroundings.
     """
     laws = selected_laws() if laws is None else laws
-    found = [h for law in laws for h in _of_law(law, physics, observed, sample_time, ambient)]
-    return found + [Hypothesis(PARAMETER, location, path=path) for path, location in _numbers(device)]
+    effects = [h for law in laws for h in _of_law(law, physics, observed, sample_time, ambient)]
+    return effects + [Hypothesis(PARAMETER, location, path=path) for path, location in _numbers(device)]
 
 
 def _of_law(

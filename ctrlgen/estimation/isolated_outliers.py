@@ -31,8 +31,8 @@ def mark_outliers(recording: Recording, predicted: Callable[[Record], np.ndarray
 def _marked(record: Record, predicted: np.ndarray) -> Record:
     residual = np.nan_to_num(np.where(record.valid, record.observed - predicted, 0.0))
     marked = record.valid & isolated_outliers(residual)
-    found = tuple((int(k), int(i), float(residual[k, i])) for k, i in np.argwhere(marked))
-    return replace(record, valid=record.valid & ~marked, spikes=(*record.spikes, *found)) if found else record
+    spikes = tuple((int(k), int(i), float(residual[k, i])) for k, i in np.argwhere(marked))
+    return replace(record, valid=record.valid & ~marked, spikes=(*record.spikes, *spikes)) if spikes else record
 
 
 def isolated_outliers(residual: np.ndarray) -> np.ndarray:

@@ -96,10 +96,10 @@ class LeastSquaresProblem:
         """The residual (m,) alone, without the work that the Jacobian takes."""
         values = self.to_si(x)
         rows = [
-            huber(self._white(record, simulator.simulate(record, values[: self.k], values[own])), self.error.corner)[
+            huber(self._white(record, simulator.simulate(record, values[: self.k], values[places])), self.error.corner)[
                 0
             ].ravel()
-            for record, simulator, own in self._records()
+            for record, simulator, places in self._records()
         ]
         return self._with_prior(rows, x)
 
@@ -110,15 +110,15 @@ class LeastSquaresProblem:
         values, k = self.to_si(x), self.k
         si_by_scaled = self.si_by_scaled(values)
         rows, blocks, curvature = [], [], []
-        for record, simulator, own in self._records():
-            y, Y = simulator.sensitivities(record, values[:k], values[own])
+        for record, simulator, places in self._records():
+            y, Y = simulator.sensitivities(record, values[:k], values[places])
             white = self._white(record, y)
             robust, weight = huber(white, self.error.corner)
             rows.append(robust.ravel())
             curvature.append(huber_curvature(white, self.error.corner).ravel())
             W = self.error.whiten(_clipped(Y), record.valid).reshape(len(rows[-1]), Y.shape[2]) * weight.reshape(-1, 1)
             J = np.zeros((len(W), len(x)))
-            J[:, :k], J[:, own] = -W[:, :k], -W[:, k:]
+            J[:, :k], J[:, places] = -W[:, :k], -W[:, k:]
             blocks.append(J * si_by_scaled)
         P = np.zeros((len(self.prior), len(x)))
         for row, (i, p) in enumerate(self.prior):

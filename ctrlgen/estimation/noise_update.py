@@ -23,15 +23,15 @@ def update_noise(fitter: Fitter, fit: Fit) -> Noise:
     noise = fitter.noise
     if not noise.guessed.any():
         return correct_stated_noise(fitter.with_noise(update_noise_colour(fitter, fit)), fit)
-    found = update_guessed_noise(fitter, fit)
-    smaller = found.floor < noise.floor
+    update = update_guessed_noise(fitter, fit)
+    smaller = update.floor < noise.floor
     if not smaller.any():
         return noise
-    source = [found if s else noise for s in smaller]
+    source = [update if s else noise for s in smaller]
     return replace(
         noise,
-        sd=np.where(smaller, found.sd, noise.sd),
-        count=np.where(smaller, found.count, noise.count),
+        sd=np.where(smaller, update.sd, noise.sd),
+        count=np.where(smaller, update.count, noise.count),
         ar=tuple(source[i].ar[i] for i in range(len(smaller))),
         notes=tuple(source[i].notes[i] for i in range(len(smaller))),
     )

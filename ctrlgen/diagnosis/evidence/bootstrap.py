@@ -132,8 +132,8 @@ def bootstrap(
     items = [[seed, k] for k in range(replicates)]
     results: list[Any] = [None] * replicates
     if len(fit.theta):
-        for k, found in run_all(work, items, scheduler, jobs, progress):
-            results[k] = found
+        for k, theta in run_all(work, items, scheduler, jobs, progress):
+            results[k] = theta
     thetas = [r for r in results if isinstance(r, np.ndarray)]
     failed = tuple(dict.fromkeys(r.what for r in results if isinstance(r, Failure)))
     return _summary(fit.structure, fit.theta, np.array(thetas), blocks, failed)

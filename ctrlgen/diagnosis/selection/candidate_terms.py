@@ -46,7 +46,7 @@ class CandidateTerm:
 
 def signal_peaks(fitter: Fitter, fit: Fit) -> Peaks:
     """How far the signals at every place go in the records to fit."""
-    found: Peaks = {}
+    peaks: Peaks = {}
     physics = nominal_physics(fit.structure.device)
     reached = (Place.DRIVE, Place.FORCE, Place.DISPLACEMENT)
     places = [(place, i) for place in reached for i in range(len(channels(physics, place)))]
@@ -64,9 +64,9 @@ def signal_peaks(fitter: Fitter, fit: Fit) -> Peaks:
         )
         most = np.nan_to_num(np.abs(values.full())).max(axis=1).reshape(-1, len(REACHED))
         for where, row in zip(places, most, strict=True):
-            old = found.get(where, {})
-            found[where] = {unit: max(old.get(unit, 0.0), value) for unit, value in zip(REACHED, row, strict=True)}
-    return found
+            old = peaks.get(where, {})
+            peaks[where] = {unit: max(old.get(unit, 0.0), value) for unit, value in zip(REACHED, row, strict=True)}
+    return peaks
 
 
 class CandidateTerms:
@@ -141,8 +141,8 @@ class CandidateTerms:
         for k, term in enumerate(self.terms):
             kinds.setdefault(term.kind, []).append(k)
         return [
-            (own, self.laws.compiled([self.terms[k] for k in own], [k in self.driven for k in own]))
-            for own in kinds.values()
+            (places, self.laws.compiled([self.terms[k] for k in places], [k in self.driven for k in places]))
+            for places in kinds.values()
         ]
 
     @cached_property
@@ -161,7 +161,7 @@ class CandidateTerms:
     def start(self, time: float) -> list[np.ndarray]:
         """The laws' states before the first sample, group by group, at `time` [s]: zero, but for clocks."""
         begin = time if np.isfinite(self.simulator.sample_time) else 0.0
-        clocks = ([clock for k in own for clock in self.terms[k].clocks] for own, _ in self.groups)
+        clocks = ([clock for k in places for clock in self.terms[k].clocks] for places, _ in self.groups)
         return [np.where(np.array(each, bool), begin, 0.0) for each in clocks]
 
     def along(
@@ -173,12 +173,12 @@ class CandidateTerms:
         A pose is read with the memories at the end of its dwell.
         """
         n = len(motion[0])
-        found, ends = np.empty((n, len(self.terms))), np.empty((n, len(self.terms)))
+        slopes, ends = np.empty((n, len(self.terms))), np.empty((n, len(self.terms)))
         read, at_end = self.signals.along(p, *motion)
         after = []
-        for (own, group), memory in zip(self.groups, memories, strict=True):
+        for (places, group), memory in zip(self.groups, memories, strict=True):
             rows = self.signals.columns(group.reads)
-            states, found[:, own], jumped = group.along(memory, read[:, rows], at_end[:, rows])
-            ends[:, [k for k in own if k in self.driven]] = jumped
+            states, slopes[:, places], jumped = group.along(memory, read[:, rows], at_end[:, rows])
+            ends[:, [k for k in places if k in self.driven]] = jumped
             after.append(states)
-        return after, found, ends[:, self.driven]
+        return after, slopes, ends[:, self.driven]

@@ -168,16 +168,16 @@ class CompiledTerms:
     def __init__(self, laws: LawTerms, terms: Sequence[LawTerm], driven: Sequence[bool]) -> None:
         memory = ca.vertcat(NONE, *(s for term in terms for s in term.states))
         after = ca.vertcat(NONE, *(term.after(laws.timing.sample_time) for term in terms))
-        found = ca.vertcat(NONE, *(term.slope for term in terms))
-        own = {s.name() for s in ca.symvar(ca.vertcat(found, after))}
-        self.reads = [r for r, symbol in laws.symbols.items() if own & {s.name() for s in ca.symvar(symbol)}]
+        slopes = ca.vertcat(NONE, *(term.slope for term in terms))
+        names = {s.name() for s in ca.symvar(ca.vertcat(slopes, after))}
+        self.reads = [r for r, symbol in laws.symbols.items() if names & {s.name() for s in ca.symvar(symbol)}]
         read = ca.vertcat(NONE, *(laws.symbols[r] for r in self.reads))
         end = ca.SX.sym("end", read.numel())
-        chosen = found[[k for k, is_driven in enumerate(driven) if is_driven]]
+        chosen = slopes[[k for k, is_driven in enumerate(driven) if is_driven]]
         (at_end,) = ca.substitute([chosen], [memory, read], [after, end]) if chosen.numel() else (NONE,)
         if laws.timing.poses:
-            found = ca.substitute(found, memory, after)
-        results = [ca.densify(value) for value in (after, found, at_end)]
+            slopes = ca.substitute(slopes, memory, after)
+        results = [ca.densify(value) for value in (after, slopes, at_end)]
         self._one = ca.Function("laws", [memory, read, end], results, {"cse": True})
         self._many: dict[int, ca.Function] = {}
 

@@ -38,9 +38,9 @@ class _Group:
         for k, probe, runs in self.entries:
             for into, term in runs:
                 X[1:, k, into] += F_p[:, self.states[k], probe, None] * f[:, term]
-        own = np.ascontiguousarray(F_S[:, self.states[:, None], self.states])
+        F = np.ascontiguousarray(F_S[:, self.states[:, None], self.states])
         for k in range(len(f)):
-            X[k + 1] += own[k] @ X[k]
+            X[k + 1] += F[k] @ X[k]
         self.D = X[-1]
         return X[:-1]
 
@@ -57,8 +57,8 @@ class LtvPropagation:
         self.groups = [_Group(np.flatnonzero(label == g), F_p, columns) for g in range(count)]
         self.groups = [g for g in self.groups if len(g.columns)]
         self.seen, self.through, self.direct = [], [], []
-        for row, own in zip(H_S, H_p, strict=True):
-            sees = np.array([any(own[probe] for probe in c.probes) for c in columns], bool)
+        for row, direct in zip(H_S, H_p, strict=True):
+            sees = np.array([any(direct[probe] for probe in c.probes) for c in columns], bool)
             for group in self.groups:
                 sees[group.columns] |= row[group.states].any()
             seen = np.flatnonzero(sees)
@@ -72,7 +72,7 @@ class LtvPropagation:
                 ]
             )
             self.direct.append(
-                [(probe, _runs(*pairs)) for probe, pairs in _entries(columns, seen).items() if own[probe]]
+                [(probe, _runs(*pairs)) for probe, pairs in _entries(columns, seen).items() if direct[probe]]
             )
 
     def readings(self, linear: Sequence[np.ndarray], f: np.ndarray, following: np.ndarray) -> Iterator[np.ndarray]:
@@ -97,13 +97,13 @@ class LtvPropagation:
 
 def _entries(columns: Sequence[CandidateTerm], chosen: np.ndarray) -> dict[int, tuple[list[int], list[int]]]:
     """By probe: the places among the `chosen` columns of those that enter there, and the terms that do."""
-    found: dict[int, tuple[list[int], list[int]]] = {}
+    entries: dict[int, tuple[list[int], list[int]]] = {}
     for place, j in enumerate(chosen):
         for probe, term in zip(columns[j].probes, columns[j].terms, strict=True):
-            places, terms = found.setdefault(probe, ([], []))
+            places, terms = entries.setdefault(probe, ([], []))
             places.append(place)
             terms.append(term)
-    return found
+    return entries
 
 
 def _runs(first: Sequence[int] | np.ndarray, second: Sequence[int] | np.ndarray) -> list[Run]:

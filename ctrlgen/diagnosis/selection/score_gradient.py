@@ -116,8 +116,8 @@ class ScoreGradient:
                 SS[i] += S.T @ S
                 total.US[:, seen[i]] += U[a:b, i].T @ S
                 total.Sr[seen[i]] += white[a:b, i] @ S
-        for own, columns in zip(SS, seen, strict=True):
-            total.SS[np.ix_(columns, columns)] += own
+        for products, columns in zip(SS, seen, strict=True):
+            total.SS[np.ix_(columns, columns)] += products
         gone = [j for j, column in enumerate(self.columns) if lost[list(column.terms)].any()]
         total.US[:, gone], total.Sr[gone], total.SS[gone], total.SS[:, gone] = 0.0, 0.0, 0.0, 0.0
         return total
@@ -141,15 +141,15 @@ class ScoreGradient:
             # the last block is filled up
             here = np.minimum(np.arange(a, a + size + 1), n - 1)
             k = min(size, n - a)
-            memories, found, ends = self.laws.along(self.p, memory, *(x[here] for x in seen))
+            memories, terms, ends = self.laws.along(self.p, memory, *(x[here] for x in seen))
             memory = [states[size - 1] for states in memories]
             if a + k == n:
-                found[k:] = found[k - 1]
-            found = np.hstack([found, np.repeat(self.sizes[None, :], size + 1, axis=0)])
-            lost |= ~np.all(np.abs(found) < CANDIDATE_TERMS.diverged, axis=0)
+                terms[k:] = terms[k - 1]
+            terms = np.hstack([terms, np.repeat(self.sizes[None, :], size + 1, axis=0)])
+            lost |= ~np.all(np.abs(terms) < CANDIDATE_TERMS.diverged, axis=0)
             # memories that have left the numbers say nothing
-            found[:, lost] = 0.0
-            f, following = found[:k], found[1 : k + 1].copy() if series else found[:k]
+            terms[:, lost] = 0.0
+            f, following = terms[:k], terms[1 : k + 1].copy() if series else terms[:k]
             following[:, self.laws.driven] = np.where(lost[self.laws.driven], 0.0, ends[:k])
             linear = self.linear.evaluate_along(*(x[here[:size]] for x in inputs))
             yield a, a + k, self.spread.readings([block[:k] for block in linear], f, following)

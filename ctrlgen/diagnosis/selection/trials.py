@@ -115,9 +115,9 @@ class Trials:
         if known is not None and known.fit.objective <= fit.objective:
             self.fitted[key] = (known, steps)
             return replace(known, cause=cause)
-        found = scored(self.fitter, fit, cause)
-        self.fitted[key] = (found, steps)
-        return found
+        candidate = scored(self.fitter, fit, cause)
+        self.fitted[key] = (candidate, steps)
+        return candidate
 
     def tried(
         self,
@@ -148,8 +148,8 @@ class Trials:
     def converged(self, candidate: CandidateModel) -> CandidateModel:
         """The same candidate fitted until it converges, or as it was where that fails: candidates are first fitted for a few
         steps only."""
-        found = self.tried(candidate.fit.restarted, candidate.cause, steps=FIT.max_steps)
-        return found[0] if found else candidate
+        tried = self.tried(candidate.fit.restarted, candidate.cause, steps=FIT.max_steps)
+        return tried[0] if tried else candidate
 
     def screened(self, candidate: CandidateModel) -> Screened:
         """The screen of what a candidate leaves."""
@@ -175,11 +175,11 @@ class Trials:
                 break
             before = self.fitter
             self.use(fitter)
-            found = self.tried(candidate.fit.restarted, candidate.cause, steps=FIT.max_steps)
-            if not found:
+            tried = self.tried(candidate.fit.restarted, candidate.cause, steps=FIT.max_steps)
+            if not tried:
                 self.use(before)
                 break
-            candidate = found[0]
+            candidate = tried[0]
         return candidate
 
     def with_noise_update(self, candidate: CandidateModel) -> CandidateModel:
