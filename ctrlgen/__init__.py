@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from ctrlgen.devices import Device, load_device
     from ctrlgen.devices.user.user_device import user_device
     from ctrlgen.diagnosis.diagnosis_folder import diagnose
-    from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis, Estimate, Finding
+    from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
+    from ctrlgen.diagnosis.selection.findings import Estimate, Finding
     from ctrlgen.firmware.folder import CFolder, generate
     from ctrlgen.learning.learn import Learning, learn
     from ctrlgen.model.assembly import build_model
@@ -71,8 +72,8 @@ _EXPORTS = {
     ),
     "devices.user.user_device": ("user_device",),
     "diagnosis.diagnosis_folder": ("diagnose",),
-    "diagnosis.selection.diagnosis_result": (
-        "Diagnosis",
+    "diagnosis.evidence.diagnosis_result": ("Diagnosis",),
+    "diagnosis.selection.findings": (
         "Estimate",
         "Finding",
     ),

@@ -21,18 +21,37 @@ DEVICE = shipped("scenarios") / "devices" / "mems_hexapod.toml"
 
 # Printed in N and um; (row, column) counted from 1.
 K_TB = {
-    (1, 4): "8.70e-2", (2, 3): "-2.16e-2", (2, 5): "4.32e-5", (3, 2): "3.91e-2", (3, 6): "7.83e-5", (4, 1): "3.06",
-    (5, 2): "26.1", (5, 6): "3.91e-2", (6, 3): "14.4", (6, 5): "-0.22",
-}  # fmt: skip
+    (1, 4): "8.70e-2",
+    (2, 3): "-2.16e-2",
+    (2, 5): "4.32e-5",
+    (3, 2): "3.91e-2",
+    (3, 6): "7.83e-5",
+    (4, 1): "3.06",
+    (5, 2): "26.1",
+    (5, 6): "3.91e-2",
+    (6, 3): "14.4",
+    (6, 5): "-0.22",
+}
 K_T = {
-    (1, 4): "1.33e-2", (2, 3): "-498.0", (2, 5): "2.60", (3, 2): "0.368", (3, 6): "2.35e-3", (4, 1): "827.0", (5, 2): "174.0",
-    (6, 3): "1.23e5", (6, 5): "-498",
-}  # fmt: skip
+    (1, 4): "1.33e-2",
+    (2, 3): "-498.0",
+    (2, 5): "2.60",
+    (3, 2): "0.368",
+    (3, 6): "2.35e-3",
+    (4, 1): "827.0",
+    (5, 2): "174.0",
+    (6, 3): "1.23e5",
+    (6, 5): "-498",
+}
 # Table 3: what was commanded and what the paper's finite elements gave, and the printed error in percent [um, rad].
 TABLE_3 = (
-    ("delta_z", "3.0e1", "3.07e1", "2.39"), ("delta_x", "-1.0e1", "-1.04e1", "4.12"), ("delta_y", "-1.0e1", "-1.04e1", "4.25"),
-    ("theta_x", "-4.0e-3", "-4.10e-3", "2.34"), ("theta_y", "-4.0e-3", "-4.20e-3", "4.69"), ("theta_z", "-4.00e-3", "-4.19e-3", "4.56"),
-)  # fmt: skip
+    ("delta_z", "3.0e1", "3.07e1", "2.39"),
+    ("delta_x", "-1.0e1", "-1.04e1", "4.12"),
+    ("delta_y", "-1.0e1", "-1.04e1", "4.25"),
+    ("theta_x", "-4.0e-3", "-4.10e-3", "2.34"),
+    ("theta_y", "-4.0e-3", "-4.20e-3", "4.69"),
+    ("theta_z", "-4.00e-3", "-4.19e-3", "4.56"),
+)
 SIGNS_19 = ("-1", "-1", "-1", "1", "1", "1")  # F <= 0 or F >= 0, in the order of the actuators
 NO_PLANT = "compares with the paper's own finite elements; an independent plant answers this: python -m plants"
 
@@ -71,9 +90,12 @@ def _geometry(device: MemsHexapod) -> list[PrintedNumber]:
         return float(np.linalg.norm(points[i] - points[j])) * 1e3
 
     lengths = (
-        ("Table 2, L", "5.4", float(hexapod.strut_length(p.hexapod)) * 1e3), ("Table 2, c_1", "0.4", spacing(B, 1, 2)),
-        ("Table 2, c_2", "7.2", spacing(B, 0, 1)), ("Table 2, c_3", "0.4", spacing(A, 0, 1)), ("Table 2, c_4", "2.5", spacing(A, 1, 2)),
-    )  # fmt: skip
+        ("Table 2, L", "5.4", float(hexapod.strut_length(p.hexapod)) * 1e3),
+        ("Table 2, c_1", "0.4", spacing(B, 1, 2)),
+        ("Table 2, c_2", "7.2", spacing(B, 0, 1)),
+        ("Table 2, c_3", "0.4", spacing(A, 0, 1)),
+        ("Table 2, c_4", "2.5", spacing(A, 1, 2)),
+    )
     ratio = p.stage.lever_long / p.stage.lever_short
     result = [PrintedNumber("S1", where, printed, "mm", ours) for where, printed, ours in lengths]
     return [*result, PrintedNumber("S1", "section 3.3, e_4/e_3", "10", "1", ratio)]

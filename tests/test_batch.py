@@ -166,7 +166,7 @@ def creeping(tmp_path_factory):
 
 
 def test_replicates_agree_with_the_slopes_where_the_noise_is_white(creeping):
-    found = bootstrap(creeping, 24, seed=3, jobs=0)
+    found = bootstrap(creeping.search, 24, seed=3, jobs=0)
     assert found.replicates == 24 and found.failed == () and list(found.vanished.values()) == [0.0]
     gain, fit = found.values["effect[0].gain"], creeping.search.chosen.fit
     assert gain.ci95[0] < 0.03 < gain.ci95[1]
@@ -179,7 +179,7 @@ def test_replicates_agree_with_the_slopes_where_the_noise_is_white(creeping):
 
 
 def test_replicates_are_the_same_in_other_processes(creeping):
-    a, b = (bootstrap(creeping, 4, seed=3, jobs=jobs) for jobs in (0, 2))
+    a, b = (bootstrap(creeping.search, 4, seed=3, jobs=jobs) for jobs in (0, 2))
     assert a == b
     assert "too few" in a.note
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -22,12 +21,14 @@ from ctrlgen.diagnosis.evidence.experiment_design import separate
 from ctrlgen.diagnosis.evidence.experiment_files import files
 from ctrlgen.diagnosis.evidence.ltv_linearisation import linearise_along
 from ctrlgen.diagnosis.evidence.residual_localisation import localise_residual
+from ctrlgen.diagnosis.evidence.residual_location import LocatedIn
 from ctrlgen.diagnosis.evidence.spectral_lines import spectral_lines
 from ctrlgen.diagnosis.evidence.supporting_analyses import run_supporting_analyses
 from ctrlgen.diagnosis.evidence.unknown_input import estimate_unknown_input
 from ctrlgen.diagnosis.evidence.unmodelled_dynamics import describe_unmodelled_force
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
+from ctrlgen.diagnosis.selection.search_history import search_history
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.noise import Noise, NoiseSource, estimate_noise
@@ -37,6 +38,7 @@ from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recording import Record, Recording
+from ctrlgen.reporting.result_file import json_text
 
 CREEP, DRIFT, CUBIC = (
     Hypothesis("creep", "stage:axis", "axis"),
@@ -82,7 +84,7 @@ def test_a_stop_is_placed_at_the_end_of_the_travel_where_it_stands():
 def test_a_clean_record_has_nothing_to_place():
     found = mapped(axis_fitter())[2]
     assert found.by_reading[0].ci95[0] < 0 < found.by_reading[0].ci95[1]
-    assert found.coordinates.located_in == "there is no significant excess"
+    assert found.coordinates.located_in is LocatedIn.NO_EXCESS
     assert not any("direction" in said for said in found.statements)
 
 
@@ -262,10 +264,10 @@ def test_drift_and_creep_get_an_experiment_that_separates_them():
     found = separate(fitter, creep, drift, "both explain this recording alike")
     assert found.before < 3 < found.after and found.after > 2 * found.before
     assert found.settles and found.candidates[0].separation == max(c.separation for c in found.candidates)
-    u = found.record.drive[:, 0]
+    u = found.proposed.drive[:, 0]
     y = move(u, lambda *a: creeping(*a, gain=4e-4, tau=2.0))
     y = y + NOISE * np.random.default_rng(9).standard_normal(len(u))
-    new = Record(**{**found.record.__dict__, "observed": y[:, None]})
+    new = Record(**{**found.proposed.__dict__, "observed": y[:, None]})
     parts = (*fitter.recording.records, new)
     both = Fitter(Recording(**{**fitter.recording.__dict__, "records": parts}), fitter.noise)
     gained = both.fit(drift.structure).objective - both.fit(creep.structure).objective
@@ -346,23 +348,21 @@ def test_evidence_is_numbers_that_json_knows(monkeypatch):
     fitter = axis_fitter(lambda t, q, v, memory: (cubic(t, q, v, 0)[0] + 0.02 * detent(t, q, v, 0)[0], 0), n=1000)
     search = Searcher(fitter, Screen(fitter, [CUBIC, DRIFT]), lambda _: None).run(AXIS)
     found = run_supporting_analyses(search, explained=False)
-    text = json.dumps(
-        [found.residual_location, found.detectability, found.next_experiment, found.search_history, found.extra],
-        allow_nan=False,
-    )
-    assert len(text) < 1e6
-    assert found.extra["unmodelled_force"] and set(found.residual_location) == {"before", "after"}
-    assert [row["round"] for row in found.search_history] == list(range(1, len(search.rounds) + 1))
+    history = search_history(search)
+    entries = (found.residual_location, found.detectability, found.unmodelled_force.record(), *history)
+    assert sum(len(json_text(entry)) for entry in entries) < 1e6
+    assert found.unmodelled_force.sentences() and "unmodelled_force" not in found.residual_location.after.as_json()
+    assert [row.round for row in history] == list(range(1, len(search.rounds) + 1))
     monkeypatch.setattr(
         unmodelled_dynamics, "estimate_unknown_input", lambda *_: SimpleNamespace(f=np.array([np.nan]), sd=np.ones(1))
     )
     without = run_supporting_analyses(search, explained=False)
-    assert without.extra["unmodelled_force"] is None and "unmodelled_force" not in without.residual_location["after"]
+    assert without.unmodelled_force is None
     assert without.failed == ("the unknown input is left out: it grows without bound along the motion",)
-    first, last = found.search_history[0], found.search_history[-1]
-    assert first["decision"] == "added stiffening at stage:axis" and first["candidates"][0]["causes"][0]["accepted"]
-    assert last["decision"].endswith("stopped")
-    assert not any(cause["accepted"] for trial in last["candidates"] for cause in trial["causes"])
+    first, last = history[0], history[-1]
+    assert first.decision == "added stiffening at stage:axis" and first.candidates[0].causes[0].accepted
+    assert last.decision.endswith("stopped")
+    assert not any(cause.accepted for trial in last.candidates for cause in trial.causes)
     assert plain({"a": np.array([np.nan, 1.0]), "b": np.bool_(True)}) == {"a": [None, 1.0], "b": True}
 
 

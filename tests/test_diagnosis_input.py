@@ -13,7 +13,7 @@ import ctrlgen
 from ctrlgen.core.errors import InputError
 from ctrlgen.diagnosis.diagnosis_folder import diagnose_into
 from ctrlgen.diagnosis.report.narrative import next_steps, sentence
-from ctrlgen.diagnosis.selection.verdict import CONSISTENT, EXPLAINED, UNEXPLAINED
+from ctrlgen.diagnosis.selection.verdict import Verdict
 
 # The answer is the same, and quick
 LAWS = (
@@ -46,10 +46,10 @@ def test_a_cause_without_a_number_is_reported_like_any(tmp_path):
     found = diagnose_into(
         tmp_path / "table.toml", [servo_poses(tmp_path / "run", -2.0, 0)], tmp_path / "out", laws=LAWS
     )
-    assert found.verdict == EXPLAINED and [f.effect for f in found.findings] == ["reversed"]
+    assert found.verdict == Verdict.EXPLAINED and [f.effect for f in found.findings] == ["reversed"]
     assert "share = 1, 100 % of the mismatch." in sentence(found) and (tmp_path / "out" / "report.html").exists()
     again = ctrlgen.diagnose(tmp_path / "out" / "device.next.toml", tmp_path / "run", laws=LAWS)
-    assert again.verdict == CONSISTENT
+    assert again.verdict == Verdict.CONSISTENT
 
 
 @pytest.mark.long
@@ -58,7 +58,7 @@ def test_a_column_of_another_unit_is_no_agreement(clean, unit):
     path = clean / "recording.toml"
     path.write_text(path.read_text().replace('"nm"', f'"{unit}"').replace('"5 nm"', f'"5 {unit}"'))
     found = ctrlgen.diagnose(AXIS_FILE, clean)
-    assert found.verdict == UNEXPLAINED and sentence(found).startswith("Unexplained")
+    assert found.verdict == Verdict.UNEXPLAINED and sentence(found).startswith("Unexplained")
     assert "units" in " ".join(next_steps(found))
 
 
@@ -72,7 +72,7 @@ def test_a_reading_that_counts_backwards_is_a_sign_and_no_lag(clean):
 
 
 def test_numbers_as_uncertain_as_they_are_stated_are_no_contradiction(clean):
-    assert ctrlgen.diagnose(AXIS_FILE, clean, laws=LAWS).verdict == CONSISTENT
+    assert ctrlgen.diagnose(AXIS_FILE, clean, laws=LAWS).verdict == Verdict.CONSISTENT
 
 
 @pytest.mark.parametrize("kept", [0, 1, 19])
@@ -100,7 +100,7 @@ def test_a_dead_channel_beside_live_ones_is_named_and_left_out(tmp_path):
     assert [(f.effect, f.location) for f in found.findings] == [("stuck", "sensor:delta_y")]
     level = found.findings[0].parameters["level"]
     assert (level.value, level.unit) == (pytest.approx(12.5), "um") and "reading.delta_y" not in found.held_out
-    assert found.verdict == EXPLAINED and any("left out of every fit" in note for note in found.notes)
+    assert found.verdict == Verdict.EXPLAINED and any("left out of every fit" in note for note in found.notes)
 
 
 def test_a_rest_that_reads_one_number_does_not_tell_the_noise(clean):
@@ -111,7 +111,7 @@ def test_a_rest_that_reads_one_number_does_not_tell_the_noise(clean):
     path = clean / "recording.toml"
     path.write_text(path.read_text() + record)
     found = ctrlgen.diagnose(AXIS_FILE, clean, laws=LAWS)
-    assert found.verdict == CONSISTENT and found.held_out["reading.axis"].noise_floor == pytest.approx(5.0)
+    assert found.verdict == Verdict.CONSISTENT and found.held_out["reading.axis"].noise_floor == pytest.approx(5.0)
 
 
 def repeated(folder: Path, wrong: float) -> Path:
@@ -131,11 +131,11 @@ def repeated(folder: Path, wrong: float) -> Path:
 def test_repeated_poses_tell_the_noise(tmp_path):
     (tmp_path / "table.toml").write_text(SERVO)
     found = ctrlgen.diagnose(tmp_path / "table.toml", repeated(tmp_path / "good", 0.0), laws=LAWS)
-    assert found.verdict == CONSISTENT
+    assert found.verdict == Verdict.CONSISTENT
     floor = found.held_out["reading.axis"].noise_floor
     assert floor == pytest.approx(0.01, rel=0.3)  # 40 repeats: 11 % standard deviation
     found = ctrlgen.diagnose(tmp_path / "table.toml", repeated(tmp_path / "bad", 5.0), laws=LAWS)
-    assert found.verdict == UNEXPLAINED
+    assert found.verdict == Verdict.UNEXPLAINED
 
 
 def test_agreement_without_a_known_noise_says_how_far_it_goes(tmp_path):
@@ -144,7 +144,7 @@ def test_agreement_without_a_known_noise_says_how_far_it_goes(tmp_path):
     path = folder / "recording.toml"
     path.write_text(path.read_text().replace(', noise = "0.001 deg"', ""))
     found = ctrlgen.diagnose(tmp_path / "table.toml", folder, laws=LAWS)
-    assert found.verdict == CONSISTENT and "errors below 0.000918 deg" in sentence(found)
+    assert found.verdict == Verdict.CONSISTENT and "errors below 0.000918 deg" in sentence(found)
 
 
 def test_only_the_effects_asked_for_are_considered_and_the_answer_says_so(tmp_path):
@@ -154,7 +154,7 @@ def test_only_the_effects_asked_for_are_considered_and_the_answer_says_so(tmp_pa
     found = ctrlgen.diagnose(AXIS_FILE, folder, laws=("stiffening", "home_offset"))
     tried = {c.hypothesis.effect for round_ in found.search.rounds for c in round_.screened.suspects}
     assert tried <= {"stiffening", "home_offset", "parameter"} and "stiffening" in tried
-    assert found.notes[-1].endswith("home_offset, stiffening") and found.verdict != EXPLAINED
+    assert found.notes[-1].endswith("home_offset, stiffening") and found.verdict != Verdict.EXPLAINED
     assert "creep" not in {f.effect for f in found.findings}
 
 

@@ -4,50 +4,43 @@ from __future__ import annotations
 
 import json
 import re
-import sys
-import warnings
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from conftest import AXIS_FILE, MESO_FILE, SCENARIOS
-from recording_folders import axis_recording, poses_recording
+from axis_records import record as axis_record
+from conftest import AXIS_FILE, MESO_FILE
+from creeping_axis import CREEP, LAWS, creeping_recording
+from recording_folders import poses_recording
 from result_files import faults
 
 import ctrlgen
-from ctrlgen.app.commands.cli import execute
 from ctrlgen.core.to_json import plain
-from ctrlgen.diagnosis.diagnosis_folder import diagnose_into, unfinished
-from ctrlgen.diagnosis.report.diagnosis_json import Provenance, diagnosis_record
+from ctrlgen.diagnosis.evidence.detectability import DetectabilityEntry, SmallestDetectableEntry
+from ctrlgen.diagnosis.evidence.experiment_design import CandidateExperimentEntry, Experiment
+from ctrlgen.diagnosis.evidence.residual_location import ResidualPartEntry
+from ctrlgen.diagnosis.evidence.unmodelled_dynamics import Coordinate, DependenceMap, UnmodelledForce
+from ctrlgen.diagnosis.report.diagnosis_record import Provenance, diagnosis_record
 from ctrlgen.diagnosis.report.figures import POINTS, residual_density, thinned
 from ctrlgen.diagnosis.report.html_report import page
 from ctrlgen.diagnosis.report.narrative import gathered, interval, next_steps, sentence
 from ctrlgen.diagnosis.report.plot_uncertainty import draw_rivals
 from ctrlgen.diagnosis.report.writeback import next_text
-from ctrlgen.diagnosis.selection.diagnosis_result import Estimate, Finding
-from ctrlgen.diagnosis.selection.verdict import AMBIGUOUS, CONSISTENT, EXPLAINED, PARTLY, UNEXPLAINED
+from ctrlgen.diagnosis.selection.findings import Estimate, Finding
+from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.profile_likelihood import BOUNDED, Profile
 from ctrlgen.estimation.simulator import Simulator
-
-CREEP = '[[effect]]\nkind = "creep"\nat = "axis"\ngain = "0.03"\ntau = "0.2 s"\nslow = "0.1"\n'
-# Four effects instead of all: the report is the same, and quick
-LAWS = (
-    "creep",
-    "drive_gain",
-    "home_offset",
-    "stiffening",
-)
-
+from ctrlgen.reporting.result_file import json_text
 
 MADE_FROM = Provenance({"flexure_axis.toml": "0" * 64}, 3)
 
 
 @pytest.fixture(scope="module")
 def creeping(tmp_path_factory) -> Path:
-    return axis_recording(tmp_path_factory.mktemp("creeping"), AXIS_FILE.read_text() + CREEP)
+    return creeping_recording(tmp_path_factory.mktemp("creeping"))
 
 
 @pytest.fixture(scope="module")
@@ -76,12 +69,12 @@ def same_prediction(diagnosis, text: str, folder: Path) -> None:
 
 
 def test_the_json_is_the_contract(found):
-    result = json.loads(json.dumps(diagnosis_record(found, MADE_FROM), allow_nan=False))
+    result = json.loads(json_text(diagnosis_record(found, MADE_FROM)))
     assert (
         faults(result, "diagnosis") == [] and result["inputs"] == MADE_FROM.inputs and result["seed"] == MADE_FROM.seed
     )
     assert result["notes"] == list(found.notes)
-    assert result["verdict"] == EXPLAINED
+    assert result["verdict"] == Verdict.EXPLAINED
     (finding,) = result["findings"]
     assert set(finding) == {"effect", "location", "of", "parameters", "share", "worth", "alternatives", "source"}
     assert (finding["effect"], finding["location"]) == ("creep", "stage:axis")
@@ -104,7 +97,7 @@ def test_the_json_is_the_contract(found):
 def test_the_json_lists_alternatives_by_name(found):
     others = (Hypothesis("thermal_lag", "actuator:axis", "axis"), Hypothesis("swapped", "actuator:a", "a", "b"))
     rival = replace(found.findings[0], alternatives=others)
-    result = diagnosis_record(replace(found, findings=(rival,)), MADE_FROM)
+    result = diagnosis_record(replace(found, findings=(rival,)), MADE_FROM).as_json()
     assert faults(result, "diagnosis") == [] and result["findings"][0]["alternatives"] == [
         {"effect": "thermal_lag", "location": "actuator:axis", "of": None},
         {"effect": "swapped", "location": "actuator:a", "of": "b"},
@@ -115,8 +108,12 @@ def test_numbers_that_are_none_are_null():
     given = {"a": float("nan"), "b": (np.float64(np.inf), np.int64(3)), "c": np.array([1.5, np.nan]), 1: np.bool_(True)}
     given["e"] = Estimate(1.0, (-np.inf, 2.0), "s")
     assert plain(given) == {
-        "a": None, "b": [None, 3], "c": [1.5, None], "1": True, "e": {"value": 1.0, "ci95": [None, 2.0], "unit": "s"},
-    }  # fmt: skip
+        "a": None,
+        "b": [None, 3],
+        "c": [1.5, None],
+        "1": True,
+        "e": {"value": 1.0, "ci95": [None, 2.0], "unit": "s"},
+    }
 
 
 def test_the_figure_of_rivals_names_every_candidate_by_what_it_adds(found):
@@ -238,61 +235,92 @@ def test_a_title_cannot_write_html(found):
     assert "<script>" not in page(hostile, Provenance({}, 0))
 
 
+def proposal(settles: bool) -> Experiment:
+    """A proposed experiment that decides between two causes, or does not."""
+    drive = CandidateExperimentEntry(kind="slow multisine", description="odd lines", strength=0.5, separation=9.0)
+    series = axis_record(np.zeros(20), np.zeros(20), "fit")
+    return Experiment(("creep", "drift"), "alike", 1.0, 9.0 if settles else 1.0, (drive,), series)
+
+
 def test_the_page_shows_whatever_evidence_there_is(found):
-    part = {"label": "reading.axis", "excess": 4.0, "ci95": (3.0, 5.0)}
-    nominal = {
-        "by_reading": [part],
-        "by_direction": {"axis": [{**part, "label": "forward"}]},
-        "statements": ["more below 1 Hz"],
-    }
-    location = {"before": nominal, "after": {"statements": []}}
+    part = ResidualPartEntry(
+        label="reading.axis", excess=4.0, ci95=(3.0, 5.0), share=1.0, mean=0.0, mean_ci95=(-1.0, 1.0), unit="um", n=9
+    )
+    forward = part.model_copy(update={"label": "forward"})
+    nominal = found.residual_location.before.model_copy(
+        update={"by_reading": [part], "by_direction": {"axis": [forward]}, "statements": ["more below 1 Hz"]}
+    )
+    location = found.residual_location.model_copy(update={"before": nominal})
     profile = Profile(
-        "effect[0].tau", "creep", "stage:axis", "tau", 0.2, (0.1, 0.3), "s", ((0.1, 4.0), (0.2, 0.0), (0.3, 4.0)), BOUNDED,
-        True, None,
-    )  # fmt: skip
-    experiment = {"drive": "multisine", "duration": {"value": 20.0, "unit": "s"}}
-    extra = {"unmodelled_force": {"statements": ["axis: position explains 80% of the unknown input's variance"]}}
+        "effect[0].tau",
+        "creep",
+        "stage:axis",
+        "tau",
+        0.2,
+        (0.1, 0.3),
+        "s",
+        ((0.1, 4.0), (0.2, 0.0), (0.3, 4.0)),
+        BOUNDED,
+        True,
+        None,
+    )
+    position = DependenceMap(Coordinate.POSITION, "um", (0.0, 1.0), (1.0, 2.0), (0.5, 1.5), (1.5, 2.5), "N", 0.8)
+    force = UnmodelledForce("force", {"axis": 1.0}, "N", {"axis": (position,)}, ("axis",), ())
+    drift = SmallestDetectableEntry(
+        effect="drift",
+        location="sensor:axis",
+        amplitude="rate",
+        detectable_from=float("nan"),
+        identifiable_from=2.0,
+        unit="nm/s",
+        confusable_with=[],
+        by_location={},
+    )
     told = replace(
-        found, residual_location=location, next_experiment=experiment,
-        search_history=({"was": "before"},), extra=extra, profiles=(profile,),
-        detectability={"drift": {"value": float("nan"), "unit": "nm/s"}},
-    )  # fmt: skip
+        found,
+        residual_location=location,
+        next_experiment=proposal(settles=True),
+        unmodelled_force=force,
+        profiles=(profile,),
+        detectability=DetectabilityEntry(smallest={"drift": drift}, undetectable=[]),
+    )
     text = page(told, Provenance({}, 0))
-    assert text.count("<figure>") == 9
-    for words in (
-        "more below 1 Hz",
-        "20 s",
-        "before",
-        "drift",
-        "position explains 80%",
-    ):
+    assert text.count("<figure>") == 10
+    for words in ("more below 1 Hz", "slow multisine", "added creep", "nm/s", "position explains 80%"):
         assert words in text
 
 
 def test_a_verdict_says_what_to_do(found):
     rival = replace(found.findings[0], alternatives=(Hypothesis("thermal_lag", "actuator:axis", "axis"),))
-    told = {v: replace(found, verdict=v, findings=(rival,)) for v in (EXPLAINED, PARTLY, AMBIGUOUS, UNEXPLAINED)}
-    told[CONSISTENT] = replace(found, verdict=CONSISTENT, findings=())
+    told = {
+        v: replace(found, verdict=v, findings=(rival,))
+        for v in (Verdict.EXPLAINED, Verdict.PARTLY, Verdict.AMBIGUOUS, Verdict.UNEXPLAINED)
+    }
+    told[Verdict.CONSISTENT] = replace(found, verdict=Verdict.CONSISTENT, findings=())
     first = {verdict: (sentence(d).split(":")[0], next_steps(d)[0]) for verdict, d in told.items()}
     assert len(set(first.values())) == 5
-    assert first[CONSISTENT][1].startswith("Nothing to correct") and first[EXPLAINED][1].startswith(
+    assert first[Verdict.CONSISTENT][1].startswith("Nothing to correct") and first[Verdict.EXPLAINED][1].startswith(
         "Use device.next.toml"
     )
-    assert "Check wiring, units and clocks" in next_steps(told[UNEXPLAINED])[1]
-    assert "cannot tell it from thermal_lag at actuator:axis" in sentence(told[AMBIGUOUS])
-    assert "thermal_lag" not in sentence(told[EXPLAINED])
+    assert "Check wiring, units and clocks" in next_steps(told[Verdict.UNEXPLAINED])[1]
+    assert "cannot tell it from thermal_lag at actuator:axis" in sentence(told[Verdict.AMBIGUOUS])
+    assert "thermal_lag" not in sentence(told[Verdict.EXPLAINED])
     for settles, said in ((True, "Run the next experiment"), (False, "None of the drives considered")):
-        assert next_steps(replace(told[AMBIGUOUS], next_experiment={"settles": settles}))[0].startswith(said)
-    assert "no known effect" in sentence(replace(found, verdict=UNEXPLAINED, findings=()))
+        assert next_steps(replace(told[Verdict.AMBIGUOUS], next_experiment=proposal(settles)))[0].startswith(said)
+    assert "no known effect" in sentence(replace(found, verdict=Verdict.UNEXPLAINED, findings=()))
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("value", "low", "high", "unit", "says"),
-    [(0.041, 0.039, 0.043, "1", "4.1 % (3.9 ... 4.3 %)"), (312.0, 300.0, 324.0, "nm", "312 nm (300 ... 324 nm)"),
-     (2.5, 2.4, 2.6, "1", "2.5 (2.4 ... 2.6)"), (0.5, 0.3, 0.5, "s", "0.5 s (0.3 ... 0.5 s, at its bound)"),
-     (0.5, -np.inf, np.inf, "s", "0.5 s (this recording does not determine it)")],
-)  # fmt: skip
+    [
+        (0.041, 0.039, 0.043, "1", "4.1 % (3.9 ... 4.3 %)"),
+        (312.0, 300.0, 324.0, "nm", "312 nm (300 ... 324 nm)"),
+        (2.5, 2.4, 2.6, "1", "2.5 (2.4 ... 2.6)"),
+        (0.5, 0.3, 0.5, "s", "0.5 s (0.3 ... 0.5 s, at its bound)"),
+        (0.5, -np.inf, np.inf, "s", "0.5 s (this recording does not determine it)"),
+    ],
+)
 def test_intervals_read_well(value, low, high, unit, says):
     assert interval(Estimate(value, (low, high), unit)) == says
 
@@ -317,87 +345,6 @@ def test_notes_alike_are_said_once():
     assert gathered(notes) == ["reading.x, reading.y: as stated", "a.csv: 3 spikes"]
 
 
-# --- the command and the job
-
-
-def command(*words: object) -> int:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["ctrlgen", *map(str, words)])
-        patch.setattr(warnings, "showwarning", warnings.showwarning)  # put back what the command changes
-        return execute()
-
-
-@pytest.mark.long
-def test_the_command_leaves_three_files_and_prints_the_answer(creeping, tmp_path, capsys):
-    out = tmp_path / "out"
-    assert command("diagnose", AXIS_FILE, creeping, "--out", out, "--seed", 3, "--laws", ",".join(LAWS)) == 0
-    assert {p.name for p in out.iterdir()} == {"report.html", "diagnosis.json", "device.next.toml", ".ctrlgen"}
-    printed = capsys.readouterr().out
-    told = json.loads((out / "diagnosis.json").read_text())
-    assert faults(told, "diagnosis") == [] and told["seed"] == 3
-    assert set(told["inputs"]) >= {AXIS_FILE.name} and len(told["inputs"]) == 4  # device, recording.toml, two tables
-    assert "Explained: a flexure" in printed and "stage:axis" in printed and str(out / "report.html") in printed
-    page_text = (out / "report.html").read_text()
-    assert "seed 3" in page_text and "/fit.csv" in page_text and "/recording.toml" in page_text
-    assert (
-        command("diagnose", out / "device.next.toml", creeping, "--out", tmp_path / "next", "--laws", ",".join(LAWS))
-        == 0
-    )
-    assert json.loads((tmp_path / "next" / "diagnosis.json").read_text())["verdict"] == CONSISTENT
-
-
-def test_a_place_for_replicates_that_nobody_asked_for_is_refused(creeping, tmp_path, capsys):
-    where = "--scheduler", "tcp://nowhere:1"
-    assert command("diagnose", AXIS_FILE, creeping, "--out", tmp_path / "out", *where) == 2
-    assert "--bootstrap" in capsys.readouterr().err and not (tmp_path / "out").exists()
-
-
-def without_values(folder: Path) -> Path:
-    """The same recording with nothing in its reading."""
-    for name in ("fit.csv", "hold_out.csv"):
-        lines = (folder / name).read_text().splitlines()
-        (folder / name).write_text("\n".join([lines[0], *(line.rpartition(",")[0] + ",nan" for line in lines[1:])]))
-    return folder
-
-
-@pytest.mark.parametrize(
-    ("spoil", "device", "says"),
-    [(lambda f: f, MESO_FILE, "'flexure_axis' is not 'meso_hexapod'"), (lambda f: f / "none", AXIS_FILE, "does not exist"),
-     (lambda f: f, SCENARIOS / "none.toml", "does not exist"), (without_values, AXIS_FILE, "reading.axis")],
-    ids=["device of another recording", "no recording", "no device file", "empty channel"],
-)  # fmt: skip
-def test_bad_input_is_refused_with_status_2_and_nothing_is_written(tmp_path, capsys, spoil, device, says):
-    folder = spoil(axis_recording(tmp_path / "given", AXIS_FILE.read_text()))
-    assert command("diagnose", device, folder, "--out", tmp_path / "out") == 2
-    told = capsys.readouterr()
-    assert says in told.err and "fault" in told.err and told.out == ""
-    assert [p.name for p in tmp_path.iterdir()] == ["given"]
-
-
-def test_a_foreign_folder_is_refused(creeping, tmp_path, capsys):
-    (tmp_path / "thesis.tex").write_text("precious")
-    assert command("diagnose", AXIS_FILE, creeping, "--out", tmp_path) == 2
-    assert "did not make" in capsys.readouterr().err and [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    "at", [pytest.param("noise", marks=pytest.mark.long), pytest.param("screening", marks=pytest.mark.long), "report"]
-)
-def test_an_interruption_keeps_the_earlier_result(creeping, tmp_path, at):
-    def stop(step: str) -> None:
-        if step.startswith(at):
-            raise KeyboardInterrupt
-
-    out = tmp_path / "out"
-    diagnose_into(AXIS_FILE, [creeping], out, laws=LAWS)
-    before = {p.name: p.read_bytes() for p in out.iterdir()}
-    with pytest.raises(KeyboardInterrupt):
-        diagnose_into(AXIS_FILE, [creeping], out, progress=stop, laws=LAWS)
-    assert {p.name: p.read_bytes() for p in out.iterdir()} == before
-    assert set(tmp_path.iterdir()) <= {out, unfinished(out)}  # the fits, for when it is asked again
-
-
 @pytest.mark.long
 def test_objects_and_paths_give_the_same_answer_and_the_same_page(creeping, found):
     device = ctrlgen.load_device(AXIS_FILE)
@@ -408,11 +355,3 @@ def test_objects_and_paths_give_the_same_answer_and_the_same_page(creeping, foun
     assert page(again, Provenance({}, 0)) == page(found, Provenance({}, 0))
     several = ctrlgen.diagnose(str(AXIS_FILE), [str(creeping / "recording.toml")], laws=LAWS)
     assert diagnosis_record(several, MADE_FROM) == diagnosis_record(found, MADE_FROM)
-
-
-def test_check_says_what_the_gate_lets_through(creeping, capsys):
-    assert command("check", creeping, "--device", AXIS_FILE) == 0
-    printed = capsys.readouterr().out
-    assert "creeping axis" in printed and "hold_out" in printed and "0 of 1200" in printed
-    assert command("check", creeping) == 1
-    assert "--device" in capsys.readouterr().err

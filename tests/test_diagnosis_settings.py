@@ -9,11 +9,13 @@ import pytest
 from conftest import ROOT
 
 from ctrlgen.diagnosis import settings
+from ctrlgen.estimation import settings as estimation
 
-DIAGNOSIS = ROOT / "ctrlgen" / "diagnosis"
-GROUPS = {name: getattr(settings, name) for name in settings.__all__}
-FILES = [path for path in sorted((DIAGNOSIS / "settings").glob("*.py")) if path.stem != "__init__"]
-MODULES = [path for path in sorted(DIAGNOSIS.rglob("*.py")) if path.parent.name != "settings"]
+ROOMS = (ROOT / "ctrlgen" / "diagnosis", ROOT / "ctrlgen" / "estimation")
+HELD = {**vars(settings), **vars(estimation)}
+GROUPS = {name: value for name, value in HELD.items() if name.isupper() and dataclasses.is_dataclass(value)}
+FILES = [*(ROOMS[0] / "settings").glob("*.py"), ROOMS[1] / "settings.py"]
+MODULES = [path for room in ROOMS for path in sorted(room.rglob("*.py")) if path not in FILES]
 
 
 def documented(path) -> dict[str, dict[str, str]]:

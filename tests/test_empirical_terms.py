@@ -12,7 +12,7 @@ from axis_records import record
 import ctrlgen
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.report.diagnosis_json import Provenance, diagnosis_record
+from ctrlgen.diagnosis.report.diagnosis_record import Provenance, diagnosis_record
 from ctrlgen.diagnosis.report.writeback import next_text
 from ctrlgen.diagnosis.shares.empirical_terms import ridge_regression
 from ctrlgen.estimation.simulator import Simulator
@@ -113,8 +113,8 @@ def test_a_function_that_no_law_reaches_is_written_into_the_device_file_and_pred
     rms = rms_of(device, "reading.axis", found.recording)
     assert rms == pytest.approx(term.rms_after * 1e-6, rel=1e-3)  # told in um; initial states are free there
     assert rms < np.sqrt(1.05 * (1 - term.share)) * rms_of(device_of(tmp_path, SERVO), "reading.axis", found.recording)
-    (entry,) = diagnosis_record(found, Provenance({}, 0))["empirical_terms"]
-    assert entry["effect"] == effect and entry["share"] == term.share
+    (entry,) = diagnosis_record(found, Provenance({}, 0)).empirical_terms
+    assert entry.effect == effect and entry.share == term.share
 
 
 def test_a_function_that_the_held_out_record_does_not_show_is_not_written():

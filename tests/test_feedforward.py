@@ -143,10 +143,14 @@ def test_the_cheap_bound_of_the_stress_is_never_below_it_and_exact_for_a_lift(mo
 def test_a_stress_is_limited_whatever_the_signs_of_the_displacements(low, high):
     """The cheap bound of axes that are only pulled is as good as of those that are pushed."""
     device = user_device(
-        "stage", parameters={"gain": "0.2 N/V", "stiffness": "1 N/um"}, drive=dict.fromkeys("xy", "150 V"),
-        axes=dict.fromkeys("xy", (low, high)), force=lambda u, p: p.gain * u.vector, restoring_force=lambda d, p: p.stiffness * d.vector,
+        "stage",
+        parameters={"gain": "0.2 N/V", "stiffness": "1 N/um"},
+        drive=dict.fromkeys("xy", "150 V"),
+        axes=dict.fromkeys("xy", (low, high)),
+        force=lambda u, p: p.gain * u.vector,
+        restoring_force=lambda d, p: p.stiffness * d.vector,
         limits={"stress": (lambda d, p: 1e13 * ca.sum1(ca.fabs(d.vector)), "250 MPa")},
-    )  # fmt: skip
+    )
     controller = controller_of(build_model(device), "pose", H)
     target = np.array([25e-6, 20e-6]) * (-1 if low.startswith("-") else 1)
     step = controller.step(controller.rest(), target, settle=True)

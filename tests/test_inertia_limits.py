@@ -99,9 +99,8 @@ def test_every_path_that_cannot_be_followed_is_explained_with_one_that_can(tmp_p
 def test_the_online_drive_is_that_of_the_equations_and_limits_are_kept():
     device = coil(state={"current": ("-1.5 V", "1.5 V")})
     controller = controller_of(build_model(device), "pose", 1e-3)
-    assert (
-        controller.kernels.moving is None and controller.kernels.named.moving is None
-    )  # derivatives instead of the sample before
+    # Derivatives instead of the sample before
+    assert controller.kernels.moving is None and controller.kernels.named.moving is None
     rest = controller.rest()
     d, v, a, jerk = 20e-6, 1e-3, 0.5, 30.0
     force = MASS * a + DAMPING * v + STIFFNESS * d + CUBIC * d**3

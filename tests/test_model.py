@@ -225,8 +225,10 @@ def test_bounds_as_formulas_follow_free_numbers_and_the_nearer_of_two_limits(dev
     model = symbolic_model(device, ["actuator.power_limit"])
     drive, (low, high) = model.limits[0], model.bounds_formulas[0]
     nearer = replace(
-        model, limits=(*model.limits, drive, drive), bounds_formulas=(*model.bounds_formulas, (low, 0.9 * high), (-1.0, None))
-    )  # fmt: skip
+        model,
+        limits=(*model.limits, drive, drive),
+        bounds_formulas=(*model.bounds_formulas, (low, 0.9 * high), (-1.0, None)),
+    )
     for m, share in ((model, 1.0), (nearer, 0.9)):
         bounds = ca.Function("bounds", [m.p], list(m.bounds_formula(m.u)))
         for power in (0.1, 0.2):

@@ -10,7 +10,7 @@ from axis_records import AXIS, NOISE, SETTLING, H, drives, fitter_of, move, reco
 from scipy.signal import lfilter, lsim
 
 from ctrlgen.diagnosis.diagnose import diagnose_recording
-from ctrlgen.diagnosis.selection.verdict import CONSISTENT
+from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.estimation.noise import estimate_noise
 from ctrlgen.estimation.noise_update import correct_stated_noise
 from ctrlgen.recordings.recording import Recording
@@ -54,7 +54,7 @@ def recorded(noise, stated: float = NOISE, seed: int = 4, change=move) -> Record
 )
 def test_a_device_that_lacks_nothing_is_consistent(noise, stated):
     found = diagnose_recording(AXIS, recorded(noise, stated * NOISE), laws=LAWS)
-    assert (found.verdict, found.findings) == (CONSISTENT, ())
+    assert (found.verdict, found.findings) == (Verdict.CONSISTENT, ())
 
 
 def ramped(u: np.ndarray) -> np.ndarray:
@@ -68,9 +68,9 @@ def test_a_drive_that_is_linear_between_samples_is_no_mismatch():
     given = recorded(white, change=ramped)
     linear = tuple(replace(r, linear=True) for r in given.records)
     found = diagnose_recording(AXIS, replace(given, records=linear), laws=LAWS)
-    assert (found.verdict, found.findings) == (CONSISTENT, ())
+    assert (found.verdict, found.findings) == (Verdict.CONSISTENT, ())
     # Taken as held it is half a sample late
-    assert diagnose_recording(AXIS, given, laws=("stiffening",)).verdict != CONSISTENT
+    assert diagnose_recording(AXIS, given, laws=("stiffening",)).verdict != Verdict.CONSISTENT
 
 
 # --- a noise that is stated wrongly

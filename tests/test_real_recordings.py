@@ -156,7 +156,7 @@ def test_emps_has_dry_friction_and_a_drive_that_counts_later():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["recording_split2", *more("recording", "recording_half_rate")])
+@pytest.mark.parametrize("name", ["recording", "recording_split2", "recording_half_rate"])
 def test_the_rack_has_friction_or_a_zero_that_is_off_and_two_clocks(name):
     """The motion never reverses, so that friction and a zero of the load cell are nearly one: the answer says so."""
     found = diagnosed("rack_pinion", f"{name}.toml")

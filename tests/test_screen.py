@@ -9,8 +9,9 @@ import pytest
 from axis_records import AXIS, axis_fitter
 
 from ctrlgen.diagnosis.evidence.detectability import detectability
-from ctrlgen.diagnosis.selection.screen import Screen
-from ctrlgen.diagnosis.selection.subset_search import SubsetSearch
+from ctrlgen.diagnosis.selection.confusable import explains_alike, explains_better, look_alike
+from ctrlgen.diagnosis.selection.screen import Screen, Screened
+from ctrlgen.diagnosis.selection.subset_search import SubsetSearch, Suspect
 from ctrlgen.effects import Channel
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.structure import Structure
@@ -34,6 +35,26 @@ def test_sets_come_in_the_order_of_what_they_explain_and_none_has_one_member():
     gains, members = zip(*sets_of(3.0, 4.0, 5.0), strict=True)
     assert gains == pytest.approx((50.0, 41.0, 34.0, 25.0), rel=1e-6)  # the ridge is far below
     assert members == ({"h0", "h1", "h2"}, {"h1", "h2"}, {"h0", "h2"}, {"h0", "h1"})
+
+
+def test_suspects_look_alike_by_the_cosine_of_what_they_do_to_the_readings():
+    """The most similar first; of the opposite sign too, for an amplitude may be negative."""
+    cosine = np.eye(5)
+    cosine[0, 1:] = cosine[1:, 0] = 0.981, -0.999, 0.979, 0.5
+    suspects = tuple(Suspect(Hypothesis(f"h{k}", "stage:axis"), {}, 5.0 - k, 1.0, k) for k in range(5))
+    alike = look_alike(Screened(suspects, cosine, 3.0, {}), suspects[0])
+    assert [s.hypothesis.effect for s in alike] == ["h2", "h1"]
+
+
+@pytest.mark.parametrize(
+    "lead, alike, better", [(-10, False, False), (-8, True, False), (8, True, False), (10, True, True)]
+)
+def test_models_explain_alike_within_three_standard_deviations_of_the_criterion(lead, alike, better):
+    """`lead`: of the rival. One that is far ahead is no alternative but takes the other's place."""
+    T = {"model": 0.0, "rival": -float(lead)}
+    compare = SimpleNamespace(advantage=lambda a, b: T[b] - T[a])
+    assert explains_alike(compare, "rival", "model") is alike
+    assert explains_better(compare, "rival", "model") is better
 
 
 def test_of_a_linear_device_the_gain_of_the_drive_hides_the_gain_of_the_sensor():

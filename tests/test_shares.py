@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from ctrlgen.diagnosis.shares.design import Kind
 from ctrlgen.diagnosis.shares.families import FAMILY_OF, SPEAKS_FOR, Family, ranking
-from ctrlgen.diagnosis.shares.model_free_shares import model_free_shares, predict_share
-from ctrlgen.diagnosis.shares.regressors import Kind, Signals
-from ctrlgen.diagnosis.shares.shares_table import as_json, as_text
+from ctrlgen.diagnosis.shares.model_free_shares import model_free_shares
+from ctrlgen.diagnosis.shares.shares_record import table_record
+from ctrlgen.diagnosis.shares.signals import Signals
 from ctrlgen.effects import Effect
+from ctrlgen.reporting.result_file import json_text
 
 N, H = 6000, 0.002
 T = H * np.arange(N)
@@ -184,19 +186,6 @@ def test_samples_that_are_not_valid_and_a_second_record_are_taken_as_they_are(si
     assert np.isnan(found.residual).any()
 
 
-@pytest.mark.long
-def test_a_prediction_reaches_the_share_that_it_has_on_the_same_blocks(signals, rng):
-    law = FUNCTIONS[Kind.DIRECTION](signals)
-    y = planted(law, rng)
-    blocks = model_free_shares([y[:, None]], [signals], ["x"]).blocks
-    size = (y @ law) / (law @ law)
-    reached = predict_share([size * law], [y], blocks)
-    assert reached.share == pytest.approx(PART, abs=0.03) and reached.ci95[0] < reached.share < reached.ci95[1]
-    # The mean is free
-    assert predict_share([size * law + 1.0], [y], blocks).share == pytest.approx(reached.share, abs=1e-3)
-    assert predict_share([-size * law], [y], blocks).share < -1
-
-
 def test_a_drive_that_is_the_position_has_no_row(signals, rng):
     s = replace(signals, drive={"u": 3.0 * signals.position["x"]})
     table = model_free_shares([planted(FUNCTIONS[Kind.POSITION](s), rng)[:, None]], [s], ["x"])
@@ -232,9 +221,9 @@ def test_the_family_of_what_was_planted_comes_first(kind, family, signals, rng):
 
 
 @pytest.mark.long
-def test_the_record_is_plain_and_the_text_names_what_was_selected(signals, rng):
+def test_the_record_is_plain_and_says_what_was_selected(signals, rng):
     table = model_free_shares([planted(FUNCTIONS[Kind.POSITION](signals), rng)[:, None]], [signals], ["x"])
-    record = json.loads(json.dumps(as_json(table), allow_nan=False))
+    record = json.loads(json_text(table_record(table, {"x": "um"}, {"x": 1.0})))
     first = record["channels"]["x"]["kinds"][0]
     assert first["kind"] == "position" and first["share"] == table.channels[0].kinds[0].alone.share
-    assert "selected 1" in next(line for line in as_text(table).splitlines() if line.strip().startswith("position"))
+    assert first["selected"] == 1 and record["channels"]["x"]["rms"] == pytest.approx(1e6 * table.channels[0].rms)

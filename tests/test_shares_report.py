@@ -10,7 +10,7 @@ from axis_records import AXIS, KF, NOISE, H, move, record
 from result_files import faults
 
 import ctrlgen
-from ctrlgen.diagnosis.report.diagnosis_json import Provenance, diagnosis_record
+from ctrlgen.diagnosis.report.diagnosis_record import Provenance, diagnosis_record
 from ctrlgen.diagnosis.report.html_report import page
 from ctrlgen.diagnosis.report.shares_sentences import (
     ceiling_sentence,
@@ -19,10 +19,10 @@ from ctrlgen.diagnosis.report.shares_sentences import (
     shares_sentences,
     with_interval,
 )
-from ctrlgen.diagnosis.selection.verdict import CONSISTENT
+from ctrlgen.diagnosis.selection.verdict import Verdict
+from ctrlgen.diagnosis.shares.design import Kind
 from ctrlgen.diagnosis.shares.families import Family
 from ctrlgen.diagnosis.shares.gather import residual_shares
-from ctrlgen.diagnosis.shares.regressors import Kind
 from ctrlgen.diagnosis.shares.shares_table import ChannelShares, KindShare, Share
 from ctrlgen.recordings.recording import Recording
 
@@ -89,7 +89,7 @@ def test_without_the_law_the_ceiling_is_told_and_that_no_law_reaches_it(without)
 
 @pytest.mark.long
 def test_the_record_and_the_page_hold_the_shares(found):
-    result = diagnosis_record(found, MADE_FROM)
+    result = diagnosis_record(found, MADE_FROM).as_json()
     assert faults(result, "diagnosis") == []
     shares = result["shares"]
     assert shares["statements"] == shares_sentences(found)
@@ -103,12 +103,12 @@ def test_the_record_and_the_page_hold_the_shares(found):
 
 @pytest.mark.long
 def test_a_consistent_verdict_says_nothing_and_short_records_have_no_shares(found):
-    assert shares_sentences(replace(found, verdict=CONSISTENT)) == []
+    assert shares_sentences(replace(found, verdict=Verdict.CONSISTENT)) == []
     assert shares_sentences(replace(found, shares=None)) == []
     short = [replace(r, valid=np.arange(N)[:, None] < 4) for r in found.recording.records]
     fitter = replace(found.fitter, recording=replace(found.recording, records=tuple(short)))
     assert residual_shares(fitter, found.search.nominal.fit, found.search.chosen.fit) is None
-    assert diagnosis_record(replace(found, shares=None), MADE_FROM)["shares"] is None
+    assert diagnosis_record(replace(found, shares=None), MADE_FROM).shares is None
 
 
 @pytest.mark.long

@@ -11,7 +11,7 @@ from axis_records import AXIS, NOISE, H, drive, move, record
 import ctrlgen
 from ctrlgen.diagnosis.diagnose import noise_before_fits
 from ctrlgen.diagnosis.selection.dead_channels import without_dead_channels
-from ctrlgen.diagnosis.selection.verdict import CONSISTENT
+from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.isolated_outliers import mark_outliers
 from ctrlgen.estimation.spikes import Spikes, find_spikes
@@ -41,7 +41,7 @@ def described(recording: Recording):
 @pytest.mark.parametrize("size", [6.5, 40.0])
 def test_spikes_have_their_rate_and_size_however_large_and_the_verdict_stays(size):
     found = ctrlgen.diagnose(AXIS, spiked(size), laws=["stiffening", "creep"])
-    assert found.verdict == CONSISTENT and found.findings == ()
+    assert found.verdict == Verdict.CONSISTENT and found.findings == ()
     (spikes,) = found.spikes
     assert (spikes.channel, spikes.unit, spikes.samples) == ("reading.axis", "nm", 2 * N)
     assert spikes.count == pytest.approx(8, abs=1)  # normal noise takes one below four deviations, or adds one

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 import ctrlgen
 from ctrlgen.core.errors import InputError
 from ctrlgen.core.units import to_si
-from ctrlgen.diagnosis.selection.verdict import EXPLAINED
+from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.trajectory.solution_plots import draw_path
 
 INERTIA, WEIGHT, DAMPING, MOTOR = 2e-4, 0.02, 4e-4, 0.015
@@ -147,7 +147,7 @@ def test_friction_of_a_pendulum_is_found(tmp_path):
     folder = recorded(tmp_path, "pendulum", force, [INERTIA], drives, (["swing"], "deg"), 2e-4)
     device = pendulum()
     found = ctrlgen.diagnose(device, folder, laws=LAWS)
-    assert found.verdict == EXPLAINED
+    assert found.verdict == Verdict.EXPLAINED
     assert [(f.effect, f.location) for f in found.findings] == [("coulomb", "stage:swing")]
     assert found.findings[0].parameters["force"].value == pytest.approx(2e-3, rel=0.05)
     assert {"mechanism.inertia", "effect[0].force"} <= set(found.values)
@@ -182,7 +182,7 @@ def test_stiffening_of_one_axis_of_two_is_found_there(tmp_path):
     drives = drives_of(2, 3.0)
     folder = recorded(tmp_path, "stage", force, [0.4, 0.4], drives, (["x", "y"], "um"), 2e-7)
     found = ctrlgen.diagnose(stage(), folder, laws=LAWS)
-    assert found.verdict == EXPLAINED
+    assert found.verdict == Verdict.EXPLAINED
     assert [(f.effect, f.location) for f in found.findings] == [("stiffening", "stage:y")]
     k3 = found.findings[0].parameters["k3"]
     assert to_si(k3.value, k3.unit) == pytest.approx(1.5e10, rel=0.05)

@@ -12,14 +12,10 @@ from scipy import stats
 
 from ctrlgen.diagnosis.selection.attribution import Attribution, Share
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
-from ctrlgen.diagnosis.selection.diagnosis_result import findings, held_out_errors
+from ctrlgen.diagnosis.selection.findings import findings, held_out_errors
 from ctrlgen.diagnosis.selection.objections import objections
 from ctrlgen.diagnosis.selection.verdict import (
-    AMBIGUOUS,
-    CONSISTENT,
-    EXPLAINED,
-    PARTLY,
-    UNEXPLAINED,
+    Verdict,
     contradicts_datasheet,
     main_rivals,
     poorly_determined,
@@ -142,23 +138,30 @@ def judged(
 
 
 def test_a_verdict_says_what_is_known():
-    assert judged() == EXPLAINED and judged(causes=()) == CONSISTENT
-    assert judged(causes=(), seen=True) == EXPLAINED  # read off the readings themselves
-    assert judged(rivals=((GAIN,),)) == AMBIGUOUS
-    assert judged(known=False) == PARTLY and judged(confirmed=0.0) == PARTLY and judged(worse=CHANCE + 1) == PARTLY
-    assert judged(passed=False, causes=()) == UNEXPLAINED and judged(passed=False, causes=(), known=False) == CONSISTENT
-    assert judged(passed=False, share=0.1, known=False) == PARTLY
+    assert judged() == Verdict.EXPLAINED and judged(causes=()) == Verdict.CONSISTENT
+    assert judged(causes=(), seen=True) == Verdict.EXPLAINED  # read off the readings themselves
+    assert judged(rivals=((GAIN,),)) == Verdict.AMBIGUOUS
+    assert (
+        judged(known=False) == Verdict.PARTLY
+        and judged(confirmed=0.0) == Verdict.PARTLY
+        and judged(worse=CHANCE + 1) == Verdict.PARTLY
+    )
+    assert (
+        judged(passed=False, causes=()) == Verdict.UNEXPLAINED
+        and judged(passed=False, causes=(), known=False) == Verdict.CONSISTENT
+    )
+    assert judged(passed=False, share=0.1, known=False) == Verdict.PARTLY
 
 
-@pytest.mark.parametrize("share, says", [(0.75 + JUST, PARTLY), (0.75 - JUST, UNEXPLAINED)])
+@pytest.mark.parametrize("share, says", [(0.75 + JUST, Verdict.PARTLY), (0.75 - JUST, Verdict.UNEXPLAINED)])
 def test_what_takes_away_three_quarters_of_the_mismatch_is_part_of_the_answer(share, says):
-    assert judged(passed=False, share=share) == says and judged(share=share) == EXPLAINED
+    assert judged(passed=False, share=share) == says and judged(share=share) == Verdict.EXPLAINED
 
 
 def test_numbers_that_contradict_the_data_sheet_are_no_explanation():
     """What is left is noise, but at six stated deviations; beside a cause of most of the mismatch they spoil the answer in part."""
-    assert judged(apart=6.0, causes=()) == UNEXPLAINED and judged(apart=6.0, share=0.1) == UNEXPLAINED
-    assert judged(apart=6.0) == PARTLY
+    assert judged(apart=6.0, causes=()) == Verdict.UNEXPLAINED and judged(apart=6.0, share=0.1) == Verdict.UNEXPLAINED
+    assert judged(apart=6.0) == Verdict.PARTLY
 
 
 @pytest.mark.parametrize("tolerance, enough", [(20.1e-9, True), (19.9e-9, False)])
@@ -166,10 +169,10 @@ def test_what_is_within_the_stated_tolerance_is_enough(tolerance, enough):
     """A hundred times the noise of 2 nm in squares is left: 20 nm."""
     squares = 100 * N - N + 100  # less the hundred of `judged`
     said = judged(passed=False, tolerance=tolerance, left_over=squares, confirmed=1e4)
-    assert said == (EXPLAINED if enough else PARTLY)
+    assert said == (Verdict.EXPLAINED if enough else Verdict.PARTLY)
     bare = {"causes": (), "passed": False, "left_over": squares}
-    assert judged(tolerance=tolerance, **bare) == (CONSISTENT if enough else UNEXPLAINED)
-    assert judged(tolerance=None, **bare) == UNEXPLAINED
+    assert judged(tolerance=tolerance, **bare) == (Verdict.CONSISTENT if enough else Verdict.UNEXPLAINED)
+    assert judged(tolerance=None, **bare) == Verdict.UNEXPLAINED
 
 
 def test_a_channel_at_its_noise_is_within_any_tolerance():
@@ -199,7 +202,7 @@ def test_laws_of_one_family_at_one_place_are_one_answer_where_more_than_noise_is
 def test_a_whole_number_is_said_as_what_it_was_expected_to_be_and_the_weightier_cause_first(monkeypatch):
     """Reversed 0.9 to 1.1 times: one."""
     monkeypatch.setattr(
-        "ctrlgen.diagnosis.selection.diagnosis_result.robust_deviations", lambda fit: np.full(len(fit.theta), 0.01)
+        "ctrlgen.diagnosis.selection.findings.robust_deviations", lambda fit: np.full(len(fit.theta), 0.01)
     )
     chosen = trial(causes=(GAIN, REVERSED), free_parameters=(number("effect[0].gain", cause=0),), theta=(1.1,))
     bare = (trial(held=3.0 * N), trial(held=8.0 * N))
@@ -217,9 +220,7 @@ def test_a_whole_number_is_said_as_what_it_was_expected_to_be_and_the_weightier_
 
 
 def test_errors_are_root_mean_squares_of_valid_readings_in_the_readers_unit(monkeypatch):
-    monkeypatch.setattr(
-        "ctrlgen.diagnosis.selection.diagnosis_result.prediction_uncertainty", lambda *_: np.array([5e-9])
-    )
+    monkeypatch.setattr("ctrlgen.diagnosis.selection.findings.prediction_uncertainty", lambda *_: np.array([5e-9]))
     valid = np.ones((4, 1), bool)
     valid[3] = False
     nominal, chosen = trial(), trial()

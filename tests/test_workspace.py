@@ -28,8 +28,12 @@ def test_without_stress_the_workspace_is_the_strokes_seen_through_the_jacobian(w
     ranges = workspace.ranges(at(10))
     turns = np.deg2rad([0, -120, 120])
     x_needs = np.array([[np.cos(t), -np.sin(t)] for t in turns]).ravel()  # d per unit of delta_x on (1X, 1Y, 2X, ...)
-    expected = max(lift[i] / -x_needs[i] for i in range(6) if x_needs[i] < -1e-9 and lift[i] / -x_needs[i] == min(
-        lift[k] / -x_needs[k] for k in range(6) if x_needs[k] < -1e-9))  # fmt: skip
+    expected = max(
+        lift[i] / -x_needs[i]
+        for i in range(6)
+        if x_needs[i] < -1e-9
+        and lift[i] / -x_needs[i] == min(lift[k] / -x_needs[k] for k in range(6) if x_needs[k] < -1e-9)
+    )
     assert ranges[3, 1] == pytest.approx(expected, rel=1e-9)
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ctrlgen.app import scenario_pipeline as pipeline
     from ctrlgen.app.batch import BatchRow
     from ctrlgen.diagnosis.evidence.bootstrap import Bootstrap
-    from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis
+    from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
     from ctrlgen.model.model import Model
     from ctrlgen.recordings.recording import Recording
     from ctrlgen.trajectory.scenario import Scenario
@@ -195,11 +195,11 @@ def print_diagnosis(found: Diagnosis) -> None:
         hypothesis_name,
         interval,
         next_steps,
-        number,
         sentence,
         share_text,
     )
     from ctrlgen.diagnosis.report.shares_sentences import shares_sentences
+    from ctrlgen.reporting.numbers import number
 
     out.print(f"[bold]{escape(sentence(found))}[/bold]", soft_wrap=True)
     for line in shares_sentences(found):
@@ -241,15 +241,13 @@ def print_bootstrap(found: Bootstrap) -> None:
     for path, estimate in found.values.items():
         table.add_row(escape(path), interval(estimate))
     show_table(table)
-    for name, share in found.vanished.items():
-        out.print(f"{name} vanished in {share:.0%} of them", markup=False, soft_wrap=True)
-    for reason in found.failed:
-        out.print(f"some failed: {reason}", markup=False, soft_wrap=True)
+    for line in found.sentences():
+        out.print(line, markup=False, soft_wrap=True)
 
 
 def print_batch(rows: Sequence[BatchRow]) -> None:
     """One line per diagnosis, then the failures with their reasons."""
-    from ctrlgen.diagnosis.report.narrative import number
+    from ctrlgen.reporting.numbers import number
 
     errors: tuple[Column, ...] = (("before", "right"), ("after", "right"), ("noise", "right"))
     table = table_of(("result", "left"), ("verdict", "left"), ("found", "left"), *errors)

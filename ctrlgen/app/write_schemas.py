@@ -9,7 +9,7 @@ from pydantic import BaseModel
 from ctrlgen.budget.budget_schema import BudgetRecord
 from ctrlgen.calibration.calibration_schema import CalibrationRecord
 from ctrlgen.core.files import write_text
-from ctrlgen.diagnosis.report.diagnosis_schema import DiagnosisRecord
+from ctrlgen.diagnosis.report.diagnosis_record import DiagnosisRecord
 from ctrlgen.learning.learning_schema import LearningRecord
 from ctrlgen.path_timing.fastest_schema import FastestRecord
 from ctrlgen.reporting.result_file import SCHEMAS, schema_text

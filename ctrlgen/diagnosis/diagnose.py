@@ -22,16 +22,17 @@ from threadpoolctl import threadpool_limits
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.forks import usable_cores
 from ctrlgen.devices import Device
+from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.evidence.supporting_analyses import run_supporting_analyses
 from ctrlgen.diagnosis.selection.attribution import attribute
 from ctrlgen.diagnosis.selection.candidate_model import SearchResult
 from ctrlgen.diagnosis.selection.dead_channels import without_dead_channels
-from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis, findings, held_out_errors
 from ctrlgen.diagnosis.selection.direct_detection import directly_detected_findings
+from ctrlgen.diagnosis.selection.findings import findings, held_out_errors
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.trials import FAILURES
-from ctrlgen.diagnosis.selection.verdict import CONSISTENT, EXPLAINED, in_another_unit, verdict
+from ctrlgen.diagnosis.selection.verdict import Verdict, in_another_unit, verdict
 from ctrlgen.diagnosis.shares.empirical_terms import EmpiricalTerm, empirical_terms
 from ctrlgen.diagnosis.shares.gather import ResidualShares, residual_shares
 from ctrlgen.effects import Effect
@@ -77,9 +78,14 @@ def diagnose_recording(
 
 
 def _diagnose(
-    device: Device, recording: Recording, seed: int, step: Progress, checkpoint: Checkpoint | None, laws: Sequence[str] | None,
+    device: Device,
+    recording: Recording,
+    seed: int,
+    step: Progress,
+    checkpoint: Checkpoint | None,
+    laws: Sequence[str] | None,
     jobs: int,
-) -> Diagnosis:  # fmt: skip
+) -> Diagnosis:
     effects = selected_laws(laws)
     recording = _relative_ambient(_with_both_roles(recording))
     step("noise")
@@ -100,7 +106,7 @@ def _diagnose(
     likelihoods = profiles(search.fitter, search.chosen.fit)
     analyses = run_supporting_analyses(search, tests.passed, seed)
     shares = residual_shares(search.fitter, search.nominal.fit, search.chosen.fit, seed)
-    enough = unit_is_wrong or answer in (CONSISTENT, EXPLAINED)
+    enough = unit_is_wrong or answer in (Verdict.CONSISTENT, Verdict.EXPLAINED)
     left, failed = ((), ()) if enough else _empirical_terms(search, shares)
     spikes = find_spikes(search.fitter, search.chosen.fit, known)
     notes = (*_notes(search, live.notes, spikes, tests.restless, laws, effects), *analyses.failed, *failed)
@@ -119,7 +125,10 @@ def _diagnose(
         search=search,
         fitter=search.fitter,
         profiles=likelihoods,
-        **{name: value for name, value in vars(analyses).items() if name != "failed"},
+        residual_location=analyses.residual_location,
+        unmodelled_force=analyses.unmodelled_force,
+        detectability=analyses.detectability,
+        next_experiment=analyses.next_experiment,
     )
 
 
@@ -164,9 +173,13 @@ def _without_outliers(device: Device, fitter: Fitter) -> Fitter:
 
 
 def _notes(
-    search: SearchResult, live: Sequence[str], spikes: Sequence[Spikes], restless: Sequence[str], laws: Sequence[str] | None,
+    search: SearchResult,
+    live: Sequence[str],
+    spikes: Sequence[Spikes],
+    restless: Sequence[str],
+    laws: Sequence[str] | None,
     effects: Sequence[type[Effect]],
-) -> tuple[str, ...]:  # fmt: skip
+) -> tuple[str, ...]:
     """What was done to the recording, what is known of its noise, and what could not be tried."""
     failed = dict.fromkeys(text for round_ in search.rounds for text in round_.failed)
     return (
@@ -186,8 +199,8 @@ def _hypotheses(device: Device, recording: Recording, effects: Sequence[type[Eff
     shortest = min(r.sample_time for r in recording.records)
     sample_time = shortest if np.isfinite(shortest) else None
     ambient = any(r.ambient is not None for r in recording.records)
-    found = hypotheses(device, nominal_physics(device), recording.channels, sample_time, ambient, effects)
-    return [h for h in found if h.effect != PARAMETER or h.path in acting]
+    offered = hypotheses(device, nominal_physics(device), recording.channels, sample_time, ambient, effects)
+    return [h for h in offered if h.effect != PARAMETER or h.path in acting]
 
 
 def _relative_ambient(recording: Recording) -> Recording:

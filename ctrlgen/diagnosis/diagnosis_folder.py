@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ctrlgen.core.files import whole_folder, write_text
-from ctrlgen.core.to_json import plain
 from ctrlgen.devices import Device, files_of, load_device
 from ctrlgen.diagnosis.diagnose import diagnose_recording
 from ctrlgen.diagnosis.evidence.bootstrap import Bootstrap, bootstrap
-from ctrlgen.diagnosis.report.diagnosis_json import Provenance, diagnosis_record
+from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
+from ctrlgen.diagnosis.report.diagnosis_record import Provenance, diagnosis_record
 from ctrlgen.diagnosis.report.html_report import page
 from ctrlgen.diagnosis.report.writeback import write_next
-from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis
+from ctrlgen.diagnosis.selection.candidate_model import SearchResult
 from ctrlgen.estimation.checkpoint import Checkpoint
 from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recorded_files import recording_files, sha256
 from ctrlgen.recordings.recording import Recording
+from ctrlgen.reporting.result_file import json_text
 from ctrlgen.version import code_hash
 
 Progress = Callable[[str], None]
@@ -35,14 +35,14 @@ class Replicates:
     scheduler: str | None = None
     jobs: int | None = None
 
-    def of(self, found: Diagnosis, seed: int, step: Progress) -> Bootstrap:
-        """The bootstrap of a diagnosis; `step` is called with its progress."""
+    def of(self, search: SearchResult, seed: int, step: Progress) -> Bootstrap:
+        """The bootstrap of the chosen model; `step` is called with its progress."""
         step(f"bootstrap, {self.count} replicates")
 
         def told(done: int, of: int) -> None:
             step(f"bootstrap, {done} of {of} replicates")
 
-        return bootstrap(found, self.count, seed, self.scheduler, self.jobs, told)
+        return bootstrap(search, self.count, seed, self.scheduler, self.jobs, told)
 
 
 def diagnose(
@@ -82,7 +82,7 @@ def diagnose_into(
     """`diagnose`, reported into the folder `out`, which is replaced as a whole or left unchanged. Raises InputError.
 
     An interrupted diagnosis leaves its fits in a file beside `out`; the same call continues from them. With `replicates`
-    bootstrap.json is written too, and the diagnosis' `extra` holds it as "bootstrap".
+    bootstrap.json is written too, and the diagnosis holds it as `bootstrap`.
     """
     step = progress or (lambda _: None)
     with whole_folder(Path(out)) as draft:
@@ -92,21 +92,21 @@ def diagnose_into(
         checkpoint = _checkpoint(Path(out), device, recordings, seed, laws)
         if checkpoint.reused:
             step(f"continuing after {checkpoint.reused} fits")
-        found = diagnose(model.device, recording, seed, step, checkpoint, laws, jobs)
+        diagnosis = diagnose(model.device, recording, seed, step, checkpoint, laws, jobs)
         if replicates is not None:
-            found.extra["bootstrap"] = replicates.of(found, seed, step)
-            write_text(draft / "bootstrap.json", json.dumps(plain(found.extra["bootstrap"]), indent=1) + "\n")
+            diagnosis = replace(diagnosis, bootstrap=replicates.of(diagnosis.search, seed, step))
+        if diagnosis.bootstrap is not None:
+            write_text(draft / "bootstrap.json", json_text(diagnosis.bootstrap))
         step("report")
-        write_next(found, Path(device), draft / "device.next.toml")
-        settles = (found.next_experiment or {}).get("settles")
-        for name, content in found.extra["files"].items() if settles else ():
+        write_next(diagnosis, Path(device), draft / "device.next.toml")
+        experiment = diagnosis.next_experiment
+        for name, content in experiment.files.items() if experiment is not None and experiment.settles else ():
             write_text(draft / "next_experiment" / name, content)
         provenance = Provenance(digests(Path(device), recordings), seed)
-        record = diagnosis_record(found, provenance)
-        write_text(draft / "diagnosis.json", json.dumps(record, indent=1, allow_nan=False) + "\n")
-        write_text(draft / "report.html", page(found, provenance))
+        write_text(draft / "diagnosis.json", json_text(diagnosis_record(diagnosis, provenance)))
+        write_text(draft / "report.html", page(diagnosis, provenance))
     checkpoint.done()  # only now: a diagnosis interrupted during its replicates need not repeat its fits
-    return found
+    return diagnosis
 
 
 def unfinished(out: Path) -> Path:

@@ -93,8 +93,8 @@ def diagnose(
         complain(error)
         raise typer.Exit(2) from None
     print_diagnosis(found)
-    if replicates is not None:
-        print_bootstrap(found.extra["bootstrap"])
+    if found.bootstrap is not None:
+        print_bootstrap(found.bootstrap)
     out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'report.html'))}", soft_wrap=True)
 
 

@@ -15,36 +15,39 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from pydantic import Field
 
 from ctrlgen.core.parallel import Failure, run_all, sendable
 from ctrlgen.core.units import from_si
-from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis, Estimate
+from ctrlgen.diagnosis.selection.candidate_model import SearchResult
+from ctrlgen.diagnosis.selection.findings import Estimate
 from ctrlgen.diagnosis.settings import BOOTSTRAP
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Record, Recording
+from ctrlgen.reporting.result_file import FiniteOrNull, Keys
 
 Progress = Callable[[int, int], None]
 
 
-@dataclass(frozen=True)
-class Bootstrap:
-    """Percentile intervals of a diagnosis.
+class Bootstrap(Keys):
+    """Percentile intervals of a diagnosis: what bootstrap.json holds."""
 
-    replicates: recordings that were refitted.
-    block: length of the blocks [samples] of each record to fit.
-    values: estimate and 95 % interval by parameter path, as in `Diagnosis.values`.
-    vanished: share of the replicates, by finding, whose amplitude lies on a bound or has the other sign.
-    failed: reasons of replicates that could not be refitted, each once.
-    note: how it was done, and whether there are too few replicates.
-    """
+    replicates: int = Field(description="Recordings that were refitted.")
+    block: tuple[int, ...] = Field(description="Length of the blocks [samples] of each record to fit.")
+    values: dict[str, Estimate] = Field(
+        description="Estimate and 95 % interval by parameter path, as in `Diagnosis.values`."
+    )
+    vanished: dict[str, FiniteOrNull] = Field(
+        description="Share of the replicates, by finding, whose amplitude lies on a bound or has the other sign."
+    )
+    failed: tuple[str, ...] = Field(description="Reasons of replicates that could not be refitted, each once.")
+    note: str = Field(description="How it was done, and whether there are too few replicates.")
 
-    replicates: int
-    block: tuple[int, ...]
-    values: dict[str, Estimate]
-    vanished: dict[str, float]
-    failed: tuple[str, ...]
-    note: str
+    def sentences(self) -> list[str]:
+        """How often each finding vanished, and why replicates failed."""
+        vanished = [f"{name} vanished in {share:.0%} of them" for name, share in self.vanished.items()]
+        return [*vanished, *(f"some failed: {reason}" for reason in self.failed)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,19 +106,19 @@ def block_length(record: Record, predicted: np.ndarray) -> int:
 
 
 def bootstrap(
-    diagnosis: Diagnosis,
+    search: SearchResult,
     replicates: int = 200,
     seed: int = 0,
     scheduler: str | None = None,
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> Bootstrap:
-    """Percentile intervals of every fitted parameter of `diagnosis`.
+    """Percentile intervals of every fitted parameter of the chosen model.
 
     The result depends on `seed` alone, not on where the replicates run (see `ctrlgen.core.parallel`). A device whose
     functions cannot be sent to another process (lambdas of a user's device) is refitted in this process.
     """
-    fit, fitter = diagnosis.search.chosen.fit, diagnosis.fitter
+    fit, fitter = search.chosen.fit, search.fitter
     recording = replace(fitter.recording, records=tuple(fitter.fit_records))
     predicted = tuple(fitter.predict(fit, r) for r in recording.records)
     blocks = tuple(block_length(r, y) for r, y in zip(recording.records, predicted, strict=True))
@@ -162,4 +165,4 @@ def _summary(
         else ""
     )
     note = f"residual blocks of {', '.join(map(str, sorted(set(blocks))))} samples, the model unchanged{few}"
-    return Bootstrap(len(drawn), blocks, values, vanished, failed, note)
+    return Bootstrap(replicates=len(drawn), block=blocks, values=values, vanished=vanished, failed=failed, note=note)

@@ -7,54 +7,43 @@ parameters' sensitivities is undetectable at any amplitude.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from pydantic import Field
 
 from ctrlgen.core.units import difference, written_unit
+from ctrlgen.diagnosis.selection.cause_entry import EffectAt
+from ctrlgen.diagnosis.selection.confusable import look_alike
 from ctrlgen.diagnosis.selection.screen import Screened
-from ctrlgen.diagnosis.settings import DETECTABILITY, MODEL_SELECTION
+from ctrlgen.diagnosis.settings import MODEL_SELECTION
 from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, numbers
+from ctrlgen.reporting.result_file import FiniteOrNull, Keys
 
 
-@dataclass(frozen=True)
-class SmallestDetectable:
-    """The smallest detectable amplitude of one effect, at the location where it shows most.
+class SmallestDetectableEntry(EffectAt):
+    """The smallest amplitude of one effect that this recording would have shown, at the location where it shows most."""
 
-    amplitude: name of the amplitude parameter.
-    detectable_from: smallest amplitude that exceeds the screen's threshold [unit].
-    identifiable_from: smallest amplitude that the search would also have accepted [unit].
-    confusable_with: (effect, location) of hypotheses with nearly the same effect on the readings.
-    by_location: detectable_from at every location [unit].
-    """
-
-    effect: str
-    location: str
-    amplitude: str
-    detectable_from: float
-    identifiable_from: float
-    unit: str
-    confusable_with: tuple[tuple[str, str], ...]
-    by_location: dict[str, float]
+    amplitude: str = Field(description="Name of the amplitude parameter.")
+    detectable_from: FiniteOrNull = Field(description="Smallest amplitude that exceeds the screen's threshold [unit].")
+    identifiable_from: FiniteOrNull = Field(description="Smallest amplitude that would also have been named [unit].")
+    unit: str = Field(description="Unit of the amplitude.")
+    confusable_with: list[tuple[str, str]] = Field(description="[effect, location] of what it would be taken for.")
+    by_location: dict[str, FiniteOrNull] = Field(description="detectable_from at every location [unit].")
 
 
-@dataclass(frozen=True)
-class Undetectable:
-    """A cause that this recording cannot show, and what masks it."""
+class UndetectableEntry(EffectAt):
+    """A cause that this recording cannot show."""
 
-    effect: str
-    location: str
-    masked_by: str
+    masked_by: str = Field(description="The free parameter, or the reason, that hides it.")
 
 
-@dataclass(frozen=True)
-class Detectability:
-    """The smallest detectable amplitudes by effect, and the undetectable causes."""
+class DetectabilityEntry(Keys):
+    """What this recording could have shown besides the findings."""
 
-    smallest: dict[str, SmallestDetectable]
-    undetectable: tuple[Undetectable, ...]
+    smallest: dict[str, SmallestDetectableEntry] = Field(description="By effect.")
+    undetectable: list[UndetectableEntry] = Field(description="Causes that this recording cannot show.")
 
 
-def detectability(fit: Fit, screened: Screened, n: float) -> Detectability:
+def detectability(fit: Fit, screened: Screened, n: float) -> DetectabilityEntry:
     """Detectability of every hypothesis beside the causes of `fit`, from the screen of its residual over `n` samples.
 
     Where the residual exceeds the noise, the residual takes the place of the noise.
@@ -76,15 +65,10 @@ def detectability(fit: Fit, screened: Screened, n: float) -> Detectability:
     kinds = {kind: left for kind, p in kinds.items() if (left := {h: row for h, row in p.items() if h not in beyond})}
     smallest = {kind: _smallest(kind, places, screened, need) for kind, places in sorted(kinds.items())}
     free = {u.path for u in fit.structure.free_parameters}
-    undetectable = tuple(
-        Undetectable(h.effect, h.location, _masking_parameter(fit, k))
-        for h, k in screened.undetectable.items()
-        if h.path not in free
-    )
-    too_small = tuple(
-        Undetectable(h.effect, h.location, "the noise: only an amplitude beyond its bounds would show") for h in beyond
-    )
-    return Detectability(smallest, undetectable + too_small)
+    masked = {h: _masking_parameter(fit, k) for h, k in screened.undetectable.items() if h.path not in free}
+    masked |= dict.fromkeys(beyond, "the noise: only an amplitude beyond its bounds would show")
+    undetectable = [UndetectableEntry(effect=h.effect, location=h.location, masked_by=why) for h, why in masked.items()]
+    return DetectabilityEntry(smallest=smallest, undetectable=undetectable)
 
 
 def _span(h: Hypothesis) -> float:
@@ -94,21 +78,23 @@ def _span(h: Hypothesis) -> float:
 
 def _smallest(
     kind: str, places: dict[Hypothesis, tuple[float, float, str]], screened: Screened, need: float
-) -> SmallestDetectable:
+) -> SmallestDetectableEntry:
+    """The smallest detectable amplitude of one `kind` of effect, from (sd [unit], sd over its range, unit) by place."""
     best = min(places, key=lambda h: places[h][1])
     sd, _, unit = places[best]
-    own = next(s for s in screened.suspects if s.hypothesis == best)
-    others = sorted(
-        (s for s in screened.suspects if s.hypothesis != best), key=lambda s: -screened.confusability(own, s)
-    )
-    confusable_with = tuple(
-        (s.hypothesis.effect, s.hypothesis.location)
-        for s in others[:DETECTABILITY.most_alike] if screened.confusability(own, s) >= DETECTABILITY.alike
-    )  # fmt: skip
+    suspect = next(s for s in screened.suspects if s.hypothesis == best)
+    confusable_with = [(s.hypothesis.effect, s.hypothesis.location) for s in look_alike(screened, suspect)]
     name = best.path.rpartition(".")[2] if kind == PARAMETER else best.law.amplitude().name
     by_location = {h.location: screened.threshold * value for h, (value, *_) in places.items()}
-    return SmallestDetectable(
-        kind, best.location, name, screened.threshold * sd, need * sd, unit, confusable_with, by_location
+    return SmallestDetectableEntry(
+        effect=kind,
+        location=best.location,
+        amplitude=name,
+        detectable_from=screened.threshold * sd,
+        identifiable_from=need * sd,
+        unit=unit,
+        confusable_with=confusable_with,
+        by_location=by_location,
     )
 
 

@@ -97,10 +97,17 @@ def admissible(
         centre = np.where(one_sided, low + half, 0.0)
         drive = np.clip(centre + half * shape.values, low, high)
         record = Record(
-            f"next: {shape.kind}", "fit", first + np.arange(n) * h, template.sample_time, drive,
-            np.zeros((n, template.observed.shape[1])), template.linear, None,
-            np.ones((n, template.observed.shape[1]), bool), poses=template.poses,
-        )  # fmt: skip
+            f"next: {shape.kind}",
+            "fit",
+            first + np.arange(n) * h,
+            template.sample_time,
+            drive,
+            np.zeros((n, template.observed.shape[1])),
+            template.linear,
+            None,
+            np.ones((n, template.observed.shape[1]), bool),
+            poses=template.poses,
+        )
         if _kept(simulator, p, record):
             best, first_left = (record, EXCITATION.strengths[middle]), middle + 1
         else:

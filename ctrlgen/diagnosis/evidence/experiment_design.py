@@ -12,9 +12,10 @@ Source: A. C. Atkinson, V. V. Fedorov, Biometrika 62 (1975) 57.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from pydantic import Field
 
 from ctrlgen.diagnosis.evidence.excitation_signals import admissible, pose_sets, time_series
 from ctrlgen.diagnosis.selection.candidate_model import SearchResult
@@ -22,16 +23,32 @@ from ctrlgen.diagnosis.settings import EXPERIMENT
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.least_squares import initial_state_sd
 from ctrlgen.recordings.recording import Record
+from ctrlgen.reporting.result_file import FiniteOrNull, Keys
 
 
-@dataclass(frozen=True)
-class CandidateExperiment:
-    """One drive and the separation [standard deviations] that it and this recording together would give."""
+class CandidateExperimentEntry(Keys):
+    """One drive that was considered."""
 
-    kind: str
-    description: str
-    strength: float
-    separation: float
+    kind: str = Field(description="Form of the drive.")
+    description: str = Field(description="The drive in words.")
+    strength: float = Field(description="Amplitude as a share of the drive's range.")
+    separation: float = Field(description="Separation of the rivals with it [standard deviations].")
+
+
+class NextExperimentEntry(Keys):
+    """The drive that discriminates best between models that this recording cannot tell apart."""
+
+    discriminates_between: tuple[str, str] = Field(description="The two models, by their causes.")
+    reason: str = Field(description="Why these two.")
+    description: str = Field(description="The drive in words.")
+    kind: str = Field(description="Form of the drive.")
+    strength: float = Field(description="Amplitude as a share of the drive's range.")
+    samples: int = Field(description="Length of the drive.")
+    sample_time: FiniteOrNull = Field(description="[s]; null for settled poses.")
+    separation_now: FiniteOrNull = Field(description="Separation by this recording [standard deviations].")
+    separation_after: FiniteOrNull = Field(description="Separation by both recordings [standard deviations].")
+    settles: bool = Field(description="Whether separation_after decides between them.")
+    candidates: list[CandidateExperimentEntry] = Field(description="All drives considered, the best first.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,20 +57,39 @@ class Experiment:
 
     rivals: the two models by their causes. reason: why these two.
     before, after: separation [standard deviations] by this recording, and with the new one.
-    candidates: all drives considered, the best first. record: the best drive as a record without readings.
+    candidates: all drives considered, the best first. proposed: the best drive as a record without readings.
+    files: the content of each file of the folder next_experiment/.
     """
 
     rivals: tuple[str, str]
     reason: str
     before: float
     after: float
-    candidates: tuple[CandidateExperiment, ...]
-    record: Record
+    candidates: tuple[CandidateExperimentEntry, ...]
+    proposed: Record
+    files: dict[str, str] = field(default_factory=dict)
 
     @property
     def settles(self) -> bool:
         """Whether the separation with the new recording decides between them."""
         return self.after >= EXPERIMENT.settles
+
+    def record(self) -> NextExperimentEntry:
+        """Its entry in diagnosis.json."""
+        best = self.candidates[0]
+        return NextExperimentEntry(
+            discriminates_between=self.rivals,
+            reason=self.reason,
+            description=best.description,
+            kind=best.kind,
+            strength=best.strength,
+            samples=len(self.proposed.drive),
+            sample_time=self.proposed.sample_time,
+            separation_now=self.before,
+            separation_after=self.after,
+            settles=self.settles,
+            candidates=list(self.candidates),
+        )
 
 
 def next_experiment(search: SearchResult, explained: bool, seed: int = 0) -> Experiment | None:
@@ -63,7 +99,7 @@ def next_experiment(search: SearchResult, explained: bool, seed: int = 0) -> Exp
     if not pairs:
         return None
     return max(
-        (found for a, b in pairs if (found := separate(fitter, a, b, reason, seed)) is not None),
+        (experiment for a, b in pairs if (experiment := separate(fitter, a, b, reason, seed)) is not None),
         key=lambda e: -e.before,
         default=None,
     )
@@ -105,7 +141,10 @@ def separate(fitter: Fitter, a: Fit, b: Fit, reason: str, seed: int = 0) -> Expe
         record, strength = given
         both = [s.plus(fitter, *pair, record).separation for s, pair in zip(now, ((a, b), (b, a)), strict=True)]
         if np.all(np.isfinite(both)):
-            rows.append((CandidateExperiment(shape.kind, shape.description, strength, min(both)), record))
+            entry = CandidateExperimentEntry(
+                kind=shape.kind, description=shape.description, strength=strength, separation=min(both)
+            )
+            rows.append((entry, record))
     if not rows:
         return None
     rows.sort(key=lambda row: -row[0].separation)
@@ -139,7 +178,7 @@ class _Sums:
 
     @classmethod
     def present(cls, fitter: Fitter, truth: Fit, refitted: Fit) -> _Sums:
-        """Over the records to fit. Prior rows of the refitted model keep its parameters near their stated values."""
+        """The sums over the records to fit. Prior rows of the refitted model keep its parameters near their stated values."""
         n = sum(r.valid.size for r in fitter.fit_records)
         delta = np.zeros(len(refitted.residual))
         delta[:n] = refitted.residual[:n] - truth.residual[:n]

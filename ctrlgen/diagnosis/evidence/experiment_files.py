@@ -24,10 +24,10 @@ def files(fitter: Fitter, fit: Fit, chosen: Experiment, device_file: str) -> dic
 
     A device with inertia gets no scenario: the solver handles devices in quasi-static balance.
     """
-    record = chosen.record
+    record = chosen.proposed
     simulator = fitter.simulator(fit.structure, record)
-    found = {DRIVE: _drive(simulator, chosen), RECORDING: _recording(fitter, simulator, chosen)}
-    return found | (_scenario(simulator, fit, chosen, device_file) if _solved(simulator.model) else {})
+    texts = {DRIVE: _drive(simulator, chosen), RECORDING: _recording(fitter, simulator, chosen)}
+    return texts | (_scenario(simulator, fit, chosen, device_file) if _solved(simulator.model) else {})
 
 
 def _solved(m: Model) -> bool:
@@ -41,7 +41,7 @@ def _csv(header: list[str], columns: np.ndarray) -> str:
 
 
 def _drive(simulator: Simulator, chosen: Experiment) -> str:
-    signal, record = simulator.model.signals["drive"], chosen.record
+    signal, record = simulator.model.signals["drive"], chosen.proposed
     units = zip(record.drive.T, signal.units, strict=True)
     columns = [difference(u, unit) for u, unit in units]
     header = [f"{c} [{u}]" for c, u in zip(signal.channels, signal.units, strict=True)]
@@ -53,7 +53,7 @@ def _drive(simulator: Simulator, chosen: Experiment) -> str:
 
 def _recording(fitter: Fitter, simulator: Simulator, chosen: Experiment) -> str:
     """A recording.toml for the experiment; the readings are to be added under the column names that it gives."""
-    recording, record, signal = fitter.recording, chosen.record, simulator.model.signals["drive"]
+    recording, record, signal = fitter.recording, chosen.proposed, simulator.model.signals["drive"]
     n = len(record.drive)
     cut = int(EXPERIMENT.fitted_share * n)
     lines = [
@@ -82,7 +82,7 @@ def _recording(fitter: Fitter, simulator: Simulator, chosen: Experiment) -> str:
 
 def _scenario(simulator: Simulator, fit: Fit, chosen: Experiment, device_file: str) -> dict[str, str]:
     """A scenario whose command is the predicted displacement; the solver finds the drives from it."""
-    m, record = simulator.model, chosen.record
+    m, record = simulator.model, chosen.proposed
     after = simulate_motion(simulator, record, fit.theta, None)[1]
     f = ca.Function("z", [ca.vertcat(m.x, m.z)], [m.z]).map(len(after))
     signal = m.signals["displacement"]

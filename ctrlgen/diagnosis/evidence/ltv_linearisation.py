@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ctrlgen.core.units import written_unit
 from ctrlgen.devices import BalancedPhysics, DevicePhysics
 from ctrlgen.diagnosis.settings import LTV_MODEL
 from ctrlgen.effects import Place
@@ -105,12 +106,23 @@ def linearise_along(fitter: Fitter, fit: Fit, record: Record) -> LtvModel:
     sd = np.zeros(simulator.n_s)
     sd[list(simulator.free_initial_states)] = initial_state_sd(simulator)
     return LtvModel(
-        record, place, tuple(probe.at for probe in placed),
-        tuple(probe.values["delta"].text.partition(" ")[2] for probe in placed), physics.travel_unit,
-        residual,
-        noise.whiten(residual, record.valid), noise.usable(record.valid), z, _velocity(simulator, record, at, z),
-        F_S, F_f, H_S, H_f, sd, np.concatenate([m.x_scale, m.z_scale]),
-    )  # fmt: skip
+        record=record,
+        place=place,
+        axes=tuple(probe.at for probe in placed),
+        units=tuple(written_unit(probe.values["delta"].text) for probe in placed),
+        travel_unit=physics.travel_unit,
+        residual=residual,
+        white=noise.whiten(residual, record.valid),
+        usable=noise.usable(record.valid),
+        displacement=z,
+        velocity=_velocity(simulator, record, at, z),
+        F_S=F_S,
+        F_f=F_f,
+        H_S=H_S,
+        H_f=H_f,
+        start_sd=sd,
+        state_scale=np.concatenate([m.x_scale, m.z_scale]),
+    )
 
 
 def _probed(fitter: Fitter, fit: Fit, record: Record, place: Place) -> tuple[Simulator, np.ndarray, list[int]]:

@@ -8,7 +8,6 @@ cause is more likely.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import PurePosixPath
 
 import numpy as np
@@ -16,89 +15,31 @@ from scipy import signal, stats
 
 from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.evidence.ltv_linearisation import LtvModel
-from ctrlgen.diagnosis.evidence.spectral_lines import SpectralLines, spectral_lines
+from ctrlgen.diagnosis.evidence.residual_location import (
+    CoordinatesEntry,
+    FrequencyBandEntry,
+    LocatedIn,
+    ResidualLocationEntry,
+    ResidualPartEntry,
+)
+from ctrlgen.diagnosis.evidence.spectral_lines import spectral_lines
 from ctrlgen.diagnosis.settings import LOCALISATION
-
-
-@dataclass(frozen=True)
-class ResidualPart:
-    """The residual in one part of the recording.
-
-    excess: mean square of the whitened residual, less 1, with its interval. share: of the whole excess.
-    mean: mean of the residual [unit] with its interval. n: samples.
-    """
-
-    label: str
-    excess: float
-    ci95: tuple[float, float]
-    share: float
-    mean: float
-    mean_ci95: tuple[float, float]
-    unit: str
-    n: int
-
-
-@dataclass(frozen=True)
-class FrequencyBand:
-    """The residual in one frequency band [Hz].
-
-    excess: power of the whitened residual in the band, less 1, with its interval.
-    coherence: largest coherence of any reading's residual with any drive; noise alone exceeds `coherence_floor` with 5 %.
-    """
-
-    low: float
-    high: float
-    excess: float
-    ci95: tuple[float, float]
-    coherence: float | None
-    coherence_floor: float | None
-
-
-@dataclass(frozen=True)
-class Coordinates:
-    """How sparse the excess is in the coordinates of the readings and in those of the actuators.
-
-    participation_ratio: effective number of coordinates with excess, by "reading" and "actuator".
-    explained_by_one: share of the excess that each coordinate alone could explain.
-    located_in: the kind of which one coordinate explains more, or why neither can be named.
-    """
-
-    participation_ratio: dict[str, float]
-    explained_by_one: dict[str, dict[str, float]]
-    located_in: str
-
-
-@dataclass(frozen=True)
-class ResidualLocation:
-    """Where the residual of one fit is; `statements` are the sentences that follow."""
-
-    excess: float
-    by_reading: tuple[ResidualPart, ...]
-    by_actuator: tuple[ResidualPart, ...]
-    coordinates: Coordinates
-    by_frequency: tuple[FrequencyBand, ...]
-    by_travel: dict[str, tuple[ResidualPart, ...]]
-    by_direction: dict[str, tuple[ResidualPart, ...]]
-    by_time: tuple[ResidualPart, ...]
-    by_temperature: tuple[ResidualPart, ...]
-    spectral_lines: tuple[SpectralLines, ...]
-    statements: tuple[str, ...]
 
 
 def localise_residual(
     models: list[LtvModel], channels: tuple[str, ...], units: tuple[str, ...], seed: int = 0
-) -> ResidualLocation:
+) -> ResidualLocationEntry:
     """Localises the residual of the LTV models `models`, one a record; `channels` names the readings, `units` their units.
 
     `seed` draws the bootstrap.
     """
     maps = _Maps(models, seed)
     axes = models[0].axes
-    outputs = tuple(
+    outputs = [
         maps.sizes(maps.white[:, i], maps.usable[:, i], [(name, np.ones(maps.n, bool))], maps.residual[:, i], unit)[0]
         for i, (name, unit) in enumerate(zip(channels, units, strict=True))
-    )
-    actuators: list[ResidualPart] = []
+    ]
+    actuators: list[ResidualPartEntry] = []
     regions, directions = {}, {}
     for i, axis in enumerate(axes):
         a, sized, unit = maps.actuators[:, i], maps.actuators_white[:, i], models[0].units[i]
@@ -110,13 +51,25 @@ def localise_residual(
         )
     norm, whole = np.sqrt(np.mean(maps.white**2, axis=1)), np.any(maps.usable, axis=1)
     ambient = _quintiles(maps.ambient, "delta_degC") if maps.ambient is not None else []
-    located = ResidualLocation(
-        maps.excess, _shared(outputs), _shared(tuple(actuators)), maps.coordinates(channels), _bands(models), regions,
-        directions, maps.sizes(norm, whole, maps.times(), norm, "1"), maps.sizes(norm, whole, ambient, norm, "1"),
-        tuple(row for a in models for i in range(len(channels)) if (row := spectral_lines(a.record, i, channels[i], units[i]))),
-        (),
-    )  # fmt: skip
-    return ResidualLocation(**{**located.__dict__, "statements": _statements(located)})
+    located = ResidualLocationEntry(
+        excess=maps.excess,
+        by_reading=_shared(outputs),
+        by_actuator=_shared(actuators),
+        coordinates=maps.coordinates(channels),
+        by_frequency=_bands(models),
+        by_travel=regions,
+        by_direction=directions,
+        by_time=maps.sizes(norm, whole, maps.times(), norm, "1"),
+        by_temperature=maps.sizes(norm, whole, ambient, norm, "1"),
+        spectral_lines=[
+            row
+            for a in models
+            for i, (name, unit) in enumerate(zip(channels, units, strict=True))
+            if (row := spectral_lines(a.record, i, name, unit))
+        ],
+        statements=[],
+    )
+    return located.model_copy(update={"statements": _statements(located)})
 
 
 def _quintiles(values: np.ndarray, unit: str) -> list[tuple[str, np.ndarray]]:
@@ -136,10 +89,10 @@ def _without_position(values: np.ndarray, d: np.ndarray, usable: np.ndarray) -> 
     return values - powers @ np.linalg.lstsq(powers[usable], values[usable], rcond=1e-10)[0]
 
 
-def _shared(sizes: tuple[ResidualPart, ...]) -> tuple[ResidualPart, ...]:
+def _shared(parts: list[ResidualPartEntry]) -> list[ResidualPartEntry]:
     """The parts with their shares of the excess, where they make up the whole."""
-    total = sum(max(s.excess, 0.0) for s in sizes)
-    return tuple(ResidualPart(**{**s.__dict__, "share": max(s.excess, 0.0) / total if total else 0.0}) for s in sizes)
+    total = sum(max(p.excess, 0.0) for p in parts)
+    return [p.model_copy(update={"share": max(p.excess, 0.0) / total if total else 0.0}) for p in parts]
 
 
 class _Maps:
@@ -165,13 +118,8 @@ class _Maps:
         self.along_each = np.concatenate([c[2] for c in coordinates])
 
     def sizes(
-        self,
-        white: np.ndarray,
-        usable: np.ndarray,
-        cells: list[tuple[str, np.ndarray]],
-        values: np.ndarray,
-        unit: str,
-    ) -> tuple[ResidualPart, ...]:
+        self, white: np.ndarray, usable: np.ndarray, cells: list[tuple[str, np.ndarray]], values: np.ndarray, unit: str
+    ) -> list[ResidualPartEntry]:
         """The residual in each cell (label, mask), with bootstrap intervals; cells of too few samples are left out."""
         parts = []
         weights = self.rng.multinomial(
@@ -195,11 +143,18 @@ class _Maps:
             share = float(np.clip((squares.sum() - n) / total, 0, 1))
             mean = float(difference(sums.sum() / n, unit))
             parts.append(
-                ResidualPart(
-                    label, excess, (float(low), float(high)), share, mean, (float(bounds[0]), float(bounds[1])), unit, n
+                ResidualPartEntry(
+                    label=label,
+                    excess=excess,
+                    ci95=(low, high),
+                    share=share,
+                    mean=mean,
+                    mean_ci95=(bounds[0], bounds[1]),
+                    unit=unit,
+                    n=n,
                 )
             )
-        return tuple(parts)
+        return parts
 
     def times(self) -> list[tuple[str, np.ndarray]]:
         """Tenths of each record, by the time of the recording."""
@@ -218,26 +173,30 @@ class _Maps:
             first += n
         return cells
 
-    def coordinates(self, channels: tuple[str, ...]) -> Coordinates:
+    def coordinates(self, channels: tuple[str, ...]) -> CoordinatesEntry:
         """Sparsity of the excess in both kinds of coordinates."""
         w, a, rows = self.white[self.complete], self.actuators_white[self.complete], self.along_each[self.complete]
         total = float(np.sum(w**2) - w.size)
         if total < LOCALISATION.least_excess * np.sqrt(2 * w.size):
-            return Coordinates({}, {}, "there is no significant excess")
+            return CoordinatesEntry(participation_ratio={}, explained_by_one={}, located_in=LocatedIn.NO_EXCESS)
+
+        def explained(v: np.ndarray) -> np.ndarray:
+            return np.clip((np.sum(v**2, axis=0) - len(w)) / total, 0, 1)
+
         alone = {
-            kind: {name: float(x) for name, x in zip(names, np.clip((np.sum(v**2, axis=0) - len(w)) / total, 0, 1), strict=True)}
+            kind: dict(zip(names, explained(v), strict=True))
             for kind, names, v in (("reading", channels, w), ("actuator", self.models[0].axes, rows))
-        }  # fmt: skip
+        }
         ratios = {"reading": _participation(w), "actuator": _participation(a)}
         best = {kind: max(values.values()) for kind, values in alone.items()}
         gap = best["actuator"] - best["reading"]
         if len(channels) == 1:
-            kind = "cannot be told from one reading"
+            kind = LocatedIn.ONE_READING
         elif abs(gap) < LOCALISATION.stands_out:
-            kind = "neither readings nor actuators"
+            kind = LocatedIn.NEITHER
         else:
-            kind = "actuator" if gap > 0 else "reading"
-        return Coordinates(ratios, alone, kind)
+            kind = LocatedIn.ACTUATOR if gap > 0 else LocatedIn.READING
+        return CoordinatesEntry(participation_ratio=ratios, explained_by_one=alone, located_in=kind)
 
 
 def _blocks(lengths: list[int]) -> np.ndarray:
@@ -280,10 +239,10 @@ def _participation(w: np.ndarray) -> float:
     return float(e.sum() ** 2 / np.sum(e**2)) if np.any(e > 0) else float("nan")
 
 
-def _bands(models: list[LtvModel]) -> tuple[FrequencyBand, ...]:
+def _bands(models: list[LtvModel]) -> list[FrequencyBandEntry]:
     """Logarithmic bands from one over the longest record's duration to half the sampling rate; none for settled poses."""
     if models[0].poses:
-        return ()
+        return []
     longest, fastest = (
         max(a.record.sample_time * len(a.white) for a in models),
         min(a.record.sample_time for a in models),
@@ -307,15 +266,20 @@ def _bands(models: list[LtvModel]) -> tuple[FrequencyBand, ...]:
         measured = [value for c, _ in coherences if (value := c[k]) is not None]
         floor = max((f for c, f in coherences if c[k] is not None), default=None)
         bands.append(
-            FrequencyBand(
-                float(edges[k]), float(edges[k + 1]), float(level - 1), (low, high), max(measured, default=None), floor
+            FrequencyBandEntry(
+                low=edges[k],
+                high=edges[k + 1],
+                excess=level - 1,
+                ci95=(low, high),
+                coherence=max(measured, default=None),
+                coherence_floor=floor,
             )
         )
-    return tuple(bands)
+    return bands
 
 
 def _coherence(a: LtvModel, edges: np.ndarray) -> tuple[list[float | None], float]:
-    """By band, the largest coherence of a reading's residual with a drive; and the coherence that chance exceeds with 5 %."""
+    """The largest coherence of a reading's residual with a drive, a value a band; and the coherence that chance exceeds with 5 %."""
     segment = max(len(a.white) // LOCALISATION.coherence_segments * 2, 8)
     averages = max(2 * len(a.white) // segment - 1, 2)
     best: list[float | None] = [None] * (len(edges) - 1)
@@ -331,14 +295,15 @@ def _coherence(a: LtvModel, edges: np.ndarray) -> tuple[list[float | None], floa
     return best, float(1 - 0.05 ** (1 / (averages - 1)))
 
 
-def _statements(located: ResidualLocation) -> tuple[str, ...]:
+def _statements(located: ResidualLocationEntry) -> list[str]:
+    """What follows from the parts, in sentences."""
     sentences = []
     if located.by_reading:
         most = max(located.by_reading, key=lambda s: s.share)
         if most.ci95[0] > 0:
             sentences.append(f"{most.label} has {most.share:.0%} of the excess over the noise")
     kind = located.coordinates.located_in
-    if kind in ("actuator", "reading"):
+    if kind in (LocatedIn.ACTUATOR, LocatedIn.READING):
         name, share = max(located.coordinates.explained_by_one[kind].items(), key=lambda item: item[1])
         sentences.append(f"{kind} {name} alone could explain {share:.0%} of it")
     for axis, sides in located.by_direction.items():
@@ -349,4 +314,4 @@ def _statements(located: ResidualLocation) -> tuple[str, ...]:
                 sentences.append(
                     f"{axis} depends on direction: {gap:.3g} {sides[0].unit} between forward and backward motion"
                 )
-    return (*sentences, *(f"{line.channel} in {line.record}: {line.statement}" for line in located.spectral_lines))
+    return [*sentences, *(f"{line.channel} in {line.record}: {line.statement}" for line in located.spectral_lines)]

@@ -8,39 +8,34 @@ Source: R. Pintelon, J. Schoukens, System Identification: A Frequency Domain App
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
+from pydantic import Field
 from scipy import stats
 
 from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.settings import SPECTRAL_LINES
 from ctrlgen.estimation.noise import drive_period
 from ctrlgen.recordings.recording import Record
+from ctrlgen.reporting.result_file import FiniteOrNull, Keys, Number
 
 
-@dataclass(frozen=True)
-class SpectralLines:
-    """Response of one reading by kind of spectral line, root mean square [unit].
+class SpectralLinesEntry(Keys):
+    """Response of one reading to a periodic drive, by kind of spectral line, root mean square in unit."""
 
-    excited: at the lines of the drive. odd, even: at harmonics that are not excited, None without such lines.
-    noise: of the noise in as many lines. p_odd, p_even: p-values of these lines under noise alone.
-    """
-
-    record: str
-    channel: str
-    unit: str
-    periods: int
-    excited: float
-    odd: float | None
-    even: float | None
-    noise: float
-    p_odd: float | None
-    p_even: float | None
-    statement: str
+    record: str = Field(description="Name of the record.")
+    channel: str = Field(description="The reading.")
+    unit: str = Field(description="Unit of the four levels.")
+    periods: int = Field(description="Periods averaged.")
+    excited: FiniteOrNull = Field(description="At the lines of the drive.")
+    odd: Number = Field(description="At odd harmonics that are not driven; null without any.")
+    even: Number = Field(description="At even harmonics that are not driven; null without any.")
+    noise: FiniteOrNull = Field(description="Noise in as many lines.")
+    p_odd: Number = Field(description="p-value of the odd lines under noise alone.")
+    p_even: Number = Field(description="p-value of the even lines under noise alone.")
+    statement: str = Field(description="What follows.")
 
 
-def spectral_lines(record: Record, i: int, channel: str, unit: str) -> SpectralLines | None:
+def spectral_lines(record: Record, i: int, channel: str, unit: str) -> SpectralLinesEntry | None:
     """Spectral lines of reading `i`; None where the drive has fewer than three periods or readings are missing."""
     P = drive_period(record.drive)
     if P is None or len(record.time) < 3 * P:
@@ -49,9 +44,8 @@ def spectral_lines(record: Record, i: int, channel: str, unit: str) -> SpectralL
     if not record.valid[P : whole * P, i].all():
         return None
     drive = np.abs(np.fft.rfft(record.drive[:P], axis=0))[1:] / P
-    spectra = (
-        np.fft.rfft(record.observed[P : whole * P, i].reshape(-1, P), axis=1)[:, 1:] / P
-    )  # without the first period, in which the device settles
+    # without the first period, in which the device settles
+    spectra = np.fft.rfft(record.observed[P : whole * P, i].reshape(-1, P), axis=1)[:, 1:] / P
     m = len(spectra)
     if m < 2:
         return None
@@ -61,7 +55,8 @@ def spectral_lines(record: Record, i: int, channel: str, unit: str) -> SpectralL
     if not excited.any():
         return None
     mean = spectra.mean(axis=0)
-    noise = np.sum(np.abs(spectra - mean) ** 2, axis=0) / (m - 1) / m  # variance of the mean over periods, by line
+    # variance of the mean over periods, by line
+    noise = np.sum(np.abs(spectra - mean) ** 2, axis=0) / (m - 1) / m
     near = harmonics <= SPECTRAL_LINES.highest * harmonics[excited].max()
     kinds = {"odd": harmonics % 2 == 1, "even": harmonics % 2 == 0}
     levels, p = {}, {}
@@ -70,10 +65,19 @@ def spectral_lines(record: Record, i: int, channel: str, unit: str) -> SpectralL
         levels[kind] = None if not chosen.any() else _rms(np.abs(mean[chosen]) ** 2, unit)
         p[kind] = None if not chosen.any() else _p(mean[chosen], noise[chosen], m)
     both = bool(np.any(excited & kinds["odd"]) and np.any(excited & kinds["even"]))
-    return SpectralLines(
-        record.name, channel, unit, m, _rms(np.abs(mean[excited]) ** 2, unit), levels["odd"], levels["even"],
-        _rms(noise[near], unit), p["odd"], p["even"], _statement(p, both),
-    )  # fmt: skip
+    return SpectralLinesEntry(
+        record=record.name,
+        channel=channel,
+        unit=unit,
+        periods=m,
+        excited=_rms(np.abs(mean[excited]) ** 2, unit),
+        odd=levels["odd"],
+        even=levels["even"],
+        noise=_rms(noise[near], unit),
+        p_odd=p["odd"],
+        p_even=p["even"],
+        statement=_statement(p, both),
+    )
 
 
 def _rms(squares: np.ndarray, unit: str) -> float:

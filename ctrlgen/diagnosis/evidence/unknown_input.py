@@ -50,12 +50,9 @@ class _Problem:
         self.n = min(len(model.white), UNKNOWN_INPUT.most_samples)
         self.m, self.k = model.F_S.shape[1], model.F_f.shape[2]
         self.model, self.size = model, size
-        density = noise.sd / np.array(
-            [1 - min(np.sum(a), 0.99) for a in noise.ar]
-        )  # coloured noise is taken as white noise
-        self.sd = np.maximum(
-            density, noise.floor
-        )  # of its density at zero frequency, so that slow noise does not appear as a force
+        # coloured noise is taken as white noise of its density at zero frequency, so that slow noise does not appear as a force
+        density = noise.sd / np.array([1 - min(np.sum(a), 0.99) for a in noise.ar])
+        self.sd = np.maximum(density, noise.floor)
         self.residual = model.residual / self.sd
         scale = np.concatenate([np.where(model.start_sd > 0, model.start_sd, model.state_scale), size])
         self.up, self.down = scale, 1 / scale

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -12,16 +12,10 @@ from matplotlib.figure import Figure
 from scipy.signal import freqz, welch
 
 from ctrlgen.core.units import from_si
+from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.narrative import short
-from ctrlgen.diagnosis.report.plot_maps import draw_unknown, draw_where
 from ctrlgen.diagnosis.report.plot_shares import draw_shares
-from ctrlgen.diagnosis.report.plot_uncertainty import (
-    draw_confusability,
-    draw_intervals,
-    draw_profiles,
-    draw_rivals,
-)
-from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis
+from ctrlgen.diagnosis.report.plot_uncertainty import draw_confusability, draw_intervals, draw_profiles, draw_rivals
 from ctrlgen.recordings.recording import Record
 from ctrlgen.reporting.plots import COLOURS, STYLE, svg
 
@@ -35,20 +29,20 @@ BANDS = 20  # bands a decade
 def draw_all(diagnosis: Diagnosis) -> dict[str, str]:
     """SVG text by name of every plot for which this diagnosis has data."""
     residuals = Residuals(diagnosis)
-    drawings: dict[str, Callable[[], Figure | None]] = {
-        "residuals": lambda: draw_residuals(residuals),
-        "spectrum": lambda: draw_spectrum(residuals),
-        "shares_before": lambda: _shares(diagnosis, after=False),
-        "shares_after": lambda: _shares(diagnosis, after=True),
-        "where": lambda: draw_where(diagnosis),
-        "unknown": lambda: draw_unknown(diagnosis),
-        "rivals": lambda: draw_rivals(diagnosis),
-        "confusability": lambda: draw_confusability(diagnosis),
-        "intervals": lambda: draw_intervals(diagnosis),
-        "profiles": lambda: draw_profiles(diagnosis),
-    }
+    force = diagnosis.unmodelled_force
     with plt.rc_context(STYLE):
-        figures = {name: draw() for name, draw in drawings.items()}
+        figures: dict[str, Figure | None] = {
+            "residuals": draw_residuals(residuals),
+            "spectrum": draw_spectrum(residuals),
+            "shares_before": _shares(diagnosis, after=False),
+            "shares_after": _shares(diagnosis, after=True),
+            **diagnosis.residual_location.figures(),
+            **({} if force is None else force.figures()),
+            "rivals": draw_rivals(diagnosis),
+            "confusability": draw_confusability(diagnosis),
+            "intervals": draw_intervals(diagnosis),
+            "profiles": draw_profiles(diagnosis),
+        }
         return {name: svg(figure) for name, figure in figures.items() if figure is not None}
 
 
@@ -89,8 +83,8 @@ class Residuals:
 
 
 def draw_residuals(residuals: Residuals) -> Figure:
-    """By channel: the residual before and after the correction, and after alone on its own scale with the noise; one panel
-    where nothing was corrected."""
+    """The figure of the residual, a row a channel: before and after the correction and, on its own scale with the noise, after
+    alone; one panel where nothing was corrected."""
     channels, wide = residuals.recording.channels, 1 + residuals.changed
     size = (WIDTH, 0.9 + 1.55 * len(channels))
     figure, axes = plt.subplots(len(channels), wide, figsize=size, sharex=True, squeeze=False)

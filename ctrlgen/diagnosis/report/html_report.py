@@ -9,25 +9,19 @@ import numpy as np
 
 from ctrlgen.core.units import show
 from ctrlgen.devices.changed_numbers import written
-from ctrlgen.diagnosis.report.diagnosis_json import Provenance, diagnosis_record
+from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
+from ctrlgen.diagnosis.report.diagnosis_record import Provenance, location_record, shares_record
 from ctrlgen.diagnosis.report.figures import draw_all
-from ctrlgen.diagnosis.report.narrative import (
-    gathered,
-    hard,
-    interval,
-    next_steps,
-    number,
-    plain_name,
-    sentence,
-    share_text,
-    unknown_lines,
-)
+from ctrlgen.diagnosis.report.narrative import gathered, hard, interval, next_steps, plain_name, sentence, share_text
 from ctrlgen.diagnosis.report.shares_sentences import family_shares, per_cent, shares_sentences
-from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis, Finding
+from ctrlgen.diagnosis.selection.findings import Finding
+from ctrlgen.diagnosis.selection.search_history import search_history
 from ctrlgen.diagnosis.settings import SHARES
 from ctrlgen.estimation.hypothesis import PARAMETER, numbers
 from ctrlgen.estimation.robust_covariance import robust_deviations
 from ctrlgen.reporting.html import render
+from ctrlgen.reporting.numbers import number
+from ctrlgen.reporting.result_file import Keys, origin
 
 CAPTIONS = {
     "residuals": "Residual on the held-out records. Gaps are samples that were marked as not usable.",
@@ -56,7 +50,10 @@ def page(diagnosis: Diagnosis, provenance: Provenance) -> str:
     """The page as HTML text."""
     return render(
         Path(__file__).with_name("diagnosis.html.j2"),
-        d=diagnosis_record(diagnosis, provenance),
+        d=diagnosis,
+        origin=origin(provenance.inputs, provenance.seed),
+        trees={name: entry.as_json() for name, entry in _entries(diagnosis).items() if entry is not None},
+        history=[entry.as_json() for entry in search_history(diagnosis.search)],
         title=diagnosis.recording.title,
         device_title=diagnosis.device.title,
         counts=counts(diagnosis),
@@ -68,13 +65,24 @@ def page(diagnosis: Diagnosis, provenance: Provenance) -> str:
         captions=CAPTIONS,
         notes=gathered(diagnosis.notes),
         changed=_changed(diagnosis),
-        unknown=unknown_lines(diagnosis),
+        unknown=[] if diagnosis.unmodelled_force is None else diagnosis.unmodelled_force.sentences(),
         shares=shares_sentences(diagnosis),
         families=_families(diagnosis),
         source=diagnosis.device.source,
         number=number,
         hard=hard,
     )
+
+
+def _entries(diagnosis: Diagnosis) -> dict[str, Keys | None]:
+    """What the page shows number by number, as diagnosis.json states it."""
+    experiment = diagnosis.next_experiment
+    return {
+        "shares": shares_record(diagnosis),
+        "residual_location": location_record(diagnosis),
+        "detectability": diagnosis.detectability,
+        "next_experiment": None if experiment is None else experiment.record(),
+    }
 
 
 def counts(diagnosis: Diagnosis) -> str:
@@ -103,11 +111,15 @@ def _families(diagnosis: Diagnosis) -> list[dict[str, str]]:
 
 def _row(f: Finding) -> dict[str, Any]:
     return {
-        "plain": plain_name(f.effect), "effect": f.effect, "location": f.location, "of": f.cause.of,
+        "plain": plain_name(f.effect),
+        "effect": f.effect,
+        "location": f.location,
+        "of": f.cause.of,
         "numbers": [(name, interval(e)) for name, e in f.parameters.items()],
         "alternatives": [{"effect": h.effect, "location": h.location} for h in f.alternatives],
-        "share": share_text(f.share), "source": f.source,
-    }  # fmt: skip
+        "share": share_text(f.share),
+        "source": f.source,
+    }
 
 
 def _tested(diagnosis: Diagnosis) -> str:

@@ -6,30 +6,24 @@ import math
 import re
 from collections.abc import Sequence
 
+from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.selection.attribution import Share
-from ctrlgen.diagnosis.selection.diagnosis_result import ChannelError, Diagnosis, Estimate, Finding
-from ctrlgen.diagnosis.selection.verdict import (
-    AMBIGUOUS,
-    CONSISTENT,
-    EXPLAINED,
-    PARTLY,
-    UNEXPLAINED,
-    contradicts_datasheet,
-    within_tolerance,
-)
+from ctrlgen.diagnosis.selection.findings import ChannelError, Estimate, Finding
+from ctrlgen.diagnosis.selection.verdict import Verdict, contradicts_datasheet, within_tolerance
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.reporting.numbers import number
 
 NAMED = 3  # findings that the first sentence names
 WIDE = 1.0  # a dimensionless number whose interval lies within this is shown in per cent
 HARD_SPACE = "\u00a0"
 EDGE = 1e-6  # share of its interval within which an estimate counts as on the interval's end
 HEADLINE = {
-    EXPLAINED: "Explained",
-    PARTLY: "Partly explained",
-    AMBIGUOUS: "Ambiguous",
-    UNEXPLAINED: "Unexplained",
-    CONSISTENT: "Consistent",
+    Verdict.EXPLAINED: "Explained",
+    Verdict.PARTLY: "Partly explained",
+    Verdict.AMBIGUOUS: "Ambiguous",
+    Verdict.UNEXPLAINED: "Unexplained",
+    Verdict.CONSISTENT: "Consistent",
 }
 
 
@@ -76,16 +70,6 @@ def _to_width(value: float, width: float) -> str:
         return number(value)
     digits = math.floor(math.log10(max(abs(value), width))) - math.floor(math.log10(width)) + 2
     return number(value, max(2, min(digits, 9)))
-
-
-def number(value: float, digits: int = 4) -> str:
-    """A number as text: '0.00412', '1.2e-07', '53800'."""
-    if not math.isfinite(value):
-        return "not known"
-    if value and (abs(value) >= 1e6 or abs(value) < 1e-4):
-        return f"{value:.{digits - 1}e}"
-    exact = f"{value:.{digits}g}"
-    return f"{float(exact):.0f}" if "e" in exact else exact
 
 
 def channel_sentence(channel: str, error: ChannelError) -> str:
@@ -142,14 +126,14 @@ def sentence(diagnosis: Diagnosis) -> str:
     findings, verdict = diagnosis.findings, diagnosis.verdict
     head, chosen = HEADLINE[verdict], diagnosis.search.chosen
     far = contradicts_datasheet(chosen.fit)
-    if verdict == CONSISTENT:
+    if verdict == Verdict.CONSISTENT:
         text = f"{head}: the device file ({diagnosis.device.title}) lacks nothing that this recording can show"
         text += f"{_blind(diagnosis) or _within(diagnosis)}."
     elif far and (diagnosis.residual_tests.passed or not findings):
         text = f"{head}: {_beyond(diagnosis, far)}{f'; the model also needs {named(findings)}' if findings else ''}."
     elif not findings:
         text = f"{head}: the recording differs from {diagnosis.device.title}, and no known effect explains it."
-    elif verdict == UNEXPLAINED:
+    elif verdict == Verdict.UNEXPLAINED:
         text = f"{head}: no confirmed cause takes away most of the mismatch; the best are {named(findings)}{_rest(diagnosis)}."
     else:
         text = f"{head}: {named(findings)}{_rivals(diagnosis)}{_rest(diagnosis)}."
@@ -201,7 +185,7 @@ def _beyond(diagnosis: Diagnosis, far: dict[str, float]) -> str:
 def _rivals(diagnosis: Diagnosis) -> str:
     """'; this recording cannot tell it from thermal_lag at actuator:axis', for an ambiguous verdict."""
     others = dict.fromkeys(hypothesis_name(h) for f in diagnosis.findings for h in f.alternatives)
-    if diagnosis.verdict != AMBIGUOUS or not others:
+    if diagnosis.verdict != Verdict.AMBIGUOUS or not others:
         return ""
     return f"; this recording cannot tell it from {' or '.join(others)}"
 
@@ -212,18 +196,15 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
     use = "Use device.next.toml in place of the device file: solve and generate the C with it, then record again to confirm."
     known = all(e.noise_floor is not None for e in diagnosis.held_out.values())
     rest = "" if known else " Record a period at rest (drive off), or repeat poses, so that the noise can be estimated."
-    if verdict == CONSISTENT:
-        unseen = (
-            " Effects smaller than those listed in the report would not have been detected."
-            if diagnosis.detectability
-            else ""
-        )
-        return [f"Nothing to correct.{unseen}{rest}"]
-    if verdict == EXPLAINED:
+    if verdict == Verdict.CONSISTENT:
+        return [
+            f"Nothing to correct. Effects smaller than those listed in the report would not have been detected.{rest}"
+        ]
+    if verdict == Verdict.EXPLAINED:
         return [use]
-    if verdict == AMBIGUOUS:
+    if verdict == Verdict.AMBIGUOUS:
         first = "None of the drives considered would decide between the alternatives: measure one directly, with another sensor."
-        if (diagnosis.next_experiment or {}).get("settles"):
+        if diagnosis.next_experiment is not None and diagnosis.next_experiment.settles:
             first = "Run the next experiment (next_experiment/) to decide between the alternatives; until then the cause is not known."
         return [
             first,
@@ -240,7 +221,7 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
         steps.append(
             f"No held-out record shows {names}: hold out a record that covers the same range as the records to fit."
         )
-    if verdict == UNEXPLAINED:
+    if verdict == Verdict.UNEXPLAINED:
         steps.append("Check wiring, units and clocks of the set-up: no known effect takes away most of the mismatch.")
     return [*steps, *(f"Not taken: {text}." for text in refusals(diagnosis))]
 
@@ -284,15 +265,10 @@ def empirical_sentences(diagnosis: Diagnosis) -> list[str]:
 
 
 FUNCTIONS = {
-    "empirical_position": "the position", "empirical_speed": "the speed and its direction",
+    "empirical_position": "the position",
+    "empirical_speed": "the speed and its direction",
     "empirical_history": "the last reversals",
-}  # fmt: skip
-
-
-def unknown_lines(diagnosis: Diagnosis) -> list[str]:
-    """What the unknown input depends on: it describes the residual and names no cause."""
-    force = diagnosis.extra.get("unmodelled_force")
-    return list(force["statements"]) if force else []
+}
 
 
 def hard(text: str) -> str:

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ctrlgen.core.units import difference
-from ctrlgen.diagnosis.shares.regressors import Columns, Kind
+from ctrlgen.diagnosis.shares.design import Columns, Kind
 from ctrlgen.diagnosis.shares.shares_table import ChannelShares, SharesTable
 from ctrlgen.reporting.plots import COLOURS
 
@@ -120,7 +120,7 @@ def _abscissa(table: SharesTable, channel: ChannelShares, kind: Kind) -> tuple[n
     blocks = list(table.design.of_kind(stands_for.get(kind, kind), channel.own))
     blocks = blocks or [b for b in table.design.blocks if b.kind is Kind.TIME]
     best = max(blocks, key=lambda block: _explained(block, channel.predictions[kind]))
-    x, name = best.abscissa, best.signal.partition(" x ")[0]
+    x, name = best.abscissa, best.signal
     if kind is Kind.PITCH:
         period = channel.periods[kind]
         return (x / period) % 1.0, f"{name} in the pitch", "periods"

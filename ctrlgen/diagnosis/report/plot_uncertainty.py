@@ -10,12 +10,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ctrlgen.core.to_json import plain
-from ctrlgen.diagnosis.report.narrative import hypothesis_name, number
+from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
+from ctrlgen.diagnosis.report.narrative import hypothesis_name
 from ctrlgen.diagnosis.selection.candidate_model import Round
-from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis
-from ctrlgen.diagnosis.settings import SEARCH
+from ctrlgen.diagnosis.selection.confusable import likeness
+from ctrlgen.diagnosis.settings import CONFUSABLE
+from ctrlgen.estimation.profile_likelihood import Profile
 from ctrlgen.estimation.settings import STATISTICS
+from ctrlgen.reporting.numbers import number
 from ctrlgen.reporting.plots import COLOURS
 
 FIGURE_WIDTH = 8.6
@@ -46,23 +48,23 @@ def draw_rivals(diagnosis: Diagnosis) -> Figure | None:
 
 def _rival_bars(panel: Axes, round_: Round, kept: set[Any]) -> None:
     best = round_.criteria[0]
-    far = max(10 * SEARCH.rival_difference, *(T - best for T in round_.criteria))
+    far = max(10 * CONFUSABLE.criterion, *(T - best for T in round_.criteria))
     labels = []
     for row, (candidate, criterion) in enumerate(zip(round_.candidates, round_.criteria, strict=True)):
         worse = criterion - best
         added = [c for c in candidate.causes if c not in round_.before.causes]  # several where a set is tried
         names = " + ".join(map(hypothesis_name, added)) or "fewer causes"
         labels.append(textwrap.fill(names, WIDE_LABEL, break_long_words=False))
-        colour = FOUND if added and kept.issuperset(added) else ALIKE if worse < SEARCH.rival_difference else WORSE
+        colour = FOUND if added and kept.issuperset(added) else ALIKE if worse < CONFUSABLE.criterion else WORSE
         panel.barh(row, worse, color=colour, height=0.6)
         panel.plot(0, row, "o", color=colour, ms=5, clip_on=False)
         _beside(panel, worse, row, number(worse, 3) if row else "best")
     panel.set_yticks(range(len(labels)), labels, fontsize=8)
     panel.invert_yaxis()
-    panel.set_xscale("symlog", linthresh=SEARCH.rival_difference)
+    panel.set_xscale("symlog", linthresh=CONFUSABLE.criterion)
     panel.set_xlim(0, 30 * far)
     panel.set_xticks([0, *(10.0**k for k in range(1, int(np.log10(30 * far)) + 1))])
-    panel.axvline(SEARCH.rival_difference, color="#666666", lw=1, ls=":")
+    panel.axvline(CONFUSABLE.criterion, color="#666666", lw=1, ls=":")
 
 
 def _beside(panel: Axes, x: float, y: float, text: str) -> None:
@@ -77,7 +79,7 @@ def draw_confusability(diagnosis: Diagnosis) -> Figure | None:
     top = screened.suspects[:SUSPECTS]
     if len(top) < 2:
         return None
-    values = np.array([[screened.confusability(a, b) for b in top] for a in top])
+    values = np.array([[likeness(screened, a, b) for b in top] for a in top])
     labels = [textwrap.fill(hypothesis_name(s.hypothesis), LABEL, break_long_words=False) for s in top]
     figure, panel = plt.subplots(figsize=(FIGURE_WIDTH, 1.9 + 0.42 * len(top)))
     panel.imshow(values, cmap="Blues", vmin=0, vmax=1, aspect="auto")
@@ -136,7 +138,7 @@ def _percent(value: float) -> str:
 
 def draw_profiles(diagnosis: Diagnosis) -> Figure | None:
     """Profile likelihoods: the rise of the objective when one parameter is held and the others are refitted."""
-    profiles = [p for p in plain(diagnosis.profiles) if len(p["points"]) > 2][:PROFILES]
+    profiles = [p for p in diagnosis.profiles if len(p.points) > 2][:PROFILES]
     if not profiles:
         return None
     columns = min(3, len(profiles))
@@ -151,16 +153,16 @@ def draw_profiles(diagnosis: Diagnosis) -> Figure | None:
     return figure
 
 
-def _profile(panel: Axes, p: dict[str, Any]) -> None:
-    x, rise = np.array(p["points"], float).T
-    root = np.sqrt(np.maximum(rise, 0.0)) * np.sign(x - p["value"])
+def _profile(panel: Axes, p: Profile) -> None:
+    x, rise = np.array(p.points, float).T
+    root = np.sqrt(np.maximum(rise, 0.0)) * np.sign(x - p.value)
     fine = np.linspace(x[0], x[-1], 101)
     panel.plot(fine, np.interp(fine, x, root) ** 2, color=FOUND, lw=1.2)
     panel.plot(x, rise, "o", ms=3.5, color=FOUND)
     panel.axhline(STATISTICS.z_95**2, color="#666666", lw=1, ls=":")
-    panel.axvspan(*p["ci95"], color=FOUND, alpha=0.12, lw=0)
-    unit = "" if p["unit"] == "1" else f" [{p['unit']}]"
-    panel.set_xlabel(f"{p['parameter']}{unit}")
-    panel.set_title(textwrap.fill(f"{p['effect']} at {p['location']}", LABEL), fontsize=8)
+    panel.axvspan(*p.ci95, color=FOUND, alpha=0.12, lw=0)
+    unit = "" if p.unit == "1" else f" [{p.unit}]"
+    panel.set_xlabel(f"{p.parameter}{unit}")
+    panel.set_title(textwrap.fill(f"{p.effect} at {p.location}", LABEL), fontsize=8)
     panel.locator_params("x", nbins=4)
     panel.tick_params(labelsize=7.5)

@@ -2,18 +2,31 @@
 
 from __future__ import annotations
 
-from ctrlgen.diagnosis.report.narrative import empirical_sentences, number, short
-from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis
-from ctrlgen.diagnosis.selection.verdict import CONSISTENT
+from enum import Enum
+
+from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
+from ctrlgen.diagnosis.report.narrative import empirical_sentences, short
+from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.diagnosis.settings import SHARES
+from ctrlgen.diagnosis.shares.design import Kind
 from ctrlgen.diagnosis.shares.families import SPEAKS_FOR, Family, ranking
-from ctrlgen.diagnosis.shares.regressors import Kind
 from ctrlgen.diagnosis.shares.shares_table import ChannelShares, Share, SharesTable
+from ctrlgen.reporting.numbers import number
 
 NAMED = 3  # kinds that a sentence names
 FAMILIES = 2  # families of laws that a sentence names
-CONSTANT, NUMBERS = "a constant", "what other values of the device's own numbers would take away"
-NAMES = {
+
+
+class Beside(Enum):
+    """What stands beside every kind of signal."""
+
+    CONSTANT = "a constant"
+    NUMBERS = "what other values of the device's own numbers would take away"
+
+
+# a residual in which these are the largest part is not called a function of a signal
+NO_FUNCTION = (Beside.CONSTANT, Beside.NUMBERS, Kind.RECORD, Kind.PROPORTION)
+NAMES: dict[Kind | Beside, str] = {
     Kind.DIRECTION: "the direction of motion",
     Kind.PROPORTION: "a part in proportion to position",
     Kind.PITCH: "the place in a pitch",
@@ -31,7 +44,7 @@ def shares_sentences(diagnosis: Diagnosis) -> list[str]:
     """Of the channel with the largest residual, in noise units: what explains it and how much the accepted laws reach; then
     what is left. None where the device as described leaves noise alone, or the records are too short."""
     shares = diagnosis.shares
-    if shares is None or diagnosis.verdict == CONSISTENT:
+    if shares is None or diagnosis.verdict == Verdict.CONSISTENT:
         return []
     worst = worst_of(diagnosis, shares.before)
     said = ceiling_sentence(worst)
@@ -68,8 +81,8 @@ def ceiling_sentence(c: ChannelShares) -> str:
         return f"No signal explains more than {per_cent(SHARES.told)} {leaves}"
     total = with_interval(c.total)
     if len(parts) == 1:
-        return f"{_capital(parts[0][0])} explains {total} {leaves}"
-    listed = [f"{name} ({per_cent(share)})" for name, share in parts[:NAMED]]
+        return f"{_capital(part_name(c, parts[0][0]))} explains {total} {leaves}"
+    listed = [f"{part_name(c, part)} ({per_cent(share)})" for part, share in parts[:NAMED]]
     beside = " together with lesser ones" if c.total.share - sum(s for _, s in parts[:NAMED]) > SHARES.told else ""
     return f"{_capital(', '.join(listed[:-1]))} and {listed[-1]}{beside} explain {total} {leaves}"
 
@@ -77,36 +90,37 @@ def ceiling_sentence(c: ChannelShares) -> str:
 def rest_sentence(c: ChannelShares) -> str:
     """'What is left in axis is mostly a function of travel history, 64 % (50 ... 71 %), which ...'."""
     left = f"What is left in {short(c.channel)}"
-    memory = f"its own past predicts {per_cent(c.rest_own_past)} more" if c.rest_own_past >= SHARES.told else ""
-    name, share = next(iter(named_parts(c)), ("", 0.0))
-    if share <= c.rest_own_past or not name:
-        beside = [memory.replace(" more", " of it")] * bool(memory) + [f"{name} {per_cent(share)}"] * bool(name)
+    past = f"its own past predicts {per_cent(c.rest_own_past)}" if c.rest_own_past >= SHARES.told else None
+    part, share = next(iter(named_parts(c)), (None, 0.0))
+    if part is None or share <= c.rest_own_past:
+        beside = [] if past is None else [f"{past} of it"]
+        beside += [] if part is None else [f"{part_name(c, part)} {per_cent(share)}"]
         told = f": {', '.join(beside)}" if beside else ""
         return f"{left} is mostly a function of none of the signals looked at{told}."
-    memory = f"; {memory}" if memory else ""
-    if name in (CONSTANT, NUMBERS, NAMES[Kind.RECORD], NAMES[Kind.PROPORTION]):
-        return f"{left} is {_mostly(share)} {name}, {per_cent(share)}{memory}."
+    memory = "" if past is None else f"; {past} more"
+    if part in NO_FUNCTION:
+        return f"{left} is {_mostly(share)} {part_name(c, part)}, {per_cent(share)}{memory}."
     row = max(c.selected, key=lambda row: row.additional)
     families = [f.value for f in SPEAKS_FOR[row.kind][0][:FAMILIES]]
     where = f", where {' or '.join(families)} would show" if families else ""
     return (
-        f"{left} is {_mostly(share)} a function of {name}, {per_cent(share)} ({interval(row.alone.ci95)} alone){where}, "
+        f"{left} is {_mostly(share)} a function of {part_name(c, part)}, {per_cent(share)} ({interval(row.alone.ci95)} alone){where}, "
         f"which no confirmed law of the library reaches{memory}."
     )
 
 
-def named_parts(c: ChannelShares) -> list[tuple[str, float]]:
+def named_parts(c: ChannelShares) -> list[tuple[Kind | Beside, float]]:
     """What a residual is a function of with the share that each adds, the largest first; those below `SHARES.told` left out."""
-    parts = [(CONSTANT, c.constant), (NUMBERS, c.numbers)]
-    parts += [(kind_name(c, row.kind), row.additional) for row in c.selected]
+    parts: list[tuple[Kind | Beside, float]] = [(Beside.CONSTANT, c.constant), (Beside.NUMBERS, c.numbers)]
+    parts += [(row.kind, row.additional) for row in c.selected]
     return sorted((part for part in parts if part[1] >= SHARES.told), key=lambda part: -part[1])
 
 
-def kind_name(c: ChannelShares, kind: Kind) -> str:
+def part_name(c: ChannelShares, part: Kind | Beside) -> str:
     """'the direction of motion', 'a line of 2.2 Hz'."""
-    if kind is Kind.LINE:
-        return f"a line of {number(1 / c.periods[kind], 3)} Hz"
-    return NAMES.get(kind, kind.value)
+    if part is Kind.LINE:
+        return f"a line of {number(1 / c.periods[part], 3)} Hz"
+    return NAMES.get(part, part.value)
 
 
 def per_cent(share: float) -> str:

@@ -20,6 +20,7 @@ from ctrlgen.core.edited_toml import DIGITS, inline_table, replace_quantity, sd_
 from ctrlgen.core.files import read_text, write_text
 from ctrlgen.core.units import from_si, to_si
 from ctrlgen.devices.python_file import as_toml
+from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.narrative import (
     BETTER,
     HARD_SPACE,
@@ -30,8 +31,7 @@ from ctrlgen.diagnosis.report.narrative import (
     predicts_better,
     sentence,
 )
-from ctrlgen.diagnosis.selection.diagnosis_result import Diagnosis
-from ctrlgen.diagnosis.selection.verdict import UNEXPLAINED
+from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.estimation.free_parameters import FreeParameter
 from ctrlgen.estimation.hypothesis import PARAMETER, numbers
 from ctrlgen.estimation.robust_covariance import robust_deviations
@@ -54,10 +54,10 @@ def write_next(diagnosis: Diagnosis, original: Path, target: Path) -> None:
 def next_text(diagnosis: Diagnosis, original: str) -> str:
     """The text of the device file `original` with the findings in it."""
     fit = diagnosis.search.chosen.fit
-    found = list(zip(fit.structure.free_parameters, fit.theta, robust_deviations(fit), strict=True))
+    estimates = list(zip(fit.structure.free_parameters, fit.theta, robust_deviations(fit), strict=True))
     document = tomlkit.parse(original)
-    changed = _change_numbers(document, diagnosis, found)
-    effects = _effects(diagnosis, found)
+    changed = _change_numbers(document, diagnosis, estimates)
+    effects = _effects(diagnosis, estimates)
     if effects and "effect" in document and not isinstance(document["effect"], AoT):
         for table in effects:  # effect = [{ ... }] in one line cannot be continued by [[effect]]
             document["effect"].append(inline_table(table))
@@ -69,12 +69,12 @@ def next_text(diagnosis: Diagnosis, original: str) -> str:
 
 
 def _change_numbers(
-    document: Any, diagnosis: Diagnosis, found: Sequence[tuple[FreeParameter, float, float]]
+    document: Any, diagnosis: Diagnosis, estimates: Sequence[tuple[FreeParameter, float, float]]
 ) -> list[str]:
     """Writes the changed parameters of the device into the document; returns their paths."""
     known = {path: number for path, _, number in numbers(diagnosis.device)}
     causes, changed = diagnosis.search.chosen.fit.structure.causes, []
-    for unknown, value, sd in found:
+    for unknown, value, sd in estimates:
         cause = None if unknown.cause is None else causes[unknown.cause]
         own = cause is None or cause.effect == PARAMETER
         if not own or abs(value - unknown.nominal) <= MOVED * abs(unknown.nominal):
@@ -89,9 +89,9 @@ def _change_numbers(
     return changed
 
 
-def _effects(diagnosis: Diagnosis, found: Sequence[tuple[FreeParameter, float, float]]) -> list[dict[str, Any]]:
+def _effects(diagnosis: Diagnosis, estimates: Sequence[tuple[FreeParameter, float, float]]) -> list[dict[str, Any]]:
     """One table for each effect found; parameters as {value, sd} where the recording determines them."""
-    fitted, tables = {unknown.path: (unknown, value, sd) for unknown, value, sd in found}, []
+    fitted, tables = {unknown.path: (unknown, value, sd) for unknown, value, sd in estimates}, []
     for k, effect in enumerate(diagnosis.corrected.effect):
         if k < len(diagnosis.device.effect):
             continue
@@ -131,7 +131,7 @@ def _header(diagnosis: Diagnosis, changed: list[str]) -> str:
         lines.append(f"Parameters changed above: {', '.join(changed)}.")
     if diagnosis.findings:
         lines.append(BETTER if predicts_better(diagnosis) else WORSE)
-    if diagnosis.verdict == UNEXPLAINED:
+    if diagnosis.verdict == Verdict.UNEXPLAINED:
         lines.append("This does NOT explain the recording: the values are the best fit, not physical parameters.")
     kept = (hard(" ".join(line.split())) for line in lines)
     wrapped = (part for line in kept for part in textwrap.wrap(line, WIDTH, break_long_words=False))

@@ -80,8 +80,8 @@ def attribute(
     left = {frozenset(range(n)): after}
     rough = fitter.with_errors_of(described.fit)  # initial states of incomplete models, which leave much
     subsets = _subsets(n)
-    found = in_forks(lambda present: _left_or_all(rough, fit, present, records, before), subsets, jobs)
-    left |= dict(zip(subsets, found, strict=True))
+    energies = in_forks(lambda present: _left_or_all(rough, fit, present, records, before), subsets, jobs)
+    left |= dict(zip(subsets, energies, strict=True))
     bare = left[frozenset()]
     if after.sum() > ATTRIBUTION.hidden * before.sum() and before.sum() < ATTRIBUTION.hidden * bare.sum():
         before = bare  # the device's own numbers, as they were fitted to it as described, hide the mismatch
@@ -147,10 +147,10 @@ def _shapley(left: dict[frozenset[int], np.ndarray], k: int, n: int) -> np.ndarr
 def left_by(fitter: Fitter, fit: Fit, present: frozenset[int], records: list[Record]) -> Misfit:
     """What the model leaves with the `present` causes alone, those of the device's own numbers adapted that are hardly known."""
     structure = fit.structure
-    found = {_key(structure, p): value for p, value in zip(structure.free_parameters, fit.theta, strict=True)}
+    values = {_key(structure, p): value for p, value in zip(structure.free_parameters, fit.theta, strict=True)}
     for k in sorted(set(range(len(structure.causes))) - present, reverse=True):
         structure = structure.without(k)
-    theta = np.array([found.get(_key(structure, p), p.nominal) for p in structure.free_parameters])
+    theta = np.array([values.get(_key(structure, p), p.nominal) for p in structure.free_parameters])
     problem = _WithinStated(structure, fitter, theta)
     x = levenberg_marquardt(problem, problem.start, ATTRIBUTION.steps)
     nothing = np.zeros(0)

@@ -23,12 +23,12 @@ def fit_candidates(trials: Trials, current: CandidateModel, screened: Screened) 
     def in_other_shapes(own: Trials, t: CandidateModel) -> CandidateModel:
         return t if current.errors.is_noise else restart_elsewhere(own, t, current, screened)
 
-    found = fit_each(trials, current.fit, significant(trials, current, screened), in_other_shapes)
-    found = (*found, *fit_other_clocks(trials, current, found))
+    candidates = fit_each(trials, current.fit, significant(trials, current, screened), in_other_shapes)
+    candidates = (*candidates, *fit_other_clocks(trials, current, candidates))
     if trials.selection.parameters_may_mask_cause(current.fit):
-        found = (*found, *_as_stated(trials, current))
-    found = (*found, *fit_subsets(trials, current, screened, found))
-    return _converge_promising(trials, current, found)
+        candidates = (*candidates, *_as_stated(trials, current))
+    candidates = (*candidates, *fit_subsets(trials, current, screened, candidates))
+    return _converge_promising(trials, current, candidates)
 
 
 def significant(trials: Trials, current: CandidateModel, screened: Screened) -> list[Suspect]:
@@ -58,7 +58,7 @@ def fit_each(
     def one(own: Trials, s: Suspect) -> list[CandidateModel]:
         return [finish(own, t) for t in own.tried(fit.restarted.with_cause(s.hypothesis, s.start), s.hypothesis, fit)]
 
-    return tuple(t for found in trials.each(one, suspects, lambda s: trying(s.hypothesis)) for t in found)
+    return tuple(t for fitted in trials.each(one, suspects, lambda s: trying(s.hypothesis)) for t in fitted)
 
 
 def trying(*causes: Hypothesis) -> str:
@@ -122,7 +122,7 @@ def fit_other_clocks(
         return own.tried(structure, cause, beside.fit)
 
     besides = [current, *trials.selection.ranked(singles)[: SEARCH.beside_clocks]]
-    return tuple(t for found in trials.each(one, besides, lambda _: trying(*shifts)) for t in found)
+    return tuple(t for fitted in trials.each(one, besides, lambda _: trying(*shifts)) for t in fitted)
 
 
 def _as_stated(trials: Trials, current: CandidateModel) -> tuple[CandidateModel, ...]:
@@ -146,7 +146,7 @@ def fit_subsets(
         return []
     best = max((current.fit.objective - t.fit.objective for t in singles), default=0.0)
     least = min((t.fitted.excess for t in singles), default=np.inf)
-    found: list[CandidateModel] = []
+    candidates: list[CandidateModel] = []
 
     def one(own: Trials, suspects: Sequence[Suspect]) -> list[CandidateModel]:
         structure = current.fit.restarted
@@ -162,11 +162,11 @@ def fit_subsets(
         enough = best + max(trials.selection.required_z2(current, screened), SEARCH.subset_share * left)
         sets = _promising_sets(screened, size, enough, trials.per_round)
         tried = trials.each(one, sets, lambda suspects: trying(*(s.hypothesis for s in suspects)))
-        found += [t for fitted in tried for t in fitted]
-        sound = [t for t in found if not trials.objections(t)]
+        candidates += [t for fitted in tried for t in fitted]
+        sound = [t for t in candidates if not trials.objections(t)]
         best = max([best, *(current.fit.objective - t.fit.objective for t in sound)])
         least = min([least, *(t.fitted.excess for t in sound)])
-    return found
+    return candidates
 
 
 def _promising_sets(screened: Screened, size: int, enough: float, most: int) -> list[tuple[Suspect, ...]]:

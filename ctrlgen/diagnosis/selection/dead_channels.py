@@ -10,8 +10,8 @@ import numpy as np
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import difference, show
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.selection.diagnosis_result import Finding
 from ctrlgen.diagnosis.selection.direct_detection import unfitted_finding
+from ctrlgen.diagnosis.selection.findings import Finding
 from ctrlgen.diagnosis.settings import DIRECT_DETECTION
 from ctrlgen.effects import Channel, Effect, Place
 from ctrlgen.estimation.hypothesis import nominal_physics, selected_laws
@@ -83,9 +83,11 @@ def _only(recording: Recording, kept: list[int]) -> Recording:
     place = {i: k for k, i in enumerate(kept)}
     records = tuple(
         replace(
-            r, observed=r.observed[:, kept], valid=r.valid[:, kept],
+            r,
+            observed=r.observed[:, kept],
+            valid=r.valid[:, kept],
             spikes=tuple((row, place[i], size) for row, i, size in r.spikes if i in place),
         )
         for r in recording.records
-    )  # fmt: skip
+    )
     return replace(recording, channels=channels, units=units, noise=noise, tolerance=tolerance, records=records)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ctrlgen.core.units import from_si
 from ctrlgen.diagnosis.selection.candidate_model import SearchResult
-from ctrlgen.diagnosis.selection.diagnosis_result import Estimate, Finding
+from ctrlgen.diagnosis.selection.findings import Estimate, Finding
 from ctrlgen.diagnosis.settings import DIRECT_DETECTION
 from ctrlgen.effects import Channel, Effect, Place
 from ctrlgen.estimation.hypothesis import DOMAIN, Hypothesis, nominal_physics, selected_laws
@@ -27,7 +27,7 @@ def directly_detected_findings(search: SearchResult, laws: Sequence[type[Effect]
     if recording.kind != "series":
         return ()
     known = {(e.kind, e.at) for e in structure.device.effect} | {(c.effect, c.at) for c in structure.causes}
-    found = []
+    findings = []
     for channel in channels(nominal_physics(structure.device), Place.SENSOR):
         name = f"reading.{channel.name}"
         if name not in recording.channels:
@@ -42,8 +42,8 @@ def directly_detected_findings(search: SearchResult, laws: Sequence[type[Effect]
                 or {(law.kind, channel.name), (law.kind, "all")} & known
             ):
                 continue
-            found.append(unfitted_finding(law, channel, seen[0]))
-    return tuple(found)
+            findings.append(unfitted_finding(law, channel, seen[0]))
+    return tuple(findings)
 
 
 def unfitted_finding(law: type[Effect], channel: Channel, values: dict[str, float]) -> Finding:

@@ -96,7 +96,7 @@ class LtvPropagation:
 
 
 def _entries(columns: Sequence[CandidateTerm], chosen: np.ndarray) -> dict[int, tuple[list[int], list[int]]]:
-    """By probe: the places among the `chosen` columns of those that enter there, and the terms that do."""
+    """The entries by probe: the places among the `chosen` columns of those that enter there, and the terms that do."""
     entries: dict[int, tuple[list[int], list[int]]] = {}
     for place, j in enumerate(chosen):
         for probe, term in zip(columns[j].probes, columns[j].terms, strict=True):

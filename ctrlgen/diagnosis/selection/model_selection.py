@@ -111,7 +111,7 @@ class ModelSelection:
         alike = [
             t
             for t in others
-            if self.advantage(first, t) <= MODEL_SELECTION.alike and len(t.fit.structure.free_parameters) <= numbers
+            if self.advantage(first, t) <= MODEL_SELECTION.tie and len(t.fit.structure.free_parameters) <= numbers
         ]
         return min((first, *alike), key=lambda t: -t.fit.structure.log_prior_odds)
 

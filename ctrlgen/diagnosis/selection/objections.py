@@ -31,7 +31,7 @@ def objections(
     `exact`: the model leaves noise alone, so that an event or a short line is what it looks like.
     """
     causes = fit.structure.causes
-    found: dict[int, str] = {}
+    reasons: dict[int, str] = {}
     for k, cause in enumerate(causes):
         if cause in accepted:
             continue
@@ -45,12 +45,12 @@ def objections(
             )
         )
         if reason:
-            found[k] = reason
+            reasons[k] = reason
     for j, k in combinations(range(len(causes)), 2):
         new = k if causes[k] not in accepted else j
-        if causes[new] not in accepted and new not in found and _same_line(recording, fit, j, k):
-            found[new] = "the records are too short to tell it from another line of its kind"
-    return found
+        if causes[new] not in accepted and new not in reasons and _same_line(recording, fit, j, k):
+            reasons[new] = "the records are too short to tell it from another line of its kind"
+    return reasons
 
 
 def _outside_its_range(fit: Fit, k: int) -> str:
@@ -119,8 +119,8 @@ def _no_line(recording: Recording, fit: Fit, k: int) -> str:
 def _line_interval(fit: Fit, k: int) -> float:
     """Half the 95 % interval [Hz] of the frequency of cause k."""
     free = fit.structure.free_parameters
-    found = (i for i, p in enumerate(free) if p.cause == k and p.unit == "Hz")
-    i = next(found, None)
+    places = (i for i, p in enumerate(free) if p.cause == k and p.unit == "Hz")
+    i = next(places, None)
     return 0.0 if i is None else STATISTICS.z_95 * float(np.sqrt(max(fit.covariance[i, i], 0.0)))
 
 
@@ -163,11 +163,12 @@ def _onsets(record: Record) -> np.ndarray:
     moving = np.any(np.abs(np.diff(record.drive, axis=0)) > OBJECTIONS.standing * span, axis=1)
     edges = np.flatnonzero(np.diff(moving.astype(int)))
     long = int(OBJECTIONS.rest_samples)
-    return np.array([
-        record.time[a + 1]
-        for a in edges
-        if not (moving[max(a + 1 - long, 0) : a + 1] if moving[a + 1] else moving[a + 1 : a + 1 + long]).any()
-    ])  # fmt: skip
+
+    def after_rest_or_before(a: int) -> bool:
+        rest = moving[max(a + 1 - long, 0) : a + 1] if moving[a + 1] else moving[a + 1 : a + 1 + long]
+        return not rest.any()
+
+    return np.array([record.time[a + 1] for a in edges.tolist() if after_rest_or_before(a)])
 
 
 def _on_the_lattice(recording: Recording, fit: Fit, k: int) -> str:

@@ -15,11 +15,11 @@ from ctrlgen.estimation.hypothesis import Hypothesis
 
 def all_pruned(trials: Trials, current: CandidateModel, candidates: Sequence[CandidateModel]) -> list[CandidateModel]:
     """The candidates that meet no objection, and of the others what is left without the causes that do."""
-    found: dict[frozenset, CandidateModel] = {}
+    by_causes: dict[frozenset, CandidateModel] = {}
     for kept in trials.each(lambda own, t: pruned(own, t, current.causes), candidates):
         if kept is not None:
-            found.setdefault(frozenset(kept.causes), kept)
-    return list(found.values())
+            by_causes.setdefault(frozenset(kept.causes), kept)
+    return list(by_causes.values())
 
 
 def pruned(trials: Trials, candidate: CandidateModel, accepted: Sequence[Hypothesis]) -> CandidateModel | None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, linearised_optimum
 from ctrlgen.diagnosis.selection.candidates import significant, trying
+from ctrlgen.diagnosis.selection.confusable import explains_alike, explains_better
 from ctrlgen.diagnosis.selection.screen import Suspect
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
 from ctrlgen.diagnosis.settings import SEARCH
@@ -21,8 +22,7 @@ def swapped(trials: Trials, current: CandidateModel, before: int) -> CandidateMo
     causes = len(current.causes)
     for k in range(before if causes == before + 1 else causes):
         for rival in replacements(trials, current, k):
-            better = trials.selection.advantage(rival, current) > SEARCH.rival_difference
-            if better and not trials.objections(rival, current.causes):
+            if explains_better(trials.selection, rival, current) and not trials.objections(rival, current.causes):
                 current = trials.converged(rival)
                 break
     return current
@@ -33,10 +33,9 @@ def simplified(trials: Trials, current: CandidateModel) -> CandidateModel:
     the friction falls with speed, say, is then within what the discrepancy feigns."""
     for k in range(len(current.causes)):
         special = None if current.errors.is_noise else current.fit.nested_case(k)
-        found = replacements(trials, current, k) if special else []
-        for t in (t for t in found if t.cause and t.cause.effect == special):
-            alike = trials.selection.advantage(current, t) < SEARCH.rival_difference
-            if alike and not trials.objections(t, current.causes):
+        candidates = replacements(trials, current, k) if special else []
+        for t in (t for t in candidates if t.cause and t.cause.effect == special):
+            if explains_alike(trials.selection, t, current) and not trials.objections(t, current.causes):
                 return simplified(trials, trials.converged(t))
     return current
 
@@ -46,15 +45,12 @@ def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Rou
     `rounds` tried in its place."""
     there, special = current.causes, current.fit.nested_case(k)
     tried = [t for r in rounds for t in r.candidates if not current.errors.is_noise]
-    found = [*replacements(trials, current, k), *_in_place_of(k, there, tried)]
+    candidates = [*replacements(trials, current, k), *_in_place_of(k, there, tried)]
     alike = {
         t.cause: t
-        for t in reversed(found)
+        for t in reversed(candidates)
         if not _same_name(t.cause, there[k])
-        and (
-            trials.selection.advantage(current, t) < SEARCH.rival_difference
-            or (special and t.cause and t.cause.effect == special)
-        )
+        and (explains_alike(trials.selection, t, current) or (special and t.cause and t.cause.effect == special))
     }
     return tuple(t for t in trials.selection.ranked(list(alike.values())) if not trials.objections(t, there))
 
@@ -62,12 +58,12 @@ def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Rou
 def _in_place_of(k: int, there: Sequence[Hypothesis], tried: Sequence[CandidateModel]) -> list[CandidateModel]:
     """Those `tried` that hold the causes `there`, but another one instead of cause k."""
     others = set(there) - {there[k]}
-    found = []
+    replaced = []
     for t in tried:
         if len(t.causes) == len(there) and others < set(t.causes) and there[k] not in t.causes:
             (cause,) = set(t.causes) - others
-            found.append(replace(t, cause=cause))
-    return found
+            replaced.append(replace(t, cause=cause))
+    return replaced
 
 
 def replacements(trials: Trials, current: CandidateModel, k: int) -> list[CandidateModel]:
@@ -92,10 +88,10 @@ def replacements(trials: Trials, current: CandidateModel, k: int) -> list[Candid
         return own.tried(replace_cause(own, current.fit, k, others, s), s.hypothesis)
 
     tried = trials.each(one, able[: SEARCH.most_rivals], lambda s: f"{trying(s.hypothesis)} instead")
-    found = [t for fitted in tried for t in fitted]
-    near = trials.close_contenders(without, current, trials.selection.ranked(found))
+    fits = [t for fitted in tried for t in fitted]
+    near = trials.close_contenders(without, current, trials.selection.ranked(fits))
     ends = trials.each(lambda own, t: own.converged(t), near)
-    return trials.selection.ranked([*ends, *(t for t in found if t not in near)])
+    return trials.selection.ranked([*ends, *(t for t in fits if t not in near)])
 
 
 def replace_cause(trials: Trials, fit: Fit, k: int, others: Structure, suspect: Suspect) -> Structure:

@@ -141,15 +141,15 @@ class ScoreGradient:
             # the last block is filled up
             here = np.minimum(np.arange(a, a + size + 1), n - 1)
             k = min(size, n - a)
-            memories, terms, ends = self.laws.along(self.p, memory, *(x[here] for x in seen))
+            memories, slopes, ends = self.laws.along(self.p, memory, *(x[here] for x in seen))
             memory = [states[size - 1] for states in memories]
             if a + k == n:
-                terms[k:] = terms[k - 1]
-            terms = np.hstack([terms, np.repeat(self.sizes[None, :], size + 1, axis=0)])
-            lost |= ~np.all(np.abs(terms) < CANDIDATE_TERMS.diverged, axis=0)
-            # memories that have left the numbers say nothing
-            terms[:, lost] = 0.0
-            f, following = terms[:k], terms[1 : k + 1].copy() if series else terms[:k]
+                slopes[k:] = slopes[k - 1]
+            slopes = np.hstack([slopes, np.repeat(self.sizes[None, :], size + 1, axis=0)])
+            lost |= ~np.all(np.abs(slopes) < CANDIDATE_TERMS.diverged, axis=0)
+            # memories that have diverged say nothing
+            slopes[:, lost] = 0.0
+            f, following = slopes[:k], slopes[1 : k + 1].copy() if series else slopes[:k]
             following[:, self.laws.driven] = np.where(lost[self.laws.driven], 0.0, ends[:k])
             linear = self.linear.evaluate_along(*(x[here[:size]] for x in inputs))
             yield a, a + k, self.spread.readings([block[:k] for block in linear], f, following)

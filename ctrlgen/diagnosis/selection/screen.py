@@ -47,10 +47,6 @@ class Screened:
     undetectable: dict[Hypothesis, int] = field(default_factory=dict)
     dropped: dict[Hypothesis, str] = field(default_factory=dict)
 
-    def confusability(self, a: Suspect, b: Suspect) -> float:
-        """|cos| between two suspects."""
-        return float(abs(self.cosine[a.index, b.index]))
-
 
 class Screen:
     """The hypotheses of one fitter, ready to be compared with any fit."""

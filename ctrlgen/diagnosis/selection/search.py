@@ -16,6 +16,7 @@ import numpy as np
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, SearchResult
 from ctrlgen.diagnosis.selection.candidates import fit_candidates, restart_elsewhere
+from ctrlgen.diagnosis.selection.confusable import explains_alike
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.pruning import all_pruned, without_needless
 from ctrlgen.diagnosis.selection.rivals import rivals, simplified, swapped
@@ -52,9 +53,8 @@ class Searcher:
             if np.allclose(noise.floor, before.floor, rtol=SEARCH.same_noise):
                 break
         current = simplified(trials, self._settled(current))
-        nominal = scored(
-            trials.fitter, trials.fitter.described(device)[1]
-        )  # its numbers not bent by errors of a better model
+        # its numbers are not bent by the errors of a better model
+        nominal = scored(trials.fitter, trials.fitter.described(device)[1])
         each = range(len(current.causes))
         bare = tuple(trials.each(lambda own, k: _without(own, current, k, nominal), each))
         alike = tuple(trials.each(lambda own, k: rivals(own, current, k, rounds), each))
@@ -83,7 +83,7 @@ class Searcher:
                 return current
             current = without_needless(trials, swapped(trials, best, len(current.causes)))
             same = next((v for v in visited if frozenset(v.causes) == frozenset(current.causes)), None)
-            if same is not None and trials.selection.advantage(current, same) < SEARCH.rival_difference:
+            if same is not None and explains_alike(trials.selection, same, current):
                 return current  # no better than when it was there before
             current = trials.with_noise_update(trials.with_errors(trials.converged(current)))
             visited.append(current)
@@ -118,5 +118,5 @@ class Searcher:
 
 def _without(trials: Trials, current: CandidateModel, k: int, nominal: CandidateModel) -> CandidateModel:
     """The model without cause k; the device as described where that cannot be simulated."""
-    found = trials.tried(current.fit.restarted.without(k), None, None)
-    return found[0] if found else nominal
+    fitted = trials.tried(current.fit.restarted.without(k), None, None)
+    return fitted[0] if fitted else nominal

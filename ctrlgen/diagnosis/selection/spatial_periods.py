@@ -33,10 +33,10 @@ def spatial_periods(path: np.ndarray, left: np.ndarray) -> tuple[float, ...]:
     return tuple(float(padding * span / (first + k)) for k in best)
 
 
-def merged_periods(found: Iterable[tuple[float, ...]]) -> tuple[float, ...]:
+def merged_periods(periods: Iterable[tuple[float, ...]]) -> tuple[float, ...]:
     """The ways along several paths, such as the one read and the one foreseen, each once."""
     kept: list[float] = []
-    for way in (way for ways in found for way in ways):
+    for way in (way for ways in periods for way in ways):
         if all(abs(way / other - 1) > SPATIAL_PERIODS.same_period for other in kept):
             kept.append(way)
     return tuple(kept)

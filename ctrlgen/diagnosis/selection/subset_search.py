@@ -44,13 +44,15 @@ class SubsetSearch:
     def search(self) -> tuple[tuple[float, tuple[Suspect, ...]], ...]:
         """Sets of every size from two, those whose amplitudes make sense, the best first."""
         beam: list[tuple[float, tuple[int, ...]]] = [(0.0, ())]
-        found = []
+        subsets = []
         for size in range(1, SUBSETS.largest + 1):
             beam = self._grown(beam)
             if size > 1:
                 sets = [(gain, self._amplitudes(members), members) for gain, members in beam]
-                found += [(gain, self._suspects(members, b)) for gain, b, members in sets if self._sensible(members, b)]
-        return tuple(sorted(found, key=lambda f: -f[0]))
+                subsets += [
+                    (gain, self._suspects(members, b)) for gain, b, members in sets if self._sensible(members, b)
+                ]
+        return tuple(sorted(subsets, key=lambda f: -f[0]))
 
     def _grown(self, beam: list[tuple[float, tuple[int, ...]]]) -> list[tuple[float, tuple[int, ...]]]:
         gains, places = [], []

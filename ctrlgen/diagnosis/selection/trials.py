@@ -148,8 +148,8 @@ class Trials:
     def converged(self, candidate: CandidateModel) -> CandidateModel:
         """The same candidate fitted until it converges, or as it was where that fails: candidates are first fitted for a few
         steps only."""
-        tried = self.tried(candidate.fit.restarted, candidate.cause, steps=FIT.max_steps)
-        return tried[0] if tried else candidate
+        fitted = self.tried(candidate.fit.restarted, candidate.cause, steps=FIT.max_steps)
+        return fitted[0] if fitted else candidate
 
     def screened(self, candidate: CandidateModel) -> Screened:
         """The screen of what a candidate leaves."""
@@ -175,11 +175,11 @@ class Trials:
                 break
             before = self.fitter
             self.use(fitter)
-            tried = self.tried(candidate.fit.restarted, candidate.cause, steps=FIT.max_steps)
-            if not tried:
+            fitted = self.tried(candidate.fit.restarted, candidate.cause, steps=FIT.max_steps)
+            if not fitted:
                 self.use(before)
                 break
-            candidate = tried[0]
+            candidate = fitted[0]
         return candidate
 
     def with_noise_update(self, candidate: CandidateModel) -> CandidateModel:

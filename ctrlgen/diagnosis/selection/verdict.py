@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
+
 import numpy as np
 from scipy import stats
 
@@ -15,13 +17,21 @@ from ctrlgen.estimation.residual_tests import ResidualTests
 from ctrlgen.estimation.settings import STATISTICS
 from ctrlgen.estimation.structure import Structure
 
-CONSISTENT, EXPLAINED, PARTLY, AMBIGUOUS, UNEXPLAINED = "consistent", "explained", "partly", "ambiguous", "unexplained"
+
+class Verdict(StrEnum):
+    """The answer of a diagnosis in one word."""
+
+    CONSISTENT = "consistent"
+    EXPLAINED = "explained"
+    PARTLY = "partly"
+    AMBIGUOUS = "ambiguous"
+    UNEXPLAINED = "unexplained"
 
 
 def verdict(
     search: SearchResult, tests: ResidualTests, shares: Attribution, detected: bool = False, another_unit: bool = False
-) -> str:
-    """The verdict: one of the five words above. `detected` says whether an effect was detected directly in the readings,
+) -> Verdict:
+    """The verdict. `detected` says whether an effect was detected directly in the readings,
     `another_unit` whether a reading is `in_another_unit`.
 
     consistent: no cause is found, and what is left is noise or within the tolerance. explained: confirmed causes, and what is
@@ -31,19 +41,19 @@ def verdict(
     column's unit is wrong.
     """
     if another_unit:
-        return UNEXPLAINED
-    fitter, found = search.fitter, detected or search.chosen.causes
+        return Verdict.UNEXPLAINED
+    fitter, named = search.fitter, detected or search.chosen.causes
     known = bool(fitter.noise.known.all())
     enough = (known and tests.passed) or within_tolerance(search)
     contradicted = bool(contradicts_datasheet(search.chosen.fit))
-    if not found:
-        return UNEXPLAINED if contradicted or (known and not enough) else CONSISTENT
+    if not named:
+        return Verdict.UNEXPLAINED if contradicted or (known and not enough) else Verdict.CONSISTENT
     if main_rivals(search, shares):
-        return AMBIGUOUS
+        return Verdict.AMBIGUOUS
     if enough and not contradicted and not unconfirmed(search) and not poorly_determined(search):
-        return EXPLAINED
+        return Verdict.EXPLAINED
     sound = enough or not known or shares.explained >= VERDICT.most
-    return PARTLY if sound and not (contradicted and shares.explained < VERDICT.most) else UNEXPLAINED
+    return Verdict.PARTLY if sound and not (contradicted and shares.explained < VERDICT.most) else Verdict.UNEXPLAINED
 
 
 def in_another_unit(search: SearchResult) -> bool:
@@ -124,15 +134,15 @@ def contradicts_datasheet(fit: Fit) -> dict[str, float]:
 def unconfirmed(search: SearchResult) -> tuple[Hypothesis, ...]:
     """Causes that the held-out records do not confirm, except where the device's stated parameters alone require them."""
     compare = ModelSelection(search.fitter, lambda *_, **__: [search.chosen])
-    found = []
+    causes = []
     for cause, bare in zip(search.chosen.causes, search.without_cause, strict=True):
         errors = compare.reference((bare, search.chosen))
         confirmed = compare.held_out_loss(bare, errors) - compare.held_out_loss(search.chosen, errors)
         gain = compare.fit_loss(bare, errors) - compare.fit_loss(search.chosen, errors)
         hidden = bare.fit.penalty - search.chosen.fit.penalty >= 0.5 * gain
         if confirmed < MODEL_SELECTION.least_confirmed and not hidden:
-            found.append(cause)
-    return tuple(found)
+            causes.append(cause)
+    return tuple(causes)
 
 
 def poorly_determined(search: SearchResult) -> bool:

@@ -7,7 +7,6 @@ was chosen on simulated recordings whose causes are known, and another value of 
 
 from ctrlgen.diagnosis.settings.evidence import (
     BOOTSTRAP,
-    DETECTABILITY,
     EXCITATION,
     EXPERIMENT,
     LOCALISATION,
@@ -18,6 +17,7 @@ from ctrlgen.diagnosis.settings.evidence import (
 )
 from ctrlgen.diagnosis.settings.selection import (
     ATTRIBUTION,
+    CONFUSABLE,
     DIRECT_DETECTION,
     MODEL_SELECTION,
     OBJECTIONS,
@@ -32,7 +32,7 @@ from ctrlgen.diagnosis.settings.shares import SHARES
 __all__ = [
     "ATTRIBUTION",
     "BOOTSTRAP",
-    "DETECTABILITY",
+    "CONFUSABLE",
     "DIRECT_DETECTION",
     "EXCITATION",
     "EXPERIMENT",

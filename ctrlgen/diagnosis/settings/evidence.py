@@ -82,22 +82,10 @@ class MapSettings:
 
 
 @dataclass(frozen=True)
-class DetectabilitySettings:
-    """The smallest effect of each kind that would have been seen."""
-
-    alike: float = 0.98
-    """|cos| of two scores from which on causes cannot be told apart."""
-    most_alike: int = 3
-    """Causes that are listed as alike at most."""
-
-
-@dataclass(frozen=True)
 class ExcitationSettings:
     """Drives of the next experiment."""
 
-    strengths: tuple[float, ...] = (
-        0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0,
-    )  # fmt: skip
+    strengths: tuple[float, ...] = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
     """Amplitudes that are tried, over the range of the drives; the largest that keeps every limit is taken."""
     limit_slack: float = 1e-6
     """Violation of a limit that counts as none, over the limit's own size: rounding."""
@@ -146,7 +134,6 @@ LOCALISATION = LocalisationSettings()
 SPECTRAL_LINES = SpectralLineSettings()
 UNKNOWN_INPUT = UnknownInputSettings()
 MAPS = MapSettings()
-DETECTABILITY = DetectabilitySettings()
 EXCITATION = ExcitationSettings()
 EXPERIMENT = ExperimentSettings()
 BOOTSTRAP = BootstrapSettings()

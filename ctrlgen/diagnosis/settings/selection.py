@@ -92,8 +92,6 @@ class SearchSettings:
     converged_candidates: int = 2
     """Candidates a round that are fitted until they converge although they look useless: laws with corners and events need
     many steps."""
-    rival_difference: float = 9.0
-    """Difference of the total criterion below which two models explain alike: three standard deviations."""
     rival_share: float = 0.5
     """Share of what a cause explains that a rival must promise by its score to be fitted: shape parameters between the
     start values lose so much."""
@@ -113,6 +111,19 @@ class SearchSettings:
     """Share of what the best smaller set leaves that a larger one must promise beyond it to be fitted. Judgement."""
     smallest_score: float = 0.25
     """Share of the largest z^2 below which candidates are not tried, unless nothing else is."""
+
+
+@dataclass(frozen=True)
+class ConfusableSettings:
+    """What makes two causes confusable."""
+
+    cosine: float = 0.98
+    """|cos| of the projected sensitivities from which on they look alike: a linear estimate of one amplitude beside the other then
+    has five times the standard deviation of one alone."""
+    criterion: float = 9.0
+    """Difference of the criterion T below which two models explain alike: three standard deviations."""
+    most_listed: int = 3
+    """Causes that are listed as alike at most."""
 
 
 @dataclass(frozen=True)
@@ -145,7 +156,7 @@ class ModelSelectionSettings:
     """Bootstrap samples of the blocks: they know a p of 5 % to 0.7 %."""
     block_p: float = 0.1
     """p of the bootstrap above which a gain is not that of the recording as a whole."""
-    alike: float = 2.0
+    tie: float = 2.0
     """Difference of the criterion below which the commoner law is taken: a factor e of likelihood."""
     most_of_mismatch: float = 0.9
     """Share of the mismatch: a cause that explains so much of the records to fit need not be confirmed by held-out
@@ -244,6 +255,7 @@ SCREEN = ScreenSettings()
 SPATIAL_PERIODS = SpatialPeriodSettings()
 SUBSETS = SubsetSettings()
 SEARCH = SearchSettings()
+CONFUSABLE = ConfusableSettings()
 MODEL_SELECTION = ModelSelectionSettings()
 OBJECTIONS = ObjectionsSettings()
 DIRECT_DETECTION = DirectDetectionSettings()

@@ -20,9 +20,11 @@ from ctrlgen.diagnosis.shares.cross_validation import (
     standard_error,
     stands_out,
 )
+from ctrlgen.diagnosis.shares.design import Design, Kind
 from ctrlgen.diagnosis.shares.periodic import line_columns, pitch_columns, strongest_line, strongest_pitch
-from ctrlgen.diagnosis.shares.regressors import Design, Kind, Signals, standardised
+from ctrlgen.diagnosis.shares.regressors import standardised
 from ctrlgen.diagnosis.shares.shares_table import Share
+from ctrlgen.diagnosis.shares.signals import Signals
 
 
 class ChannelSmoothers:
@@ -88,10 +90,10 @@ class ChannelSmoothers:
             return self.fitted[key]
         columns = [self.kinds[kind] for kind in self.kinds if kind in kinds]
         chosen = np.concatenate(columns) if columns else np.zeros(0, int)
-        found = self.folds.fit(chosen, self.every_fold if targets is None else targets, free)
+        prediction = self.folds.fit(chosen, self.every_fold if targets is None else targets, free)
         if targets is None:
-            self.fitted[key] = found
-        return found
+            self.fitted[key] = prediction
+        return prediction
 
     def says_more(self, before: OutOfBlock, after: OutOfBlock) -> bool:
         """Whether a prediction says more than another one, and more than the mean and the numbers, which stand beside every
@@ -109,7 +111,7 @@ class ChannelSmoothers:
         return share_of(gain, self.energy, stands_out(gain))
 
     def _found_in_residual(self) -> tuple[list[dict[Kind, np.ndarray]], dict[Kind, float]]:
-        """By fold, the columns of own past, pitch and line; and the middle one of the folds' periods."""
+        """The columns of own past, pitch and line of each fold, and the median of the folds' periods."""
         extra: list[dict[Kind, np.ndarray]] = []
         periods: dict[Kind, list[float]] = {}
         past, positions = self._past(), [b.abscissa for b in self.design.of_kind(Kind.POSITION, self.own)]
@@ -123,11 +125,11 @@ class ChannelSmoothers:
             columns = {Kind.PAST: past, **rates}
             if positions and len(self.y) > 8 * SHARES.longest_pitch:
                 y = np.where(self.common.train[k], without[k], 0.0)
-                found = [strongest_pitch(x, y) for x in positions]
-                pitches = [standardised(pitch_columns(x, p)) for x, p in zip(positions, found, strict=True)]
+                spacings = [strongest_pitch(x, y) for x in positions]
+                pitches = [standardised(pitch_columns(x, p)) for x, p in zip(positions, spacings, strict=True)]
                 best = int(np.argmax([np.sum((c.T @ y) ** 2) for c in pitches]))
                 columns[Kind.PITCH] = pitches[best]
-                periods.setdefault(Kind.PITCH, []).append(found[best])
+                periods.setdefault(Kind.PITCH, []).append(spacings[best])
             if np.isfinite(self.sample_time) and longest > 4 * SHARES.line_periods:
                 frequency = strongest_line(self._without_fold(k))
                 columns[Kind.LINE] = line_columns(self.blocks.rows, frequency)
@@ -184,11 +186,11 @@ class Selection:
 def select_kinds(channel: ChannelSmoothers, kinds: Sequence[Kind]) -> Selection:
     """The kinds that say most. Where other values of the device's numbers would take away much that their stated deviations
     do not allow, these stand in for physics: they are left out where the kinds predict as well without them."""
-    found = forward_selection(channel, kinds)
+    selection = forward_selection(channel, kinds)
     if channel.base is channel.mean:
-        return found
+        return selection
     bare = forward_selection(channel.without_numbers(), kinds)
-    return bare if as_good(bare.joint, found.joint, channel.energy) else found
+    return bare if as_good(bare.joint, selection.joint, channel.energy) else selection
 
 
 def forward_selection(channel: ChannelSmoothers, kinds: Sequence[Kind]) -> Selection:

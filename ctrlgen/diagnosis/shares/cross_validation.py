@@ -17,7 +17,7 @@ from scipy.linalg.lapack import dposv
 
 from ctrlgen.diagnosis.settings import SHARES
 from ctrlgen.diagnosis.shares.blocks import Blocks
-from ctrlgen.diagnosis.shares.regressors import Design
+from ctrlgen.diagnosis.shares.design import Design
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ class FoldsOfChannel:
             self.tested.append(np.clip(E[:, test].T, seen.min(axis=1), seen.max(axis=1)).T)
 
     def constant(self, y: np.ndarray) -> OutOfBlock:
-        """The mean alone."""
+        """The prediction by the mean alone."""
         return self.fit(np.zeros(0, int), np.tile(y, (self.common.count, 1)))
 
     def fit(self, columns: np.ndarray, targets: np.ndarray, free: np.ndarray | None = None) -> OutOfBlock:
@@ -116,7 +116,7 @@ class FoldsOfChannel:
         """The fit of which the first `n_free` columns are free."""
         common, is_free = self.common, np.arange(len(columns)) < n_free
         products = self._products(targets) if len(columns) else [np.zeros(0)] * common.count
-        found = np.zeros((len(SHARES.ridges), targets.shape[1]))
+        predicted = np.zeros((len(SHARES.ridges), targets.shape[1]))
         models = []
         for k in range(common.count):
             train, test, y = common.train[k], common.test[k], targets[k]
@@ -129,15 +129,15 @@ class FoldsOfChannel:
             for i, ridge in enumerate(SHARES.ridges):
                 held = G + np.diag(np.where(is_free, min(ridge, SHARES.free_ridge), ridge))
                 b = dposv(held, c)[1] if len(c) else c
-                found[i, test] = level + b @ tested
+                predicted[i, test] = level + b @ tested
                 slopes.append((b, level - float(b @ mean)))
             models.append(slopes)
         # out of block each sample has the target of its own fold
         own = targets[common.blocks.fold, np.arange(targets.shape[1])]
-        errors = np.where(common.usable, (own - found) ** 2, 0.0)
+        errors = np.where(common.usable, (own - predicted) ** 2, 0.0)
         best = int(np.argmin(errors.sum(axis=1)))
         chosen = tuple(slopes[best] for slopes in models)
-        return OutOfBlock(found[best], common.blocks.sums(errors[best]), columns, chosen)
+        return OutOfBlock(predicted[best], common.blocks.sums(errors[best]), columns, chosen)
 
 
 def standard_error(by_block: np.ndarray) -> float:

@@ -20,9 +20,10 @@ import numpy as np
 from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.settings import SHARES
 from ctrlgen.diagnosis.shares.cross_validation import stands_out
+from ctrlgen.diagnosis.shares.design import Kind
 from ctrlgen.diagnosis.shares.gather import ResidualShares, gather
-from ctrlgen.diagnosis.shares.regressors import Kind, Signals
 from ctrlgen.diagnosis.shares.shares_table import ChannelShares, SharesTable
+from ctrlgen.diagnosis.shares.signals import Signals
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis, nominal_physics
@@ -67,10 +68,10 @@ def empirical_terms(fitter: Fitter, fit: Fit, shares: ResidualShares | None) -> 
             if (smoother.cause.effect, smoother.cause.of) in tried:
                 continue
             tried.add((smoother.cause.effect, smoother.cause.of))
-            found = _fitted(fitter, fit, smoother)
-            if (term := _confirmed(fitter, fit, found, smoother.kind, channel.channel)) is not None:
+            smoothed = _fitted(fitter, fit, smoother)
+            if (term := _confirmed(fitter, fit, smoothed, smoother.kind, channel.channel)) is not None:
                 terms.append(term)
-                fit = found
+                fit = smoothed
     return tuple(terms)
 
 
@@ -110,10 +111,15 @@ def _position_and_speed(signals: Sequence[Signals], axis: str) -> tuple[list[np.
 
 
 _LAWS = {
-    Kind.PROPORTION: "empirical_position", Kind.POSITION: "empirical_position", Kind.OTHER_AXIS: "empirical_position",
-    Kind.DRIVE: "empirical_position", Kind.DIRECTION: "empirical_speed", Kind.SPEED: "empirical_speed",
-    Kind.TRAVEL_HISTORY: "empirical_history", Kind.DRIVE_HISTORY: "empirical_history",
-}  # fmt: skip
+    Kind.PROPORTION: "empirical_position",
+    Kind.POSITION: "empirical_position",
+    Kind.OTHER_AXIS: "empirical_position",
+    Kind.DRIVE: "empirical_position",
+    Kind.DIRECTION: "empirical_speed",
+    Kind.SPEED: "empirical_speed",
+    Kind.TRAVEL_HISTORY: "empirical_history",
+    Kind.DRIVE_HISTORY: "empirical_history",
+}
 
 
 def _axis(table: SharesTable, channel: ChannelShares, kind: Kind) -> str | None:
@@ -161,9 +167,10 @@ def _fitted(fitter: Fitter, fit: Fit, smoother: _Smoother) -> Fit:
         c, left = ridge_regression(trust[seen, None] * X[seen], trust[seen] * whole[seen])
         if left < least:
             theta[weights] = np.clip(c, [free[k].low for k in weights], [free[k].high for k in weights])
-            found = smooth.restarted(last, numbers | {free[k].name: float(theta[k]) for k in weights})
+            weighed = smooth.restarted(last, numbers | {free[k].name: float(theta[k]) for k in weights})
             empty = np.zeros(0)
-            best, least = replace(fit, structure=found, theta=theta, initial_states=(), residual=empty, J=empty), left
+            best = replace(fit, structure=weighed, theta=theta, initial_states=(), residual=empty, J=empty)
+            least = left
     return best
 
 
@@ -181,7 +188,7 @@ def ridge_regression(X: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float]:
         c = V @ (b / (values + ridge))
         free = 1 - float(np.sum(values / (values + ridge))) / max(float(y @ y), 1e-300)
         left = float(np.sum((y - X @ c) ** 2)) / max(free, 1e-3) ** 2
-        best = min(best, (c, left), key=lambda found: found[1])
+        best = min(best, (c, left), key=lambda pair: pair[1])
     return best
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from enum import Enum
 
-from ctrlgen.diagnosis.shares.regressors import Kind
+from ctrlgen.diagnosis.shares.design import Kind
 from ctrlgen.diagnosis.shares.shares_table import SharesTable
 
 
@@ -47,10 +47,7 @@ SPEAKS_FOR: dict[Kind, tuple[tuple[Family, ...], str]] = {
         (Family.DYNAMICS, Family.TIMING, Family.FRICTION),
         "viscous and drag forces; a reading late by tau is off by tau times the speed; friction that falls with speed",
     ),
-    Kind.ACCELERATION: (
-        (Family.DYNAMICS, Family.TIMING),
-        "forces of inertia, a mass on a spring; a lag of the speed",
-    ),
+    Kind.ACCELERATION: ((Family.DYNAMICS, Family.TIMING), "forces of inertia, a mass on a spring; a lag of the speed"),
     Kind.RATE: (
         (Family.TIMING, Family.DYNAMICS),
         "a reading late by tau is off by tau times its rate, one behind a filter also by its second derivative",
@@ -82,10 +79,7 @@ SPEAKS_FOR: dict[Kind, tuple[tuple[Family, ...], str]] = {
     Kind.TEMPERATURE: ((Family.THERMAL,), "expansion, and sensors that see the surroundings"),
     Kind.RECORD: ((Family.GAIN, Family.EVENTS), "the zero point of each record, or what happened between them"),
     Kind.PITCH: ((Family.PERIODIC,), "fringes, teeth, resolvers and screws repeat along the way"),
-    Kind.TIME: (
-        (Family.EVENTS, Family.THERMAL, Family.CREEP),
-        "drift and ageing on the clock, whatever was done",
-    ),
+    Kind.TIME: ((Family.EVENTS, Family.THERMAL, Family.CREEP), "drift and ageing on the clock, whatever was done"),
     Kind.LINE: ((Family.EVENTS,), "vibration and mains repeat in time"),
     Kind.PAST: ((), "says that something is left that lasts longer than a sample, not what"),
 }
@@ -154,5 +148,5 @@ def ranking(table: SharesTable, noise: dict[str, float] | None = None) -> list[t
             own[Family.FRICTION] += channel.constant
         for family in Family:
             share[family] += weights[channel.channel] / whole * (own[family] or beside[family])
-    found = [(family, value) for family, value in share.items() if value > 0]
-    return sorted(found, key=lambda pair: (-round(pair[1], 3), place[pair[0]], list(Family).index(pair[0])))
+    shares = [(family, value) for family, value in share.items() if value > 0]
+    return sorted(shares, key=lambda pair: (-round(pair[1], 3), place[pair[0]], list(Family).index(pair[0])))

@@ -9,8 +9,8 @@ import numpy as np
 
 from ctrlgen.diagnosis.shares.channel import share_of
 from ctrlgen.diagnosis.shares.model_free_shares import TooFewSamples, model_free_shares
-from ctrlgen.diagnosis.shares.regressors import Signals
 from ctrlgen.diagnosis.shares.shares_table import Share, SharesTable
+from ctrlgen.diagnosis.shares.signals import Signals
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.settings import FIT
 from ctrlgen.recordings.recording import Record

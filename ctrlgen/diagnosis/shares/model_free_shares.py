@@ -21,19 +21,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from ctrlgen.diagnosis.settings import SHARES
-from ctrlgen.diagnosis.shares.blocks import Blocks, make_blocks
+from ctrlgen.diagnosis.shares.blocks import make_blocks
 from ctrlgen.diagnosis.shares.channel import (
     ChannelSmoothers,
     as_good,
-    mean_or_zero,
     rates_of,
     select_kinds,
-    share_of,
     without_spikes,
 )
 from ctrlgen.diagnosis.shares.cross_validation import Folds
-from ctrlgen.diagnosis.shares.regressors import Design, Kind, Signals, build_design, own_axes
-from ctrlgen.diagnosis.shares.shares_table import ChannelShares, KindShare, Share, SharesTable
+from ctrlgen.diagnosis.shares.design import Kind
+from ctrlgen.diagnosis.shares.regressors import build_design, own_axes
+from ctrlgen.diagnosis.shares.shares_table import ChannelShares, KindShare, SharesTable
+from ctrlgen.diagnosis.shares.signals import Signals
 
 
 class TooFewSamples(ValueError):
@@ -59,7 +59,7 @@ def model_free_shares(
     blocks = make_blocks(residuals, signals[0].settled, seed)
     design = build_design(signals, blocks.rows)
     folds: dict[bytes, Folds] = {}
-    found = []
+    rows = []
     for i, name in enumerate(channels):
         given = [np.asarray(part[:, i], float) for part in residuals]
         parts = given if signals[0].settled else without_spikes(given)
@@ -74,17 +74,17 @@ def model_free_shares(
         rates = rates_of(signals, name, blocks)
         smoothers = ChannelSmoothers(parts, design, folds[key], own, numbers, signals[0].sample_time, rates)
         spikes = 1 - np.isfinite(np.concatenate(parts)).sum() / np.isfinite(np.concatenate(given)).sum()
-        found.append(_shares(name, smoothers, float(spikes)))
-    if not found:
+        rows.append(_shares(name, smoothers, float(spikes)))
+    if not rows:
         raise TooFewSamples("no channel has enough valid samples")
-    return SharesTable(tuple(found), blocks, design)
+    return SharesTable(tuple(rows), blocks, design)
 
 
 def _shares(name: str, channel: ChannelSmoothers, spikes: float) -> ChannelShares:
     """Shares alone, forward selection and ceiling of one channel."""
     named = [kind for kind in channel.kinds if kind is not Kind.PAST]
-    found = select_kinds(channel, named)
-    channel, selected, joint = found.channel, found.kinds, found.joint
+    selection = select_kinds(channel, named)
+    channel, selected, joint = selection.channel, selection.kinds, selection.joint
     usable, total = channel.common.usable, max(float(channel.energy.sum()), 1e-300)
     alone = {kind: channel.fit([kind]) for kind in channel.kinds}
     rows, before = [], channel.base
@@ -103,7 +103,7 @@ def _shares(name: str, channel: ChannelSmoothers, spikes: float) -> ChannelShare
             rows.append(KindShare(kind, channel.share(channel.base, fit), gain, None, ()))
     rows.sort(key=lambda row: (row.kind is Kind.PAST, -row.alone.share))
     # all columns at once cost more than they tell where there are few blocks
-    whole = max((channel.whole_share(f) for f in (found.everything, joint)), key=lambda s: s.share)
+    whole = max((channel.whole_share(f) for f in (selection.everything, joint)), key=lambda s: s.share)
     return ChannelShares(
         channel=name,
         rms=float(np.sqrt(total / usable.sum())),
@@ -119,16 +119,3 @@ def _shares(name: str, channel: ChannelSmoothers, spikes: float) -> ChannelShare
         residual=np.where(usable, channel.y, np.nan),
         predictions={kind: np.where(usable, fit.prediction, np.nan) for kind, fit in alone.items()},
     )
-
-
-def predict_share(prediction: Sequence[np.ndarray], residuals: Sequence[np.ndarray], blocks: Blocks) -> Share:
-    """The share of one residual (n,) a record that a prediction (n,) of it reaches, such as a law's, on the same samples and
-    blocks and beside a constant as the kinds of `model_free_shares` do; it is negative where the prediction does harm."""
-    y, p = blocks.drawn(list(residuals)), blocks.drawn(list(prediction))
-    usable = np.isfinite(y) & np.isfinite(p)
-    nothing = np.empty((len(y), 0))
-    common = Folds(Design(nothing, (), (), {}), blocks, usable)
-    folds = common.with_columns([nothing] * common.count)
-    y, left = (np.where(usable, v, 0.0) for v in (y, y - p))
-    before, after = (mean_or_zero(folds, v, blocks.sums(v**2)).squares for v in (y, left))
-    return share_of(before - after, blocks.sums(y**2))

@@ -1,4 +1,4 @@
-"""What a residual may be a function of: the signals of a record, and smooth functions of them in columns.
+"""What a residual may be a function of: smooth functions of the signals of a record, in columns.
 
 A kind of regressor is a set of columns: cubic B-splines of a signal (C. de Boor, A Practical Guide to Splines (1978)), its
 sign, what play operators of several widths leave of it (rate-independent memory, as in Prandtl-Ishlinskii models), what
@@ -7,9 +7,7 @@ low-passes leave of it (memory of a time constant), or products of two signals.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from enum import Enum
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from itertools import combinations, pairwise
 
@@ -18,157 +16,11 @@ from scipy.interpolate import BSpline
 from scipy.signal import lfilter
 
 from ctrlgen.diagnosis.settings import SHARES
+from ctrlgen.diagnosis.shares.design import Columns, Design, Kind
+from ctrlgen.diagnosis.shares.signals import Signals
 
-FEW = 2  # signals of one kind, up to which each gets all its columns
-
-
-class Kind(Enum):
-    """Kinds of regressor, in the order in which they are preferred where two predict alike.
-
-    First laws that act always, the simpler before what contains it; then memory of time, products, and last what fits
-    something of any residual: a pitch, a trend, a line.
-    """
-
-    DIRECTION = "direction of motion"
-    PROPORTION = "position, in proportion"
-    POSITION = "position"
-    SPEED = "speed"
-    ACCELERATION = "acceleration"
-    RATE = "rate of the reading"
-    DRIVE = "drive"
-    TRAVEL_HISTORY = "travel history"
-    DRIVE_HISTORY = "drive history"
-    OTHER_AXIS = "other axis"
-    DRIVE_LAG = "low-passed drive"
-    PRODUCT = "product of two"
-    TEMPERATURE = "temperature"
-    RECORD = "record"
-    PITCH = "place in a pitch"
-    TIME = "time"
-    LINE = "phase of a line"
-    PAST = "own past"
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Signals:
-    """The signals of one record, each (n,) in SI.
-
-    `time` [s] on the clock of the recording, the pose's number for settled poses, whose `sample_time` is infinite; poses
-    stand in the order in which they were taken. `position` by axis, `speed` by axis where it is known (else the derivative
-    of the position is taken), `drive` by actuator, `reading`: what the model predicts, by channel, which tells the axes that
-    a channel sees. `temperature` of the surroundings. `units`: for figures, by 'position x' or 'drive x'.
-    """
-
-    time: np.ndarray
-    sample_time: float
-    position: Mapping[str, np.ndarray] = field(default_factory=dict)
-    speed: Mapping[str, np.ndarray] = field(default_factory=dict)
-    drive: Mapping[str, np.ndarray] = field(default_factory=dict)
-    reading: Mapping[str, np.ndarray] = field(default_factory=dict)
-    temperature: np.ndarray | None = None
-    units: Mapping[str, str] = field(default_factory=dict)
-
-    @property
-    def settled(self) -> bool:
-        """Whether the samples are settled poses."""
-        return not np.isfinite(self.sample_time)
-
-    def derivative(self, values: np.ndarray) -> np.ndarray:
-        """d/dt of `values` (n,); for settled poses the step from the pose before."""
-        if self.settled:
-            return np.diff(values, prepend=values[:1])
-        return np.gradient(values, self.sample_time) if len(values) > 1 else np.zeros_like(values)
-
-    def speed_of(self, axis: str) -> np.ndarray:
-        """Speed (n,) of one axis, the step from the pose before for settled poses."""
-        return self.speed[axis] if axis in self.speed else self.derivative(self.position[axis])
-
-
-@dataclass(frozen=True, eq=False)
-class Columns:
-    """Columns (N, p) of unit variance and zero mean of one kind, made of one signal, or of two.
-
-    `axes`: the axes that the signal belongs to. `signal` and `unit` name `abscissa` (N,), over which a figure shows them; if
-    `of_abscissa`, they are functions of it and are held beyond its range, else each column is clamped to its own range.
-    """
-
-    kind: Kind
-    signal: str
-    unit: str
-    axes: frozenset[str]
-    abscissa: np.ndarray
-    values: np.ndarray
-
-    @property
-    def of_abscissa(self) -> bool:
-        """Whether the columns are splines of the abscissa."""
-        return self.kind in (
-            Kind.PROPORTION,
-            Kind.POSITION,
-            Kind.SPEED,
-            Kind.ACCELERATION,
-            Kind.DRIVE,
-            Kind.TEMPERATURE,
-            Kind.TIME,
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Design:
-    """All columns at the drawn samples: X (N, P), its blocks, and the drives that are no signals of their own (`same_as`)."""
-
-    X: np.ndarray
-    blocks: tuple[Columns, ...]
-    axes: tuple[str, ...]
-    same_as: dict[str, str]
-
-    def clamped(self, train: np.ndarray, test: np.ndarray) -> np.ndarray:
-        """The columns (P, samples) at the `test` samples, none of them beyond what the `train` samples have seen."""
-        X = self.X[test].T.copy()
-        for block, places in zip(self.blocks, self.places, strict=True):
-            if block.of_abscissa:
-                x, seen = block.abscissa[test], np.flatnonzero(train)
-                for end, beyond in ((np.argmin, np.less), (np.argmax, np.greater)):
-                    last = seen[end(block.abscissa[seen])]
-                    out = beyond(x, block.abscissa[last])
-                    X[np.ix_(places, out)] = block.values[last][:, None]
-            else:
-                seen_values = block.values[train]
-                X[places] = np.clip(X[places], seen_values.min(axis=0)[:, None], seen_values.max(axis=0)[:, None])
-        return X
-
-    def one_way(self, own: frozenset[str]) -> bool:
-        """Whether the axes `own` move in one direction only, so that dry friction and an offset are one."""
-        turning = [b for b in self.of_kind(Kind.DIRECTION, own) if np.ptp(np.sign(b.abscissa)) == 2]
-        return bool(own) and not any(
-            min(np.mean(b.abscissa > 0), np.mean(b.abscissa < 0)) > SHARES.one_way for b in turning
-        )
-
-    @cached_property
-    def places(self) -> list[np.ndarray]:
-        """The columns of X of each block."""
-        ends = np.cumsum([0, *(b.values.shape[1] for b in self.blocks)])
-        return [np.arange(a, b) for a, b in pairwise(ends)]
-
-    def kinds(self, own: frozenset[str]) -> dict[Kind, np.ndarray]:
-        """Columns of X by kind, for a channel that sees the axes `own`."""
-        found: dict[Kind, list[np.ndarray]] = {}
-        for block, places in zip(self.blocks, self.places, strict=True):
-            if (kind := kind_for(block, own)) is not None:
-                found.setdefault(kind, []).append(places)
-        return {kind: np.concatenate(found[kind]) for kind in Kind if kind in found}
-
-    def of_kind(self, kind: Kind, own: frozenset[str]) -> Iterator[Columns]:
-        """The blocks of one kind, for a channel that sees the axes `own`."""
-        return (block for block in self.blocks if kind_for(block, own) is kind)
-
-
-def kind_for(block: Columns, own: frozenset[str]) -> Kind | None:
-    """The kind of a block for a channel that sees the axes `own`: what belongs to another axis counts as that; None where it
-    is not looked at."""
-    if not block.axes or block.axes & own:
-        return block.kind
-    return Kind.OTHER_AXIS if block.kind in (Kind.POSITION, Kind.SPEED, Kind.ACCELERATION) else None
+# signals of one kind, up to which each gets all its columns
+FEW = 2
 
 
 def own_axes(signals: Sequence[Signals], channel: str) -> frozenset[str]:
@@ -367,7 +219,7 @@ class _Builder:
             moving = {one, other} - set(self.axes)
             if at and of and at != of and moving:  # of two axes the positions alone
                 continue
-            yield Columns(Kind.PRODUCT, f"{one} x {other}", "", at | of, x, (plain[one] * plain[other])[:, None])
+            yield Columns(Kind.PRODUCT, one, "", at | of, x, (plain[one] * plain[other])[:, None])
 
     @cached_property
     def ambient(self) -> np.ndarray | None:

@@ -1,19 +1,13 @@
-"""The table of model-free shares, as values, as JSON and as text."""
+"""The table of model-free shares, by channel and kind of regressor."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from ctrlgen.core.to_json import plain
-from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.shares.blocks import Blocks
-from ctrlgen.diagnosis.shares.regressors import Design, Kind
-
-NAMED = 3  # kinds that do as well: so many are named in a line
+from ctrlgen.diagnosis.shares.design import Design, Kind
 
 
 @dataclass(frozen=True)
@@ -87,50 +81,3 @@ class SharesTable:
     def of(self, channel: str) -> ChannelShares:
         """The shares of one channel by name."""
         return next(c for c in self.channels if c.channel == channel)
-
-
-def as_json(table: SharesTable, units: Mapping[str, str] | None = None) -> dict[str, Any]:
-    """The table in the types of JSON, without the samples: for diagnosis.json. `units` of the residuals by channel; SI without."""
-
-    def row(kind: KindShare) -> dict[str, Any]:
-        return {
-            "kind": kind.kind.value, "share": kind.alone.share, "ci95": kind.alone.ci95, "additional": kind.additional,
-            "selected": kind.selected, "alike": [k.value for k in kind.alike],
-        }  # fmt: skip
-
-    def shown(c: ChannelShares) -> tuple[float, str]:
-        unit = (units or {}).get(c.channel, "")
-        return (float(difference(c.rms, unit)) if unit else c.rms), unit
-
-    rows = {
-        c.channel: {
-            "rms": rms, "unit": unit, "own_axes": sorted(c.own), "constant": c.constant, "numbers": c.numbers,
-            "kinds": [row(k) for k in c.kinds], "total": c.total.share, "total_ci95": c.total.ci95, "rest": c.rest,
-            "rest_own_past": c.rest_own_past, "spikes": c.spikes,
-            "periods": {kind.value: period for kind, period in c.periods.items()},
-        }
-        for c in table.channels
-        for rms, unit in [shown(c)]
-    }  # fmt: skip
-    return plain({"channels": rows, "blocks": table.blocks.count, "same_as": table.design.same_as})
-
-
-def as_text(table: SharesTable, least: float = 0.005) -> str:
-    """The table as lines of text: the selected kinds in their order, then the others; those with a share below `least` are
-    left out."""
-    lines = []
-    for c in table.channels:
-        lines.append(
-            f"{c.channel}: all kinds {c.total.share:.0%}, rest {c.rest:.0%}, of which {c.rest_own_past:.0%} has memory; "
-            f"mean {c.constant:.0%}, the device's own numbers {c.numbers:.0%}"
-        )
-        for k in (*c.selected, *(k for k in c.kinds if not k.selected)):
-            if max(k.alone.share, k.additional) < least:
-                continue
-            low, high = k.alone.ci95
-            place = f", selected {k.selected}" if k.selected else ""
-            others = [a.value for a in k.alike] if len(k.alike) <= NAMED else [f"one of {len(k.alike)} others"]
-            alike = f" (or {', '.join(others)})" if others else ""
-            alone = f"{k.alone.share:6.1%} ({low:.0%} ... {high:.0%})"
-            lines.append(f"  {k.kind.value:20s} {alone:22s} adds {k.additional:6.1%}{place}{alike}")
-    return "\n".join(lines)

@@ -1,31 +1,20 @@
-"""The answer of a diagnosis: verdict, findings with intervals, held-out errors, and how they were found."""
+"""The findings of a diagnosis: causes with the intervals of their numbers, shares and alternatives, and held-out errors."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
-from ctrlgen.core.units import difference, from_si, to_si
-from ctrlgen.devices import Device
-from ctrlgen.devices.changed_numbers import changed, written
+from ctrlgen.core.units import difference, from_si
 from ctrlgen.diagnosis.selection.attribution import Attribution, Share
 from ctrlgen.diagnosis.selection.candidate_model import SearchResult
-from ctrlgen.diagnosis.selection.verdict import unconfirmed
-from ctrlgen.diagnosis.shares.empirical_terms import EmpiricalTerm
-from ctrlgen.diagnosis.shares.gather import ResidualShares
-from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 from ctrlgen.estimation.prediction_uncertainty import prediction_uncertainty
 from ctrlgen.estimation.profile_likelihood import Profile
-from ctrlgen.estimation.residual_tests import ResidualTests
 from ctrlgen.estimation.robust_covariance import robust_deviations
 from ctrlgen.estimation.settings import STATISTICS
-from ctrlgen.estimation.spikes import Spikes
-from ctrlgen.estimation.structure import Structure
-from ctrlgen.recordings.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -64,6 +53,11 @@ class Finding:
     source: str
     cause: Hypothesis
 
+    @property
+    def of(self) -> str | None:
+        """The other channel of an effect between two."""
+        return self.cause.of
+
 
 @dataclass(frozen=True)
 class ChannelError:
@@ -81,71 +75,9 @@ class ChannelError:
     uncertainty: float | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Diagnosis:
-    """The answer: verdict, findings and supporting analyses; `search` and `fitter` hold how it was found.
-
-    attribution: shares of the causes and of the rest. shares: of what the residual is a function, whatever the law, before and
-    after; None where the records are too short. empirical_terms: smoothers of what no law reaches. spikes: isolated outliers, of
-    the channels that have some.
-    """
-
-    verdict: str
-    findings: tuple[Finding, ...]
-    attribution: Attribution
-    shares: ResidualShares | None
-    empirical_terms: tuple[EmpiricalTerm, ...]
-    held_out: dict[str, ChannelError]
-    residual_tests: ResidualTests
-    residual_location: dict[str, Any]
-    detectability: dict[str, Any]
-    next_experiment: dict[str, Any] | None
-    search_history: tuple[dict[str, Any], ...]
-    spikes: tuple[Spikes, ...]
-    notes: tuple[str, ...]
-    device: Device
-    recording: Recording
-    search: SearchResult
-    fitter: Fitter
-    profiles: tuple[Profile, ...] = ()
-    extra: dict[str, Any] = field(default_factory=dict)
-
-    @cached_property
-    def values(self) -> dict[str, Estimate]:
-        """Every fitted number by its path in `corrected`, uncertain ones of the device included, with 95 % intervals.
-
-        A device written in Python has no file: this is what to put into its code.
-        """
-        return estimated_values(self.search.chosen.fit, self.profiles)
-
-    @property
-    def unconfirmed(self) -> tuple[Hypothesis, ...]:
-        """Causes that the held-out records do not confirm."""
-        return unconfirmed(self.search)
-
-    @cached_property
-    def corrected(self) -> Device:
-        """The device with all findings, then what was detected directly, then empirical terms: as device.next.toml describes it."""
-        fit = self.search.chosen.fit
-        own = {
-            u.path: float(v) for u, v in zip(fit.structure.free_parameters, fit.theta, strict=True) if u.cause is None
-        }
-        starts = tuple(fit.values(k) for k in range(len(fit.structure.causes)))
-        device = changed(Structure(fit.structure.device, fit.structure.causes, starts).device_with_causes, own)
-        beside = [f for f in self.findings if f.cause not in fit.structure.causes]
-        read = [
-            f.cause.law(
-                f.cause.at, {n: written(float(to_si(e.value, e.unit)), e.unit) for n, e in f.parameters.items()}
-            )
-            for f in beside
-        ]
-        left = (term.effect for term in self.empirical_terms)
-        return device.model_copy(update={"effect": (*device.effect, *read, *left)})
-
-
 def held_out_errors(search: SearchResult, known: np.ndarray) -> dict[str, ChannelError]:
     """Held-out errors of the nominal and of the chosen model by channel; `known` (n_y,) says whose noise is known."""
-    found, fitter = {}, search.fitter
+    errors, fitter = {}, search.fitter
     floor, unsure = fitter.noise.floor, prediction_uncertainty(fitter, search.chosen.fit)
     for i, (channel, unit) in enumerate(zip(fitter.recording.channels, fitter.recording.units, strict=True)):
         scale = difference(1.0, unit)
@@ -157,8 +89,8 @@ def held_out_errors(search: SearchResult, known: np.ndarray) -> dict[str, Channe
             rms.append(float(np.sqrt(np.mean(np.concatenate(squares)))) * scale if squares else float("nan"))
         noise = float(floor[i] * scale) if known[i] else None
         beside = float(unsure[i] * scale) if np.isfinite(unsure[i]) else None
-        found[channel] = ChannelError(rms[0], rms[1], noise, unit, beside)
-    return found
+        errors[channel] = ChannelError(rms[0], rms[1], noise, unit, beside)
+    return errors
 
 
 def estimated_values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, Estimate]:
@@ -167,7 +99,7 @@ def estimated_values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, 
     An interval includes the model-form error of an amplitude's law, and is at least as wide as the parameter's profile
     likelihood gives.
     """
-    found, profiled = {}, {p.path: p for p in profiles}
+    estimates, profiled = {}, {p.path: p for p in profiles}
     for unknown, value, s in zip(fit.structure.free_parameters, fit.theta, robust_deviations(fit), strict=True):
         cause = fit.structure.cause_of(unknown) if unknown.amplitude else None
         if cause is not None and cause.effect != PARAMETER:
@@ -177,8 +109,8 @@ def estimated_values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, 
         if unknown.path in profiled:
             below, above = profiled[unknown.path].ci95
             low, high = min(low, below), max(high, above)
-        found[unknown.path] = Estimate(value, (low, high), unknown.unit)
-    return found
+        estimates[unknown.path] = Estimate(value, (low, high), unknown.unit)
+    return estimates
 
 
 def findings(search: SearchResult, shares: Attribution, profiles: tuple[Profile, ...] = ()) -> tuple[Finding, ...]:

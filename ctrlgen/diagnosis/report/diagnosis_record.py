@@ -1,0 +1,200 @@
+"""What diagnosis.json holds, key by key; `ctrlgen/reporting/schemas/diagnosis.schema.json` is written from it.
+
+What the analyses state stands with them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import Field, WithJsonSchema
+
+from ctrlgen.diagnosis.evidence.detectability import DetectabilityEntry
+from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
+from ctrlgen.diagnosis.evidence.experiment_design import NextExperimentEntry
+from ctrlgen.diagnosis.evidence.residual_location import ResidualLocations
+from ctrlgen.diagnosis.report.narrative import sentence
+from ctrlgen.diagnosis.report.shares_sentences import noise_of, shares_sentences
+from ctrlgen.diagnosis.selection.cause_entry import Cause
+from ctrlgen.diagnosis.selection.search_history import RoundEntry, search_history
+from ctrlgen.diagnosis.selection.verdict import Verdict
+from ctrlgen.diagnosis.shares.shares_record import FractionEntry, SharesEntry, table_record
+from ctrlgen.reporting.result_file import Keys, Number, Origin, origin
+
+# 95 %
+Interval = tuple[Number, Number]
+
+
+class EstimateEntry(Keys):
+    """A number with its 95 % interval."""
+
+    value: Number = Field(description="Estimate.")
+    ci95: Interval = Field(
+        description="95 % interval; both ends equal the value where it was not estimated but read from the data."
+    )
+    unit: str = Field(description="Unit of value and interval; 1 without one.")
+
+
+class ShareEntry(Keys):
+    """A share of the mismatch."""
+
+    value: Number = Field(description="Of the energy beyond the noise that the device as described leaves.")
+    ci95: Interval = Field(description="95 % interval, by a bootstrap over blocks.")
+
+
+class WorthEntry(Keys):
+    """What a cause is worth in one channel, root mean square on the held-out records."""
+
+    without: Number = Field(description="Error without the cause, the others refitted [unit].")
+    with_it: Number = Field(description="Error with it [unit].")
+    unit: str = Field(description="Unit of both.")
+
+
+class AttributionEntry(Keys):
+    """How much of the mismatch the findings take away together."""
+
+    explained: Number = Field(description="Share of the mismatch that all findings take away, of energy.")
+    rest: ShareEntry | None = Field(description="Share that is left; null where there is no mismatch to share.")
+    held_out: bool = Field(description="Whether the shares are of the held-out records, else of those to fit.")
+
+
+class FindingEntry(Cause):
+    """One cause that the device file leaves out."""
+
+    share: ShareEntry | None = Field(
+        description="Share of the mismatch that it takes away: its Shapley value; null where it was read from the data."
+    )
+    worth: dict[str, WorthEntry] = Field(description="What it is worth, by channel.")
+    parameters: dict[str, EstimateEntry] = Field(description="Parameters of the effect, by name.")
+    alternatives: list[Cause] = Field(description="Other causes that explain the recording equally well in its place.")
+    source: str = Field(description="Publication of the effect's law.")
+
+
+class ChannelErrorEntry(Keys):
+    """Root mean square error of one channel on the held-out records."""
+
+    rms_before: Number = Field(description="Of the device as described, refitted within its stated uncertainty.")
+    rms_after: Number = Field(description="With the findings.")
+    noise_floor: Number = Field(description="Standard deviation of the noise; null where it is not known.")
+    unit: str = Field(description="Unit of all four numbers.")
+    uncertainty: Number = Field(
+        description="Prediction uncertainty that the fitted parameters alone cause; null where it is not known."
+    )
+
+
+class SpikesEntry(Keys):
+    """Isolated outliers of one channel: faults of its sensor, which count for nothing else."""
+
+    count: int = Field(description="How many.")
+    samples: int = Field(description="Among so many samples.")
+    per_thousand: Number = Field(description="In a thousand samples.")
+    size: Number = Field(description="Median magnitude [unit].")
+    unit: str = Field(description="Unit of size.")
+    in_noise: Number = Field(description="Size in standard deviations of the noise; null where that is not known.")
+
+
+class EmpiricalTermEntry(Keys):
+    """A smoother of what no law reaches, as an effect in device.next.toml; it names no cause."""
+
+    effect: str = Field(description="Name of the effect: empirical_position, empirical_speed or empirical_history.")
+    at: str = Field(description="Component of the pose to which it is added.")
+    of: str = Field(description="Axis of whose motion it is a function.")
+    channel: str = Field(description="Reading that it corrects.")
+    function_of: str = Field(description="Kind of the model-free shares that it holds.")
+    share: float = Field(description="Of the energy left in the channel on the held-out records what it takes away.")
+    rms_before: float = Field(description="Error there without it [unit].")
+    rms_after: float = Field(description="Error there with it [unit].")
+    unit: str = Field(description="Unit of the errors.")
+
+
+class DiagnosisRecord(Origin):
+    """Result of `ctrlgen diagnose`: what a recording shows that the device file leaves out."""
+
+    verdict: Annotated[Verdict, WithJsonSchema({"enum": list(Verdict), "type": "string"})] = Field(
+        title="Verdict", description="The answer in one word."
+    )
+    sentence: str = Field(description="The answer in a sentence: cause, size, share, what is left.")
+    findings: list[FindingEntry] = Field(
+        description="Causes that the device file leaves out, the most important first."
+    )
+    attribution: AttributionEntry = Field(description="What the findings take away together, and the rest.")
+    shares: SharesEntry | None = Field(
+        description="How much of the residual is a function of what; null where the records are too short."
+    )
+    empirical_terms: list[EmpiricalTermEntry] = Field(description="What device.next.toml holds beside the findings.")
+    residual_location: ResidualLocations = Field(description="Where the residual is large, before and after.")
+    held_out: dict[str, ChannelErrorEntry] = Field(description="Errors on the held-out records, by channel.")
+    spikes: dict[str, SpikesEntry] = Field(
+        description="Isolated outliers by channel; channels without any are left out."
+    )
+    detectability: DetectabilityEntry = Field(description="What this recording could have shown besides.")
+    next_experiment: NextExperimentEntry | None = Field(description="Null where no drive would decide anything.")
+    search_history: list[RoundEntry] = Field(description="Rounds of the search.")
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What a diagnosis was made from: SHA-256 of its input files by name, and the seed."""
+
+    inputs: dict[str, str]
+    seed: int
+
+
+def diagnosis_record(diagnosis: Diagnosis, provenance: Provenance) -> DiagnosisRecord:
+    """What diagnosis.json holds: nothing that changes from run to run."""
+    d = diagnosis
+    return DiagnosisRecord(
+        **origin(provenance.inputs, provenance.seed, d.notes),
+        verdict=d.verdict,
+        sentence=sentence(d),
+        findings=[FindingEntry.model_validate(f, from_attributes=True) for f in d.findings],
+        attribution=AttributionEntry.model_validate(d.attribution, from_attributes=True),
+        shares=shares_record(d),
+        empirical_terms=[
+            EmpiricalTermEntry(
+                effect=t.effect.kind,
+                at=t.effect.at,
+                of=t.effect.of or "",
+                channel=t.channel,
+                function_of=t.kind.value,
+                share=t.share,
+                rms_before=t.rms_before,
+                rms_after=t.rms_after,
+                unit=t.unit,
+            )
+            for t in d.empirical_terms
+        ],
+        residual_location=location_record(d),
+        held_out={
+            channel: ChannelErrorEntry.model_validate(e, from_attributes=True) for channel, e in d.held_out.items()
+        },
+        spikes={s.channel: SpikesEntry.model_validate(s, from_attributes=True) for s in d.spikes},
+        detectability=d.detectability,
+        next_experiment=None if d.next_experiment is None else d.next_experiment.record(),
+        search_history=search_history(d.search),
+    )
+
+
+def location_record(diagnosis: Diagnosis) -> ResidualLocations:
+    """Where the residual is; with what the unknown input depends on that would explain what is left, where there is one."""
+    location, force = diagnosis.residual_location, diagnosis.unmodelled_force
+    if force is None:
+        return location
+    after = location.after.model_copy(update={"unmodelled_force": force.record()})
+    return ResidualLocations(before=location.before, after=after)
+
+
+def shares_record(diagnosis: Diagnosis) -> SharesEntry | None:
+    """The model-free shares before and after, in the recording's units, with the families of laws and what follows."""
+    shares, recording = diagnosis.shares, diagnosis.recording
+    if shares is None:
+        return None
+    units, noise = dict(zip(recording.channels, recording.units, strict=True)), noise_of(diagnosis)
+    reached = {c.channel: shares.reached(c.channel) for c in shares.before.channels}
+    return SharesEntry(
+        statements=shares_sentences(diagnosis),
+        reached={channel: FractionEntry(value=r.share, ci95=r.ci95) for channel, r in reached.items()},
+        before=table_record(shares.before, units, noise),
+        after=table_record(shares.after, units, noise),
+    )
