@@ -13,13 +13,13 @@ from benchmarks.job import PEER
 from benchmarks.measure import Line, Note, interleave, timed
 from benchmarks.samples import SCENARIO, Disagreement
 from ctrlgen.budget.error_budget import DRAWS, ErrorBudget, budget_of
+from ctrlgen.budget.robust import solve
 from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.budget.uncertainty import load_uncertainties
 from ctrlgen.devices.changed_numbers import changed
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.simulation import simulate
 from ctrlgen.trajectory.scenario import load_scenario
-from ctrlgen.trajectory.solution import solve
 
 SIMULATED = 4  # draws of the peer in a round
 NEAR = 1e-3  # of the largest deviation that a number makes: what two answers may differ by; a step of a draw is allowed as much

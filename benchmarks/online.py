@@ -14,10 +14,10 @@ from benchmarks import casadi_c, least_squares
 from benchmarks.measure import Line, Note, interleave, timed
 from benchmarks.samples import NEAR, NEAR_FLOAT, Disagreement, Samples
 from benchmarks.timed_c import Program, build, generated
+from ctrlgen.budget.robust import solve
 from ctrlgen.controller.feedforward import ControllerStatus
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import generate
-from ctrlgen.trajectory.solution import solve
 
 PASSES = 200  # over all targets of a set, in each round; the median counts
 SLOW_PASSES = 20  # for peers that take microseconds

@@ -14,15 +14,17 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
+from ctrlgen.budget.robust import solve
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.discretisation import held_step
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import simulate
+from ctrlgen.trajectory.inverse.clock import in_time
 from ctrlgen.trajectory.scenario import Scenario, load_scenario
-from ctrlgen.trajectory.solution import Solution, solve
-from ctrlgen.verification.comparison import EXCESS_LIMIT
+from ctrlgen.trajectory.solution import Solution
+from ctrlgen.verification.tolerances import EXCESS_LIMIT
 
 SCENARIO = Path(__file__).resolve().parent.parent / "scenarios" / "circle20"
 NEAR = 1e-11  # m: 0.01 nm, what two answers may differ by
@@ -80,7 +82,7 @@ class Samples:
         """(y, before) -> the drives that lead from `before` to the T in y, in W."""
         m, (y, before, _) = self.model, self.symbols
         u = ca.SX.sym("u", self.axes)
-        step = self._at(held_step(m, self.scenario.sample_time or 1.0), u, before * m.x_scale + m.rest)
+        step = self._at(held_step(m, in_time(self.scenario.clock).sample_time), u, before * m.x_scale + m.rest)
         motion = step - y[self.axes :] * m.x_scale - m.rest
         slope = ca.jacobian(motion, u)
         return ca.Function("drive", [y, before], [-ca.solve(slope, ca.substitute(motion, u, 0))])
@@ -158,7 +160,7 @@ class Samples:
         """Raises Disagreement unless the model driven by these answers keeps every limit, to what float rounding may leave."""
         m = self.model
         u = answers.u[1:]
-        reached = simulate(m, u, self.scenario.sample_time or 1.0, answers.T[0])
+        reached = simulate(m, u, in_time(self.scenario.clock).sample_time, answers.T[0])
         x, z = reached.x[1:], reached.z[1:]
         values = m.evaluate_limits.map(len(u))(x.T, z.T, u.T, np.tile(m.p_nominal[:, None], (1, len(u))))
         for limit, value in zip(m.limits, values, strict=True):
@@ -179,7 +181,7 @@ class Samples:
         _require(name, "a displacement differs from IPOPT's by", np.abs(answers.z - trace.z).max(), near)
         drives = np.roll(answers.u, -1, axis=0)
         role = self.scenario.file.follow
-        reached = simulate(self.model, drives, self.scenario.sample_time or 1.0, trace.x[0]).signals[role][:-1]
+        reached = simulate(self.model, drives, in_time(self.scenario.clock).sample_time, trace.x[0]).signals[role][:-1]
         error = np.abs(reached - self.command) / np.array(self.model.signals[role].scale) * 1e-6
         _require(name, "its drives lead the model off the circle by", error.max(), near)
 

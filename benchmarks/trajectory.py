@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks import least_squares
 from benchmarks.measure import Line, Note, interleave, timed
 from benchmarks.samples import Answers, Samples
-from ctrlgen.trajectory.solution import solve
+from ctrlgen.budget.robust import solve
 
 
 class _Stopwatch:

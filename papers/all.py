@@ -9,12 +9,12 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 
+from ctrlgen.budget.robust import solve
 from ctrlgen.core.files import write_text
 from ctrlgen.model.assembly import build_model
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.plots import STYLE, svg
 from ctrlgen.trajectory.scenario import load_scenario
-from ctrlgen.trajectory.solution import solve
 from ctrlgen.trajectory.solution_plots import draw_path, draw_signal, draw_stage_force
 
 from . import s0, s0_figures, s1, s2, s2_figures, s3, s3_hinges
@@ -28,9 +28,11 @@ def _s3_rows() -> list[PrintedNumber]:
 
 SOURCES = {"S0": s0.rows, "S1": s1.rows, "S2": s2.rows, "S3": _s3_rows}
 TITLES = {
-    "S0": "meso-scale hexapod: kinematics and calibration", "S1": "MEMS hexapod: stiffness model and control",
-    "S2": "hinge equations and the measuring chain", "S3": "3-RRR stage: kinetostatic model",
-}  # fmt: skip
+    "S0": "meso-scale hexapod: kinematics and calibration",
+    "S1": "MEMS hexapod: stiffness model and control",
+    "S2": "hinge equations and the measuring chain",
+    "S3": "3-RRR stage: kinetostatic model",
+}
 
 
 def _s1_figures() -> dict[str, str]:
@@ -70,11 +72,17 @@ def as_json(rows: list[PrintedNumber]) -> list[dict[str, Any]]:
     """The rows as plain dicts: source, where, printed, ours, difference, unit, status, reason."""
     return [
         {
-            "source": row.source, "where": row.where, "printed": row.printed, "ours": row.ours, "difference": row.difference,
-            "unit": row.unit, "status": row.status.value, "reason": row.reason,
+            "source": row.source,
+            "where": row.where,
+            "printed": row.printed,
+            "ours": row.ours,
+            "difference": row.difference,
+            "unit": row.unit,
+            "status": row.status.value,
+            "reason": row.reason,
         }
         for row in rows
-    ]  # fmt: skip
+    ]
 
 
 def counts(rows: list[PrintedNumber]) -> Counter[tuple[str, str]]:

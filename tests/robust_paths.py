@@ -73,7 +73,7 @@ def worst_numbers(solution, distance):
                 numbers[name] = values[name] + away[column]
             elif line.kind == "gain":
                 gain += away[column]
-            elif line.kind == "channel gain":
+            elif line.kind == "channel_gain":
                 gain[j] += away[column]
             column += 1
     return numbers, gain

@@ -102,7 +102,7 @@ def test_a_draw_is_a_simulated_device(circle, budget):
     drawn = budget.drawn.columns[3]
     numbers = {p: number(circle, p) + d for (kind, p), d in zip(columns, drawn, strict=True) if kind == "number"}
     gain = 1 + sum(d for (kind, _), d in zip(columns, drawn, strict=True) if kind == "gain")
-    gains = gain + np.array([d for (kind, _), d in zip(columns, drawn, strict=True) if kind == "channel gain"])
+    gains = gain + np.array([d for (kind, _), d in zip(columns, drawn, strict=True) if kind == "channel_gain"])
     (warmer,) = (d for (kind, _), d in zip(columns, drawn, strict=True) if kind == "surroundings")
     R = numbers["actuator.thermal_resistance"]
     u = circle.drive * gains + warmer / R

@@ -215,7 +215,7 @@ def test_the_report_of_a_solution_holds_the_budget_to_first_order(circle, tmp_pa
     assert f"<code>{first.name}</code>" in page and f"{1e9 * first.peak['translation']:.3g}" in page
     assert f'<code>{hidden.name}</code></td><td class="n">{hidden.sd}' not in page
     assert "keeps 550 degC with 99.9 %: margin" in page and "<code>ctrlgen budget</code> gives the whole" in page
-    assert section.shown()["sources"]["uncertainty"] in page
+    assert section.sources["uncertainty"] in page
 
 
 def test_what_the_budget_cannot_do_is_a_sentence_of_the_report(circle, tmp_path):

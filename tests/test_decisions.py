@@ -20,15 +20,8 @@ ARGUED = {
     ("firmware/c/expression_graph.py", "(1 / "): "the same",
 }
 TO_GO = {
-    ("budget/robust.py", "channel gain"),
     ("calibration/calibrate.py", "acts on nothing"),
     ("calibration/calibrate.py", "as stated"),
-    ("learning/runs.py", "are missing (first at"),
-    ("path_timing/fastest.py", "for example"),
-    ("verification/build_page.py", "excess over a limit"),
-    ("verification/build_plots.py", "online C"),
-    ("verification/build_record.py", "not run"),
-    ("verification/comparison.py", "online C"),
 }
 
 

@@ -309,7 +309,7 @@ def test_the_proposal_for_a_hexapod_is_a_scenario(meso, tmp_path):
     for name, text in files(fitter, bare, separate(fitter, *pair, ""), str(MESO_FILE)).items():
         (tmp_path / name).write_text(text)
     scenario = load_scenario(tmp_path)
-    assert scenario.command(build_model(device)).shape[1] == 6
+    assert scenario.bind(build_model(device)).samples.shape[1] == 6
 
 
 def test_what_is_called_detectable_is_seen_and_half_of_it_is_not():

@@ -18,6 +18,7 @@ from ctrlgen import InputError, SolverError, build_model, load_scenario, solve
 from ctrlgen.path_timing.binding import AT_BOUND, EXACTLY, bindings
 from ctrlgen.path_timing.curve import Curve
 from ctrlgen.path_timing.drive_law import InertialLaw, bell_polynomials
+from ctrlgen.path_timing.fastest_plots import draw_fastest
 from ctrlgen.path_timing.optimum import Optimum, Piece
 from ctrlgen.path_timing.repetition import crossing, largest
 from ctrlgen.trajectory.frame import Frame
@@ -216,16 +217,27 @@ def test_the_set_points_are_a_scenario_that_says_the_same(circle20, tmp_path):
     write_inputs(tmp_path, circle20.solution.scenario)
     scenario = load_scenario(tmp_path / "circle20_fastest.toml")
     assert scenario.closed and scenario.name == "circle20_fastest"
-    assert scenario.command(build_model(scenario.device)) == pytest.approx(
+    assert scenario.bind(build_model(scenario.device)).samples == pytest.approx(
         circle20.solution.command, rel=1e-14, abs=1e-20
     )
 
 
+@pytest.fixture(scope="module")
+def raster():
+    """The fastest motion along a path with corners."""
+    return ctrlgen.fastest(SCENARIOS / "raster", sample_rate="4 kHz")
+
+
 @pytest.mark.long
-def test_corners_are_set_points():
-    found = ctrlgen.fastest(SCENARIOS / "raster", sample_rate="4 kHz")
-    corners = found.curve.samples(np.unique(np.concatenate(found.curve.pieces)))
-    off = np.abs(found.solution.command[:, None] - corners).max(axis=2).min(axis=0)
+def test_limits_that_bind_on_some_pieces_alone_are_drawn(raster):
+    assert len(raster.curve.pieces) > 1
+    assert set(draw_fastest(raster)) == {"path", "binding", "drives"}
+
+
+@pytest.mark.long
+def test_corners_are_set_points(raster):
+    corners = raster.curve.samples(np.unique(np.concatenate(raster.curve.pieces)))
+    off = np.abs(raster.solution.command[:, None] - corners).max(axis=2).min(axis=0)
     assert len(corners) == 22 and off.max() < 1e-15
 
 
@@ -299,6 +311,7 @@ def test_the_command_says_how_large_a_circle_a_frequency_allows(tmp_path):
         ("parallelogram_line", {}, "without delay"),
         ("circle20", {"sample_rate": "fast"}, "does not start with a number"),
         ("circle20", {"sample_rate": "0 Hz"}, "is not above zero"),
+        ("circle20", {"frequency": "nan Hz"}, 'is not a finite number; write for example "50 Hz"'),
         ("circle20", {"frequency": "20 ms"}, "wrong unit"),
         ("circle20", {"frequency": "400 Hz"}, "2.5 samples"),
         ("circle20", {"frequency": "1 mHz"}, "give a lower --sample-rate"),
@@ -307,8 +320,9 @@ def test_the_command_says_how_large_a_circle_a_frequency_allows(tmp_path):
     ],
 )
 def test_what_cannot_be_answered_is_refused_with_what_to_do(scenario, options, said):
-    with pytest.raises((InputError, SolverError), match=said):
+    with pytest.raises((InputError, SolverError), match=said) as caught:
         ctrlgen.fastest(SCENARIOS / scenario, **options)
+    assert str(caught.value).count("for example") <= 1
 
 
 def test_a_path_that_cannot_even_be_held_is_explained(tmp_path):

@@ -150,6 +150,6 @@ def test_an_open_motion_lasts_from_its_first_sample_to_its_last_and_a_closed_one
     """1000 samples of 50 us: 999 steps of a line, which stands at its first sample at the time zero; of a circle the last leads back."""
     for path, steps in ((STRAIGHT, 999), (ROUND, 1000)):
         scenario = written(tmp_path, stage(both(RATE)), path)
-        assert len(scenario.command(build_model(scenario.device))) == 1000
+        assert len(scenario.bind(build_model(scenario.device)).samples) == 1000
         found = ctrlgen.fastest(scenario)
         assert found.given == pytest.approx(steps * 50e-6)

@@ -95,7 +95,7 @@ def test_coupled_they_trace_the_circle(units, circle, tmp_path):
 def test_a_controller_whose_drives_have_rates_starts_settled_however_many_samples_that_takes(tmp_path, compiler):
     """100 V at 10 V a sample, then four drives that trace a circle of three axes."""
     scenario = load_scenario(SCENARIOS / "tilt_platform")
-    command = scenario.command(build_model(scenario.device))
+    command = scenario.bind(build_model(scenario.device)).samples
     paths = write_fmus(scenario, tmp_path / "out").paths
     with (
         opened(paths[0], tmp_path / "c", start_settled=True) as controller,

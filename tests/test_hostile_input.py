@@ -126,7 +126,7 @@ def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path):
     (folder / "scenario.toml").write_bytes(BOM + (folder / "scenario.toml").read_bytes())
     (folder / "poses.csv").write_bytes(BOM + b"delta_z [um]\n20\n")
     loaded = load_scenario(folder)
-    assert loaded.command(build_model(loaded.device)).shape == (1, 6)
+    assert loaded.bind(build_model(loaded.device)).samples.shape == (1, 6)
     (tmp_path / "recording.toml").write_bytes(BOM + AXIS.replace("FILE", "run.csv").encode())
     rows = "".join(f"{0.001 * (k % 50)},{0.01 * (k % 50)}\n" for k in range(400))
     (tmp_path / "run.csv").write_bytes(BOM + b"u,y\n" + rows.encode())

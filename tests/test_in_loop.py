@@ -16,6 +16,7 @@ from ctrlgen.firmware.folder import CFolder
 from ctrlgen.verification import cores, emulation, in_loop
 from ctrlgen.verification.build_record import BUDGETS
 from ctrlgen.verification.cores import CORES, cross_compile, cross_compilers
+from ctrlgen.verification.emulated_target import SETTLES, NotRun
 from ctrlgen.verification.emulation import Machine, available
 from ctrlgen.verification.in_loop import InLoop, run_in_loop
 from ctrlgen.verification.qemu import check_on_boards
@@ -247,7 +248,7 @@ def test_a_double_constant_in_float_code_costs_more_and_changes_bits(small, comp
     if found.runs:  # zig links a library for double
         (run,) = found.runs
         assert run.differing > 0 and run.ulp > 0 and run.where and not run.passed and not found.passed
-        assert run.worst("settle") > plain.worst("settle") + 20
+        assert run.worst(SETTLES) > plain.worst(SETTLES) + 20
     else:  # a compiler without such a library refuses to link
         assert "refuses the C" in found.stopped[0].words and not found.passed
 
@@ -280,7 +281,9 @@ def test_memory_of_its_own_fails_a_run(small, compiler, monkeypatch, tmp_path):
 def test_without_an_emulator_nothing_ran_and_the_remedy_is_named(small, monkeypatch):
     monkeypatch.setattr(in_loop, "available", lambda: False)
     found = run_in_loop(small[1], small[0])
-    assert found.runs == () and found.not_run == (("emulated cores", "pip install unicorn pyelftools"),)
+    assert found.runs == () and found.not_run == (
+        NotRun(what="emulated cores", remedy="pip install unicorn pyelftools"),
+    )
 
 
 def test_without_cross_compilers_each_is_named_with_its_remedy(small, compiler, monkeypatch):
@@ -288,7 +291,7 @@ def test_without_cross_compilers_each_is_named_with_its_remedy(small, compiler, 
     monkeypatch.setattr(cores.importlib.util, "find_spec", lambda name: None)
     monkeypatch.setattr(cores.shutil, "which", lambda name: None)
     found = run_in_loop(small[1], small[0])
-    assert found.runs == () and dict(found.not_run) == {
+    assert found.runs == () and {row.what: row.remedy for row in found.not_run} == {
         "zig": "pip install ziglang",
         "arm-none-eabi-gcc": "apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi",
     }

@@ -115,7 +115,7 @@ def test_a_signal_that_the_drive_does_not_move_is_named():
 def test_derivatives_of_a_line_are_those_of_its_polynomial(tmp_path):
     model, n, length = build_model(coil()), 50, 50e-6
     it = scenario(tmp_path, coil(), LINE + "smooth = 3", duration="10 ms")
-    motion, duration = it.motion(model), (n - 1) / 5000
+    motion, duration = it.bind(model).motion, (n - 1) / 5000
     s = np.linspace(0, 1, n)
     assert motion.position[:, 0] == pytest.approx(-20e-6 + length * SNAP(s), abs=1e-12 * length)
     for k in (1, 2, 3):
@@ -125,7 +125,7 @@ def test_derivatives_of_a_line_are_those_of_its_polynomial(tmp_path):
 
 def test_derivatives_of_a_circle_turn_by_a_right_angle_each(tmp_path):
     it = scenario(tmp_path, stage(), 'kind = "circle"\ndiameter = "40 um"\nplane = ["x", "y"]\nturns = 3')
-    motion, speed = it.motion(build_model(stage())), 2 * np.pi * 3 / 0.1
+    motion, speed = it.bind(build_model(stage())).motion, 2 * np.pi * 3 / 0.1
     angle = speed * np.arange(500) / 5000
     for k, table in enumerate([motion.position, *motion.derivatives]):
         turned = angle + k * np.pi / 2
@@ -134,10 +134,10 @@ def test_derivatives_of_a_circle_turn_by_a_right_angle_each(tmp_path):
 
 
 def test_a_line_is_by_default_one_derivative_smoother_than_the_drive_follows(tmp_path):
-    still = scenario(tmp_path, coil(), LINE).motion(build_model(coil())).derivatives
+    still = scenario(tmp_path, coil(), LINE).bind(build_model(coil())).motion.derivatives
     assert np.all(np.abs(still[:, [0, -1]]) < 1e-12 * np.abs(still).max(axis=1, keepdims=True))
     s = np.linspace(0, 1, 500)
-    command = scenario(tmp_path, stage(), 'kind = "line"\nend = { x = "1 um" }').command(build_model(stage()))
+    command = scenario(tmp_path, stage(), 'kind = "line"\nend = { x = "1 um" }').bind(build_model(stage())).samples
     assert command[:, 0] == pytest.approx(1e-6 * SNAP(s), abs=1e-18)
 
 

@@ -37,7 +37,7 @@ MAY_IMPORT = {
     "trajectory.inverse": f"{MODEL} controller",
     "trajectory": f"{MODEL} controller trajectory.inverse",
     "budget": TRAJECTORY,
-    "path_timing": TRAJECTORY,
+    "path_timing": f"{TRAJECTORY} budget",
     "learning": f"{TRAJECTORY} recordings budget",
     "firmware.c": FOUNDATION,
     "firmware.player": f"{TRAJECTORY} firmware.c",

@@ -139,6 +139,7 @@ def test_readings_at_a_part_of_the_samples_and_a_multiple_of_the_rate_are_taken(
         f"fast/{file.name}": hashlib.sha256(file.read_bytes()).hexdigest() for file in (tmp_path / "fast").iterdir()
     }
     assert files.items() <= found.inputs.items() and len(files) == 2  # the measurements too
+    assert found.notes == ()  # samples without a reading are bridged, and no news
     assert run.repeats == 3 and run.repeating["translation"] == pytest.approx(bench.error(hundred.drive), rel=0.05)
 
 

@@ -12,8 +12,9 @@ from three_stacks import HIGH, LOW, RANGE, WEIGHTS, B, W, can_push, circle, forc
 from ctrlgen import InputError, Unreachable, build_model, solve, user_device
 from ctrlgen.controller.feedforward import ControllerStatus
 from ctrlgen.controller.motion_feedforward import controller_of
+from ctrlgen.trajectory.inverse.choice import choose_inverse
+from ctrlgen.trajectory.inverse.clock import Sampled
 from ctrlgen.trajectory.inverse.drive_programmes import diagonal, least_worst, limited_rows
-from ctrlgen.trajectory.inverse.redundant import motion_inverse, path_inverse
 
 NEAR = 1e-5  # ranges: where IPOPT leaves what is at a limit
 
@@ -50,7 +51,7 @@ def test_what_can_be_followed_is_what_a_linear_programme_says(tmp_path):
     said, wanted = [], []
     for path in sizes:
         scenario, model = loaded(tmp_path, stage(), path)
-        samples = scenario.command(model)
+        samples = scenario.bind(model).samples
         wanted.append(all(can_push(f) for f in forces(samples)) and np.abs(samples).max() <= 50e-6)
         try:
             solve(scenario, model)
@@ -66,9 +67,9 @@ def test_with_a_margin_the_drives_stay_as_far_inside_of_their_ranges(tmp_path):
     said, wanted = [], []
     for size, x, y in [(d, x, y) for d in (10, 20, 30, 46) for x in (0, 10) for y in (-10, 0, 10)]:
         scenario, model = loaded(tmp_path, stage(), circle(size, x, y))
-        samples = scenario.command(model)
-        inverse = path_inverse(model, "pose", scenario.sample_time)
-        said.append([inverse.keeps_limits(samples, True, margin=margin) for margin in (0.0, 0.1)])
+        problem = scenario.bind(model)
+        samples = problem.samples
+        said.append([problem.inverse.keeps_limits(problem.motion, margin=margin) for margin in (0.0, 0.1)])
         box = [list(zip(LOW + m * RANGE, HIGH - m * RANGE, strict=True)) for m in (0.0, 0.1)]
         wanted.append(
             [all(linprog(np.zeros(3), A_eq=B, b_eq=f, bounds=b).status == 0 for f in forces(samples)) for b in box]
@@ -100,9 +101,15 @@ def test_where_a_rate_is_limited_the_drives_are_still_the_least_by_their_weights
     """Two stacks push one axis, a + b = f in N; b costs four times as much,
     a changes by 3.5 N a sample at most: scipy's SLSQP over all samples."""
     device = user_device(
-        "two", parameters={"k": "1 N/um"}, drive={"a": "100 N", "b": "100 N"}, axes={"x": "50 um"}, drive_rate={"a": "350 N/s"},
-        drive_weight={"b": 4.0}, force=lambda u: [u.a + u.b], restoring_force=lambda d, p: p.k * d.vector,
-    )  # fmt: skip
+        "two",
+        parameters={"k": "1 N/um"},
+        drive={"a": "100 N", "b": "100 N"},
+        axes={"x": "50 um"},
+        drive_rate={"a": "350 N/s"},
+        drive_weight={"b": 4.0},
+        force=lambda u: [u.a + u.b],
+        restoring_force=lambda d, p: p.k * d.vector,
+    )
     f = 10 * np.sin(2 * np.pi * np.arange(12) / 12)
     points = ", ".join(f'{{ x = "{float(v)!r} um" }}' for v in f)
     found = solve(
@@ -110,9 +117,12 @@ def test_where_a_rate_is_limited_the_drives_are_still_the_least_by_their_weights
     )
     held = np.roll(f, -1)
     best = minimize(
-        lambda a: np.sum(a**2 + 4 * (held - a) ** 2), 0.0 * f, method="SLSQP", options={"ftol": 1e-14},
+        lambda a: np.sum(a**2 + 4 * (held - a) ** 2),
+        0.0 * f,
+        method="SLSQP",
+        options={"ftol": 1e-14},
         constraints=[{"type": "ineq", "fun": lambda a, s=s: 3.5 - s * (a - np.roll(a, 1))} for s in (1, -1)],
-    ).x  # fmt: skip
+    ).x
     assert found.drive[:, 0] == pytest.approx(best, abs=1e-3)  # N, of 8: where SLSQP ends
     assert 0.1 < np.abs(0.8 * held - best).max() < 1  # else nothing is tested
 
@@ -128,10 +138,17 @@ def test_rates_are_kept_by_the_best_drives_of_the_whole_path(tmp_path):
     D = np.kron(step, np.eye(3))[::3] * RANGE[0]
     box = list(zip(np.tile(LOW / RANGE, n), np.tile(HIGH / RANGE, n), strict=True))
     # The lowest rate with which the path can be followed at all
-    slowest = linprog(
-        np.append(np.zeros(3 * n), 1.0), A_eq=np.hstack([S, np.zeros((2 * n, 1))]), b_eq=wanted.ravel(),
-        A_ub=np.block([[D, -np.ones((n, 1))], [-D, -np.ones((n, 1))]]), b_ub=np.zeros(2 * n), bounds=[*box, (0, None)],
-    ).fun / h  # fmt: skip
+    slowest = (
+        linprog(
+            np.append(np.zeros(3 * n), 1.0),
+            A_eq=np.hstack([S, np.zeros((2 * n, 1))]),
+            b_eq=wanted.ravel(),
+            A_ub=np.block([[D, -np.ones((n, 1))], [-D, -np.ones((n, 1))]]),
+            b_ub=np.zeros(2 * n),
+            bounds=[*box, (0, None)],
+        ).fun
+        / h
+    )
     assert slowest < 0.95 * change[0]
     with pytest.raises(Unreachable, match="the path is too fast"):
         solve(*loaded(tmp_path, stage(drive_rate={"a": f"{0.99 * slowest} V/s"}), circle(20, 4, 0), timing))
@@ -164,25 +181,32 @@ def test_what_few_samples_show_of_a_rate_is_what_a_linear_programme_over_all_say
     timing = 'sample_rate = "1 kHz"\nduration = "0.3 s"\n'
     n, h = 300, 1e-3
     scenario, model = loaded(tmp_path, stage(), path, timing)
-    command, closed = scenario.command(model), scenario.closed
+    motion, closed = scenario.bind(model).motion, scenario.closed
+    command = motion.position
     begin = [] if closed else [command[:1]]  # the drive that holds the start comes before the first
     wanted = forces(np.vstack([*begin, command[1:], command[:1] if closed else command[-1:]]))
     n = len(wanted)
     step = sp.eye(n) - (sp.eye(n, k=-1) + (sp.eye(n, k=n - 1) if closed else 0))
     D = sp.kron(step.tocsr()[0 if closed else 1 :], [[1.0, 0.0, 0.0]])
     one = np.ones((D.shape[0], 1))
-    slowest = linprog(
-        np.append(np.zeros(3 * n), 1.0), A_eq=sp.hstack([sp.kron(sp.eye(n), B), np.zeros((2 * n, 1))]), b_eq=wanted.ravel(),
-        A_ub=sp.vstack([sp.hstack([D, -one]), sp.hstack([-D, -one])]), b_ub=np.zeros(2 * len(one)),
-        bounds=[*list(zip(LOW, HIGH, strict=True)) * n, (0, None)],
-    ).fun / h  # fmt: skip
+    slowest = (
+        linprog(
+            np.append(np.zeros(3 * n), 1.0),
+            A_eq=sp.hstack([sp.kron(sp.eye(n), B), np.zeros((2 * n, 1))]),
+            b_eq=wanted.ravel(),
+            A_ub=sp.vstack([sp.hstack([D, -one]), sp.hstack([-D, -one])]),
+            b_ub=np.zeros(2 * len(one)),
+            bounds=[*list(zip(LOW, HIGH, strict=True)) * n, (0, None)],
+        ).fun
+        / h
+    )
     inverse = [
-        path_inverse(build_model(stage(drive_rate={"a": f"{share * slowest} V/s"})), "pose", h)
+        choose_inverse(build_model(stage(drive_rate={"a": f"{share * slowest} V/s"})), "pose", Sampled(h))
         for share in (0.5, 0.99, 0.9999, 1.0001, 1.002, 1.5)
     ]
     every = np.arange(len(command))
-    assert [i.keeps_limits(command, closed) for i in inverse] == [False] * 3 + [True] * 3
-    searched = [i.keeps_limits(command, closed, every) for i in inverse]
+    assert [i.keeps_limits(motion) for i in inverse] == [False] * 3 + [True] * 3
+    searched = [i.keeps_limits(motion, every) for i in inverse]
     assert searched[:3] + searched[4:] == [False] * 3 + [True] * 2
 
 
@@ -216,12 +240,11 @@ def test_what_refutes_one_path_bounds_what_every_other_breaks():
 @pytest.mark.parametrize("path", [circle(20, 4, 0), 'kind = "line"\nend = { x = "12 um", y = "4 um" }\n'])
 def test_forces_at_few_samples_are_those_of_the_whole_path(tmp_path, device, path):
     scenario, model = loaded(tmp_path, device, path)
-    motion = model.inertial
-    inverse = (motion_inverse if motion else path_inverse)(model, "pose", 1e-3).inner
-    command = scenario.motion(model) if motion else scenario.command(model)
-    every, few = inverse.trajectory(command, scenario.closed), np.array([0, 3, 41, 99])
+    problem = scenario.bind(model)
+    inverse, motion = problem.inverse.inner, problem.motion
+    every, few = inverse.trajectory(motion), np.array([0, 3, 41, 99])
     leads = np.roll(every.z, -1, axis=0) if scenario.closed else np.vstack([every.z[1:], every.z[-1:]])
-    z, f = inverse.forces_at(command, scenario.closed, few)
+    z, f = inverse.leads_to(motion, few)
     assert np.array_equal(z, leads[few]) and np.array_equal(f, every.u[few])
 
 
@@ -231,7 +254,7 @@ def test_a_rate_is_kept_where_the_closed_form_breaks_only_another_limit(tmp_path
     path = circle(10)
     R = np.diag(RANGE)
     scenario, model = loaded(tmp_path, stage(), path, timing)
-    wanted = forces(np.roll(scenario.command(model), -1, axis=0))
+    wanted = forces(np.roll(scenario.bind(model).samples, -1, axis=0))
     steps = [
         np.abs(u - np.roll(u, 1, axis=0))[:, 0].max()
         for u in (wanted @ (R @ np.linalg.pinv(B @ R)).T, solve(scenario, model).drive)
@@ -286,11 +309,15 @@ def test_the_reference_controller_takes_the_least_effort_and_keeps_the_drives_li
         ({"force": lambda u, p: [p.g * u.a**2, p.g * (u.c - 0.5 * u.b)]}, "not linear in the drives"),
         ({"force": lambda u, p: [p.g * (u.a + u.b + u.c)] * 2}, "independently"),
         (
-            {"state": {"s": "1 V"}, "rates": lambda u, x: [u.a - x.s], "force": lambda u, x, p: [p.g * x.s, p.g * (u.c + u.b)]},
+            {
+                "state": {"s": "1 V"},
+                "rates": lambda u, x: [u.a - x.s],
+                "force": lambda u, x, p: [p.g * x.s, p.g * (u.c + u.b)],
+            },
             "states of their own",
         ),
     ],
-)  # fmt: skip
+)
 def test_what_has_no_least_effort_is_refused(tmp_path, other, what):
     with pytest.raises(InputError, match=what):
         solve(*loaded(tmp_path, stage(**other), circle(2)))

@@ -95,15 +95,27 @@ def test_pairs_that_act_on_axes_of_their_own_are_chosen_each_by_itself():
 @pytest.mark.parametrize(
     ("device", "says"),
     [
-        (stage(drive=dict.fromkeys("abcd", "100 V"), force=lambda u, p: [p.g * (u.a + u.b + u.d), p.g * (u.c - u.b)]),
-         r"drives \(a, b, c, d\) of which 2 at a time can be chosen.*use the player"),
-        (stage(force=lambda u, d, p: [p.g * (u.a + 0.5 * u.b), p.g * (1 + d.x / 1e-3) * (u.c - 0.5 * u.b)]),
-         "slope by the drives changes.*use the player"),
-        (stage(drive={"a": "100 V", "c": "130 V"}, axes={"x": ("5 um", "30 um"), "y": "30 um"},
-               force=lambda u, p: [p.g * u.a, p.g * u.c], limits={"flexure_force": (lambda d, p: p.k * d.x, "20 N")}),
-         "moves x in a range that leaves out where it rests"),
+        (
+            stage(
+                drive=dict.fromkeys("abcd", "100 V"), force=lambda u, p: [p.g * (u.a + u.b + u.d), p.g * (u.c - u.b)]
+            ),
+            r"drives \(a, b, c, d\) of which 2 at a time can be chosen.*use the player",
+        ),
+        (
+            stage(force=lambda u, d, p: [p.g * (u.a + 0.5 * u.b), p.g * (1 + d.x / 1e-3) * (u.c - 0.5 * u.b)]),
+            "slope by the drives changes.*use the player",
+        ),
+        (
+            stage(
+                drive={"a": "100 V", "c": "130 V"},
+                axes={"x": ("5 um", "30 um"), "y": "30 um"},
+                force=lambda u, p: [p.g * u.a, p.g * u.c],
+                limits={"flexure_force": (lambda d, p: p.k * d.x, "20 N")},
+            ),
+            "moves x in a range that leaves out where it rests",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_cannot_be_chosen_online_is_refused(device, says, tmp_path):
     scenario, model = loaded(tmp_path, device, circle(10))
     with pytest.raises(InputError, match=says):
@@ -114,7 +126,7 @@ def test_the_shipped_vectors_of_the_platform_meet_range_and_rate():
     scenario = load_scenario(SCENARIOS / "tilt_platform")
     model = build_model(scenario.device)
     controller = controller_of(model, "pose", scenario.sample_time)
-    rows = vectors(controller, scenario.command(model), Real.FLOAT)["rows"]
+    rows = vectors(controller, scenario.bind(model).samples, Real.FLOAT)["rows"]
     seen = {int(row["status"]) for row in rows}
     assert {0, 1, 8, 16, 128} <= {bit for status in seen for bit in (0, 1, 8, 16, 128) if status & bit or status == bit}
     assert {row["how"] & 1 for row in rows if row["status"] & 128} == {0, 1}

@@ -8,7 +8,6 @@ from command_line import ctrlgen as run_command
 
 import ctrlgen
 from ctrlgen import InputError, Unreachable, build_model, load_device, load_scenario, solve
-from ctrlgen.trajectory.inverse.balanced import PathInverse
 
 STAGE = '''"""A piezo X-Y stage with levers, 0 to 150 V."""
 import ctrlgen
@@ -76,7 +75,8 @@ def test_a_toml_file_changes_numbers_of_a_python_file_and_adds_effects(folder):
     assert changed == {path: q.text for path, q in own.quantities() if path != "mechanism.stiffness"}
     scenario = load_scenario(folder / "circle.toml", folder / "stage.toml")
     assert scenario.inputs["device_code"].text == STAGE and "1.1 N/um" in scenario.inputs["device"].text
-    assert PathInverse(build_model(device), "pose", 1e-3).trajectory(scenario.command(build_model(device)), True).solved
+    problem = scenario.bind(build_model(device))
+    assert problem.inverse.trajectory(problem.motion).solved
 
 
 @pytest.mark.parametrize(

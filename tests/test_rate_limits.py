@@ -15,6 +15,7 @@ from ctrlgen.devices import load_device
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.toolchains import find_compilers
 from ctrlgen.firmware.player.compression import compress
+from ctrlgen.trajectory.inverse.clock import Sampled
 from ctrlgen.trajectory.inverse.inertial import InertialInverse
 from ctrlgen.trajectory.inverse.motion import Motion
 from ctrlgen.trajectory.optimisation import TrajectoryProgramme
@@ -252,7 +253,7 @@ def test_where_a_path_is_too_fast_the_optimum_follows_it_as_near_as_the_rate_all
     )
     model = build_model(device)
     scenario = load_scenario(tmp_path, device)
-    result, _ = TrajectoryProgramme(model, "pose", scenario.command(model), 1e-3, closed=True).optimum()
+    result, _ = TrajectoryProgramme(model, "pose", scenario.bind(model).motion, scenario.clock).optimum()
     assert np.abs(result.unreachable_by).max() > 0.01  # in typical sizes, 30 um
     relaxed = 2e-7  # of the rate: IPOPT's bounds are 1e-8 of its range off, and a difference of drives rounds
     changes = np.diff(np.append(result.u[-1, 0], result.u[:, 0])) / 1e-3
@@ -275,7 +276,7 @@ def test_before_a_motion_with_inertia_stands_the_drive_that_holds_its_start(tmp_
     )
     n, moved = 20, np.zeros((3, 20, 1))
     moved[2] = 5.0  # m/s^2 at every sample, the first too
-    motion = Motion(np.full((n, 1), -20e-6), moved[1:])
-    found = InertialInverse(build_model(device), "pose", 2e-4, approximate=True).trajectory(motion, closed=False)
+    motion = Motion(np.full((n, 1), -20e-6), moved[1:], closed=False)
+    found = InertialInverse(build_model(device), "pose", Sampled(2e-4), approximate=True).trajectory(motion)
     assert found.u_start[0] == pytest.approx(0.2e6 * -20e-6 / 10.0)
     assert found.u[0, 0] - found.u_start[0] == pytest.approx(0.5 * 5.0 / 10.0)

@@ -19,9 +19,9 @@ from scipy.stats import norm
 
 import ctrlgen
 from ctrlgen import Unreachable, build_model, load_scenario, solve
+from ctrlgen.budget.chance_constraint import ChanceConstraint
 from ctrlgen.budget.error_budget import budget_of
 from ctrlgen.budget.limits import Margins
-from ctrlgen.budget.robust import ChanceConstraint
 from ctrlgen.budget.uncertainty import load_uncertainties
 from ctrlgen.trajectory.scenario_file import Robust
 

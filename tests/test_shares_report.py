@@ -135,9 +135,20 @@ def channel(
         for place, (kind, share) in enumerate(parts.items(), 1)
     )
     return ChannelShares(
-        "reading.axis", 1.0, frozenset(), constant, numbers, rows, Share(total, (total - 0.05, total + 0.03)), 1 - total,
-        past, 0.0, {Kind.LINE: 0.02}, nothing, {},
-    )  # fmt: skip
+        "reading.axis",
+        1.0,
+        frozenset(),
+        constant,
+        numbers,
+        rows,
+        Share(total, (total - 0.05, total + 0.03)),
+        1 - total,
+        past,
+        0.0,
+        {Kind.LINE: 0.02},
+        nothing,
+        {},
+    )
 
 
 @pytest.mark.parametrize(

@@ -107,7 +107,7 @@ def test_every_kind_of_path_is_followed(scenario, path):
 def test_poses_from_a_csv_in_the_readers_units(scenario, tmp_path):
     (tmp_path / "poses.csv").write_text("delta_z [mm],theta_x [mrad]\n0.02,0\n0.021,0.1\n\n0.022,0.2\n")
     s = scenario('[path]\nkind = "poses"\nfile = "poses.csv"\n')
-    command = s.command(build_model(s.device))
+    command = s.bind(build_model(s.device)).samples
     assert command[:, 5] == pytest.approx([2e-5, 2.1e-5, 2.2e-5]) and command[:, 0] == pytest.approx([0, 1e-4, 2e-4])
 
 
@@ -127,7 +127,7 @@ def test_a_bad_csv_is_refused_by_line_and_column(scenario, tmp_path, text, says)
     (tmp_path / "poses.csv").write_text(text)
     s = scenario('[path]\nkind = "poses"\nfile = "poses.csv"\n')
     with pytest.raises(InputError) as caught:
-        s.command(build_model(s.device))
+        _ = s.bind(build_model(s.device)).samples
     assert says in str(caught.value)
 
 
@@ -161,5 +161,5 @@ def test_a_bad_scenario_is_refused_with_the_remedy(scenario, text, says):
 def test_a_bad_path_is_refused_when_it_meets_the_device(scenario, path, says):
     s = scenario(f"points = 4\n[path]\n{path}\n")
     with pytest.raises(InputError) as caught:
-        s.command(build_model(s.device))
+        _ = s.bind(build_model(s.device)).samples
     assert says in str(caught.value)

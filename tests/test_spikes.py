@@ -90,15 +90,21 @@ def test_a_dead_channel_takes_neither_tolerance_nor_spikes_of_another():
     recording = spiked(0.0)
     records = tuple(
         replace(
-            r, observed=np.column_stack([np.zeros(N), r.observed]), valid=np.ones((N, 2), bool),
+            r,
+            observed=np.column_stack([np.zeros(N), r.observed]),
+            valid=np.ones((N, 2), bool),
             spikes=((1, 0, 1.0), (2, 1, 3.0)),
         )
         for r in recording.records
-    )  # fmt: skip
+    )
     both = replace(
-        recording, channels=("drive.axis", "reading.axis"), units=("V", "nm"), noise=(None, NOISE), records=records,
+        recording,
+        channels=("drive.axis", "reading.axis"),
+        units=("V", "nm"),
+        noise=(None, NOISE),
+        records=records,
         tolerance=(1.0, 2e-9),
-    )  # fmt: skip
+    )
     live = without_dead_channels(AXIS, both).recording
     assert live.channels == ("reading.axis",) and live.tolerance == (2e-9,)
     assert all(r.spikes == ((2, 0, 3.0),) for r in live.records)

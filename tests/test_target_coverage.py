@@ -22,7 +22,6 @@ from ctrlgen.firmware.c.toolchains import FLAGS
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.online.vector_cases import limiter_calls
 from ctrlgen.firmware.online.vectors import vectors
-from ctrlgen.trajectory.scenario import motion_targets
 
 # Share of the branches taken. What is left, by what stands in its line, cannot be entered or not for certain in float:
 LEAST = {
@@ -100,7 +99,7 @@ def test_the_vectors_have_every_status_that_a_target_can_bring_about(real):
         scenario = load_scenario(SCENARIOS / name)
         model = build_model(scenario.device)
         controller = controller_of(model, scenario.file.follow, scenario.sample_time)
-        command = motion_targets(scenario, model) if model.inertial else scenario.command(model)
+        command = scenario.bind(model).targets
         rows = vectors(controller, command, real)["rows"]
         assert reduce(or_, (row["status"] for row in rows)) == bits
         stepped = reduce(or_, (row["status"] for row in rows if not row["how"] & 1))

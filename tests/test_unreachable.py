@@ -12,7 +12,8 @@ import ctrlgen
 from ctrlgen import Unreachable, build_model, load_scenario, solve
 from ctrlgen.core.errors import SolverError
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE, primary
-from ctrlgen.trajectory.inverse.balanced import PathInverse
+from ctrlgen.trajectory.inverse.clock import Settled
+from ctrlgen.trajectory.inverse.motion import Motion
 from ctrlgen.trajectory.inverse.violations import violations
 from ctrlgen.trajectory.optimisation import TrajectoryProgramme
 
@@ -30,7 +31,8 @@ def written(folder, device: str, effects: str, rate: float, duration: float, pat
 
 def followed_by_ipopt(model, scenario, command) -> bool:
     """Whether IPOPT, begun far away, finds a trajectory without slack: it knows nothing of the inverse."""
-    programme = TrajectoryProgramme(model, "pose", command, scenario.sample_time, scenario.closed)
+    motion = Motion.of_samples(command, scenario.closed)
+    programme = TrajectoryProgramme(model, "pose", motion, scenario.clock)
     try:
         result, _ = programme.optimum()
     except SolverError:  # as it ends without the inverse on many paths that cannot be followed
@@ -54,7 +56,7 @@ def test_a_path_that_cannot_be_followed_is_explained(tmp_path, name):
         if len(few) == len(command):
             assert followed_by_ipopt(model, scenario, command), what
         else:  # too long for IPOPT from afar, here: every pose alone
-            static = TrajectoryProgramme(model, "pose", few)
+            static = TrajectoryProgramme(model, "pose", Motion.of_samples(few), Settled())
             assert np.linalg.norm(static.optimum()[0].unreachable_by, axis=1).max() < FEASIBILITY_TOLERANCE, what
 
 
@@ -117,9 +119,9 @@ def test_one_of_another_device_is_explained_too(tmp_path, name):
         else:
             assert followed_by_ipopt(model, scenario, command), what
     if model.redundant:
-        assert not pushed(scenario.command(model), reference, h, scenario.closed)
+        assert not pushed(scenario.bind(model).samples, reference, h, scenario.closed)
     if isinstance(reference, tuple):
-        assert not moved(scenario.command(model), h, *reference)
+        assert not moved(scenario.bind(model).samples, h, *reference)
 
 
 def test_thirty_are_named():
@@ -143,26 +145,23 @@ def drawn(rng: np.random.Generator, folder):
 def test_the_inverse_and_ipopt_agree_on_what_can_be_followed(tmp_path, seed):
     scenario = drawn(np.random.default_rng(seed), tmp_path)
     model = build_model(scenario.device)
-    command = scenario.command(model)
-    inverse = PathInverse(model, "pose", scenario.sample_time)
-    assert inverse.keeps_limits(command, scenario.closed) == followed_by_ipopt(model, scenario, command)
+    problem = scenario.bind(model)
+    kept = problem.inverse.keeps_limits(problem.motion)
+    assert kept == followed_by_ipopt(model, scenario, problem.samples)
 
 
 def test_the_drawn_paths_are_of_both_kinds(tmp_path):
     kept = []
     for seed in range(24):
         scenario = drawn(np.random.default_rng(seed), tmp_path)
-        model = build_model(scenario.device)
-        kept.append(
-            PathInverse(model, "pose", scenario.sample_time).keeps_limits(scenario.command(model), scenario.closed)
-        )
+        problem = scenario.bind(build_model(scenario.device))
+        kept.append(problem.inverse.keeps_limits(problem.motion))
     assert 6 < sum(kept) < 18
 
 
 def test_what_a_path_needs_is_what_ipopt_finds(circle):
     """The inverse and the optimum are two computations of the same drives."""
-    inverse = PathInverse(circle.model, "pose", circle.scenario.sample_time)
-    needed = inverse.trajectory(circle.command, True)
+    needed = circle.scenario.bind(circle.model).inverse.trajectory(Motion.of_samples(circle.command, closed=True))
     assert needed.exact and not violations(circle.model, needed.x, needed.z, needed.u)
     # W, of 0.3: IPOPT's tolerance is 1e-10 of a sample's typical step
     assert np.abs(needed.u - circle.drive).max() < 1e-7
@@ -172,7 +171,8 @@ def test_what_a_path_needs_is_what_ipopt_finds(circle):
 def test_memories_are_carried_until_a_closed_path_repeats_or_is_seen_not_to(tmp_path, effects, settles):
     scenario = written(tmp_path, "mems_hexapod", effects, 200, 0.5, CIRCLE.format("20 um") + ABOVE)
     model = build_model(scenario.device)
-    needed = PathInverse(model, "pose", scenario.sample_time).trajectory(scenario.command(model), True)
+    problem = scenario.bind(model)
+    needed = problem.inverse.trajectory(problem.motion)
     assert needed.solved and needed.exact is settles
     solution = solve(scenario, model)
     assert np.abs(needed.z - solution.trace.z).max() < (1e-12 if settles else 3 * needed.unsettled * 1e-5)
@@ -215,7 +215,7 @@ def test_of_the_ways_into_range_the_shortest_is_offered(tmp_path):
     with pytest.raises(Unreachable) as caught:
         solve(scenario, model)
     (shifted,) = (c for w, c in caught.value.infeasibility.alternatives.items() if "shifted" in w)
-    assert shifted - scenario.command(model) == pytest.approx(np.tile([-10.1e-6, 0], (2, 1)))
+    assert shifted - scenario.bind(model).samples == pytest.approx(np.tile([-10.1e-6, 0], (2, 1)))
 
 
 def test_what_memories_may_still_change_is_the_sum_of_what_all_further_periods_bring(tmp_path):
@@ -224,8 +224,8 @@ def test_what_memories_may_still_change_is_the_sum_of_what_all_further_periods_b
     creep = {"kind": "creep", "at": "x", "gain": "20 %", "tau": "0.1 s", "slow": "0 %"}
     points = [(10 + 10 * np.cos(t), 0) for t in 2 * np.pi * np.arange(20) / 20]
     scenario, model = pair(tmp_path, points, 'sample_rate = "25 Hz"\n', "periodic = true\n", effect=[creep])
-    inverse, command = PathInverse(model, "pose", scenario.sample_time), scenario.command(model)
-    begun, last = (inverse.trajectory(command, True, periods) for periods in (3, 400))
+    problem = scenario.bind(model)
+    begun, last = (problem.inverse.trajectory(problem.motion, periods) for periods in (3, 400))
     off = np.abs(begun.x[0] - last.x[0]) / model.x_scale
     assert last.exact and not begun.exact
     assert begun.unsettled == pytest.approx(off.max() * np.exp(-2), rel=0.03)
@@ -254,7 +254,7 @@ def test_of_a_jump_beyond_the_stroke_the_stroke_alone_is_the_cause(tmp_path):
             timing,
             drive={"a": "55 N", "b": "45 N"},
         )
-        needed = PathInverse(model, "pose", scenario.sample_time).trajectory(scenario.command(model), False)
-        broken = needed.violations(model, scenario.sample_time, False)
+        problem = scenario.bind(model)
+        broken = problem.inverse.trajectory(problem.motion).violations(model)
         assert "a" in {v.limit.channels[v.channel] for v in broken}
         assert {v.limit.channels[v.channel] for v in primary(model, broken)} == causes

@@ -10,7 +10,7 @@ import pytest
 from misfits import errors_of, left, noise_of
 from scipy import stats
 
-from ctrlgen.diagnosis.selection.attribution import Attribution, Share
+from ctrlgen.diagnosis.selection.attribution import Attribution, ShareEntry
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.findings import findings, held_out_errors
 from ctrlgen.diagnosis.selection.objections import objections
@@ -71,8 +71,8 @@ def fitter(known: bool = True, tolerance=(None,), **squares) -> SimpleNamespace:
 
 
 def shares_of(*values: float | None, rest: float | None = 0.0) -> Attribution:
-    said = tuple(None if v is None else Share(v, (v, v)) for v in values)
-    return Attribution(said, None if rest is None else Share(rest, (rest, rest)), True)
+    said = tuple(None if v is None else ShareEntry(value=v, ci95=(v, v)) for v in values)
+    return Attribution(said, None if rest is None else ShareEntry(value=rest, ci95=(rest, rest)), True)
 
 
 CHANCE = 4 * np.sqrt(2 * N)  # squares by which N of them differ by chance

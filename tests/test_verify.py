@@ -26,9 +26,13 @@ from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.package import verify_package
 from ctrlgen.verification.build_page import write_build
 from ctrlgen.verification.build_record import BUDGETS, Build, record
-from ctrlgen.verification.check import Check, CheckFinding, not_run
-from ctrlgen.verification.comparison import Comparison, ComparisonRow
-from ctrlgen.verification.in_loop import Cost, InLoop, Stopped, TargetRun
+from ctrlgen.verification.check import Check, CheckState, ToolFinding, not_run
+from ctrlgen.verification.comparison import Comparison
+from ctrlgen.verification.comparison_entry import ComparisonEntry, ComparisonKind
+from ctrlgen.verification.emulated_target import CallCost, CallKind, NotRun, StoppedTarget, Target
+from ctrlgen.verification.host import HostBuild
+from ctrlgen.verification.in_loop import InLoop
+from ctrlgen.verification.tracking import Piece
 
 pytestmark = pytest.mark.long
 
@@ -130,13 +134,17 @@ def test_the_same_input_gives_the_same_numbers_on_a_page_twice(example, tmp_path
 @pytest.fixture(scope="module")
 def example(circle, circle_c) -> Build:
     """A build of six drives in which all is well."""
-    cost = Cost("step, along the scenario", 10, 500.0, 601, 601)
-    run = TargetRun("Cortex-M4F", "zig 0.13", Real.FLOAT, (cost,), 256, 1000, 100, 0, 500, 0, 0, "")
-    rows = (ComparisonRow("gcc double", "scenario, online C - CasADi", "drive", "W", 0.0, 0.0, 1.0, 10, None),)
-    errors = {"online C": {real: np.full((5, 6), 1e-12) for real in Real}}
-    check = Check("clang-tidy", "14", (("x.c", Real.FLOAT),), "passed")
+    cost = CallCost(what=CallKind.STEP_SCENARIO, calls=10, mean=500.0, worst=601, worst_within=601)
+    sizes = {"stack": 256, "code": 1000, "tables": 100, "writable": 0}
+    same = {"numbers": 500, "differing": 0, "ulp": 0, "where": ""}
+    run = Target(core="Cortex-M4F", compiler="zig 0.13", real=Real.FLOAT, costs=(cost,), **sizes, **same)
+    numbers = {"worst": 0.0, "rms": 0.0, "limit": 1.0, "samples": 10, "first": None}
+    host = HostBuild("gcc", Real.DOUBLE)
+    row = ComparisonEntry(build=host, what=ComparisonKind.FOLLOWED, signal="drive", unit="W", **numbers)
+    errors = {Piece.ONLINE: {real: np.full((5, 6), 1e-12) for real in Real}}
+    check = Check("clang-tidy", "14", (("x.c", Real.FLOAT),), CheckState.PASSED)
     return Build(
-        circle, circle_c, (), Comparison(rows, {"gcc": "gcc 12"}, ()), InLoop((run,), (), ()), (check,), errors
+        circle, circle_c, (), Comparison((row,), {"gcc": "gcc 12"}, ()), InLoop((run,), (), ()), (check,), errors
     )
 
 
@@ -146,30 +154,38 @@ def shown(build: Build, out: Path) -> str:
 
 
 def test_what_is_well_passes_and_budgets_are_stated_for_six_drives(example, tmp_path):
-    assert example.passed and record(example)["budgets"] == {"core": "Cortex-M4F", **BUDGETS}
+    assert example.passed and record(example).as_json()["budgets"] == {"core": "Cortex-M4F", **BUDGETS}
     page = shown(example, tmp_path)
     assert "Everything that ran passed" in page and "not run" not in re.sub(r"<style>.*?</style>", "", page, flags=re.S)
+
+
+def refused(file: str, line: int, severity: str, rule: str) -> ToolFinding:
+    """A rule of MISRA C that is broken and not permitted."""
+    text = f"MISRA C:2012 rule {rule}"
+    return ToolFinding(file=file, line=line, rule=f"misra-c2012-{rule}", severity=severity, text=text, permitted=False)
 
 
 def broken(build: Build) -> dict[str, tuple[Build, str]]:
     """The same build with one thing wrong, and what must be said of it."""
     run, row, check = build.in_loop.runs[0], build.comparison.rows[0], build.checks[0]
-    finding = CheckFinding("x.c", 7, "misra-c2012-13.6", "mandatory", "MISRA C:2012 rule 13.6")
-    off = replace(run, differing=3, ulp=2, where="step, along the scenario, call 4")
-    stopped = Stopped("Cortex-M7", "zig 0.13", Real.DOUBLE, "f did not return within 10 s on the emulated core")
+    finding = refused("x.c", 7, "mandatory", "13.6")
+    off = run.model_copy(update={"differing": 3, "ulp": 2, "where": "step, along the scenario, call 4"})
+    words = "f did not return within 10 s on the emulated core"
+    stopped = StoppedTarget(core="Cortex-M7", compiler="zig 0.13", real=Real.DOUBLE, words=words)
+    wrong = row.model_copy(update={"worst": 2.0, "first": 3})
     return {
         "bits": (replace(build, in_loop=InLoop((off,), (), ())), "3 of 500 numbers differ"),
         "memory": (
-            replace(build, in_loop=InLoop((replace(run, writable=4),), (), ())),
+            replace(build, in_loop=InLoop((run.model_copy(update={"writable": 4}),), (), ())),
             "4 bytes of static writable memory",
         ),
         "stopped": (replace(build, in_loop=InLoop((run,), (stopped,), ())), "f did not return within 10 s"),
         "tolerance": (
-            replace(build, comparison=replace(build.comparison, rows=(replace(row, worst=2.0, first=3),))),
+            replace(build, comparison=replace(build.comparison, rows=(wrong,))),
             "gcc double: scenario, online C - CasADi, drive, is out of tolerance",
         ),
         "rule": (
-            replace(build, checks=(replace(check, state="failed", findings=(finding,)),)),
+            replace(build, checks=(replace(check, state=CheckState.FAILED, findings=(finding,)),)),
             "clang-tidy: 1 finding, first x.c:7: mandatory: MISRA C:2012 rule 13.6",
         ),
     }
@@ -182,17 +198,17 @@ def test_anything_that_fails_fails_the_build_and_stands_first_on_the_page(exampl
     page = shown(build, tmp_path)
     assert "1 failed" in page and "Everything that ran passed" not in page
     assert page.index(words) < page.index("<h2>")
-    assert record(build)["passed"] is False
+    assert record(build).passed is False
 
 
 def test_what_did_not_run_is_listed_and_is_neither_passed_nor_failed(example, tmp_path):
     build = replace(
         example,
         checks=(not_run("clang-tidy", (), "clang-tidy is missing; apt-get install clang-tidy"),),
-        in_loop=InLoop((), (), (("emulated cores", "pip install unicorn pyelftools"),)),
+        in_loop=InLoop((), (), (NotRun(what="emulated cores", remedy="pip install unicorn pyelftools"),)),
         comparison=replace(example.comparison, missing=("clang",)),
     )
-    assert build.passed and [what for what, _ in build.not_run] == ["clang", "emulated cores", "clang-tidy"]
+    assert build.passed and [row.what for row in build.not_run] == ["clang", "emulated cores", "clang-tidy"]
     page = shown(build, tmp_path)
     assert "3 not run" in page and "apt-get install clang-tidy" in page and "pip install unicorn pyelftools" in page
     assert '<span class="idle">not run</span>' in page and '<span class="ok">passed</span>' not in page
@@ -202,7 +218,9 @@ def test_what_did_not_run_is_listed_and_is_neither_passed_nor_failed(example, tm
 def stubbed(monkeypatch, compiler):
     """Everything but solving, generating and writing replaced by an answer at once."""
     monkeypatch.setattr(
-        pipeline, "run_in_loop", lambda *_: InLoop((), (), (("emulated cores", "pip install unicorn pyelftools"),))
+        pipeline,
+        "run_in_loop",
+        lambda *_: InLoop((), (), (NotRun(what="emulated cores", remedy="pip install unicorn pyelftools"),)),
     )
     monkeypatch.setattr(pipeline, "check_on_boards", lambda *_: ())
     monkeypatch.setattr(pipeline, "check_hostile", lambda *_, **__: ())
@@ -212,8 +230,8 @@ def stubbed(monkeypatch, compiler):
 
 @pytest.mark.long
 def test_a_failing_check_gives_status_1_and_the_page_is_written(stubbed, tmp_path):
-    finding = CheckFinding("a.c", 3, "misra-c2012-15.1", "advisory", "MISRA C:2012 rule 15.1")
-    failing = Check("cppcheck --addon=misra", "2.10", (), "failed", (finding,))
+    finding = refused("a.c", 3, "advisory", "15.1")
+    failing = Check("cppcheck --addon=misra", "2.10", (), CheckState.FAILED, (finding,))
     stubbed.setattr(pipeline, "check_rules", lambda *_, **__: (failing,))
     out = tmp_path / "out"
     done = CliRunner().invoke(app, ["verify", str(SCENARIOS / "rrr_circle"), "--out", str(out)])

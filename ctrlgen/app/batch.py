@@ -147,21 +147,21 @@ def _groups(job: JobTable, folder: Path) -> Iterator[list[Path] | Fault]:
     """The recordings of each diagnosis; a fault for each text that matches nothing."""
     for given in job.recordings:
         matches = [_matches(folder, text) for text in ((given,) if isinstance(given, str) else given)]
-        for text, found in zip((given,) if isinstance(given, str) else given, matches, strict=True):
-            if not found:
+        for text, paths in zip((given,) if isinstance(given, str) else given, matches, strict=True):
+            if not paths:
                 yield Fault("", f"nothing matches {text!r}; name a folder with a recording.toml, or the file itself")
         if isinstance(given, str):
             yield from ([path] for path in matches[0])
         elif all(matches):
-            yield [path for found in matches for path in found]
+            yield [path for paths in matches for path in paths]
 
 
 def _matches(folder: Path, text: str) -> list[Path]:
     """The folders and .toml files that `text` names; of the folders that match a pattern, those with a recording."""
     if not re.search(r"[*?\[]", text):
         return [folder / text] if (folder / text).exists() else []
-    found = sorted(Path("/").glob(text[1:]) if text.startswith("/") else folder.glob(text))
-    return [p for p in found if (p.is_dir() and (p / "recording.toml").is_file()) or p.suffix == ".toml"]
+    paths = sorted(Path("/").glob(text[1:]) if text.startswith("/") else folder.glob(text))
+    return [p for p in paths if (p.is_dir() and (p / "recording.toml").is_file()) or p.suffix == ".toml"]
 
 
 def _name(path: Path) -> str:
@@ -236,17 +236,17 @@ def _is_there(folder: Path, made_from: dict[str, Any]) -> bool:
 
 def _row(name: str, state: str, content: bytes) -> BatchRow:
     """The row of a diagnosis.json, with the channel whose error is largest beside its noise."""
-    found = json.loads(content)
-    causes = "; ".join(f"{f['effect']} at {f['location']}" for f in found["findings"])
+    record = json.loads(content)
+    causes = "; ".join(f"{f['effect']} at {f['location']}" for f in record["findings"])
 
     def size(item: tuple[str, dict[str, Any]]) -> float:
         e = item[1]
         return (e["rms_before"] or 0.0) / (e["noise_floor"] or e["rms_after"] or 1.0)
 
-    channel, e = max(found["held_out"].items(), key=size)
+    channel, e = max(record["held_out"].items(), key=size)
     return BatchRow(
-        name, state, found["verdict"], causes, channel, e["rms_before"], e["rms_after"], e["noise_floor"], e["unit"]
-    )  # fmt: skip
+        name, state, record["verdict"], causes, channel, e["rms_before"], e["rms_after"], e["noise_floor"], e["unit"]
+    )
 
 
 def _one_line(text: str) -> str:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def print_budget(budget: ErrorBudget) -> None:
     """The contributors in their order, all combined, the limits, and whether the draws agree."""
-    from ctrlgen.budget.budget_page import safety_sentence
+    from ctrlgen.budget.budget_record import safety_sentence
 
     out.print(f"[bold]error budget: {escape(budget.solution.scenario.file.title)}[/bold]", soft_wrap=True)
     heads = [(f"{g.unit} {what}", "right") for g in budget.groups for what in ("per step", "peak", "rms")]

@@ -19,7 +19,7 @@ def print_calibration(calibration: Calibration, budgets: tuple[ErrorBudget, Erro
     out.print(f"[bold]calibration: {escape(calibration.recording.title)}[/bold]", soft_wrap=True)
     table = table_of(
         ("constant", "left"), ("device file", "right"), ("specimen", "right"), ("95 % interval", "right"), ("", "left")
-    )  # fmt: skip
+    )
     for row in calibration.constants:
         c = row.constant
         interval = " ... ".join(c.shown(v, 6) for v in row.interval) if row.determined else f"bounds {c.range_text}"

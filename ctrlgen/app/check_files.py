@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ctrlgen.app.console import out, print_recording, print_shaper
+from ctrlgen.app.console import out
+from ctrlgen.app.diagnosis_console import print_recording
+from ctrlgen.app.scenario_console import print_shaper
 from ctrlgen.core.errors import Fault, InputError, Unreachable
 from ctrlgen.core.files import read_toml
 from ctrlgen.core.units import show
@@ -15,8 +17,8 @@ from ctrlgen.devices.sensor import describe
 from ctrlgen.firmware.package import MANIFEST, verify_package
 from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.schema import FILE as RECORDING
+from ctrlgen.trajectory.infeasibility import check_feasible
 from ctrlgen.trajectory.scenario import load_scenario, model_of
-from ctrlgen.trajectory.solution import check_feasibility, check_motion, check_static
 
 
 def check(file: Path, device: Path | None = None, figure: Path | None = None) -> None:
@@ -48,22 +50,17 @@ def _check_scenario(file: Path) -> None:
     """Whether the path can be followed; not where the scenario expects that it cannot, when the reason is printed."""
     scenario = load_scenario(file)
     model = model_of(scenario)
-    command = scenario.command(model)
-    out.print(f"{scenario.file.title}: {len(command)} samples, device {scenario.device.name}", markup=False)
-    print_shaper(scenario, model)
+    problem = scenario.bind(model)
+    out.print(f"{scenario.file.title}: {len(problem.samples)} samples, device {scenario.device.name}", markup=False)
+    print_shaper(problem)
     try:
         if scenario.file.robust is not None:
             from ctrlgen.budget.robust import solve
-            from ctrlgen.verification.scenario_report import robust_sentence
+            from ctrlgen.verification.summary import robust_sentence
 
-            out.print(str(robust_sentence(solve(scenario, model))), markup=False, soft_wrap=True)
+            out.print(robust_sentence(solve(scenario, model)), markup=False, soft_wrap=True)
             return
-        if scenario.file.feedforward == "static":
-            _, needed = check_static(scenario, model)
-        elif model.inertial:
-            *_, needed = check_motion(scenario, model)
-        else:
-            _, needed = check_feasibility(scenario, model, command)
+        needed = check_feasible(problem)
     except Unreachable as error:
         if scenario.file.outcome == "solved":
             raise
@@ -72,8 +69,8 @@ def _check_scenario(file: Path) -> None:
     unsettled = "the memories of its effects do not settle within a period: solve it to know whether it can be followed"
     if model.inertial:
         unsettled = "no drive was found in the first place: solve it to know why"
-    found = "the path can be followed within every limit" if needed.exact else unsettled
-    out.print(found, markup=False, soft_wrap=True)
+    verdict = "the path can be followed within every limit" if needed.exact else unsettled
+    out.print(verdict, markup=False, soft_wrap=True)
 
 
 def _check_device(file: Path, figure: Path | None) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
-from ctrlgen.app.console import out, show_table, table_of
+from ctrlgen.app.console import Column, out, show_table, table_of
 
 if TYPE_CHECKING:
     from ctrlgen.learning.learn import Learning
@@ -17,18 +17,20 @@ def print_learning(learning: Learning) -> None:
     from ctrlgen.learning.learning_page import shown_error, verdict
 
     out.print(f"[bold]learning from runs: {escape(learning.solution.scenario.file.title)}[/bold]", soft_wrap=True)
-    table = table_of(
-        ("run", "left"), ("repetitions", "right"), ("rms error", "left"), ("measured", "right"), ("noise", "right"), ("repeating", "right"),
+    numbers: tuple[Column, ...] = (
+        ("measured", "right"),
+        ("noise", "right"),
+        ("repeating", "right"),
         ("predicted", "right"),
-    )  # fmt: skip
+    )
+    table = table_of(("run", "left"), ("repetitions", "right"), ("rms error", "left"), *numbers)
     for k, run in enumerate(learning.runs):
+        style = "bold" if k == learning.base else None
         for g in learning.groups:
-            first = g is learning.groups[0]
-            table.add_row(
-                escape(run.name) if first else "", str(run.repeats) if first else "", g.name, f"{g.shown(run.rms[g.name]):.4g} {g.unit}",
-                f"{g.shown(run.noise[g.name]):.3g}", shown_error(learning, run, g.name),
-                "" if run.predicted is None else f"{g.shown(run.predicted[g.name]):.3g}", style="bold" if k == learning.base else None,
-            )  # fmt: skip
+            first = (escape(run.name), str(run.repeats)) if g is learning.groups[0] else ("", "")
+            measured, noise = f"{g.shown(run.rms[g.name]):.4g} {g.unit}", f"{g.shown(run.noise[g.name]):.3g}"
+            predicted = "" if run.predicted is None else f"{g.shown(run.predicted[g.name]):.3g}"
+            table.add_row(*first, g.name, measured, noise, shown_error(learning, run, g.name), predicted, style=style)
     for g in learning.groups if not learning.stop else ():
         then = f"{g.shown(learning.predicted[g.name]):.3g}"
         table.add_row("next" if g is learning.groups[0] else "", "", g.name, "", "", "", then)

@@ -31,7 +31,6 @@ from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import Solution
 from ctrlgen.trajectory.solution_plots import draw_all, draw_workspace
 from ctrlgen.trajectory.workspace import Ball, Workspace
-from ctrlgen.verification import scenario_report as report
 from ctrlgen.verification.build_page import write_build
 from ctrlgen.verification.build_record import Build
 from ctrlgen.verification.comparison import Comparison, compare
@@ -40,6 +39,8 @@ from ctrlgen.verification.in_loop import run_in_loop
 from ctrlgen.verification.qemu import check_on_boards
 from ctrlgen.verification.reference import ReferenceAnswers
 from ctrlgen.verification.rules import check_rules
+from ctrlgen.verification.scenario_report import write_report
+from ctrlgen.verification.summary import passed
 from ctrlgen.verification.tracking import tracking_errors
 
 Progress = Callable[[str], None]
@@ -59,7 +60,7 @@ class Outcome:
     @property
     def passed(self) -> bool:
         """Whether every expectation and every comparison that was made is within tolerance."""
-        return report.passed(self.comparison, self.expected)
+        return passed(self.comparison, self.expected)
 
 
 def quiet(_: str) -> None:
@@ -93,7 +94,7 @@ def run(scenario: Scenario | Path | str, out: Path | str, progress: Progress = q
         c = generate(solution.scenario, solution.model, draft / "c", solution, drawn)
         comparison = compare(c, solution, lambda build: progress(f"compared: {build}"))
         progress("report")
-        report.write_report(draft, solution, comparison, expected, c, drawn, budget_section(solution))
+        write_report(draft, solution, comparison, expected, c, drawn, budget_section(solution))
         return Outcome(solution, c, comparison, expected)
 
 
@@ -136,7 +137,7 @@ def solve_into(scenario: Scenario | Path | str, out: Path | str, progress: Progr
         solution = solve_scenario(scenario, progress)
         expected = expectations(solution)
         progress("report")
-        report.write_report(draft, solution, None, expected, None, draw_all(solution), budget_section(solution))
+        write_report(draft, solution, None, expected, None, draw_all(solution), budget_section(solution))
         return Outcome(solution, None, None, expected)
 
 
@@ -222,33 +223,33 @@ def map_workspace(device: Device, poses: list[str], out: Path) -> WorkspaceSumma
     ranges = [workspace.ranges(base) for base in bases]
     middle = bases[len(bases) // 2]
     balls = workspace.ball(middle, workspace.translations), workspace.ball(middle, tuple(range(len(signal.channels))))
-    found = WorkspaceSummary(workspace, bases, ranges, workspace.extent(middle), *balls)
+    summary = WorkspaceSummary(workspace, bases, ranges, workspace.extent(middle), *balls)
     with whole_folder(out) as draft:
         with plt.rc_context(STYLE):
             write_text(draft / "workspace.svg", svg(draw_workspace(workspace, bases, balls[0])))
-        write_text(draft / "workspace.json", json.dumps(_workspace_numbers(found), indent=1) + "\n")
-    return found
+        write_text(draft / "workspace.json", json.dumps(_workspace_numbers(summary), indent=1) + "\n")
+    return summary
 
 
-def _workspace_numbers(found: WorkspaceSummary) -> dict[str, Any]:
+def _workspace_numbers(summary: WorkspaceSummary) -> dict[str, Any]:
     """The numbers of workspace.json, in the reader's units."""
-    signal = found.workspace.model.signals["pose"]
+    signal = summary.workspace.model.signals["pose"]
     named = list(zip(signal.channels, signal.units, strict=True))
 
     def row(values: np.ndarray) -> dict[str, Any]:
         return {f"{c} [{u}]": np.asarray(from_si(values[i], u)).tolist() for i, (c, u) in enumerate(named)}
 
     return {
-        "device": found.workspace.model.name,
-        "alone": [{"base": row(base), "range": row(r)} for base, r in zip(found.bases, found.ranges, strict=True)],
-        "anywhere": row(found.extent),
+        "device": summary.workspace.model.name,
+        "alone": [{"base": row(base), "range": row(r)} for base, r in zip(summary.bases, summary.ranges, strict=True)],
+        "anywhere": row(summary.extent),
         "largest_ball": [
             {
                 "channels": [signal.channels[i] for i in ball.channels],
                 "centre": row(ball.centre),
                 "radius_in_typical_sizes": ball.radius,
             }
-            for ball in (found.translations, found.everything)
+            for ball in (summary.translations, summary.everything)
         ],
         "typical_sizes": row(np.array(signal.scale)),
     }

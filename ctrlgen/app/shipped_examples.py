@@ -71,8 +71,8 @@ def examples() -> list[Example]:
 
 def _device(folder: Path, name: str) -> Path:
     """The device file of that name: the recording's own, or one that several share."""
-    own = [*folder.glob("device.toml"), *sorted((folder.parent / "devices").glob("*.toml"))]
-    return next(path for path in own if read_toml(path).get("name") == name).resolve()
+    candidates = [*folder.glob("device.toml"), *sorted((folder.parent / "devices").glob("*.toml"))]
+    return next(path for path in candidates if read_toml(path).get("name") == name).resolve()
 
 
 def copy_examples(names: Sequence[str], to: Path) -> list[Path]:

@@ -6,14 +6,15 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
-from ctrlgen.budget.budget_schema import BudgetRecord
-from ctrlgen.calibration.calibration_schema import CalibrationRecord
+from ctrlgen.budget.budget_record import BudgetRecord
+from ctrlgen.calibration.calibration_record import CalibrationRecord
 from ctrlgen.core.files import write_text
 from ctrlgen.diagnosis.report.diagnosis_record import DiagnosisRecord
-from ctrlgen.learning.learning_schema import LearningRecord
-from ctrlgen.path_timing.fastest_schema import FastestRecord
+from ctrlgen.learning.learning_record import LearningRecord
+from ctrlgen.path_timing.fastest_record import FastestRecord
 from ctrlgen.reporting.result_file import SCHEMAS, schema_text
-from ctrlgen.verification.summary_schema import BuildRecord, Summary
+from ctrlgen.verification.build_record import BuildRecord
+from ctrlgen.verification.summary import Summary
 
 RESULTS: dict[str, type[BaseModel]] = {
     "budget": BudgetRecord,

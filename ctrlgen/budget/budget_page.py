@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ctrlgen.budget.contributors import BudgetLine
-from ctrlgen.budget.error_budget import COVERAGE, TOLERANCE, ErrorBudget
-from ctrlgen.budget.limits import Safety
+from ctrlgen.budget.budget_record import budget_record, safety_sentence
+from ctrlgen.budget.error_budget import COVERAGE, ErrorBudget
 from ctrlgen.core.files import write_text
 from ctrlgen.core.units import difference, from_si
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
-from ctrlgen.reporting.result_file import origin
+from ctrlgen.reporting.result_file import json_text
 
 MAGNIFIED = (1, 2, 5)  # times a power of ten
 WIDEST = 0.12  # of the path's extent: half the width of the band as it is drawn
@@ -28,120 +25,17 @@ def write_budget(out: Path, budget: ErrorBudget) -> None:
     """Writes budget.json, figures/band.svg, figures/contributors.svg and budget.html into the folder `out`."""
     record = budget_record(budget)
     figures = draw_budget(budget)
-    write_text(out / "budget.json", json.dumps(record, indent=1) + "\n")
+    write_text(out / "budget.json", json_text(record))
     for name, text in figures.items():
         write_text(out / "figures" / f"{name}.svg", text)
     page = render(
-        Path(__file__).with_name("budget.html.j2"), b=record, figures=figures, device_title=budget.solution.model.device.title,
+        Path(__file__).with_name("budget.html.j2"),
+        b=record,
+        figures=figures,
+        device_title=budget.solution.model.device.title,
         sentences=[safety_sentence(s, budget.probability) for s in budget.safeties],
-    )  # fmt: skip
+    )
     write_text(out / "budget.html", page)
-
-
-def budget_record(budget: ErrorBudget) -> dict[str, Any]:
-    """What budget.json holds; nothing that changes from run to run with one seed."""
-    solution = budget.solution
-    scenario, stated = solution.scenario, budget.uncertainties
-    signal = solution.model.signals[scenario.file.follow]
-    finer = {} if budget.model_difference is None else budget.model_difference.finer.inputs
-    inputs = {**scenario.digest, **{name: read.sha256 for name, read in (*stated.inputs.items(), *finer.items())}}
-    return {
-        **origin(inputs, budget.seed if budget.draws else None, budget.notes),
-        "scenario": scenario.name, "title": scenario.file.title, "device": solution.model.name, "signal": scenario.file.follow,
-        "samples": len(solution.command), "coverage_factor": budget.factor,
-        "groups": [
-            {
-                "name": g.name, "unit": g.unit, "channels": [signal.channels[i] for i in g.channels],
-                "combined_peak": g.shown(budget.peak(g)), "combined_rms": g.shown(budget.rms(g)),
-                "band95": g.shown(budget.factor * budget.peak(g)),
-            }
-            for g in budget.groups
-        ],
-        "contributors": [_contributor(budget, line, k) for k, line in enumerate(budget.lines, 1)],
-        "model_difference": _model_difference(budget), "draws": budget.draws,
-        "agreement": [
-            {
-                "group": a.group.name, "linear": a.group.shown(a.linear), "drawn": a.group.shown(a.drawn), "difference": a.difference,
-                "difference_of_interval": a.difference_of_interval, "mean": a.group.shown(a.mean), "tolerance": TOLERANCE,
-                "passed": a.passed,
-            }
-            for a in budget.agreements
-        ],
-        "reasons": list(budget.reasons), "probability": budget.probability,
-        "limits": [_safety(budget, s) for s in budget.safeties],
-        "broken": budget.broken,
-        "band": {
-            f"{signal.channels[i]} [{g.unit}]": difference(budget.combined[:, i], g.unit).tolist()
-            for g in budget.groups for i in g.channels
-        },
-    }  # fmt: skip
-
-
-def _contributor(budget: ErrorBudget, line: BudgetLine, rank: int) -> dict[str, Any]:
-    effects = [
-        {
-            "group": g.name, "sensitivity": g.shown(line.sensitivity[g.name]), "peak": g.shown(line.peak[g.name]),
-            "rms": g.shown(line.rms[g.name]), "combined_if_halved": g.shown(line.halved[g.name]),
-            "second_order": g.shown(line.alone[g.name]) if budget.draws else None,
-        }
-        for g in budget.groups
-    ]  # fmt: skip
-    return {
-        "rank": rank, "name": line.name, "called": line.called, "sd": line.sd, "source": line.source, "per": line.per, "share": line.share,
-        "effects": effects,
-    }  # fmt: skip
-
-
-def _model_difference(budget: ErrorBudget) -> dict[str, Any] | None:
-    """How the finer model moves; None without one."""
-    if budget.model_difference is None:
-        return None
-    signal = budget.solution.model.signals[budget.solution.scenario.file.follow]
-    deviation = budget.model_difference.deviation
-    return {
-        "kind": "model difference", "device": budget.model_difference.finer.model.name,
-        "effects": [
-            {"group": g.name, "peak": g.shown(budget.difference_peak(g)), "rms": g.shown(budget.difference_rms(g))}
-            for g in budget.groups
-        ],
-        "deviation": {
-            f"{signal.channels[i]} [{g.unit}]": difference(deviation[:, i], g.unit).tolist()
-            for g in budget.groups for i in g.channels
-        },
-    }  # fmt: skip
-
-
-def _safety(budget: ErrorBudget, s: Safety) -> dict[str, Any]:
-    unit, solution = s.limit.unit, budget.solution
-    return {
-        "limit": s.limit.name, "label": s.limit.label, "channel": s.channel, "side": s.side, "sample": s.sample,
-        "time_s": float(solution.trace.time[s.sample]) if solution.scenario.sample_time else None,
-        "unit": unit, "bound": float(from_si(s.bound, unit)), "margin_unit": _margin_unit(unit),
-        "margin": float(difference(s.margin, unit)), "sd": float(difference(s.sd, unit)),
-        "margin_at_probability": float(difference(s.kept, unit)),
-        "margin_drawn": None if s.drawn is None else float(difference(s.drawn, unit)),
-        "probability": s.probability, "kept": s.kept >= 0,
-    }  # fmt: skip
-
-
-def _margin_unit(unit: str) -> str:
-    return {"degC": "K", "degF": "delta_degF"}.get(unit, unit)
-
-
-def percent(probability: float) -> str:
-    """99.9 % for 0.999."""
-    return f"{100 * probability:.10g} %"
-
-
-def safety_sentence(s: Safety, probability: float) -> str:
-    """Such as 'actuator temperature keeps 550 degC with 99.9 %: margin 3.1 K'."""
-    unit = s.limit.unit
-    bound = f"{from_si(s.bound, unit):.5g} {unit}"
-    left = f"{abs(difference(s.kept, unit)):.3g} {_margin_unit(unit)}"
-    if s.kept >= 0:
-        return f"{s.limit.label} keeps {bound} with {percent(probability)}: margin {left}"
-    likely = f"it does with {100 * s.probability:.3g} %"
-    return f"{s.limit.label} does not keep {bound} with {percent(probability)}: short by {left}; {likely}"
 
 
 def draw_budget(budget: ErrorBudget) -> dict[str, str]:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
-from ctrlgen.budget.budget_page import budget_record, percent, safety_sentence
+from ctrlgen.budget.budget_record import BudgetRecord, budget_record, safety_sentence
 from ctrlgen.budget.error_budget import ErrorBudget, budget_of
 from ctrlgen.budget.uncertainty import FILE, load_uncertainties
 from ctrlgen.core.errors import InputError, SolverError
 from ctrlgen.trajectory.solution import Solution
 
-SHOWN = 8  # contributors
 MOST_SAMPLES = 20_000  # of a path whose budget takes a few seconds
 
 
@@ -22,16 +20,21 @@ class BudgetSection:
     budget: ErrorBudget | None
     missing: str
 
-    def shown(self) -> dict[str, Any]:
-        """For the template: the record of budget.json, the sentences on limits, how many contributors to show."""
-        if self.budget is None:
-            return {"missing": self.missing}
+    @property
+    def record(self) -> BudgetRecord | None:
+        """As budget.json would hold it."""
+        return None if self.budget is None else budget_record(self.budget)
+
+    @property
+    def sentences(self) -> list[tuple[str, bool]]:
+        """What is said of each limit, and whether it is kept."""
         b = self.budget
-        return {
-            **budget_record(b), "missing": "", "shown": SHOWN, "at": percent(b.probability),
-            "sentences": [(safety_sentence(s, b.probability), s.kept >= 0) for s in b.safeties],
-            "sources": {name: read.sha256 for name, read in b.uncertainties.inputs.items()},
-        }  # fmt: skip
+        return [] if b is None else [(safety_sentence(s, b.probability), s.kept >= 0) for s in b.safeties]
+
+    @property
+    def sources(self) -> dict[str, str]:
+        """SHA-256 of the files that state what is uncertain, by name."""
+        return {} if self.budget is None else {n: read.sha256 for n, read in self.budget.uncertainties.inputs.items()}
 
 
 def budget_section(solution: Solution) -> BudgetSection | None:

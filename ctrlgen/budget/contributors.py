@@ -83,7 +83,7 @@ class _Seen:
     columns: slice | None
     scatters: str | None
     by_step: np.ndarray
-    own: np.ndarray
+    deviation: np.ndarray
     bend: np.ndarray
 
 
@@ -99,11 +99,16 @@ def budget_lines(
     lines = []
     for rank, one in enumerate(seen, 1):
         half = combination.of(seen[:rank], 0.5)
-        lines.append(BudgetLine(
-            one.name, path.model.device.called(one.name), *one.texts, {g.name: largest(one.by_step, g) for g in groups},
-            {g.name: largest(one.own, g) for g in groups}, {g.name: rms(one.own[:, g.channels]) for g in groups}, shares[one.name],
-            {g.name: largest(half, g) for g in groups}, {g.name: largest(one.bend, g) for g in groups},
-        ))  # fmt: skip
+        by_group = {
+            "sensitivity": {g.name: largest(one.by_step, g) for g in groups},
+            "peak": {g.name: largest(one.deviation, g) for g in groups},
+            "rms": {g.name: rms(one.deviation[:, g.channels]) for g in groups},
+            "halved": {g.name: largest(half, g) for g in groups},
+            "alone": {g.name: largest(one.bend, g) for g in groups},
+        }
+        sd, per, source = one.texts
+        called, share = path.model.device.called(one.name), shares[one.name]
+        lines.append(BudgetLine(one.name, called, sd, per, source, share=share, **by_group))
     return tuple(lines)
 
 
@@ -112,21 +117,21 @@ def _numbers(path: UncertainPath, linear: Propagated, drawn: Drawn | None) -> It
     for uncertain in path.uncertainties.lines:
         columns = slice(first, first + len(uncertain.sds))
         first = columns.stop
-        own = np.sqrt(np.sum((Y[:, :, columns] * uncertain.sds) ** 2, axis=2))
+        deviation = np.sqrt(np.sum((Y[:, :, columns] * uncertain.sds) ** 2, axis=2))
         by_step = np.abs(Y[:, :, columns] * uncertain.per[1]).max(axis=2)
         bend = np.zeros((1, Y.shape[1]))
         if drawn is not None:  # of several columns the one that bends most
             bend = np.abs(drawn.alone[:, columns].sum(axis=0) / 2).max(axis=0)
         texts = uncertain.text, uncertain.per[0], uncertain.source
-        yield _Seen(uncertain.name, texts, columns, None, by_step, own, bend)
+        yield _Seen(uncertain.name, texts, columns, None, by_step, deviation, bend)
 
 
 def _scattering(path: UncertainPath, linear: Propagated) -> Iterator[_Seen]:
     stated = path.uncertainties
-    for name, own in linear.scatter["pose"].items():
-        per, by_step = _by_step(path, linear, name, own)
+    for name, deviation in linear.scatter["pose"].items():
+        per, by_step = _by_step(path, linear, name, deviation)
         texts = stated.texts[name], per, stated.sources[name]
-        yield _Seen(f"drive.{name}", texts, None, name, by_step, own, np.zeros_like(own))
+        yield _Seen(f"drive.{name}", texts, None, name, by_step, deviation, np.zeros_like(deviation))
 
 
 def _share(combined: np.ndarray, without: np.ndarray, groups: tuple[Group, ...]) -> float:
@@ -158,12 +163,12 @@ class _Combination:
         return np.asarray(np.sqrt(variance))
 
 
-def _by_step(path: UncertainPath, linear: Propagated, name: str, own: np.ndarray) -> tuple[str, np.ndarray]:
+def _by_step(path: UncertainPath, linear: Propagated, name: str, deviation: np.ndarray) -> tuple[str, np.ndarray]:
     """Text and deviation (n, channels) of one step: of a converter and of arithmetic the path under the rounded drives."""
     if name == "jitter":
-        return "1 us", own / path.uncertainties.jitter * JITTER_STEP
+        return "1 us", deviation / path.uncertainties.jitter * JITTER_STEP
     if name == "player":
-        return "tolerance", own * np.sqrt(3)
+        return "tolerance", deviation * np.sqrt(3)
     single = path.drive.astype(np.float32).astype(float)
     rounded = path.nominal(path.rounded() if name == "converter" else single)
     pose = path.evaluate("pose", rounded[path.before :], path.drive[path.before :])

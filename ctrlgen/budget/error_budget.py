@@ -118,32 +118,30 @@ class ErrorBudget:
     @property
     def reasons(self) -> tuple[str, ...]:
         """Why the draws differ from the first order; empty where they agree."""
-        found = []
+        why = []
         for a in self.agreements:
-            group, off = (
-                a.group,
-                a.difference_of_interval if a.outlying else max(a.difference, a.difference_of_interval),
-            )
+            group = a.group
+            off = a.difference_of_interval if a.outlying else max(a.difference, a.difference_of_interval)
             if a.outlying and not a.passed and a.turned:
-                found.append(
+                why.append(
                     f"{group.name}: {a.outlying} of {self.draws} draws lie more than {OUTLYING:g} standard uncertainties off and make "
                     f"the sd of the draws: in all of them {' and '.join(a.turned)} has the other sign, as a normal distribution with so "
                     "large an sd reaches; state a smaller sd, or compare the 95 % intervals"
                 )
             elif a.outlying and not a.passed:
-                found.append(
+                why.append(
                     f"{group.name}: {a.outlying} of {self.draws} draws lie more than {OUTLYING:g} standard uncertainties off and make "
                     "the sd of the draws: the device is near a pole or resonates, or the simulation grows, whose steps are exact for the "
                     "numbers as described; lower the sds, or simulate such a device by itself"
                 )
             if off > TOLERANCE:
                 most = max(self.lines, key=lambda line: line.alone[group.name])
-                found.append(
+                why.append(
                     f"{group.name}: the draws differ by {100 * off:.0f} % from the first order, because the path is not linear in what is "
                     f"uncertain: at one standard deviation the second order of {most.name} adds "
                     f"{group.shown(most.alone[group.name]):.3g} {group.unit}; take the 95 % interval of the draws"
                 )
-        return tuple(found)
+        return tuple(why)
 
 
 def error_budget(
@@ -255,6 +253,12 @@ def agreement(group: Group, combined: np.ndarray, drawn: Drawn, path: UncertainP
         if kind == "number" and far.any() and np.all((values[name] + drawn.columns[far, i]) * values[name] < 0):
             turned.append(name)
     return Agreement(
-        group, float(linear.max()), float(sd.max()), off(sd, linear), off((high - low) / 2, expected), float(np.abs(mean).max()),
-        int(far.sum()), tuple(turned),
-    )  # fmt: skip
+        group,
+        linear=float(linear.max()),
+        drawn=float(sd.max()),
+        difference=off(sd, linear),
+        difference_of_interval=off((high - low) / 2, expected),
+        mean=float(np.abs(mean).max()),
+        outlying=int(far.sum()),
+        turned=tuple(turned),
+    )

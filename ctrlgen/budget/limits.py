@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 import scipy
@@ -37,7 +38,7 @@ class Safety:
 
     limit: Limit
     channel: str
-    side: str
+    side: Literal["lower", "upper"]
     sample: int
     bound: float
     margin: float

@@ -23,6 +23,7 @@ from ctrlgen.model.assembly import build_model, movable
 from ctrlgen.model.discretisation import NEWTON_STEPS, balanced, one_step_map, settling_time
 from ctrlgen.model.model import Model
 from ctrlgen.numerics.batched_evaluation import Recursion
+from ctrlgen.trajectory.inverse.clock import Settled
 from ctrlgen.trajectory.solution import Solution
 
 MOST_BEFORE = 100_000  # samples before the path: a memory that has not settled by then has its described value
@@ -47,7 +48,8 @@ class UncertainPath:
         self.free = (*self.moving, *sorted(ambients))
         self.rise = ca.SX.sym("surroundings")
         self.model = _warmed(build_model(device, self.free, self.rise), self.free, self.rise)
-        self.sample_time = inf if scenario.sample_time is None else scenario.sample_time
+        clock = scenario.clock
+        self.sample_time = inf if isinstance(clock, Settled) else clock.sample_time
         m = self.model
         self.state, self.q = ca.vertcat(m.x, m.z), ca.vertcat(m.p, self.rise)
         self.q_nominal = np.append(m.p_nominal, 0.0)

@@ -105,7 +105,7 @@ class Uncertain:
     """
 
     name: str
-    kind: Literal["number", "surroundings", "gain", "channel gain"]
+    kind: Literal["number", "surroundings", "gain", "channel_gain"]
     paths: tuple[str, ...]
     sds: tuple[float, ...]
     text: str
@@ -191,13 +191,13 @@ class _Reader:
             self.lines.append(
                 Uncertain("surroundings", "surroundings", ("",), (sd,), stated.sd, stated.source, ("1 K", (1.0,)))
             )
-        kinds: dict[str, Literal["gain", "channel gain"]] = {"gain": "gain", "channel_gain": "channel gain"}
-        for key, kind in kinds.items():
-            if (own := getattr(self.drive, key)) is not None:
-                share = self._share(f"drive.{key}.sd", own.sd)
-                of = model.signals["drive"].channels if key == "channel_gain" else ("all",)
-                name, per = f"drive.{key}", ("1 %", (0.01,) * len(of))
-                self.lines.append(Uncertain(name, kind, of, (share,) * len(of), own.sd, own.source, per))
+        kinds: tuple[Literal["gain", "channel_gain"], ...] = ("gain", "channel_gain")
+        for kind in kinds:
+            if (gain := getattr(self.drive, kind)) is not None:
+                share = self._share(f"drive.{kind}.sd", gain.sd)
+                of = model.signals["drive"].channels if kind == "channel_gain" else ("all",)
+                name, per = f"drive.{kind}", ("1 %", (0.01,) * len(of))
+                self.lines.append(Uncertain(name, kind, of, (share,) * len(of), gain.sd, gain.source, per))
         self.jitter = (
             0.0 if self.drive.jitter is None else self._absolute("drive.jitter.sd", self.drive.jitter.sd, "s", "1 us")
         )

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from ctrlgen.budget.error_budget import ErrorBudget, budget_of
+from ctrlgen.budget.robust import solve
 from ctrlgen.budget.uncertainty import FILE, Uncertain, Uncertainties, load_uncertainties
 from ctrlgen.calibration.calibrate import Calibration, sd_of_bounds
 from ctrlgen.core.units import to_si
 from ctrlgen.devices import Device
 from ctrlgen.devices.run_time import RunTimeConstant
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
-from ctrlgen.trajectory.solution import solve
 
 BOUNDS = "bounds of [run_time], uniform between them"
 

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 from matplotlib.figure import Figure
 
-from ctrlgen.budget.error_budget import ErrorBudget
-from ctrlgen.calibration.calibrate import CalibratedConstant, Calibration
-from ctrlgen.calibration.constants_files import device_hash, write_constants
+from ctrlgen.calibration.calibrate import Calibration
+from ctrlgen.calibration.calibration_record import Budgets, calibration_record
+from ctrlgen.calibration.constants_files import write_constants
 from ctrlgen.core.files import write_text
-from ctrlgen.core.units import difference, from_si
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
-from ctrlgen.reporting.result_file import origin
-
-Budgets = tuple[ErrorBudget, ErrorBudget] | None
+from ctrlgen.reporting.result_file import json_text
 
 
 def write_calibration(out: Path, calibration: Calibration, budgets: Budgets = None) -> None:
@@ -27,7 +21,7 @@ def write_calibration(out: Path, calibration: Calibration, budgets: Budgets = No
     with plt.rc_context(STYLE):
         figure = svg(draw_constants(calibration))
     write_constants(out, calibration)
-    write_text(out / "constants.json", json.dumps(record, indent=1, allow_nan=False) + "\n")
+    write_text(out / "constants.json", json_text(record))
     write_text(out / "figures" / "constants.svg", figure)
     write_text(
         out / "calibration.html",
@@ -35,42 +29,6 @@ def write_calibration(out: Path, calibration: Calibration, budgets: Budgets = No
             Path(__file__).with_name("calibration.html.j2"), c=record, figure=figure, title=calibration.device.title
         ),
     )
-
-
-def calibration_record(calibration: Calibration, budgets: Budgets = None) -> dict[str, Any]:
-    """What constants.json holds."""
-    inputs = {name: read.sha256 for name, read in calibration.inputs.items()}
-    if budgets is not None:
-        inputs |= budgets[0].solution.scenario.digest
-    sds = np.sqrt(np.diag(calibration.covariance))
-    return {
-        **origin(inputs, None, calibration.notes),
-        "device": calibration.device.name, "device_hash": f"{device_hash(calibration):08x}", "recording": calibration.recording.title,
-        "constants": [_constant(row) for row in calibration.constants],
-        "correlation": (calibration.covariance / np.outer(sds, sds)).tolist(),
-        "channels": [
-            {"channel": e.channel, "unit": e.unit, **{k: float(difference(getattr(e, k), e.unit)) for k in ("before", "after", "noise")}}
-            for e in calibration.errors
-        ],
-        "scenario": None if budgets is None else budgets[0].solution.scenario.name,
-        "budget": [] if budgets is None else [
-            {"group": g.name, "unit": g.unit, "before": g.shown(budgets[0].peak(g)), "after": g.shown(budgets[1].peak(g))}
-            for g in budgets[0].groups
-        ],
-    }  # fmt: skip
-
-
-def _constant(row: CalibratedConstant) -> dict[str, Any]:
-    c = row.constant
-
-    def shown(si: float) -> float:
-        return float(from_si(si, c.unit))
-
-    return {
-        "name": c.name, "path": c.path, "unit": c.unit, "value": shown(row.value), "value_si": row.value,
-        "interval95": [shown(v) for v in row.interval], "sd_si": row.sd, "default": shown(c.default),
-        "bounds": [shown(c.low), shown(c.high)], "determined": row.determined, "remark": row.remark,
-    }  # fmt: skip
 
 
 def draw_constants(calibration: Calibration) -> Figure:

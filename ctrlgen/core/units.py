@@ -18,6 +18,11 @@ from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 if TYPE_CHECKING:
     import pint
 
+
+class ExampleGiven(ValueError):
+    """A text is no quantity of the wanted kind; the message says what to write instead."""
+
+
 _NUMBER = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|[+-]?inf)\s*(.*?)\s*$", re.IGNORECASE)
 
 
@@ -117,7 +122,7 @@ def parse(text: object, unit: str) -> float:
     if isinstance(text, str):
         match = _NUMBER.match(text)
         if not match:
-            raise ValueError(f'{text!r} does not start with a number; write for example "1 {unit}"')
+            raise ExampleGiven(f'{text!r} does not start with a number; write for example "1 {unit}"')
         value, written = float(match[1]), match[2]
     else:
         value, written = float(text), ""
@@ -127,9 +132,9 @@ def parse(text: object, unit: str) -> float:
     absolute = unit in ("degC", "degF", "K")
     if (written == "" and unit != "1") or (absolute and "delta" in written) or not same_dimension(written, unit):
         if written == "":
-            raise ValueError(f'{text!r} has no unit; write for example "{value:g} {unit}"')
+            raise ExampleGiven(f'{text!r} has no unit; write for example "{value:g} {unit}"')
         hint = f'"{value:g} {unit}"' if unit != "1" else f'"{value:g}" without a unit'
-        raise ValueError(
+        raise ExampleGiven(
             f"{text!r} has the wrong unit: {unit if unit != '1' else 'a plain number'} is needed, for example {hint}"
         )
     return to_si(value, written)

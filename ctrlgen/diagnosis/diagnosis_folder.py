@@ -105,13 +105,15 @@ def diagnose_into(
         provenance = Provenance(digests(Path(device), recordings), seed)
         write_text(draft / "diagnosis.json", json_text(diagnosis_record(diagnosis, provenance)))
         write_text(draft / "report.html", page(diagnosis, provenance))
-    checkpoint.done()  # only now: a diagnosis interrupted during its replicates need not repeat its fits
+    # only now: a diagnosis interrupted during its replicates need not repeat its fits
+    checkpoint.done()
     return diagnosis
 
 
 def unfinished(out: Path) -> Path:
     """The checkpoint file of a diagnosis into `out`; it exists until the diagnosis is done."""
-    out = out.resolve()  # "." has no name of its own
+    # "." has no name of its own
+    out = out.resolve()
     return out.with_name(f"{out.name}.unfinished")
 
 
@@ -127,5 +129,5 @@ def _checkpoint(
 
 def digests(device: Path, recordings: Sequence[Path | str]) -> dict[str, str]:
     """SHA-256 of every file that a diagnosis reads, by name."""
-    own = [(file.name, file) for file in files_of(device)]
-    return {name: sha256(path) for name, path in (*own, *recording_files(recordings))}
+    device_files = [(file.name, file) for file in files_of(device)]
+    return {name: sha256(path) for name, path in (*device_files, *recording_files(recordings))}

@@ -27,7 +27,7 @@ from ctrlgen.firmware.player.compression import Compression, compress
 from ctrlgen.firmware.player.player_context import player_context
 from ctrlgen.firmware.player_only import check_online
 from ctrlgen.model.model import Model
-from ctrlgen.trajectory.scenario import Scenario, check_tightened, motion_targets
+from ctrlgen.trajectory.scenario import Scenario, check_tightened
 from ctrlgen.trajectory.solution import Solution
 
 
@@ -73,8 +73,9 @@ def generate(
     check_online(scenario, model)
     controller = controller_of(model, scenario.file.follow, scenario.sample_time)
     played = solution if scenario.sample_time else None
-    command = scenario.command(model) if solution is None else solution.command
-    targets = motion_targets(scenario, model) if model.inertial else command
+    problem = scenario.bind(model)
+    command = problem.samples if solution is None else solution.command
+    targets = problem.targets if model.inertial else command
     names = {
         piece: {real: f"{owner}_{piece}_{real.suffix}" for real in Real} for piece, owner in owners(scenario).items()
     }
@@ -85,7 +86,7 @@ def generate(
         online = online_context(scenario, controller, real, of["online"])
         samples = {} if played is None else player_context(played, compression[real], of["player"])
         reference = vectors(controller, targets, real) | played_vectors(
-            compression.get(real), len(command), 1 / (scenario.sample_time or 1.0)
+            compression.get(real), len(command), scenario.clock
         )
         contexts[real] = samples | online | of | reference | {"solved": solution is not None}
         by_template = {"online": online, "selftest": contexts[real], "vectors": contexts[real]}

@@ -15,7 +15,7 @@ from ctrlgen.core.units import base_unit
 from ctrlgen.devices.base import Signal
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.templates import comment, write
-from ctrlgen.firmware.player.compression import Candidate
+from ctrlgen.firmware.player.compression import PlayerCandidate
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.version import __version__, commit
 
@@ -148,7 +148,7 @@ def _test_calls(c: dict[str, Any]) -> int:
     return online + (len(c["played"]) + len(c["timed"]) + 4 + c["played_unusable"] if c["player"] else 0)
 
 
-def _memory(c: dict[str, Any], chosen: Sequence[Candidate | None]) -> list[dict[str, Any]]:
+def _memory(c: dict[str, Any], chosen: Sequence[PlayerCandidate | None]) -> list[dict[str, Any]]:
     """Rows of the README's table of memory, bytes in double and float; `chosen`: the player's form in each arithmetic."""
     x, n, nu, n_s, m, count = len(c["x_names"]), c["n"], c["nu"], c["n_s"], c["m"], len(c["rows"])
     timed = len(c["timed"])

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ctrlgen.budget.contributors import Group, groups_of
+from ctrlgen.budget.robust import solve
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.learning.lifted import Lifted
 from ctrlgen.learning.norm_optimal import Wanted, next_drives
@@ -24,11 +25,10 @@ from ctrlgen.model.simulation import trace
 from ctrlgen.recordings.recorded_files import recording_files, sha256
 from ctrlgen.trajectory.inverse.violations import Before, violations
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
-from ctrlgen.trajectory.solution import Solution, closest_margins, solve
+from ctrlgen.trajectory.solution import Solution, closest_margins
 
-FIRST_STEP = (
-    0.2  # of the largest drive, by which the first step may change any: what the device answers is not known yet
-)
+# of the largest drive, by which the first step may change any: what the device answers is not known yet
+FIRST_STEP = 0.2
 MISMATCH = 0.1  # share of a change by which the device may answer otherwise than described, until runs have shown it
 LEAST_MISMATCH = 0.01
 WORSE = 3.0  # standard errors by which a run must be worse than the best one for the step to be lowered

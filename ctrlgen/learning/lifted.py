@@ -19,6 +19,7 @@ import numpy as np
 from ctrlgen.budget.uncertain_path import holding_drive
 from ctrlgen.model.discretisation import one_step_map, settling_time
 from ctrlgen.numerics.batched_evaluation import Recursion, evaluate
+from ctrlgen.trajectory.inverse.clock import Settled
 from ctrlgen.trajectory.solution import Solution
 
 MOST_BEFORE = 100_000  # samples that a closed path is run for until it repeats
@@ -49,8 +50,9 @@ class Lifted:
         self.solution, m = solution, solution.model
         self.model, self.signal = m, m.signals[solution.scenario.file.follow]
         self.n, self.closed = len(solution.command), solution.scenario.closed
-        self.static = solution.scenario.sample_time is None
-        self.sample_time = inf if self.static else solution.scenario.sample_time or inf
+        clock = solution.scenario.clock
+        self.static = isinstance(clock, Settled)
+        self.sample_time = inf if isinstance(clock, Settled) else clock.sample_time
         self.composite = tuple(m.composite_limits())
         sample = one_step_map(m, self.sample_time)
         S, u, at = ca.vertcat(m.x, m.z), m.u, ca.DM(m.p_nominal)

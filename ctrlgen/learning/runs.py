@@ -17,6 +17,7 @@ from ctrlgen.core.units import show
 from ctrlgen.learning.lifted import Lifted
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recording import Record, Recording
+from ctrlgen.recordings.validation import MissingSamples
 
 SAME_DRIVE = 1e-3  # of a drive's range, within a record: digits of a file, noise of a measured drive
 ALIKE = 3e-6  # of it, between records: more may be a step that was learnt
@@ -97,11 +98,12 @@ def load_runs(paths: Sequence[Path | str], lifted: Lifted) -> Runs:
         raise InputError(source, [Fault("record", 'none is a run: all have role = "rest"')])
     noise = np.array([np.nan if p is None else recording.noise[p] or np.nan for p in places], float)
     observed = np.array([p is not None for p in places])
-    notes = [note for note in recording.notes if "are missing (first at" not in note]
+    notes = [note for note in recording.notes if not isinstance(note, MissingSamples)]
     notes += [
         f"{run.name}: the first period differs from the others by more than they from each other; it had not settled and is left out."
-        for run in runs if run.unsettled
-    ]  # fmt: skip
+        for run in runs
+        if run.unsettled
+    ]
     return Runs(tuple(runs), noise, observed, tuple(notes))
 
 

@@ -11,6 +11,7 @@ from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import same_dimension
 from ctrlgen.model.model import Model
 from ctrlgen.trajectory.paths import Poses
+from ctrlgen.trajectory.problem import PathProblem
 from ctrlgen.trajectory.scenario import Scenario
 
 DENSE = 4001  # places at which its length is summed up
@@ -29,6 +30,10 @@ class Curve:
             what = "lists samples, whose times are given with them; state the path as a formula, such as a circle, line or raster"
             raise InputError(self.scenario.path, [Fault("path", what)])
 
+    @cached_property
+    def _problem(self) -> PathProblem:
+        return self.scenario.bind(self.model)
+
     @property
     def closed(self) -> bool:
         """Whether it is followed again and again."""
@@ -37,7 +42,7 @@ class Curve:
     @cached_property
     def pieces(self) -> list[tuple[float, float]]:
         """The shares between which it is smooth."""
-        corners = self.scenario.corners(self.model)
+        corners = self._problem.corners
         return list(zip(corners[:-1].tolist(), corners[1:].tolist(), strict=True))
 
     def derivatives(self, share: np.ndarray, order: int, piece: tuple[float, float] | None = None) -> np.ndarray:
@@ -45,7 +50,7 @@ class Curve:
         inside = share
         if piece is not None and not self.closed:
             inside = np.clip(share, *np.nextafter(piece, piece[::-1]))
-        tables = self.scenario.geometry(self.model, order, inside)
+        tables = self._problem.geometry(order, inside)
         middle = self._middle
         return np.stack([middle + self.scale * (tables[0] - middle), *(self.scale * t for t in tables[1:])])
 
@@ -59,7 +64,7 @@ class Curve:
 
     @cached_property
     def _middle(self) -> np.ndarray:
-        points = self.scenario.geometry(self.model, 0, np.linspace(0, 1, DENSE))[0]
+        points = self._problem.geometry(0, np.linspace(0, 1, DENSE))[0]
         return (points.min(axis=0) + points.max(axis=0)) / 2
 
     @cached_property

@@ -22,7 +22,8 @@ from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.model.inverse import ExpansionPoint, solve_by_blocks
 from ctrlgen.model.inverse_dynamics import inverse_dynamics
 from ctrlgen.model.model import Limit, Model
-from ctrlgen.trajectory.inverse.balanced import PathInverse
+from ctrlgen.trajectory.inverse.balanced import BalancedInverse
+from ctrlgen.trajectory.inverse.clock import Sampled
 
 DEGREE = 5  # of the splines of the equilibria along a path
 
@@ -66,7 +67,7 @@ class BalancedLaw:
 
     order = 1
 
-    def __init__(self, model: Model, follow: str, inverse: PathInverse) -> None:
+    def __init__(self, model: Model, follow: str, inverse: BalancedInverse) -> None:
         self.model, self.follow, self.inverse = model, follow, inverse
         if not model.n_states and not model.rate_limits:
             what = (
@@ -169,6 +170,13 @@ def bell_polynomials(k: int, w: ca.SX) -> ca.SX:
 
 
 Law = BalancedLaw | InertialLaw
+
+
+def drive_law(model: Model, follow: str, sample_time: float) -> Law:
+    """That of a model. Raises InputError for a device of which nothing bounds the speed, or whose drives are not determined by it."""
+    if model.inertial:
+        return InertialLaw(model, follow)
+    return BalancedLaw(model, follow, BalancedInverse(model, follow, Sampled(sample_time)))
 
 
 def distances_at(law: Law, sides: list[Side]) -> ca.Function:

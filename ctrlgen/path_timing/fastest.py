@@ -1,8 +1,8 @@
 """The fastest path: the shortest time in which a scenario's path can be followed within all limits, and its law of time.
 
-For a stage in balance the largest speed at each place is the answer (`speed_bound`), under held drives the longest step of each sample;
-where the rates of drives are limited, or the stage has inertia, an optimum over the whole path is (`programme`). What is found
-becomes a scenario of its own, set-points at the sample rate, that the exact inverse confirms and everything else of ctrlgen reads.
+For a stage in balance the largest speed at each place is the answer (`maximum_velocity`), under held drives the longest step of each
+sample; where the rates of drives are limited, or the stage has inertia, an optimum over the whole path is (`time_optimal_nlp`). What is
+found becomes a scenario of its own, set-points at the sample rate, that the exact inverse confirms and everything else of ctrlgen reads.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ctrlgen.budget.robust import solve
 from ctrlgen.core.errors import Fault, InputError, SolverError
-from ctrlgen.core.units import Quantity, read_quantity, show
+from ctrlgen.core.units import ExampleGiven, Quantity, read_quantity, show
 from ctrlgen.model.model import Model
 from ctrlgen.path_timing.binding import Binding, bindings
 from ctrlgen.path_timing.curve import Curve
@@ -23,9 +24,11 @@ from ctrlgen.path_timing.feasibility import Followed, fewest
 from ctrlgen.path_timing.intersample_error import error_between
 from ctrlgen.path_timing.optimum import Optimiser, Optimum
 from ctrlgen.path_timing.repetition import Repetition, at_frequency, check_frequency
-from ctrlgen.trajectory.inverse.balanced import count_faults
+from ctrlgen.trajectory.infeasibility import check_feasible
+from ctrlgen.trajectory.inverse.choice import count_faults
+from ctrlgen.trajectory.inverse.clock import in_time
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
-from ctrlgen.trajectory.solution import Solution, check_feasibility, solve
+from ctrlgen.trajectory.solution import Solution
 
 FEWEST = 8  # samples of the fastest motion: of fewer, nothing says where between them a limit is kept
 COARSE = 32  # samples of a path, below which its set-points are few
@@ -57,8 +60,8 @@ class FastestPath:
 
     @property
     def sample_time(self) -> float:
-        """[s]"""
-        return self.solution.scenario.sample_time or 0.0
+        """Seconds between set-points."""
+        return in_time(self.solution.scenario.clock).sample_time
 
     @property
     def duration(self) -> float:
@@ -80,9 +83,12 @@ class FastestPath:
 
 
 def fastest(
-    scenario: Scenario | Path | str, *, sample_rate: str | None = None, frequency: str | None = None,
+    scenario: Scenario | Path | str,
+    *,
+    sample_rate: str | None = None,
+    frequency: str | None = None,
     progress: Callable[[str], None] = lambda _: None,
-) -> FastestPath:  # fmt: skip
+) -> FastestPath:
     """The fastest motion along the path of `scenario`, with set-points at its sample rate or at another `sample_rate`, such as
     "10 kHz"; with a `frequency`, such as "50 Hz", also the largest scale of the path that is repeated so often.
 
@@ -97,6 +103,9 @@ def fastest(
     if wanted is not None:
         check_frequency(rate, wanted)
     curve = Curve(scenario, model)
+    if scenario.file.robust is not None:
+        what = "asks for limits that hold at a probability, for which the fastest path is not computed; leave it out of a copy"
+        raise InputError(scenario.path, [Fault("robust", what)])
     if model.clocks:
         what = "changes with time by itself, so that the fastest path depends on when it begins; leave the effect out"
         raise InputError(model.name, [Fault("effect", what)])
@@ -115,7 +124,7 @@ def fastest(
     share = _sampled(optimum, followed)
     progress("even speed")
     least = max(2, int(optimum.duration * rate.si))
-    even = None if model.inertial and not curve.closed else _even(followed, least)
+    even = _even(followed, least) if followed.may_be_even else None
     stated = _stated(scenario, followed, least)
     title = f"{scenario.file.title}: as fast as its limits allow"
     solution = solve(followed.scenario(share, title), model, progress)
@@ -143,23 +152,23 @@ def _rate(scenario: Scenario, given: str | None) -> Quantity:
 
 def _quantity(option: str, text: str) -> Quantity:
     """A frequency above zero. Raises InputError."""
+    example = f'write for example "{EXAMPLES[option]}"'
     try:
-        found = read_quantity("Hz", text)
+        frequency = read_quantity("Hz", text)
+    except ExampleGiven as error:
+        raise InputError(option, [Fault("value", str(error))]) from None
     except ValueError as error:
-        example = "" if "for example" in str(error) else f'; write for example "{EXAMPLES[option]}"'
-        raise InputError(option, [Fault("value", f"{error}{example}")]) from None
-    if found.si <= 0:
-        raise InputError(
-            option, [Fault("value", f'{text!r} is not above zero; write for example "{EXAMPLES[option]}"')]
-        )
-    return found
+        raise InputError(option, [Fault("value", f"{error}; {example}")]) from None
+    if frequency.si <= 0:
+        raise InputError(option, [Fault("value", f"{text!r} is not above zero; {example}")])
+    return frequency
 
 
 def _check_held(scenario: Scenario, model: Model) -> None:
     """Raises Unreachable where the path cannot be followed however slowly."""
     still = {"sample_rate": None, "duration": None, "points": HELD_POINTS}
     held = replace(scenario, file=scenario.file.model_copy(update=still))
-    check_feasibility(held, model, held.command(model))
+    check_feasible(held.bind(model))
 
 
 def _sampled(optimum: Optimum, followed: Followed) -> np.ndarray:

@@ -2,123 +2,66 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from ctrlgen.core.files import write_text
-from ctrlgen.core.units import difference, from_si, same_dimension, show
+from ctrlgen.core.units import show
 from ctrlgen.path_timing.binding import Binding
 from ctrlgen.path_timing.fastest import FastestPath
+from ctrlgen.path_timing.fastest_plots import bound_text, draw_fastest
+from ctrlgen.path_timing.fastest_record import fastest_record, small_unit
 from ctrlgen.path_timing.retimed import write_inputs
 from ctrlgen.reporting.html import render
-from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
-from ctrlgen.reporting.result_file import origin
+from ctrlgen.reporting.result_file import json_text
 
-SHOWN = 12  # limits in the figures
 SHOWN_RUNS = 4  # runs of a limit in a table
-UNBOUND = "#bbbbbb"
-EVEN = 800  # places along the path at which even speed is drawn
-FLAT = 1e-9  # of the largest extent, below which a channel does not move
-MARKED = 120  # set-points that are dots of their own; more of them cover the colours
-ROOM = 1.15  # of the largest speed, up to which speeds are shown
 
 
-def write_fastest(out: Path, found: FastestPath) -> None:
+def write_fastest(out: Path, motion: FastestPath) -> None:
     """Writes fastest.json, figures/path.svg, figures/binding.svg, figures/drives.svg, fastest.html and, in scenario/, the set-points as
     a scenario into the folder `out`; those at a frequency in at_frequency/scenario/."""
-    record = fastest_record(found)
-    figures = draw_fastest(found)
-    write_text(out / "fastest.json", json.dumps(record, indent=1) + "\n")
+    record = fastest_record(motion)
+    figures = draw_fastest(motion)
+    write_text(out / "fastest.json", json_text(record))
     for name, text in figures.items():
         write_text(out / "figures" / f"{name}.svg", text)
-    write_inputs(out / "scenario", found.solution.scenario)
-    repeated = found.repetition.solution if found.repetition else None
+    write_inputs(out / "scenario", motion.solution.scenario)
+    repeated = motion.repetition.solution if motion.repetition else None
     if repeated is not None:
         write_inputs(out / "at_frequency" / "scenario", repeated.scenario)
     page = render(
         Path(__file__).with_name("fastest.html.j2"),
         f=record,
         figures=figures,
-        device_title=found.solution.model.device.title,
-        rows=motions(found),
-        bindings=[(b, bound_text(b), runs_text(b)) for b in found.bindings],
-        between=between_text(found),
-        repeated=repetition_sentence(found),
-        scenario_file=found.solution.scenario.path.name,
+        device_title=motion.solution.model.device.title,
+        rows=motions(motion),
+        bindings=[(b, bound_text(b), runs_text(b)) for b in motion.bindings],
+        between=between_text(motion),
+        repeated=repetition_sentence(motion),
+        scenario_file=motion.solution.scenario.path.name,
         repeated_file=None if repeated is None else repeated.scenario.path.name,
     )
     write_text(out / "fastest.html", page)
 
 
-def fastest_record(found: FastestPath) -> dict[str, Any]:
-    """What fastest.json holds."""
-    scenario, optimum, r = found.scenario, found.optimum, found.repetition
-    time, share, speed, bound = found.optimum.law()
-    return {
-        **origin(scenario.digest, None, found.notes),
-        "scenario": scenario.name, "title": scenario.file.title, "device": found.solution.model.name, "signal": scenario.file.follow,
-        "closed": found.curve.closed, "sample_rate_hz": 1 / found.sample_time, "set_points": len(found.solution.command),
-        "times": {
-            "stated": found.given, "own_law": found.stated, "even_speed": found.even, "fastest": found.duration,
-            "continuous": optimum.duration,
-        },
-        "bindings": [
-            {
-                "limit": b.side.limit.name, "label": b.side.limit.label, "channel": b.side.name,
-                "side": "upper" if b.side.upper else "lower", "bound": float(from_si(b.side.bound, b.side.limit.unit)),
-                "unit": b.side.limit.unit, "time_s": b.time, "share_of_time": b.share_of_time, "runs": [list(r) for r in b.runs],
-            }
-            for b in found.bindings
-        ],
-        "between_set_points": _between(found),
-        "law": {"time_s": time.tolist(), "share": share.tolist(), "speed": _numbers(speed), "bound": _numbers(bound)},
-        "set_point_shares": found.share.tolist(),
-        "repetition": None if r is None else {
-            "frequency_hz": r.frequency, "scale": r.scale, "scale_even_speed": r.even, "scale_set_points": r.sampled,
-            "diameter": r.size(r.scale), "diameter_even_speed": r.size(r.even), "diameter_unit": r.unit,
-        },
-    }  # fmt: skip
-
-
-def _between(found: FastestPath) -> dict[str, float]:
-    signal = found.solution.model.signals[found.scenario.file.follow]
-    rows = zip(signal.channels, map(_small, signal.units), found.between, strict=True)
-    return {f"{c} [{u}]": float(difference(v, u)) for c, u, v in rows}
-
-
-def _numbers(values: np.ndarray) -> list[float | None]:
-    return [float(v) if np.isfinite(v) else None for v in values]
-
-
-def motions(found: FastestPath) -> list[tuple[str, str, str]]:
+def motions(motion: FastestPath) -> list[tuple[str, str, str]]:
     """Rows of the table of motions: what, how long or why not, and how often a second or times as fast as stated."""
     rows: list[tuple[str, float | None]] = [
-        ("as the scenario states it", found.given),
-        ("by its own law of time, no faster", found.stated),
-        ("at even speed along the path, no faster", found.even),
-        ("by the fastest law of time, set-points", found.duration),
-        ("by the fastest law, in continuous time", found.optimum.duration),
+        ("as the scenario states it", motion.given),
+        ("by its own law of time, no faster", motion.stated),
+        ("at even speed along the path, no faster", motion.even),
+        ("by the fastest law of time, set-points", motion.duration),
+        ("by the fastest law, in continuous time", motion.optimum.duration),
     ]
-    closed, shown = found.curve.closed, []
+    closed, shown = motion.curve.closed, []
     for what, time in rows:
         if time is None:
             shown.append((what, "none", ""))
         elif closed:
             shown.append((what, show(time, "s"), show(1 / time, "Hz")))
         else:
-            shown.append((what, show(time, "s"), "" if not found.given else f"{found.given / time:.3g} x"))
+            shown.append((what, show(time, "s"), "" if not motion.given else f"{motion.given / time:.3g} x"))
     return shown
-
-
-def bound_text(binding: Binding) -> str:
-    """Such as '≥ 0 W'."""
-    side = binding.side
-    return f"{'≤' if side.upper else '≥'} {show(side.bound, side.limit.unit)}"
 
 
 def runs_text(binding: Binding) -> str:
@@ -127,27 +70,16 @@ def runs_text(binding: Binding) -> str:
     return ", ".join(runs) + (f", {len(binding.runs) - SHOWN_RUNS} more" if len(binding.runs) > SHOWN_RUNS else "")
 
 
-def name_of(binding: Binding) -> str:
-    """The limited quantity and its channel, this once."""
-    label, channel = binding.side.limit.label, binding.side.name
-    return label if channel in label.split() else f"{label} {channel}"
-
-
-def between_text(found: FastestPath) -> str:
+def between_text(motion: FastestPath) -> str:
     """The largest distances from the path between set-points, of channels that have one."""
-    signal = found.solution.model.signals[found.scenario.file.follow]
-    rows = zip(signal.channels, signal.units, found.between, signal.scale, strict=True)
-    return ", ".join(f"{c} {show(v, _small(u), 3)}" for c, u, v, size in rows if v > 1e-9 * size) or "none"
+    signal = motion.solution.model.signals[motion.scenario.file.follow]
+    rows = zip(signal.channels, signal.units, motion.between, signal.scale, strict=True)
+    return ", ".join(f"{c} {show(v, small_unit(u), 3)}" for c, u, v, size in rows if v > 1e-9 * size) or "none"
 
 
-def _small(unit: str) -> str:
-    """nm and urad, in which errors are told."""
-    return next((small for small in ("nm", "urad") if same_dimension(unit, small)), unit)
-
-
-def repetition_sentence(found: FastestPath) -> str:
+def repetition_sentence(motion: FastestPath) -> str:
     """What can be repeated at the frequency that was asked for; empty where none was."""
-    r = found.repetition
+    r = motion.repetition
     if r is None:
         return ""
 
@@ -158,127 +90,8 @@ def repetition_sentence(found: FastestPath) -> str:
         return f"{100 * scale:.4g} %" if diameter is None else f"{diameter:.4g} {r.unit} ({100 * scale:.4g} %)"
 
     what = "largest path" if r.diameter is None else "largest circle"
-    even = "" if not found.curve.closed and found.solution.model.inertial else f", at even speed {size(r.even)}"
+    even = "" if not motion.curve.closed and motion.solution.model.inertial else f", at even speed {size(r.even)}"
     points = "; no set-points of it were found that keep all limits"
     if r.solution is not None:
         points = f"; {len(r.solution.command)} set-points keep all limits at {size(r.sampled)}"
     return f"{what} at {show(r.frequency, 'Hz')}: {size(r.scale)} by the fastest law of time{even}{points}"
-
-
-def draw_fastest(found: FastestPath) -> dict[str, str]:
-    """Path and speed, the limits that bind, the drives: name -> SVG text."""
-    with plt.rc_context(STYLE):
-        return {
-            "path": svg(_draw_path(found)),
-            **({"binding": svg(_draw_binding(found))} if found.bindings else {}),
-            "drives": svg(_draw_drives(found)),
-        }
-
-
-def _colours(found: FastestPath) -> list[tuple[Binding, str]]:
-    """A colour for each limit that binds."""
-    return [(b, COLOURS[k % len(COLOURS)]) for k, b in enumerate(found.bindings[:SHOWN])]
-
-
-def _draw_path(found: FastestPath) -> Figure:
-    """Left the path with its set-points, right the speed along it; coloured by the limit that binds."""
-    signal = found.solution.model.signals[found.scenario.file.follow]
-    spread = np.ptp(found.solution.command, axis=0) / np.array(signal.scale)
-    main = int(spread.argmax())
-    alike = [i for i, u in enumerate(signal.units) if same_dimension(u, signal.units[main])]
-    columns = sorted(sorted(alike, key=lambda i: -spread[i])[:2])
-    if len(columns) == 1 or spread[columns].min() < FLAT * spread[main]:
-        columns = [main]
-    figure, (left, right) = plt.subplots(1, 2, figsize=(8.2, 3.9), width_ratios=(1, 1.25))
-
-    def at(share: np.ndarray) -> list[np.ndarray]:
-        values = found.curve.samples(share)
-        shown = [np.asarray(from_si(values[:, i], signal.units[i])) for i in columns]
-        return [100 * share, *shown] if len(shown) == 1 else shown
-
-    left.plot(*at(np.linspace(0, 1, 2001)), color=UNBOUND, lw=1)
-    for binding, colour in reversed(_colours(found)):
-        for a, b in binding.runs:
-            left.plot(*at(np.linspace(a, b, 200)), color=colour, lw=2.2, solid_capstyle="butt")
-    left.plot(*at(found.share), ".", ms=3 if len(found.share) <= MARKED else 0.8, color="#333333")
-    names = [f"{signal.channels[i]} [{signal.units[i]}]" for i in columns]
-    if len(names) == 1:
-        names = ["share of the path [%]", *names]
-    else:
-        left.set_aspect("equal", adjustable="datalim")
-    left.set_xlabel(names[0])
-    left.set_ylabel(names[1])
-    left.set_title("set-points, and which limit binds", fontsize=8)
-    _draw_speed(right, found, alike, signal.units[main])
-    return figure
-
-
-def _draw_speed(axes: Axes, found: FastestPath, alike: list[int], unit: str) -> None:
-    """Over the share of the path, in the channels `alike`: the fastest law, the bound of each place, even speed."""
-    top, even = 0.0, None if found.even is None else found.curve.evenly(EVEN)
-
-    def shown(at: np.ndarray, rate: np.ndarray) -> np.ndarray:
-        slope = np.linalg.norm(found.curve.derivatives(at, 1, ends)[1][:, alike], axis=1)
-        return np.asarray(difference(np.where(np.isfinite(rate), rate, np.nan) * slope, unit))
-
-    for k, (ends, piece) in enumerate(zip(found.curve.pieces, found.optimum.pieces, strict=True)):
-        share, speed, bound = piece.share, piece.speed, piece.bound
-
-        def labelled(text: str, first: bool = k == 0) -> str:
-            return text if first else "_"  # each once
-
-        if bound is not None and not np.allclose(bound, speed):
-            label = labelled("bound of each place alone")
-            axes.plot(100 * share, shown(share, bound), color=UNBOUND, lw=1, ls="--", label=label)
-        axes.plot(100 * share, shown(share, speed), color="#333333", lw=1, label=labelled("fastest law of time"))
-        top = max(top, float(np.nanmax(shown(share, speed))))
-        for binding, colour in reversed(_colours(found)):
-            for a, b in binding.runs:
-                own = (share >= a) & (share <= b)
-                axes.plot(100 * share[own], shown(share[own], speed[own]), color=colour, lw=2.2, solid_capstyle="butt")
-        if even is not None and found.even is not None:
-            own = (even >= ends[0]) & (even <= ends[1])
-            rate = np.gradient(even[own], found.even / (len(even) - 1))
-            label = labelled("even speed, no faster")
-            axes.plot(100 * even[own], shown(even[own], rate), color="#888888", lw=1, ls=":", label=label)
-    axes.set_xlabel("share of the path [%]")
-    axes.set_ylabel(f"speed along the path [{unit}/s]")
-    axes.set_ylim(0, ROOM * top)
-    axes.legend(fontsize=8)
-
-
-def _draw_binding(found: FastestPath) -> Figure:
-    """Where along the path each limit binds."""
-    coloured = _colours(found)
-    figure, axes = plt.subplots(figsize=(8.2, 0.7 + 0.24 * len(coloured)))
-    for row, (binding, colour) in enumerate(coloured):
-        axes.broken_barh([(100 * a, 100 * (b - a)) for a, b in binding.runs], (row - 0.35, 0.7), color=colour)
-    axes.set_yticks(range(len(coloured)), [f"{name_of(b)} {bound_text(b)}" for b, _ in coloured], fontsize=7)
-    axes.set_xlim(0, 100)
-    axes.set_xlabel("share of the path [%]")
-    axes.invert_yaxis()
-    return figure
-
-
-def _draw_drives(found: FastestPath) -> Figure:
-    """The drives, held from sample to sample."""
-    solution = found.solution
-    signal = solution.model.signals["drive"]
-    figure, axes = plt.subplots(figsize=(8.2, 2.8))
-    edges = np.append(solution.trace.time, solution.trace.time[-1] + found.sample_time) * 1e3
-    for i, (channel, unit) in enumerate(zip(signal.channels, signal.units, strict=True)):
-        axes.stairs(
-            from_si(solution.drive[:, i], unit),
-            edges,
-            baseline=None,
-            color=COLOURS[i % len(COLOURS)],
-            lw=1,
-            label=channel,
-        )
-    low, high = solution.model.u_bounds
-    for bound in {float(b) for b in (*low, *high) if np.isfinite(b)}:
-        axes.axhline(from_si(bound, signal.units[0]), color="#666666", lw=0.8, ls="--")
-    axes.set_xlabel("time [ms]")
-    axes.set_ylabel(f"drive [{signal.units[0]}]")
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", fontsize=7, ncols=6)
-    return figure

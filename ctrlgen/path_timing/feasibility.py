@@ -12,10 +12,10 @@ from ctrlgen.core.units import Quantity
 from ctrlgen.model.model import Model
 from ctrlgen.path_timing.curve import Curve
 from ctrlgen.path_timing.retimed import retimed
-from ctrlgen.trajectory.inverse.balanced import PathInverse
-from ctrlgen.trajectory.inverse.inertial import InertialInverse
+from ctrlgen.trajectory.inverse.choice import choose_inverse
+from ctrlgen.trajectory.inverse.clock import Sampled
 from ctrlgen.trajectory.inverse.motion import Motion
-from ctrlgen.trajectory.inverse.redundant import LeastEffortInverse, motion_inverse, path_inverse
+from ctrlgen.trajectory.inverse.path_inverse import PathInverse
 from ctrlgen.trajectory.scenario import Scenario
 
 GROWTH = 1.3  # of a number of intervals, by which the first that suffices is looked for
@@ -28,13 +28,12 @@ class Followed:
 
     curve: Curve
     rate: Quantity
-    inverse: PathInverse | InertialInverse | LeastEffortInverse
+    inverse: PathInverse
 
     @classmethod
     def of(cls, curve: Curve, model: Model, rate: Quantity) -> Followed:
         """With the exact inverse of `model`."""
-        follow = curve.scenario.file.follow
-        return cls(curve, rate, (motion_inverse if model.inertial else path_inverse)(model, follow, 1 / rate.si))
+        return cls(curve, rate, choose_inverse(model, curve.scenario.file.follow, Sampled(1 / rate.si)))
 
     @property
     def model(self) -> Model:
@@ -43,8 +42,13 @@ class Followed:
 
     @property
     def sample_time(self) -> float:
-        """[s]"""
+        """Seconds between set-points."""
         return 1 / self.rate.si
+
+    @property
+    def may_be_even(self) -> bool:
+        """Whether speed may be even along the path: an open one with inertia begins and ends at rest."""
+        return self.curve.closed or not self.model.inertial
 
     def samples(self, share: np.ndarray) -> np.ndarray:
         """(n, channels) the set-points at shares of the path, the end of a closed one left out, which is its beginning."""
@@ -56,32 +60,22 @@ class Followed:
 
     def keeps(self, share: np.ndarray) -> bool:
         """Whether set-points at these shares, one each sample, keep every limit."""
-        samples, closed = self.samples(share), self.curve.closed
-        if not self.model.inertial:
-            needed = self.inverse.trajectory(samples, closed)
-            return needed.exact and not needed.violations(self.model, self.sample_time, closed)
         try:
-            return self._moves(self.scenario(share, "").motion(self.model))
+            return self._keeps(self.scenario(share, "").bind(self.model).motion)
         except InputError:  # not smooth enough
             return False
 
     def keeps_timed(self, scenario: Scenario) -> bool:
-        """Whether a scenario with a law of time of its own keeps every limit at this rate."""
-        target = scenario.target(self.model)
-        if isinstance(target, Motion):
-            return self._moves(target)
-        needed = self.inverse.trajectory(target, self.curve.closed)
-        return needed.exact and not needed.violations(self.model, self.sample_time, self.curve.closed)
+        """Whether a scenario with a law of time of its own keeps every limit at this rate. Raises InputError where it has no motion."""
+        return self._keeps(scenario.bind(self.model).motion)
 
-    def _moves(self, motion: Motion) -> bool:
-        """Whether held drives lead a device with inertia along a motion within all limits."""
-        assert not isinstance(self.inverse, PathInverse)
+    def _keeps(self, motion: Motion) -> bool:
+        """Whether held drives lead along a motion within all limits."""
         try:
-            found = self.inverse.sampled(motion, self.curve.closed)
+            needed = self.inverse.held(motion)
         except SolverError:
             return False
-        needed = self.inverse.needed(found, motion, self.curve.closed)
-        return not needed.violations(self.model, self.sample_time, self.curve.closed)
+        return needed.exact and not needed.violations(self.model)
 
 
 def fewest(follows: Callable[[int], bool], least: int) -> int | None:

@@ -20,12 +20,12 @@ from ctrlgen.path_timing.drive_law import (
     Side,
     depends_on_speed,
     distances_at,
+    drive_law,
     sides_of,
 )
 from ctrlgen.path_timing.maximum_velocity import landed, largest_speeds, largest_steps, steps_in_time
 from ctrlgen.path_timing.time_optimal_nlp import RateBound, SpeedProgramme
 from ctrlgen.path_timing.timing_law import TimingLaw
-from ctrlgen.trajectory.inverse.balanced import PathInverse
 from ctrlgen.trajectory.paths import smooth_step
 from ctrlgen.trajectory.scenario_file import MOST_SAMPLES
 
@@ -101,8 +101,7 @@ class Optimiser:
 
     def __init__(self, model: Model, follow: str, sample_time: float) -> None:
         self.model, self.sample_time = model, sample_time
-        self.inverse = None if model.inertial else PathInverse(model, follow, sample_time)
-        self.law: Law = InertialLaw(model, follow) if self.inverse is None else BalancedLaw(model, follow, self.inverse)
+        self.law: Law = drive_law(model, follow, sample_time)
         self.sides = sides_of(model.limits, model)
         self.distances = distances_at(self.law, self.sides)
         by_speed = [s for s, own in zip(self.sides, depends_on_speed(self.distances), strict=True) if own]
@@ -111,7 +110,7 @@ class Optimiser:
     @property
     def by_place(self) -> bool:
         """Whether each place alone bounds the speed."""
-        return not self.model.inertial and not self.model.rate_limits
+        return isinstance(self.law, BalancedLaw) and not self.model.rate_limits
 
     def along(self, curve: Curve, progress: Callable[[str], None] = lambda _: None, sampled: bool = True) -> Optimum:
         """The fastest law along `curve`. Raises SolverError where none is found. Where not `sampled`, the samples' places are left out."""
@@ -129,8 +128,8 @@ class Optimiser:
 
     def _bounded(self, curve: Curve, ends: tuple[float, float], sampled: bool) -> Piece:
         """By the largest speed at each place."""
-        path, law, inverse = self._path(curve, ends), self.law, self.inverse
-        assert path is not None and isinstance(law, BalancedLaw) and inverse is not None and inverse.moving is not None
+        path = self._path(curve, ends)
+        assert path is not None and path.law.inverse.moving is not None
         share = path.share
         speeds = largest_speeds(
             self.distances, self.speed_distances, path, share, 1 / (PACE_SAMPLES * self.sample_time)
@@ -151,14 +150,14 @@ class Optimiser:
             )
         if sampled:
             steps = np.minimum(
-                largest_steps(path, share, speeds, self.sample_time, inverse.moving.drive),
+                largest_steps(path, share, speeds, self.sample_time, path.law.inverse.moving.drive),
                 steps_in_time(share, time, speed, self.sample_time, curve.closed),
             )
         return Piece(time, share, speeds, distances, steps, None, speeds)
 
     def _programmed(self, curve: Curve, progress: Callable[[str], None]) -> Optimum:
         """By IPOPT, piece by piece; an open piece from rest to rest."""
-        rates, rate_sides = _rates(self.model, self.sample_time)
+        rates, rate_sides = _rates(self.law, self.sample_time)
         pieces = []
         for ends in curve.pieces:
             path = self._path(curve, ends)
@@ -183,8 +182,9 @@ class Optimiser:
         return np.hstack(list(curve.derivatives(share, self.law.order, ends)))
 
 
-def _rates(model: Model, sample_time: float) -> tuple[RateBound, list[tuple[int, Side]]]:
+def _rates(law: Law, sample_time: float) -> tuple[RateBound, list[tuple[int, Side]]]:
     """The bounds of the drives' rates, and with inertia what samples can follow; each with the drive's place."""
+    model = law.model
     low, high = (bound.copy() for bound in model.rate_bounds)
     sides = []
     signal = model.signals["drive"]
@@ -192,7 +192,7 @@ def _rates(model: Model, sample_time: float) -> tuple[RateBound, list[tuple[int,
         for upper, bound in ((False, limit.lower), (True, limit.upper)):
             if bound is not None:
                 sides.append((i, Side(limit, 0, upper, bound, (limit.upper or 0.0) - (limit.lower or 0.0))))
-    if model.inertial:
+    if isinstance(law, InertialLaw):
         span = np.ptp(np.array(model.u_bounds), axis=0)
         for i in map(int, np.flatnonzero(np.isfinite(span))):
             fastest = span[i] / (SWING * sample_time)

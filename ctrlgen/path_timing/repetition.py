@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
+from ctrlgen.budget.robust import solve
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.core.units import Quantity, from_si, written_unit
 from ctrlgen.path_timing.feasibility import Followed
 from ctrlgen.path_timing.optimum import Optimiser, Optimum
 from ctrlgen.trajectory.paths import Circle
-from ctrlgen.trajectory.solution import Solution, solve
+from ctrlgen.trajectory.solution import Solution
 
 SMALLEST = 1e-3  # of the path: below, it is no longer the same
 LARGEST = 1e3
@@ -77,7 +78,7 @@ def at_frequency(
         return len(share) - 1 <= period / h * (1 + 1e-9) and replace(followed, curve=curve).keeps(share)
 
     best = crossing(behind, float(np.log(known.duration / period)))
-    even = None if followed.model.inertial and not followed.curve.closed else largest(at_even_speed)
+    even = largest(at_even_speed) if followed.may_be_even else None
     path = followed.curve.scenario.file.path
     diameter = path.diameter if isinstance(path, Circle) else None
     unit = written_unit(diameter.text) if diameter else ""

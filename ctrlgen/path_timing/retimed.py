@@ -31,18 +31,30 @@ def retimed(
     device = scenario.inputs["device"]
     folder = device.path.parent
     lines = [
-        f'title = "{_escaped(title)}"', f'device = "{device.path.name}"', f'follow = "{file.follow}"',
+        f'title = "{_escaped(title)}"',
+        f'device = "{device.path.name}"',
+        f'follow = "{file.follow}"',
         *([f'controller = "{file.controller}"'] if file.controller else []),
-        f'sample_rate = "{rate.text}"', "", "[path]", 'kind = "poses"', f'file = "{name}.csv"',
+        f'sample_rate = "{rate.text}"',
+        "",
+        "[path]",
+        'kind = "poses"',
+        f'file = "{name}.csv"',
         *(["periodic = true"] if closed else []),
-    ]  # fmt: skip
+    ]
     poses = Poses(
         kind="poses", file=f"{name}.csv", periodic=closed, folder=folder, listed=tuple(map(tuple, samples.tolist()))
     )
     changed = {
-        "title": title, "device": device.path.name, "sample_rate": rate, "duration": None, "points": None, "path": poses,
-        "outcome": "solved", "expect": (),
-    }  # fmt: skip
+        "title": title,
+        "device": device.path.name,
+        "sample_rate": rate,
+        "duration": None,
+        "points": None,
+        "path": poses,
+        "outcome": "solved",
+        "expect": (),
+    }
     inputs = {
         **scenario.inputs,
         "scenario": Input(folder / f"{name}.toml", "\n".join(lines) + "\n"),

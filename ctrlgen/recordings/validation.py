@@ -46,6 +46,10 @@ class ChannelNames:
     units: tuple[str, ...]
 
 
+class MissingSamples(str):
+    """A note on samples of a channel without a reading, which a reader who bridges such gaps leaves out."""
+
+
 @dataclass(frozen=True)
 class Validated:
     """The result of validation: usable records, notes on what was marked, and the faults that refuse the recording."""
@@ -274,7 +278,8 @@ def mark(record: Record, kind: str, names: ChannelNames, recorded: np.ndarray) -
         if not recorded[i]:
             continue
         title, y = f"{record.name}, {name}", record.observed[:, i]
-        marks = {"missing": ~np.isfinite(y) & record.valid[:, i]}
+        missing = ~np.isfinite(y) & record.valid[:, i]
+        marks = {"missing": missing}
         if _constant(y):
             value = y[np.isfinite(y)]
             state = "has no valid sample" if not len(value) else f"reads {show(value[0], names.units[i])} throughout"
@@ -288,7 +293,8 @@ def mark(record: Record, kind: str, names: ChannelNames, recorded: np.ndarray) -
         for what, chosen in marks.items():
             if chosen.any():
                 first = f"{record.time[chosen.argmax()]:.6g} s" if kind == "series" else f"row {chosen.argmax()}"
-                notes.append(f"{title}: {chosen.sum()} of {len(y)} samples are {what} (first at {first}); not used.")
+                note = f"{title}: {chosen.sum()} of {len(y)} samples are {what} (first at {first}); not used."
+                notes.append(MissingSamples(note) if chosen is missing else note)
                 valid[chosen, i] = False
         observed[~valid[:, i], i] = np.nan
     return replace(record, observed=observed, valid=valid, spikes=tuple(spikes)), notes

@@ -23,10 +23,19 @@ FiniteOrNull = Annotated[float, WithJsonSchema({"anyOf": [{"type": "number"}, {"
 """A float that may be infinite or not a number, which the file states as null."""
 
 
+def _without_remarks(schema: dict[str, Any]) -> None:
+    """What pydantic remarks of a key that follows from others says nothing of the file."""
+    for entry in schema.get("properties", {}).values():
+        entry.pop("readOnly", None)
+
+
 class Keys(BaseModel):
     """An object of a result file: it has these keys and no others."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    # built where first used: a command does not wait for the records of others
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, defer_build=True, arbitrary_types_allowed=True, json_schema_extra=_without_remarks
+    )
 
     def as_json(self) -> dict[str, Any]:
         """Its keys in the types of JSON, without those that have a default and were not given; null for what is not finite."""
@@ -79,6 +88,9 @@ class ChannelGroup(Keys):
 
 def schema_text(model: type[BaseModel], name: str) -> str:
     """The JSON Schema (draft 2020-12) of a result file as text."""
-    found = {"$schema": "https://json-schema.org/draft/2020-12/schema", **model.model_json_schema()}
-    found["title"] = name
-    return json.dumps(found, indent=1) + "\n"
+    schema = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **model.model_json_schema(mode="serialization"),
+    }
+    schema["title"] = name
+    return json.dumps(schema, indent=1) + "\n"

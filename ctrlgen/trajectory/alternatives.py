@@ -9,15 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
 
 from ctrlgen.core.units import from_si, show
-from ctrlgen.model.model import Model, Signal
-from ctrlgen.trajectory.inverse.balanced import PERIODS
-from ctrlgen.trajectory.inverse.motion import Command, samples_of, scaled
+from ctrlgen.trajectory.inverse.clock import in_time
+from ctrlgen.trajectory.inverse.motion import Motion
+from ctrlgen.trajectory.problem import PathProblem
 
 SHARES = 2.0 ** -np.arange(7, -1, -1)  # of the way to the end of an admissible range, where a shift is tried
 HALVINGS = 9  # of an interval: a shift or a scale to a five-hundredth
@@ -31,64 +30,26 @@ INSIDE = 1e-4  # of an axis' range that a shifted path stays inside of it: round
 
 @dataclass(frozen=True)
 class Alternative:
-    """A path that can be followed: `what` it is compared with the commanded one, and its `command`."""
+    """A path that can be followed: `what` it is compared with the commanded one, and its `motion`."""
 
     what: str
-    command: Command
-
-
-class Inverse(Protocol):
-    """What is asked of the inverse of a path: `PathInverse`, or `InertialInverse` of a device with inertia."""
-
-    @property
-    def model(self) -> Model:
-        """Of what it is the inverse."""
-
-    @property
-    def sample_time(self) -> float | None:
-        """Seconds between samples; None between equilibria."""
-
-    @property
-    def without_memories(self) -> Inverse:
-        """The same of the device without the effects that have memories."""
-
-    def displacements(self, command: Any, closed: bool) -> np.ndarray:
-        """z (n, n_axes) along a path."""
-
-    def keeps_limits(
-        self, command: Any, closed: bool, chosen: np.ndarray | None = None, margin: float = 0.0, periods: int = PERIODS
-    ) -> bool:
-        """Whether it can be followed."""
-
-    def at_rest(self, target: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """x, z and u of an equilibrium."""
-
-    def slope(self, target: np.ndarray) -> np.ndarray:
-        """(n_axes, channels) d displacement / d target at rest."""
+    motion: Motion
 
 
 class Alternatives:
-    """The paths nearest to `command` that can be followed.
+    """The paths nearest to that of a `problem` that can be followed; `worst` are the samples at which it breaks limits most."""
 
-    `slowed` gives the command that takes a number of times as long, None where the samples are equilibria or listed; `worst` are
-    the samples at which limits are broken most.
-    """
-
-    def __init__(
-        self, inverse: Inverse, signal: Signal, command: Command, closed: bool,
-        slowed: Callable[[float], Command] | None, worst: Sequence[int],
-    ) -> None:  # fmt: skip
-        self.confirming, self.inverse = inverse, inverse.without_memories
-        self.signal, self.command, self.closed, self.slowed = signal, command, closed, slowed
-        self.scale = np.array(signal.scale)
-        z = self.inverse.displacements(command, closed)
-        extreme = np.concatenate([z.argmin(axis=0), z.argmax(axis=0), np.array(worst)]) / len(command)
-        self.places = np.concatenate(
-            [np.linspace(0, 1, LOOKED_AT), extreme]
-        )  # along the path, where it is looked at first
+    def __init__(self, problem: PathProblem, worst: Sequence[int]) -> None:
+        self.problem, self.motion, self.signal = problem, problem.motion, problem.signal
+        self.confirming, self.inverse = problem.inverse, problem.inverse.without_memories
+        self.scale = np.array(self.signal.scale)
+        z = self.inverse.displacements(self.motion)
+        extreme = np.concatenate([z.argmin(axis=0), z.argmax(axis=0), np.array(worst)]) / len(self.motion)
+        # along the path, where it is looked at first
+        self.places = np.concatenate([np.linspace(0, 1, LOOKED_AT), extreme])
         self.everywhere, self.margin = False, 0.0
 
-    def found(self) -> tuple[Alternative, ...]:
+    def nearest(self) -> tuple[Alternative, ...]:
         """Those that exist of a slower, a shifted and a smaller one; where none does, one that is smaller and shifted."""
         alone = [a for a in map(self._searched, (self._slower, self._shifted, self._smaller)) if a]
         both = None if alone else self._searched(self._smaller_and_shifted)
@@ -98,73 +59,66 @@ class Alternatives:
         """What a search finds in a few places and all samples confirm; looking at all of them, and with a margin for memories, where
         they do not."""
         for self.everywhere, self.margin in ((False, 0.0), (True, 0.0), *((False, share) for share in MARGINS)):
-            found = search()
-            if found is None or self.confirming.keeps_limits(found.command, self.closed, periods=CONFIRMING_PERIODS):
-                return found
+            answer = search()
+            if answer is None or self.confirming.keeps_limits(answer.motion, periods=CONFIRMING_PERIODS):
+                return answer
             if self.everywhere and self.confirming is self.inverse:
                 return None
         return None
 
-    def _follows(self, command: Command) -> bool:
-        n = len(command)
+    def _follows(self, motion: Motion) -> bool:
+        n = len(motion)
         chosen = np.unique(np.minimum((self.places * n).round().astype(int), n - 1))
-        return self.inverse.keeps_limits(command, self.closed, None if self.everywhere else chosen, self.margin)
+        return self.inverse.keeps_limits(motion, None if self.everywhere else chosen, self.margin)
 
     def _slower(self) -> Alternative | None:
-        if self.slowed is None:
+        slowed = self.problem.slowed
+        if slowed is None:
             return None
-        slowed = self.slowed
         factors = 2.0 ** np.arange(1, np.log2(SLOWEST) + 1)
         enough = next((f for f in factors if self._follows(slowed(f))), None)
         if enough is None:
             return None
         factor = np.ceil(100 * _least(lambda f: self._follows(slowed(f)), enough / 2, enough)) / 100
-        command = slowed(float(factor))
-        duration = show(len(command) * (self.inverse.sample_time or 0.0), "s")
-        return Alternative(f'{factor:g} times slower (duration = "{duration}")', command)
-
-    def _middle(self) -> np.ndarray:
-        samples = samples_of(self.command)
-        return (samples.min(axis=0) + samples.max(axis=0)) / 2
-
-    def _scaled(self, share: float) -> Command:
-        return scaled(self.command, share, self._middle())
+        motion = slowed(float(factor))
+        duration = show(len(motion) * in_time(self.problem.clock).sample_time, "s")
+        return Alternative(f'{factor:g} times slower (duration = "{duration}")', motion)
 
     @property
     def _has_extent(self) -> bool:
-        return bool(np.ptp(samples_of(self.command), axis=0).max() > 0)
+        return bool(np.ptp(self.motion.position, axis=0).max() > 0)
 
     def _smaller(self) -> Alternative | None:
-        if not self._has_extent or not self._follows(self._scaled(SMALLEST_SCALE)):
+        if not self._has_extent or not self._follows(self.motion.scaled(SMALLEST_SCALE)):
             return None
-        share = _largest_share(lambda s: self._follows(self._scaled(s)))
-        return Alternative(_scaled_to(share), self._scaled(share))
+        share = _largest_share(lambda s: self._follows(self.motion.scaled(s)))
+        return Alternative(_scaled_to(share), self.motion.scaled(share))
 
     def _shifted(self) -> Alternative | None:
-        shift, _ = self._shift(self.command)
-        return None if shift is None else Alternative(self._shifted_by(shift), self.command + shift)
+        shift, _ = self._shift(self.motion)
+        return None if shift is None else Alternative(self._shifted_by(shift), self.motion + shift)
 
     def _smaller_and_shifted(self) -> Alternative | None:
         """The largest path about its own middle that follows once it is shifted the way in which the smallest one does."""
         if not self._has_extent:
             return None
-        shift, way = self._shift(self._scaled(SMALLEST_SCALE))
+        shift, way = self._shift(self.motion.scaled(SMALLEST_SCALE))
         if shift is None:
             return None
-        share = _largest_share(lambda s: self._shift(self._scaled(s), way)[0] is not None)
-        shift, _ = self._shift(self._scaled(share), way)
+        share = _largest_share(lambda s: self._shift(self.motion.scaled(s), way)[0] is not None)
+        shift, _ = self._shift(self.motion.scaled(share), way)
         if shift is None:
             return None
-        return Alternative(f"{_scaled_to(share)} and {self._shifted_by(shift)}", self._scaled(share) + shift)
+        return Alternative(f"{_scaled_to(share)} and {self._shifted_by(shift)}", self.motion.scaled(share) + shift)
 
-    def _shift(self, command: Command, way: np.ndarray | None = None) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """The least shift of `command` (channels,) and its direction: along `way` where that is given, else along one channel; where
+    def _shift(self, motion: Motion, way: np.ndarray | None = None) -> tuple[np.ndarray | None, np.ndarray | None]:
+        """The least shift of `motion` (channels,) and its direction: along `way` where that is given, else along one channel; where
         none of them does, along all of them as the least shift into range says."""
         ways = list(np.diag(self.scale)) if way is None else [way]
-        found = [(s, each) for each in ways if (s := self._along(command, each)) is not None]
+        found = [(s, each) for each in ways if (s := self._along(motion, each)) is not None]
         if not found and way is None:
-            several = self._least_shift(command)
-            shift = None if several is None else self._along(command, several)
+            several = self._least_shift(motion)
+            shift = None if several is None else self._along(motion, several)
             return shift, several
         return min(found, key=lambda f: float(np.linalg.norm(f[0] / self.scale)), default=(None, way))
 
@@ -173,9 +127,9 @@ class Alternatives:
         parts = [f"{c} = {'+' if v > 0 else ''}{show(v, u)}" for c, u, v, size in rows if abs(v) > 1e-6 * size]
         return f"shifted by {', '.join(parts)}"
 
-    def _along(self, command: Command, direction: np.ndarray) -> np.ndarray | None:
-        """The least shift along `direction` (channels,) with which `command` can be followed, rounded to be shown."""
-        low, high = self._room(command)
+    def _along(self, motion: Motion, direction: np.ndarray) -> np.ndarray | None:
+        """The least shift along `direction` (channels,) with which `motion` can be followed, rounded to be shown."""
+        low, high = self._room(motion)
         slope = self.slope @ direction
         with np.errstate(divide="ignore", invalid="ignore"):
             ends = np.array([low, high]) / slope
@@ -192,14 +146,14 @@ class Alternatives:
             *(nearest + share * (end - nearest) for end in (first, last) if np.isfinite(end) for share in SHARES),
         ]
         tries = sorted(dict.fromkeys(tries), key=abs)
-        size = next((t for t in tries if t != 0 and self._follows(command + t * direction)), None)
+        size = next((t for t in tries if t != 0 and self._follows(motion + t * direction)), None)
         if size is None:
             return None
         if size != nearest:
-            size = _least(lambda t: self._follows(command + t * direction), nearest, size)
+            size = _least(lambda t: self._follows(motion + t * direction), nearest, size)
         for digits in (3, 4, 6):
             shift = self._shown(size * direction, digits)
-            if self._follows(command + shift):
+            if self._follows(motion + shift):
                 return shift
         return None
 
@@ -213,9 +167,9 @@ class Alternatives:
                 rounded[i] = np.sign(value) * np.ceil(abs(value / one) / step * (1 - 1e-9)) * step * one
         return rounded
 
-    def _room(self, command: Command) -> tuple[np.ndarray, np.ndarray]:
+    def _room(self, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
         """By how much each displacement must at least and may at most be moved to be in range at every sample."""
-        z = self.inverse.displacements(command, self.closed)
+        z = self.inverse.displacements(motion)
         low, high = self.inverse.model.z_bounds
         inside = (INSIDE + self.margin) * np.where(np.isfinite(high - low), high - low, 0.0)
         return low + inside - z.min(axis=0), high - inside - z.max(axis=0)
@@ -223,17 +177,17 @@ class Alternatives:
     @cached_property
     def slope(self) -> np.ndarray:
         """(n_axes, channels) d displacement / d command at the middle of the path."""
-        return self.inverse.slope(self._middle())
+        return self.inverse.slope(self.motion.middle)
 
-    def _least_shift(self, command: Command) -> np.ndarray | None:
+    def _least_shift(self, motion: Motion) -> np.ndarray | None:
         """The least shift in typical sizes that brings every displacement into range, to first order; None where there is none."""
-        low, high = self._room(command)
+        low, high = self._room(motion)
         if np.any(low > high):
             return None
         A, size = self.slope * self.scale, self.inverse.model.z_scale
-        program = ca.conic("shift", "qrqp", {"h": ca.Sparsity.dense(*[len(self.scale)] * 2), "a": ca.Sparsity.dense(*A.shape)}, {
-            "print_iter": False, "print_header": False, "print_info": False, "error_on_fail": False,
-        })  # fmt: skip
+        quiet = {"print_iter": False, "print_header": False, "print_info": False, "error_on_fail": False}
+        shapes = {"h": ca.Sparsity.dense(*[len(self.scale)] * 2), "a": ca.Sparsity.dense(*A.shape)}
+        program = ca.conic("shift", "qrqp", shapes, quiet)
         answer = program(h=np.eye(len(self.scale)), a=A / size[:, None], lba=low / size, uba=high / size)
         return answer["x"].full().ravel() * self.scale if program.stats()["success"] else None
 

@@ -2,50 +2,72 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from ctrlgen.core.errors import Infeasibility, SolverError, Unreachable
+from ctrlgen.core.errors import Fault, Infeasibility, InputError, SolverError, Unreachable
 from ctrlgen.core.units import from_si, show
 from ctrlgen.model.model import Model, Signal
-from ctrlgen.trajectory.alternatives import Alternatives, Inverse
-from ctrlgen.trajectory.inverse.balanced import InverseTrajectory
-from ctrlgen.trajectory.inverse.motion import Command, samples_of
+from ctrlgen.trajectory.alternatives import Alternatives
+from ctrlgen.trajectory.inverse.choice import count_faults
+from ctrlgen.trajectory.inverse.clock import Settled
+from ctrlgen.trajectory.inverse.motion import Motion
+from ctrlgen.trajectory.inverse.path_inverse import InverseTrajectory
 from ctrlgen.trajectory.inverse.violations import Violation, violations
 from ctrlgen.trajectory.optimisation import TrajectoryProgramme
-from ctrlgen.trajectory.scenario import Scenario
+from ctrlgen.trajectory.problem import PathProblem
 
-FEASIBILITY_TOLERANCE = (
-    1e-5  # typical sizes (1 um, or 1 um at the platform's rim) off the command that count as none: 10 pm
-)
+# typical sizes (1 um, or 1 um at the platform's rim) off the command that count as none: 10 pm
+FEASIBILITY_TOLERANCE = 1e-5
 SHOWN_RUNS = 6  # runs of samples that a message lists
 SHOWN_CAUSES = 8  # limits that it lists
 
 
-def unreachable(
-    scenario: Scenario, inverse: Inverse, command: Command, needed: InverseTrajectory, certain: bool = False
-) -> Unreachable | None:
+def check_feasible(problem: PathProblem) -> InverseTrajectory:
+    """What the path takes by its inverse, without IPOPT. Raises Unreachable where that breaks a limit, and InputError for a device that
+    cannot be inverted, with too many or few drives, a closed path of one that changes with time, a path that is not as smooth as the
+    drive needs, or a static feedforward of a device without inertia."""
+    statically = problem.file.feedforward == "static"
+    solved = problem.in_balance if statically else problem
+    _check_invertible(solved)
+    motion = solved.motion
+    if statically and not solved.model.n_states:
+        motion = Motion.of_samples(solved.positions(-0.5), solved.closed)
+    needed = solved.inverse.trajectory(motion)
+    if (error := unreachable(solved, needed)) is not None:
+        raise error
+    return needed
+
+
+def _check_invertible(problem: PathProblem) -> None:
+    if problem.model.clocks and problem.closed:
+        what = "is closed, but an effect of the device changes with time, so no period repeats; make the path open, or drop the effect"
+        raise InputError(problem.source, [Fault("path", what)])
+    if faults := count_faults(problem.model, problem.follow):
+        raise InputError(problem.source, faults)
+
+
+def unreachable(problem: PathProblem, needed: InverseTrajectory, certain: bool = False) -> Unreachable | None:
     """The error that names the samples, the actuators and limits, by how much, and what can be followed instead; None where
     what is `needed` breaks no limit, or perhaps none, unless it is `certain` from elsewhere that the path cannot be followed."""
-    model, n, wanted = inverse.model, len(command), samples_of(command)
-    causes = primary(model, needed.violations(model, scenario.sample_time, scenario.closed))
+    model, inverse, signal = problem.model, problem.inverse, problem.signal
+    n, wanted, following = len(problem.motion), problem.motion.position, problem.motion.following
+    causes = primary(model, needed.violations(model))
     if not needed.exact and not certain:
         # of what may still change, or is out of the equations' range, only displacements far enough out of theirs
         least = 0.0 if not needed.solved else 2 * needed.unsettled * float(model.z_scale.max())
         causes = [c for c in causes if model.limited_variable(c.limit, c.channel) == "z" and c.beyond.max() > least]
     if not causes:
         return None
-    signal = model.signals[scenario.file.follow]
     samples = tuple(map(int, np.flatnonzero(np.any([c.beyond > 0 for c in causes], axis=0))))
-    worst = causes[0].worst
-    at = _moment(scenario)
+    worst, at = causes[0].worst, problem.clock.moment
     lines = [
         f"cannot follow {len(samples)} of {n} samples ({_runs(samples)}); the worst is sample {worst}{at(worst)}: "
         f"{_point(signal, wanted[worst])}"
     ]
-    leads = (worst + 1) % n if scenario.closed else min(worst + 1, n - 1)  # where the drive of the worst sample leads
-    x, z, u = (np.array(v) for v in zip(*map(inverse.at_rest, wanted[[worst, leads]]), strict=True))
+    ends = wanted[[worst, following[worst]]]  # of the drive of the worst sample
+    x, z, u = (np.array(v) for v in zip(*map(inverse.at_rest, ends), strict=True))
     held = violations(model, x, z, u)
     listed, also = _grouped(model, causes)
     lines += [
@@ -55,28 +77,24 @@ def unreachable(
     ]
     if len(listed) > SHOWN_CAUSES:
         lines.append(f"  and {len(listed) - SHOWN_CAUSES} more limits")
-    nearest = _nearest_pose(model, scenario.file.follow, wanted[worst]) if held else None
+    nearest = _nearest_pose(model, problem.follow, wanted[worst]) if held else None
     if nearest is not None:
         lines.append(f"  nearest pose of that sample that can be held: {_point(signal, nearest)}")
-    line, found = instead(scenario, inverse, command, [c.worst for c in causes])
+    line, others = instead(problem, [c.worst for c in causes])
     lines += [line] * bool(line)
-    return Unreachable("\n".join(lines), Infeasibility(samples, worst, wanted, nearest, found))
+    return Unreachable("\n".join(lines), Infeasibility(samples, worst, wanted, nearest, others))
 
 
-def instead(
-    scenario: Scenario, inverse: Inverse, command: Command, worst: Sequence[int]
-) -> tuple[str, dict[str, np.ndarray]]:
+def instead(problem: PathProblem, worst: Sequence[int]) -> tuple[str, dict[str, np.ndarray]]:
     """What can be followed instead of a path that breaks limits most at the samples `worst`: a line of text, empty for one pose, and
     the paths (n, channels) [SI] by what they are compared with the commanded one."""
-    slowed = None if scenario.sample_time is None else scenario.slowed(inverse.model)
-    signal = inverse.model.signals[scenario.file.follow]
-    found = Alternatives(inverse, signal, command, scenario.closed, slowed, worst).found()
+    nearest = Alternatives(problem, worst).nearest()
     line = ""
-    if found:
-        line = f"  the path can be followed {'; or '.join(a.what for a in found)}"
-    elif len(command) > 1:
+    if nearest:
+        line = f"  the path can be followed {'; or '.join(a.what for a in nearest)}"
+    elif len(problem.motion) > 1:
         line = "  no shifted, smaller or slower path was found that can be followed; command smaller motions near home"
-    return line, {a.what: samples_of(a.command) for a in found}
+    return line, {a.what: a.motion.position for a in nearest}
 
 
 def primary(model: Model, broken: Sequence[Violation]) -> list[Violation]:
@@ -130,16 +148,10 @@ def _distance(value: float, unit: str) -> str:
 def _nearest_pose(model: Model, follow: str, target: np.ndarray) -> np.ndarray | None:
     """The pose that can be held nearest to `target`, by IPOPT; None where it finds none."""
     try:
-        result, _ = TrajectoryProgramme(model, follow, target[None]).optimum()
+        result, _ = TrajectoryProgramme(model, follow, Motion.of_samples(target[None]), Settled()).optimum()
     except SolverError:
         return None
     return result.trace.signals[follow][0]
-
-
-def _moment(scenario: Scenario) -> Callable[[int], str]:
-    """The text of a sample's time."""
-    h = scenario.sample_time
-    return lambda k: "" if h is None else f" at {show(k * h, 's')}"
 
 
 def _runs(samples: Sequence[int]) -> str:
@@ -156,8 +168,6 @@ def _runs(samples: Sequence[int]) -> str:
 
 def _point(signal: Signal, values: np.ndarray) -> str:
     """A sample with its non-zero channels in the reader's units; "home" where all are zero."""
-    parts = [
-        f"{c} = {from_si(v, u):.4g} {u}" for c, u, v in zip(signal.channels, signal.units, values, strict=True)
-        if abs(v) > 1e-6 * signal.scale[signal.channels.index(c)]
-    ]  # fmt: skip
+    rows = zip(signal.channels, signal.units, signal.scale, values, strict=True)
+    parts = [f"{c} = {from_si(v, u):.4g} {u}" for c, u, size, v in rows if abs(v) > 1e-6 * size]
     return ", ".join(parts) or "home"

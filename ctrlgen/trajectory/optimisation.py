@@ -25,8 +25,10 @@ from ctrlgen.model.discretisation import held_step
 from ctrlgen.model.model import Limit, Model
 from ctrlgen.model.simulation import Trace, trace
 from ctrlgen.numerics.ipopt import check_signal
-from ctrlgen.trajectory.inverse.balanced import InverseTrajectory
-from ctrlgen.trajectory.inverse.violations import violations
+from ctrlgen.trajectory.inverse.clock import Clock, Sampled, Settled
+from ctrlgen.trajectory.inverse.motion import Motion
+from ctrlgen.trajectory.inverse.path_inverse import InverseTrajectory
+from ctrlgen.trajectory.inverse.violations import Before, violations
 
 SLACK_WEIGHT = 1e8  # against IPOPT's barrier, which otherwise keeps the solution sqrt(mu) off an active bound
 TOLERANCE = 1e-10  # IPOPT's, of the scaled optimality error
@@ -37,7 +39,8 @@ DRIVE_GUESS = 0.2  # of its typical size, where IPOPT begins
 
 @dataclass(frozen=True)
 class OptimisationResult:
-    """IPOPT's solution in SI, one row a sample: states `x`, displacements `z`, drives `u`, those held `before`, and their `trace`.
+    """IPOPT's solution in SI, one row a sample: states `x`, displacements `z`, drives `u`, those held `before` where time passes, and
+    their `trace`.
 
     `unreachable_by`: the slack, by which the followed signal is off the command, in its typical sizes.
     """
@@ -45,30 +48,29 @@ class OptimisationResult:
     x: np.ndarray
     z: np.ndarray
     u: np.ndarray
-    before: np.ndarray
+    before: Before | None
     unreachable_by: np.ndarray
     trace: Trace
     iterations: int
 
 
 class TrajectoryProgramme:
-    """The nonlinear programme of one path, `command` (n, channels) [SI] of the signal `follow` every `sample_time` [s] (None:
-    separate equilibria); `run` solves it with the composite limits that are chosen."""
+    """The nonlinear programme of one path, the `motion` of the signal `follow` whose samples are where the `clock` says; `run` solves it
+    with the composite limits that are chosen."""
 
-    def __init__(
-        self, model: Model, follow: str, command: np.ndarray, sample_time: float | None = None, closed: bool = False
-    ) -> None:
-        self.model, self.sample_time, self.closed = model, sample_time, closed
+    def __init__(self, model: Model, follow: str, motion: Motion, clock: Clock) -> None:
+        self.model, self.clock, self.closed = model, clock, motion.closed
         self.signal = model.signals[follow]
-        self.n_command = len(command)  # an open path is held for one more sample, so that its last drive is determined
-        held = sample_time is not None and not closed
-        self.command = np.vstack([command, command[-1:]]) if held else command
+        self.n_command, self.command = len(motion), motion.position
+        if isinstance(clock, Sampled) and not motion.closed:
+            # an open path is held for one more sample, so that its last drive is determined
+            self.command = np.vstack([self.command, self.command[-1:]])
         self.n = len(self.command)
         self.sizes = (model.x.numel(), model.z.numel(), model.u.numel(), self.signal.expr.numel())
 
     def _rows(self, limits: Sequence[Limit]) -> tuple[ca.Function, np.ndarray, np.ndarray]:
         """One sample's constraints (x, z, u_before, u, s, x_next, command) and their bounds."""
-        m, h = self.model, self.sample_time
+        m, clock = self.model, self.clock
         x, z, v, u, s, x_1 = (
             ca.SX.sym(name, size)
             for name, size in zip(
@@ -82,13 +84,16 @@ class TrajectoryProgramme:
             values = ca.vertcat(*physical, drive * m.u_scale, ca.DM(m.p_nominal))
             return ca.substitute(expression, ca.vertcat(m.x, m.z, m.u, m.p), values)
 
-        motion = at(m.settling, u) / m.x_scale if h is None else x_1 - (at(held_step(m, h), u) - m.rest) / m.x_scale
+        if isinstance(clock, Sampled):
+            motion = x_1 - (at(held_step(m, clock.sample_time), u) - m.rest) / m.x_scale
+        else:
+            motion = at(m.settling, u) / m.x_scale
         equal = [at(self.signal.expr, v) / self.signal.scale - commanded - s, at(m.balance, v) / m.force_scale, motion]
         low, high, rows = [np.zeros(e.numel()) for e in equal], [np.zeros(e.numel()) for e in equal], list(equal)
         for i, limit in zip(m.rate_places, m.rate_limits, strict=True):
-            if h is not None and limit.lower is not None and limit.upper is not None:
+            if isinstance(clock, Sampled) and limit.lower is not None and limit.upper is not None:
                 span = limit.upper - limit.lower
-                rows.append((u[i] - v[i]) * m.u_scale[i] / (h * span))
+                rows.append((u[i] - v[i]) * m.u_scale[i] / (clock.sample_time * span))
                 low.append(np.array([limit.lower / span]))
                 high.append(np.array([limit.upper / span]))
         for limit in limits:
@@ -104,7 +109,7 @@ class TrajectoryProgramme:
 
         Raises SolverError, and KeyboardInterrupt on a signal.
         """
-        m, n, static, closed = self.model, self.n, self.sample_time is None, self.closed
+        m, n, static, closed = self.model, self.n, isinstance(self.clock, Settled), self.closed
         rows, row_low, row_high = self._rows(limits)
         variables = ca.MX.sym("w", sum(self.sizes), n)
         X, Z, U, S = ca.vertsplit(variables, list(np.cumsum([0, *self.sizes])))
@@ -160,13 +165,10 @@ class TrajectoryProgramme:
         table = values[: n * sum(self.sizes)].reshape(n, -1)
         x, z, u, s = np.split(table, np.cumsum(self.sizes[:3]), axis=1)
         x, z, u = x * m.x_scale + m.rest, z * m.z_scale, u * m.u_scale
-        before = (
-            u
-            if static
-            else np.vstack(
-                [u[-1:] if closed else values[None, table.size : table.size + self.sizes[2]] * m.u_scale, u[:-1]]
-            )
-        )
+        before = u
+        if not static:
+            first = u[-1:] if closed else values[None, table.size : table.size + self.sizes[2]] * m.u_scale
+            before = np.vstack([first, u[:-1]])
         keep = slice(0, self.n_command)
         x, z, u, s, before = x[keep], z[keep], u[keep], s[keep], before[keep]
         return self._result(x, z, u, before, s, stats["iter_count"])
@@ -191,24 +193,21 @@ class TrajectoryProgramme:
 
     def exact(self, needed: InverseTrajectory) -> OptimisationResult:
         """What the path needs as the solution: an optimum where it keeps every limit, as its slack is zero."""
-        before = needed.u if self.sample_time is None else needed.before(self.closed)
         none, m = np.zeros((self.n_command, self.sizes[3])), self.model
-        x, z, u = (
-            np.clip(needed.x, *m.x_bounds),
-            np.clip(needed.z, *m.z_bounds),
-            np.clip(needed.u, *m.u_bounds),
-        )  # rounding
-        return self._result(x, z, u, before, none, 0)
+        rounded = ((needed.x, m.x_bounds), (needed.z, m.z_bounds), (needed.u, m.u_bounds))
+        x, z, u = (np.clip(values, *bounds) for values, bounds in rounded)
+        return self._result(x, z, u, needed.drive_before, none, 0)
 
     def _result(
         self, x: np.ndarray, z: np.ndarray, u: np.ndarray, before: np.ndarray, slack: np.ndarray, iterations: int
     ) -> OptimisationResult:
-        """With the signals that follow the drive `before` each sample, where there is time."""
-        result = trace(self.model, np.arange(len(x)) * (self.sample_time or 0.0), x, z, u)
-        if self.sample_time is not None:
-            reached = trace(self.model, result.time, x, z, before)
-            result.signals.update({role: reached.signals[role] for role in ("displacement", "pose", "reading")})
-        return OptimisationResult(x, z, u, before, slack, result, iterations)
+        """With the signals that follow the drive `before` each sample, where time passes."""
+        result = trace(self.model, self.clock.times(len(x)), x, z, u)
+        if isinstance(self.clock, Settled):
+            return OptimisationResult(x, z, u, None, slack, result, iterations)
+        reached = trace(self.model, result.time, x, z, before)
+        result.signals.update({role: reached.signals[role] for role in ("displacement", "pose", "reading")})
+        return OptimisationResult(x, z, u, Before(before, self.clock.sample_time), slack, result, iterations)
 
     def _start(self, begin: InverseTrajectory | None, starts_settled: bool) -> np.ndarray:
         """Where IPOPT begins, scaled, inside the bounds."""
@@ -229,6 +228,8 @@ class TrajectoryProgramme:
         if symbol == "s":
             return np.full(self.sizes[3], -np.inf), np.full(self.sizes[3], np.inf)
         (low, high), scale, origin = {
-            "x": (m.x_bounds, m.x_scale, m.rest), "z": (m.z_bounds, m.z_scale, 0.0), "u": (m.u_bounds, m.u_scale, 0.0),
-        }[symbol]  # fmt: skip
+            "x": (m.x_bounds, m.x_scale, m.rest),
+            "z": (m.z_bounds, m.z_scale, 0.0),
+            "u": (m.u_bounds, m.u_scale, 0.0),
+        }[symbol]
         return (low - origin) / scale, (high - origin) / scale

@@ -9,6 +9,7 @@ from pydantic import Field, field_validator, model_validator
 
 from ctrlgen.core.units import In, Quantity, read_probability
 from ctrlgen.devices.base import Section
+from ctrlgen.trajectory.inverse.clock import Clock, Sampled, Settled
 from ctrlgen.trajectory.paths import PathKind, Poses
 from ctrlgen.trajectory.shaping import Shaping
 
@@ -89,6 +90,16 @@ class ScenarioFile(Section):
     """Left out: the limits hold for the device as described, and may be broken by one whose numbers differ."""
     expect: tuple[Expectation, ...] = ()
     """`[[expect]]` tables: values that the solution must have."""
+
+    @property
+    def clock(self) -> Clock:
+        """When the samples are."""
+        return Settled() if self.sample_rate is None else Sampled(1 / self.sample_rate.si)
+
+    @property
+    def closed(self) -> bool:
+        """Whether the path is periodic: its first sample follows the last one."""
+        return self.sample_rate is not None and self.path.closed
 
     @field_validator("controller")
     @classmethod

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 from ctrlgen.core.files import write_text
 from ctrlgen.reporting.html import render
-from ctrlgen.verification.build_plots import draw_all, target_name
-from ctrlgen.verification.build_record import Build, record, run_fault
-from ctrlgen.verification.scenario_report import worst_rows
+from ctrlgen.reporting.result_file import json_text
+from ctrlgen.verification.build_plots import draw_all
+from ctrlgen.verification.build_record import Build, record
+from ctrlgen.verification.comparison_entry import ComparisonKind
 
 CAPTIONS = {
     "error_length": "Distance of the model, driven by the generated C on this computer, from the command along the "
@@ -23,20 +23,18 @@ MARKS = {"passed": "ok", "failed": "bad", "not run": "idle"}
 
 def write_build(out: Path, build: Build) -> None:
     """Writes build.html and build.json into the folder `out`."""
-    found = record(build)
-    write_text(out / "build.json", json.dumps(found, indent=1) + "\n")
+    written, worst = record(build), build.comparison.worst
+    write_text(out / "build.json", json_text(written))
     device = build.solution.model.device
     page = render(
         Path(__file__).with_name("build.html.j2"),
-        b=found,
+        b=written,
         figures=draw_all(build),
         captions=CAPTIONS,
         marks=MARKS,
-        rows=worst_rows(build.comparison),
-        targets=[(target_name(run), run, run.instructions, run_fault(run)) for run in build.in_loop.runs],
+        rows=worst,
         device_title=device.title,
         source=device.source,
-        budgets=found["budgets"],
-        limits=[row for row in worst_rows(build.comparison) if "excess over a limit" in row["what"]],
+        limits=[row for row in worst if row.what is ComparisonKind.EXCESS],
     )
     write_text(out / "build.html", page)

@@ -7,15 +7,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ctrlgen.core.units import same_dimension
+from ctrlgen.firmware.c.real import Real
 from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
 from ctrlgen.trajectory import playback
-from ctrlgen.verification import comparison
+from ctrlgen.trajectory.inverse.clock import Settled
 from ctrlgen.verification.build_record import BUDGET_CORE, BUDGETS, Build
-from ctrlgen.verification.in_loop import TargetRun
+from ctrlgen.verification.tolerances import ANGLE_LIMIT, LENGTH_LIMIT
+from ctrlgen.verification.tracking import Piece
 
 SHOWN = {
-    "um": ("nm", comparison.LENGTH_LIMIT, playback.LENGTH_TOLERANCE),
-    "rad": ("nrad", comparison.ANGLE_LIMIT, playback.ANGLE_TOLERANCE),
+    "um": ("nm", LENGTH_LIMIT, playback.LENGTH_TOLERANCE),
+    "rad": ("nrad", ANGLE_LIMIT, playback.ANGLE_TOLERANCE),
 }
 SCALES = {"nm": 1e9, "nrad": 1e9}
 DECADES = 18  # that the logarithmic axis shows at most: down to the roundings of a double
@@ -36,22 +38,22 @@ def draw_errors(build: Build, unit: str) -> Figure:
     shown, online, player = SHOWN[unit]
     channels, signal = _channels(build, unit), build.solution.model.signals[build.solution.scenario.file.follow]
     panels = [(what, real) for what, by_real in build.errors.items() for real in by_real]
-    static = build.solution.scenario.sample_time is None
+    clock = build.solution.scenario.clock
+    static = isinstance(clock, Settled)
     figure, axes = plt.subplots(
         1, len(panels), figsize=(2.3 * len(panels) + 0.6, 3.4), sharey=True, squeeze=False, sharex=True
     )
     for panel, (what, real) in zip(axes[0], panels, strict=True):
-        limit = (online[real] if what == "online C" else player) * SCALES[shown]
+        limit = (online[real] if what is Piece.ONLINE else player) * SCALES[shown]
         error = np.abs(build.errors[what][real]) * SCALES[shown]
-        time = np.arange(len(error)) * (1.0 if static else build.solution.scenario.sample_time or 1.0)
+        time = np.arange(len(error)) if isinstance(clock, Settled) else clock.times(len(error))
         for k, i in enumerate(channels):
-            values = np.where(error[:, i] > 0, error[:, i], np.nan)  # exactly zero has no place on this axis
-            panel.plot(
-                time, values, "o" if static else "-", ms=3, lw=0.9, color=COLOURS[2 * k % 6], label=signal.channels[i]
-            )
+            # exactly zero has no place on this axis
+            values, style = np.where(error[:, i] > 0, error[:, i], np.nan), "o" if static else "-"
+            panel.plot(time, values, style, ms=3, lw=0.9, color=COLOURS[2 * k % 6], label=signal.channels[i])
         panel.axhline(limit, color="#222222", lw=1, ls="--")
-        panel.text(0.98, limit, f"tolerance {limit:.3g} {shown}", ha="right", va="bottom", fontsize=7,
-                   transform=panel.get_yaxis_transform())  # fmt: skip
+        told, across = f"tolerance {limit:.3g} {shown}", panel.get_yaxis_transform()
+        panel.text(0.98, limit, told, ha="right", va="bottom", fontsize=7, transform=across)
         panel.set_title(f"{what}, {real.value}", fontsize=9)
         panel.set_xlabel("sample" if static else "time [s]")
         panel.set_yscale("log")
@@ -71,44 +73,29 @@ def _share_decades(axes: Axes, errors: list[np.ndarray]) -> None:
 
 def draw_instructions(build: Build) -> Figure:
     """Bars of the instructions per sample on each target, beside the budgets where these are stated for such a device."""
-    rows = [
-        (run, kind, count)
-        for run in build.in_loop.runs
-        for kind, count in run.instructions.items()
-        if kind in KINDS and count
-    ]
-    names = list(dict.fromkeys(target_name(run) for run, _, _ in rows))
-    kinds = [kind for kind in KINDS if any(k == kind for _, k, _ in rows)]
-    figure, axes = plt.subplots(1, len(kinds), figsize=(8.6, 1.1 + 0.34 * len(names)), sharey=True, squeeze=False)
+    runs = [run for run in build.in_loop.runs if any(run.instructions[kind] for kind in KINDS)]
+    kinds = [kind for kind in KINDS if any(run.instructions[kind] for run in runs)]
+    figure, axes = plt.subplots(1, len(kinds), figsize=(8.6, 1.1 + 0.34 * len(runs)), sharey=True, squeeze=False)
     for panel, kind in zip(axes[0], kinds, strict=True):
         budget = BUDGETS[kind] if build.budgeted else None
-        values = {target_name(run): count for run, k, count in rows if k == kind}
-        widest = max(*values.values(), budget or 0)
-        for k, name in enumerate(names):
-            if name not in values:
-                continue
-            over = budget is not None and name.startswith(BUDGET_CORE) and values[name] > budget
-            panel.barh(k, values[name], color=COLOURS[2] if over else COLOURS[0], height=0.62)
-            panel.text(
-                values[name] - 0.02 * widest, k, str(values[name]), va="center", ha="right", fontsize=8, color="white"
-            )
+        counts = {k: count for k, run in enumerate(runs) if (count := run.instructions[kind])}
+        widest = max(*counts.values(), budget or 0)
+        for k, count in counts.items():
+            over = budget is not None and runs[k].core == BUDGET_CORE and count > budget
+            panel.barh(k, count, color=COLOURS[2] if over else COLOURS[0], height=0.62)
+            panel.text(count - 0.02 * widest, k, str(count), va="center", ha="right", fontsize=8, color="white")
         if budget is not None:
-            meant = [k for k, name in enumerate(names) if name.startswith(f"{BUDGET_CORE} float")]
-            for k in meant:
-                panel.plot([budget, budget], [k - 0.5, k + 0.5], color="#222222", lw=1.2, ls="--")
+            for k, run in enumerate(runs):
+                if run.core == BUDGET_CORE and run.real is Real.FLOAT:
+                    panel.plot([budget, budget], [k - 0.5, k + 0.5], color="#222222", lw=1.2, ls="--")
         panel.set_xlim(0, 1.12 * widest)
         goal = f"\ndashed: goal, {budget}" if budget is not None else ""
         panel.set_title(f"{KINDS[kind]}{goal}", fontsize=9)
         panel.set_xlabel("instructions a sample")
         panel.grid(axis="y", visible=False)
-    axes[0][0].set_yticks(range(len(names)), names, fontsize=8)
+    axes[0][0].set_yticks(range(len(runs)), [run.short_name for run in runs], fontsize=8)
     axes[0][0].invert_yaxis()
     return figure
-
-
-def target_name(run: TargetRun) -> str:
-    """'Cortex-M4F float, zig'."""
-    return f"{run.core} {run.real.value}, {run.compiler.split()[0]}"
 
 
 def _channels(build: Build, unit: str) -> list[int]:

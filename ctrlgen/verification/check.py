@@ -6,30 +6,43 @@ import shutil
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from enum import StrEnum
+from typing import Any
+
+from pydantic import Field
 
 from ctrlgen.firmware.c.real import Real
+from ctrlgen.reporting.result_file import Keys
 
 PATIENCE = 900.0  # s; a tool that takes longer is stopped
-
 LEFT_OUT = "not run because of --quick; run without it"
 
-State = Literal["passed", "failed", "not run"]
+
+class CheckState(StrEnum):
+    """The outcome of a check."""
+
+    PASSED = "passed"
+    FAILED = "failed"
+    NOT_RUN = "not run"
 
 
-@dataclass(frozen=True)
-class CheckFinding:
-    """One remark of a tool: `rule` in the tool's own naming; `permitted` where DEVIATIONS.md lists it, or it only informs."""
+class ToolFinding(Keys):
+    """One finding of an analyser."""
 
-    file: str
-    line: int
-    rule: str
-    severity: str
-    text: str
-    permitted: bool = False
+    file: str = Field(description="The generated file.")
+    line: int = Field(description="Its line.")
+    rule: str = Field(description="The analyser's name of the rule.")
+    severity: str = Field(description="The analyser's word for how grave it is.")
+    text: str = Field(description="The analyser's message.")
+    permitted: bool = Field(description="Whether DEVIATIONS.md permits it.")
 
     def __str__(self) -> str:
         return f"{self.file}:{self.line}: {self.severity}: {self.text} [{self.rule}]"
+
+
+def error_in(file: str, line: int, rule: str, text: str) -> ToolFinding:
+    """A finding that fails its check."""
+    return ToolFinding(file=file, line=line, rule=rule, severity="error", text=text, permitted=False)
 
 
 @dataclass(frozen=True)
@@ -39,40 +52,42 @@ class Check:
     tool: str
     version: str
     subjects: tuple[tuple[str, Real], ...]
-    state: State
-    findings: tuple[CheckFinding, ...] = ()
+    state: CheckState
+    findings: tuple[ToolFinding, ...] = ()
     note: str = ""
 
     @property
     def passed(self) -> bool:
         """Whether the tool ran and every finding is permitted."""
-        return self.state == "passed"
+        return self.state is CheckState.PASSED
+
+    @property
+    def refused(self) -> tuple[ToolFinding, ...]:
+        """The findings that fail it."""
+        return tuple(f for f in self.findings if not f.permitted)
 
 
 def finished(
-    tool: str, version: str, subjects: Sequence[tuple[str, Real]], findings: Sequence[CheckFinding], note: str = ""
+    tool: str, version: str, subjects: Sequence[tuple[str, Real]], findings: Sequence[ToolFinding], note: str = ""
 ) -> Check:
     """The check of a tool that ran; it failed where a finding is not permitted."""
     ordered = tuple(sorted(set(findings), key=lambda f: (f.file, f.line, f.rule, f.text)))
-    state: State = "passed" if all(f.permitted for f in ordered) else "failed"
+    state = CheckState.PASSED if all(f.permitted for f in ordered) else CheckState.FAILED
     return Check(tool, version, tuple(subjects), state, ordered, note)
 
 
 def not_run(tool: str, subjects: Sequence[tuple[str, Real]], reason: str, version: str = "") -> Check:
     """A check that did not run; `reason` also says what to do about it."""
-    return Check(tool, version, tuple(subjects), "not run", (), reason)
+    return Check(tool, version, tuple(subjects), CheckState.NOT_RUN, (), reason)
 
 
-def run_tool(words: Sequence[str], **options: object) -> subprocess.CompletedProcess[str]:
+def run_tool(words: Sequence[str], **options: Any) -> subprocess.CompletedProcess[str]:
     """Runs a program and captures its output. Raises KeyboardInterrupt when interrupted, OSError when the program is missing."""
+    told: dict[str, Any] = {"capture_output": True, "text": True, "errors": "replace", "timeout": PATIENCE}
     try:
-        done = subprocess.run(
-            list(words), capture_output=True, text=True, errors="replace", check=False, start_new_session=True,
-            timeout=PATIENCE, **options,
-        )  # type: ignore[call-overload]  # fmt: skip
+        return subprocess.run(list(words), check=False, start_new_session=True, **told, **options)
     except subprocess.TimeoutExpired:
         return subprocess.CompletedProcess(list(words), 124, "", f"{words[0]} did not end within {PATIENCE:g} s")
-    return done
 
 
 def version_of(program: str) -> str | None:

@@ -15,9 +15,9 @@ from ctrlgen.verification.check import run_tool, version_of
 
 # No fused multiply-add: the same bits as on the computer. No unwinding: C needs none.
 FLAGS = (
-    "-std=c99", "-O2", "-ffreestanding", "-ffp-contract=off", "-fno-math-errno", "-fno-unwind-tables",
-    "-fno-asynchronous-unwind-tables",
-)  # fmt: skip
+    *("-std=c99", "-O2", "-ffreestanding", "-ffp-contract=off", "-fno-math-errno"),
+    *("-fno-unwind-tables", "-fno-asynchronous-unwind-tables"),
+)
 INSTALL = {
     "zig": "pip install ziglang",
     "arm-none-eabi-gcc": "apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi",
@@ -38,16 +38,13 @@ class Core:
     board: str
 
 
+M4 = ("-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16")
+M7 = ("-mcpu=cortex-m7", "-mfpu=fpv5-d16")
 CORES = (
-    Core(
-        "Cortex-M4F", "cortex_m4+vfp4d16sp", ("-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16"), "UC_CPU_ARM_CORTEX_M4",
-        (Real.FLOAT,), "mps2-an386",
-    ),
-    Core(  # Unicorn's M-class models refuse double precision
-        "Cortex-M7", "cortex_m7+fp_armv8d16", ("-mcpu=cortex-m7", "-mfpu=fpv5-d16"), None,
-        (Real.FLOAT, Real.DOUBLE), "mps2-an500",
-    ),
-)  # fmt: skip
+    Core("Cortex-M4F", "cortex_m4+vfp4d16sp", M4, "UC_CPU_ARM_CORTEX_M4", (Real.FLOAT,), "mps2-an386"),
+    # Unicorn's M-class models refuse double precision
+    Core("Cortex-M7", "cortex_m7+fp_armv8d16", M7, None, (Real.FLOAT, Real.DOUBLE), "mps2-an500"),
+)
 
 
 def zig() -> list[str] | None:
@@ -57,14 +54,14 @@ def zig() -> list[str] | None:
 
 def cross_compilers() -> dict[str, str]:
     """Those that are there, with their version."""
-    found = {}
+    present = {}
     if words := zig():
         done = run_tool([*words[:-1], "version"])
         if done.returncode == 0:
-            found["zig"] = f"zig {done.stdout.strip()}"
+            present["zig"] = f"zig {done.stdout.strip()}"
     if shutil.which("arm-none-eabi-gcc"):
-        found["arm-none-eabi-gcc"] = version_of("arm-none-eabi-gcc") or "arm-none-eabi-gcc"
-    return found
+        present["arm-none-eabi-gcc"] = version_of("arm-none-eabi-gcc") or "arm-none-eabi-gcc"
+    return present
 
 
 def cross_compile(

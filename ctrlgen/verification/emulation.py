@@ -45,9 +45,8 @@ class Machine:
         self.emulator.ctl_set_cpu_model(model)
         with program.open("rb") as stream:
             elf = ELFFile(stream)
-            table: Any = elf.get_section_by_name(
-                ".symtab"
-            )  # typed as any section; that of symbols is there, nothing is stripped
+            # typed as any section; that of symbols is there, nothing is stripped
+            table: Any = elf.get_section_by_name(".symtab")
             self.symbols = {s.name: s["st_value"] for s in table.iter_symbols()}
             sections = [(s.name, s["sh_size"], s["sh_flags"], s["sh_type"]) for s in elf.iter_sections()]
             for segment in elf.iter_segments():

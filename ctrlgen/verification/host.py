@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +15,21 @@ from ctrlgen.firmware.folder import CFolder, write_harness
 from ctrlgen.verification.reference import ReferenceAnswers
 
 
-def build_host(compiler: str, real: Real, folder: CFolder, scratch: Path) -> Path:
+@dataclass(frozen=True)
+class HostBuild:
+    """With what the C is built: a compiler of this computer, in one arithmetic."""
+
+    compiler: str
+    real: Real
+
+    def __str__(self) -> str:
+        return f"{self.compiler} {self.real.value}"
+
+
+def build_host(build: HostBuild, folder: CFolder, scratch: Path) -> Path:
     """The harness (`harness_{real}.c` in `scratch`) and the shipped test, linked with the same objects; returns the harness,
     the test beside it. Raises ToolError with the compiler's words."""
+    compiler, real = build.compiler, build.real
     program = scratch / f"{compiler}_{real.suffix}"
     sources = folder.sources(real)
     objects = [scratch / f"{compiler}_{source.stem}.o" for source in sources]
@@ -50,9 +63,8 @@ class Host:
     def __init__(self, folder: CFolder, reference: ReferenceAnswers, real: Real, scratch: Path) -> None:
         self.real, model = real, reference.model
         write_harness(folder, reference.scenario, model, real, scratch / f"harness_{real.suffix}.c")
-        self._program = build_host(next(iter(find_compilers())), real, folder, scratch)
-        self._drives = model.u.numel()
-        self._width = self._drives + len(model.axes) + model.n_states
+        self._program = build_host(HostBuild(next(iter(find_compilers())), real), folder, scratch)
+        self._drives, self._width = model.u.numel(), reference.width
 
     def followed(self, targets: np.ndarray, start: tuple[np.ndarray, ...]) -> np.ndarray:
         """Steps from the state `start` (x, z)."""

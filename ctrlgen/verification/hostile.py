@@ -23,8 +23,9 @@ from ctrlgen.firmware.c.templates import write
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.online.online import rates_in_c
 from ctrlgen.model.model import Model
+from ctrlgen.trajectory.inverse.clock import Sampled
 from ctrlgen.trajectory.scenario import Scenario
-from ctrlgen.verification.check import LEFT_OUT, Check, CheckFinding, finished, not_run, run_tool, version_of
+from ctrlgen.verification.check import LEFT_OUT, Check, ToolFinding, error_in, finished, not_run, run_tool, version_of
 
 RANDOM, FUZZER = "sanitizers, random calls", "libFuzzer"
 RUNS = 200_000
@@ -82,18 +83,30 @@ def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> d
         ControllerStatus.COMPOSITE if kernels.guarded_limits else bits
     )
     bits |= ControllerStatus.RATE if controller.rate else bits
-    samples = len(scenario.command(model))
+    samples, clock = len(scenario.bind(model).samples), scenario.clock
     return {
-        "real": real, "online": folder.online[real], "player": folder.player.get(real) if folder.player else None,
-        "n": len(nominal.axes), "nu": nominal.u.numel(), "nx": nominal.x.numel(), "n_s": nominal.n_states,
+        "real": real,
+        "online": folder.online[real],
+        "player": folder.player.get(real) if folder.player else None,
+        "n": len(nominal.axes),
+        "nu": nominal.u.numel(),
+        "nx": nominal.x.numel(),
+        "n_s": nominal.n_states,
         "m": len(kernels.input_limits),
-        "rate": scenario.sample_time is not None, "bits": int(bits),
-        "input_limits": kernels.input_limits, "u_low": nominal.u_bounds[0], "u_high": nominal.u_bounds[1],
+        "rate": isinstance(clock, Sampled),
+        "bits": int(bits),
+        "input_limits": kernels.input_limits,
+        "u_low": nominal.u_bounds[0],
+        "u_high": nominal.u_bounds[1],
         # limits that follow from constants of the start are computed by the C, to a few of its roundings
         "drive_room": 4 * real.epsilon if kernels.given else 0.0,
-        "u_safe": kernels.safe_drive, "z_typical": nominal.z_scale, "x_typical": np.maximum(np.abs(nominal.rest), nominal.x_scale),
-        "samples": samples, "duration": samples * (scenario.sample_time or 0.0), **rates_in_c(controller),
-    }  # fmt: skip
+        "u_safe": kernels.safe_drive,
+        "z_typical": nominal.z_scale,
+        "x_typical": np.maximum(np.abs(nominal.rest), nominal.x_scale),
+        "samples": samples,
+        "duration": samples * clock.sample_time if isinstance(clock, Sampled) else None,
+        **rates_in_c(controller),
+    }
 
 
 def _subjects(folder: CFolder) -> list[tuple[str, Real]]:
@@ -115,11 +128,9 @@ def _works(compiler: str, flags: Sequence[str], text: str, scratch: Path, *words
     if problem:
         return f"{compiler} cannot build with {flags[0]}: {problem.splitlines()[0]}"
     done = run_tool([str(scratch / "empty"), *words], cwd=scratch)
-    return (
-        ""
-        if done.returncode == 0
-        else f"a program built with {flags[0]} does not run here: {done.stderr.strip()[:200]}"
-    )
+    if done.returncode != 0:
+        return f"a program built with {flags[0]} does not run here: {done.stderr.strip()[:200]}"
+    return ""
 
 
 def _random(folder: CFolder, scratch: Path, runs: int) -> Check:
@@ -128,12 +139,8 @@ def _random(folder: CFolder, scratch: Path, runs: int) -> Check:
     against = {compiler: _works(compiler, STOPPING, EMPTY, scratch) for compiler in ("clang", "gcc")}
     compiler = next((name for name, problem in against.items() if not problem), None)
     if compiler is None:
-        return not_run(
-            tool,
-            subjects,
-            "; ".join([*against.values(), INSTALL]),
-        )
-    findings: list[CheckFinding] = []
+        return not_run(tool, subjects, "; ".join([*against.values(), INSTALL]))
+    findings: list[ToolFinding] = []
     notes = []
     for real in Real:
         sources = [scratch / f"hostile_{real.suffix}.c", *folder.sources(real)]
@@ -141,12 +148,8 @@ def _random(folder: CFolder, scratch: Path, runs: int) -> Check:
             program = scratch / f"hostile_{real.suffix}"
             problem = _build(compiler, flags, sources, folder.path, program)
             if problem and flags is STOPPING:
-                return finished(
-                    tool,
-                    version_of(compiler) or "",
-                    subjects,
-                    [CheckFinding(sources[0].name, 0, "build", "error", problem)],
-                )
+                failed = [error_in(sources[0].name, 0, "build", problem)]
+                return finished(tool, version_of(compiler) or "", subjects, failed)
             if problem:
                 notes.append(f"{real.value}: divisions by zero not looked for ({compiler} has no {flags[0]})")
                 continue
@@ -165,7 +168,7 @@ def _fuzzed(folder: CFolder, scratch: Path, runs: int) -> Check:
         major = re.search(r"version (\d+)", version or "")
         install = "apt-get install clang" + (f" libclang-rt-{major[1]}-dev" if major else " libclang-rt-14-dev")
         return not_run(tool, subjects, f"{problem}; {install}", version or "")
-    findings: list[CheckFinding] = []
+    findings: list[ToolFinding] = []
     notes = []
     for real in Real:
         program, corpus = scratch / f"fuzz_{real.suffix}", scratch / f"corpus_{real.suffix}"
@@ -176,9 +179,7 @@ def _fuzzed(folder: CFolder, scratch: Path, runs: int) -> Check:
         sources = [scratch / f"hostile_{real.suffix}.c", *folder.sources(real)]
         problem = _build("clang", FUZZING, sources, folder.path, program)
         if problem:
-            return finished(
-                tool, version or "", subjects, [CheckFinding(sources[0].name, 0, "build", "error", problem)]
-            )
+            return finished(tool, version or "", subjects, [error_in(sources[0].name, 0, "build", problem)])
         words = [
             f"-runs={runs}",
             f"-max_total_time={FUZZ_SECONDS}",
@@ -189,11 +190,11 @@ def _fuzzed(folder: CFolder, scratch: Path, runs: int) -> Check:
             "-rss_limit_mb=0",
         ]
         done = run_tool([str(program), *words, f"-artifact_prefix={scratch}/", str(corpus)], cwd=scratch)
-        found = _findings_in(done.stderr, sources[0].name, done.returncode, judge=True)
-        findings += found
+        remarks = _findings_in(done.stderr, sources[0].name, done.returncode, judge=True)
+        findings += remarks
         ran = re.findall(r"stat::number_of_executed_units:\s*(\d+)", done.stderr)
         # what writes beyond its arrays may hang where no sanitizer stops it
-        reached = "coverage not counted" if found else _coverage(sources, folder.path, corpus)
+        reached = "coverage not counted" if remarks else _coverage(sources, folder.path, corpus)
         notes.append(f"{real.value}: {ran[-1] if ran else 'unknown'} runs, {reached}")
     return finished(tool, version or "", subjects, findings, "; ".join(notes))
 
@@ -212,19 +213,24 @@ def _coverage(sources: Sequence[Path], include: Path, corpus: Path) -> str:
     )
 
 
-def _findings_in(words: str, harness: str, status: int, *, judge: bool) -> list[CheckFinding]:
+def _findings_in(words: str, harness: str, status: int, *, judge: bool) -> list[ToolFinding]:
     """The findings in the output of a sanitized program; one that fails without a message is a finding too."""
-    found = [
-        CheckFinding(
-            Path(m["file"]).name, int(m["line"]), "undefined", "error" if judge else "information", m["text"], not judge
+    remarks = [
+        ToolFinding(
+            file=Path(m["file"]).name,
+            line=int(m["line"]),
+            rule="undefined",
+            severity="error" if judge else "information",
+            text=m["text"],
+            permitted=not judge,
         )
         for m in RUNTIME_ERROR.finditer(words)
     ]
-    found += [CheckFinding(harness, 0, "promise", "error", m["text"]) for m in PROMISE.finditer(words)]
-    if not found and (error := ADDRESS.search(words)):
+    remarks += [error_in(harness, 0, "promise", m["text"]) for m in PROMISE.finditer(words)]
+    if not remarks and (error := ADDRESS.search(words)):
         place = PLACE.search(words, error.end())
         file, line = (Path(place["file"]).name, int(place["line"])) if place else (harness, 0)
-        found.append(CheckFinding(file, line, error["rule"], "error", error["text"][:200]))
-    if not found and status != 0:
-        found.append(CheckFinding(harness, 0, "stopped", "error", f"status {status}: {words.strip()[-200:]}"))
-    return found
+        remarks.append(error_in(file, line, error["rule"], error["text"][:200]))
+    if not remarks and status != 0:
+        remarks.append(error_in(harness, 0, "stopped", f"status {status}: {words.strip()[-200:]}"))
+    return remarks

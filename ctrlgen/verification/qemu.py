@@ -12,7 +12,7 @@ from ctrlgen.core.errors import ToolError
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.templates import write
 from ctrlgen.firmware.folder import CFolder
-from ctrlgen.verification.check import Check, CheckFinding, finished, not_run, run_tool, version_of
+from ctrlgen.verification.check import Check, error_in, finished, not_run, run_tool, version_of
 from ctrlgen.verification.cores import CORES, INSTALL, Core, cross_compile
 
 TOOL = "qemu-system-arm"
@@ -48,10 +48,10 @@ def _run(folder: CFolder, core: Core, real: Real, compiler: str, scratch: Path) 
     try:
         cross_compile(compiler, core, sources, folder.path, "reset", program, ("-T", str(scratch / "board.ld"), "-lc"))
     except ToolError as error:
-        return finished(tool, version, subject, [CheckFinding(sources[0].name, 1, "build", "error", str(error))])
+        return finished(tool, version, subject, [error_in(sources[0].name, 1, "build", str(error))])
     done = run_tool([TOOL, "-M", core.board, *WORDS, *SEMIHOSTING, "-kernel", str(program)])
     outcome = OUTCOME.search(done.stdout)
     if outcome and outcome[1] == "0" and done.returncode == 0:
         return finished(tool, version, subject, (), f"{outcome[2]} of {outcome[2]} reference vectors agree")
     text = done.stdout.strip() or done.stderr.strip()[:500] or f"ended with status {done.returncode} without output"
-    return finished(tool, version, subject, [CheckFinding(f"{subject[0][0]}.c", 1, "vectors", "error", text)])
+    return finished(tool, version, subject, [error_in(f"{subject[0][0]}.c", 1, "vectors", text)])

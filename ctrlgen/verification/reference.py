@@ -8,9 +8,8 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.controller.controller_step import State
-from ctrlgen.controller.motion_feedforward import controller_of
+from ctrlgen.controller.motion_feedforward import MotionKernels, controller_of
 from ctrlgen.model.simulation import simulate, trace
-from ctrlgen.trajectory.scenario import motion_targets
 from ctrlgen.trajectory.solution import Solution
 
 RANDOM_TARGETS = 1000
@@ -36,10 +35,22 @@ class ReferenceAnswers:
         self.start = (solution.trace.x[0], solution.trace.z[0], *self._last_drive(solution))
         last = solution.command[:1] if self.scenario.closed else solution.command[-1:]
         self.path = np.vstack([solution.command, last])
-        self.command = motion_targets(self.scenario, self.model) if self.model.inertial else self.path[1:]
+        self.command = self.scenario.bind(self.model).targets if self.model.inertial else self.path[1:]
         self.followed = self._answers(self.command, self.start)
         self.hostile = self._hostile_targets()
         self.chased = self._answers(self.hostile, self.controller.rest())
+
+    @property
+    def columns(self) -> dict[str, slice]:
+        """Of an answer (status, drive, displacement, actuator state): the columns of each signal; no state where there is none."""
+        m, drives = self.model, self.model.u.numel()
+        at = {"drive": slice(1, 1 + drives), "displacement": slice(1 + drives, 1 + drives + len(m.axes))}
+        return at | ({"state": slice(at["displacement"].stop, 1 + self.width)} if m.n_states else {})
+
+    @property
+    def width(self) -> int:
+        """Numbers of an answer behind its status."""
+        return self.model.u.numel() + len(self.model.axes) + self.model.n_states
 
     @property
     def sample_time(self) -> float:
@@ -54,7 +65,7 @@ class ReferenceAnswers:
         with inertia; 0 without."""
         if not self.model.inertial:
             return 0.0
-        drives = self.followed[:, 1 : 1 + self.solution.drive.shape[1]]
+        drives = self.followed[:, self.columns["drive"]]
         moved = simulate(self.model, drives, self.sample_time, *self.start[:2]).signals[self.scenario.file.follow]
         return 2 * float(np.abs(moved - self.path).max())
 
@@ -66,6 +77,22 @@ class ReferenceAnswers:
         slope = ca.jacobian(kernel(rest, 0 * self.model.z_scale, target), target)
         size = np.abs(ca.Function("slope", [target], [slope])(0).full())
         return float(np.max(np.abs(self.positions) @ size.T))
+
+    def moved_drive(self, share: float) -> float:
+        """[SI] by how much a drive changes where all that it follows from is off by this share."""
+        kernels = self.controller.kernels
+        if isinstance(kernels, MotionKernels):
+            return max(kernels.drive_sensitivity(target) for target in self.command[::37]) * share
+        controller, rest = self.controller, self.model.rest[self.model.n_states :]
+        inverse, worst, factor = kernels.moving or kernels.static, 0.0, 1 + share
+        drive, displacement = self.columns["drive"], self.columns["displacement"]
+        state = slice(displacement.stop, None)
+        for before, row in zip(self.followed[:-1:37], self.followed[1::37], strict=False):
+            now = (np.concatenate([before[state], rest]), before[displacement], before[drive])
+            moved = controller.drive(inverse, now, row[displacement] * factor, row[state] * factor)
+            moved = moved - controller.drive(inverse, now, row[displacement], row[state])
+            worst = max(worst, float(np.max(np.abs(moved))))
+        return worst
 
     def _random_targets(self) -> np.ndarray:
         """Half reachable (random displacements through the model), half anywhere around, beyond every limit."""

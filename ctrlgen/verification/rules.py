@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,24 +16,28 @@ from ctrlgen.firmware.c.deviations import permits
 from ctrlgen.firmware.c.misra import CPPCHECK, rule_class
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import CFolder
-from ctrlgen.verification.check import LEFT_OUT, Check, CheckFinding, finished, not_run, run_tool, version_of
+from ctrlgen.verification.check import LEFT_OUT, Check, ToolFinding, finished, not_run, run_tool, version_of
 
 MISRA = "cppcheck --addon=misra"
 AT_ONCE = 2  # tools running side by side
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion")
-# What clang-tidy is not asked, and why.
-TIDY = {
-    "Checks": ",".join([
-        "-*", "bugprone-*", "cert-*", "clang-analyzer-*", "misc-*", "performance-*", "portability-*", "readability-*",
-        "-readability-identifier-length",  # x, z, u, i are what the equations call them
-        "-readability-magic-numbers",  # the numbers are the device's, printed from its description
-        "-readability-uppercase-literal-suffix",  # 1.0f, as CMSIS and most C writes it; it hides no digit
-        "-bugprone-easily-swappable-parameters",  # low and high, x and z: both are vectors of one type, called in one place
-        "-bugprone-implicit-widening-of-multiplication-result",  # 2 * i of a loop over a table's rows is below a table's size
-        "-readability-function-size",  # a printed kernel is a straight list of assignments, as long as the physics
-        "-readability-function-cognitive-complexity",  # it counts each maximum in such a list as a branch
-    ]),
-}  # fmt: skip
+TIDY = (
+    *("-*", "bugprone-*", "cert-*", "clang-analyzer-*", "misc-*", "performance-*", "portability-*", "readability-*"),
+    # what clang-tidy is not asked, and why: x, z, u, i are what the equations call them
+    "-readability-identifier-length",
+    # the numbers are the device's, printed from its description
+    "-readability-magic-numbers",
+    # 1.0f, as CMSIS and most C writes it; it hides no digit
+    "-readability-uppercase-literal-suffix",
+    # low and high, x and z: both are vectors of one type, called in one place
+    "-bugprone-easily-swappable-parameters",
+    # 2 * i of a loop over a table's rows is below a table's size
+    "-bugprone-implicit-widening-of-multiplication-result",
+    # a printed kernel is a straight list of assignments, as long as the physics
+    "-readability-function-size",
+    # it counts each maximum in such a list as a branch
+    "-readability-function-cognitive-complexity",
+)
 GAVE_UP = "analyzer-too-complex"  # gcc then says nothing of what it has not looked at
 REMARK = re.compile(
     r"^(?P<file>[^\n:]+):(?P<line>\d+):\d+: (?P<severity>warning|error): (?P<text>.*?)(?: \[(?P<rule>[^\]]+)\])?$", re.M
@@ -51,23 +55,18 @@ class Analyzer:
     install: str
 
 
+# -O0: an optimiser removes what it should find; the rest lets it come to the end of a controller
+GCC = (
+    *("-fanalyzer", "-fanalyzer-call-summaries", "--param=analyzer-bb-explosion-factor=100"),
+    *("--param=analyzer-max-enodes-per-program-point=64", f"-W{GAVE_UP}", *STRICT, "-O0", "-c", "-o", "/dev/null"),
+)
+CLANG = ("--analyze", "--analyzer-output", "text", "-Xclang", "-analyzer-werror", *STRICT)
+TIDILY = ("--quiet", f"--config={{Checks: '{','.join(TIDY)}'}}")
 ANALYZERS = (
-    Analyzer(
-        "clang-tidy", "clang-tidy",
-        ("--quiet", "--config={" + ", ".join(f"{k}: '{v}'" for k, v in TIDY.items()) + "}"), ("--", *STRICT),
-        "apt-get install clang-tidy",
-    ),
-    Analyzer(
-        "gcc -fanalyzer", "gcc",  # -O0: an optimiser removes what it should find; the rest lets it come to the end of a controller
-        ("-fanalyzer", "-fanalyzer-call-summaries", "--param=analyzer-bb-explosion-factor=100",
-         "--param=analyzer-max-enodes-per-program-point=64", f"-W{GAVE_UP}", *STRICT, "-O0", "-c", "-o", "/dev/null"), (),
-        "apt-get install gcc",
-    ),
-    Analyzer(
-        "clang --analyze", "clang", ("--analyze", "--analyzer-output", "text", "-Xclang", "-analyzer-werror", *STRICT), (),
-        "apt-get install clang",
-    ),
-)  # fmt: skip
+    Analyzer("clang-tidy", "clang-tidy", TIDILY, ("--", *STRICT), "apt-get install clang-tidy"),
+    Analyzer("gcc -fanalyzer", "gcc", GCC, (), "apt-get install gcc"),
+    Analyzer("clang --analyze", "clang", CLANG, (), "apt-get install clang"),
+)
 
 
 def check_rules(
@@ -97,13 +96,20 @@ def _misra(folder: CFolder) -> Check:
     version = version_of("cppcheck")
     if version is None:
         return not_run(tool, subjects, "cppcheck is missing; apt-get install cppcheck")
-    findings: list[CheckFinding] = []
+    findings: list[ToolFinding] = []
     with tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch:  # what one run has analysed the next takes over
         words = [
-            "cppcheck", f"-j{AT_ONCE}", f"--cppcheck-build-dir={scratch}", "--addon=misra", "--std=c99", "-U__cplusplus", "--quiet",
-            "--enable=warning,style,performance,portability", "--error-exitcode=0",
-            "--template={file}\t{line}\t{severity}\t{id}\t{message}", "-I", str(folder.path),
-        ]  # fmt: skip
+            *(
+                "cppcheck",
+                f"-j{AT_ONCE}",
+                f"--cppcheck-build-dir={scratch}",
+                "--addon=misra",
+                "--std=c99",
+                "-U__cplusplus",
+            ),
+            *("--quiet", "--enable=warning,style,performance,portability", "--error-exitcode=0"),
+            *("--template={file}\t{line}\t{severity}\t{id}\t{message}", "-I", str(folder.path)),
+        ]
         programs = [[path for real in Real for path in folder.sources(real)]]
         programs += [[folder.runner(real), *folder.sources(real)] for real in Real]
         for files in programs:
@@ -124,12 +130,12 @@ def _misra(folder: CFolder) -> Check:
     return finished(tool, version, subjects, findings, note)
 
 
-def _of_cppcheck(file: str, line: str, severity: str, rule: str, text: str) -> CheckFinding:
-    name = Path(file).name
-    if not rule.startswith("misra-c2012-"):
-        return CheckFinding(name, int(line), rule, severity, text)
-    number = rule.removeprefix("misra-c2012-")
-    return CheckFinding(name, int(line), rule, rule_class(number), f"MISRA C:2012 rule {number}", permits(number, name))
+def _of_cppcheck(file: str, line: str, severity: str, rule: str, text: str) -> ToolFinding:
+    name, permitted = Path(file).name, False
+    if rule.startswith("misra-c2012-"):
+        number = rule.removeprefix("misra-c2012-")
+        severity, text, permitted = rule_class(number), f"MISRA C:2012 rule {number}", permits(number, name)
+    return ToolFinding(file=name, line=int(line), rule=rule, severity=severity, text=text, permitted=permitted)
 
 
 def run_analyzer(analyzer: Analyzer, folder: CFolder) -> Check:
@@ -139,19 +145,26 @@ def run_analyzer(analyzer: Analyzer, folder: CFolder) -> Check:
         return not_run(analyzer.tool, subjects, f"{analyzer.program} is missing; {analyzer.install}")
     files = [path for path, _ in _files(folder)]
 
-    def run(path: Path) -> tuple[list[CheckFinding], str]:
+    def run(path: Path) -> tuple[list[ToolFinding], str]:
         include = ("-I", str(folder.path))
         words = [analyzer.program, *analyzer.words, *(() if analyzer.after else include), str(path)]
         done = run_tool([*words, *((*analyzer.after, *include) if analyzer.after else ())], cwd=folder.path)
-        found = [
-            CheckFinding(Path(m["file"]).name, int(m["line"]), m["rule"] or m["severity"], m["severity"], m["text"])
+        remarks = [
+            ToolFinding(
+                file=Path(m["file"]).name,
+                line=int(m["line"]),
+                rule=m["rule"] or m["severity"],
+                severity=m["severity"],
+                text=m["text"],
+                permitted=False,
+            )
             for m in REMARK.finditer(done.stdout + "\n" + done.stderr)
         ]
-        return found, "" if done.returncode == 0 or found else (done.stderr or done.stdout).strip()[:500]
+        return remarks, "" if done.returncode == 0 or remarks else (done.stderr or done.stdout).strip()[:500]
 
     with ThreadPoolExecutor(max_workers=AT_ONCE) as pool:
         results = list(pool.map(run, files))
-    incomplete = sorted({f.file for found, _ in results for f in found if GAVE_UP in f.rule})
+    incomplete = sorted({f.file for remarks, _ in results for f in remarks if GAVE_UP in f.rule})
     if incomplete:
         return not_run(
             analyzer.tool,
@@ -162,8 +175,4 @@ def run_analyzer(analyzer: Analyzer, folder: CFolder) -> Check:
     silent = [words for _, words in results if words]
     if silent:
         return not_run(analyzer.tool, subjects, f"{analyzer.program} stopped: {silent[0]}; {analyzer.install}", version)
-    return finished(analyzer.tool, version, subjects, _flat([found for found, _ in results]))
-
-
-def _flat(rows: Sequence[list[CheckFinding]]) -> list[CheckFinding]:
-    return [finding for row in rows for finding in row]
+    return finished(analyzer.tool, version, subjects, [finding for remarks, _ in results for finding in remarks])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from enum import StrEnum
 from pathlib import Path
 
 import numpy as np
@@ -14,35 +15,46 @@ from ctrlgen.verification.host import Host
 from ctrlgen.verification.reference import ReferenceAnswers
 
 
-def reached(ref: ReferenceAnswers, drives: np.ndarray, followed: np.ndarray) -> np.ndarray:
-    """(n, channels) of the followed signal, SI: the model simulated under `drives` (samples, axes) from IPOPT's first sample.
+class Piece(StrEnum):
+    """What of the generated C computes drives."""
 
-    Where the scenario has no sample time, the model at the displacements and states of `followed`, the C's answers.
+    ONLINE = "online C"
+    PLAYER = "player C"
+
+
+def reached(ref: ReferenceAnswers, followed: np.ndarray) -> np.ndarray:
+    """(n, channels) of the followed signal [SI]: the model under the drives of the C's answers `followed`.
+
+    Where the scenario has no sample time, the model at the displacements and states of these answers.
     """
-    m, role = ref.model, ref.scenario.file.follow
-    first = ref.solution.trace
+    drives = followed[:, ref.columns["drive"]]
     if ref.scenario.sample_time is not None:
-        return simulate(m, drives, ref.scenario.sample_time, first.x[0], first.z[0]).signals[role]
-    n, n_u = len(m.axes), m.u.numel()
-    z, state = followed[:, 1 + n_u : 1 + n_u + n], followed[:, 1 + n_u + n :]
-    x = np.hstack([state, first.x[:, m.n_states :]])
-    return trace(m, np.zeros(len(z)), x, z, drives).signals[role]
+        return reached_under(ref, drives)
+    m, rest = ref.model, ref.solution.trace.x[:, ref.model.n_states :]
+    x = np.hstack([followed[:, ref.columns["displacement"].stop :], rest])
+    at = trace(m, np.zeros(len(x)), x, followed[:, ref.columns["displacement"]], drives)
+    return at.signals[ref.scenario.file.follow]
 
 
-def tracking_errors(folder: CFolder, ref: ReferenceAnswers) -> dict[str, dict[Real, np.ndarray]]:
-    """'online C' and 'player C' -> arithmetic -> (n, channels), SI: the model under their drives minus the command.
+def reached_under(ref: ReferenceAnswers, drives: np.ndarray) -> np.ndarray:
+    """(n, channels) of the followed signal [SI]: the model simulated under `drives` (samples, axes) from the first sample solved."""
+    first = ref.solution.trace
+    return simulate(ref.model, drives, ref.sample_time, first.x[0], first.z[0]).signals[ref.scenario.file.follow]
+
+
+def tracking_errors(folder: CFolder, ref: ReferenceAnswers) -> dict[Piece, dict[Real, np.ndarray]]:
+    """Online C and player C -> arithmetic -> (n, channels), SI: the model under their drives minus the command.
 
     Raises ToolError where the C is refused.
     """
-    n_u = ref.model.u.numel()
-    errors: dict[str, dict[Real, np.ndarray]] = {"online C": {}}
+    errors: dict[Piece, dict[Real, np.ndarray]] = {Piece.ONLINE: {}}
     with tempfile.TemporaryDirectory(prefix="ctrlgen-") as name:
         for real in Real:
             host = Host(folder, ref, real, Path(name))
             moving = ref.scenario.sample_time is not None
             followed = host.followed(ref.command, ref.start) if moving else host.settled(ref.command)
-            errors["online C"][real] = reached(ref, followed[:, 1 : 1 + n_u], followed) - ref.path
+            errors[Piece.ONLINE][real] = reached(ref, followed) - ref.path
             if folder.player:
                 played = host.played(np.arange(len(ref.solution.drive)))[:, 1:]
-                errors.setdefault("player C", {})[real] = reached(ref, played, followed) - ref.path
+                errors.setdefault(Piece.PLAYER, {})[real] = reached_under(ref, played) - ref.path
     return errors

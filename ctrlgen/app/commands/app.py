@@ -11,16 +11,23 @@ from ctrlgen.version import program
 
 # the parts of `ctrlgen --help`, in their order
 PANELS = SCENARIO_PANEL, ACCURACY_PANEL, DEVICE_PANEL, RECORDING_PANEL = (
-    "Drives and C of a scenario", "How well and how fast", "Devices", "Recordings of the real stage",
-)  # fmt: skip
+    "Drives and C of a scenario",
+    "How well and how fast",
+    "Devices",
+    "Recordings of the real stage",
+)
 
 app = typer.Typer(
-    name="ctrlgen", no_args_is_help=True, add_completion=False, rich_markup_mode="rich", pretty_exceptions_enable=False,
+    name="ctrlgen",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
     help="Describe a flexure nanopositioner once; solve its trajectories, generate its C and prove that the C is right, and "
     "find the physics that a recording shows and the description leaves out.\n\n"
     "Start with:  [bold]ctrlgen example circle20 --to scenarios[/bold]\n\n"
     "then:  [bold]ctrlgen run scenarios/circle20 --out out/circle20[/bold]",
-)  # fmt: skip
+)
 
 
 def _show_version(wanted: bool) -> None:

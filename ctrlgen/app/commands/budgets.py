@@ -80,16 +80,22 @@ def budget(
     if out_folder is not None:
         check_folder(out_folder)
     with progress() as advance:
-        found = error_budget(
-            load_scenario(scenario, device), uncertainty, probability=chance, draws=draws, seed=seed, finer=finer, progress=advance
-        )  # fmt: skip
+        drawn_up = error_budget(
+            load_scenario(scenario, device),
+            uncertainty,
+            probability=chance,
+            draws=draws,
+            seed=seed,
+            finer=finer,
+            progress=advance,
+        )
         if out_folder is not None:
             from ctrlgen.budget.budget_page import write_budget
 
             advance("report")
             with whole_folder(out_folder) as draft:
-                write_budget(draft, found)
-    print_budget(found)
+                write_budget(draft, drawn_up)
+    print_budget(drawn_up)
     if out_folder is not None:
         out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'budget.html'))}", soft_wrap=True)
 

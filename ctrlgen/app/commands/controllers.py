@@ -9,7 +9,8 @@ import typer
 from rich.markup import escape
 
 from ctrlgen.app.commands.app import SCENARIO_PANEL, OtherDevice, OutFolder, ScenarioPath, app
-from ctrlgen.app.console import out, print_build, print_comparison, print_solution, progress
+from ctrlgen.app.console import out, progress
+from ctrlgen.app.scenario_console import print_build, print_comparison, print_solution
 
 if TYPE_CHECKING:
     from ctrlgen.app.scenario_pipeline import Outcome

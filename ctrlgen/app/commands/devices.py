@@ -10,7 +10,8 @@ from typing import Annotated
 import typer
 
 from ctrlgen.app.commands.app import DEVICE_PANEL, DevicePath, OutFolder, app
-from ctrlgen.app.console import err, out, print_workspace, progress
+from ctrlgen.app.console import err, out, progress
+from ctrlgen.app.scenario_console import print_workspace
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.shipped_files import shipped_package
 

@@ -55,17 +55,17 @@ def fastest(
         check_folder(out_folder)
     with progress() as advance:
         loaded = load_scenario(scenario, device)
-        found = fastest_path(loaded, sample_rate=sample_rate, frequency=frequency, progress=advance)
+        motion = fastest_path(loaded, sample_rate=sample_rate, frequency=frequency, progress=advance)
         if out_folder is not None:
             from ctrlgen.firmware.player_only import generate_player
             from ctrlgen.path_timing.fastest_page import write_fastest
 
             advance("player and report")
             with whole_folder(out_folder) as draft:
-                write_fastest(draft, found)
-                generate_player(found.solution, draft / "player")
-                if found.repetition is not None and found.repetition.solution is not None:
-                    generate_player(found.repetition.solution, draft / "at_frequency" / "player")
-    print_fastest(found)
+                write_fastest(draft, motion)
+                generate_player(motion.solution, draft / "player")
+                if motion.repetition is not None and motion.repetition.solution is not None:
+                    generate_player(motion.repetition.solution, draft / "at_frequency" / "player")
+    print_fastest(motion)
     if out_folder is not None:
         out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'fastest.html'))}", soft_wrap=True)

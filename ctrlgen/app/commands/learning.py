@@ -56,16 +56,16 @@ def learn(
     if out_folder is not None:
         check_folder(out_folder)
     with progress() as advance:
-        found = learn_next(load_scenario(scenario, device), recordings, progress=advance)
+        learning = learn_next(load_scenario(scenario, device), recordings, progress=advance)
         if out_folder is not None:
             from ctrlgen.firmware.player_only import generate_player
             from ctrlgen.learning.learning_page import write_learning
 
             advance("report and player")
             with whole_folder(out_folder) as draft:
-                write_learning(draft, found)
-                if found.solution.scenario.sample_time is not None:
-                    generate_player(found.next, draft / "c")
-    print_learning(found)
+                write_learning(draft, learning)
+                if learning.solution.scenario.sample_time is not None:
+                    generate_player(learning.next, draft / "c")
+    print_learning(learning)
     if out_folder is not None:
         out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'learning.html'))}", soft_wrap=True)

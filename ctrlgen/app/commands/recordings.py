@@ -17,16 +17,8 @@ from ctrlgen.app.commands.app import (
     SchedulerAddress,
     app,
 )
-from ctrlgen.app.console import (
-    complain,
-    counted,
-    err,
-    out,
-    print_batch,
-    print_bootstrap,
-    print_diagnosis,
-    progress,
-)
+from ctrlgen.app.console import complain, counted, err, out, progress
+from ctrlgen.app.diagnosis_console import print_batch, print_bootstrap, print_diagnosis
 from ctrlgen.core.errors import InputError
 
 
@@ -81,7 +73,7 @@ def diagnose(
         replicates = Replicates(bootstrap, scheduler, jobs) if bootstrap else None
         chosen = None if laws is None else [name.strip() for name in laws.split(",") if name.strip()]
         with progress() as advance:
-            found = diagnose_into(device, recording, out_folder, seed, advance, replicates, chosen, jobs)
+            result = diagnose_into(device, recording, out_folder, seed, advance, replicates, chosen, jobs)
     except KeyboardInterrupt:
         kept = unfinished(out_folder)
         if kept.exists():
@@ -92,9 +84,9 @@ def diagnose(
     except InputError as error:
         complain(error)
         raise typer.Exit(2) from None
-    print_diagnosis(found)
-    if found.bootstrap is not None:
-        print_bootstrap(found.bootstrap)
+    print_diagnosis(result)
+    if result.bootstrap is not None:
+        print_bootstrap(result.bootstrap)
     out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'report.html'))}", soft_wrap=True)
 
 
@@ -147,16 +139,16 @@ def calibrate(
     if out_folder is not None:
         check_folder(out_folder)
     with progress() as advance:
-        found = calibrated(device, recording, advance)
-        both = None if scenario is None else budgets(found, scenario, device, advance)
+        result = calibrated(device, recording, advance)
+        both = None if scenario is None else budgets(result, scenario, device, advance)
         if out_folder is not None:
             from ctrlgen.calibration.calibration_page import write_calibration
 
             advance("report")
             with whole_folder(out_folder) as draft:
-                write_calibration(draft, found, both)
-                write_calibrated_device(found, device, draft / NAME)
-    print_calibration(found, both)
+                write_calibration(draft, result, both)
+                write_calibrated_device(result, device, draft / NAME)
+    print_calibration(result, both)
     if out_folder is not None:
         out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'calibration.html'))}", soft_wrap=True)
 

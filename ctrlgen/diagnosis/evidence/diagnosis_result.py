@@ -15,7 +15,7 @@ from ctrlgen.diagnosis.evidence.residual_location import ResidualLocations
 from ctrlgen.diagnosis.evidence.unmodelled_dynamics import UnmodelledForce
 from ctrlgen.diagnosis.selection.attribution import Attribution
 from ctrlgen.diagnosis.selection.candidate_model import SearchResult
-from ctrlgen.diagnosis.selection.findings import ChannelError, Estimate, Finding, estimated_values
+from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding, estimated_values
 from ctrlgen.diagnosis.selection.verdict import Verdict, unconfirmed
 from ctrlgen.diagnosis.shares.empirical_terms import EmpiricalTerm
 from ctrlgen.diagnosis.shares.gather import ResidualShares
@@ -43,7 +43,7 @@ class Diagnosis:
     attribution: Attribution
     shares: ResidualShares | None
     empirical_terms: tuple[EmpiricalTerm, ...]
-    held_out: dict[str, ChannelError]
+    held_out: dict[str, ChannelErrorEntry]
     residual_tests: ResidualTests
     residual_location: ResidualLocations
     unmodelled_force: UnmodelledForce | None
@@ -75,11 +75,11 @@ class Diagnosis:
     def corrected(self) -> Device:
         """The device with all findings, then what was detected directly, then empirical terms: as device.next.toml describes it."""
         fit = self.search.chosen.fit
-        own = {
+        refitted = {
             u.path: float(v) for u, v in zip(fit.structure.free_parameters, fit.theta, strict=True) if u.cause is None
         }
         starts = tuple(fit.values(k) for k in range(len(fit.structure.causes)))
-        device = changed(Structure(fit.structure.device, fit.structure.causes, starts).device_with_causes, own)
+        device = changed(Structure(fit.structure.device, fit.structure.causes, starts).device_with_causes, refitted)
         beside = [f for f in self.findings if f.cause not in fit.structure.causes]
         read = [
             f.cause.law(

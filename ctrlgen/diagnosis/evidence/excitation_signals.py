@@ -49,8 +49,8 @@ def time_series(n: int, n_u: int, rate: float, seed: int) -> Iterator[Excitation
     yield ExcitationSignal("on/off cycles", "four cycles between the limits", _together(square, n_u))
     if n_u > 1:
         turns = np.minimum((s * n_u).astype(int), n_u - 1)
-        own = (s * n_u) % 1
-        wave = np.where(own < 0.25, 0.0, np.where(own < 0.6, 1.0, -1.0))
+        turn = (s * n_u) % 1
+        wave = np.where(turn < 0.25, 0.0, np.where(turn < 0.6, 1.0, -1.0))
         yield ExcitationSignal(
             "one axis at a time", "each actuator stepped and returned alone", wave[:, None] * np.eye(n_u)[turns]
         )
@@ -128,11 +128,11 @@ def _kept(simulator: Simulator, p: np.ndarray, record: Record) -> bool:
     values = f(after.T, record.drive.T, np.tile(p[:, None], (1, n)), np.zeros((1, n))).full().T
     first = 0
     for limit in m.limits:
-        own = values[:, first : first + limit.expr.numel()]
+        reached = values[:, first : first + limit.expr.numel()]
         first += limit.expr.numel()
         size = max(abs(limit.lower or 0.0), abs(limit.upper or 0.0))
-        if limit.lower is not None and own.min() < limit.lower - EXCITATION.limit_slack * size:
+        if limit.lower is not None and reached.min() < limit.lower - EXCITATION.limit_slack * size:
             return False
-        if limit.upper is not None and own.max() > limit.upper + EXCITATION.limit_slack * size:
+        if limit.upper is not None and reached.max() > limit.upper + EXCITATION.limit_slack * size:
             return False
     return True

@@ -114,7 +114,8 @@ def _open(search: SearchResult, explained: bool) -> tuple[list[tuple[Fit, Fit]],
     if explained or not search.rounds or search.rounds[-1].before.fit is not chosen:
         return [], ""
     tried: dict[str, Fit] = {}
-    for trial in search.rounds[-1].candidates:  # none was accepted
+    # the last round accepted none of its candidates
+    for trial in search.rounds[-1].candidates:
         tried.setdefault(trial.cause.effect if trial.cause else "", trial.fit)
     closest = [*list(tried.values())[: EXPERIMENT.suspects], chosen][: EXPERIMENT.suspects]
     pairs = [(closest[0], closest[1])] if len(closest) == EXPERIMENT.suspects else []
@@ -155,8 +156,8 @@ def separate(fitter: Fitter, a: Fit, b: Fit, reason: str, seed: int = 0) -> Expe
 
 def _named(fit: Fit, other: Fit) -> str:
     """The causes that `other` does not have."""
-    own = [c for c in fit.structure.causes if c not in other.structure.causes]
-    return " and ".join(f"{c.effect} at {c.location}" for c in own) or "the device without it"
+    causes = [c for c in fit.structure.causes if c not in other.structure.causes]
+    return " and ".join(f"{c.effect} at {c.location}" for c in causes) or "the device without it"
 
 
 @dataclass(frozen=True, eq=False)

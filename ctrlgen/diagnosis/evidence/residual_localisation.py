@@ -204,9 +204,9 @@ def _blocks(lengths: list[int]) -> np.ndarray:
     size = max(sum(lengths) // LOCALISATION.blocks, 1)
     blocks, first = [], 0
     for n in lengths:
-        own = np.arange(n) // size
-        blocks.append(first + own)
-        first += own.max(initial=-1) + 1
+        of_record = np.arange(n) // size
+        blocks.append(first + of_record)
+        first += of_record.max(initial=-1) + 1
     return np.concatenate(blocks)
 
 
@@ -221,10 +221,10 @@ def equivalent_inputs(a: LtvModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     sd = np.linalg.norm(inverse, axis=2)
     values = (inverse @ (a.residual * per_noise)[:, :, None])[:, :, 0]
     white = (inverse @ a.white[:, :, None])[:, :, 0] / np.where(sd > 0, sd, 1.0)
-    own = np.einsum(
+    projected = np.einsum(
         "tia,ti->ta", np.broadcast_to(G / np.where(size > 0, size, 1.0), (len(white), *G.shape[1:])), a.white
     )
-    return values, white, own
+    return values, white, projected
 
 
 def _per_noise(a: LtvModel) -> np.ndarray:

@@ -16,7 +16,9 @@ from ctrlgen.diagnosis.evidence.experiment_design import NextExperimentEntry
 from ctrlgen.diagnosis.evidence.residual_location import ResidualLocations
 from ctrlgen.diagnosis.report.narrative import sentence
 from ctrlgen.diagnosis.report.shares_sentences import noise_of, shares_sentences
+from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.cause_entry import Cause
+from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, WorthEntry
 from ctrlgen.diagnosis.selection.search_history import RoundEntry, search_history
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.diagnosis.shares.shares_record import FractionEntry, SharesEntry, table_record
@@ -34,21 +36,6 @@ class EstimateEntry(Keys):
         description="95 % interval; both ends equal the value where it was not estimated but read from the data."
     )
     unit: str = Field(description="Unit of value and interval; 1 without one.")
-
-
-class ShareEntry(Keys):
-    """A share of the mismatch."""
-
-    value: Number = Field(description="Of the energy beyond the noise that the device as described leaves.")
-    ci95: Interval = Field(description="95 % interval, by a bootstrap over blocks.")
-
-
-class WorthEntry(Keys):
-    """What a cause is worth in one channel, root mean square on the held-out records."""
-
-    without: Number = Field(description="Error without the cause, the others refitted [unit].")
-    with_it: Number = Field(description="Error with it [unit].")
-    unit: str = Field(description="Unit of both.")
 
 
 class AttributionEntry(Keys):
@@ -69,18 +56,6 @@ class FindingEntry(Cause):
     parameters: dict[str, EstimateEntry] = Field(description="Parameters of the effect, by name.")
     alternatives: list[Cause] = Field(description="Other causes that explain the recording equally well in its place.")
     source: str = Field(description="Publication of the effect's law.")
-
-
-class ChannelErrorEntry(Keys):
-    """Root mean square error of one channel on the held-out records."""
-
-    rms_before: Number = Field(description="Of the device as described, refitted within its stated uncertainty.")
-    rms_after: Number = Field(description="With the findings.")
-    noise_floor: Number = Field(description="Standard deviation of the noise; null where it is not known.")
-    unit: str = Field(description="Unit of all four numbers.")
-    uncertainty: Number = Field(
-        description="Prediction uncertainty that the fitted parameters alone cause; null where it is not known."
-    )
 
 
 class SpikesEntry(Keys):
@@ -166,9 +141,7 @@ def diagnosis_record(diagnosis: Diagnosis, provenance: Provenance) -> DiagnosisR
             for t in d.empirical_terms
         ],
         residual_location=location_record(d),
-        held_out={
-            channel: ChannelErrorEntry.model_validate(e, from_attributes=True) for channel, e in d.held_out.items()
-        },
+        held_out=d.held_out,
         spikes={s.channel: SpikesEntry.model_validate(s, from_attributes=True) for s in d.spikes},
         detectability=d.detectability,
         next_experiment=None if d.next_experiment is None else d.next_experiment.record(),

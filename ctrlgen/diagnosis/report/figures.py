@@ -21,9 +21,12 @@ from ctrlgen.reporting.plots import COLOURS, STYLE, svg
 
 BEFORE, AFTER, NOISE = COLOURS[2], COLOURS[0], "#d9d9d9"
 WIDTH = 8.6
-POINTS = 700  # columns of a long curve; of each the smallest and the largest sample are drawn
-SEGMENT = 2048  # samples of a window of the spectrum
-BANDS = 20  # bands a decade
+# columns of a long curve; of each the smallest and the largest sample are drawn
+POINTS = 700
+# samples of a window of the spectrum
+SEGMENT = 2048
+# bands a decade
+BANDS = 20
 
 
 def draw_all(diagnosis: Diagnosis) -> dict[str, str]:

@@ -42,8 +42,10 @@ CAPTIONS = {
     "off the device's uncertain parameters. At 1 they cannot be told apart, at 0 they cannot be confused. Each has fixed "
     "shape parameters; fitting those can make two more similar. |z|: score in standard deviations.",
 }
-TINY = 1e-4  # a p-value below is shown as "< 0.0001"
-NEGLIGIBLE = 1e-3  # standard deviations: parameters that moved by less are left out of the table
+# a p-value below is shown as "< 0.0001"
+TINY = 1e-4
+# standard deviations: parameters that moved by less are left out of the table
+NEGLIGIBLE = 1e-3
 
 
 def page(diagnosis: Diagnosis, provenance: Provenance) -> str:
@@ -141,8 +143,8 @@ def _changed(diagnosis: Diagnosis) -> list[dict[str, str]]:
     rows = []
     for unknown, value, sd in zip(fit.structure.free_parameters, fit.theta, robust_deviations(fit), strict=True):
         cause = None if unknown.cause is None else fit.structure.causes[unknown.cause]
-        own = cause is None or cause.effect == PARAMETER
-        if own and abs(value - unknown.nominal) > NEGLIGIBLE * sd:
+        of_device = cause is None or cause.effect == PARAMETER
+        if of_device and abs(value - unknown.nominal) > NEGLIGIBLE * sd:
             spread = show(sd, unknown.unit, 2) if np.isfinite(sd) and unknown.unit not in ("degC", "degF") else ""
             now = written(value, unknown.unit).text
             rows.append({"path": unknown.path, "was": known[unknown.path].text, "now": now, "sd": spread})

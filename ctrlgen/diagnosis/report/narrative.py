@@ -7,17 +7,20 @@ import re
 from collections.abc import Sequence
 
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
-from ctrlgen.diagnosis.selection.attribution import Share
-from ctrlgen.diagnosis.selection.findings import ChannelError, Estimate, Finding
+from ctrlgen.diagnosis.selection.attribution import ShareEntry
+from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding
 from ctrlgen.diagnosis.selection.verdict import Verdict, contradicts_datasheet, within_tolerance
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 from ctrlgen.reporting.numbers import number
 
-NAMED = 3  # findings that the first sentence names
-WIDE = 1.0  # a dimensionless number whose interval lies within this is shown in per cent
+# findings that the first sentence names
+NAMED = 3
+# a dimensionless number whose interval lies within this is shown in per cent
+WIDE = 1.0
 HARD_SPACE = "\u00a0"
-EDGE = 1e-6  # share of its interval within which an estimate counts as on the interval's end
+# share of its interval within which an estimate counts as on the interval's end
+EDGE = 1e-6
 HEADLINE = {
     Verdict.EXPLAINED: "Explained",
     Verdict.PARTLY: "Partly explained",
@@ -56,7 +59,8 @@ def interval(e: Estimate) -> str:
     value, low, high = (v * (100 if percent else 1) for v in ends)
     if not math.isfinite(high - low):
         return f"{number(value)}{unit} (this recording does not determine it)"
-    if high == low:  # detected directly, or fixed by its definition
+    # detected directly, or fixed by its definition
+    if high == low:
         return f"{number(value)}{unit}"
     shown = [_to_width(v, high - low) for v in (value, low, high)]
     edge = EDGE * (high - low)
@@ -72,7 +76,7 @@ def _to_width(value: float, width: float) -> str:
     return number(value, max(2, min(digits, 9)))
 
 
-def channel_sentence(channel: str, error: ChannelError) -> str:
+def channel_sentence(channel: str, error: ChannelErrorEntry) -> str:
     """'Held-out error of delta_x: 312 nm -> 5.2 nm, noise 5 nm.'"""
     noise = "not known" if error.noise_floor is None else f"{number(error.noise_floor, 3)} {error.unit}"
     shown = [f"{number(v, 3)} {error.unit}" for v in (error.rms_before, error.rms_after)]
@@ -91,7 +95,7 @@ def worst_channel(diagnosis: Diagnosis) -> str:
     """The channel with the largest held-out error before the correction, relative to its noise; where the noise is not known,
     relative to the error after the correction."""
 
-    def size(item: tuple[str, ChannelError]) -> float:
+    def size(item: tuple[str, ChannelErrorEntry]) -> float:
         e = item[1]
         ratio = e.rms_before / (e.noise_floor or e.rms_after or 1.0)
         return ratio if math.isfinite(ratio) else -1.0
@@ -141,7 +145,7 @@ def sentence(diagnosis: Diagnosis) -> str:
     return f"{text} {channel_sentence(channel, diagnosis.held_out[channel])}"
 
 
-def share_text(share: Share | None) -> str:
+def share_text(share: ShareEntry | None) -> str:
     """'82 % (75 ... 88 %)'; a dash for a cause that was read from the data."""
     if share is None:
         return "-"

@@ -13,10 +13,13 @@ from ctrlgen.diagnosis.shares.shares_table import ChannelShares, SharesTable
 from ctrlgen.reporting.plots import COLOURS
 
 WIDTH = 8.6
-BARS = 7  # kinds of a channel that are shown, besides the selected ones
+# kinds of a channel that are shown, besides the selected ones
+BARS = 7
 PANELS = 3
-POINTS = 600  # samples drawn in a panel: each costs a hundred bytes of the page
-SMALL = 0.01  # shares below it have no bar
+# samples drawn in a panel: each costs a hundred bytes of the page
+POINTS = 600
+# shares below it have no bar
+SMALL = 0.01
 SELECTED, OTHER, PAST, ADDED, RESIDUAL = COLOURS[0], "#c4d7e6", "#d9d9d9", COLOURS[3], "#b0b0b0"
 
 

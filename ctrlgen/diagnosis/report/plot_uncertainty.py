@@ -21,10 +21,13 @@ from ctrlgen.reporting.numbers import number
 from ctrlgen.reporting.plots import COLOURS
 
 FIGURE_WIDTH = 8.6
-SUSPECTS = 8  # hypotheses in the confusability matrix
-LABEL, WIDE_LABEL = 26, 60  # characters of a label before it is broken
+# hypotheses in the confusability matrix
+SUSPECTS = 8
+# characters of a label before it is broken
+LABEL, WIDE_LABEL = 26, 60
 PROFILES = 9
-WIDEST = 300.0  # per cent: intervals are shown up to here
+# per cent: intervals are shown up to here
+WIDEST = 300.0
 FOUND, ALIKE, WORSE = COLOURS[0], COLOURS[2], "#b0b0b0"
 
 
@@ -52,7 +55,8 @@ def _rival_bars(panel: Axes, round_: Round, kept: set[Any]) -> None:
     labels = []
     for row, (candidate, criterion) in enumerate(zip(round_.candidates, round_.criteria, strict=True)):
         worse = criterion - best
-        added = [c for c in candidate.causes if c not in round_.before.causes]  # several where a set is tried
+        # several where a set is tried
+        added = [c for c in candidate.causes if c not in round_.before.causes]
         names = " + ".join(map(hypothesis_name, added)) or "fewer causes"
         labels.append(textwrap.fill(names, WIDE_LABEL, break_long_words=False))
         colour = FOUND if added and kept.issuperset(added) else ALIKE if worse < CONFUSABLE.criterion else WORSE

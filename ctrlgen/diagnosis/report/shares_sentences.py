@@ -13,8 +13,10 @@ from ctrlgen.diagnosis.shares.families import SPEAKS_FOR, Family, ranking
 from ctrlgen.diagnosis.shares.shares_table import ChannelShares, Share, SharesTable
 from ctrlgen.reporting.numbers import number
 
-NAMED = 3  # kinds that a sentence names
-FAMILIES = 2  # families of laws that a sentence names
+# kinds that a sentence names
+NAMED = 3
+# families of laws that a sentence names
+FAMILIES = 2
 
 
 class Beside(Enum):

@@ -38,7 +38,8 @@ from ctrlgen.estimation.robust_covariance import robust_deviations
 from ctrlgen.version import program
 
 WIDTH = 110
-MOVED = 1e-12  # relative change below which a parameter is left as it is
+# relative change below which a parameter is left as it is
+MOVED = 1e-12
 
 
 def write_next(diagnosis: Diagnosis, original: Path, target: Path) -> None:
@@ -59,7 +60,8 @@ def next_text(diagnosis: Diagnosis, original: str) -> str:
     changed = _change_numbers(document, diagnosis, estimates)
     effects = _effects(diagnosis, estimates)
     if effects and "effect" in document and not isinstance(document["effect"], AoT):
-        for table in effects:  # effect = [{ ... }] in one line cannot be continued by [[effect]]
+        # effect = [{ ... }] in one line cannot be continued by [[effect]]
+        for table in effects:
             document["effect"].append(inline_table(table))
         effects = []
     text = document.as_string().rstrip("\n") + "\n"
@@ -76,8 +78,8 @@ def _change_numbers(
     causes, changed = diagnosis.search.chosen.fit.structure.causes, []
     for unknown, value, sd in estimates:
         cause = None if unknown.cause is None else causes[unknown.cause]
-        own = cause is None or cause.effect == PARAMETER
-        if not own or abs(value - unknown.nominal) <= MOVED * abs(unknown.nominal):
+        of_device = cause is None or cause.effect == PARAMETER
+        if not of_device or abs(value - unknown.nominal) <= MOVED * abs(unknown.nominal):
             continue
         word = "refitted to" if cause is None else "diagnosed from"
         old = known[unknown.path]

@@ -17,6 +17,7 @@ from itertools import combinations
 from math import comb
 
 import numpy as np
+from pydantic import Field
 
 from ctrlgen.core.forks import in_forks
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
@@ -31,14 +32,14 @@ from ctrlgen.estimation.settings import STATISTICS
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 from ctrlgen.recordings.recording import Record
+from ctrlgen.reporting.result_file import FiniteOrNull, Keys
 
 
-@dataclass(frozen=True)
-class Share:
-    """A share of the mismatch, of its energy, with its 95 % interval."""
+class ShareEntry(Keys):
+    """A share of the mismatch."""
 
-    value: float
-    ci95: tuple[float, float]
+    value: FiniteOrNull = Field(description="Of the energy beyond the noise that the device as described leaves.")
+    ci95: tuple[FiniteOrNull, FiniteOrNull] = Field(description="95 % interval, by a bootstrap over blocks.")
 
 
 @dataclass(frozen=True)
@@ -48,8 +49,8 @@ class Attribution:
     `held_out`: whether they are of the held-out records; of the records to fit where the held-out ones show no mismatch.
     """
 
-    shares: tuple[Share | None, ...]
-    rest: Share | None
+    shares: tuple[ShareEntry | None, ...]
+    rest: ShareEntry | None
     held_out: bool
 
     @property
@@ -78,13 +79,15 @@ def attribute(
     records = fitter.held_out_records if held else fitter.fit_records
     before, after = _by_block(nominal), _by_block(chosen)
     left = {frozenset(range(n)): after}
-    rough = fitter.with_errors_of(described.fit)  # initial states of incomplete models, which leave much
+    # for the initial states of incomplete models, which leave much
+    rough = fitter.with_errors_of(described.fit)
     subsets = _subsets(n)
     energies = in_forks(lambda present: _left_or_all(rough, fit, present, records, before), subsets, jobs)
     left |= dict(zip(subsets, energies, strict=True))
     bare = left[frozenset()]
     if after.sum() > ATTRIBUTION.hidden * before.sum() and before.sum() < ATTRIBUTION.hidden * bare.sum():
-        before = bare  # the device's own numbers, as they were fitted to it as described, hide the mismatch
+        # the device's own numbers, as they were fitted to it as described, hide the mismatch
+        before = bare
     most = ATTRIBUTION.diverged * np.maximum(np.maximum(before, bare), 1.0)
     left = {S: np.minimum(E, most) for S, E in left.items()}
     parts = np.array([_shapley(left, k, n) for k in range(n)])
@@ -93,13 +96,14 @@ def attribute(
     sampled = _shares(*(v[..., drawn].sum(axis=-1) for v in (parts, before, after)))
     low, high = np.quantile(sampled, (0.025, 0.975), axis=1)
     value = _shares(parts.sum(axis=-1), before.sum(), after.sum())
-    shares = [Share(float(v), (float(a), float(b))) for v, a, b in zip(value, low, high, strict=True)]
+    shares = [ShareEntry(value=v, ci95=(a, b)) for v, a, b in zip(value, low, high, strict=True)]
     return Attribution(tuple(shares[:n]), shares[n], held)
 
 
 def _shares(parts: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """Shares (n + 1, ...) of n causes and of the rest, from their `parts` (n, ...) and the energies `before` and `after` (...)."""
-    rest = np.maximum(after, 0.0) / np.maximum(before, 1e-300)  # by chance less may be left than noise
+    # by chance less may be left than noise
+    rest = np.maximum(after, 0.0) / np.maximum(before, 1e-300)
     taken = parts.sum(axis=0)
     scale = np.where(taken > 0, (1 - rest) / np.maximum(taken, 1e-300), 1 / np.maximum(before, 1e-300))
     return np.concatenate([parts * scale, np.asarray(rest)[None]])

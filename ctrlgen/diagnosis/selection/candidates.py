@@ -20,8 +20,8 @@ from ctrlgen.estimation.structure import Structure
 def fit_candidates(trials: Trials, current: CandidateModel, screened: Screened) -> tuple[CandidateModel, ...]:
     """All that is tried beside `current`, the promising ones fitted to their end."""
 
-    def in_other_shapes(own: Trials, t: CandidateModel) -> CandidateModel:
-        return t if current.errors.is_noise else restart_elsewhere(own, t, current, screened)
+    def in_other_shapes(branch: Trials, t: CandidateModel) -> CandidateModel:
+        return t if current.errors.is_noise else restart_elsewhere(branch, t, current, screened)
 
     candidates = fit_each(trials, current.fit, significant(trials, current, screened), in_other_shapes)
     candidates = (*candidates, *fit_other_clocks(trials, current, candidates))
@@ -55,8 +55,10 @@ def fit_each(
 ) -> tuple[CandidateModel, ...]:
     """Each suspect beside what is fitted, and what `finish` makes of it."""
 
-    def one(own: Trials, s: Suspect) -> list[CandidateModel]:
-        return [finish(own, t) for t in own.tried(fit.restarted.with_cause(s.hypothesis, s.start), s.hypothesis, fit)]
+    def one(branch: Trials, s: Suspect) -> list[CandidateModel]:
+        return [
+            finish(branch, t) for t in branch.tried(fit.restarted.with_cause(s.hypothesis, s.start), s.hypothesis, fit)
+        ]
 
     return tuple(t for fitted in trials.each(one, suspects, lambda s: trying(s.hypothesis)) for t in fitted)
 
@@ -103,7 +105,7 @@ def fit_other_clocks(
     if current.errors.is_noise or trials.fitter.recording.kind == "poses" or not shifts:
         return ()
 
-    def one(own: Trials, beside: CandidateModel) -> list[CandidateModel]:
+    def one(branch: Trials, beside: CandidateModel) -> list[CandidateModel]:
         begun: list[tuple[float, Hypothesis, Structure]] = []
         for cause in shifts:
             p = cause.law.amplitude()
@@ -113,13 +115,13 @@ def fit_other_clocks(
                 for start in starts:
                     suspected = beside.fit.restarted.with_cause(cause, {p.name: starts[0]})
                     structure = suspected.restarted(len(beside.causes), {p.name: start})
-                    begun.append((own.fitter.initial_objective(structure), cause, structure))
+                    begun.append((branch.fitter.initial_objective(structure), cause, structure))
             except FAILURES as error:
-                own.note_failure(cause, error)
+                branch.note_failure(cause, error)
         if not begun:
             return []
         _, cause, structure = min(begun, key=lambda b: b[0])
-        return own.tried(structure, cause, beside.fit)
+        return branch.tried(structure, cause, beside.fit)
 
     besides = [current, *trials.selection.ranked(singles)[: SEARCH.beside_clocks]]
     return tuple(t for fitted in trials.each(one, besides, lambda _: trying(*shifts)) for t in fitted)
@@ -148,11 +150,11 @@ def fit_subsets(
     least = min((t.fitted.excess for t in singles), default=np.inf)
     candidates: list[CandidateModel] = []
 
-    def one(own: Trials, suspects: Sequence[Suspect]) -> list[CandidateModel]:
+    def one(branch: Trials, suspects: Sequence[Suspect]) -> list[CandidateModel]:
         structure = current.fit.restarted
         for s in suspects:
             structure = structure.with_cause(s.hypothesis, s.start)
-        return own.tried(structure, suspects[-1].hypothesis, current.fit)
+        return branch.tried(structure, suspects[-1].hypothesis, current.fit)
 
     for size in (2, 3, 4):
         explained = least <= (1 - MODEL_SELECTION.most_of_mismatch) * current.fitted.excess
@@ -194,5 +196,5 @@ def _converge_promising(
     early = [
         t for t in best if t.fit.objective < current.fit.objective and not trials.selection.improves_enough(current, t)
     ]
-    ends = dict(zip(map(id, early), trials.each(lambda own, t: own.converged(t), early), strict=True))
+    ends = dict(zip(map(id, early), trials.each(lambda branch, t: branch.converged(t), early), strict=True))
     return tuple(ends.get(id(t), t) for t in candidates)

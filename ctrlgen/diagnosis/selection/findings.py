@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from pydantic import Field
 
 from ctrlgen.core.units import difference, from_si
-from ctrlgen.diagnosis.selection.attribution import Attribution, Share
+from ctrlgen.diagnosis.selection.attribution import Attribution, ShareEntry
 from ctrlgen.diagnosis.selection.candidate_model import SearchResult
 from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
@@ -15,6 +16,7 @@ from ctrlgen.estimation.prediction_uncertainty import prediction_uncertainty
 from ctrlgen.estimation.profile_likelihood import Profile
 from ctrlgen.estimation.robust_covariance import robust_deviations
 from ctrlgen.estimation.settings import STATISTICS
+from ctrlgen.reporting.result_file import FiniteOrNull, Keys, Number
 
 
 @dataclass(frozen=True)
@@ -26,13 +28,12 @@ class Estimate:
     unit: str
 
 
-@dataclass(frozen=True)
-class Worth:
-    """Root mean square error of one channel on the held-out records, `without` a cause and `with_it` [unit]."""
+class WorthEntry(Keys):
+    """What a cause is worth in one channel, root mean square on the held-out records."""
 
-    without: float
-    with_it: float
-    unit: str
+    without: FiniteOrNull = Field(description="Error without the cause, the others refitted [unit].")
+    with_it: FiniteOrNull = Field(description="Error with it [unit].")
+    unit: str = Field(description="Unit of both.")
 
 
 @dataclass(frozen=True)
@@ -48,8 +49,8 @@ class Finding:
     location: str
     parameters: dict[str, Estimate]
     alternatives: tuple[Hypothesis, ...]
-    share: Share | None
-    worth: dict[str, Worth]
+    share: ShareEntry | None
+    worth: dict[str, WorthEntry]
     source: str
     cause: Hypothesis
 
@@ -59,23 +60,19 @@ class Finding:
         return self.cause.of
 
 
-@dataclass(frozen=True)
-class ChannelError:
-    """Root mean square error of one channel on the held-out records [unit].
+class ChannelErrorEntry(Keys):
+    """Root mean square error of one channel on the held-out records."""
 
-    rms_before: of the device as described, refitted within its stated uncertainty. rms_after: with the findings.
-    noise_floor: standard deviation of the noise, None where it is not known.
-    uncertainty: prediction uncertainty that the fitted parameters alone cause, None where it is not known.
-    """
-
-    rms_before: float
-    rms_after: float
-    noise_floor: float | None
-    unit: str
-    uncertainty: float | None = None
+    rms_before: FiniteOrNull = Field(description="Of the device as described, refitted within its stated uncertainty.")
+    rms_after: FiniteOrNull = Field(description="With the findings.")
+    noise_floor: Number = Field(description="Standard deviation of the noise; null where it is not known.")
+    unit: str = Field(description="Unit of all four numbers.")
+    uncertainty: Number = Field(
+        description="Prediction uncertainty that the fitted parameters alone cause; null where it is not known."
+    )
 
 
-def held_out_errors(search: SearchResult, known: np.ndarray) -> dict[str, ChannelError]:
+def held_out_errors(search: SearchResult, known: np.ndarray) -> dict[str, ChannelErrorEntry]:
     """Held-out errors of the nominal and of the chosen model by channel; `known` (n_y,) says whose noise is known."""
     errors, fitter = {}, search.fitter
     floor, unsure = fitter.noise.floor, prediction_uncertainty(fitter, search.chosen.fit)
@@ -89,7 +86,9 @@ def held_out_errors(search: SearchResult, known: np.ndarray) -> dict[str, Channe
             rms.append(float(np.sqrt(np.mean(np.concatenate(squares)))) * scale if squares else float("nan"))
         noise = float(floor[i] * scale) if known[i] else None
         beside = float(unsure[i] * scale) if np.isfinite(unsure[i]) else None
-        errors[channel] = ChannelError(rms[0], rms[1], noise, unit, beside)
+        errors[channel] = ChannelErrorEntry(
+            rms_before=rms[0], rms_after=rms[1], noise_floor=noise, unit=unit, uncertainty=beside
+        )
     return errors
 
 
@@ -135,11 +134,13 @@ def findings(search: SearchResult, shares: Attribution, profiles: tuple[Profile,
     return tuple(sorted(rows, key=lambda f: -(f.share.value if f.share else 0.0)))
 
 
-def _worth(search: SearchResult, k: int) -> dict[str, Worth]:
+def _worth(search: SearchResult, k: int) -> dict[str, WorthEntry]:
     """The held-out error without cause k, the others refitted, and with it, of each channel."""
     recording, floor = search.fitter.recording, search.fitter.noise.floor
     without, with_it = (np.sqrt(t.held_out.plain_mean) * floor for t in (search.without_cause[k], search.chosen))
     return {
-        channel: Worth(float(a) * difference(1.0, unit), float(b) * difference(1.0, unit), unit)
+        channel: WorthEntry(
+            without=float(a) * difference(1.0, unit), with_it=float(b) * difference(1.0, unit), unit=unit
+        )
         for channel, unit, a, b in zip(recording.channels, recording.units, without, with_it, strict=True)
     }

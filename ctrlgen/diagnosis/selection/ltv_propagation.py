@@ -38,9 +38,9 @@ class _Group:
         for k, probe, runs in self.entries:
             for into, term in runs:
                 X[1:, k, into] += F_p[:, self.states[k], probe, None] * f[:, term]
-        F = np.ascontiguousarray(F_S[:, self.states[:, None], self.states])
+        block = np.ascontiguousarray(F_S[:, self.states[:, None], self.states])
         for k in range(len(f)):
-            X[k + 1] += F[k] @ X[k]
+            X[k + 1] += block[k] @ X[k]
         self.D = X[-1]
         return X[:-1]
 

@@ -148,9 +148,8 @@ class ModelSelection:
         n, n_held = (self.samples(m, errors) for m in (after.fitted, after.held_out))
         added = len(after.fit.structure.free_parameters) - len(before.fit.structure.free_parameters)
         needed = MODEL_SELECTION.least_gain + added * np.log(max(n, 2))
-        if (
-            before.fit.penalty - after.fit.penalty > MODEL_SELECTION.hidden_share * gain
-        ):  # parameters of the device masked it, so the readings hardly show it
+        # parameters of the device masked it, so the readings hardly show it
+        if before.fit.penalty - after.fit.penalty > MODEL_SELECTION.hidden_share * gain:
             return gain > needed and confirmed > -MODEL_SELECTION.largest_contradiction
         if (
             self.unseen_in_held_out(before)
@@ -193,10 +192,10 @@ class ModelSelection:
         on the records to fit and on the held-out records); a multiple of that where the 95 % interval of k's amplitude
         includes zero. `bare` is the model without k."""
         fit = current.fit
-        own = [i for i, u in enumerate(fit.structure.free_parameters) if u.cause == k and u.amplitude]
+        amplitudes = [i for i, u in enumerate(fit.structure.free_parameters) if u.cause == k and u.amplitude]
         sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-        vague = bool(own) and all(
-            abs(fit.theta[i] - fit.structure.free_parameters[i].nominal) < STATISTICS.z_95 * sd[i] for i in own
+        vague = bool(amplitudes) and all(
+            abs(fit.theta[i] - fit.structure.free_parameters[i].nominal) < STATISTICS.z_95 * sd[i] for i in amplitudes
         )
         # beside k, another cause may take the place of an accepted one
         return self._explained_by_model_form_error(

@@ -16,7 +16,7 @@ from ctrlgen.estimation.hypothesis import Hypothesis
 def all_pruned(trials: Trials, current: CandidateModel, candidates: Sequence[CandidateModel]) -> list[CandidateModel]:
     """The candidates that meet no objection, and of the others what is left without the causes that do."""
     by_causes: dict[frozenset, CandidateModel] = {}
-    for kept in trials.each(lambda own, t: pruned(own, t, current.causes), candidates):
+    for kept in trials.each(lambda branch, t: pruned(branch, t, current.causes), candidates):
         if kept is not None:
             by_causes.setdefault(frozenset(kept.causes), kept)
     return list(by_causes.values())

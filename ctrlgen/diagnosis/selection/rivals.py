@@ -84,13 +84,13 @@ def replacements(trials: Trials, current: CandidateModel, k: int) -> list[Candid
         if s.z**2 > SEARCH.rival_share * gained and s.hypothesis != structure.causes[k]
     ]
 
-    def one(own: Trials, s: Suspect) -> list[CandidateModel]:
-        return own.tried(replace_cause(own, current.fit, k, others, s), s.hypothesis)
+    def one(branch: Trials, s: Suspect) -> list[CandidateModel]:
+        return branch.tried(replace_cause(branch, current.fit, k, others, s), s.hypothesis)
 
     tried = trials.each(one, able[: SEARCH.most_rivals], lambda s: f"{trying(s.hypothesis)} instead")
     fits = [t for fitted in tried for t in fitted]
     near = trials.close_contenders(without, current, trials.selection.ranked(fits))
-    ends = trials.each(lambda own, t: own.converged(t), near)
+    ends = trials.each(lambda branch, t: branch.converged(t), near)
     return trials.selection.ranked([*ends, *(t for t in fits if t not in near)])
 
 

@@ -84,7 +84,7 @@ class ScoreGradient:
         others = [h for h in hypotheses if h.effect != PARAMETER]
         self.laws = CandidateTerms(laws, self.simulator, fit.structure, others, entered, seen)
         places = [free.index(h.path) for h in numbers]
-        # the terms of numbers are constant
+        # the constant terms of numbers
         self.sizes = np.array([max(abs(self.p[i]), 1e-3) * 1e-3 for i in places])
         self.columns = list(self.laws.columns)
         for k, (h, i) in enumerate(zip(numbers, places, strict=True)):
@@ -109,7 +109,7 @@ class ScoreGradient:
                     tails[i] = Y[len(Y) - len(tails[i]) :]
                 S = noise.whiten_channel(Y, i)
                 S[~usable[a:b, i]] = 0.0
-                # as in the fit
+                # large residuals count less, as in the fit
                 S *= np.minimum(1.0, corner[i] / np.maximum(np.abs(white[a:b, i]), 1e-300))[:, None]
                 if not np.isfinite(S.sum()):
                     S = np.nan_to_num(S)

@@ -70,7 +70,8 @@ class Screen:
             self.fitter.fit_records, fit.initial_states or [None] * len(self.fitter.fit_records), strict=True
         ):
             slopes = ScoreGradient(self.fitter, fit, record, open_, seen, self._laws(fit, record.timing))
-            if slopes.laws.unusable:  # the columns must be the same on every record
+            # the columns must be the same on every record
+            if slopes.laws.unusable:
                 return self.run(fit, dropped | slopes.laws.unusable)
             columns = slopes.columns
             n = record.valid.size
@@ -154,15 +155,15 @@ class Screen:
     ) -> Screened:
         """`gradient` U'r (k,), zero at an optimum inside all bounds; `likeness` |J's|/|J| (free numbers, columns)."""
         norm = np.diag(sums.SS)
-        own = norm - np.sum(sums.US**2, axis=0)
+        distinct = norm - np.sum(sums.US**2, axis=0)
         score = sums.Sr - gradient @ sums.US
-        distinct_share = np.where(norm > 0, own / np.where(norm > 0, norm, 1.0), 0.0)
+        distinct_share = np.where(norm > 0, distinct / np.where(norm > 0, norm, 1.0), 0.0)
         seen = np.flatnonzero((distinct_share > SCREEN.own_share) & (norm > 0) & np.isfinite(norm))
         gram = sums.SS - sums.US.T @ sums.US
         d = np.sqrt(np.maximum(np.diag(gram), 1e-300))
         cosine = np.clip(gram / np.outer(d, d), -1, 1)
         z = np.zeros(len(columns))
-        z[seen] = score[seen] / np.sqrt(own[seen])
+        z[seen] = score[seen] / np.sqrt(distinct[seen])
         for j in seen:
             if columns[j].one_sided and z[j] * columns[j].one_sided < 0:
                 z[j] = 0.0
@@ -170,16 +171,20 @@ class Screen:
         for j in sorted(seen, key=lambda j: -abs(z[j])):
             ranked.setdefault(columns[j].hypothesis, []).append(int(j))
         order = [js[0] for js in ranked.values()]
-        suspect = {j: self._suspect(columns[j], z[j], score[j] / own[j], distinct_share[j], j) for j in map(int, seen)}
+        suspect = {
+            j: self._suspect(columns[j], z[j], score[j] / distinct[j], distinct_share[j], j) for j in map(int, seen)
+        }
         suspects = tuple(
             replace(suspect[j], other_starts=tuple(suspect[i].start for i in others[: SCREEN.most_other_starts]))
             for j, *others in ranked.values()
         )
         sds = {
-            (columns[j].hypothesis.effect, columns[j].hypothesis.location): float(columns[j].size / np.sqrt(own[j]))
+            (columns[j].hypothesis.effect, columns[j].hypothesis.location): float(
+                columns[j].size / np.sqrt(distinct[j])
+            )
             for j in order
         }
-        together = SubsetSearch(columns, seen, score, own, distinct_share, cosine, self._suspect)
+        together = SubsetSearch(columns, seen, score, distinct, distinct_share, cosine, self._suspect)
         resembles = np.argmax(likeness, axis=0) if len(likeness) else np.full(len(columns), -1)
         undetectable = {c.hypothesis: int(resembles[j]) if norm[j] > 0 else -1 for j, c in enumerate(columns)}
         undetectable = {h: k for h, k in undetectable.items() if h not in ranked}

@@ -56,8 +56,8 @@ class Searcher:
         # its numbers are not bent by the errors of a better model
         nominal = scored(trials.fitter, trials.fitter.described(device)[1])
         each = range(len(current.causes))
-        bare = tuple(trials.each(lambda own, k: _without(own, current, k, nominal), each))
-        alike = tuple(trials.each(lambda own, k: rivals(own, current, k, rounds), each))
+        bare = tuple(trials.each(lambda branch, k: _without(branch, current, k, nominal), each))
+        alike = tuple(trials.each(lambda branch, k: rivals(branch, current, k, rounds), each))
         return SearchResult(trials.fitter, nominal, current, bare, alike, tuple(rounds), trials.screened(current))
 
     def _settled(self, current: CandidateModel) -> CandidateModel:
@@ -84,7 +84,8 @@ class Searcher:
             current = without_needless(trials, swapped(trials, best, len(current.causes)))
             same = next((v for v in visited if frozenset(v.causes) == frozenset(current.causes)), None)
             if same is not None and explains_alike(trials.selection, same, current):
-                return current  # no better than when it was there before
+                # no better than when it was there before
+                return current
             current = trials.with_noise_update(trials.with_errors(trials.converged(current)))
             visited.append(current)
 
@@ -95,7 +96,9 @@ class Searcher:
         trials = self.trials
         first = trials.selection.most_parsimonious(better)
         near = trials.close_contenders(current.fit.objective, first, [t for t in better if t is not first])
-        ends = trials.each(lambda own, t: restart_elsewhere(own, own.converged(t), current, screened), (first, *near))
+        ends = trials.each(
+            lambda branch, t: restart_elsewhere(branch, branch.converged(t), current, screened), (first, *near)
+        )
         sound = [t for t in ends if not trials.objections(t, current.causes)]
         return trials.selection.most_parsimonious(sound or [first])
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ctrlgen.diagnosis.selection.candidate_terms import CandidateTerm
 from ctrlgen.diagnosis.settings import SUBSETS
 from ctrlgen.estimation.hypothesis import Hypothesis
 
@@ -29,10 +31,19 @@ class SubsetSearch:
     Adding hypothesis j to a set K raises it by (z_j - c_jK C_KK^-1 z_K)^2/(1 - c_jK C_KK^-1 c_Kj).
     """
 
-    def __init__(self, columns, seen, score, own, distinct_share, cosine, suspect) -> None:
+    def __init__(
+        self,
+        columns: Sequence[CandidateTerm],
+        seen: np.ndarray,
+        score: np.ndarray,
+        distinct: np.ndarray,
+        distinct_share: np.ndarray,
+        cosine: np.ndarray,
+        suspect: Callable[[CandidateTerm, float, float, float, int], Suspect],
+    ) -> None:
         self.columns = [columns[j] for j in seen]
         self.index = seen
-        self.root = np.sqrt(own[seen])
+        self.root = np.sqrt(distinct[seen])
         self.z = score[seen] / self.root
         self.distinct_share, self.C, self.suspect = distinct_share[seen], cosine[np.ix_(seen, seen)], suspect
         self.group = (
@@ -72,7 +83,8 @@ class SubsetSearch:
             places += [(member, int(j)) for j in best]
         grown: dict[frozenset, tuple[float, tuple[int, ...]]] = {}
         joined = np.concatenate([np.zeros(0), *gains])
-        for i in np.argsort(-joined, kind="stable"):  # the best with each group first
+        # the best with each group first
+        for i in np.argsort(-joined, kind="stable"):
             member, j = places[i]
             members = (*beam[member][1], j)
             grown.setdefault(frozenset(self.group[list(members)]), (float(joined[i]), members))

@@ -67,10 +67,10 @@ def make_blocks(residuals: Sequence[np.ndarray], settled: bool, seed: int = 0) -
         ends = np.minimum(edges + stretch, n)
         drawn = np.unique(np.minimum((edges + rng.random(len(edges)) * (ends - edges)).astype(int), n - 1))
         drawn = drawn if stretch > 1 else np.arange(n)
-        own = int(np.ceil(n / length - 0.01))
+        n_blocks = int(np.ceil(n / length - 0.01))
         rows.append(drawn)
-        blocks.append(first + np.minimum(drawn * own // n, own - 1))
-        first += own
+        blocks.append(first + np.minimum(drawn * n_blocks // n, n_blocks - 1))
+        first += n_blocks
     block = np.concatenate(blocks)
     record = np.repeat(np.arange(len(rows)), list(map(len, rows)))
     return Blocks(tuple(rows), record, block, block % min(SHARES.folds, first), round(length))

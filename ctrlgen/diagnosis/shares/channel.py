@@ -116,7 +116,8 @@ class ChannelSmoothers:
         periods: dict[Kind, list[float]] = {}
         past, positions = self._past(), [b.abscissa for b in self.design.of_kind(Kind.POSITION, self.own)]
         without = self.every_fold
-        if positions:  # the trend with position would pass for a long pitch
+        # the trend with position would pass for a long pitch
+        if positions:
             plain = self.common.with_columns([np.empty((len(self.y), 0))] * self.common.count)
             without = plain.left(plain.fit(self.kinds[Kind.POSITION], self.every_fold), self.every_fold)
         longest = max(map(len, self.parts))
@@ -218,7 +219,8 @@ def _selected(
     """
     while len(chosen) < SHARES.most_steps and (left := [kind for kind in kinds if kind not in chosen]):
         remains = channel.folds.left(now, channel.every_fold)
-        alone = {kind: channel.without_numbers().fit([kind], remains).squares.sum() for kind in left}  # to rank them
+        # to rank them
+        alone = {kind: channel.without_numbers().fit([kind], remains).squares.sum() for kind in left}
         ranked = sorted(left, key=lambda kind: alone[kind])
         many = sum(map(len, channel.kinds.values())) > SHARES.many_columns
         few = SHARES.joint_candidates if many and chosen else None
@@ -228,7 +230,8 @@ def _selected(
             added = _best_addition(channel, chosen, now, list(combinations(ranked[:several], 2)))
         trial = _simplified(channel, [*chosen, *added], left) if added else chosen
         after = channel.fit(trial)
-        if after.squares.sum() >= now.squares.sum():  # nothing was added, or gave way to what was there before
+        # nothing was added, or gave way to what was there before
+        if after.squares.sum() >= now.squares.sum():
             break
         chosen, now = trial, after
     return chosen, now

@@ -84,12 +84,12 @@ class FoldsOfChannel:
 
     def _columns(self, columns: np.ndarray) -> Callable[[int], np.ndarray]:
         """The chosen columns (p, N) of fold k as a function of k."""
-        shared, own = columns < self.n_common, columns[columns >= self.n_common] - self.n_common
+        shared, extra = columns < self.n_common, columns[columns >= self.n_common] - self.n_common
         X = np.empty((len(columns), self.common.X.shape[1]))
         X[shared] = self.common.X[columns[shared]]
 
         def of_fold(k: int) -> np.ndarray:
-            X[~shared] = self.extra[k][own]
+            X[~shared] = self.extra[k][extra]
             return X
 
         return of_fold
@@ -133,8 +133,8 @@ class FoldsOfChannel:
                 slopes.append((b, level - float(b @ mean)))
             models.append(slopes)
         # out of block each sample has the target of its own fold
-        own = targets[common.blocks.fold, np.arange(targets.shape[1])]
-        errors = np.where(common.usable, (own - predicted) ** 2, 0.0)
+        target = targets[common.blocks.fold, np.arange(targets.shape[1])]
+        errors = np.where(common.usable, (target - predicted) ** 2, 0.0)
         best = int(np.argmin(errors.sum(axis=1)))
         chosen = tuple(slopes[best] for slopes in models)
         return OutOfBlock(predicted[best], common.blocks.sums(errors[best]), columns, chosen)

@@ -93,7 +93,8 @@ def _smoothers(fit: Fit, table: SharesTable, channel: ChannelShares, signals: Se
         if axis is None:
             continue
         law = Effect.library[_LAWS[row.kind]]
-        if not law.requires <= offered:  # of a stage without inertia the direction is what its last reversals leave
+        # of a stage without inertia the direction is what its last reversals leave
+        if not law.requires <= offered:
             law = Effect.library["empirical_history"]
         d, v = (np.concatenate(parts) for parts in _position_and_speed(signals, axis))
         ranges: dict[str, list[dict[str, float]]] = {
@@ -102,7 +103,7 @@ def _smoothers(fit: Fit, table: SharesTable, channel: ChannelShares, signals: Se
             "empirical_history": [{"reach": share * float(np.ptp(d))} for share in SHARES.reaches],
         }
         rest = {p.name: 0.0 for p in law.params} | {law.amplitude().name: channel.rms}
-        trials = tuple(rest | own for own in ranges[law.kind])
+        trials = tuple(rest | numbers for numbers in ranges[law.kind])
         yield _Smoother(row.kind, Hypothesis(law.kind, f"mechanism:{at}", at, axis), trials)
 
 
@@ -147,7 +148,8 @@ def _fitted(fitter: Fitter, fit: Fit, smoother: _Smoother) -> Fit:
         np.concatenate([fitter.error.whiten(v, r.valid).ravel() for v, r in zip(e, records, strict=True)])
     )
     corner = np.concatenate([np.tile(fitter.error.corner, len(r.valid)) for r in records])
-    trust = np.minimum(1.0, corner / np.maximum(np.abs(whole), 1e-300))  # as in a fit, spikes bend nothing
+    # as in a fit, spikes bend nothing
+    trust = np.minimum(1.0, corner / np.maximum(np.abs(whole), 1e-300))
     best, least = fit, np.inf
     # one simulator for all trials
     smooth, last = fit.restarted.with_cause(smoother.cause, smoother.trials[0]), len(fit.structure.causes)
@@ -163,7 +165,8 @@ def _fitted(fitter: Fitter, fit: Fit, smoother: _Smoother) -> Fit:
             fitter.error.whiten(Y, r.valid).reshape(-1, len(weights)) for Y, r in zip(slopes, records, strict=True)
         ]
         X = np.nan_to_num(np.vstack(white))
-        seen = np.abs(X).max(axis=1) > 0  # channels and samples that the term moves
+        # channels and samples that the term moves
+        seen = np.abs(X).max(axis=1) > 0
         c, left = ridge_regression(trust[seen, None] * X[seen], trust[seen] * whole[seen])
         if left < least:
             theta[weights] = np.clip(c, [free[k].low for k in weights], [free[k].high for k in weights])

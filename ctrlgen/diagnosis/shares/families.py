@@ -135,18 +135,19 @@ def ranking(table: SharesTable, noise: dict[str, float] | None = None) -> list[t
     share = dict.fromkeys(Family, 0.0)
     place = dict.fromkeys(Family, len(Family))
     for channel in table.channels:
-        own, beside = dict.fromkeys(Family, 0.0), dict.fromkeys(Family, 0.0)
+        selected, beside = dict.fromkeys(Family, 0.0), dict.fromkeys(Family, 0.0)
         for row in channel.kinds:
             for k, family in enumerate(SPEAKS_FOR[row.kind][0]):
                 if row.selected:
-                    own[family] += row.additional
+                    selected[family] += row.additional
                     place[family] = min(place[family], k)
                 else:
                     beside[family] = max(beside[family], row.additional)
-        own[Family.GAIN] += channel.constant + channel.numbers
-        if table.design.one_way(channel.own):  # friction without a change of direction is an offset
-            own[Family.FRICTION] += channel.constant
+        selected[Family.GAIN] += channel.constant + channel.numbers
+        # friction without a change of direction is an offset
+        if table.design.one_way(channel.own):
+            selected[Family.FRICTION] += channel.constant
         for family in Family:
-            share[family] += weights[channel.channel] / whole * (own[family] or beside[family])
+            share[family] += weights[channel.channel] / whole * (selected[family] or beside[family])
     shares = [(family, value) for family, value in share.items() if value > 0]
     return sorted(shares, key=lambda pair: (-round(pair[1], 3), place[pair[0]], list(Family).index(pair[0])))

@@ -71,8 +71,8 @@ def gather(fitter: Fitter, fit: Fit, record: Record) -> tuple[np.ndarray, Signal
     """
     simulator = fitter.simulator(fit.structure, record)
     model = simulator.model
-    own = [k for k, r in enumerate(fitter.fit_records) if r is record]
-    start = fit.initial_states[own[0]] if own and fit.initial_states else None
+    places = [k for k, r in enumerate(fitter.fit_records) if r is record]
+    start = fit.initial_states[places[0]] if places and fit.initial_states else None
     after, _ = simulator.simulate_states(record, fit.theta, start)
     poses = record.poses
     driven = simulator.aligned(record, fit.theta)

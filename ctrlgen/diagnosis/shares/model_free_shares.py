@@ -70,9 +70,9 @@ def model_free_shares(
         if key not in folds:
             folds[key] = Folds(design, blocks, usable)
         numbers = blocks.drawn([S[:, i] for S in sensitivities]) if sensitivities else np.empty((len(usable), 0))
-        own = own_axes(signals, name)
+        axes = own_axes(signals, name)
         rates = rates_of(signals, name, blocks)
-        smoothers = ChannelSmoothers(parts, design, folds[key], own, numbers, signals[0].sample_time, rates)
+        smoothers = ChannelSmoothers(parts, design, folds[key], axes, numbers, signals[0].sample_time, rates)
         spikes = 1 - np.isfinite(np.concatenate(parts)).sum() / np.isfinite(np.concatenate(given)).sum()
         rows.append(_shares(name, smoothers, float(spikes)))
     if not rows:

@@ -13,8 +13,10 @@ from ctrlgen.diagnosis.settings import SHARES
 from ctrlgen.diagnosis.shares.regressors import standardised
 from ctrlgen.numerics.spectral_peaks import periodogram
 
-BINS = 2048  # of the range of travel: ten a period of the shortest pitch
-PADDING = 8  # of the range: the phase is then off by at most a sixteenth of a period at either end
+# of the range of travel: ten a period of the shortest pitch
+BINS = 2048
+# of the range: the phase is then off by at most a sixteenth of a period at either end
+PADDING = 8
 
 
 def strongest_pitch(x: np.ndarray, y: np.ndarray) -> float:

@@ -33,12 +33,13 @@ def own_axes(signals: Sequence[Signals], channel: str) -> frozenset[str]:
     parts, columns = [], []
     for axis in axes:
         d = np.concatenate([s.position[axis] for s in signals])
-        own = [d]
+        signals_of_axis = [d]
         if not signals[0].settled:
             v = [s.speed_of(axis) for s in signals]
-            own += [np.concatenate(v), np.concatenate([s.derivative(x) for s, x in zip(signals, v, strict=True)])]
-        columns += own
-        parts.append(len(own))
+            acceleration = [s.derivative(x) for s, x in zip(signals, v, strict=True)]
+            signals_of_axis += [np.concatenate(v), np.concatenate(acceleration)]
+        columns += signals_of_axis
+        parts.append(len(signals_of_axis))
     X = np.column_stack([standardised(c) for c in columns])
     slopes = np.linalg.lstsq(X, y - y.mean(), rcond=1e-8)[0]
     ends = np.cumsum([0, *parts])
@@ -114,7 +115,8 @@ class _Builder:
         full = {a: [s.speed_of(a) for s in signals] for a in self.axes}
         self.speed = {a: self.drawn(full[a]) for a in self.axes}
         fastest = {a: max(float(np.abs(v).max(initial=0.0)) for v in full[a]) for a in self.axes}
-        if self.settled:  # a step counts over the range
+        # a step counts over the range
+        if self.settled:
             fastest = {a: float(np.ptp(np.concatenate([s.position[a] for s in signals]))) for a in self.axes}
         self.direction = {a: direction(self.speed[a], fastest[a]) for a in self.axes}
         self.acceleration = {
@@ -155,16 +157,16 @@ class _Builder:
         """The blocks of columns, not yet standardised."""
         nothing: frozenset[str] = frozenset()
         for a in self.axes:
-            d, v, own = self.position[a], self.speed[a], frozenset([a])
+            d, v, axis = self.position[a], self.speed[a], frozenset([a])
             unit, speed_unit = self._unit("position", a), self._unit("speed", a)
-            yield Columns(Kind.PROPORTION, a, unit, own, d, d[:, None])
-            yield Columns(Kind.POSITION, a, unit, own, d, splines(d, self.count(len(self.axes))))
-            yield Columns(Kind.DIRECTION, f"speed of {a}", speed_unit, own, v, self.direction[a][:, None])
+            yield Columns(Kind.PROPORTION, a, unit, axis, d, d[:, None])
+            yield Columns(Kind.POSITION, a, unit, axis, d, splines(d, self.count(len(self.axes))))
+            yield Columns(Kind.DIRECTION, f"speed of {a}", speed_unit, axis, v, self.direction[a][:, None])
             if not self.settled:
-                yield Columns(Kind.SPEED, f"speed of {a}", speed_unit, own, v, splines(v, self.count(len(self.axes))))
+                yield Columns(Kind.SPEED, f"speed of {a}", speed_unit, axis, v, splines(v, self.count(len(self.axes))))
                 acc = self.acceleration[a]
                 values = splines(acc, SHARES.spline_columns_many)
-                yield Columns(Kind.ACCELERATION, f"acceleration of {a}", "", own, acc, values)
+                yield Columns(Kind.ACCELERATION, f"acceleration of {a}", "", axis, acc, values)
         for name, u in self.drive.items():
             unit = self._unit("drive", name)
             yield Columns(Kind.DRIVE, name, unit, nothing, u, splines(u, self.count(len(self.drive))))
@@ -186,7 +188,8 @@ class _Builder:
             kind = Kind.TRAVEL_HISTORY if what == "position" else Kind.DRIVE_HISTORY
             axes = frozenset([name] if what == "position" else [])
             values = left[:, i]
-            if not self.settled and len(names) <= 2 * FEW:  # butterflies and loops that differ by side
+            # butterflies and loops that differ by side
+            if not self.settled and len(names) <= 2 * FEW:
                 values = np.column_stack([values, values * standardised(x)[:, None], values**2])
             yield Columns(kind, name, unit, axes, x, values)
             if what == "drive":
@@ -205,19 +208,21 @@ class _Builder:
         """Products of two signals of zero mean and unit variance."""
         signals: list[tuple[str, frozenset[str], np.ndarray]] = []
         for a in self.axes:
-            own = frozenset([a])
-            signals.append((a, own, self.position[a]))
-            signals.append((f"direction of {a}", own, self.direction[a]))
+            axis = frozenset([a])
+            signals.append((a, axis, self.position[a]))
+            signals.append((f"direction of {a}", axis, self.direction[a]))
             if not self.settled:
-                signals.append((f"speed of {a}", own, self.speed[a]))
-        if len(self.drive) <= FEW:  # their number grows with the square
+                signals.append((f"speed of {a}", axis, self.speed[a]))
+        # their number grows with the square
+        if len(self.drive) <= FEW:
             signals += [(u, frozenset(), x) for u, x in self.drive.items()]
         if self.ambient is not None:
             signals.append(("temperature", frozenset(), self.ambient))
         plain = {name: standardised(x) for name, _, x in signals}
         for (one, at, x), (other, of, _) in combinations(signals, 2):
             moving = {one, other} - set(self.axes)
-            if at and of and at != of and moving:  # of two axes the positions alone
+            # of two axes the positions alone
+            if at and of and at != of and moving:
                 continue
             yield Columns(Kind.PRODUCT, one, "", at | of, x, (plain[one] * plain[other])[:, None])
 

@@ -245,7 +245,7 @@ def _write_unit(
         "token": f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}",
         "inputs": unit.inputs, "outputs": unit.outputs, "status": unit.status, "settles": unit.settles,
         "initial_inputs": [v.attributes["start"] for v in unit.inputs], "variables": unit.variables,
-        "units": _units(unit.variables), "stop_time": repr(len(scenario.command(plant.model)) * plant.sample_time),
+        "units": _units(unit.variables), "stop_time": repr(len(scenario.bind(plant.model).samples) * plant.sample_time),
         "description": _described(scenario, unit),
         "foreign_types": FOREIGN_TYPES, "refused": REFUSED_3 if fmi == 3 else REFUSED_2,
     }  # fmt: skip

@@ -12,6 +12,7 @@ from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.online.online import FLOAT_SLACK
 from ctrlgen.firmware.online.vector_cases import Call, limiter_calls
 from ctrlgen.firmware.player.compression import Compression
+from ctrlgen.trajectory.inverse.clock import Clock, in_time
 
 VECTORS = 24  # reference vectors along the command
 BEYOND = 16  # far beyond every limit
@@ -63,7 +64,7 @@ def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str
     }  # fmt: skip
 
 
-def played_vectors(compression: Compression | None, samples: int, rate: float) -> dict[str, Any]:
+def played_vectors(compression: Compression | None, samples: int, clock: Clock) -> dict[str, Any]:
     """Samples of the player, the first and the last among them, times between them, and the tolerance of both.
 
     The tolerance is 16 roundings of the largest drive, since a processor may fuse products and sums.
@@ -77,7 +78,7 @@ def played_vectors(compression: Compression | None, samples: int, rate: float) -
         "played": [{"index": int(k), "drive": drive} for k, drive in zip(indices, drives, strict=True)],
         "played_unusable": UNUSABLE,
         "played_tolerance": max(rounding, float(np.finfo(np.float32).tiny)),
-        "timed": _timed(compression, indices, samples, rate),
+        "timed": _timed(compression, indices, samples, 1 / in_time(clock).sample_time),
     }
 
 

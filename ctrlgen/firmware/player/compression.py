@@ -7,10 +7,11 @@ two laps), and may differ from the command by `LENGTH_TOLERANCE` and `ANGLE_TOLE
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from pydantic import Field
 
 from ctrlgen.core.errors import SolverError
 from ctrlgen.core.units import same_dimension
@@ -18,6 +19,8 @@ from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.player.spline import Spline, fit
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import simulate
+from ctrlgen.reporting.result_file import Keys, Number
+from ctrlgen.trajectory.inverse.clock import in_time
 from ctrlgen.trajectory.playback import ANGLE_TOLERANCE, LENGTH_TOLERANCE
 from ctrlgen.trajectory.solution import Solution
 
@@ -64,25 +67,19 @@ BETWEEN = 4  # moments a sample at which the rates of a curve are looked at
 RATE_ROUNDING = 1e-3  # of the range of a rate: of drives in float over a quarter of a sample
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """One way to store the drive.
+class PlayerCandidate(Keys):
+    """One way in which the player's drives could be stored."""
 
-    `length` [m], `angle` [rad]: largest error of the followed signal; `drive`: largest difference from the solved drive.
-    `instructions`: estimate for one sample on a Cortex-M4F. `remark`: why it was chosen, or why not. Numbers are None
-    where there is no such curve.
-    """
-
-    kind: str
-    size: str
-    bytes: int | None
-    operations: int | None
-    instructions: int | None
-    length: float | None
-    angle: float | None
-    drive: float | None
-    chosen: bool
-    remark: str
+    kind: str = Field(description="Form: table, spline or Fourier series.")
+    size: str = Field(description="Its size in words.")
+    bytes: int | None = Field(description="Bytes of constant data.")
+    operations: int | None = Field(description="Operations of one call.")
+    instructions: int | None = Field(description="Instructions of one call, estimated.")
+    length: Number = Field(description="Largest position error that it causes [m].")
+    angle: Number = Field(description="Largest rotation error that it causes [rad].")
+    drive: Number = Field(description="Largest drive error, as a share of the drive's range.")
+    chosen: bool = Field(description="Whether it was generated.")
+    remark: str = Field(description="Why not, where it was not.")
 
 
 @dataclass(frozen=True)
@@ -97,10 +94,10 @@ class Compression:
     closed: bool
     low: np.ndarray
     high: np.ndarray
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[PlayerCandidate, ...]
 
     @property
-    def chosen(self) -> Candidate:
+    def chosen(self) -> PlayerCandidate:
         """The candidate that became the player."""
         return next(c for c in self.candidates if c.chosen)
 
@@ -131,7 +128,7 @@ def _compress(solution: Solution, real: Real, spline: Callable[[int], Spline | N
     bounds = _inward(solution.model, real)
     n, closed = len(solution.drive), solution.scenario.closed
 
-    def measured(curve: Curve) -> Candidate:
+    def measured(curve: Curve) -> PlayerCandidate:
         compression = Compression(real, curve, closed, *_kept(curve, bounds, real), ())
         values = compression.drives(np.arange(n))
         length, angle = _error(solution, values)
@@ -139,27 +136,37 @@ def _compress(solution: Solution, real: Real, spline: Callable[[int], Spline | N
             length = np.inf
         off = float(np.abs(values - solution.drive).max())
         cost = instructions(curve, int(np.isfinite([compression.low, compression.high]).sum()))
-        return Candidate(
-            curve.kind, _size(curve), curve.bytes(real), curve.operations, cost, length, angle, off, False, ""
+        return PlayerCandidate(
+            kind=curve.kind,
+            size=_size(curve),
+            bytes=curve.bytes(real),
+            operations=curve.operations,
+            instructions=cost,
+            length=length,
+            angle=angle,
+            drive=off,
+            chosen=False,
+            remark="",
         )
 
     table = SampleTable(np.clip(solution.drive, *bounds))
-    found: list[tuple[Curve | None, Candidate]] = [(table, measured(table))]
+    found: list[tuple[Curve | None, PlayerCandidate]] = [(table, measured(table))]
 
     cubic = _coarsest(spline, measured, table.bytes(real))
-    found.append(cubic or (None, _none("cubic", "no shorter than the table within the tolerance")))
+    found.append(cubic or (None, _no_curve("cubic", "no shorter than the table within the tolerance")))
     usable = [(curve, c) for curve, c in found if curve is not None and _within(c) and _affordable(c)]
     curve, best = min(usable, key=lambda pair: pair[1].bytes or 0) if usable else found[0]
     assert curve is not None
-    candidates = tuple(
-        replace(c, chosen=c is best, remark=c.remark or _remark(c, best, bool(usable))) for _, c in found
-    )
-    return Compression(real, curve, closed, *_kept(curve, bounds, real), candidates)
+    candidates = []
+    for _, c in found:
+        told = {"chosen": c is best, "remark": c.remark or _remark(c, best, bool(usable))}
+        candidates.append(c.model_copy(update=told))
+    return Compression(real, curve, closed, *_kept(curve, bounds, real), tuple(candidates))
 
 
 def _coarsest(
-    spline: Callable[[int], Spline | None], measured: Callable[[Curve], Candidate], most: int
-) -> tuple[Spline, Candidate] | None:
+    spline: Callable[[int], Spline | None], measured: Callable[[Curve], PlayerCandidate], most: int
+) -> tuple[Spline, PlayerCandidate] | None:
     """The spline of the coarsest drive tolerance that keeps the tolerance of what is followed; None where it needs `most` bytes.
 
     Tolerances are refined by decades until one serves, then the coarsest that serves is found by bisection.
@@ -204,7 +211,7 @@ def _error(solution: Solution, drives: np.ndarray) -> tuple[float, float]:
     else:
         wanted = np.vstack([command, command[-1:]])
     try:
-        reached = simulate(m, drives, scenario.sample_time or 1.0, start.x[0], start.z[0]).signals[role]
+        reached = simulate(m, drives, in_time(scenario.clock).sample_time, start.x[0], start.z[0]).signals[role]
     except SolverError:
         return np.inf, np.inf
     worst = np.abs(reached - wanted).max(axis=0)
@@ -218,7 +225,7 @@ def _error(solution: Solution, drives: np.ndarray) -> tuple[float, float]:
 
 def _keeps_rates(solution: Solution, compression: Compression) -> bool:
     """Whether the drives, looked at between samples too, change no faster than they may; where those of the solution do not either."""
-    m, n, h = solution.model, len(solution.drive), solution.scenario.sample_time or 1.0
+    m, n, h = solution.model, len(solution.drive), in_time(solution.scenario.clock).sample_time
     if not m.rate_limits:
         return True
     k = np.repeat(np.arange(n), BETWEEN)
@@ -231,7 +238,7 @@ def _keeps_rates(solution: Solution, compression: Compression) -> bool:
     return bool(np.all(change >= low - rounded) and np.all(change <= high + rounded))
 
 
-def _within(c: Candidate) -> bool:
+def _within(c: PlayerCandidate) -> bool:
     return (
         c.length is not None
         and c.angle is not None
@@ -240,11 +247,11 @@ def _within(c: Candidate) -> bool:
     )
 
 
-def _affordable(c: Candidate) -> bool:
+def _affordable(c: PlayerCandidate) -> bool:
     return c.instructions is not None and c.instructions <= INSTRUCTION_BUDGET
 
 
-def _remark(c: Candidate, best: Candidate, usable: bool) -> str:
+def _remark(c: PlayerCandidate, best: PlayerCandidate, usable: bool) -> str:
     """Why this candidate was chosen, or why not."""
     if c is best:
         return "fewest bytes" if usable else "as solved; nothing is within the tolerance"
@@ -253,8 +260,9 @@ def _remark(c: Candidate, best: Candidate, usable: bool) -> str:
     return f"more bytes than the {best.kind}" if _affordable(c) else f"more than {INSTRUCTION_BUDGET} instructions"
 
 
-def _none(kind: str, remark: str) -> Candidate:
-    return Candidate(kind, "", None, None, None, None, None, None, False, remark)
+def _no_curve(kind: str, remark: str) -> PlayerCandidate:
+    numbers = dict.fromkeys(("bytes", "operations", "instructions", "length", "angle", "drive"))
+    return PlayerCandidate(kind=kind, size="", **numbers, chosen=False, remark=remark)
 
 
 def _size(curve: Curve) -> str:

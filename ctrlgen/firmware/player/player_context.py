@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from ctrlgen.firmware.c.templates import comment
-from ctrlgen.firmware.player.compression import INSTRUCTION_BUDGET, Candidate, Compression, SampleTable
+from ctrlgen.firmware.player.compression import INSTRUCTION_BUDGET, Compression, PlayerCandidate, SampleTable
 from ctrlgen.firmware.player.spline import Spline
+from ctrlgen.trajectory.inverse.clock import in_time
 from ctrlgen.trajectory.solution import Solution
 from ctrlgen.version import __version__
 
@@ -37,11 +38,11 @@ def player_context(solution: Solution, compression: Compression, prefix: str) ->
         "chosen": compression.chosen,
         "lines": [_line(c) for c in compression.candidates],
         "budget": INSTRUCTION_BUDGET,
-        "rate": 1 / (solution.scenario.sample_time or 1.0),
+        "rate": 1 / in_time(solution.scenario.clock).sample_time,
     }
 
 
-def _line(c: Candidate) -> str:
+def _line(c: PlayerCandidate) -> str:
     """One candidate, as the header's comment lists it."""
     verdict = f"chosen: {c.remark}" if c.chosen else c.remark
     if c.bytes is None or c.length is None:

@@ -1,4 +1,4 @@
-"""A commanded motion: samples of a target with their derivatives by time."""
+"""A commanded motion: samples of a target with as many derivatives by time as the drive follows."""
 
 from __future__ import annotations
 
@@ -9,44 +9,45 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Motion:
-    """`position` (n, channels) [SI] at the samples, and `derivatives` (order, n, channels) [SI, by time], the first one first."""
+    """`position` (n, channels) [SI] at the samples, and `derivatives` (order, n, channels) [SI, by time], the first one first: of order
+    zero for a stage in balance. Of a `closed` motion the first sample follows the last one."""
 
     position: np.ndarray
     derivatives: np.ndarray
+    closed: bool
+
+    @classmethod
+    def of_samples(cls, position: np.ndarray, closed: bool = False) -> Motion:
+        """The samples (n, channels) alone."""
+        return cls(position, np.zeros((0, *position.shape)), closed)
 
     def __len__(self) -> int:
         return len(self.position)
 
     def __add__(self, shift: np.ndarray) -> Motion:
         """The motion shifted by a vector (channels,)."""
-        return Motion(self.position + shift, self.derivatives)
+        return Motion(self.position + shift, self.derivatives, self.closed)
+
+    def scaled(self, share: float) -> Motion:
+        """The motion scaled about its middle."""
+        position = self.middle + share * (self.position - self.middle)
+        return Motion(position, share * self.derivatives, self.closed)
+
+    @property
+    def middle(self) -> np.ndarray:
+        """(channels,) halfway between the ends of each channel."""
+        return (self.position.min(axis=0) + self.position.max(axis=0)) / 2
+
+    @property
+    def following(self) -> np.ndarray:
+        """(n,) the sample after each: the first one after the last of a closed motion, the last one again of an open one."""
+        n = len(self)
+        return np.append(np.arange(1, n), 0 if self.closed else n - 1)
 
     def at(self, chosen: np.ndarray) -> Motion:
         """Some of its samples."""
-        return Motion(self.position[chosen], self.derivatives[:, chosen])
-
-    def held(self) -> Motion:
-        """With one more sample, at rest where it ends."""
-        still = np.zeros((len(self.derivatives), 1, self.position.shape[1]))
-        ends = np.vstack([self.position, self.position[-1:]])
-        return Motion(ends, np.concatenate([self.derivatives, still], axis=1))
+        return Motion(self.position[chosen], self.derivatives[:, chosen], self.closed)
 
     def stacked(self) -> np.ndarray:
         """(n, channels, order + 1): each channel with its derivatives."""
         return np.moveaxis(np.concatenate([self.position[None], self.derivatives]), 0, -1)
-
-
-Command = (
-    np.ndarray | Motion
-)  # what is followed: samples (n, channels) [SI], with derivatives where the device has inertia
-
-
-def samples_of(command: Command) -> np.ndarray:
-    """The samples (n, channels) [SI]."""
-    return command.position if isinstance(command, Motion) else command
-
-
-def scaled(command: Command, share: float, middle: np.ndarray) -> Command:
-    """The path scaled about a point (channels,)."""
-    position = middle + share * (samples_of(command) - middle)
-    return Motion(position, share * command.derivatives) if isinstance(command, Motion) else position

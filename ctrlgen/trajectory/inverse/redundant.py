@@ -26,9 +26,9 @@ from itertools import combinations
 import casadi as ca
 import numpy as np
 
-from ctrlgen.model.allocation import INDEPENDENT, Allocation, allocate, effort_weights
+from ctrlgen.model.allocation import INDEPENDENT, Allocation, effort_weights
 from ctrlgen.model.model import Model
-from ctrlgen.trajectory.inverse.balanced import PERIODS, InverseTrajectory, PathInverse
+from ctrlgen.trajectory.inverse.clock import Settled
 from ctrlgen.trajectory.inverse.drive_programmes import (
     Refutation,
     diagonal,
@@ -38,9 +38,8 @@ from ctrlgen.trajectory.inverse.drive_programmes import (
     limited_rows,
     polished,
 )
-from ctrlgen.trajectory.inverse.inertial import InertialInverse
-from ctrlgen.trajectory.inverse.motion import Command, Motion, samples_of
-from ctrlgen.trajectory.inverse.sampled import SampledTrajectory
+from ctrlgen.trajectory.inverse.motion import Motion
+from ctrlgen.trajectory.inverse.path_inverse import PERIODS, InverseTrajectory, PathInverse
 from ctrlgen.trajectory.inverse.violations import NEGLIGIBLE, violations
 
 COARSE = 100  # samples along a path that decide for most whether its rates can be kept
@@ -55,106 +54,78 @@ class Wanted(Enum):
     ANY = "any that keep the limits"
 
 
-class LeastEffortInverse:
-    """The inverse of a `model` with more drives than axes along paths of its signal `follow`: `inner` is that of the forces."""
+class RedundantInverse(PathInverse):
+    """The inverse of a `model` with more drives than axes: `inner` is that of the forces, `allocation` the drives of least effort."""
 
-    def __init__(self, model: Model, inner: PathInverse | InertialInverse, allocation: Allocation) -> None:
-        self.model, self.inner, self.allocation = model, inner, allocation
-        self.sample_time = inner.sample_time
+    def __init__(self, model: Model, inner: PathInverse, allocation: Allocation) -> None:
+        super().__init__(model, inner.follow, inner.clock)
+        self.inner, self.allocation = inner, allocation
 
     @property
-    def without_memories(self) -> LeastEffortInverse:
+    def without_memories(self) -> RedundantInverse:
         """The same of the device without the effects that have memories."""
         plain = self.inner.without_memories
-        return self if plain is self.inner else LeastEffortInverse(self.model, plain, self.allocation)
+        return self if plain is self.inner else RedundantInverse(self.model, plain, self.allocation)
 
-    @property
-    def _timed(self) -> bool:
-        """Whether the samples act on one another, by the rates of drives."""
-        return self.sample_time is not None and bool(self.model.rate_limits)
+    def trajectory(self, motion: Motion, periods: int = PERIODS) -> InverseTrajectory:
+        """The drives break limits only where none keep them."""
+        return self._allocated(self.inner.trajectory(motion, periods), motion)
 
-    def trajectory(self, command: Command, closed: bool, periods: int = PERIODS) -> InverseTrajectory:
-        """What a path takes; the drives break limits only where none keep them."""
-        return self._allocated(self._forces(command, closed, periods), samples_of(command)[0], closed)
+    def held(self, motion: Motion) -> InverseTrajectory:
+        """The drives of the held forces."""
+        return self._allocated(self.inner.held(motion), motion)
 
-    def _forces(self, command: Command, closed: bool, periods: int) -> InverseTrajectory:
-        """What a path takes, with forces instead of drives."""
-        if isinstance(self.inner, InertialInverse):
-            return self.inner.trajectory(command, closed, periods)
-        assert isinstance(command, np.ndarray)  # of devices in balance only samples are followed
-        return self.inner.trajectory(command, closed, periods)
-
-    def sampled(self, command: Motion, closed: bool) -> SampledTrajectory:
-        """The drives that lead a device with inertia along the samples of `command` while each is held. Raises SolverError."""
-        assert isinstance(self.inner, InertialInverse)
-        found = self.inner.sampled(command, closed)
-        return replace(found, u=self.needed(found, command, closed).u)
-
-    def needed(self, found: SampledTrajectory, command: Motion, closed: bool) -> InverseTrajectory:
-        """Sampled forces, or drives, as what the motion takes."""
-        forces = (
-            found.u
-            if found.u.shape[1] == len(self.model.axes)
-            else np.einsum("kij,kj->ki", self._slopes(found.z), found.u)
-        )
-        begin = InverseTrajectory(found.x, found.z, forces, forces[0], True)
-        return self._allocated(begin, command.position[0], closed)
-
-    def displacements(self, command: Command, closed: bool) -> np.ndarray:
-        """z (n, n_axes) along a path, whatever the drives."""
-        return self._forces(command, closed, PERIODS).z
+    def displacements(self, motion: Motion) -> np.ndarray:
+        """Those of the forces."""
+        return self.inner.displacements(motion)
 
     def at_rest(self, target: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """x, z and u of the equilibrium at `target`; not finite where there is none."""
+        """With the drives of least effort."""
         x, z, f = self.inner.at_rest(target)
         return x, z, self.drives(z[None], f[None])[0]
 
     def slope(self, target: np.ndarray) -> np.ndarray:
-        """(n_axes, channels) d displacement / d target at rest there."""
+        """That of the forces."""
         return self.inner.slope(target)
 
     def keeps_limits(
-        self,
-        command: Command,
-        closed: bool,
-        chosen: np.ndarray | None = None,
-        margin: float = 0.0,
-        periods: int = PERIODS,
+        self, motion: Motion, chosen: np.ndarray | None = None, margin: float = 0.0, periods: int = PERIODS
     ) -> bool:
-        """Whether `command` can be followed with a `margin`, a share of each limit; where nothing but the samples matters, judged by
-        those `chosen`; with limits on rates and samples `chosen`, paths within a thousandth or so of a limit are taken as beyond it."""
-        if self._timed and chosen is not None and len(command) >= 2 * COARSE:
-            return self._evidently_keeps(command, closed, margin, periods)
+        """By the samples `chosen` where nothing but the samples matters; with limits on rates and samples `chosen`, paths within a
+        thousandth or so of a limit are taken as beyond it."""
+        if self._rate_bounds(margin) is not None and chosen is not None and len(motion) >= 2 * COARSE:
+            return self._evidently_keeps(motion, margin, periods)
         if self.model.rate_limits or self._facets is None:
-            found = self._forces(command, closed, periods)
-            found = self._allocated(found, samples_of(command)[0], closed, margin, Wanted.ANY)
-            return found.solved and not found.violations(self.model, self.sample_time, closed, margin)
-        if isinstance(command, np.ndarray) and isinstance(self.inner, PathInverse) and not self.inner.remembers:
-            x, z, f = self.inner.equilibria(command if chosen is None else command[chosen])
-        else:
-            found = self._forces(command, closed, periods)
-            x, z, f = found.x, found.z, found.u
-            if not found.solved:
+            needed = self._allocated(self.inner.trajectory(motion, periods), motion, margin, Wanted.ANY)
+            return needed.solved and not needed.violations(self.model, margin)
+        separate = self.inner.equilibria_at(motion if chosen is None else motion.at(chosen))
+        if separate is None:
+            needed = self.inner.trajectory(motion, periods)
+            if not needed.solved:
                 return False
+            separate = needed.x, needed.z, needed.u
+        x, z, f = separate
         u = np.clip(self._closed_form(z, f), *self._bounds(margin))
         return self._attainable(f, margin) and not violations(self.model, x, z, u, margin)
 
-    def _evidently_keeps(self, command: Command, closed: bool, margin: float, periods: int) -> bool:
+    def _evidently_keeps(self, motion: Motion, margin: float, periods: int) -> bool:
         """Whether drives that join those of few samples keep every limit. What these samples take is looked at before all others are."""
-        n = len(command) if closed else len(command) + 1
+        closed = motion.closed
+        n = len(motion) if closed else len(motion) + 1
         k = np.unique(np.linspace(0, n - 1, COARSE).round().astype(int))
-        few = self._held_at(command, closed, k)
+        few = self._pushed_at(motion, k)
         if few is not None and not self._within_reach(*few, margin):
             return False
         bounds, rates, gaps = self._bounds(margin), self._rate_bounds(margin), _gaps(k, n, closed)
+        assert rates is not None  # asked for by `keeps_limits`
         coarse = None
         if few is not None and np.any(_out(self._closed_form(*few), bounds, rates, gaps)):
             coarse = self._coarse(self._slopes(few[0]), few[1], bounds, rates, gaps)
             if coarse is None:
                 return False
-        found = self._forces(command, closed, periods)
-        z, f = self._held(found, samples_of(command)[0], closed)
-        if not found.solved or not self._within_reach(z, f, margin):
+        needed = self.inner.trajectory(motion, periods)
+        z, f = self._pushed(needed, motion)
+        if not needed.solved or not self._within_reach(z, f, margin):
             return False
         u, B = self._closed_form(z, f), self._slopes(z)
         if np.any(_out(u, bounds, rates, _gaps(np.arange(n), n, closed))):
@@ -163,48 +134,44 @@ class LeastEffortInverse:
             if joined is None:
                 return False
             u = joined
-        return not _with_held(found, u, closed).violations(self.model, self.sample_time, closed, margin)
+        return not _with_drives(needed, u).violations(self.model, margin)
 
     def _allocated(
-        self, found: InverseTrajectory, first: np.ndarray, closed: bool, margin: float = 0.0, wanted: Wanted = Wanted.LEAST
-    ) -> InverseTrajectory:  # fmt: skip
-        """`found` with drives instead of forces."""
-        if not np.all(np.isfinite(found.u)):
-            u = np.full((len(found.u), self.model.u.numel()), np.nan)
-            return replace(found, u=u, u_start=u[0])
-        if self.sample_time is None:
-            u = self.drives(found.z, found.u, margin=margin, wanted=wanted)
-            return replace(found, u=u, u_start=u[0])
-        z, f = self._held(found, first, closed)
-        return _with_held(found, self.drives(z, f, closed, margin, wanted), closed)
+        self, needed: InverseTrajectory, motion: Motion, margin: float = 0.0, wanted: Wanted = Wanted.LEAST
+    ) -> InverseTrajectory:
+        """`needed` with drives instead of forces."""
+        if not np.all(np.isfinite(needed.u)):
+            u = np.full((len(needed.u), self.model.u.numel()), np.nan)
+            return replace(needed, u=u, u_start=u[0])
+        if isinstance(self.clock, Settled):
+            u = self.drives(needed.z, needed.u, margin=margin, wanted=wanted)
+            return replace(needed, u=u, u_start=u[0])
+        z, f = self._pushed(needed, motion)
+        return _with_drives(needed, self.drives(z, f, needed.closed, margin, wanted))
 
-    def _held(self, found: InverseTrajectory, first: np.ndarray, closed: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Where each held drive leads, and the force it pushes with; before an open path stands that which holds its `first` target."""
-        z = np.vstack([found.z[1:], found.z[:1] if closed else found.z[-1:]])
-        if closed:
-            return z, found.u
-        _, z_start, f_start = self.inner.at_rest(first)
-        return np.vstack([z_start, z]), np.vstack([f_start, found.u])
+    def _pushed(self, needed: InverseTrajectory, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+        """Where each held drive leads, and the force it pushes with; before an open path stands that which holds its first target."""
+        z = needed.z[motion.following]
+        if motion.closed:
+            return z, needed.u
+        _, z_start, f_start = self.inner.at_rest(motion.position[0])
+        return np.vstack([z_start, z]), np.vstack([f_start, needed.u])
 
-    def _held_at(self, command: Command, closed: bool, places: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    def _pushed_at(self, motion: Motion, places: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
         """The same at some `places` alone; None where these take all samples."""
-        begun = 0 if closed else 1
-        if isinstance(self.inner, InertialInverse):
-            found = self.inner.forces_at(command, closed, places[begun:] - begun)
-        else:
-            assert isinstance(command, np.ndarray)  # of devices in balance only samples are followed
-            found = self.inner.forces_at(command, closed, places[begun:] - begun)
-        if found is None or closed:
-            return found
-        _, z_start, f_start = self.inner.at_rest(samples_of(command)[0])
-        return np.vstack([z_start, found[0]]), np.vstack([f_start, found[1]])
+        if motion.closed:
+            return self.inner.leads_to(motion, places)
+        later = self.inner.leads_to(motion, places[1:] - 1)
+        if later is None:
+            return None
+        _, z_start, f_start = self.inner.at_rest(motion.position[0])
+        return np.vstack([z_start, later[0]]), np.vstack([f_start, later[1]])
 
     def drives(
         self, z: np.ndarray, f: np.ndarray, closed: bool = False, margin: float = 0.0, wanted: Wanted = Wanted.LEAST
     ) -> np.ndarray:  # fmt: skip
         """(n, n_u) the drives that push with the forces `f` (n, n_axes) at the displacements `z`, in time one after the other."""
-        n, u, bounds = len(f), self._closed_form(z, f), self._bounds(margin)
-        rates = self._rate_bounds(margin) if self._timed else None
+        n, u, bounds, rates = len(f), self._closed_form(z, f), self._bounds(margin), self._rate_bounds(margin)
         out = _out(u, bounds, rates, _gaps(np.arange(n), n, closed))
         chosen = out if np.all(np.isfinite(u)) else np.zeros(n, dtype=bool)
         if chosen.any():
@@ -264,10 +231,12 @@ class LeastEffortInverse:
     def _bounds(self, margin: float) -> tuple[np.ndarray, np.ndarray]:
         return _narrowed(self.model.u_bounds, margin)
 
-    def _rate_bounds(self, margin: float) -> tuple[np.ndarray, np.ndarray]:
-        """Of the change from one sample to the next."""
+    def _rate_bounds(self, margin: float) -> tuple[np.ndarray, np.ndarray] | None:
+        """Of the change from one sample to the next; None where the samples do not act on one another so."""
+        if isinstance(self.clock, Settled) or not self.model.rate_limits:
+            return None
         low, high = _narrowed(self.model.rate_bounds, margin)
-        return low * (self.sample_time or 0.0), high * (self.sample_time or 0.0)
+        return low * self.clock.sample_time, high * self.clock.sample_time
 
     def _solved(
         self, B: np.ndarray, f: np.ndarray, begin: np.ndarray, bounds: tuple[np.ndarray, np.ndarray],
@@ -350,9 +319,9 @@ def _out(
     return out
 
 
-def _with_held(found: InverseTrajectory, u: np.ndarray, closed: bool) -> InverseTrajectory:
-    """`found` with the held drives `u`, of an open path that before it among them."""
-    return replace(found, u=u, u_start=u[-1]) if closed else replace(found, u=u[1:], u_start=u[0])
+def _with_drives(needed: InverseTrajectory, u: np.ndarray) -> InverseTrajectory:
+    """`needed` with the held drives `u`, of an open path that before it among them."""
+    return replace(needed, u=u, u_start=u[-1]) if needed.closed else replace(needed, u=u[1:], u_start=u[0])
 
 
 def _narrowed(bounds: tuple[np.ndarray, np.ndarray], margin: float) -> tuple[np.ndarray, np.ndarray]:
@@ -362,19 +331,3 @@ def _narrowed(bounds: tuple[np.ndarray, np.ndarray], margin: float) -> tuple[np.
     size = np.where(both, high - low, np.where(np.isfinite(low), abs(low), abs(high)))
     by = margin * np.where(np.isfinite(size), size, 0.0)
     return low + by, high - by
-
-
-def path_inverse(model: Model, follow: str, sample_time: float | None) -> PathInverse | LeastEffortInverse:
-    """The inverse of a model without inertia along paths. Raises InputError where the drives do not push the axes independently."""
-    if not model.redundant:
-        return PathInverse(model, follow, sample_time)
-    allocation = allocate(model)
-    return LeastEffortInverse(model, PathInverse(allocation.ganged, follow, sample_time), allocation)
-
-
-def motion_inverse(model: Model, follow: str, sample_time: float) -> InertialInverse | LeastEffortInverse:
-    """The same of a model with inertia."""
-    if not model.redundant:
-        return InertialInverse(model, follow, sample_time)
-    allocation = allocate(model)
-    return LeastEffortInverse(model, InertialInverse(allocation.ganged, follow, sample_time), allocation)

@@ -1,12 +1,17 @@
-"""What budget.json holds, key by key; `ctrlgen/reporting/schemas/budget.schema.json` is written from it."""
+"""What budget.json holds of an error budget, key by key."""
 
 from __future__ import annotations
 
 from typing import Literal
 
+import numpy as np
 from pydantic import Field
 
-from ctrlgen.reporting.result_file import ChannelGroup, Keys, Number, Origin
+from ctrlgen.budget.contributors import BudgetLine, Group
+from ctrlgen.budget.error_budget import TOLERANCE, Agreement, ErrorBudget
+from ctrlgen.budget.limits import Safety
+from ctrlgen.core.units import difference, from_si
+from ctrlgen.reporting.result_file import ChannelGroup, Keys, Number, Origin, origin
 
 
 class GroupEntry(ChannelGroup):
@@ -131,3 +136,142 @@ class BudgetRecord(Origin):
     band: dict[str, list[float]] = Field(
         description="Combined standard uncertainty at every sample, by 'channel [unit]', in the unit of its group."
     )
+
+
+def budget_record(budget: ErrorBudget) -> BudgetRecord:
+    """Plain numbers in the stated units; nothing that changes from run to run with one seed."""
+    solution = budget.solution
+    scenario, stated = solution.scenario, budget.uncertainties
+    finer = {} if budget.model_difference is None else budget.model_difference.finer.inputs
+    inputs = {**scenario.digest, **{name: read.sha256 for name, read in (*stated.inputs.items(), *finer.items())}}
+    return BudgetRecord(
+        **origin(inputs, budget.seed if budget.draws else None, budget.notes),
+        scenario=scenario.name,
+        title=scenario.file.title,
+        device=solution.model.name,
+        signal=scenario.file.follow,
+        samples=len(solution.command),
+        coverage_factor=budget.factor,
+        groups=[_group(budget, g) for g in budget.groups],
+        contributors=[_contributor(budget, line, rank) for rank, line in enumerate(budget.lines, 1)],
+        model_difference=_model_difference(budget),
+        draws=budget.draws,
+        agreement=[_agreement(a) for a in budget.agreements],
+        reasons=list(budget.reasons),
+        probability=budget.probability,
+        limits=[_safety(budget, s) for s in budget.safeties],
+        broken=budget.broken,
+        band=_by_channel(budget, budget.combined),
+    )
+
+
+def _group(budget: ErrorBudget, g: Group) -> GroupEntry:
+    signal = budget.solution.model.signals[budget.solution.scenario.file.follow]
+    return GroupEntry(
+        name=g.name,
+        unit=g.unit,
+        channels=[signal.channels[i] for i in g.channels],
+        combined_peak=g.shown(budget.peak(g)),
+        combined_rms=g.shown(budget.rms(g)),
+        band95=g.shown(budget.factor * budget.peak(g)),
+    )
+
+
+def _contributor(budget: ErrorBudget, line: BudgetLine, rank: int) -> ContributorEntry:
+    effects = [
+        ByGroup(
+            group=g.name,
+            sensitivity=g.shown(line.sensitivity[g.name]),
+            peak=g.shown(line.peak[g.name]),
+            rms=g.shown(line.rms[g.name]),
+            combined_if_halved=g.shown(line.halved[g.name]),
+            second_order=g.shown(line.alone[g.name]) if budget.draws else None,
+        )
+        for g in budget.groups
+    ]
+    return ContributorEntry(
+        rank=rank,
+        name=line.name,
+        called=line.called,
+        sd=line.sd,
+        source=line.source,
+        per=line.per,
+        share=line.share,
+        effects=effects,
+    )
+
+
+def _model_difference(budget: ErrorBudget) -> ModelDifferenceEntry | None:
+    """How the finer model moves; None without one."""
+    if budget.model_difference is None:
+        return None
+    effects = [
+        DifferenceByGroup(group=g.name, peak=g.shown(budget.difference_peak(g)), rms=g.shown(budget.difference_rms(g)))
+        for g in budget.groups
+    ]
+    return ModelDifferenceEntry(
+        kind="model difference",
+        device=budget.model_difference.finer.model.name,
+        effects=effects,
+        deviation=_by_channel(budget, budget.model_difference.deviation),
+    )
+
+
+def _by_channel(budget: ErrorBudget, values: np.ndarray) -> dict[str, list[float]]:
+    """'channel [unit]' -> its column of (n, channels) [SI], in the unit of its group."""
+    channels = budget.solution.model.signals[budget.solution.scenario.file.follow].channels
+    return {
+        f"{channels[i]} [{g.unit}]": difference(values[:, i], g.unit).tolist()
+        for g in budget.groups
+        for i in g.channels
+    }
+
+
+def _agreement(a: Agreement) -> AgreementEntry:
+    return AgreementEntry(
+        group=a.group.name,
+        linear=a.group.shown(a.linear),
+        drawn=a.group.shown(a.drawn),
+        difference=a.difference,
+        difference_of_interval=a.difference_of_interval,
+        mean=a.group.shown(a.mean),
+        tolerance=TOLERANCE,
+        passed=a.passed,
+    )
+
+
+def _safety(budget: ErrorBudget, s: Safety) -> SafetyEntry:
+    unit, solution = s.limit.unit, budget.solution
+    return SafetyEntry(
+        limit=s.limit.name,
+        label=s.limit.label,
+        channel=s.channel,
+        side=s.side,
+        sample=s.sample,
+        time_s=float(solution.trace.time[s.sample]) if solution.scenario.sample_time else None,
+        unit=unit,
+        bound=float(from_si(s.bound, unit)),
+        margin_unit=margin_unit(unit),
+        margin=float(difference(s.margin, unit)),
+        sd=float(difference(s.sd, unit)),
+        margin_at_probability=float(difference(s.kept, unit)),
+        margin_drawn=None if s.drawn is None else float(difference(s.drawn, unit)),
+        probability=s.probability,
+        kept=s.kept >= 0,
+    )
+
+
+def margin_unit(unit: str) -> str:
+    """The unit of a difference of two values in `unit`."""
+    return {"degC": "K", "degF": "delta_degF"}.get(unit, unit)
+
+
+def safety_sentence(s: Safety, probability: float) -> str:
+    """Such as 'actuator temperature keeps 550 degC with 99.9 %: margin 3.1 K'."""
+    unit, likely = s.limit.unit, f"{100 * probability:.10g} %"
+    bound = f"{from_si(s.bound, unit):.5g} {unit}"
+    left = f"{abs(difference(s.kept, unit)):.3g} {margin_unit(unit)}"
+    if s.kept >= 0:
+        return f"{s.limit.label} keeps {bound} with {likely}: margin {left}"
+    does = f"it does with {100 * s.probability:.3g} %"
+    return f"{s.limit.label} does not keep {bound} with {likely}: short by {left}; {does}"

@@ -1,4 +1,4 @@
-"""What fastest.json holds, key by key; `ctrlgen/reporting/schemas/fastest.schema.json` is written from it."""
+"""What fastest.json holds of a fastest motion, key by key."""
 
 from __future__ import annotations
 
@@ -6,7 +6,11 @@ from typing import Literal
 
 from pydantic import Field
 
-from ctrlgen.reporting.result_file import Keys, Number, Origin
+from ctrlgen.core.units import difference, from_si, same_dimension
+from ctrlgen.path_timing.binding import Binding
+from ctrlgen.path_timing.fastest import FastestPath
+from ctrlgen.path_timing.repetition import Repetition
+from ctrlgen.reporting.result_file import Keys, Number, Origin, origin
 
 
 class Times(Keys):
@@ -76,3 +80,64 @@ class FastestRecord(Origin):
     law: LawEntry = Field(description="The law of time.")
     set_point_shares: list[float] = Field(description="Share of the path that is behind at each set-point.")
     repetition: RepetitionEntry | None = Field(description="What can be repeated at --frequency; null without it.")
+
+
+def fastest_record(path: FastestPath) -> FastestRecord:
+    """Plain numbers in the stated units."""
+    scenario, law = path.scenario, zip(("time_s", "share", "speed", "bound"), path.optimum.law(), strict=True)
+    signal = path.solution.model.signals[scenario.file.follow]
+    between = zip(signal.channels, map(small_unit, signal.units), path.between, strict=True)
+    return FastestRecord(
+        **origin(scenario.digest, None, path.notes),
+        scenario=scenario.name,
+        title=scenario.file.title,
+        device=path.solution.model.name,
+        signal=scenario.file.follow,
+        closed=path.curve.closed,
+        sample_rate_hz=1 / path.sample_time,
+        set_points=len(path.solution.command),
+        times=Times(
+            stated=path.given,
+            own_law=path.stated,
+            even_speed=path.even,
+            fastest=path.duration,
+            continuous=path.optimum.duration,
+        ),
+        bindings=[_binding(b) for b in path.bindings],
+        between_set_points={f"{c} [{u}]": float(difference(v, u)) for c, u, v in between},
+        law=LawEntry(**{name: values.tolist() for name, values in law}),
+        set_point_shares=path.share.tolist(),
+        repetition=None if path.repetition is None else _repetition(path.repetition),
+    )
+
+
+def _binding(b: Binding) -> BindingEntry:
+    limit = b.side.limit
+    return BindingEntry(
+        limit=limit.name,
+        label=limit.label,
+        channel=b.side.name,
+        side="upper" if b.side.upper else "lower",
+        bound=float(from_si(b.side.bound, limit.unit)),
+        unit=limit.unit,
+        time_s=b.time,
+        share_of_time=b.share_of_time,
+        runs=list(b.runs),
+    )
+
+
+def _repetition(r: Repetition) -> RepetitionEntry:
+    return RepetitionEntry(
+        frequency_hz=r.frequency,
+        scale=r.scale,
+        scale_even_speed=r.even,
+        scale_set_points=r.sampled,
+        diameter=r.size(r.scale),
+        diameter_even_speed=r.size(r.even),
+        diameter_unit=r.unit,
+    )
+
+
+def small_unit(unit: str) -> str:
+    """nm and urad, in which errors are told."""
+    return next((small for small in ("nm", "urad") if same_dimension(unit, small)), unit)

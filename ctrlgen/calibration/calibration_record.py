@@ -1,10 +1,17 @@
-"""What constants.json holds, key by key; `ctrlgen/reporting/schemas/constants.schema.json` is written from it."""
+"""What constants.json holds of a calibration, key by key."""
 
 from __future__ import annotations
 
+import numpy as np
 from pydantic import Field
 
-from ctrlgen.reporting.result_file import Keys, Number, Origin
+from ctrlgen.budget.error_budget import ErrorBudget
+from ctrlgen.calibration.calibrate import CalibratedConstant, Calibration, ReadingError
+from ctrlgen.calibration.constants_files import device_hash
+from ctrlgen.core.units import difference, from_si
+from ctrlgen.reporting.result_file import Keys, Number, Origin, origin
+
+Budgets = tuple[ErrorBudget, ErrorBudget] | None  # before and after
 
 
 class ConstantEntry(Keys):
@@ -61,3 +68,55 @@ class CalibrationRecord(Origin):
     channels: list[ChannelEntry] = Field(description="One entry an observed channel.")
     scenario: str | None = Field(description="Scenario of the budgets; null without --scenario.")
     budget: list[PathEntry] = Field(description="One entry a kind of unit; empty without --scenario.")
+
+
+def calibration_record(calibration: Calibration, budgets: Budgets = None) -> CalibrationRecord:
+    """Plain numbers in the stated units; of a scenario where there are `budgets`."""
+    inputs = {name: read.sha256 for name, read in calibration.inputs.items()}
+    if budgets is not None:
+        inputs |= budgets[0].solution.scenario.digest
+    sds = np.sqrt(np.diag(calibration.covariance))
+    return CalibrationRecord(
+        **origin(inputs, None, calibration.notes),
+        device=calibration.device.name,
+        device_hash=f"{device_hash(calibration):08x}",
+        recording=calibration.recording.title,
+        constants=[_constant(row) for row in calibration.constants],
+        correlation=(calibration.covariance / np.outer(sds, sds)).tolist(),
+        channels=[_channel(error) for error in calibration.errors],
+        scenario=None if budgets is None else budgets[0].solution.scenario.name,
+        budget=[] if budgets is None else _path(*budgets),
+    )
+
+
+def _constant(row: CalibratedConstant) -> ConstantEntry:
+    c = row.constant
+
+    def shown(si: float) -> float:
+        return float(from_si(si, c.unit))
+
+    return ConstantEntry(
+        name=c.name,
+        path=c.path,
+        unit=c.unit,
+        value=shown(row.value),
+        value_si=row.value,
+        interval95=(shown(row.interval[0]), shown(row.interval[1])),
+        sd_si=row.sd,
+        default=shown(c.default),
+        bounds=(shown(c.low), shown(c.high)),
+        determined=row.determined,
+        remark=row.remark,
+    )
+
+
+def _channel(error: ReadingError) -> ChannelEntry:
+    before, after, noise = (float(difference(v, error.unit)) for v in (error.before, error.after, error.noise))
+    return ChannelEntry(channel=error.channel, unit=error.unit, before=before, after=after, noise=noise)
+
+
+def _path(before: ErrorBudget, after: ErrorBudget) -> list[PathEntry]:
+    return [
+        PathEntry(group=g.name, unit=g.unit, before=g.shown(before.peak(g)), after=g.shown(after.peak(g)))
+        for g in before.groups
+    ]

@@ -1,10 +1,14 @@
-"""What learning.json holds, key by key; `ctrlgen/reporting/schemas/learning.schema.json` is written from it."""
+"""What learning.json holds of the runs of a path and of the next one, key by key."""
 
 from __future__ import annotations
 
+import numpy as np
 from pydantic import Field
 
-from ctrlgen.reporting.result_file import ChannelGroup, Keys, Number, Origin
+from ctrlgen.budget.contributors import Group
+from ctrlgen.core.units import difference, from_si
+from ctrlgen.learning.learn import Learning, RunResult
+from ctrlgen.reporting.result_file import ChannelGroup, Keys, Number, Origin, origin
 
 
 class RunError(Keys):
@@ -66,3 +70,63 @@ class LearningRecord(Origin):
         description="Largest change of each drive from the best run to the next one, by 'channel [unit]'."
     )
     drives: dict[str, list[float]] = Field(description="The next drives at every sample, by 'channel [unit]'.")
+
+
+def learning_record(learning: Learning) -> LearningRecord:
+    """Plain numbers in the stated units; nothing that changes from call to call."""
+    scenario, m, upcoming = learning.solution.scenario, learning.solution.model, learning.next.drive
+    signal, drive = m.signals[scenario.file.follow], m.signals["drive"]
+    change = np.abs(upcoming - learning.runs[learning.base].drive).max(axis=0)
+    columns = [(f"{c} [{u}]", u) for c, u in zip(drive.channels, drive.units, strict=True)]
+    answer = learning.response
+    return LearningRecord(
+        **origin(learning.inputs, None, learning.notes),
+        scenario=scenario.name,
+        title=scenario.file.title,
+        device=m.name,
+        signal=scenario.file.follow,
+        not_read=[c for c, seen in zip(signal.channels, learning.observed, strict=True) if not seen],
+        groups=[
+            ChannelGroup(name=g.name, unit=g.unit, channels=[signal.channels[i] for i in g.channels])
+            for g in learning.groups
+        ],
+        runs=[
+            RunEntry(
+                name=run.name,
+                repetitions=run.repeats,
+                best=k == learning.base,
+                errors=[_error(run, g) for g in learning.groups],
+            )
+            for k, run in enumerate(learning.runs)
+        ],
+        actuators=[]
+        if answer is None
+        else [
+            ActuatorEntry(drive=c, gain=_finite(gain), standard_error=_finite(se))
+            for c, gain, se in zip(drive.channels, answer.gain, answer.se, strict=True)
+        ],
+        unexplained=None if answer is None else answer.unexplained,
+        stop=learning.stop,
+        step=learning.step,
+        predicted=[
+            PredictedEntry(group=g.name, repeating=g.shown(learning.predicted[g.name])) for g in learning.groups
+        ],
+        largest_change={name: float(difference(v, u)) for (name, u), v in zip(columns, change, strict=True)},
+        drives={name: from_si(v, u).tolist() for (name, u), v in zip(columns, upcoming.T, strict=True)},
+    )
+
+
+def _error(run: RunResult, g: Group) -> RunError:
+    return RunError(
+        group=g.name,
+        measured=g.shown(run.rms[g.name]),
+        noise=g.shown(run.noise[g.name]),
+        repeating=g.shown(run.repeating[g.name]),
+        repeating_least=g.shown(run.least[g.name]),
+        repeating_most=g.shown(run.most[g.name]),
+        predicted=None if run.predicted is None else g.shown(run.predicted[g.name]),
+    )
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,105 @@
+"""Console output of recordings and of their diagnoses, one or many."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from rich.markup import escape
+
+from ctrlgen.app.console import Column, out, show_table, table_of
+
+if TYPE_CHECKING:
+    from ctrlgen.app.batch import BatchRow
+    from ctrlgen.diagnosis.evidence.bootstrap import Bootstrap
+    from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
+    from ctrlgen.recordings.recording import Recording
+
+
+def print_recording(recording: Recording) -> None:
+    """The validated records, with the number of samples marked not valid, and the notes."""
+    out.print(f"{recording.title}: {', '.join(recording.channels)}", markup=False, soft_wrap=True)
+    table = table_of(("record", "left"), ("role", "left"), ("samples", "right"), ("marked", "right"))
+    for record in recording.records:
+        marked = int((~record.valid).sum())
+        table.add_row(escape(record.name), record.role, str(len(record.time)), f"{marked} of {record.valid.size}")
+    show_table(table)
+    for note in recording.notes:
+        out.print(f"note: {note}", markup=False, soft_wrap=True)
+
+
+def print_diagnosis(diagnosis: Diagnosis) -> None:
+    """The verdict, the findings and the held-out errors of a diagnosis."""
+    from ctrlgen.diagnosis.report.narrative import (
+        gathered,
+        hypothesis_name,
+        interval,
+        next_steps,
+        sentence,
+        share_text,
+    )
+    from ctrlgen.diagnosis.report.shares_sentences import shares_sentences
+    from ctrlgen.reporting.numbers import number
+
+    out.print(f"[bold]{escape(sentence(diagnosis))}[/bold]", soft_wrap=True)
+    for line in shares_sentences(diagnosis):
+        out.print(line, markup=False, soft_wrap=True)
+    if diagnosis.findings:
+        table = table_of(
+            ("found", "left"),
+            ("at", "left"),
+            ("share", "right"),
+            ("parameter", "left"),
+            ("estimate, 95 % interval", "left"),
+        )
+        for finding in diagnosis.findings:
+            rows = [(name, interval(e)) for name, e in finding.parameters.items()]
+            alike = ", ".join(map(hypothesis_name, finding.alternatives))
+            for k, (name, text) in enumerate(rows):
+                first = (finding.effect, finding.location, share_text(finding.share)) if k == 0 else ("",) * 3
+                table.add_row(*first, name, text, escape(f"or {alike}") if alike and k == 0 else "")
+        show_table(table)
+    table = table_of(
+        ("held out", "left"), ("before", "right"), ("after", "right"), ("noise", "right"), ("parameters", "right")
+    )
+    for channel, e in diagnosis.held_out.items():
+        values = (e.rms_before, e.rms_after, e.noise_floor, e.uncertainty)
+        table.add_row(channel, *("not known" if v is None else f"{number(v)} {e.unit}" for v in values))
+    show_table(table)
+    for note in gathered(diagnosis.notes):
+        out.print(f"note: {note}", markup=False, soft_wrap=True)
+    for step in next_steps(diagnosis):
+        out.print(f"next: {step}", markup=False, soft_wrap=True)
+
+
+def print_bootstrap(bootstrap: Bootstrap) -> None:
+    """The percentile interval of each number, and how often a finding vanished."""
+    from ctrlgen.diagnosis.report.narrative import interval
+
+    out.print(f"bootstrap: {bootstrap.replicates} replicates; {bootstrap.note}", markup=False, soft_wrap=True)
+    table = table_of(("number", "left"), ("95 % of the replicates", "left"))
+    for path, estimate in bootstrap.values.items():
+        table.add_row(escape(path), interval(estimate))
+    show_table(table)
+    for line in bootstrap.sentences():
+        out.print(line, markup=False, soft_wrap=True)
+
+
+def print_batch(rows: Sequence[BatchRow]) -> None:
+    """One line per diagnosis, then the failures with their reasons."""
+    from ctrlgen.reporting.numbers import number
+
+    errors: tuple[Column, ...] = (("before", "right"), ("after", "right"), ("noise", "right"))
+    table = table_of(("result", "left"), ("verdict", "left"), ("found", "left"), *errors)
+    for row in rows:
+        if row.state == "failed":
+            table.add_row(escape(row.name), "[red]failed[/red]")
+            continue
+        known = ["not known" if v is None else f"{number(v)} {row.unit}" for v in (row.before, row.after, row.noise)]
+        table.add_row(escape(row.name), row.verdict, escape(row.findings) or "-", *known)
+    show_table(table)
+    for row in rows:
+        if row.error:
+            out.print(f"{row.name}: {row.error}", style="red", markup=False, soft_wrap=True)
+    made, kept, failed = (sum(row.state == state for row in rows) for state in ("done", "done before", "failed"))
+    out.print(f"{made} diagnosed, {kept} there already, {failed} failed")

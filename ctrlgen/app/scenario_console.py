@@ -1,0 +1,156 @@
+"""Console output of a scenario: its solution, the comparison of its C, everything known of its build; the workspace of its device."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rich.markup import escape
+
+from ctrlgen.app.console import Column, out, show_table, table_of
+from ctrlgen.core.units import from_si, show
+
+if TYPE_CHECKING:
+    from ctrlgen.app.scenario_pipeline import Outcome, WorkspaceSummary
+    from ctrlgen.trajectory.problem import PathProblem
+    from ctrlgen.verification.build_record import Build
+
+SHOWN_COSTS = ("scenario", "worst", "player")
+
+
+def print_shaper(problem: PathProblem) -> None:
+    """The mode that a shaped path leaves at rest, and by how much longer it lasts; nothing where it is not shaped."""
+    if (used := problem.shaper) is not None:
+        mode = f"{show(used.frequency, 'Hz')}, damping ratio {used.damping_ratio:.3g}"
+        out.print(f"shaped by {used.kind} for a mode of {mode}: {show(used.times[-1], 's')} longer", soft_wrap=True)
+
+
+def print_solution(outcome: Outcome) -> None:
+    """Title, tracking error, margins and expectations."""
+    from ctrlgen.verification.summary import robust_sentence
+
+    solution = outcome.solution
+    scenario = solution.scenario
+    rate = f"at {1 / scenario.sample_time:g} Hz" if scenario.sample_time else "as equilibria"
+    out.print(f"[bold]{escape(scenario.file.title)}[/bold]", soft_wrap=True)
+    solved = f"{solution.solver} {solution.iterations} iterations"
+    out.print(
+        f"{len(solution.command)} samples {rate}, {escape(solution.model.device.title)}, {solved}", soft_wrap=True
+    )
+    print_shaper(scenario.bind(solution.model))
+    if solution.between_samples is not None:
+        signal = solution.model.signals[scenario.file.follow]
+        error = abs(solution.trace.signals[scenario.file.follow] - solution.command).max(axis=0)
+        for channel, unit, at, between in zip(
+            signal.channels, signal.units, error, solution.between_samples, strict=True
+        ):
+            out.print(f"error of {channel}: {show(at, unit)} at the samples, {show(between, unit)} between them")
+    if sentence := robust_sentence(solution):
+        out.print(sentence, markup=False, soft_wrap=True)
+    robust: tuple[Column, ...] = (("reserved", "right"),) if sentence else ()
+    table = table_of(
+        ("limit", "left"),
+        ("closest at", "left"),
+        ("value", "right"),
+        ("bound", "right"),
+        *robust,
+        ("range left", "right"),
+    )
+    for margin in solution.margins:
+        unit, tightest = margin.limit.unit, margin is solution.tightest
+        share = "" if margin.share is None else f"{100 * margin.share:.1f} %"
+        where = f"{margin.channel}, " + (
+            f"{solution.trace.time[margin.sample]:.3f} s" if scenario.sample_time else f"sample {margin.sample}"
+        )
+        reserved = (show(margin.reserve, "K" if unit == "degC" else unit, 3) if margin.reserve else "",) * len(robust)
+        bound = show(margin.limit.described(margin.bound), unit)
+        row = (margin.limit.label, where, show(margin.value, unit), bound, *reserved, share)
+        table.add_row(*row, "<- tightest" if tightest else "", style="bold" if tightest else None)
+    show_table(table)
+    if outcome.expected:
+        good = sum(e.passed for e in outcome.expected)
+        out.print(f"expected: {good} of {len(outcome.expected)} values in range")
+    for e in outcome.expected:
+        if not e.passed:
+            measured, low, high = (f"{from_si(v, e.unit):.7g}" for v in (e.measured, e.low, e.high))
+            out.print(f"[red]  {e.value} = {measured} {e.unit}, expected {low} ... {high}[/red]")
+
+
+def print_comparison(outcome: Outcome) -> None:
+    """One line per arithmetic and comparison."""
+    if outcome.comparison is None or outcome.c is None:
+        return
+    comparison, c = outcome.comparison, outcome.c
+    tools = ", ".join(comparison.compilers)
+    cost = f"{c.operations} operations a sample, {c.worst_operations} at most"
+    out.print(f"[bold]generated C[/bold], built strictly with {tools}; {cost}", soft_wrap=True)
+    for missing in comparison.missing:
+        out.print(f"[yellow]{missing} is not installed: not run[/yellow]")
+    table = table_of(("", "left"), ("", "left"), ("worst", "right"), ("limit", "right"))
+    for row in comparison.worst:
+        if row.passed and row.what.is_controller:
+            continue
+        unit = "" if row.unit == "1" else f" {row.unit}"
+        verdict = "[green]ok[/green]" if row.passed else f"[red]OUT from sample {row.first} ({row.build})[/red]"
+        numbers = (f"{value:.2g}{unit}" for value in (row.worst, row.limit))
+        table.add_row(row.build.real.value, f"{row.what}, {row.signal}", *numbers, verdict)
+    show_table(table)
+    good = sum(row.passed for row in comparison.rows)
+    out.print(f"{good} of {len(comparison.rows)} comparisons within tolerance")
+
+
+def print_build(build: Build) -> None:
+    """One line per target and one per check, then what failed and what did not run."""
+    good = sum(row.passed for row in build.comparison.rows)
+    out.print(
+        f"{good} of {len(build.comparison.rows)} comparisons within tolerance, {', '.join(build.comparison.compilers)}"
+    )
+    if build.in_loop.runs:
+        columns: tuple[Column, ...] = (
+            *((kind, "right") for kind in SHOWN_COSTS),
+            ("stack", "right"),
+            ("code", "right"),
+            ("tables", "right"),
+        )
+        table = table_of(("instructions a sample", "left"), *columns)
+        for run in build.in_loop.runs:
+            most = run.instructions
+            counts = ("-" if most[kind] is None else str(most[kind]) for kind in SHOWN_COSTS)
+            sizes = (f"{size} B" for size in (run.stack, run.code, run.tables))
+            verdict = "[green]equal bits[/green]" if run.passed else "[red]FAILED[/red]"
+            table.add_row(run.short_name, *counts, *sizes, verdict)
+        show_table(table)
+    colours = {"passed": "green", "failed": "red", "not run": "yellow"}
+    table = table_of(("check", "left"), ("", "left"))
+    for check in build.checks:
+        table.add_row(escape(check.tool), f"[{colours[check.state]}]{check.state}[/{colours[check.state]}]")
+    show_table(table)
+    for row in build.not_run:
+        out.print(f"not run: {row.what}: {row.remedy}", style="yellow", markup=False, soft_wrap=True)
+    for line in build.failures:
+        out.print(f"failed: {line}", style="red", markup=False, soft_wrap=True)
+
+
+def print_workspace(summary: WorkspaceSummary) -> None:
+    """The range of every channel at some poses and anywhere, the largest balls, and the typical sizes they are given in."""
+    signal_ = summary.workspace.model.signals["pose"]
+    named = list(enumerate(zip(signal_.channels, signal_.units, strict=True)))
+
+    def place(pose: Any) -> str:
+        shown = (f"{c} {from_si(pose[i], u):.4g} {u}" for i, (c, u) in named if abs(pose[i]) > 1e-3 * signal_.scale[i])
+        return ", ".join(shown) or "home"
+
+    table = table_of(("from", "left"), *((place(base), "right") for base in summary.bases), ("anywhere", "right"))
+    for i, (channel, unit) in named:
+        rounding = 1e-9 * signal_.scale[i]
+        ends = ([v if abs(v) > rounding else 0.0 for v in r[i]] for r in (*summary.ranges, summary.extent))
+        table.add_row(
+            escape(f"{channel} [{unit}]"), *(" ... ".join(f"{from_si(v, unit):.4g}" for v in e) for e in ends)
+        )
+    show_table(table)
+    for what, ball in (("translations", summary.translations), ("all channels", summary.everything)):
+        out.print(
+            f"largest ball of {what}: radius {ball.radius:.4g} typical sizes around {place(ball.centre)}",
+            soft_wrap=True,
+        )
+    sizes = ", ".join(f"{show(v, u)}" for v, u in sorted(set(zip(signal_.scale, signal_.units, strict=True))))
+    out.print(f"typical sizes: {sizes}")

@@ -1,0 +1,33 @@
+"""How far the generated C may be from what it is compared with, and why."""
+
+from __future__ import annotations
+
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.verification.reference import ReferenceAnswers
+
+# m: 0.01 nm, 0.1 nm: below the resolution of every sensor in the shipped devices
+LENGTH_LIMIT = {Real.DOUBLE: 1e-11, Real.FLOAT: 1e-10}
+# rad: 1e-8 rad moves the platform's rim by 0.02 nm
+ANGLE_LIMIT = {Real.DOUBLE: 1e-12, Real.FLOAT: 1e-8}
+# double C against CasADi: about 4500 roundings
+RELATIVE_LIMIT = 1e-12
+# of a limit's bound: rounding
+EXCESS_LIMIT = {Real.DOUBLE: 1e-9, Real.FLOAT: 1e-5}
+# the same where effects remember: while the drives are limited a memory moves on under the displacement
+EXCESS_LIMIT_WITH_MEMORY = 1e-3
+# float C against CasADi: of the largest value, accumulated over one evaluation
+ROUNDINGS = 16
+
+
+def float_limit(role: str, size: float, ref: ReferenceAnswers) -> float:
+    """What `ROUNDINGS` float roundings of the largest value amount to; for the drive, of what it follows from."""
+    limit = ROUNDINGS * Real.FLOAT.epsilon * size
+    return max(limit, ref.moved_drive(ROUNDINGS / 2 * Real.FLOAT.epsilon)) if role == "drive" else limit
+
+
+def controller_limit(role: str, size: float, ref: ReferenceAnswers, real: Real, wider: float = 1.0) -> float:
+    """Of the C against the controller evaluated by CasADi, for answers up to `size` [SI]; in float `wider` times as much."""
+    if real is Real.DOUBLE:
+        return RELATIVE_LIMIT * size
+    limit = float_limit(role, size, ref)
+    return wider * (max(limit, LENGTH_LIMIT[real]) if role == "displacement" else limit)
