@@ -13,6 +13,7 @@ test: $(VENV)/installed-test
 	$(BIN)/python -m pytest -n auto --dist loadfile -m "not long"
 
 test-long: $(VENV)/installed-test
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[test,docs,plant,recordings,dask,mutants]'
 	$(BIN)/python -m benchmarks diagnosis --repeat 1
 	$(BIN)/python -m pytest -n auto --dist worksteal
 

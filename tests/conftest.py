@@ -11,7 +11,7 @@ from package_programs import STRICT, run
 
 from ctrlgen import build_model, generate, load_device, load_scenario, solve
 from ctrlgen.firmware.folder import CFolder
-from ctrlgen.trajectory.solution_plots import draw_all
+from ctrlgen.trajectory.solution_plots import draw_solution
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENARIOS = ROOT / "scenarios"
@@ -99,7 +99,8 @@ def packages(tmp_path_factory, circle) -> dict[str, CFolder]:
     spiral = solve(scenario, build_model(scenario.device))
     out = tmp_path_factory.mktemp("packages")
     return {
-        s.scenario.name: generate(s.scenario, s.model, out / s.scenario.name, s, draw_all(s)) for s in (circle, spiral)
+        s.scenario.name: generate(s.scenario, s.model, out / s.scenario.name, s, draw_solution(s))
+        for s in (circle, spiral)
     }
 
 

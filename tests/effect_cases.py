@@ -11,11 +11,12 @@ import casadi as ca
 import numpy as np
 import pytest
 from conftest import AXIS_FILE, DEVICE
+from law_inputs import law_inputs
 
 from ctrlgen.core.files import validate
 from ctrlgen.core.units import from_si
 from ctrlgen.devices import Device
-from ctrlgen.effects import Channel, Effect, Param, Place
+from ctrlgen.effects import Channel, Effect, LawInputs, Param, Place
 from ctrlgen.estimation.priors import prior_of
 from ctrlgen.model.effect_terms import available, channels, partner_channels
 
@@ -159,8 +160,8 @@ class Law:
         self.one = ca.Function("one", [memory, signals, p], [after, term], ["m", "s", "p"], ["next", "term"])
         self.whole = ca.Function("whole", [memory, signals, p], [ca.vertcat(after, term)], ["m", "s", "p"], ["result"])
 
-    def seen(self, memory, every, held: dict) -> SimpleNamespace:
-        return SimpleNamespace(
+    def seen(self, memory, every, held: dict) -> LawInputs:
+        return law_inputs(
             value=every[self.index],
             rate=None,
             second_rate=None,
@@ -169,7 +170,7 @@ class Law:
             partner=self.partner,
             ambient=held["ambient"],
             sample_time=self.h,
-            rest=self.REST,
+            temperature_at_rest=self.REST,
             scale=1.0,
             travel=1.0,
             second_order_kinematics=lambda: every,
@@ -180,7 +181,7 @@ class Law:
             displacement=held["displacement"],
             velocity=held["velocity"],
             force=held["force"],
-            state=held["state"],
+            temperature=held["state"],
             **{s.name: memory[i] for i, s in enumerate(self.effect.states)},
         )
 
@@ -196,14 +197,14 @@ class Law:
         return [values[q.name] for q in self.effect.params]
 
 
-def apply(effect: type[Effect], s: SimpleNamespace, numbers: list) -> tuple[list, list, ca.SX]:
+def apply(effect: type[Effect], s: LawInputs, numbers: list) -> tuple[list, list, ca.SX]:
     """Memories after the sample, their rates, and the term, as a model asks for them; the term sees the new ones."""
     p = SimpleNamespace(**dict(zip((q.name for q in effect.params), numbers, strict=True)))
     instance = effect("all", {})
-    before = {state.name: getattr(s, state.name) for state in effect.states}
-    s.__dict__.update(instance.update(s, p))
+    before = {state.name: getattr(s.states, state.name) for state in effect.states}
+    s = s.with_states(instance.update(s, p))
     rates = {state.name: 0.0 for state in effect.states} | instance.rates(s, p)
-    return [getattr(s, name) for name in before], [rates[name] for name in before], instance.term(s, p)
+    return [getattr(s.states, name) for name in before], [rates[name] for name in before], instance.term(s, p)
 
 
 def place_unit(effect: type[Effect]) -> str:

@@ -6,6 +6,7 @@ import subprocess
 from pathlib import Path
 
 from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.toolchains import FLAGS
 from ctrlgen.firmware.folder import CFolder
 
 STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
@@ -34,3 +35,9 @@ def everything(packages: dict[str, CFolder]) -> str:
     }}
 """
     return "".join(f'#include "{h}"\n' for h in headers) + f"int main(void)\n{{\n{calls}    return 0;\n}}\n"
+
+
+def build(compiler: str, sources: list[Path], out: Path, *more: str) -> None:
+    """Compiles with the flags of the verification."""
+    done = subprocess.run([compiler, *FLAGS, *more, *map(str, sources), "-o", str(out)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

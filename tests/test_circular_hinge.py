@@ -14,8 +14,9 @@ from scipy.integrate import quad
 
 from ctrlgen.core.errors import InputError
 from ctrlgen.core.files import validate
-from ctrlgen.devices.base import Section, si_namespace
 from ctrlgen.devices.hinge import Hinge
+from ctrlgen.devices.quantities import si_namespace
+from ctrlgen.devices.section import Section
 from ctrlgen.physics import circular_hinge as c
 from ctrlgen.physics import circular_hinge_table as table
 from ctrlgen.physics.circular_hinge_table import ALPHA, DELTA_X, DELTA_Y, LOCKED, Geometry

@@ -3,26 +3,23 @@
 from __future__ import annotations
 
 import difflib
-import hashlib
 import importlib.util
 import re
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
-from conftest import ROOT, SCENARIOS
+from conftest import ROOT
+from package_programs import build
 
-from ctrlgen import CtrlgenError, __version__, build_model, load_scenario
+from ctrlgen import CtrlgenError, __version__, build_model
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.firmware.c.cprint import print_function
 from ctrlgen.firmware.c.elementary import elementary_text
 from ctrlgen.firmware.c.real import Real
-from ctrlgen.firmware.c.templates import ABI, hertz
-from ctrlgen.firmware.c.toolchains import FLAGS
 from ctrlgen.firmware.fmi.fmu import write_fmus
 from ctrlgen.firmware.fmi.plant import plant_of, write_plant
 from ctrlgen.firmware.folder import generate, write_harness
@@ -33,14 +30,8 @@ NUMBER = re.compile(r"-?\d+\.\d+(?:e[+-]?\d+)?|-?\d+e[+-]?\d+")
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory, circle):
-    out = tmp_path_factory.mktemp("c")
-    return generate(circle.scenario, circle.model, out, circle)
-
-
-def build(compiler: str, sources: list[Path], out: Path, *more: str) -> None:
-    done = subprocess.run([compiler, *FLAGS, *more, *map(str, sources), "-o", str(out)], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+def folder(circle_c):
+    return circle_c
 
 
 @pytest.mark.long
@@ -203,13 +194,51 @@ def test_casadis_own_c_is_a_second_reference(circle, compiler, tmp_path):
 def test_every_operation_prints_what_casadi_computes(real, compiler, tmp_path):
     a, b = ca.SX.sym("a"), ca.SX.sym("b")
     expressions = ca.vertcat(
-        a + b, a - b, a * b, a / b, -a, a * a, 2 * a, 1 / a, ca.fmin(a, b), ca.fmax(a, b), ca.fabs(-a), ca.sign(a - b), ca.sqrt(a),
-        ca.exp(a), ca.log(a), ca.sin(a), ca.cos(a), ca.tan(a), ca.asin(a / 4), ca.acos(a / 4), ca.atan(a), ca.tanh(a), a**2.5,
+        a + b,
+        a - b,
+        a * b,
+        a / b,
+        -a,
+        a * a,
+        2 * a,
+        1 / a,
+        ca.fmin(a, b),
+        ca.fmax(a, b),
+        ca.fabs(-a),
+        ca.sign(a - b),
+        ca.sqrt(a),
+        ca.exp(a),
+        ca.log(a),
+        ca.sin(a),
+        ca.cos(a),
+        ca.tan(a),
+        ca.asin(a / 4),
+        ca.acos(a / 4),
+        ca.atan(a),
+        ca.tanh(a),
+        a**2.5,
         ca.atan2(a, b),
-        a < b, a <= b, ca.eq(a, b), ca.ne(a, b), ca.logic_and(a, b), ca.logic_or(a, b), ca.logic_not(a), 
-        ca.if_else(a < b, a, b), ca.floor(a),
-        ca.ceil(a), 0 * b + 3.25, ca.sinh(a), ca.cosh(a), a**b, (-a)**3, a**-3, a**7, a**-1.5, a**0.3, (-a)**17,
-    )  # fmt: skip
+        a < b,
+        a <= b,
+        ca.eq(a, b),
+        ca.ne(a, b),
+        ca.logic_and(a, b),
+        ca.logic_or(a, b),
+        ca.logic_not(a),
+        ca.if_else(a < b, a, b),
+        ca.floor(a),
+        ca.ceil(a),
+        0 * b + 3.25,
+        ca.sinh(a),
+        ca.cosh(a),
+        a**b,
+        (-a) ** 3,
+        a**-3,
+        a**7,
+        a**-1.5,
+        a**0.3,
+        (-a) ** 17,
+    )
     f = ca.Function("f", [a, b], [expressions], ["a", "b"], ["r"])
     kernel = print_function(f, "f", real)
     n = f.size1_out(0)
@@ -246,206 +275,18 @@ def test_a_constant_beyond_float_is_refused():
         print_function(ca.Function("f", [x], [x * float("inf")], ["x"], ["r"]), "f", Real.DOUBLE)
 
 
-def test_null_and_hostile_calls_are_safe(folder, compiler, tmp_path):
-    """NULL pointers, a state of garbage, times and indices out of range: a status and admissible drives."""
-    online, player = folder.online[Real.FLOAT], folder.player[Real.FLOAT]
-    (tmp_path / "main.c").write_text(f"""
-#include "{online}.h"
-#include "{player}.h"
-#include <stddef.h>
-int main(void)
-{{
-    {online}_state s;
-    {online}_output o;
-    const float up[6] = {{ 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 2e-5f }};
-    const float zero = 0.0f;
-    const float nan = zero / zero;
-    float u[6];
-    int i;
-    {online}_init(NULL);
-    if ({online}_step(NULL, up, &o) != {online.upper()}_INPUT) {{ return 1; }}
-    {online}_init(&s);
-    if ({online}_step(&s, NULL, &o) != {online.upper()}_INPUT) {{ return 2; }}
-    if ({online}_step(&s, up, NULL) != {online.upper()}_INPUT) {{ return 3; }}
-    for (i = 0; i < 6; i++) {{ s.x[i] = nan; s.z[i] = nan; }}
-    if ({online}_step(&s, up, &o) != {online.upper()}_LOST) {{ return 4; }}
-    for (i = 0; i < 6; i++) {{ if (o.drive[i] != 0.0f) {{ return 5; }} }}
-    if ({player}_at(nan, u) != {player.upper()}_INPUT) {{ return 6; }}
-    if ({player}_at(-1.0f, u) != {player.upper()}_INPUT) {{ return 7; }}
-    if ({player}_at(1e30f, u) != {player.upper()}_INPUT) {{ return 8; }}
-    if ({player}_at(0.9999f, u) != 0) {{ return 9; }}
-    if ({player}_sample(4000000000U, u) != 0) {{ return 10; }}
-    if ({player}_sample(0U, NULL) != {player.upper()}_INPUT) {{ return 11; }}
-    return 0;
-}}
-""")
-    sources = [tmp_path / "main.c", folder.path / f"{online}.c", folder.path / f"{player}.c"]
-    build(compiler, sources, tmp_path / "main", f"-I{folder.path}", "-fsanitize=undefined", "-fno-sanitize-recover=all")
-    done = subprocess.run([tmp_path / "main"], capture_output=True, text=True)
-    assert done.returncode == 0, (done.returncode, done.stderr)
-
-
-def test_a_lost_state_is_told_and_stays_so_until_it_is_initialised(folder, compiler, tmp_path):
-    """NaN or an absurd temperature in one place, a struct of zeros or of any repeated byte; by step and by settle."""
-    online = folder.online[Real.FLOAT]
-    (tmp_path / "main.c").write_text(f"""
-#include "{online}.h"
-#include <math.h>
-#include <string.h>
-#define LOST {online.upper()}_LOST
-static const float up[6] = {{ 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 2e-5f }};
-static {online}_output o;
-static int stays_lost({online}_state *s)
-{{
-    const {online}_state before = *s;
-    int i;
-    if ({online}_step(s, up, &o) != LOST) {{ return 0; }}
-    for (i = 0; i < 6; i++) {{ if (o.drive[i] != 0.0f || o.displacement[i] != 0.0f || o.state[i] != 295.15f) {{ return 0; }} }}
-    if (memcmp(s->x, before.x, sizeof s->x) != 0 || memcmp(s->z, before.z, sizeof s->z) != 0) {{ return 0; }}
-    {online}_state healed = *s; /* numbers alone do not help */
-    for (i = 0; i < 6; i++) {{ healed.x[i] = 295.15f; healed.z[i] = 0.0f; }}
-    if ({online}_step(&healed, up, &o) != LOST || {online}_settle(&healed, up, &o) != LOST) {{ return 0; }}
-    {online}_init(s);
-    return {online}_settle(s, up, &o) == 0U && {online}_step(s, up, &o) == 0U && o.drive[0] > 0.0f;
-}}
-int main(void)
-{{
-    static const float bad[] = {{ NAN, INFINITY, -INFINITY, 1e4f, -1e4f, 1e30f }};
-    {online}_state s;
-    unsigned i, k;
-    for (i = 0; i < 256; i++) {{ (void)memset(&s, (int)i, sizeof s); if (!stays_lost(&s)) {{ return 1; }} }}
-    for (i = 0; i < 6; i++) {{
-        for (k = 0; k < 6; k++) {{
-            {online}_init(&s);
-            if ({online}_settle(&s, up, &o) != 0U) {{ return 2; }}
-            s.x[i] = bad[k];
-            if (!stays_lost(&s)) {{ return 3; }}
-            {online}_init(&s);
-            s.z[i] = bad[k]; /* no answer of this device depends on it: repaired, or told where a limit is met */
-            if ({online}_settle(&s, up, &o) != 0U || !(s.z[i] > 0.0f && s.z[i] < 1e-4f)) {{ return 4; }}
-        }}
-    }}
-    return 0;
-}}
-""")
-    build(compiler, [tmp_path / "main.c", folder.path / f"{online}.c"], tmp_path / "main", f"-I{folder.path}")
-    assert subprocess.run([tmp_path / "main"]).returncode == 0
-
-
-def test_two_controllers_link_into_one_program(folder, compiler, tmp_path):
-    scenario = load_scenario(SCENARIOS / "rrr_circle")
-    other = generate(scenario, build_model(scenario.device), tmp_path / "rrr")
-    (tmp_path / "main.c").write_text("int main(void) { return 0; }\n")
-    sources = [folder.path / f"{name}.c" for name in (*folder.online.values(), *folder.player.values())]
-    sources += [other.path / f"{name}.c" for name in other.online.values()]
-    build(compiler, [tmp_path / "main.c", *sources], tmp_path / "main")
-
-
-@pytest.mark.long
-def test_two_trajectories_of_one_device_and_rate_have_the_same_online_controller(folder, circle, tmp_path):
-    spiral, raster = (load_scenario(SCENARIOS / name) for name in ("spiral", "raster"))
-    same, slower = (generate(s, build_model(s.device), tmp_path / s.name) for s in (spiral, raster))
-    for real in Real:
-        for ending in ("h", "c"):
-            here, there, elsewhere = (
-                (c.path / f"{c.online[real]}.{ending}").read_bytes() for c in (folder, same, slower)
-            )
-            assert here == there
-            assert ending == "c" or here != elsewhere  # 500 Hz instead of 1 kHz
-    for name in (circle.scenario.name, spiral.name):
-        assert name not in (folder.path / f"{folder.online[Real.FLOAT]}.h").read_text()
-
-
-@pytest.mark.long
-def test_controllers_of_one_device_at_two_rates_with_two_names_link_into_one_program(
-    folder, circle, compiler, tmp_path
-):
-    """Both controllers and both plants; each has the rate of its own."""
-    text = circle.scenario.inputs["scenario"].text.replace("../devices", str(SCENARIOS / "devices"))
-    text = text.replace('sample_rate = "1 kHz"', 'sample_rate = "2 kHz"\ncontroller = "fast_hexapod"')
-    (tmp_path / "scenario.toml").write_text(text)
-    scenario = load_scenario(tmp_path)
-    fast = generate(scenario, build_model(scenario.device), tmp_path / "fast")
-    names = [folder.online[Real.FLOAT], fast.online[Real.FLOAT]]
-    plants = [write_plant(s, plant_of(s), Real.FLOAT, tmp_path) for s in (circle.scenario, scenario)]
-    assert names == ["mems_hexapod_online_f32", "fast_hexapod_online_f32"]
-    assert plants == ["mems_hexapod_plant_f32", "fast_hexapod_plant_f32"]
-    headers = "\n".join(f'#include "{name}.h"' for name in (*names, *plants))
-    calls = "\n".join(
-        f"""    {{
-        static {name}_state state;
-        {name}_output out;
-        {name}_init(&state);
-        if (({name.upper()}_RATE_HZ != {rate}U) || ({name}_step(&state, target, &out) == {name.upper()}_LOST)) {{ return {rate}; }}
-    }}"""
-        for name, rate in zip(names, (1000, 2000), strict=True)
-    )
-    target = "static const float target[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 2e-5f };"
-    (tmp_path / "main.c").write_text(f"{headers}\n{target}\nint main(void)\n{{\n{calls}\n    return 0;\n}}\n")
-    sources = [folder.path / f"{names[0]}.c", fast.path / f"{names[1]}.c", *(tmp_path / f"{name}.c" for name in plants)]
-    build(
-        compiler,
-        [tmp_path / "main.c", *sources],
-        tmp_path / "main",
-        f"-I{folder.path}",
-        f"-I{fast.path}",
-        f"-I{tmp_path}",
-    )
-    assert subprocess.run([tmp_path / "main"]).returncode == 0
-    for text in ("README.md", "library.properties", "zephyr/Kconfig"):
-        assert "mems_hexapod_online" not in (fast.path / text).read_text()
-
-
-@pytest.mark.parametrize("piece", ["online", "player", "plant"])
-def test_a_firmware_can_pin_the_interface_at_compile_time(piece, folder, circle, tmp_path):
-    if not shutil.which("gcc"):
-        pytest.skip("gcc is missing: _Static_assert was not compiled")
-    write_plant(circle.scenario, plant_of(circle.scenario), Real.FLOAT, tmp_path)
-    name = "mems_hexapod_plant_f32" if piece == "plant" else getattr(folder, piece)[Real.FLOAT]
-    source = circle.scenario.inputs["device"].path.read_bytes()
-    right = {
-        "ABI": f"{ABI}U",
-        "DEVICE_HASH": f"0x{hashlib.sha256(source).hexdigest()[:8]}U",
-        "RATE_HZ": "1000U",
-        "DRIVE_SIZE": "6U",
-    }
-    right |= {
-        "online": {"TARGET_SIZE": "6U", "STATE_SIZE": "6U", "DISPLACEMENT_SIZE": "6U"},
-        "player": {"SAMPLES": "1000U", "SCENARIO_HASH": f"0x{circle.scenario.digest['scenario'][:8]}U"},
-        "plant": {"MODEL_STATE_SIZE": "6U", "POSE_SIZE": "6U"},
-    }[piece]
-
-    def compiles(macro: str, value: str) -> bool:
-        asserted = f'_Static_assert({name.upper()}_{macro} == {value}, "{macro}");'
-        version = f"static const char version[] = {name.upper()}_VERSION; int main(void) {{ return version[0] == 0; }}"
-        (tmp_path / "main.c").write_text(f'#include "{name}.h"\n{asserted}\n{version}\n')
-        words = [
-            "gcc",
-            "-std=c11",
-            "-Wall",
-            "-Wextra",
-            "-Werror",
-            f"-I{folder.path}",
-            f"-I{tmp_path}",
-            "-fsyntax-only",
-            "main.c",
-        ]
-        return subprocess.run(words, cwd=tmp_path, capture_output=True).returncode == 0
-
-    for macro, value in right.items():
-        assert compiles(macro, value), macro
-        assert not compiles(macro, f"{value} + 1U"), macro
-
-
-def test_a_rate_that_is_no_whole_number_stays_one():
-    assert hertz(1 / (1 / 44100.0), Real.FLOAT) == "44100U" and hertz(None, Real.FLOAT) == "0U"
-    assert hertz(0.25, Real.FLOAT) == "0.25f" and hertz(1000.5, Real.DOUBLE) == "1000.5"
-
-
 def test_headers_state_names_units_limits_and_provenance(folder, circle):
     text = (folder.path / f"{folder.online[Real.FLOAT]}.h").read_text()
-    for words in ("theta_x [rad]", "delta_z [m]", "1X [W]", "1000 Hz", "22 degC <= actuator temperature <= 550 degC",
-                  "wire flexure stress <= 550 MPa", circle.scenario.device_sha256[:16], "Mech. Mach. Theory"):  # fmt: skip
+    for words in (
+        "theta_x [rad]",
+        "delta_z [m]",
+        "1X [W]",
+        "1000 Hz",
+        "22 degC <= actuator temperature <= 550 degC",
+        "wire flexure stress <= 550 MPa",
+        circle.scenario.device_sha256[:16],
+        "Mech. Mach. Theory",
+    ):
         assert words in text, words
 
 

@@ -1,9 +1,14 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 from conftest import DEVICE
 
 from ctrlgen import InputError, build_model, load_device
+from ctrlgen.devices.changed_numbers import changed
+from ctrlgen.devices.quantities import member_at
 
 
 def faults(tmp_path, *edits: tuple[str, str]) -> dict[str, str]:
@@ -93,3 +98,23 @@ def test_an_effect_at_a_place_that_does_not_exist_is_refused():
 def test_a_free_parameter_that_does_not_exist_is_refused(device):
     with pytest.raises(InputError, match=r"stage\.colour"):
         build_model(device, free=["stage.colour"])
+
+
+@pytest.mark.parametrize("path", sorted(DEVICE.parent.glob("*.toml")), ids=lambda p: p.stem)
+def test_a_path_leads_to_the_number_that_it_names_and_changes_that_one_alone(path):
+    device = load_device(path)
+    numbers = dict(device.quantities())
+    for name in list(numbers)[:: max(len(numbers) // 4, 1)]:
+        number = numbers[name]
+        assert member_at(device, name) is number
+        other = dict(changed(device, {name: number.si + 1.0}).quantities())
+        assert other.pop(name).si == number.si + 1.0
+        assert other == {key: kept for key, kept in numbers.items() if key != name}
+
+
+def test_distances_from_a_limit_count_in_its_range_or_in_its_only_bound(device):
+    (stroke,) = (limit for limit in build_model(device).limits if limit.name == "stroke")
+    assert replace(stroke, lower=-2.0, upper=3.0).span == 5.0
+    assert replace(stroke, lower=None, upper=3.0).span == replace(stroke, lower=-3.0, upper=None).span == 3.0
+    assert replace(stroke, lower=0.0, upper=None).span == 0.0
+    assert replace(stroke, lower=None, upper=3.0).bounds == (-np.inf, 3.0)

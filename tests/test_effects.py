@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,6 +12,7 @@ import numpy as np
 import pint
 import pytest
 from effect_cases import SAMPLE_TIME, Law, apply, device_of, every_effect, place_of, place_unit, shapes, size, written
+from law_inputs import law_inputs
 
 import ctrlgen.effects
 from ctrlgen import build_model
@@ -160,7 +162,8 @@ def test_does_not_depend_on_the_choice_of_units(effect, rng):
             ca.DM([e * factor(u) for e, u in zip(every, every_unit, strict=True)]),
             {k: v * factor(units[k]) for k, v in held.items()},
         )
-        s.sample_time, s.rest, s.scale, s.travel = 1e-2 * factor("s"), Law.REST * factor("K"), factor(unit), factor("m")
+        sizes = {"sample_time": 1e-2 * factor("s"), "scale": factor(unit), "travel": factor("m")}
+        s = replace(s, temperature_at_rest=Law.REST * factor("K"), **sizes)
         values = [number * factor(where.unit_of(q)) for number, q in zip(numbers, effect.params, strict=True)]
         after, rates, term = apply(effect, s, values)
         return [float(a) for a in after], [float(r) for r in rates], float(term)
@@ -209,14 +212,14 @@ def test_logarithmic_creep_follows_the_logarithm_for_so_many_decades(D):
     """After a unit step, tau = 1 s; 3 % of a decade's, as its file says."""
     law = Effect.library["log_creep"]("all", {})
     one, p = (
-        SimpleNamespace(**{z.name: 0.0 for z in law.states}, value=1.0),
+        law_inputs(**{z.name: 0.0 for z in law.states}, value=1.0),
         SimpleNamespace(gain=1.0, tau=1.0, decades=D),
     )
     rates = law.rates(one, p)
 
     def after(t: float) -> float:
         moved = {name: 1 - np.exp(-float(rate) * t) for name, rate in rates.items()}
-        return float(law.term(SimpleNamespace(**moved), p))
+        return float(law.term(law_inputs(**moved), p))
 
     for t in np.geomspace(3.0, 10 ** (D - 1.5), 20):
         assert after(t) == pytest.approx(np.log10(t) + 0.5, abs=0.03)

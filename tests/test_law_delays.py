@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from conftest import AXIS_FILE
+from law_inputs import law_inputs
 from written_laws import H
 
 import ctrlgen.effects  # noqa: F401  fills the library
@@ -26,11 +27,10 @@ def read_late(y, samples: np.ndarray, h: float, slopes: bool) -> np.ndarray:
     law = Effect.library["delay"]("all", {})
     memory = {state.name: 0.0 for state in law.states}
     for k in range(10):
-        s = SimpleNamespace(value=y(k * h), sample_time=h, rate=None, second_rate=None, **memory)
-        if slopes:
-            s.rate, s.second_rate = y.deriv()(k * h), y.deriv(2)(k * h)
+        rates = {"rate": y.deriv()(k * h), "second_rate": y.deriv(2)(k * h)} if slopes else {}
+        s = law_inputs(value=y(k * h), sample_time=h, **rates, **memory)
         memory |= law.update(s, None)
-        s.__dict__.update(memory)
+        s = s.with_states(memory)
     return np.array([s.value + float(ca.DM(law.term(s, SimpleNamespace(delay=D * h)))) for D in samples])
 
 

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import casadi as ca
 import numpy as np
 import pytest
+from law_inputs import law_inputs
 from numpy import abs, exp, sign, tanh
 from scipy.integrate import solve_ivp
 from written_laws import H, parameters
@@ -20,7 +21,7 @@ def along(kind: str, path: np.ndarray, p: SimpleNamespace, velocity: float | Non
     law = Effect.library[kind]("all", {})
     memory, found = {state.name: 0.0 for state in law.states}, []
     for d in path:
-        s = SimpleNamespace(
+        s = law_inputs(
             value=d,
             displacement=d,
             velocity=velocity,
@@ -33,8 +34,7 @@ def along(kind: str, path: np.ndarray, p: SimpleNamespace, velocity: float | Non
         )
         new = {k: float(ca.DM(v)) for k, v in law.update(s, p).items()}
         memory |= new
-        s.__dict__.update(new)
-        found.append(float(ca.DM(law.term(s, p))))
+        found.append(float(ca.DM(law.term(s.with_states(new), p))))
     return np.array(found)
 
 
@@ -113,7 +113,7 @@ def settled(kind: str, p: SimpleNamespace, time: float, **held) -> dict[str, flo
     names = [state.name for state in law.states]
 
     def slope(_, y):
-        rates = law.rates(SimpleNamespace(**held, **dict(zip(names, y, strict=True))), p)
+        rates = law.rates(law_inputs(**held, **dict(zip(names, y, strict=True))), p)
         return [float(rates[name]) for name in names]
 
     y = solve_ivp(slope, (0, time), np.zeros(len(names)), method="Radau", rtol=1e-9, atol=1e-12).y[:, -1]
@@ -121,7 +121,7 @@ def settled(kind: str, p: SimpleNamespace, time: float, **held) -> dict[str, flo
 
 
 def force(kind: str, p: SimpleNamespace, time: float, **held) -> float:
-    return float(Effect.library[kind]("all", {}).term(SimpleNamespace(**held, **settled(kind, p, time, **held)), p))
+    return float(Effect.library[kind]("all", {}).term(law_inputs(**held, **settled(kind, p, time, **held)), p))
 
 
 @pytest.mark.parametrize("v", [-2.0, -0.1, 0.01, 0.3, 5.0])
@@ -161,7 +161,7 @@ def test_creep_in_decades_is_a_step_of_its_gain_a_decade():
 def test_a_bristle_stands_where_it_is_at_standstill():
     """0/0 is kept away: no force grows or fades while nothing moves."""
     p = SimpleNamespace(force=0.4, reach=0.02, smoothing=0.1)
-    held = SimpleNamespace(velocity=0.0, z=0.6)
+    held = law_inputs(velocity=0.0, z=0.6)
     rate = float(Effect.library["coulomb"]("all", {}).rates(held, p)["z"])
     assert rate == pytest.approx(-0.1 * 0.6 / 0.02, rel=1e-9)  # v_s/r: a contact loaded for long creeps
 

@@ -7,11 +7,12 @@ from types import SimpleNamespace
 import casadi as ca
 import numpy as np
 import pytest
+from law_inputs import law_inputs
 from numpy import sqrt
 from written_laws import AMPLITUDES, LAWS, ROUNDING, H, parameters
 
 import ctrlgen.effects  # noqa: F401  fills the library
-from ctrlgen.effects import Effect
+from ctrlgen.effects import Effect, LawInputs
 
 
 def test_every_law_of_the_library_is_written_out_here():
@@ -32,8 +33,8 @@ def signals(rng: np.random.Generator, kind: str) -> SimpleNamespace:
         partner=5 - index,
         ambient=rng.uniform(-3, 3),
         sample_time=H,
-        rest=0.3,
-        state=rng.uniform(0.5, 3),
+        temperature_at_rest=0.3,
+        temperature=rng.uniform(0.5, 3),
         scale=1.3,
         travel=0.7,
         second_order_kinematics=lambda: other,
@@ -48,9 +49,9 @@ def signals(rng: np.random.Generator, kind: str) -> SimpleNamespace:
     )
 
 
-def symbolic(s: SimpleNamespace) -> SimpleNamespace:
-    """The same with vectors as the laws get them."""
-    return SimpleNamespace(**{k: ca.DM(v) if isinstance(v, np.ndarray) else v for k, v in vars(s).items()})
+def symbolic(s: SimpleNamespace) -> LawInputs:
+    """The same as the laws get it."""
+    return law_inputs(**{k: ca.DM(v) if isinstance(v, np.ndarray) else v for k, v in vars(s).items()})
 
 
 WRITTEN = [kind for kind, law in LAWS.items() if law]
@@ -71,7 +72,7 @@ def test_a_law_says_what_its_record_says(kind, rng):
 
 def test_contacts_count_from_where_they_touch():
     """Far beyond its corner e a spring is k (d - gap) but for e; Hertz's is e^-(1/2) k x^(3/2)."""
-    law, s = Effect.library["end_stop"]("all", {}), SimpleNamespace(displacement=1.4, travel=1.0)
+    law, s = Effect.library["end_stop"]("all", {}), law_inputs(displacement=1.4, travel=1.0)
     spring = law.term(s, SimpleNamespace(stiffness=2.0, gap=0.4, power=1.0))
     assert float(spring) == pytest.approx(-2.0, rel=2e-3)  # e is a thousandth
     hertz = law.term(s, SimpleNamespace(stiffness=2.0, gap=0.4, power=1.5))
@@ -84,7 +85,7 @@ def test_a_rise_is_half_over_at_its_moment(way):
     """4 % at its begin, 96 % at its end."""
     law = Effect.library["sensor_step"]("all", {})
     p = SimpleNamespace(offset=1.0, moment=3.0, rise=way)
-    at = [float(law.term(SimpleNamespace(t=t), p)) for t in (3.0 - way / 2, 3.0, 3.0 + way / 2)]
+    at = [float(law.term(law_inputs(t=t), p)) for t in (3.0 - way / 2, 3.0, 3.0 + way / 2)]
     assert at == pytest.approx([0.0414, 0.5, 0.9586], abs=1e-4)  # (1 -+ tanh(pi/2))/2, to the digits written
 
 

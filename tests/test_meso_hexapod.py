@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from conftest import MESO_FILE
+from exact_struts import actuators_from_pose, pose_from_actuators
 from scipy.spatial.transform import Rotation
 
 from ctrlgen import build_model, simulate
@@ -149,8 +150,8 @@ def workspace(p, rng, n: int) -> np.ndarray:
 
 def test_pose_and_actuators_return_to_each_other_over_the_workspace(p, rng) -> None:
     T = workspace(p, rng, 40)
-    U = meso_hexapod.actuators_from_pose(T, p.hexapod, p.directions.constraint)
-    again = meso_hexapod.pose_from_actuators(U, p.hexapod, p.directions.constraint)
+    U = actuators_from_pose(T, p.hexapod, p.directions.constraint)
+    again = pose_from_actuators(U, p.hexapod, p.directions.constraint)
     # 1e-15 m of strut length through a condition of some tens, and 1/0.08 m for angles.
     assert np.abs(again - T).max() < 1e-13
 
@@ -161,7 +162,7 @@ def test_every_strut_keeps_its_length_at_the_solved_pose(p, rng) -> None:
     A, B = (ca.DM(points).full() for points in meso_hexapod.geometry(h))
     home = np.linalg.norm(A - B, axis=0)
     stage = {0: (0, 5), 1: (1, 2), 2: (3, 4)}  # U = (1x, 2x, 2y, 3x, 3y, 1y)
-    for u, T in zip(U, meso_hexapod.pose_from_actuators(U, h, p.directions.constraint), strict=True):
+    for u, T in zip(U, pose_from_actuators(U, h, p.directions.constraint), strict=True):
         moved = Rotation.from_rotvec(T[:3]).as_matrix() @ A + T[3:, None]
         feet = B.copy()
         for strut, j in enumerate((0, 1, 1, 2, 2, 0)):
@@ -173,7 +174,7 @@ def test_the_kinematic_jacobian_errs_by_the_square_of_the_displacement(p, rng) -
     J = ca.DM(meso_hexapod.kinematic_jacobian(p.hexapod, p.directions.constraint)).full()
     U = rng.uniform(-1, 1, (5, 6))
     errors = [
-        np.abs(meso_hexapod.pose_from_actuators(s * U, p.hexapod, p.directions.constraint) - s * U @ J.T).max()
+        np.abs(pose_from_actuators(s * U, p.hexapod, p.directions.constraint) - s * U @ J.T).max()
         for s in (4e-4, 2e-4, 1e-4)
     ]
     assert errors[0] / errors[1] == pytest.approx(4, rel=0.02)  # the next order is 1e-3 of it
@@ -182,12 +183,12 @@ def test_the_kinematic_jacobian_errs_by_the_square_of_the_displacement(p, rng) -
 
 def test_moving_all_stages_alike_carries_the_platform_along(p) -> None:
     U = np.array([[3, 3, -5, 3, -5, -5]]) * 1e-4
-    pose = meso_hexapod.pose_from_actuators(U, p.hexapod, p.directions.constraint)[0]
+    pose = pose_from_actuators(U, p.hexapod, p.directions.constraint)[0]
     assert np.abs(pose - [0, 0, 0, 3e-4, -5e-4, 0]).max() < 1e-14  # Newton's bound
 
 
 def test_other_strut_lengths_raise_the_platform_straight(p) -> None:
-    pose = meso_hexapod.pose_from_actuators(
+    pose = pose_from_actuators(
         np.zeros((1, 6)), p.hexapod, p.directions.constraint, ca.DM([p.hexapod.strut_length] * 6)
     )[0]
     run = 0.08144**2 + 0.13892**2 - 2 * 0.08144 * 0.13892 * np.cos(np.radians(47))
@@ -197,7 +198,7 @@ def test_other_strut_lengths_raise_the_platform_straight(p) -> None:
 
 def test_inputs_that_tear_the_struts_are_refused(p) -> None:
     with pytest.raises(ValueError, match="no pose within 20 Newton steps"):
-        meso_hexapod.pose_from_actuators(np.array([[1.0, 0, 0, 0.5, 0, 0]]), p.hexapod, p.directions.constraint)
+        pose_from_actuators(np.array([[1.0, 0, 0, 0.5, 0, 0]]), p.hexapod, p.directions.constraint)
 
 
 # Cube and platform
@@ -245,7 +246,7 @@ def test_what_the_linear_kinematics_leave_is_the_second_order_of_the_loop_closur
     directions = p.directions.jacobian
     J = ca.DM(meso_hexapod.kinematic_jacobian(p.hexapod, directions)).full()
     for d in 5e-4 * np.random.default_rng(2).uniform(-1, 1, (5, 6)):
-        left = meso_hexapod.pose_from_actuators(d[None, :], p.hexapod, directions)[0] - J @ d
+        left = pose_from_actuators(d[None, :], p.hexapod, directions)[0] - J @ d
         found = second_order(lambda pose, u: meso_hexapod.loop_closure(pose, u, p.hexapod, directions), ca.DM(d))
         expected = ca.DM(found).full().ravel()
         for part in (slice(0, 3), slice(3, 6)):

@@ -15,7 +15,7 @@ from ctrlgen import InputError, build_model, generate, load_scenario
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.package import verify_package
-from ctrlgen.trajectory.solution_plots import draw_all
+from ctrlgen.trajectory.solution_plots import draw_solution
 
 pytestmark = pytest.mark.long
 
@@ -186,7 +186,7 @@ def test_the_manifest_tells_a_spoiled_file(packages, tmp_path):
 
 
 def test_the_same_input_gives_the_same_bytes_of_everything(packages, circle, tmp_path):
-    again = generate(circle.scenario, circle.model, tmp_path, circle, draw_all(circle))
+    again = generate(circle.scenario, circle.model, tmp_path, circle, draw_solution(circle))
     first = packages["circle20"].path
     names = sorted(p.relative_to(first) for p in first.rglob("*") if p.is_file())
     assert names == sorted(p.relative_to(again.path) for p in again.path.rglob("*") if p.is_file())

@@ -10,7 +10,7 @@ from conftest import ROOT
 
 import ctrlgen
 from ctrlgen.core.errors import InputError
-from ctrlgen.devices.base import Limit
+from ctrlgen.devices.limit import Limit
 from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings import preprocessing
 from ctrlgen.recordings.reader import load_recordings

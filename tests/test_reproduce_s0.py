@@ -15,7 +15,7 @@ from ctrlgen.devices import load_device
 from ctrlgen.devices.meso_hexapod import matrices
 from ctrlgen.physics import meso_hexapod_kinematics as meso_hexapod
 from ctrlgen.recordings.calibration import calibrate_jacobian
-from ctrlgen.recordings.pose_errors import opposites, parasitic, pose_drift, pose_errors, repeatability
+from ctrlgen.recordings.pose_errors import parasitic, pose_errors
 from papers import s0, s0_figures
 from papers.rounding import half_units, propagated_rounding
 from papers.row import ReproductionStatus
@@ -235,42 +235,9 @@ def test_parasitic_motion_is_read_where_one_channel_alone_is_commanded(data) -> 
     assert z.others[0] == pytest.approx(data.measured[23, :5], rel=1e-14) and z.channels[-1] == "delta_y"
 
 
-def test_the_recording_repeats_no_pose_but_opposite_ones(data) -> None:
-    assert repeatability(data.commanded, data.measured).groups == ()
-    assert repeatability(data.commanded, data.measured).sd is None
-    both = opposites(data.commanded, data.measured)
-    assert len(both.pairs) == 27 and (0, 6) in both.pairs
-    assert both.even[0] == pytest.approx((data.measured[0] + data.measured[6]) / 2, rel=1e-14)
-
-
-def test_repeated_poses_are_pooled_home_included() -> None:
-    commanded = np.zeros((5, 6))
-    commanded[[1, 3], 0] = 1.0
-    measured = np.zeros((5, 6))
-    measured[:, 5] = [1, 10, 3, 14, 5]
-    found = repeatability(commanded, measured)
-    assert found.groups == ((0, 2, 4), (1, 3))
-    assert found.sd[5] == pytest.approx(np.sqrt((8 + 8) / 3)) and found.sd[0] == 0
-    assert opposites(commanded, measured).pairs == ()
-
-
 def test_the_device_s_travel_covers_the_recorded_commands(device, data) -> None:
     for J in (matrices(device)["J_k"], data.J_c):
         assert 0.8 < np.abs(np.linalg.solve(J, data.commanded.T)).max() / device.travel.si < 1
-
-
-def test_a_planted_drift_is_found_and_the_recording_shows_none(data, rng) -> None:
-    slopes = np.array([1, -2, 0, 3, 0, 5]) * 1e-8
-    order = np.arange(54)
-    found = pose_drift(np.outer(order, slopes) + rng.normal(0, 1e-7, (54, 6)))
-    assert (np.abs(found.level - order.mean() * slopes) < 4 * found.level_sd).all()
-    assert found.level_sd == pytest.approx(np.full(6, 1e-7 / np.sqrt(54)), rel=0.4)
-    assert (np.abs(found.slope - slopes) < 4 * found.slope_sd).all() and (found.slope_sd < 2e-9).all()
-    assert found.slope_sd == pytest.approx(np.full(6, 1e-7 / np.sqrt(54 * (54**2 - 1) / 12)), rel=0.4)
-    ours = pose_drift(calibrate_jacobian(data.inputs, data.measured, offset=True).residuals)
-    assert (np.abs(ours.slope) < 2 * ours.slope_sd).all()
-    with pytest.raises(InputError, match="2 poses"):
-        pose_drift(np.zeros((2, 6)))
 
 
 # Rows and figures

@@ -61,10 +61,10 @@ def test_the_trajectory_file_has_its_columns_and_numbers(circle, tmp_path):
 def test_the_report_is_one_file_that_refers_to_nothing_outside(circle, tmp_path):
     import re
 
-    from ctrlgen.trajectory.solution_plots import draw_all
+    from ctrlgen.trajectory.solution_plots import draw_solution
     from ctrlgen.verification.scenario_report import write_report
 
-    write_report(tmp_path, circle, None, expectations(circle), None, draw_all(circle))
+    write_report(tmp_path, circle, None, expectations(circle), None, draw_solution(circle))
     page = (tmp_path / "report.html").read_text()
     assert page.count("<svg") == 5 and "Not run." in page
     assert not re.search(r'(src|href)="(?!#)', page)

@@ -57,3 +57,9 @@ def test_no_test_uses_a_private_name(path):
 )
 def test_a_private_name_is_found_wherever_it_is_used(text):
     assert private_names(ast.parse(text))
+
+
+@pytest.mark.parametrize("path", TESTS, ids=lambda p: p.stem)
+def test_a_file_of_tests_is_of_one_subject(path):
+    """Of 400 lines at most, as the modules of the program."""
+    assert len(path.read_text().splitlines()) <= 400

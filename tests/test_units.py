@@ -4,7 +4,16 @@ import re
 
 import pytest
 
-from ctrlgen.core.units import from_si, parse, read_quantity, same_dimension, show, to_si
+from ctrlgen.core.units import (
+    from_si,
+    parse,
+    parse_difference,
+    read_quantity,
+    same_dimension,
+    show,
+    show_difference,
+    to_si,
+)
 
 
 @pytest.mark.parametrize(
@@ -98,3 +107,15 @@ def test_a_standard_deviation_is_a_difference_or_a_share(value, unit, sd, si):
 def test_a_standard_deviation_that_is_neither_is_refused(value, unit, sd, says):
     with pytest.raises(ValueError, match=re.escape(says)):
         read_quantity(unit, {"value": value, "sd": sd})
+
+
+@pytest.mark.parametrize("text", ["2 K", "2 degC", "2 delta_degC", "3.6 degF", "3.6 delta_degF"])
+@pytest.mark.parametrize("unit", ["degC", "K"])
+def test_a_difference_of_temperatures_does_not_count_from_absolute_zero(text, unit):
+    assert parse_difference(text, unit) == pytest.approx(2.0, rel=1e-12)  # roundings of 459.67 and 5/9
+    assert read_quantity(unit, {"value": f"20 {unit}", "sd": text}).sd == parse_difference(text, unit)
+
+
+def test_a_difference_is_shown_in_kelvins_where_the_quantity_is_in_degrees():
+    assert [show_difference(2.0, unit) for unit in ("degC", "K")] == ["2 K", "2 K"]
+    assert show_difference(2.0, "degF") == "3.6 delta_degF" and show_difference(2e-6, "um") == "2 um"

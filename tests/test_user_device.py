@@ -349,3 +349,10 @@ def test_an_imposed_motion_that_does_not_fit_is_refused(other, says):
     with pytest.raises(InputError) as caught:
         gantry(**other)
     assert says in str(caught.value)
+
+
+def test_an_argument_that_does_not_exist_or_is_missing_is_named():
+    with pytest.raises(TypeError, match="no argument 'drives'; did you mean 'drive'"):
+        pendulum(drives={"motor": "2 V"})
+    with pytest.raises(TypeError, match="needs the arguments axes, parameters"):
+        ctrlgen.user_device("pendulum")

@@ -9,7 +9,6 @@ from ctrlgen.app.diagnosis_console import print_recording
 from ctrlgen.app.scenario_console import print_shaper
 from ctrlgen.core.errors import Fault, InputError, Unreachable
 from ctrlgen.core.files import read_toml
-from ctrlgen.core.units import show
 from ctrlgen.devices import load_device
 from ctrlgen.devices.mechanism.mechanism import Mechanism
 from ctrlgen.devices.mechanism.modes import summary
@@ -97,8 +96,7 @@ def _check_device(file: Path, figure: Path | None) -> None:
     for line in summary(device) if isinstance(device, Mechanism) else ():
         out.print(f"  {line}", markup=False, soft_wrap=True)
     for limit in (*model.limits, *model.rate_limits):
-        low = "" if limit.lower is None else f"{show(limit.lower, limit.unit)} <= "
-        out.print(f"  {low}{limit.label}" + ("" if limit.upper is None else f" <= {show(limit.upper, limit.unit)}"))
+        out.print(f"  {limit.text}")
     units = dict(zip(model.signals["reading"].channels, model.signals["reading"].units, strict=True))
     for sensor in device.sensor:
         out.print(f"  sensor: {describe(sensor, units[sensor.at])}", markup=False, soft_wrap=True)

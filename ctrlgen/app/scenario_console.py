@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rich.markup import escape
 
 from ctrlgen.app.console import Column, out, show_table, table_of
-from ctrlgen.core.units import from_si, show
+from ctrlgen.core.units import from_si, show, show_difference
 
 if TYPE_CHECKING:
     from ctrlgen.app.scenario_pipeline import Outcome, WorkspaceSummary
@@ -61,7 +61,7 @@ def print_solution(outcome: Outcome) -> None:
         where = f"{margin.channel}, " + (
             f"{solution.trace.time[margin.sample]:.3f} s" if scenario.sample_time else f"sample {margin.sample}"
         )
-        reserved = (show(margin.reserve, "K" if unit == "degC" else unit, 3) if margin.reserve else "",) * len(robust)
+        reserved = (show_difference(margin.reserve, unit, 3) if margin.reserve else "",) * len(robust)
         bound = show(margin.limit.described(margin.bound), unit)
         row = (margin.limit.label, where, show(margin.value, unit), bound, *reserved, share)
         table.add_row(*row, "<- tightest" if tightest else "", style="bold" if tightest else None)

@@ -29,7 +29,7 @@ from ctrlgen.trajectory.frame import Frame
 from ctrlgen.trajectory.metrics import ExpectationResult, expectations
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import Solution
-from ctrlgen.trajectory.solution_plots import draw_all, draw_workspace
+from ctrlgen.trajectory.solution_plots import draw_solution, draw_workspace
 from ctrlgen.trajectory.workspace import Ball, Workspace
 from ctrlgen.verification.build_page import write_build
 from ctrlgen.verification.build_record import Build
@@ -90,7 +90,7 @@ def run(scenario: Scenario | Path | str, out: Path | str, progress: Progress = q
         solution = solve_scenario(scenario, progress)
         expected = expectations(solution)
         progress("C sources")
-        drawn = draw_all(solution)
+        drawn = draw_solution(solution)
         c = generate(solution.scenario, solution.model, draft / "c", solution, drawn)
         comparison = compare(c, solution, lambda build: progress(f"compared: {build}"))
         progress("report")
@@ -111,7 +111,7 @@ def verify(scenario: Scenario | Path | str, out: Path | str, progress: Progress 
         solution = solve_scenario(scenario, progress)
         expected = expectations(solution)
         progress("C sources")
-        c = generate(solution.scenario, solution.model, draft / "c", solution, draw_all(solution))
+        c = generate(solution.scenario, solution.model, draft / "c", solution, draw_solution(solution))
         progress("reference")
         reference = ReferenceAnswers(solution)
         comparison = compare(c, solution, lambda build: progress(f"compared: {build}"), reference)
@@ -137,7 +137,7 @@ def solve_into(scenario: Scenario | Path | str, out: Path | str, progress: Progr
         solution = solve_scenario(scenario, progress)
         expected = expectations(solution)
         progress("report")
-        write_report(draft, solution, None, expected, None, draw_all(solution), budget_section(solution))
+        write_report(draft, solution, None, expected, None, draw_solution(solution), budget_section(solution))
         return Outcome(solution, None, None, expected)
 
 
@@ -146,7 +146,7 @@ def generate_into(scenario: Scenario | Path | str, out: Path | str, progress: Pr
     scenario = _with_online(scenario)
     with whole_folder(Path(out)) as draft:
         solution = solve_scenario(scenario, progress)
-        c = generate(solution.scenario, solution.model, draft, solution, draw_all(solution))
+        c = generate(solution.scenario, solution.model, draft, solution, draw_solution(solution))
     return replace(c, path=Path(out))
 
 

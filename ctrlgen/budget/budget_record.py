@@ -10,7 +10,7 @@ from pydantic import Field
 from ctrlgen.budget.contributors import BudgetLine, Group
 from ctrlgen.budget.error_budget import TOLERANCE, Agreement, ErrorBudget
 from ctrlgen.budget.limits import Safety
-from ctrlgen.core.units import difference, from_si
+from ctrlgen.core.units import difference, from_si, shown_difference_unit
 from ctrlgen.reporting.result_file import ChannelGroup, Keys, Number, Origin, origin
 
 
@@ -251,7 +251,7 @@ def _safety(budget: ErrorBudget, s: Safety) -> SafetyEntry:
         time_s=float(solution.trace.time[s.sample]) if solution.scenario.sample_time else None,
         unit=unit,
         bound=float(from_si(s.bound, unit)),
-        margin_unit=margin_unit(unit),
+        margin_unit=shown_difference_unit(unit),
         margin=float(difference(s.margin, unit)),
         sd=float(difference(s.sd, unit)),
         margin_at_probability=float(difference(s.kept, unit)),
@@ -261,16 +261,11 @@ def _safety(budget: ErrorBudget, s: Safety) -> SafetyEntry:
     )
 
 
-def margin_unit(unit: str) -> str:
-    """The unit of a difference of two values in `unit`."""
-    return {"degC": "K", "degF": "delta_degF"}.get(unit, unit)
-
-
 def safety_sentence(s: Safety, probability: float) -> str:
     """Such as 'actuator temperature keeps 550 degC with 99.9 %: margin 3.1 K'."""
     unit, likely = s.limit.unit, f"{100 * probability:.10g} %"
     bound = f"{from_si(s.bound, unit):.5g} {unit}"
-    left = f"{abs(difference(s.kept, unit)):.3g} {margin_unit(unit)}"
+    left = f"{abs(difference(s.kept, unit)):.3g} {shown_difference_unit(unit)}"
     if s.kept >= 0:
         return f"{s.limit.label} keeps {bound} with {likely}: margin {left}"
     does = f"it does with {100 * s.probability:.3g} %"

@@ -22,7 +22,7 @@ class BudgetSection:
 
     @property
     def record(self) -> BudgetRecord | None:
-        """As budget.json would hold it."""
+        """What budget.json would hold; None where no budget is drawn up."""
         return None if self.budget is None else budget_record(self.budget)
 
     @property

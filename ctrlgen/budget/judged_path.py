@@ -57,8 +57,8 @@ class JudgedPath:
         for limit, own in self.path.places:
             values = np.concatenate([y[:, own].ravel(), rest[limit.name]])
             below, above = largest[limit.name]
-            room_below = np.inf if limit.lower is None else max(float(values.min()) - limit.lower, 0.0)
-            room_above = np.inf if limit.upper is None else max(limit.upper - float(values.max()), 0.0)
+            low, high = limit.bounds
+            room_below, room_above = max(float(values.min()) - low, 0.0), max(high - float(values.max()), 0.0)
             reserves[limit.name] = (min(below, room_below), min(above, room_above))
         return reserves
 

@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.budget.uncertainty import Uncertainties
+from ctrlgen.model.allocation import drive_ranges
 from ctrlgen.model.assembly import build_model, movable
 from ctrlgen.model.model import Model
 
@@ -43,9 +44,7 @@ def of_least_error(model: Model, stated: Uncertainties, follow: str) -> Model:
                 own = C @ by_number[:, :, free.index(path)] if path in free else np.zeros((1, n_u))
                 size = np.sum(own**2, axis=0) * sd**2
                 variance += size if np.count_nonzero(size) == 1 else 0.0
-    low, high = model.u_bounds
-    span = np.where(np.isfinite(high - low), high - low, 2 * model.u_scale)
-    weights = variance * span**2
+    weights = variance * drive_ranges(model) ** 2
     if not weights.any():
         return model
     return replace(model, drive_weights=np.maximum(weights / weights.max(), LEAST_WEIGHT))

@@ -115,10 +115,7 @@ def _bounds(path: UncertainPath, model: Model) -> np.ndarray:
     """(2, channels) lower and upper bounds; infinite where there is none."""
     by_name = {limit.name: limit for limit in model.limits}
     found = [by_name[limit.name] for limit, _ in path.channels]
-    return np.array([
-        [-np.inf if limit.lower is None else limit.lower for limit in found],
-        [np.inf if limit.upper is None else limit.upper for limit in found],
-    ])  # fmt: skip
+    return np.array([limit.bounds for limit in found]).reshape(-1, 2).T
 
 
 def _limited(path: UncertainPath, model: Model, x: np.ndarray, z: np.ndarray) -> np.ndarray:

@@ -14,8 +14,17 @@ from pydantic import Field
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, read_toml, validate
-from ctrlgen.core.units import Quantity, is_share, parse, same_dimension, share_of, to_si, written_unit
-from ctrlgen.devices.base import Section
+from ctrlgen.core.units import (
+    Quantity,
+    is_share,
+    parse_difference,
+    same_dimension,
+    share_of,
+    shown_difference_unit,
+    to_si,
+    written_unit,
+)
+from ctrlgen.devices.section import Section
 from ctrlgen.model.model import Model
 from ctrlgen.trajectory.playback import ANGLE_TOLERANCE, LENGTH_TOLERANCE, playback_tolerance
 from ctrlgen.trajectory.scenario import Input, Scenario
@@ -234,7 +243,9 @@ class _Reader:
                         Fault(f"{where}.sd", f"{stated.sd!r} must be above zero; leave out what is known exactly")
                     )
             else:
-                sds.append(self._absolute(f"{where}.sd", stated.sd, unit, f"1 {_step(unit)}".replace(" 1", "")))
+                sds.append(
+                    self._absolute(f"{where}.sd", stated.sd, unit, f"1 {shown_difference_unit(unit)}".replace(" 1", ""))
+                )
         self._add(name, "number", paths, tuple(sds), stated.sd, stated.source, self.numbers[paths[0]])
 
     def _add(
@@ -262,11 +273,11 @@ class _Reader:
         )
 
     def _absolute(self, where: str, text: str, unit: str, example: str) -> float:
-        return self._positive(where, text, "delta_degC" if to_si(0.0, unit) else unit, text, 1.0, example)
+        return self._positive(where, text, unit, text, 1.0, example)
 
     def _positive(self, where: str, text: str, unit: str, body: str, scale: float, example: str) -> float:
         try:
-            value = parse(body, unit) * scale
+            value = parse_difference(body, unit) * scale
         except ValueError as error:
             self.faults.append(Fault(where, f'{error}; an sd is a difference, such as "{example}"'))
             return math.nan
@@ -318,8 +329,3 @@ class _Reader:
             what = "contradict one another: no deviations can have these coefficients together; lower some of them"
             raise InputError(path, [Fault("correlation", what)])
         return matrix
-
-
-def _step(unit: str) -> str:
-    """The unit of a difference of numbers in `unit`."""
-    return "K" if to_si(0.0, unit) else unit

@@ -9,7 +9,7 @@ import numpy as np
 from ctrlgen.budget.chance_constraint import ChanceConstraint
 from ctrlgen.budget.judged_path import JudgedPath
 from ctrlgen.core.errors import Infeasibility, Unreachable
-from ctrlgen.core.units import show
+from ctrlgen.core.units import show, show_difference
 from ctrlgen.trajectory.infeasibility import instead
 from ctrlgen.trajectory.inverse.clock import Clock
 from ctrlgen.trajectory.solution import Solution
@@ -47,14 +47,14 @@ def _missing(
     for limit, own in judged.path.places:
         for side, away in enumerate(("above", "below")):
             k, i = np.unravel_index(int(np.argmax(short[side, :, own])), short[side, :, own].shape)
-            at, unit = (side, int(k), own.start + int(i)), "K" if limit.unit == "degC" else limit.unit
+            at = side, int(k), own.start + int(i)
             if not short[at]:
                 continue
             bound, margin = float(m.bounds[side, at[2]]), float(m.margin[at])
             value = show(bound + (margin if side == 0 else -margin), limit.unit)
+            left, taken, lacking = (show_difference(v, limit.unit) for v in (margin, reserve[at], short[at]))
             text = (
-                f"  {limit.label} at {limit.channels[i]}: {value} at sample {k}{clock.moment(at[1])} is {show(margin, unit)} {away} "
-                f"{show(bound, limit.unit)}, but what is uncertain takes {show(reserve[at], unit)} there: short by "
-                f"{show(short[at], unit)}"
+                f"  {limit.label} at {limit.channels[i]}: {value} at sample {k}{clock.moment(at[1])} is {left} {away} "
+                f"{show(bound, limit.unit)}, but what is uncertain takes {taken} there: short by {lacking}"
             )
             yield float(short[at] / m.sd[at]), text, at[1]

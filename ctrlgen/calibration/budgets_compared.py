@@ -13,7 +13,7 @@ from ctrlgen.budget.error_budget import ErrorBudget, budget_of
 from ctrlgen.budget.robust import solve
 from ctrlgen.budget.uncertainty import FILE, Uncertain, Uncertainties, load_uncertainties
 from ctrlgen.calibration.calibrate import Calibration, sd_of_bounds
-from ctrlgen.core.units import to_si
+from ctrlgen.core.units import show_difference, to_si
 from ctrlgen.devices import Device
 from ctrlgen.devices.run_time import RunTimeConstant
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
@@ -78,9 +78,7 @@ def _joined(
 
 
 def _shown(c: RunTimeConstant, sd: float) -> str:
-    scale = to_si(1.0, c.unit) - to_si(0.0, c.unit)
-    unit = "K" if to_si(0.0, c.unit) else c.unit
-    return f"{sd / scale:.3g} {'' if unit == '1' else unit}".strip()
+    return show_difference(sd, c.unit, 3)
 
 
 def _step(c: RunTimeConstant) -> tuple[str, tuple[float, ...]]:

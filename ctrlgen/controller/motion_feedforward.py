@@ -17,9 +17,9 @@ from ctrlgen.controller.controller_step import State
 from ctrlgen.controller.feedforward import Controller, ControllerStatus, ControllerStep
 from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.core.errors import Fault, InputError
-from ctrlgen.model.assembly import TYPICAL_RATE
 from ctrlgen.model.inverse_dynamics import InverseDynamics, inverse_dynamics
 from ctrlgen.model.model import Model, Signal
+from ctrlgen.model.state_vector import TYPICAL_RATE
 
 
 @dataclass(frozen=True)

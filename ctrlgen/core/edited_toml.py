@@ -9,7 +9,7 @@ import numpy as np
 import tomlkit
 from tomlkit.items import Item, Table
 
-from ctrlgen.core.units import from_si
+from ctrlgen.core.units import difference_unit, from_si
 
 DIGITS = 12  # nine would round by 5e-9, more than predictions may differ by
 SD_DIGITS = 3
@@ -49,5 +49,4 @@ def sd_text(sd: float, unit: str) -> str:
     if not np.isfinite(sd) or sd == 0:
         return ""
     scale = from_si(sd, unit) - from_si(0.0, unit)
-    name = {"degC": "delta_degC", "degF": "delta_degF", "1": ""}.get(unit, unit)
-    return f"{scale:.{SD_DIGITS}g} {name}".strip()
+    return f"{scale:.{SD_DIGITS}g} {'' if unit == '1' else difference_unit(unit)}".strip()

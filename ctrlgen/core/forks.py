@@ -97,7 +97,7 @@ def in_forks(
 def _work(
     function: Callable[[Any], Any], items: Sequence[Any], waiting: int, send: Connection, shared: Sequence[Any]
 ) -> None:
-    """One fork: takes items until none waits."""
+    """The life of one fork: it takes items until none waits."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     while index := os.read(waiting, INDEX_BYTES):
         k = int.from_bytes(index, "little")

@@ -97,7 +97,7 @@ def _check_sendable(function: Callable[[Any], Any], items: list[Any]) -> None:
 
 
 def _begin_worker() -> None:
-    """One BLAS thread a process; Ctrl-C is left to the parent."""
+    """Gives a worker one BLAS thread, and leaves Ctrl-C to its parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     for name in THREAD_VARIABLES:
         os.environ[name] = "1"

@@ -74,6 +74,16 @@ def difference(value: Any, unit: str) -> Any:
     return value / _affine(unit)[0]
 
 
+def difference_unit(unit: str) -> str:
+    """The unit of differences of quantities in `unit`, as files state it: 'degC' -> 'delta_degC', 'um' -> 'um'."""
+    return f"delta_{unit}" if _affine(unit)[1] else unit
+
+
+def shown_difference_unit(unit: str) -> str:
+    """The unit of differences of quantities in `unit`, as reports show it: 'degC' -> 'K', 'degF' -> 'delta_degF', 'um' -> 'um'."""
+    return "K" if unit == "degC" else difference_unit(unit)
+
+
 def base_unit(unit: str) -> str:
     """The SI unit of a quantity given in `unit`: 'um' -> 'm', 'degC' -> 'K', 'W' -> 'W'."""
     for plain in ("m", "rad", "K", "N", "W", "V", "A", "s", "Hz", "Pa", "kg", "ohm", "1"):
@@ -140,8 +150,19 @@ def parse(text: object, unit: str) -> float:
     return to_si(value, written)
 
 
+def parse_difference(text: str, unit: str) -> float:
+    """The SI number of a difference of quantities in `unit`: of temperatures '1 K', '1 degC' and '1 delta_degC' are the same.
+
+    Raises ValueError as `parse`.
+    """
+    written = written_unit(text)
+    if _affine(written)[1]:
+        text = text.replace(written, difference_unit(written))
+    return parse(text, "delta_degC" if same_dimension(unit, "K") else unit)
+
+
 def _bounds_text(unit: str, low: float | None, high: float | None, low_open: bool) -> str:
-    """Such as '> 0 um and <= 100 um'; empty where nothing is bounded."""
+    """The bounds as text, such as '> 0 um and <= 100 um'; empty where nothing is bounded."""
     side = ">" if low_open else ">="
     parts = [] if low is None else [f"{side} {show(low, unit)}"]
     return " and ".join(parts + ([] if high is None else [f"<= {show(high, unit)}"]))
@@ -165,19 +186,17 @@ def share_of(sd: str, si: float, value: str) -> float:
     """The standard deviation [SI] of the `value`, `si` in SI, of which `sd` is a share. Raises ValueError."""
     unit = written_unit(value)
     if si == 0 or to_si(0.0, unit):
-        step = "K" if to_si(0.0, unit) else unit
         what = f'sd = "{sd}" is a share of {value}, which does not count from a zero of its own'
-        raise ValueError(f'{what}; write a difference, such as "1 {step}"')
+        raise ValueError(f'{what}; write a difference, such as "1 {shown_difference_unit(unit)}"')
     return parse(sd.removesuffix("%").strip(), "1") / 100 * abs(si)
 
 
 def _deviation(sd: object, si: float, value: str, unit: str) -> float:
     """A standard deviation [SI] as the file states it, a difference in `unit` or a share of the value. Raises ValueError."""
-    step = unit if unit != "degC" else "delta_degC"
-    found = share_of(str(sd).strip(), si, value) if is_share(sd, value) else parse(sd, step)
-    if found < 0:
+    deviation = share_of(str(sd).strip(), si, value) if is_share(sd, value) else parse_difference(str(sd), unit)
+    if deviation < 0:
         raise ValueError(f"sd = {sd!r} is negative")
-    return found
+    return deviation
 
 
 def _reader(
@@ -284,3 +303,8 @@ def read_probability(text: str) -> float:
 def show(si: float, unit: str, digits: int = 4) -> str:
     """The text of an SI number in `unit`, such as '31.53 um'."""
     return f"{from_si(si, unit):.{digits}g} {unit if unit != '1' else ''}".strip()
+
+
+def show_difference(si: float, unit: str, digits: int = 4) -> str:
+    """The text of an SI difference of quantities in `unit`, such as '3 K' where the unit is degC."""
+    return show(si, shown_difference_unit(unit), digits)

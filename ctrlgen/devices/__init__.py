@@ -10,8 +10,11 @@ from pkgutil import walk_packages
 import ctrlgen.effects  # noqa: F401  fills Effect.library before a device file is read
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_toml, validate
-from ctrlgen.devices.base import BalancedPhysics, Device, DevicePhysics, ImposedPhysics, InertialPhysics, Limit, Signal
+from ctrlgen.devices.base import Device
+from ctrlgen.devices.device_physics import BalancedPhysics, DevicePhysics, ImposedPhysics, InertialPhysics
+from ctrlgen.devices.limit import Limit
 from ctrlgen.devices.python_file import KIND, changed_device, python_device, python_file_of
+from ctrlgen.devices.signal import Signal
 
 for _module in walk_packages(__path__, f"{__name__}."):
     if not _module.name.endswith(".figure"):  # drawing is imported when something is drawn

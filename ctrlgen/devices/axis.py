@@ -8,7 +8,11 @@ from typing import Annotated, ClassVar, Literal
 import casadi as ca
 
 from ctrlgen.core.units import In, Quantity, written_unit
-from ctrlgen.devices.base import AxisSignal, Device, FeedbackLoop, InertialPhysics, Limit, Section, Signal
+from ctrlgen.devices.base import Device
+from ctrlgen.devices.device_physics import FeedbackLoop, InertialPhysics
+from ctrlgen.devices.limit import Limit
+from ctrlgen.devices.section import Section
+from ctrlgen.devices.signal import AxisSignal, Signal
 
 ForceConstant = Annotated[Quantity, In("N/V", positive=True)] | Annotated[Quantity, In("N/A", positive=True)]
 

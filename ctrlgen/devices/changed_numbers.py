@@ -6,7 +6,7 @@ from typing import Any
 
 from ctrlgen.core.units import Quantity, from_si, written_unit
 from ctrlgen.devices.base import Device
-from ctrlgen.devices.section import Section
+from ctrlgen.devices.quantities import map_quantities
 from ctrlgen.effects import Effect
 
 
@@ -19,19 +19,15 @@ def written(si: float, unit: str, source: str | None = None) -> Quantity:
 def changed(device: Device, values: dict[str, float]) -> Device:
     """The device with some of its numbers at other values [SI]."""
 
-    def walk(node: Any, prefix: str) -> Any:
-        if isinstance(node, Quantity):
-            return written(values[prefix], written_unit(node.text), node.source) if prefix in values else node
-        if isinstance(node, Section):
-            fields = {
-                key: walk(getattr(node, key), f"{prefix}.{key}" if prefix else key) for key in type(node).model_fields
-            }
-            return node.model_copy(update=fields)
-        if isinstance(node, Effect):
-            own = {key: walk(value, f"{prefix}.{key}") for key, value in node.values.items()}
-            return node if own == node.values else type(node)(node.at, own, node.of)
-        if isinstance(node, tuple):
-            return tuple(walk(member, f"{prefix}[{i}]") for i, member in enumerate(node))
-        return node
+    def change(path: str, number: Quantity) -> Quantity:
+        return written(values[path], written_unit(number.text), number.source) if path in values else number
 
-    return walk(device, "") if values else device
+    def build(node: Any, members: dict[str, Any]) -> Any:
+        if isinstance(node, tuple):
+            return tuple(members.values())
+        named = {suffix.removeprefix("."): member for suffix, member in members.items()}
+        if isinstance(node, Effect):
+            return node if named == node.values else type(node)(node.at, named, node.of)
+        return node.model_copy(update=named)
+
+    return map_quantities(device, change, build) if values else device

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import model_validator
 
 from ctrlgen.core.units import In, Quantity
-from ctrlgen.devices.base import Section
+from ctrlgen.devices.section import Section
 from ctrlgen.physics import circular_hinge_table as table
 from ctrlgen.physics.screw import Matrix, Scalar
 

@@ -12,16 +12,11 @@ import scipy
 from pydantic import Field, model_validator
 
 from ctrlgen.core.units import In, Quantity
-from ctrlgen.devices.base import (
-    AxisSignal,
-    BalancedPhysics,
-    Device,
-    DevicePhysics,
-    InertialPhysics,
-    Limit,
-    Section,
-    Signal,
-)
+from ctrlgen.devices.base import Device
+from ctrlgen.devices.device_physics import BalancedPhysics, DevicePhysics, InertialPhysics
+from ctrlgen.devices.limit import Limit
+from ctrlgen.devices.section import Section
+from ctrlgen.devices.signal import AxisSignal, Signal
 from ctrlgen.numerics.constraint_second_order import second_order
 from ctrlgen.physics import hexapod, thermal_actuator, xy_stage
 from ctrlgen.physics.damping import modal_damping

@@ -9,7 +9,11 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.units import In, Quantity
-from ctrlgen.devices.base import BalancedPhysics, Device, Limit, Section, Signal
+from ctrlgen.devices.base import Device
+from ctrlgen.devices.device_physics import BalancedPhysics
+from ctrlgen.devices.limit import Limit
+from ctrlgen.devices.section import Section
+from ctrlgen.devices.signal import Signal
 from ctrlgen.numerics.constraint_second_order import second_order
 from ctrlgen.physics import meso_hexapod_kinematics as meso_hexapod
 

@@ -10,8 +10,12 @@ import numpy as np
 from pydantic import model_validator
 
 from ctrlgen.core.units import In, Quantity
-from ctrlgen.devices.base import BalancedPhysics, Device, Limit, Section, Signal
+from ctrlgen.devices.base import Device
+from ctrlgen.devices.device_physics import BalancedPhysics
 from ctrlgen.devices.hinge import Hinge
+from ctrlgen.devices.limit import Limit
+from ctrlgen.devices.section import Section
+from ctrlgen.devices.signal import Signal
 from ctrlgen.physics import piezo_stack
 from ctrlgen.physics import rrr_kinetostatics as rrr_stage
 from ctrlgen.physics.rrr_kinetostatics import Kinetostatics

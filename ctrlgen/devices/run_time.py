@@ -11,6 +11,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, ValidationError
 
 from ctrlgen.core.units import Quantity, base_unit, parse, show, to_si, written_unit
+from ctrlgen.devices.quantities import member_at
 from ctrlgen.devices.section import Section
 from ctrlgen.effects import Effect
 
@@ -43,7 +44,7 @@ class RunTime(Section):
 
 @dataclass(frozen=True)
 class RunTimeConstant:
-    """One of them: `path` in the file, `name` in C, default, `low` and `high` in SI, `unit` as the file writes it."""
+    """A constant that is given at the start: `path` in the file, `name` in C, default, `low` and `high` in SI, `unit` of the file."""
 
     path: str
     name: str
@@ -60,7 +61,7 @@ class RunTimeConstant:
 
     @property
     def range_text(self) -> str:
-        """Such as '450 ... 650 K/W'."""
+        """The range as text, such as '450 ... 650 K/W'."""
         ends = [show(v, self.unit).removesuffix(f" {self.unit}") for v in (self.low, self.high)]
         return f"{ends[0]} ... {ends[1]} {'' if self.unit == '1' else self.unit}".strip()
 
@@ -129,9 +130,7 @@ def _parsed(key: str, text: str, unit: str) -> float:
 def _refused(device: Any, path: str, text: str) -> str:
     """What the section of a number says against another value; empty where it says nothing."""
     match = re.fullmatch(r"(.*)\.(\w+)", path)
-    node: Any = device
-    for key in re.findall(r"\w+", match[1]) if match else ():
-        node = node[int(key)] if key.isdigit() else getattr(node, key)
+    node = member_at(device, match[1]) if match else None
     if not match or not isinstance(node, Section):
         return ""
     try:

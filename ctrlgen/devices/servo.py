@@ -9,7 +9,11 @@ import casadi as ca
 from pydantic import model_validator
 
 from ctrlgen.core.units import In, Quantity, same_dimension, written_unit
-from ctrlgen.devices.base import BalancedPhysics, Device, Limit, Section, Signal
+from ctrlgen.devices.base import Device
+from ctrlgen.devices.device_physics import BalancedPhysics
+from ctrlgen.devices.limit import Limit
+from ctrlgen.devices.section import Section
+from ctrlgen.devices.signal import Signal
 
 Travel = Annotated[Quantity, In("deg", positive=True)] | Annotated[Quantity, In("um", positive=True)]
 

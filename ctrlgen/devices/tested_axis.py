@@ -10,7 +10,10 @@ import casadi as ca
 from pydantic import Field, model_validator
 
 from ctrlgen.core.units import In, Quantity, same_dimension, written_unit
-from ctrlgen.devices.base import Device, ImposedPhysics, Limit, Section, imposed_motion
+from ctrlgen.devices.base import Device
+from ctrlgen.devices.device_physics import ImposedPhysics, imposed_motion
+from ctrlgen.devices.limit import Limit
+from ctrlgen.devices.section import Section
 
 Mass = Annotated[Quantity, In("kg", low=0.0)] | Annotated[Quantity, In("kg*m^2", low=0.0)]
 Damping = Annotated[Quantity, In("N*s/m", low=0.0)] | Annotated[Quantity, In("N*m*s/rad", low=0.0)]

@@ -12,18 +12,31 @@ The theorems of `tests/test_effects.py` and `tests/test_effects_in_c.py` then ho
 units, C equal to Python. What the diagnosis believes of it beforehand has defaults; `ctrlgen/estimation/priors.py` takes a row
 where they are wrong.
 
-A law's file imports `Effect, Param, Place` (and `State`) from here. Files that begin with an underscore are no laws: the law's
-interface, the reader of [[effect]] tables, and expressions that several laws share.
+A law's file imports what it needs from here: `Effect`, `Param`, `Place`, `State` and the types of what it is given. Files that begin
+with an underscore are no laws: the law's interface, the reader of [[effect]] tables, and expressions that several laws share.
 """
 
 from importlib import import_module
 from pkgutil import iter_modules
 
 from ctrlgen.effects._effect import Effect, Place
+from ctrlgen.effects._law_inputs import Expression, LawInputs, LawNumbers
 from ctrlgen.effects._parameter import Channel, Param, State
 from ctrlgen.effects._table import EffectTable, faults_at, read_effect
 
 for _module in iter_modules(__path__):
     import_module(f"{__name__}.{_module.name}")
 
-__all__ = ["Channel", "Effect", "EffectTable", "Param", "Place", "State", "faults_at", "read_effect"]
+__all__ = [
+    "Channel",
+    "Effect",
+    "EffectTable",
+    "Expression",
+    "LawInputs",
+    "LawNumbers",
+    "Param",
+    "Place",
+    "State",
+    "faults_at",
+    "read_effect",
+]

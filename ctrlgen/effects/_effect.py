@@ -5,12 +5,10 @@ from __future__ import annotations
 import re
 import sys
 from enum import Enum
-from types import SimpleNamespace
 from typing import ClassVar
 
-import casadi as ca
-
 from ctrlgen.core.units import Quantity, same_dimension
+from ctrlgen.effects._law_inputs import Expression, LawInputs, LawNumbers
 from ctrlgen.effects._parameter import Channel, Param, State
 
 
@@ -28,20 +26,8 @@ class Place(Enum):
 class Effect:
     """Base of every effect: one law a file in `ctrlgen/effects/`; one that acts at several places or axes is named for each.
 
-    `term(s, p)` is the law's contribution, in the unit of the place. `p` holds the parameters in SI. `s` holds:
-
-    value, rate [1/s], second_rate [1/s^2]: the signal of this channel, before the effects of the same order at this place, and
-        its derivatives; rate and second_rate are None where the motion does not give them, second_rate is for `update` only
-    all, index, partner: that signal for every channel as a vector, the index of this channel, and that of the other of a pair (at
-        `partner_place`, where the law names one)
-    scale, travel: typical sizes of the signal and of the stage displacement
-    the effect's own states, by name
-    ambient [K]: rise of the surroundings' temperature; sample_time [s]
-    second_order_kinematics(), tangent_compliance(): vectors of the device, see `BalancedPhysics`; only where it has them
-    displacements, velocities (of all axes; no velocities for a device without inertia)
-    and, at places of an axis: displacement, velocity (None for a device without inertia), accelerations (of all axes; None but
-        for an imposed motion), force (that the stage takes at this displacement), and the actuator's state, such as its
-        temperature, with its rest
+    `term(s, p)` is the law's contribution, in the unit of the place: `p` holds the parameters in SI, and `LawInputs` says what `s`
+    holds.
     """
 
     library: ClassVar[dict[str, type[Effect]]] = {}
@@ -124,18 +110,20 @@ class Effect:
         itself = cls.partner_place is None and channel.partner == channel.name
         return channel.partner is not None and not itself and same_dimension(channel.partner_unit, wanted)
 
-    def term(self, s: SimpleNamespace, p: SimpleNamespace) -> ca.SX:
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         """The contribution at this place and channel."""
         raise NotImplementedError
 
-    def rates(self, s: SimpleNamespace, p: SimpleNamespace) -> dict[str, ca.SX]:
+    def rates(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         """Time derivative of each state that is integrated; clocks run by themselves."""
         return {}
 
-    def update(self, s: SimpleNamespace, p: SimpleNamespace) -> dict[str, ca.SX]:
+    def update(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         """Each stepped state after the present sample, from its value before; `term` sees the new one."""
         return {}
 
-    def after_sample(self, s: SimpleNamespace, p: SimpleNamespace) -> dict[str, ca.SX]:
+    def after_sample(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         """`update`, with the states that keep their value through a record."""
-        return {state.name: getattr(s, state.name) for state in self.states if state.per_record} | self.update(s, p)
+        return {state.name: getattr(s.states, state.name) for state in self.states if state.per_record} | self.update(
+            s, p
+        )

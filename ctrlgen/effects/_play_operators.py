@@ -8,10 +8,9 @@ reversals between samples, the others are lags of a signal itself, so that their
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import casadi as ca
 
+from ctrlgen.effects._law_inputs import LawInputs
 from ctrlgen.effects._parameter import State
 
 ELEMENTS = 8
@@ -26,20 +25,20 @@ def play_states(unit: str) -> tuple[State, ...]:
     return (*plays, State("start", "1", 1.0, per_record=True))
 
 
-def beginning(s: SimpleNamespace, radius: ca.SX) -> ca.SX:
+def beginning(s: LawInputs, radius: ca.SX) -> ca.SX:
     """Where a play of this `radius` begins: within it; in its middle where the law has no `start`."""
-    return radius * ca.fmax(ca.fmin(s.start, 1.0), -1.0) if hasattr(s, "start") else 0.0 * radius
+    return radius * ca.fmax(ca.fmin(s.states.start, 1.0), -1.0) if hasattr(s.states, "start") else 0.0 * radius
 
 
-def weighted_lag(s: SimpleNamespace, value: ca.SX, reach: ca.SX, taper: ca.SX) -> ca.SX:
+def weighted_lag(s: LawInputs, value: ca.SX, reach: ca.SX, taper: ca.SX) -> ca.SX:
     """sum_j w_j (value - P_j), w_j ~ j^-taper, sum w_j = 1."""
     weights = _weights(taper)
     return sum(w * lag for w, lag in zip(weights, lags(s, value, radii(reach)), strict=True)) / sum(weights)
 
 
-def lags(s: SimpleNamespace, value: ca.SX, widths: list[ca.SX]) -> list[ca.SX]:
+def lags(s: LawInputs, value: ca.SX, widths: list[ca.SX]) -> list[ca.SX]:
     """value - P_j of the plays with these half widths."""
-    return [value - getattr(s, name) - beginning(s, r) for name, r in zip(_play_names(), widths, strict=True)]
+    return [value - getattr(s.states, name) - beginning(s, r) for name, r in zip(_play_names(), widths, strict=True)]
 
 
 def following(value: ca.SX, reach: ca.SX, taper: ca.SX) -> ca.SX:
@@ -53,12 +52,12 @@ def _weights(taper: ca.SX) -> list[ca.SX]:
     return [float(j) ** -taper for j in range(1, ELEMENTS + 1)]
 
 
-def updated_plays(s: SimpleNamespace, path: list[ca.SX], widths: list[ca.SX]) -> dict[str, ca.SX]:
+def updated_plays(s: LawInputs, path: list[ca.SX], widths: list[ca.SX]) -> dict[str, ca.SX]:
     """The plays after the input has taken the values of `path` in turn: P_j stays within its half width of each value."""
     new = {}
     for name, radius in zip(_play_names(), widths, strict=True):
         first = beginning(s, radius)
-        play = getattr(s, name) + first
+        play = getattr(s.states, name) + first
         for value in path:
             play = ca.fmax(ca.fmin(play, value + radius), value - radius)
         new[name] = play - first

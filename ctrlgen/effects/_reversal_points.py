@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import casadi as ca
 import numpy as np
 
+from ctrlgen.effects._law_inputs import LawInputs
 
-def reversal_point(s: SimpleNamespace, before: ca.SX, velocity_before: ca.SX) -> ca.SX:
+
+def reversal_point(s: LawInputs, before: ca.SX, velocity_before: ca.SX) -> ca.SX:
     """The displacement at which the motion reversed since the last sample; the present displacement where it did not.
 
     For a velocity that changes linearly from v_0 to v_1 within h: d* = d_0 + h v_0^2/(2 (v_0 - v_1)), the mean of this from

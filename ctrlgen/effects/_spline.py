@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import casadi as ca
 
+from ctrlgen.effects._law_inputs import LawNumbers
 from ctrlgen.effects._parameter import Param
 
 KNOTS = 17  # bends as short as a tenth of the range
@@ -17,7 +16,7 @@ def weight_params(doc: str) -> tuple[Param, ...]:
     return tuple(Param(name, "1", (-100.0, 100.0), doc) for name in WEIGHTS)
 
 
-def cubic_spline(share: ca.SX, p: SimpleNamespace) -> ca.SX:
+def cubic_spline(share: ca.SX, p: LawNumbers) -> ca.SX:
     """sum_j c_j B(14 t - j + 2), j = 1..17, t = `share` of the way through a range, held beyond its ends; B the uniform cubic B-spline.
 
     B(x) = (max(2 - |x|, 0)^3 - 4 max(1 - |x|, 0)^3)/6. Source: C. de Boor, A Practical Guide to Splines (1978).

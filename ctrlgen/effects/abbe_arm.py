@@ -1,6 +1,6 @@
 """A sensor that does not stand in line with the point it should measure."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class AbbeArm(Effect):
@@ -16,5 +16,5 @@ class AbbeArm(Effect):
     source = "J. B. Bryan, Precision Engineering 1 (1979) 129: the Abbe principle revisited"
     params = (Param("arm", "um/urad", (-1.0, 1.0), "distance between sensor and point", off=0.0),)
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.arm * s.all[s.partner]

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class AsymmetricGain(Effect):
@@ -13,5 +13,5 @@ class AsymmetricGain(Effect):
     source = "definition"
     params = (Param("gain", "1", (-0.5, 0.5), "half the difference of the gains", off=0.0),)
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.gain * ca.fabs(s.value)

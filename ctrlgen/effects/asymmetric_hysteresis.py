@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
 
 
 class AsymmetricHysteresis(Effect):
@@ -22,12 +22,12 @@ class AsymmetricHysteresis(Effect):
     )
     states = (State("z", "travel", 0.1, stepped=True, free=True), State("w", "travel", 1.0, stepped=True))
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         slope = 1 + p.skew * s.displacement / ca.sqrt(s.displacement**2 + s.travel**2)
-        return -p.stiffness * s.z * slope
+        return -p.stiffness * s.states.z * slope
 
-    def update(self, s, p):
+    def update(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         w = s.displacement + p.skew * (ca.sqrt(s.displacement**2 + s.travel**2) - s.travel)
-        step = w - s.w
+        step = w - s.states.w
         settled = 1 - ca.exp(-ca.fabs(step) / p.reach)
-        return {"z": s.z + (ca.sign(step) * p.reach - s.z) * settled, "w": w}
+        return {"z": s.states.z + (ca.sign(step) * p.reach - s.states.z) * settled, "w": w}

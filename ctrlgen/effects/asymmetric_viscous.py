@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class AsymmetricViscous(Effect):
@@ -16,5 +16,5 @@ class AsymmetricViscous(Effect):
     source = "B. Armstrong-Helouvry et al., Automatica 30 (1994) 1083: direction-dependent friction"
     params = (Param("damping", "channel*s/travel", (-10.0, 10.0), "forward minus backward damping", off=0.0),)
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -(p.damping * ca.fabs(s.velocity) + ca.fabs(p.damping) * s.velocity) / 2

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
 from ctrlgen.effects._play_operators import beginning
 from ctrlgen.effects._reversal_points import reversal_point
 
@@ -28,13 +28,13 @@ class Backlash(Effect):
         State("v", "travel/s", 100.0, stepped=True),
     )
 
-    def term(self, s, p):
-        return 0.999 * (s.w + beginning(s, p.gap / 2) - s.displacement)
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return 0.999 * (s.states.w + beginning(s, p.gap / 2) - s.displacement)
 
-    def update(self, s, p):
+    def update(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         first, touch = beginning(s, p.gap / 2), TOUCH * s.travel
-        w = s.w + first
-        for d in (reversal_point(s, s.d, s.v), s.displacement):
+        w = s.states.w + first
+        for d in (reversal_point(s, s.states.d, s.states.v), s.displacement):
             low, high = d - p.gap / 2, d + p.gap / 2
             w = ca.if_else(w > high - touch, high, ca.if_else(w < low + touch, low, w))
         return {"w": w - first, "d": s.displacement, "v": 0 if s.velocity is None else s.velocity}

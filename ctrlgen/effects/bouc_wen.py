@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
 
 
 class Yielding(Effect, listed=False):
@@ -15,15 +15,15 @@ class Yielding(Effect, listed=False):
     source = "Y. K. Wen, J. Eng. Mech. Div. ASCE 102 (1976) 249; R. Bouc (1967)"
     states = (State("z", "travel", 0.1, stepped=True, free=True), State("d", "travel", 1.0, stepped=True))
 
-    def update(self, s, p):
-        step = s.displacement - s.d
-        way, zeta = ca.fabs(step) / p.reach, ca.sign(step) * s.z / p.reach
+    def update(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
+        step = s.displacement - s.states.d
+        way, zeta = ca.fabs(step) / p.reach, ca.sign(step) * s.states.z / p.reach
         c = 2 * p.loop - 1
         below, above = ca.fmax(-zeta, 0), ca.fmax(zeta, 0)
         to_zero = ca.log(1 + c * below) / c
         back, on = ca.fmin(way, to_zero), ca.fmax(way - to_zero, 0)
         change = (1 + c * below) * (1 - ca.exp(-c * back)) / c + (1 - above) * (1 - ca.exp(-on))
-        return {"z": s.z + ca.sign(step) * p.reach * change, "d": s.displacement}
+        return {"z": s.states.z + ca.sign(step) * p.reach * change, "d": s.displacement}
 
 
 _SHAPE = (
@@ -42,8 +42,8 @@ class BoucWen(Yielding):
     requires = frozenset({"force"})
     params = (Param("stiffness", "channel/travel", (0.0, 1e2), "stiffness right after a reversal", off=0.0), *_SHAPE)
 
-    def term(self, s, p):
-        return -p.stiffness * s.z
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return -p.stiffness * s.states.z
 
 
 class DisplacementBoucWen(Yielding):
@@ -55,5 +55,5 @@ class DisplacementBoucWen(Yielding):
     requires = frozenset({"actuator"})
     params = (Param("share", "1", (-0.95, 0.95), "share of the displacement that lags", off=0.0), *_SHAPE)
 
-    def term(self, s, p):
-        return -p.share * s.z
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return -p.share * s.states.z

@@ -1,6 +1,6 @@
 """A sensor with curvature: the first even term of its nonlinearity."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class Bow(Effect):
@@ -13,5 +13,5 @@ class Bow(Effect):
     source = "A. J. Fleming, Sensors and Actuators A 190 (2013) 106: calibration and nonlinearity"
     params = (Param("curvature", "1/channel", (-0.5, 0.5), "nonlinearity per reading squared", off=0.0),)
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.curvature * s.value**2

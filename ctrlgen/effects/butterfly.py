@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 from ctrlgen.effects._play_operators import following, play_states, radii, updated_plays, weighted_lag
 
 
@@ -32,10 +32,10 @@ class Butterfly(Effect):
     )
     states = play_states("channel")
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         polarisation = s.value - weighted_lag(s, s.value, p.reach, p.taper)
         most = ca.fmax(following(s.scale, p.reach, p.taper), 1e-3 * s.scale)
         return p.share * (s.scale * (polarisation / most) ** 2 - p.linear * s.value)
 
-    def update(self, s, p):
+    def update(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         return updated_plays(s, [s.value], radii(p.reach))

@@ -1,6 +1,6 @@
 """Two recorders whose clocks do not agree"""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class ClockOffset(Effect):
@@ -19,5 +19,5 @@ class ClockOffset(Effect):
     shifts_drive = True
     moves_in_time = True
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return 0.0 * p.offset

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
 
 STILL = 1e-6  # of v_s: keeps speed/tanh(speed) from being 0/0 at rest
 
@@ -25,9 +25,9 @@ class Coulomb(Effect):
     )
     states = (State("z", "1", 1.0),)
 
-    def term(self, s, p):
-        return -p.force * s.z
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return -p.force * s.states.z
 
-    def rates(self, s, p):
+    def rates(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         speed = ca.sqrt((s.velocity / p.smoothing) ** 2 + STILL**2)
-        return {"z": (s.velocity - p.smoothing * speed / ca.tanh(speed) * s.z) / p.reach}
+        return {"z": (s.velocity - p.smoothing * speed / ca.tanh(speed) * s.states.z) / p.reach}

@@ -1,6 +1,6 @@
 """One stage carries its neighbour along."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class Coupling(Effect):
@@ -12,5 +12,5 @@ class Coupling(Effect):
     source = "S. Awtar, A. H. Slocum, J. Mech. Des. 129 (2007) 816: cross-axis error of XY flexures"
     params = (Param("gain", "1", (-0.3, 0.3), "travel per travel of the other axis", off=0.0),)
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.gain * s.all[s.partner]

@@ -1,6 +1,6 @@
 """A flexure or its glue keeps moving after the load has settled."""
 
-from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
 
 RATIO = 4.0  # slow over fast relaxation time: two octaves, which a mixture of the two covers evenly
 
@@ -23,8 +23,8 @@ class Creep(Effect):
     )
     states = (State("z", "travel", 1.0), State("w", "travel", 1.0))
 
-    def term(self, s, p):
-        return p.gain * ((1 - p.slow) * s.z + p.slow * s.w)
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return p.gain * ((1 - p.slow) * s.states.z + p.slow * s.states.w)
 
-    def rates(self, s, p):
-        return {"z": (s.value - s.z) / p.tau, "w": (s.value - s.w) / (RATIO * p.tau)}
+    def rates(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
+        return {"z": (s.value - s.states.z) / p.tau, "w": (s.value - s.states.w) / (RATIO * p.tau)}

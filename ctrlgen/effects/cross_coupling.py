@@ -1,6 +1,6 @@
 """Two axes that share a flexure, a damper or a mass: the motion of the one takes force on the other."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class CrossCoupling(Effect, listed=False):
@@ -26,7 +26,7 @@ class StiffnessCoupling(CrossCoupling):
     requires = frozenset({"force", "velocity"})
     params = (Param("stiffness", "channel/travel", (-10.0, 10.0), "cross stiffness", off=0.0),)
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.stiffness * s.displacements[s.partner]
 
 
@@ -38,7 +38,7 @@ class DampingCoupling(CrossCoupling):
     active = True
     params = (Param("damping", "channel*s/travel", (-10.0, 10.0), "cross damping", off=0.0),)
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.damping * s.velocities[s.partner]
 
 
@@ -51,5 +51,5 @@ class InertiaCoupling(CrossCoupling):
     requires = frozenset({"force", "acceleration"})
     params = (Param("inertia", "channel*s^2/travel", (-10.0, 10.0), "cross inertia", off=0.0),)
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.inertia * s.accelerations[s.partner]

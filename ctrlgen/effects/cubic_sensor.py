@@ -1,6 +1,6 @@
 """A sensor that flattens, or steepens, toward both ends of its range."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class CubicSensor(Effect):
@@ -11,5 +11,5 @@ class CubicSensor(Effect):
     source = "A. J. Fleming, Sensors and Actuators A 190 (2013) 106: calibration and nonlinearity"
     params = (Param("curvature", "1/channel^2", (-0.3, 0.3), "nonlinearity per reading cubed", off=0.0),)
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.curvature * s.value**3

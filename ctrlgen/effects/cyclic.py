@@ -4,7 +4,7 @@ import math
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class Cyclic(Effect):
@@ -30,5 +30,5 @@ class Cyclic(Effect):
         back = 2 * math.pi * abs(p["amplitude"]) >= p["period"]
         return "its amplitude is so large beside its period that the reading would turn back" if back else ""
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.amplitude * ca.sin(2 * ca.pi * s.value / p.period + p.phase)

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class DeadZone(Effect):
@@ -19,7 +19,7 @@ class DeadZone(Effect):
         Param("rounding", "1", (0.01, 5.0), "r: rounding of the corners, in widths"),
     )
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         corner = (p.rounding * p.width) ** 2 + (1e-6 * s.scale) ** 2
         above, below = (ca.sqrt((s.value + side * p.width) ** 2 + corner) for side in (1, -1))
         return -(above - below) / 2

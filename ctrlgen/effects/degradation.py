@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
 
 
 class Degradation(Effect):
@@ -20,5 +20,5 @@ class Degradation(Effect):
     )
     states = (State("t", "s", 1.0, clock=True),)
 
-    def term(self, s, p):
-        return -p.rate * p.levels_off * (1 - ca.exp(-s.t / p.levels_off)) * s.value
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return -p.rate * p.levels_off * (1 - ca.exp(-s.states.t / p.levels_off)) * s.value

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
 
 SAMPLES = 5
 EVERY = range(SAMPLES + 1)
@@ -27,11 +27,11 @@ class Delay(Effect):
         *(State(f"c{k}", "channel/s^2", 100.0, stepped=True) for k in EVERY),
     )
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         h, total = s.sample_time, 0.0
         D = ca.fmin(p.delay / h, SAMPLES)
         for k in EVERY[:-1]:  # w from 0 at sample k, counted backwards, to 1 at sample k + 1
-            near, old = ([getattr(s, f"{name}{j}") for name in "yrc"] for j in (k, k + 1))
+            near, old = ([getattr(s.states, f"{name}{j}") for name in "yrc"] for j in (k, k + 1))
             w, slope = D - k, h * near[1]
             gap, turn = old[0] - near[0] + slope, slope - h * old[1]
             fourth = (h**2 * old[2] + 6 * gap - 4 * turn) / 2 if s.second_rate is not None else 0.0
@@ -41,11 +41,11 @@ class Delay(Effect):
             total += ca.if_else(inside, near[0] - s.value + between, 0.0)
         return total
 
-    def update(self, s, p):
-        slope = (s.value - s.y0) / s.sample_time if s.rate is None else s.rate
+    def update(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
+        slope = (s.value - s.states.y0) / s.sample_time if s.rate is None else s.rate
         new = {"y0": s.value, "r0": slope, "c0": 0.0 if s.second_rate is None else s.second_rate}
         for k in EVERY[1:]:
-            new |= {f"{name}{k}": getattr(s, f"{name}{k - 1}") for name in "yrc"}
+            new |= {f"{name}{k}": getattr(s.states, f"{name}{k - 1}") for name in "yrc"}
         if s.rate is None:
-            new["r1"] = (s.value - s.y1) / (2 * s.sample_time)
+            new["r1"] = (s.value - s.states.y1) / (2 * s.sample_time)
         return new

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
 
 
 class DirectionalFriction(Effect):
@@ -23,9 +23,9 @@ class DirectionalFriction(Effect):
     )
     states = (State("z", "1", 1.0), State("w", "1", 1.0))
 
-    def term(self, s, p):
-        return -p.force * (s.z + p.skew * s.w)
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return -p.force * (s.states.z + p.skew * s.states.w)
 
-    def rates(self, s, p):
+    def rates(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         speed = ca.fabs(s.velocity)
-        return {"z": (s.velocity - speed * s.z) / p.reach, "w": speed * (1 - s.w) / p.reach}
+        return {"z": (s.velocity - speed * s.states.z) / p.reach, "w": speed * (1 - s.states.w) / p.reach}

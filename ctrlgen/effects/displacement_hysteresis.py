@@ -1,6 +1,6 @@
 """Hysteresis of a joint or guide between stage and mechanism: the displacement lags."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 from ctrlgen.effects._play_operators import play_states, radii, updated_plays, weighted_lag
 
 
@@ -25,8 +25,8 @@ class DisplacementHysteresis(Effect):
     )
     states = play_states("travel")
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.share * (weighted_lag(s, s.value, p.reach, p.taper) - p.reversible * s.value)
 
-    def update(self, s, p):
+    def update(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         return updated_plays(s, [s.value], radii(p.reach))

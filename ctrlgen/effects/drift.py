@@ -1,6 +1,6 @@
 """A reading that moves with time alone."""
 
-from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
 
 
 class Drift(Effect):
@@ -12,5 +12,5 @@ class Drift(Effect):
     params = (Param("rate", "channel/s", (-1.0, 1.0), "drift per time", off=0.0),)
     states = (State("t", "s", 1.0, clock=True),)
 
-    def term(self, s, p):
-        return p.rate * s.t
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return p.rate * s.states.t

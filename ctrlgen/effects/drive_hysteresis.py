@@ -1,6 +1,6 @@
 """Hysteresis of a piezo stack: the displacement lags behind the voltage."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 from ctrlgen.effects._play_operators import play_states, radii, updated_plays, weighted_lag
 
 
@@ -22,8 +22,8 @@ class DriveHysteresis(Effect):
     )
     states = play_states("channel")
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.share * weighted_lag(s, s.value, p.reach, p.taper)
 
-    def update(self, s, p):
+    def update(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         return updated_plays(s, [s.value], radii(p.reach))

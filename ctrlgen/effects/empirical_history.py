@@ -1,6 +1,6 @@
 """A rate-independent memory of an axis' displacement, measured and not explained."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 from ctrlgen.effects._play_operators import ELEMENTS, lags, play_states, radii, updated_plays
 
 
@@ -22,10 +22,10 @@ class EmpiricalHistory(Effect):
     )
     states = tuple(state for state in play_states("travel") if not state.per_record)  # each begins in its middle
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         widths = radii(p.reach)
         behind = zip(lags(s, s.displacements[s.partner], widths), widths, strict=True)
         return p.size * sum(getattr(p, f"c{j}") * lag / r for j, (lag, r) in enumerate(behind, start=1))
 
-    def update(self, s, p):
+    def update(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         return updated_plays(s, [s.displacements[s.partner]], radii(p.reach))

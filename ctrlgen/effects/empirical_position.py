@@ -1,6 +1,6 @@
 """A smooth function of an axis' displacement, measured and not explained."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 from ctrlgen.effects._spline import cubic_spline, weight_params
 
 
@@ -22,5 +22,5 @@ class EmpiricalPosition(Effect):
         *weight_params("weight of one bend, evenly spaced over the range"),
     )
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.size * cubic_spline((s.displacements[s.partner] - p.low) / p.width, p)

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 from ctrlgen.effects._spline import cubic_spline, weight_params
 
 
@@ -24,6 +24,6 @@ class EmpiricalSpeed(Effect):
         *weight_params("weight of one bend, evenly spaced from fast backward to fast forward"),
     )
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         v = s.velocities[s.partner]
         return p.size * cubic_spline((1 + v / ca.sqrt(v**2 + p.speed**2)) / 2, p)

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class EndStop(Effect):
@@ -26,7 +26,7 @@ class EndStop(Effect):
         Param("power", "1", (1.0, 2.0), "n: how the force grows with the depth"),
     )
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         side = ca.sign(p.gap)
         x = ca.fmax(side * (s.displacement - p.gap), 0)
         e = 1e-3 * s.travel

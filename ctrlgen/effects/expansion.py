@@ -1,6 +1,6 @@
 """Beams whose thermal expansion, or stiffness, depends on temperature differently from the model."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class Expansion(Effect):
@@ -14,5 +14,5 @@ class Expansion(Effect):
     source = "Y. Okada, Y. Tokumaru, J. Appl. Phys. 56 (1984) 314: expansion of silicon between 300 and 1500 K"
     params = (Param("slope", "1/K", (-1e-2, 1e-2), "relative change of force per kelvin", off=0.0),)
 
-    def term(self, s, p):
-        return p.slope * (s.state - s.rest) * s.value
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return p.slope * (s.temperature - s.temperature_at_rest) * s.value

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class FrameRotation(Effect, listed=False):
@@ -19,7 +19,7 @@ class FrameRotation(Effect, listed=False):
     params = (Param("angle", "mrad", (-100.0, 100.0), "rotation of the platform's frame", off=0.0),)
     axis: int  # 0, 1, 2 for x, y, z
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         half, component = 3 * (s.index // 3), s.index % 3
         a, b = (self.axis + 1) % 3, (self.axis + 2) % 3
         if component == self.axis:

@@ -1,6 +1,6 @@
 """A wrong gain: of an amplifier, a lever or a sensor."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class Gain(Effect, listed=False):
@@ -8,7 +8,7 @@ class Gain(Effect, listed=False):
 
     source = "definition"
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.gain * s.value
 
 

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class HeatCrosstalk(Effect):
@@ -16,5 +16,5 @@ class HeatCrosstalk(Effect):
     source = "definition"
     params = (Param("share", "1", (0.0, 0.1), "power arriving per power of another heater", off=0.0),)
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.share * (ca.sum1(s.all) - s.value)

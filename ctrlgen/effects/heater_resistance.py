@@ -1,6 +1,6 @@
 """A heater whose resistance changes with temperature, driven by an amplifier that was set for the cold heater."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class HeaterResistance(Effect):
@@ -14,6 +14,6 @@ class HeaterResistance(Effect):
     source = "definition: linear temperature coefficient of resistance"
     params = (Param("slope", "1/K", (-1e-3, 1e-2), "relative change of resistance per kelvin", off=0.0),)
 
-    def term(self, s, p):
-        rise = p.slope * (s.state - s.rest)
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        rise = p.slope * (s.temperature - s.temperature_at_rest)
         return -s.value * rise / (1 + rise)

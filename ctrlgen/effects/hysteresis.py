@@ -1,6 +1,6 @@
 """Hysteresis of many small slipping contacts."""
 
-from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
 from ctrlgen.effects._play_operators import play_states, radii, updated_plays, weighted_lag
 from ctrlgen.effects._reversal_points import reversal_point
 
@@ -26,9 +26,9 @@ class Hysteresis(Effect):
         State("v", "travel/s", 100.0, stepped=True),
     )
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.stiffness * weighted_lag(s, s.displacement, p.reach, p.taper)
 
-    def update(self, s, p):
+    def update(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         new = {"d": s.displacement, "v": 0 if s.velocity is None else s.velocity}
-        return new | updated_plays(s, [reversal_point(s, s.d, s.v), s.displacement], radii(p.reach))
+        return new | updated_plays(s, [reversal_point(s, s.states.d, s.states.v), s.displacement], radii(p.reach))

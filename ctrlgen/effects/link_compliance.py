@@ -1,6 +1,6 @@
 """A compliant joint or strut: the platform tilts when it moves."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class LinkCompliance(Effect):
@@ -13,5 +13,5 @@ class LinkCompliance(Effect):
     source = "L. L. Howell, Compliant Mechanisms (2001), chapter 5: pseudo-rigid-body joints"
     params = (Param("tilt", "channel/partner", (-3.0, 3.0), "rotation per motion", off=0.0),)
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.tilt * s.all[s.partner]

@@ -1,6 +1,6 @@
 """Stages that stiffen: they yield less to the load of the links, the further they are driven."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class LinkLoad(Effect):
@@ -14,5 +14,5 @@ class LinkLoad(Effect):
     source = "S1 eq. (12) and (16): stages in series with struts, at the stage's tangent stiffness"
     params = (Param("share", "1", (-2.0, 4.0), "1 for the stage's own law", off=0.0),)
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.share * s.tangent_compliance()[s.index]

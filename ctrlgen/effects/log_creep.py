@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
 
 TIMES = tuple(10 ** (j / 2) for j in range(9))  # relaxation times per shortest one
 
@@ -24,10 +24,10 @@ class LogCreep(Effect):
     )
     states = tuple(State(f"z{j}", "travel", 1.0) for j in range(len(TIMES)))
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         weights = [ca.fmin(ca.fmax(2 * p.decades - j, 0.0), 1.0) for j in range(len(TIMES))]
-        return p.gain / 2 * sum(w * getattr(s, z.name) for w, z in zip(weights, self.states, strict=True))
+        return p.gain / 2 * sum(w * getattr(s.states, z.name) for w, z in zip(weights, self.states, strict=True))
 
-    def rates(self, s, p):
+    def rates(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         slow = zip(self.states, TIMES, strict=True)
-        return {z.name: (s.value - getattr(s, z.name)) / (times * p.tau) for z, times in slow}
+        return {z.name: (s.value - getattr(s.states, z.name)) / (times * p.tau) for z, times in slow}

@@ -1,6 +1,6 @@
 """Beams, or a winding, that break at one moment."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 from ctrlgen.effects._smooth_step import CLOCK, WHEN, smooth_step
 
 
@@ -16,5 +16,5 @@ class LostBeams(Effect):
     )
     states = CLOCK
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.share * s.value * smooth_step(s, p)

@@ -1,6 +1,6 @@
 """A lever that bends under the force it transmits."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class LostMotion(Effect):
@@ -15,5 +15,5 @@ class LostMotion(Effect):
     source = "S. T. Smith, Flexures: Elements of Elastic Mechanisms (2000): levers"
     params = (Param("compliance", "um/N", (-100.0, 100.0), "lost travel per force", off=0.0),)
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.compliance * s.force

@@ -1,6 +1,6 @@
 """A sensor, or its filter, of limited bandwidth."""
 
-from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
 
 
 class LowPass(Effect):
@@ -20,8 +20,8 @@ class LowPass(Effect):
     )
     states = (State("w", "channel", 1.0), State("v", "channel", 1.0))
 
-    def term(self, s, p):
-        return p.share * (s.w - s.value)
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return p.share * (s.states.w - s.value)
 
-    def rates(self, s, p):
-        return {"w": s.v / p.tau, "v": (s.value - s.w - 2 * p.damping * s.v) / p.tau}
+    def rates(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
+        return {"w": s.states.v / p.tau, "v": (s.value - s.states.w - 2 * p.damping * s.states.v) / p.tau}

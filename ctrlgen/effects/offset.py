@@ -1,6 +1,6 @@
 """A constant offset: of an amplifier or a sensor."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class Offset(Effect, listed=False):
@@ -8,7 +8,7 @@ class Offset(Effect, listed=False):
 
     source = "definition"
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.offset
 
 

@@ -1,6 +1,6 @@
 """A flexure that is bent or loaded already at home: stiffer to one side than to the other."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class OneSidedStiffening(Effect):
@@ -11,5 +11,5 @@ class OneSidedStiffening(Effect):
     source = "definition: second term of the power series of a restoring force"
     params = (Param("k2", "channel/travel^2", (-10.0, 10.0), "quadratic stiffness", off=0.0),)
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.k2 * s.displacement**2

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class Payload(Effect):
@@ -19,5 +19,5 @@ class Payload(Effect):
         Param("lean", "deg", (-180.0, 180.0), "how far the centre of mass leans at home"),
     )
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.share * (ca.sin(s.value + p.lean) - ca.sin(p.lean))

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class QuadraticDamping(Effect):
@@ -13,5 +13,5 @@ class QuadraticDamping(Effect):
     source = "definition: drag at constant drag coefficient"
     params = (Param("damping", "channel*s^2/travel^2", (0.0, 10.0), "force per speed squared", off=0.0),)
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.damping * s.velocity * ca.fabs(s.velocity)

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class Quantisation(Effect):
@@ -20,5 +20,5 @@ class Quantisation(Effect):
         Param("quantum", "channel", (1e-7, 1.0), "q: step"),
     )
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.share * (p.quantum * ca.floor(s.value / p.quantum + 0.5) - s.value)

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class RaisedPoint(Effect):
@@ -17,6 +17,6 @@ class RaisedPoint(Effect):
     source = "R. M. Murray, Z. Li, S. S. Sastry, Robotic Manipulation (1994), chapter 2: Rodrigues' formula"
     params = (Param("height", "mm", (-500.0, 500.0), "h: height above the centre of rotation", off=0.0),)
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         turn, arm = s.all[:3], ca.vertcat(0, 0, p.height)
         return ca.cross(turn, ca.cross(turn, arm))[s.index - 3] / 2

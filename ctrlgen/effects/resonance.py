@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
 
 
 class Resonance(Effect):
@@ -27,10 +27,13 @@ class Resonance(Effect):
             f"a damping ratio of {p['damping']:.2g} leaves no resonance, only a lag" if p["damping"] > 0.5**0.5 else ""
         )
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         w = 2 * ca.pi * p.frequency
-        return p.stiffness * (s.q - s.displacement + 2 * p.damping * (s.p - s.velocity / w))
+        return p.stiffness * (s.states.q - s.displacement + 2 * p.damping * (s.states.p - s.velocity / w))
 
-    def rates(self, s, p):
+    def rates(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         w = 2 * ca.pi * p.frequency
-        return {"q": w * s.p, "p": w * (s.displacement - s.q + 2 * p.damping * (s.velocity / w - s.p))}
+        return {
+            "q": w * s.states.p,
+            "p": w * (s.displacement - s.states.q + 2 * p.damping * (s.velocity / w - s.states.p)),
+        }

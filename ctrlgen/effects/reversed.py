@@ -1,6 +1,6 @@
 """An actuator connected the wrong way round."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class Reversed(Effect):
@@ -12,5 +12,5 @@ class Reversed(Effect):
     source = "definition"
     params = (Param("share", "1", (0.0, 1.2), "1: the sign is reversed", off=0.0),)
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -2 * p.share * s.value

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class Saturation(Effect):
@@ -25,7 +25,7 @@ class Saturation(Effect):
         ),
     )
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         corner = (p.level / 200) ** 2
         above, below = (ca.sqrt((s.value + side * p.level) ** 2 + corner) for side in (1, -1))
         return p.share * ((above - below) / 2 - s.value)

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class ScrewMotion(Effect):
@@ -17,5 +17,5 @@ class ScrewMotion(Effect):
     source = "R. M. Murray, Z. Li, S. S. Sastry, Robotic Manipulation (1994), chapter 2: exponential of a twist"
     params = (Param("share", "1", (-4.0, 4.0), "1: motion along one screw axis", off=0.0),)
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.share * ca.cross(s.all[:3], s.all[3:])[s.index - 3] / 2

@@ -1,6 +1,6 @@
 """A second thermal mass between heater and beams: part of the heat comes late."""
 
-from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
 
 
 class SecondPole(Effect):
@@ -18,8 +18,8 @@ class SecondPole(Effect):
     )
     states = (State("w", "channel", 1.0),)
 
-    def term(self, s, p):
-        return p.share * (s.w - s.value)
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return p.share * (s.states.w - s.value)
 
-    def rates(self, s, p):
-        return {"w": (s.value - s.w) / p.tau}
+    def rates(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
+        return {"w": (s.value - s.states.w) / p.tau}

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
 from ctrlgen.effects._play_operators import lags, play_states, radii, updated_plays
 from ctrlgen.effects._reversal_points import reversal_point
 
@@ -29,15 +29,15 @@ class SlackFriction(Effect):
         State("v", "travel/s", 100.0, stepped=True),
     )
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         bent = (
             ca.fmax(e - p.slack / 2, 0) + ca.fmin(e + p.slack / 2, 0) for e in lags(s, s.displacement, self.widths(p))
         )
         return -p.force * sum(bent) / sum(radii(p.reach))
 
-    def update(self, s, p):
+    def update(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         new = {"d": s.displacement, "v": 0 if s.velocity is None else s.velocity}
-        return new | updated_plays(s, [reversal_point(s, s.d, s.v), s.displacement], self.widths(p))
+        return new | updated_plays(s, [reversal_point(s, s.states.d, s.states.v), s.displacement], self.widths(p))
 
     @staticmethod
     def widths(p):

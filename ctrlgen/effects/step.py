@@ -1,6 +1,6 @@
 """A step at one moment: of a force or of a reading."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 from ctrlgen.effects._smooth_step import CLOCK, WHEN, smooth_step
 
 
@@ -10,7 +10,7 @@ class Step(Effect, listed=False):
     source = "definition"
     states = CLOCK
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return getattr(p, self.amplitude().name) * smooth_step(s, p)
 
 

@@ -1,6 +1,6 @@
 """A clamped flexure stretches as it bends."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class Stiffening(Effect):
@@ -14,5 +14,5 @@ class Stiffening(Effect):
     source = "S. Timoshenko, Strength of Materials II (1956), large deflection of clamped beams"
     params = (Param("k3", "channel/travel^3", (-10.0, 10.0), "cubic stiffness", off=0.0),)
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.k3 * s.displacement**3

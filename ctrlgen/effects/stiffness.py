@@ -1,6 +1,6 @@
 """A stage stiffer, or softer, than the drawing says."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class Stiffness(Effect):
@@ -11,5 +11,5 @@ class Stiffness(Effect):
     source = "definition"
     params = (Param("stiffness", "channel/travel", (-10.0, 10.0), "stiffness beyond the nominal one", off=0.0),)
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.stiffness * s.displacement

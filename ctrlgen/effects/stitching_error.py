@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class StitchingError(Effect):
@@ -28,5 +28,5 @@ class StitchingError(Effect):
             else ""
         )
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.offset * (1 + ca.tanh(2 * (s.value - p.position) / p.width)) / 2

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
 
 
 class Stribeck(Effect):
@@ -23,9 +23,9 @@ class Stribeck(Effect):
     )
     states = (State("z", "1", 1.0),)
 
-    def term(self, s, p):
-        return -p.force * s.z
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return -p.force * s.states.z
 
-    def rates(self, s, p):
+    def rates(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         level = 1 + (p.breakaway - 1) * ca.exp(-((s.velocity / p.speed) ** 2))
-        return {"z": (s.velocity - ca.fabs(s.velocity) * s.z / level) / p.reach}
+        return {"z": (s.velocity - ca.fabs(s.velocity) * s.states.z / level) / p.reach}

@@ -1,6 +1,6 @@
 """A dead channel: it reports one number, whatever the motion."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class Stuck(Effect):
@@ -14,5 +14,5 @@ class Stuck(Effect):
         Param("level", "channel", (-1e3, 1e3), "y_0: what is reported"),
     )
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.share * (s.value - p.level)

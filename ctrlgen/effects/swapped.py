@@ -1,6 +1,6 @@
 """Two actuators whose leads are exchanged."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class Swapped(Effect):
@@ -15,5 +15,5 @@ class Swapped(Effect):
     source = "definition"
     params = (Param("share", "1", (0.0, 1.2), "1: the two are exchanged", off=0.0),)
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.share * (s.all[s.partner] - s.value)

@@ -1,6 +1,6 @@
 """A reading that moves with the temperature of the surroundings."""
 
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
 
 class TemperatureSensitivity(Effect):
@@ -18,5 +18,5 @@ class TemperatureSensitivity(Effect):
         Param("reference", "K", (-30.0, 30.0), "rise at which the reading is right, T_0"),
     )
 
-    def term(self, s, p):
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.slope * (s.ambient - p.reference)

@@ -1,6 +1,6 @@
 """A share of the actuator's action that builds up slowly, as heat spreads through a body."""
 
-from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
 
 THIRD = 9 / 25  # third over second time constant: those of a rod heated at one end are as 1, 1/9, 1/25
 
@@ -23,9 +23,13 @@ class ThermalLag(Effect):
     )
     states = (State("v", "channel", 1.0), State("w", "channel", 1.0), State("x", "channel", 1.0))
 
-    def term(self, s, p):
-        return p.share * (s.x - s.value)
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return p.share * (s.states.x - s.value)
 
-    def rates(self, s, p):
+    def rates(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         second = p.second * p.tau
-        return {"v": (s.value - s.v) / p.tau, "w": (s.v - s.w) / second, "x": (s.w - s.x) / (THIRD * second)}
+        return {
+            "v": (s.value - s.states.v) / p.tau,
+            "w": (s.states.v - s.states.w) / second,
+            "x": (s.states.w - s.states.x) / (THIRD * second),
+        }

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
 
 
 class Vibration(Effect):
@@ -20,5 +20,5 @@ class Vibration(Effect):
     )
     states = (State("t", "s", 1.0, clock=True),)
 
-    def term(self, s, p):
-        return p.amplitude * ca.sin(2 * ca.pi * p.frequency * s.t + p.phase)
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return p.amplitude * ca.sin(2 * ca.pi * p.frequency * s.states.t + p.phase)

@@ -1,6 +1,6 @@
 """A sensor whose zero is set anew for every record."""
 
-from ctrlgen.effects import Effect, Param, Place, State
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
 
 
 class ZeroPerRecord(Effect):
@@ -15,5 +15,5 @@ class ZeroPerRecord(Effect):
     params = (Param("share", "1", (0.0, 2.0), "1: the zero is free", off=0.0),)
     states = (State("zero", "channel", 1.0, per_record=True),)
 
-    def term(self, s, p):
-        return p.share * s.zero
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return p.share * s.states.zero

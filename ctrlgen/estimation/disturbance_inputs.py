@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import casadi as ca
 
 from ctrlgen.core.units import Quantity
 from ctrlgen.devices import Device, DevicePhysics, ImposedPhysics
-from ctrlgen.effects import Effect, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 from ctrlgen.model.effect_terms import available, channels
 
 
@@ -22,7 +20,7 @@ class _DisturbanceInput(Effect, listed=False):
         super().__init__(at, {"delta": Quantity(0.0, f"0 {unit}")})
         self.place = place  # type: ignore[misc]  # one class stands for all places
 
-    def term(self, s: SimpleNamespace, p: SimpleNamespace) -> ca.SX:
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.delta
 
 

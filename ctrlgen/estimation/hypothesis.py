@@ -12,7 +12,8 @@ from itertools import product
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import Quantity
 from ctrlgen.devices import Device, DevicePhysics
-from ctrlgen.devices.base import Section
+from ctrlgen.devices.quantities import walk
+from ctrlgen.devices.section import Section
 from ctrlgen.effects import Channel, Effect, Param, Place
 from ctrlgen.estimation.priors import DEFAULT, LawPrior, prior_of
 from ctrlgen.estimation.settings import CANDIDATE_TERMS
@@ -207,19 +208,7 @@ def _numbers(device: Device) -> Iterator[tuple[str, str]]:
 
 def numbers(device: Device) -> Iterator[tuple[str, Section, Quantity]]:
     """Every number outside the effects with the section that holds it."""
-
-    def walk(node: object, prefix: str, section: Section) -> Iterator[tuple[str, Section, Quantity]]:
-        if isinstance(node, Quantity):
-            yield prefix, section, node
-        elif isinstance(node, Section):
-            for key in type(node).model_fields:
-                if key != "effect":
-                    yield from walk(getattr(node, key), f"{prefix}.{key}" if prefix else key, node)
-        elif isinstance(node, tuple):
-            for i, member in enumerate(node):
-                yield from walk(member, f"{prefix}[{i}]", section)
-
-    yield from walk(device, "", device)
+    return (place for place in walk(device) if isinstance(place[1], Section))
 
 
 @lru_cache(maxsize=DEVICES_KEPT)

@@ -67,7 +67,7 @@ def generate(
 ) -> CFolder:
     """Writes the package of `scenario` to `out`; with a `solution` also its player. Raises CtrlgenError.
 
-    `figures` (name -> SVG text, as `ctrlgen.reporting.plots.draw_all` gives) are put beside the README.
+    `figures` (name -> SVG text, as `ctrlgen.trajectory.solution_plots.draw_solution` gives) are put beside the README.
     """
     check_tightened(scenario, model)
     check_online(scenario, model)

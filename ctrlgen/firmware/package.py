@@ -7,17 +7,19 @@ import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, write_text
 from ctrlgen.core.units import base_unit
-from ctrlgen.devices.base import Signal
+from ctrlgen.devices.signal import Signal
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.templates import comment, write
-from ctrlgen.firmware.player.compression import PlayerCandidate
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.version import __version__, commit
+
+if TYPE_CHECKING:
+    from ctrlgen.firmware.player.compression import PlayerCandidate
 
 MANIFEST = "manifest.json"
 PIECES = ("online", "player", "selftest", "vectors")

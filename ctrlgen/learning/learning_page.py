@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from pathlib import Path
 
-import numpy as np
-
 from ctrlgen.core.files import write_text
-from ctrlgen.core.units import from_si
 from ctrlgen.learning.learn import Learning, RunResult
 from ctrlgen.learning.learning_plots import draw_learning
 from ctrlgen.learning.learning_record import learning_record
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.result_file import json_text
+from ctrlgen.trajectory.solution_table import table_of_signals
 
 
 def write_learning(out: Path, learning: Learning) -> None:
@@ -22,7 +18,8 @@ def write_learning(out: Path, learning: Learning) -> None:
     record = learning_record(learning)
     figures = draw_learning(learning)
     write_text(out / "learning.json", json_text(record))
-    write_text(out / "drives.csv", drives_csv(learning))
+    # row k acts from sample k to sample k + 1
+    write_text(out / "drives.csv", table_of_signals(learning.next, ["drive"]))
     for name, text in figures.items():
         write_text(out / "figures" / f"{name}.svg", text)
     page = render(
@@ -52,17 +49,3 @@ def shown_error(learning: Learning, run: RunResult, group: str) -> str:
     if run.least[group] == 0.0:
         return f"< {g.shown(run.most[group]):.2g}"
     return f"{g.shown(run.repeating[group]):.3g}"
-
-
-def drives_csv(learning: Learning) -> str:
-    """The next drives: time (or the pose's number) and each drive with its unit, row k acting from sample k to sample k + 1."""
-    solution = learning.next
-    drive, static = solution.model.signals["drive"], solution.scenario.sample_time is None
-    at = np.arange(len(solution.drive)) if static else solution.trace.time
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["sample" if static else "time [s]", *drive.columns])
-    values = [from_si(solution.drive[:, i], unit) for i, unit in enumerate(drive.units)]
-    for row in np.column_stack([at, *values]):
-        writer.writerow([f"{value:.12g}" for value in row])
-    return text.getvalue()

@@ -20,16 +20,21 @@ import scipy.sparse.linalg
 
 from ctrlgen.core.errors import SolverError
 from ctrlgen.learning.lifted import Lifted, Linearised
-from ctrlgen.numerics.ipopt import check_signal
+from ctrlgen.numerics.ipopt import IpoptOptions, NonlinearProgramme, solve_nlp
 
 STEP_WEIGHT = 1e-2  # rho: a hundredth of the signal's own weight, so that what the drives hardly move is left alone
 MOST_PROGRAMMES = 6
 SETTLED = 1e-7  # of the drives' range, by which the last programme still changes them
 SMALLEST_STEP = 1 / 16  # of a programme's step, before it counts as no improvement
-IPOPT = {
-    "print_level": 0, "sb": "yes", "tol": 1e-9, "honor_original_bounds": "yes", "mehrotra_algorithm": "yes",
-    "hessian_constant": "yes", "jac_c_constant": "yes", "jac_d_constant": "yes",
-}  # fmt: skip
+OPTIONS = IpoptOptions(
+    tol=1e-9,
+    honor_original_bounds="yes",
+    # a quadratic programme with linear rows
+    mehrotra_algorithm="yes",
+    jac_c_constant="yes",
+    jac_d_constant="yes",
+    hessian_constant="yes",
+)
 ADDED_WITHIN = 0.1  # of a limit: rows of composite limits are added at samples that come so near
 
 
@@ -101,8 +106,8 @@ def _composite_bounds(lifted: Lifted) -> tuple[np.ndarray, np.ndarray]:
     low, high = list[float](), list[float]()
     for limit in lifted.composite:
         count = limit.expr.numel()
-        low += [-np.inf if limit.lower is None else limit.lower] * count
-        high += [np.inf if limit.upper is None else limit.upper] * count
+        low += [limit.bounds[0]] * count
+        high += [limit.bounds[1]] * count
     return np.array(low), np.array(high)
 
 
@@ -169,28 +174,28 @@ def _limited(
     w, p = ca.MX.sym("w", len(slope)), ca.MX.sym("p", 0)
     factor, multipliers = ca.MX.sym("factor"), ca.MX.sym("multipliers", constraints.shape[0])
     value, rows = ca.bilin(H, w, w) / 2 + ca.dot(ca.DM(slope), w), ca.mtimes(a, w)
-    options = {
-        "print_time": False, "calc_lam_p": False, "no_nlp_grad": True,
+    derivatives = {
+        "calc_lam_p": False,
+        "no_nlp_grad": True,
         "grad_f": ca.Function("nlp_grad_f", [w, p], [value, ca.mtimes(H, w) + slope], ["x", "p"], ["f", "grad_f_x"]),
         "jac_g": ca.Function("nlp_jac_g", [w, p], [rows, a], ["x", "p"], ["g", "jac_g_x"]),
         "hess_lag": ca.Function(
-            "nlp_hess_l", [w, p, factor, multipliers], [ca.triu(factor * H)], ["x", "p", "lam_f", "lam_g"], ["triu_hess_gamma_x_x"]
+            "nlp_hess_l",
+            [w, p, factor, multipliers],
+            [ca.triu(factor * H)],
+            ["x", "p", "lam_f", "lam_g"],
+            ["triu_hess_gamma_x_x"],
         ),
-        "ipopt": IPOPT,
-    }  # fmt: skip
-    solver = ca.nlpsol("learning", "ipopt", {"x": w, "p": p, "f": value, "g": rows}, options)
+    }
     zeros = np.zeros(equations)
-    answer = solver(
-        x0=0, lbx=low, ubx=high, lbg=np.concatenate([zeros, extra_low]), ubg=np.concatenate([zeros, extra_high])
-    )
-    status = solver.stats()
-    check_signal(status["return_status"])
-    if not status["success"]:
+    row_bounds = np.concatenate([zeros, extra_low]), np.concatenate([zeros, extra_high])
+    solution = solve_nlp(NonlinearProgramme(w, value, rows, row_bounds, (low, high), derivatives), 0.0, OPTIONS)
+    if not solution.converged:
         raise SolverError(
-            f"IPOPT finds no drives for the next run ({status['return_status']}); look at the limits of the device that the recorded "
+            f"IPOPT finds no drives for the next run ({solution.status}); look at the limits of the device that the recorded "
             "drives already break, or solve the scenario anew"
         )
-    return answer["x"].full().ravel()
+    return solution.unknowns
 
 
 def _carried(A: np.ndarray, n_u: int, closed: bool, static: bool) -> sp.csr_matrix:

@@ -17,6 +17,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.devices.limit import ranges
 from ctrlgen.model.inverse import NEWTON_STEPS, Inverse, invert
 from ctrlgen.model.model import Model
 from ctrlgen.numerics.newton import newton_root
@@ -24,11 +25,14 @@ from ctrlgen.numerics.newton import newton_root
 INDEPENDENT = 1e-9  # smallest over largest singular value of B in typical sizes, below which drives push only together
 
 
+def drive_ranges(model: Model) -> np.ndarray:
+    """(n_u,) r_i [SI]; the range of a drive without limits counts as twice its typical size."""
+    return ranges(model.u_bounds, 2 * model.u_scale)
+
+
 def effort_weights(model: Model) -> np.ndarray:
-    """(n_u,) w_i / r_i^2 [SI]; the range of a drive without limits counts as twice its typical size."""
-    low, high = model.u_bounds
-    span = np.where(np.isfinite(high - low), high - low, 2 * model.u_scale)
-    return model.drive_weights / span**2
+    """(n_u,) w_i / r_i^2 [SI]."""
+    return model.drive_weights / drive_ranges(model) ** 2
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,7 +14,7 @@ import casadi as ca
 from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import same_dimension
 from ctrlgen.devices import BalancedPhysics, Device, DevicePhysics, ImposedPhysics, InertialPhysics
-from ctrlgen.effects import Channel, Effect, Place, State, faults_at
+from ctrlgen.effects import Channel, Effect, LawInputs, Place, State, faults_at
 
 # Typical displacements beyond which a law reads the stage's force at that end: a search may try values farther out, where
 # no stage goes and a restoring force may have no value (a root of a negative number).
@@ -51,10 +52,10 @@ class Member:
     rates: dict[str, ca.SX] = field(default_factory=dict)
     stepped: dict[str, ca.SX] = field(default_factory=dict)
 
-    def apply(self, s: SimpleNamespace) -> ca.SX:
+    def apply(self, s: LawInputs) -> ca.SX:
         """The term for the inputs `s`; keeps the states' rates and the new values of those that change once a sample."""
         self.stepped = {name: ca.SX(value) for name, value in self.effect.after_sample(s, self.values).items()}
-        s.__dict__.update(self.stepped)
+        s = s.with_states(self.stepped)
         by_default = {state.name: ca.SX(float(state.clock)) for state in self.effect.states}
         self.rates = {**by_default, **self.effect.rates(s, self.values)}
         return self.effect.term(s, self.values)
@@ -133,33 +134,47 @@ class EffectTerms:
 
     def law_inputs(
         self, place: Place, i: int, partner: int | None, states: dict[str, ca.SX], order: int = 0
-    ) -> SimpleNamespace:
-        """What the law of an effect on channel `i` of `place` may read (see `Effect`), with the effect's own `states`."""
+    ) -> LawInputs:
+        """What the law of an effect on channel `i` of `place` may read, with the effect's own `states`."""
         before = next(signal for level, signal in self.signals_before[place] if level >= order)
-        s = SimpleNamespace(
-            value=before[i], all=before, index=i, partner=partner, ambient=self.ambient, sample_time=self.sample_time,
-            **states,
-        )  # fmt: skip
-        s.second_order_kinematics = lambda: self.second_order_kinematics
-        s.tangent_compliance = lambda: self.tangent_compliance
-        s.displacements, s.velocities = self.displacement, self.velocity
+        channel = channels(self.physics, place)[i]
         at_platform = place in (Place.POSE, Place.SENSOR)
-        if not at_platform:
-            i = min(i, len(self.physics.axes) - 1)
-            s.displacement, s.velocity = self.displacement[i], self.velocity[i] if self.velocity.numel() else None
-            s.accelerations = self.imposed_acceleration
-            state = self.physics.state if _has_heaters(self.physics) else None
-            s.state = None if state is None else state.expr[i]
-            s.rest = None if state is None else self.physics.rest[i]
-            s.force = self.restoring_force[i]
-        s.rate = s.second_rate = None
-        if at_platform and isinstance(self.physics, InertialPhysics):
-            z, v = self.displacement, self.velocity
-            s.rate = ca.jtimes(s.value, z, v) + ca.jtimes(s.value, v, self.acceleration)
-            s.second_rate = ca.jtimes(s.rate, z, v) + ca.jtimes(s.rate, v, self.acceleration)
-        channel = channels(self.physics, place)[s.index]
-        s.scale, s.travel = channel.scale, channel.travel_scale
-        return s
+        return LawInputs(
+            value=before[i],
+            all=before,
+            index=i,
+            partner=partner,
+            scale=channel.scale,
+            travel=channel.travel_scale,
+            states=SimpleNamespace(**states),
+            ambient=self.ambient,
+            sample_time=math.nan if self.sample_time is None else self.sample_time,
+            displacements=self.displacement,
+            velocities=self.velocity,
+            second_order_kinematics=lambda: self.second_order_kinematics,
+            tangent_compliance=lambda: self.tangent_compliance,
+            **(self._of_platform(before[i]) if at_platform else self._of_axis(min(i, len(self.physics.axes) - 1))),
+        )
+
+    def _of_platform(self, value: ca.SX) -> dict[str, ca.SX]:
+        """The derivatives by time of a signal of the platform, where the motion gives them."""
+        if not isinstance(self.physics, InertialPhysics):
+            return {}
+        z, v = self.displacement, self.velocity
+        rate = ca.jtimes(value, z, v) + ca.jtimes(value, v, self.acceleration)
+        return {"rate": rate, "second_rate": ca.jtimes(rate, z, v) + ca.jtimes(rate, v, self.acceleration)}
+
+    def _of_axis(self, i: int) -> dict[str, ca.SX]:
+        """The motion, force and heater of axis i."""
+        heater = self.physics.state if _has_heaters(self.physics) else None
+        return {
+            "displacement": self.displacement[i],
+            "velocity": self.velocity[i] if self.velocity.numel() else None,
+            "accelerations": self.imposed_acceleration,
+            "force": self.restoring_force[i],
+            "temperature": None if heater is None else heater.expr[i],
+            "temperature_at_rest": None if heater is None else self.physics.rest[i],
+        }
 
     @property
     def imposed_acceleration(self) -> ca.SX | None:

@@ -135,7 +135,7 @@ class ExpansionPoint:
 
     @classmethod
     def of(cls, *rows: tuple[ca.SX, np.ndarray, np.ndarray]) -> ExpansionPoint:
-        """From (symbol, base, scale) of each vector."""
+        """The point given by (symbol, base, scale) of each vector."""
         symbols, bases, scales = zip(*rows, strict=True)
         return cls(ca.vertcat(*symbols), np.concatenate(bases), np.concatenate(scales))
 

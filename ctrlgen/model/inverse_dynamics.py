@@ -29,9 +29,9 @@ import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.model.allocation import allocate
-from ctrlgen.model.assembly import TYPICAL_RATE
 from ctrlgen.model.inverse import ExpansionPoint, solve_by_blocks
 from ctrlgen.model.model import Model
+from ctrlgen.model.state_vector import TYPICAL_RATE
 
 NONE = ca.SX(0, 1)  # a vector without components
 
@@ -50,7 +50,7 @@ class InverseDynamics:
 
     @property
     def order(self) -> int:
-        """How many derivatives of the target are needed."""
+        """The number of derivatives of the target that are needed."""
         return max(self.degrees)
 
 
@@ -107,7 +107,7 @@ def inverse_dynamics(model: Model, follow: str) -> InverseDynamics:
 
 
 def _of_least_effort(model: Model, follow: str) -> InverseDynamics:
-    """With more drives than axes: those of the least effort among all that do it."""
+    """The drives of least effort among all that give the same motion, where there are more of them than axes."""
     allocation = allocate(model)
     dynamics = inverse_dynamics(allocation.ganged, follow)
     target = ca.SX.sym("target", *dynamics.kernel.size_in(0))

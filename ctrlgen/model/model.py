@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from types import SimpleNamespace
 from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
 
 from ctrlgen.devices import Device, Limit, Signal
+from ctrlgen.effects import LawInputs
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,12 +76,10 @@ class Model:
     bounds_formulas: tuple[tuple[float | ca.SX | None, float | ca.SX | None], ...]  # of each limit, in terms of p
     laws: tuple[Law, ...]  # parts of the equations that have a name
     rate_limits: tuple[Limit, ...]  # on the change by time of a drive, which is their `expr`
-    drive_weights: (
-        np.ndarray
-    )  # (n_u,) how much each drive counts where there are more than axes; none of an imposed motion
-    law_inputs: Callable[
-        ..., SimpleNamespace
-    ]  # (place, channel, partner, states, stage) -> what an effect's law reads there
+    # (n_u,) how much each drive counts where there are more than axes; none of an imposed motion
+    drive_weights: np.ndarray
+    # (place, channel, partner, states, order) -> what an effect's law reads there
+    law_inputs: Callable[..., LawInputs]
 
     # Names and typical sizes, SI, per component
     x_names: tuple[str, ...]
@@ -193,10 +191,7 @@ class Model:
         low, high = np.full(symbol.numel(), -np.inf), np.full(symbol.numel(), np.inf)
         for limit in self.limits:
             for _, i in _positions(limit, symbol):
-                if limit.lower is not None:
-                    low[i] = max(low[i], limit.lower)
-                if limit.upper is not None:
-                    high[i] = min(high[i], limit.upper)
+                low[i], high[i] = max(low[i], limit.bounds[0]), min(high[i], limit.bounds[1])
         return low, high
 
     def bounds_formula(self, symbol: ca.SX) -> tuple[ca.SX, ca.SX]:
@@ -233,7 +228,7 @@ class Model:
         """Lower and upper bounds (n_u,) of the drives' rates; infinite where there is none."""
         low, high = np.full(self.u.numel(), -np.inf), np.full(self.u.numel(), np.inf)
         for i, limit in zip(self.rate_places, self.rate_limits, strict=True):
-            low[i], high[i] = limit.lower, limit.upper
+            low[i], high[i] = limit.bounds
         return low, high
 
     def tightened(self, reserves: Mapping[str, tuple[float, float]], probability: float | None) -> Model:

@@ -25,7 +25,7 @@ class Binding:
 
 def bindings(optimum: Optimum) -> tuple[Binding, ...]:
     """All limits that bind somewhere, that for the longest time first."""
-    found = []
+    binding = []
     for k, side in enumerate(optimum.sides):
         time, runs = 0.0, []
         for piece in optimum.pieces:
@@ -37,5 +37,5 @@ def bindings(optimum: Optimum) -> tuple[Binding, ...]:
                 (float(piece.share[a]), float(piece.share[b])) for a, b in zip(edges[::2], edges[1::2], strict=True)
             ]
         if time > 0:
-            found.append(Binding(side, time, time / optimum.duration, tuple(runs)))
-    return tuple(sorted(found, key=lambda b: -b.time))
+            binding.append(Binding(side, time, time / optimum.duration, tuple(runs)))
+    return tuple(sorted(binding, key=lambda b: -b.time))

@@ -73,7 +73,7 @@ class Curve:
         share = np.unique(np.concatenate([np.linspace(0, 1, DENSE), *self.pieces]))
         signal = self.model.signals[self.scenario.file.follow]
         sizes = [
-            max(size for size, own in zip(signal.scale, signal.units, strict=True) if same_dimension(own, unit))
+            max(size for size, other in zip(signal.scale, signal.units, strict=True) if same_dimension(other, unit))
             for unit in signal.units
         ]  # alike for channels of one dimension, so that a circle is evenly round
         step = np.diff(self.samples(share), axis=0) / sizes
@@ -83,9 +83,9 @@ class Curve:
         """Shares (at least intervals + 1,) at equal distances along the curve, every corner among them."""
         share, length = self._length
         step = length[-1] / intervals
-        found = [np.zeros(1)]
+        shares = [np.zeros(1)]
         for a, b in self.pieces:
             first, last = (float(np.interp(end, share, length)) for end in (a, b))
             n = max(1, int(np.ceil((last - first) / step * (1 - 1e-9))))
-            found.append(np.append(np.interp(np.linspace(first, last, n + 1)[1:-1], length, share), b))
-        return np.concatenate(found)
+            shares.append(np.append(np.interp(np.linspace(first, last, n + 1)[1:-1], length, share), b))
+        return np.concatenate(shares)

@@ -47,16 +47,16 @@ class Side:
 
 def sides_of(limits: tuple[Limit, ...], model: Model) -> list[Side]:
     """Both sides of all limits, as far as they are bounded."""
-    found = []
+    sides = []
     for limit in limits:
-        given = [bound for bound in (limit.lower, limit.upper) if bound is not None]
-        unit = (max(given) - min(given) if len(given) == 2 else abs(given[0])) or model.force_scale
+        unit = limit.span or model.force_scale
         for i in range(len(limit.channels)):
-            found += [
+            sides += [
                 Side(limit, i, upper, bound, unit)
-                for upper, bound in ((False, limit.lower), (True, limit.upper)) if bound is not None
-            ]  # fmt: skip
-    return found
+                for upper, bound in ((False, limit.lower), (True, limit.upper))
+                if bound is not None
+            ]
+    return sides
 
 
 class BalancedLaw:

@@ -32,7 +32,7 @@ class Followed:
 
     @classmethod
     def of(cls, curve: Curve, model: Model, rate: Quantity) -> Followed:
-        """With the exact inverse of `model`."""
+        """The samples of a curve, followed by the exact inverse of `model`."""
         return cls(curve, rate, choose_inverse(model, curve.scenario.file.follow, Sampled(1 / rate.si)))
 
     @property

@@ -37,8 +37,8 @@ def largest_speeds(
     places = path.places(share)
 
     def kept(speed: np.ndarray, of: ca.Function = by_speed) -> np.ndarray:
-        found = of.map(len(share))(places.T, speed[None])[0].full()
-        return np.all(np.where(np.isfinite(found), found, -1.0) >= -NEGLIGIBLE, axis=0)
+        spare = of.map(len(share))(places.T, speed[None])[0].full()
+        return np.all(np.where(np.isfinite(spare), spare, -1.0) >= -NEGLIGIBLE, axis=0)
 
     low = np.full(len(share), SLOWEST * typical)
     low[~kept(low, distances)] = 0.0
@@ -70,12 +70,8 @@ def largest_steps(
         u = drive.map(len(share))(x.T, z.T, z_then.T, x_then[:, : model.n_states].T).full().T
         good = np.all(np.isfinite(u), axis=1)
         for limit, values in limited_values(model, x, z, u):
-            given = [b for b in (limit.lower, limit.upper) if b is not None]
-            unit = (max(given) - min(given) if len(given) == 2 else abs(given[0])) or model.force_scale
-            if limit.lower is not None:
-                good &= np.all(values >= limit.lower - NEGLIGIBLE / 2 * unit, axis=1)
-            if limit.upper is not None:
-                good &= np.all(values <= limit.upper + NEGLIGIBLE / 2 * unit, axis=1)
+            (low, high), beyond = limit.bounds, NEGLIGIBLE / 2 * (limit.span or model.force_scale)
+            good &= np.all((values >= low - beyond) & (values <= high + beyond), axis=1)
         return good
 
     low = np.zeros(len(share))

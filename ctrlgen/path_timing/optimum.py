@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from ctrlgen.core.errors import SolverError
-from ctrlgen.devices.base import Limit
+from ctrlgen.devices.limit import Limit
 from ctrlgen.model.model import Model
 from ctrlgen.path_timing.curve import Curve
 from ctrlgen.path_timing.drive_law import (
@@ -191,7 +191,7 @@ def _rates(law: Law, sample_time: float) -> tuple[RateBound, list[tuple[int, Sid
     for i, limit in zip(model.rate_places, model.rate_limits, strict=True):
         for upper, bound in ((False, limit.lower), (True, limit.upper)):
             if bound is not None:
-                sides.append((i, Side(limit, 0, upper, bound, (limit.upper or 0.0) - (limit.lower or 0.0))))
+                sides.append((i, Side(limit, 0, upper, bound, limit.span)))
     if isinstance(law, InertialLaw):
         span = np.ptp(np.array(model.u_bounds), axis=0)
         for i in map(int, np.flatnonzero(np.isfinite(span))):

@@ -58,8 +58,12 @@ def check_frequency(rate: Quantity, frequency: Quantity) -> None:
 
 
 def at_frequency(
-    followed: Followed, optimiser: Optimiser, frequency: Quantity, known: Optimum, progress: Callable[[str], None] = lambda _: None
-) -> Repetition:  # fmt: skip
+    followed: Followed,
+    optimiser: Optimiser,
+    frequency: Quantity,
+    known: Optimum,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Repetition:
     """The largest scales at a `frequency`, with set-points; `known` is the optimum at the scale 1."""
     period, h = 1 / frequency.si, followed.sample_time
     n = int(period / h * (1 + 1e-9))

@@ -28,13 +28,13 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import SolverError
-from ctrlgen.numerics.ipopt import check_signal
+from ctrlgen.devices.limit import ranges
+from ctrlgen.numerics.ipopt import IpoptOptions, NonlinearProgramme, solve_nlp
 from ctrlgen.path_timing.drive_law import Law
 from ctrlgen.path_timing.timing_law import TimingLaw
 
 INTERVALS = ((32, 1e-4), (128, 1e-6), (512, 1e-8))  # of the path, and the weight of the smoothing term in each pass
-TOLERANCE = 1e-8
-MOST_ITERATIONS = 400
+OPTIONS = IpoptOptions(tol=1e-8, max_iter=400, mu_strategy="adaptive", bound_relax_factor=0.0)
 SHORTEST = 1e-6  # of the mean time of an interval
 
 
@@ -95,7 +95,7 @@ class SpeedProgramme:
                 row(W[k - 1, 1:] - W[k - 1, :-1] - moved, 0.0, 0.0)
         distances, u = self.distances.map(n + 1)(self.places(share).T, W * unit[:, None])
         row(distances, 0.0, np.inf)
-        span = self._spans()
+        span = ranges(self.law.model.u_bounds, self.law.model.u_scale)
         for i in range(u.size1()):
             for bound, is_high in ((self.rates.low[i], False), (self.rates.high[i], True)):
                 if np.isfinite(bound):
@@ -110,38 +110,21 @@ class SpeedProgramme:
         if not self.closed:
             w_low[:, [0, -1]] = w_high[:, [0, -1]] = 0.0
         start = self._start(begin, share, unit, T, size, n)
-        solver = ca.nlpsol(
-            "fastest", "ipopt", {"x": ca.veccat(W, C, H), "f": cost, "g": ca.vertcat(*rows)},
-            {
-                "print_time": False,
-                "ipopt": {
-                    "print_level": 0, "sb": "yes", "tol": TOLERANCE, "max_iter": MOST_ITERATIONS, "mu_strategy": "adaptive",
-                    "bound_relax_factor": 0.0,
-                },
-            },
-        )  # fmt: skip
         free = np.full(n, np.inf)
-        answer = solver(
-            x0=start, lbg=np.concatenate(low), ubg=np.concatenate(high),
-            lbx=np.concatenate([w_low.ravel("F"), -free, np.full(n, SHORTEST)]),
-            ubx=np.concatenate([w_high.ravel("F"), free, free]),
-        )  # fmt: skip
-        stats = solver.stats()
-        check_signal(stats["return_status"])
-        if not stats["success"]:
+        least = np.concatenate([w_low.ravel("F"), -free, np.full(n, SHORTEST)])
+        most = np.concatenate([w_high.ravel("F"), free, free])
+        row_bounds = np.concatenate(low), np.concatenate(high)
+        programme = NonlinearProgramme(ca.veccat(W, C, H), cost, ca.vertcat(*rows), row_bounds, (least, most))
+        solution = solve_nlp(programme, start, OPTIONS)
+        if not solution.converged:
             raise SolverError(
-                f"IPOPT found no fastest speed along the path ({stats['return_status']} after {stats['iter_count']} iterations); "
+                f"IPOPT found no fastest speed along the path ({solution.status} after {solution.iterations} iterations); "
                 "make the path smoother or smaller"
             )
-        values = answer["x"].full().ravel()
+        values = solution.unknowns
         w = values[: m * (n + 1)].reshape(m, n + 1, order="F")
         time = np.concatenate([[0.0], np.cumsum(values[-n:]) * step])
         return TimingLaw(time, share, (w * unit[:, None]).T)
-
-    def _spans(self) -> np.ndarray:
-        """(n_u,) sizes of the drives."""
-        low, high = self.law.model.u_bounds
-        return np.where(np.isfinite(high - low), high - low, self.law.model.u_scale)
 
     def _start(
         self, begin: TimingLaw, share: np.ndarray, unit: np.ndarray, T: float, size: float, n: int

@@ -97,7 +97,7 @@ class Equation:
 
     @property
     def range_text(self) -> str:
-        """Such as '0.05 <= t/R < 0.1 (S3 Table 3)'."""
+        """The range as text, such as '0.05 <= t/R < 0.1 (S3 Table 3)'."""
         if self.within is None:
             return f"no t/R ({self.range_source})"
         return f"{self.within[0]:g} <= t/R {'<' if self.open_end else '<='} {self.within[1]:g} ({self.range_source})"
@@ -114,7 +114,7 @@ class Compliance:
 
     @property
     def source(self) -> str:
-        """Such as 'S2 C.22, Schotborgh et al. (2005)'."""
+        """Where the equation stands, such as 'S2 C.22, Schotborgh et al. (2005)'."""
         return f"S2 {self.equation.number}, {self.equation.authors}"
 
     @property

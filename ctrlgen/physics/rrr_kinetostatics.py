@@ -36,7 +36,7 @@ def transformed(C: Matrix, A: Matrix) -> Matrix:
 
 
 def hinge_1_lever(g: Any) -> Matrix:
-    """From Point 1 to Point o' at (l_1, l_4) from it. Source: S3 eq. (B.17), (B.25)."""
+    """The lever from Point 1 to Point o', which is at (l_1, l_4) from it. Source: S3 eq. (B.17), (B.25)."""
     return lever(g.l1, g.l4)
 
 

@@ -1,7 +1,6 @@
-"""Errors between two sets of poses: norms, statistics per channel, parasitic motion, repeatability, drift.
+"""Errors between two sets of poses: norms, statistics per channel, parasitic motion.
 
 Source: S0 section 5.
-
 
 Poses are rows (theta_x, theta_y, theta_z, delta_x, delta_y, delta_z) [rad, m]; an error is measured minus expected.
 """
@@ -76,38 +75,6 @@ class Parasitic:
     channels: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Repeatability:
-    """Repeatability of poses commanded more than once: `groups` of pose numbers from 0, pooled `sd` (6,) within them.
-
-    `sd` is None where no command was repeated: the recording then says nothing about repeatability.
-    """
-
-    groups: tuple[tuple[int, ...], ...]
-    sd: np.ndarray | None
-
-
-@dataclass(frozen=True)
-class PoseDrift:
-    """Errors fitted by level + slope * (order - mean order): `slope` (6,) per pose, `level` (6,), and their `sd`s."""
-
-    slope: np.ndarray
-    slope_sd: np.ndarray
-    level: np.ndarray
-    level_sd: np.ndarray
-
-
-@dataclass(frozen=True)
-class Opposites:
-    """Poses commanded at +T and at -T: `pairs` of pose numbers from 0, `even` (pairs, 6) half the sum of both poses.
-
-    No Jacobian explains the even part: it is an offset of home, an even nonlinearity, or drift between the two.
-    """
-
-    pairs: tuple[tuple[int, int], ...]
-    even: np.ndarray
-
-
 def error_statistics(values: np.ndarray) -> ErrorStatistics:
     """Statistics over the rows (poses) of `values`."""
     return ErrorStatistics(values.max(0), values.min(0), values.mean(0), values.std(0, ddof=1))
@@ -138,49 +105,6 @@ def parasitic(commanded: np.ndarray, measured: np.ndarray) -> list[Parasitic]:
             )
         )  # fmt: skip
     return found
-
-
-def repeatability(commanded: np.ndarray, measured: np.ndarray) -> Repeatability:
-    """The pooled scatter within groups of equal commands; home counts where it was recorded more than once."""
-    measured, commanded = _two(measured, commanded)
-    _, member = np.unique(commanded, axis=0, return_inverse=True)
-    member = member.ravel()
-    groups = [np.flatnonzero(member == g) for g in dict.fromkeys(member)]
-    groups = [group for group in groups if len(group) > 1]
-    if not groups:
-        return Repeatability((), None)
-    squares = sum(((measured[group] - measured[group].mean(0)) ** 2).sum(0) for group in groups)
-    freedom = sum(len(group) - 1 for group in groups)
-    return Repeatability(tuple(tuple(map(int, group)) for group in groups), np.sqrt(squares / freedom))
-
-
-def pose_drift(errors: np.ndarray) -> PoseDrift:
-    """Least-squares line through `errors` (n, 6) in order of measurement, n >= 3. Raises InputError for fewer.
-
-    Errors that depend on the command (a wrong Jacobian) look like drift where the commands themselves rise in time: give
-    the residuals of a calibration. The standard deviations hold for errors that are independent from pose to pose.
-    """
-    n = len(errors)
-    if n < 3:
-        raise InputError("drift", [Fault("errors", f"{n} poses cannot tell a slope from noise; give at least 3")])
-    order = np.arange(n) - (n - 1) / 2
-    level, slope = errors.mean(0), order @ errors / (order @ order)
-    residual = errors - level - np.outer(order, slope)
-    noise = np.sqrt((residual**2).sum(0) / (n - 2))
-    return PoseDrift(slope, noise / np.sqrt(order @ order), level, noise / np.sqrt(n))
-
-
-def opposites(commanded: np.ndarray, measured: np.ndarray) -> Opposites:
-    """Every pair of poses with opposite commands, home excepted."""
-    measured, commanded = _two(measured, commanded)
-    where = {tuple(row): k for k, row in enumerate(commanded + 0.0)}
-    pairs = []
-    for k, row in enumerate(commanded):
-        other = where.get(tuple(0.0 - row))
-        if row.any() and other is not None and other > k:
-            pairs.append((k, other))
-    even = np.array([(measured[a] + measured[b]) / 2 for a, b in pairs]).reshape(-1, 6)
-    return Opposites(tuple(pairs), even)
 
 
 def _two(measured: np.ndarray, expected: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -274,7 +274,7 @@ class _RecordReader:
         return values | derivatives
 
     def _kept(self, sample_time: float) -> int:
-        """One row in so many is kept of those `sample_time` [s] apart."""
+        """The number n of which every n-th row is kept, where rows are `sample_time` [s] apart."""
         w = self.written
         return w.keep_every or (preprocessing.enough_rows(sample_time, w.low_pass.si) if w.low_pass else 1)
 

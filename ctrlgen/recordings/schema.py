@@ -9,8 +9,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from ctrlgen.core.errors import Fault
-from ctrlgen.core.units import In, Quantity, parse, same_dimension
-from ctrlgen.devices.base import Section
+from ctrlgen.core.units import In, Quantity, parse, parse_difference, same_dimension
+from ctrlgen.devices.section import Section
 from ctrlgen.model.model import Model
 
 FILE = "recording.toml"
@@ -131,8 +131,7 @@ class RecordingFile(Section):
 
 def deviation(text: str, unit: str) -> float:
     """A standard deviation or tolerance in SI; of a temperature, as a difference. Raises ValueError for text that is none."""
-    temperature = same_dimension(unit, "K")
-    value = parse(text.replace(" degC", " delta_degC") if temperature else text, "delta_degC" if temperature else unit)
+    value = parse_difference(text, unit)
     if value < 0:
         raise ValueError(f"{text!r} is negative")
     return value

@@ -17,6 +17,7 @@ import numpy as np
 
 from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import from_si, show
+from ctrlgen.devices.limit import spans
 from ctrlgen.model.model import Model
 from ctrlgen.recordings.outliers import outliers, stuck_samples
 from ctrlgen.recordings.recording import Record
@@ -123,9 +124,8 @@ def _beyond_limits(record: Record, kind: str, model: Model, names: ChannelNames,
     faults = []
     for i, (low, high) in enumerate(zip(*model.u_bounds, strict=True)):
         u, unit = record.drive[:, i], names.drive_units[i]
-        span = high - low if np.isfinite(high - low) else max(abs(b) for b in (low, high, 0.0) if np.isfinite(b))
         excess = np.fmax(u - high, low - u)
-        count = int((excess > OVER_LIMIT * span).sum())
+        count = int((excess > OVER_LIMIT * spans((low, high))).sum())
         if not count:
             continue
         k = int(np.nanargmax(excess))

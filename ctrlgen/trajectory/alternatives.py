@@ -14,6 +14,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.units import from_si, show
+from ctrlgen.devices.limit import ranges
 from ctrlgen.trajectory.inverse.clock import in_time
 from ctrlgen.trajectory.inverse.motion import Motion
 from ctrlgen.trajectory.problem import PathProblem
@@ -171,7 +172,7 @@ class Alternatives:
         """By how much each displacement must at least and may at most be moved to be in range at every sample."""
         z = self.inverse.displacements(motion)
         low, high = self.inverse.model.z_bounds
-        inside = (INSIDE + self.margin) * np.where(np.isfinite(high - low), high - low, 0.0)
+        inside = (INSIDE + self.margin) * ranges((low, high), 0.0)
         return low + inside - z.min(axis=0), high - inside - z.max(axis=0)
 
     @cached_property

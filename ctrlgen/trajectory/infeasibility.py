@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ctrlgen.core.errors import Fault, Infeasibility, InputError, SolverError, Unreachable
-from ctrlgen.core.units import from_si, show
+from ctrlgen.core.units import from_si, show, show_difference
 from ctrlgen.model.model import Model, Signal
 from ctrlgen.trajectory.alternatives import Alternatives
 from ctrlgen.trajectory.inverse.choice import count_faults
@@ -123,7 +123,7 @@ def _said(model: Model, cause: Violation, held: bool) -> str:
     """What is needed of whom, against which bound, and why there is one; `held`: a limit is also broken at rest."""
     limit, channel, value = cause.limit, cause.limit.channels[cause.channel], cause.value[cause.worst]
     below, variable = value < cause.bound, model.limited_variable(limit, cause.channel)
-    side, missing = "below" if below else "above", _distance(abs(value - cause.bound), limit.unit)
+    side, missing = "below" if below else "above", show_difference(abs(value - cause.bound), limit.unit)
     amount = f"{show(value, limit.unit)}, {missing} {side} {show(cause.bound, limit.unit)}"
     if variable == "z":
         why = "the actuator only pushes" if below and cause.bound == 0 else "its stroke ends there"
@@ -138,11 +138,6 @@ def _said(model: Model, cause: Violation, held: bool) -> str:
         heated = below and "power" in model.signals
         return f"{own} ({'it cannot cool faster than passively' if heated else 'the path is too fast'})"
     return own
-
-
-def _distance(value: float, unit: str) -> str:
-    """A difference, in kelvin where the unit is a temperature."""
-    return show(value, "K" if unit == "degC" else unit)
 
 
 def _nearest_pose(model: Model, follow: str, target: np.ndarray) -> np.ndarray | None:

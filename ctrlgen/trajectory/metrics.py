@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
-from ctrlgen.core.units import from_si, parse
+from ctrlgen.core.units import difference_unit, from_si, parse
 from ctrlgen.trajectory.solution import Solution
 
 _STATISTICS: dict[str, Callable[[np.ndarray], np.floating]] = {
@@ -64,7 +64,7 @@ def metric(solution: Solution, name: str) -> tuple[float, str]:
             raise ValueError(
                 f"{name!r}: limits are {', '.join(margin.limit.name for margin in solution.margins)}; write one of them"
             )
-        return margin.distance, "delta_degC" if margin.limit.unit == "degC" else margin.limit.unit
+        return margin.distance, difference_unit(margin.limit.unit)
     followed = solution.scenario.file.follow
     tables = {
         (signal.name if role == "state" else role): (signal, solution.trace.signals[role])

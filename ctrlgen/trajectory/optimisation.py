@@ -15,7 +15,7 @@ Reference: A. Waechter, L. T. Biegler, Math. Program. 106 (2006) 25 (IPOPT).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -24,16 +24,23 @@ from ctrlgen.core.errors import SolverError
 from ctrlgen.model.discretisation import held_step
 from ctrlgen.model.model import Limit, Model
 from ctrlgen.model.simulation import Trace, trace
-from ctrlgen.numerics.ipopt import check_signal
+from ctrlgen.numerics.ipopt import IpoptOptions, NonlinearProgramme, solve_nlp
 from ctrlgen.trajectory.inverse.clock import Clock, Sampled, Settled
 from ctrlgen.trajectory.inverse.motion import Motion
 from ctrlgen.trajectory.inverse.path_inverse import InverseTrajectory
 from ctrlgen.trajectory.inverse.violations import Before, violations
 
 SLACK_WEIGHT = 1e8  # against IPOPT's barrier, which otherwise keeps the solution sqrt(mu) off an active bound
-TOLERANCE = 1e-10  # IPOPT's, of the scaled optimality error
-MOST_ITERATIONS = 120
-MOST_FROM_EXACT = 30  # from a solution that only needs confirming: where kinks keep IPOPT from it, more do not help
+OPTIONS = IpoptOptions(
+    tol=1e-10,
+    max_iter=120,
+    mu_strategy="adaptive",
+    nlp_scaling_method="none",
+    # IPOPT relaxes the bounds by 1e-8 while it works
+    honor_original_bounds="yes",
+)
+# From a solution that only needs confirming: where kinks keep IPOPT from it, more iterations do not help.
+FROM_EXACT = replace(OPTIONS, max_iter=30)
 DRIVE_GUESS = 0.2  # of its typical size, where IPOPT begins
 
 
@@ -92,15 +99,14 @@ class TrajectoryProgramme:
         low, high, rows = [np.zeros(e.numel()) for e in equal], [np.zeros(e.numel()) for e in equal], list(equal)
         for i, limit in zip(m.rate_places, m.rate_limits, strict=True):
             if isinstance(clock, Sampled) and limit.lower is not None and limit.upper is not None:
-                span = limit.upper - limit.lower
-                rows.append((u[i] - v[i]) * m.u_scale[i] / (clock.sample_time * span))
-                low.append(np.array([limit.lower / span]))
-                high.append(np.array([limit.upper / span]))
+                rows.append((u[i] - v[i]) * m.u_scale[i] / (clock.sample_time * limit.span))
+                low.append(np.array([limit.lower / limit.span]))
+                high.append(np.array([limit.upper / limit.span]))
         for limit in limits:
             unit = limit.upper or m.force_scale
             rows.append(at(limit.expr, v) / unit)
-            low.append(np.full(limit.expr.numel(), -np.inf if limit.lower is None else limit.lower / unit))
-            high.append(np.full(limit.expr.numel(), np.inf if limit.upper is None else limit.upper / unit))
+            low.append(np.full(limit.expr.numel(), limit.bounds[0] / unit))
+            high.append(np.full(limit.expr.numel(), limit.bounds[1] / unit))
         function = ca.Function("sample", [x, z, v, u, s, x_1, commanded], [ca.vertcat(*rows)], {"cse": True})
         return function, np.concatenate(low), np.concatenate(high)
 
@@ -134,34 +140,17 @@ class TrajectoryProgramme:
         low, high = zip(*(self._bounds(s) for s in "xzus"), strict=True)
         start = self._start(begin, bool(extra))
         zeros = np.zeros(sum(e.numel() for e in extra_rows))
-        options = {
-            "print_time": False,
-            "ipopt": {
-                "print_level": 0,
-                "sb": "yes",
-                "tol": TOLERANCE,
-                "mu_strategy": "adaptive",
-                "max_iter": MOST_FROM_EXACT if begin is not None and begin.exact else MOST_ITERATIONS,
-                "nlp_scaling_method": "none",
-                "honor_original_bounds": "yes",  # it relaxes them by 1e-8 while it works
-            },
-        }
-        solver = ca.nlpsol("trajectory", "ipopt", {"x": w, "f": 0.5 * SLACK_WEIGHT * ca.sumsqr(S), "g": g}, options)
-        answer = solver(
-            x0=start,
-            lbx=np.concatenate([np.tile(np.concatenate(low), n), *extra_low]),
-            ubx=np.concatenate([np.tile(np.concatenate(high), n), *extra_high]),
-            lbg=np.concatenate([np.tile(row_low, n), zeros]),
-            ubg=np.concatenate([np.tile(row_high, n), zeros]),
-        )
-        stats = solver.stats()
-        check_signal(stats["return_status"])
-        if not stats["success"]:
+        row_bounds = np.concatenate([np.tile(row_low, n), zeros]), np.concatenate([np.tile(row_high, n), zeros])
+        least = np.concatenate([np.tile(np.concatenate(low), n), *extra_low])
+        most = np.concatenate([np.tile(np.concatenate(high), n), *extra_high])
+        programme = NonlinearProgramme(w, 0.5 * SLACK_WEIGHT * ca.sumsqr(S), g, row_bounds, (least, most))
+        solution = solve_nlp(programme, start, FROM_EXACT if begin is not None and begin.exact else OPTIONS)
+        if not solution.converged:
             raise SolverError(
-                f"IPOPT stopped with {stats['return_status']} after {stats['iter_count']} iterations; "
+                f"IPOPT stopped with {solution.status} after {solution.iterations} iterations; "
                 "the model may have no solution near the command: check the device's limits and the sample rate"
             )
-        values = answer["x"].full().ravel()
+        values = solution.unknowns
         table = values[: n * sum(self.sizes)].reshape(n, -1)
         x, z, u, s = np.split(table, np.cumsum(self.sizes[:3]), axis=1)
         x, z, u = x * m.x_scale + m.rest, z * m.z_scale, u * m.u_scale
@@ -171,7 +160,7 @@ class TrajectoryProgramme:
             before = np.vstack([first, u[:-1]])
         keep = slice(0, self.n_command)
         x, z, u, s, before = x[keep], z[keep], u[keep], s[keep], before[keep]
-        return self._result(x, z, u, before, s, stats["iter_count"])
+        return self._result(x, z, u, before, s, solution.iterations)
 
     def optimum(
         self, begin: InverseTrajectory | None = None, progress: Callable[[Sequence[Limit]], None] = lambda _: None

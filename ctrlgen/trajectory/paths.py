@@ -20,7 +20,7 @@ from pydantic.json_schema import SkipJsonSchema
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import In, Quantity, read_quantity, same_dimension, written_unit
-from ctrlgen.devices.base import Section
+from ctrlgen.devices.section import Section
 from ctrlgen.trajectory.frame import Frame, Point, read_poses
 
 MINIMUM_JERK = 2  # derivatives that are zero at a rest point, where nothing else is stated

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, field_validator, model_validator
 
 from ctrlgen.core.units import In, Quantity, read_probability
-from ctrlgen.devices.base import Section
+from ctrlgen.devices.section import Section
 from ctrlgen.trajectory.inverse.clock import Clock, Sampled, Settled
 from ctrlgen.trajectory.paths import PathKind, Poses
 from ctrlgen.trajectory.shaping import Shaping

@@ -17,7 +17,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from ctrlgen.core.units import In, Quantity
-from ctrlgen.devices.base import Section
+from ctrlgen.devices.section import Section
 
 ORDERS = {"ZV": 1, "ZVD": 2, "ZVDD": 3}
 WHOLE = 1e-9  # of a sample, by which a shaper may be longer than whole samples

@@ -78,8 +78,7 @@ def closest_margins(model: Model, x: np.ndarray, z: np.ndarray, u: np.ndarray, b
                 continue
             distance = sign * (table - bound)
             k, i = np.unravel_index(int(np.argmin(distance)), distance.shape)
-            span = (limit.upper - limit.lower) if limit.lower is not None and limit.upper is not None else abs(bound)
-            share = float(distance[k, i]) / span if span else None
+            share = float(distance[k, i]) / limit.span if limit.span else None
             sides.append(
                 Margin(limit, limit.channels[i], int(k), float(table[k, i]), bound, float(distance[k, i]), share)
             )

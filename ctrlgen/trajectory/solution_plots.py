@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
-from ctrlgen.core.units import from_si, show
+from ctrlgen.core.units import from_si, show_difference
 from ctrlgen.reporting.plots import COLOURS, STYLE, svg
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE
 from ctrlgen.trajectory.metrics import force_parts
@@ -18,7 +18,7 @@ from ctrlgen.trajectory.solution import Solution
 from ctrlgen.trajectory.workspace import Ball, Workspace
 
 
-def draw_all(solution: Solution) -> dict[str, str]:
+def draw_solution(solution: Solution) -> dict[str, str]:
     """Every figure that applies to this solution: name -> SVG text."""
     drawings: dict[str, Callable[[Solution], Figure]] = {"margins": draw_margins}
     state = solution.model.signals.get("state")
@@ -115,8 +115,7 @@ def draw_margins(solution: Solution) -> Figure:
         axes.barh(row, share, color=COLOURS[2] if margin is solution.tightest else COLOURS[0], height=0.6)
         unit = margin.limit.unit
         value, bound = from_si(margin.value, unit), from_si(margin.limit.described(margin.bound), unit)
-        step = "K" if unit == "degC" else unit
-        reserved = f" less {show(margin.reserve, step, 3)} reserved" if margin.reserve else ""
+        reserved = f" less {show_difference(margin.reserve, unit, 3)} reserved" if margin.reserve else ""
         axes.text(
             share + 1,
             row,

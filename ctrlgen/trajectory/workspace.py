@@ -117,13 +117,10 @@ class Workspace:
         values = m.evaluate_limits(ca.vertcat(state, ca.DM(m.rest[m.n_states :])), d, u, m.p_nominal)
         violations = []
         for limit, value in zip(m.limits, values, strict=True):
-            span = (limit.upper or 0.0) - (limit.lower or 0.0) or 1.0
             if limit.upper is not None:
-                violations.append((value - limit.upper) / span)
-            elif limit.lower is not None and limit.lower != 0.0:
-                violations.append((limit.lower - value) / abs(limit.lower))
-            if limit.upper is not None and limit.lower is not None:
-                violations.append((limit.lower - value) / span)
+                violations.append((value - limit.upper) / (limit.span or 1.0))
+            if limit.lower is not None and limit.span:
+                violations.append((limit.lower - value) / limit.span)
         worst = ca.mmax(ca.vertcat(*violations))
         return ca.Function("excess", [pose], [worst, ca.gradient(worst, pose)])
 

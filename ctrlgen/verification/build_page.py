@@ -7,7 +7,7 @@ from pathlib import Path
 from ctrlgen.core.files import write_text
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.result_file import json_text
-from ctrlgen.verification.build_plots import draw_all
+from ctrlgen.verification.build_plots import draw_build
 from ctrlgen.verification.build_record import Build, record
 from ctrlgen.verification.comparison_entry import ComparisonKind
 
@@ -29,7 +29,7 @@ def write_build(out: Path, build: Build) -> None:
     page = render(
         Path(__file__).with_name("build.html.j2"),
         b=written,
-        figures=draw_all(build),
+        figures=draw_build(build),
         captions=CAPTIONS,
         marks=MARKS,
         rows=worst,

@@ -24,7 +24,7 @@ DECADES = 18  # that the logarithmic axis shows at most: down to the roundings o
 KINDS = {"scenario": "along the scenario", "worst": "worst case", "player": "player"}
 
 
-def draw_all(build: Build) -> dict[str, str]:
+def draw_build(build: Build) -> dict[str, str]:
     """Name -> SVG text; there is no figure of what did not run."""
     with plt.rc_context(STYLE):
         figures = {f"error_{unit}": svg(draw_errors(build, unit)) for unit in SHOWN if _channels(build, unit)}

@@ -53,7 +53,7 @@ def zig() -> list[str] | None:
 
 
 def cross_compilers() -> dict[str, str]:
-    """Those that are there, with their version."""
+    """The cross compilers that are installed: name -> version."""
     present = {}
     if words := zig():
         done = run_tool([*words[:-1], "version"])

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from pathlib import Path
-
-import numpy as np
 
 from ctrlgen.budget.budget_section import BudgetSection
 from ctrlgen.core.files import write_text
-from ctrlgen.core.units import from_si
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.result_file import json_text
 from ctrlgen.trajectory.metrics import ExpectationResult
 from ctrlgen.trajectory.solution import Solution
+from ctrlgen.trajectory.solution_table import table_of_signals
 from ctrlgen.verification.comparison import Comparison
 from ctrlgen.verification.summary import summary
 
@@ -33,20 +29,7 @@ def write_trajectory(solution: Solution, path: Path) -> None:
     roles = [role for role in CSV_SIGNALS if role in signals]
     if signals["drive"].columns not in [signals[role].columns for role in roles]:
         roles.append("drive")
-    static = solution.scenario.sample_time is None
-    header = ["sample" if static else "time [s]"]
-    columns = [(np.arange(len(solution.command)) if static else solution.trace.time)[:, None]]
-    for role in roles:
-        signal = solution.model.signals[role]
-        header += signal.columns
-        values = solution.trace.signals[role]
-        columns.append(np.column_stack([from_si(values[:, i], unit) for i, unit in enumerate(signal.units)]))
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(header)
-    for row in np.hstack(columns):
-        writer.writerow([f"{value:.12g}" for value in row])
-    write_text(path, text.getvalue())
+    write_text(path, table_of_signals(solution, roles))
 
 
 def write_report(
@@ -60,7 +43,7 @@ def write_report(
 ) -> None:
     """Writes what a reader looks at: summary.json, trajectory.csv, figures/*.svg, report.html.
 
-    `figures`: name -> SVG text, as `ctrlgen.reporting.plots.draw_all` gives; `budget` as `budget_section` gives.
+    `figures`: name -> SVG text, as `ctrlgen.trajectory.solution_plots.draw_solution` gives; `budget` as `budget_section` gives.
     """
     result = summary(solution, comparison, expected, c)
     write_text(out / "summary.json", json_text(result))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from ctrlgen.core.units import difference, from_si, show
+from ctrlgen.core.units import difference, from_si, show, shown_difference_unit
 from ctrlgen.devices import Signal
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.player.compression import PlayerCandidate
@@ -178,7 +178,7 @@ def _margin(m: Margin, solution: Solution) -> MarginRow:
         bound=float(from_si(m.limit.described(m.bound), unit)),
         reserve=float(difference(m.reserve, unit)),
         margin=float(difference(m.distance, unit)),
-        margin_unit="K" if unit == "degC" else unit,
+        margin_unit=shown_difference_unit(unit),
         share_left=m.share,
     )
 

@@ -8,7 +8,8 @@ from typing import Annotated, Literal
 from pydantic import model_validator
 
 from ctrlgen.core.units import In, Quantity
-from ctrlgen.devices.mechanism.flexures import Flexible, FlexureSection, Length, Name
+from ctrlgen.devices.mechanism.flexures import Flexible, FlexureSection
+from ctrlgen.devices.mechanism.joining import Length, Name
 from ctrlgen.devices.section import Section
 from ctrlgen.physics import thermal_actuator
 from ctrlgen.physics.screw import Matrix, inverse

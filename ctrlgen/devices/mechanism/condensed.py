@@ -5,93 +5,24 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any, Protocol
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from ctrlgen.devices.mechanism.copies import Copied, Placed
-from ctrlgen.devices.mechanism.flexures import TWIST, Direction
+from ctrlgen.devices.mechanism.copies import Placed
+from ctrlgen.devices.mechanism.drawing import Drawing
+from ctrlgen.devices.mechanism.joining import TWIST, Direction
 from ctrlgen.numerics.newton import newton_root
 from ctrlgen.physics import rigid_bodies as mechanism
 from ctrlgen.physics.flexure_mass import flexure_mass
 from ctrlgen.physics.rigid_bodies import GROUND, Element
 from ctrlgen.physics.screw import Matrix, adjoint, inverse_adjoint, move
 
-MOST_STEPS = (
-    12  # of Newton's method from the motion without cubic springs: more, and they hold more than the flexures do
-)
+# Of Newton's method from the motion without cubic springs: with more steps they hold more than the flexures do.
+MOST_STEPS = 12
 ROUNDING = 1e-14  # of the stretch: what an iteration leaves
 SPARE_STEPS = 2  # for numbers that differ from the file's, as in a diagnosis
-
-
-class Drawing(Protocol):
-    """What the equations need of a mechanism's description (`devices.mechanism.Mechanism`)."""
-
-    actuator: tuple[Any, ...]
-    material: tuple[Any, ...]
-    element: tuple[Any, ...]
-    output: Any
-    dynamics: Any
-
-    @property
-    def second_order(self) -> bool:
-        """Whether pose and force are of second order at least."""
-        ...
-
-    @property
-    def geometric_stiffening(self) -> bool:
-        """Whether the energy is of fourth order, as an element states."""
-        ...
-
-    @property
-    def bodies(self) -> tuple[str, ...]:
-        """The names of all bodies, copies with their number."""
-        ...
-
-    @property
-    def placed_bodies(self) -> tuple[Copied, ...]:
-        """Every copy of every body, by its number."""
-        ...
-
-    @property
-    def placed_elements(self) -> tuple[Placed, ...]:
-        """Every copy of every element."""
-        ...
-
-    @property
-    def placed_actuators(self) -> tuple[Placed, ...]:
-        """Every copy of every actuator."""
-        ...
-
-    @property
-    def placed_readings(self) -> tuple[Placed, ...]:
-        """Every copy of every reading."""
-        ...
-
-    @property
-    def reading_scale(self) -> tuple[float, ...]:
-        """A typical size of each reading beside those of the output."""
-        ...
-
-    @property
-    def size(self) -> float:
-        """The largest distance of an element's end from the origin [m]."""
-        ...
-
-    @property
-    def channel_scale(self) -> tuple[float, ...]:
-        """A typical size of each channel that is followed."""
-        ...
-
-    @property
-    def cubic_steps(self) -> int:
-        """Steps of Newton's method that find the stretch of the cubic springs."""
-        ...
-
-    def values(self) -> SimpleNamespace:
-        """Its numbers in SI."""
-        ...
 
 
 @dataclass(frozen=True)

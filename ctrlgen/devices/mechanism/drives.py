@@ -9,8 +9,9 @@ from types import SimpleNamespace
 import casadi as ca
 
 from ctrlgen.core.units import written_unit
-from ctrlgen.devices.base import AxisSignal, Limit, Signal
+from ctrlgen.devices.limit import Limit
 from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.devices.signal import AxisSignal, Signal
 from ctrlgen.physics import thermal_actuator
 
 

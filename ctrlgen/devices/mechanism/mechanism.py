@@ -15,23 +15,17 @@ import casadi as ca
 import numpy as np
 from pydantic import Field, model_validator
 
-from ctrlgen.devices.base import Device, DevicePhysics
+from ctrlgen.devices.base import Device
+from ctrlgen.devices.device_physics import DevicePhysics
 from ctrlgen.devices.mechanism.bent_beams import BentBeam, ThermalActuator
 from ctrlgen.devices.mechanism.condensed import MOST_STEPS, SPARE_STEPS, Condensed
 from ctrlgen.devices.mechanism.copies import Copied, Placed
-from ctrlgen.devices.mechanism.flexures import (
-    TWIST,
-    Blade,
-    CircularHinge,
-    Compliance,
-    ComplianceMatrix,
-    Flexible,
-    Strut,
-    Wire,
-)
+from ctrlgen.devices.mechanism.flexures import Blade, CircularHinge, Flexible, Strut, Wire
+from ctrlgen.devices.mechanism.joining import TWIST
 from ctrlgen.devices.mechanism.mechanism_physics import mechanism_physics
 from ctrlgen.devices.mechanism.modes import guyan_modes, inertia_remarks
 from ctrlgen.devices.mechanism.springs import Spring
+from ctrlgen.devices.mechanism.stated_compliances import Compliance, ComplianceMatrix
 from ctrlgen.devices.mechanism.tables import GROUND_NAME, Actuator, Body, Dynamics, Material, Output, Pattern, Reading
 from ctrlgen.physics import rigid_bodies as mechanism
 from ctrlgen.physics.rigid_bodies import GROUND, Element
@@ -346,13 +340,13 @@ class Mechanism(Device):
 
     @property
     def _output_motion(self) -> np.ndarray:
-        """(6, n) at home."""
+        """The motion of the output point (6, n) per displacement of the axes, at home."""
         moved = ca.DM(ca.evalf(ca.SX(Condensed(self, self.values()).output_motion))).full()
         return moved[:, : len(self.placed_actuators)]
 
     @property
     def _joints(self) -> list[Element]:
-        """Who is joined to whom."""
+        """The pairs of bodies that elements join."""
         return [Element(e.first, e.second, ca.DM.eye(6)) for e in self.placed_elements]
 
     def remarks(self) -> list[str]:

@@ -8,7 +8,8 @@ from typing import Any
 import casadi as ca
 
 from ctrlgen.core.units import written_unit
-from ctrlgen.devices.base import BalancedPhysics, DevicePhysics, InertialPhysics, Limit, SensedPoints, rate_limit
+from ctrlgen.devices.device_physics import BalancedPhysics, DevicePhysics, InertialPhysics, SensedPoints
+from ctrlgen.devices.limit import Limit, rate_limit
 from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.devices.mechanism.drives import transduction
 from ctrlgen.devices.mechanism.second_order import SecondOrder

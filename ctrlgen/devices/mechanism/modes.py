@@ -9,7 +9,8 @@ import numpy as np
 import scipy
 
 from ctrlgen.core.units import show
-from ctrlgen.devices.mechanism.condensed import Condensed, Drawing
+from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.devices.mechanism.drawing import Drawing
 from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.physics.rigid_bodies import GROUND
 from ctrlgen.physics.screw import inverse_adjoint

@@ -14,7 +14,7 @@ import numpy as np
 
 from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.devices.mechanism.copies import Placed
-from ctrlgen.devices.mechanism.flexures import TWIST
+from ctrlgen.devices.mechanism.joining import TWIST
 from ctrlgen.physics import rigid_bodies as mechanism
 from ctrlgen.physics.rigid_bodies import GROUND
 from ctrlgen.physics.screw import Matrix, adjoint, inverse_adjoint
@@ -81,7 +81,7 @@ class SecondOrder:
 
     @cached_property
     def parts(self) -> list[tuple[Matrix, tuple[Segment, ...], Matrix | None]]:
-        """Of every element where it is looked at, its segments, and what its `beam` makes of products of its loads (6, 36)."""
+        """For every element: where it is looked at, its segments, and what its `beam` makes of products of its loads (6, 36)."""
         c, found = self.c, []
         materials = {m.name: q for m, q in zip(c.device.material, c.p.material, strict=True)}
         a, b = [x for x in range(6) for _ in range(6)], [y for _ in range(6) for y in range(6)]
@@ -212,7 +212,8 @@ class SecondOrder:
         return [T - ca.mtimes(T_1, travelled + moved) for T, T_1 in zip(free, self.first_order, strict=True)]
 
     def _motions(self, k: int, more: list[Matrix] | None = None, between: list[Matrix] | None = None) -> Motions:
-        """Of element k in the n motions of first order, and behind them in `more` (of every body) or in those `between` (of its two)."""
+        """The twists of element k in the n motions of first order, and behind them in `more` (of every body) or in those
+        `between` (of its two)."""
         c, e, n = self.c, self.c.elements[k], self.n
         added = between
         if more is not None:

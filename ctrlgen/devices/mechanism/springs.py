@@ -9,7 +9,7 @@ import casadi as ca
 from pydantic import model_validator
 
 from ctrlgen.core.units import In, Quantity
-from ctrlgen.devices.mechanism.flexures import TWIST, Joining
+from ctrlgen.devices.mechanism.joining import TWIST, Joining
 from ctrlgen.physics.screw import Matrix
 
 Translational = Annotated[Quantity, In("N/um", low=0.0)]

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from ctrlgen.core.units import In, Quantity, same_dimension, written_unit
-from ctrlgen.devices.mechanism.flexures import Direction, Name, Place
+from ctrlgen.devices.mechanism.joining import Direction, Name, Place
 from ctrlgen.devices.section import Section
 from ctrlgen.physics.screw import Matrix, rotation_z
 
@@ -133,7 +133,7 @@ class Actuator(Section):
     @field_validator("rate", mode="before")
     @classmethod
     def _is_to_both_sides(cls, stated: Any) -> Any:
-        """One rate is the largest to both sides."""
+        """Reads a single rate as the largest to both sides."""
         return (f"-{stated}", stated) if isinstance(stated, str) else stated
 
     @model_validator(mode="after")
@@ -214,7 +214,7 @@ class Reading(Section):
 
     @property
     def direction(self) -> Direction:
-        """`along` or `about`."""
+        """The direction that is read: `along` or `about`."""
         return self.along or self.about or (0.0, 0.0, 0.0)
 
 

@@ -8,11 +8,10 @@ or, where the motion is imposed and the force read,   reading = needed_force(d, 
 u drives, x the user's states, d displacements of the axes, v their velocities, a their accelerations, p parameters; all SI.
 """
 
-from __future__ import annotations
-
+# Without postponed annotations: `Required` is read when `UserArguments` is made.
 from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Required, TypedDict, Unpack
 
 import casadi as ca
 import numpy as np
@@ -21,11 +20,12 @@ from pydantic import create_model
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import validate
 from ctrlgen.core.units import In, Quantity, same_dimension, written_unit
-from ctrlgen.devices.base import BalancedPhysics, Device, DevicePhysics, ImposedPhysics, InertialPhysics
+from ctrlgen.devices.base import Device
+from ctrlgen.devices.device_physics import BalancedPhysics, DevicePhysics, ImposedPhysics, InertialPhysics
 from ctrlgen.devices.section import Section
 from ctrlgen.devices.user.arguments import PLACEHOLDER, SECTIONS, ArgumentReader
-from ctrlgen.devices.user.ports import Law, Ports
-from ctrlgen.devices.user.user_physics import PhysicsBuilder, UserDescription
+from ctrlgen.devices.user.ports import Law, Ports, suggestion
+from ctrlgen.devices.user.user_physics import ARGUMENTS, PhysicsBuilder, UserDescription
 
 
 class UserNumbers(Section):
@@ -97,53 +97,81 @@ def _unpickled(
     return _device_class(description).model_validate({**plain, **sections})
 
 
-def user_device(
-    name: str,
-    *,
-    parameters: Mapping[str, Any],
-    axes: Mapping[str, str | tuple[str, str]],
-    drive: Mapping[str, str | tuple[str, str]] | None = None,
-    drive_rate: Mapping[str, str | tuple[str, str]] | None = None,
-    drive_weight: Mapping[str, float] | None = None,
-    force: Law | None = None,
-    restoring_force: Law | None = None,
-    damping_force: Law | None = None,
-    mass: Law | None = None,
-    acceleration: Law | None = None,
-    state: Mapping[str, str | tuple[str, str]] | None = None,
-    rates: Law | None = None,
-    reading: Mapping[str, str] | None = None,
-    pose: Law | None = None,
-    needed_force: Law | None = None,
-    speed: Mapping[str, str] | None = None,
-    limits: Mapping[str, tuple[Law, str]] | None = None,
-    force_size: str | None = None,
-    title: str = "",
-    source: str = "a user's model",
-    effect: Sequence[Mapping[str, Any]] = (),
-) -> Device:
-    """A device from the user's functions.
+Size = str | tuple[str, str]  # the largest size, "24 V", or a range, ("0 V", "150 V")
 
-    `drive`, `axes`, `state` and `reading` name the components of a vector with their largest size, {"motor": "24 V"};
-    the readings are the axes unless `pose` is given. Drives and axes are kept within plus and minus that size, or within a range
-    given as a pair, {"stack": ("0 V", "150 V")}; states only within a range. `drive_rate` limits how fast a drive may change,
-    {"stack": "5 V/ms"}, or down and up, ("-2 V/ms", "5 V/ms"). Of more drives than axes those with the least sum of `drive_weight`
-    (1 where it is not given) times the square of the drive as a share of its range move the axes. `limits` are of any
-    expression, {"stress": (lambda d, p: p.k * d.x, "300 MPa")}: its magnitude stays below the value. `parameters` are "0.5 kg",
-    ("0.5 kg", sd) or
-    {value, sd, source, domain}: the diagnosis takes a number with an sd as uncertain, one without as exact until the data
-    contradict it; its path is 'mechanism.NAME'. A law takes any of u, x, d, v, p as arguments of these names (see the
-    module) and returns one number for each axis, state or reading: a vector, a list, or {name: number}. It may be a
-    `ca.Function` with inputs of these names. Without `mass` the axes have no inertia. With `needed_force` the motion of the axes is
-    imposed, up to the `speed` of each, and the force that it takes is read: there is then no drive and no other law.
-    `force_size` is the typical force with its unit, by default that of the full drive in N, or N*m. Raises InputError with
-    every fault.
+
+class UserArguments(TypedDict, total=False):
+    """What `user_device` takes beside the name.
+
+    A law takes any of u, x, d, v, p as arguments of these names (see the module) and returns one number for each axis, state or
+    reading: a vector, a list, or {name: number}. It may be a `ca.Function` with inputs of these names.
     """
+
+    parameters: Required[Mapping[str, Any]]
+    """"0.5 kg", ("0.5 kg", sd) or {value, sd, source, domain} by name: the diagnosis takes a number with an sd as uncertain, one
+    without as exact until the data contradict it; its path is 'mechanism.NAME'."""
+    axes: Required[Mapping[str, Size]]
+    """Displacements with their largest size, {"x": "50 um"}, or range: they are kept within."""
+    drive: Mapping[str, Size]
+    """Drives with their largest size, {"motor": "24 V"}, or range, {"stack": ("0 V", "150 V")}: they are kept within."""
+    drive_rate: Mapping[str, Size]
+    """How fast a drive may change, {"stack": "5 V/ms"}, or down and up, ("-2 V/ms", "5 V/ms")."""
+    drive_weight: Mapping[str, float]
+    """Of more drives than axes those with the least sum of this (1 where it is not given) times the square of the drive as a share
+    of its range move the axes."""
+    force: Law
+    """force(u, x, d, v, p) on each axis."""
+    restoring_force: Law
+    """restoring_force(d, p), which pulls each axis home."""
+    damping_force: Law
+    """damping_force(v, p), against the motion of each axis."""
+    mass: Law
+    """mass(p) of each axis; without it the axes have no inertia."""
+    acceleration: Law
+    """acceleration(u, x, d, v, p) of each axis, in place of the three forces."""
+    state: Mapping[str, Size]
+    """The user's states with their typical size, {"current": "1 A"}, or the range that they are kept within."""
+    rates: Law
+    """rates(u, x, d, v, p) of the states."""
+    reading: Mapping[str, str]
+    """Readings with their largest size; by default the axes."""
+    pose: Law
+    """pose(d, p), the readings; by default the displacements."""
+    needed_force: Law
+    """needed_force(d, v, a, p): the motion of the axes is imposed and the force that it takes is read. There is then no drive and
+    no other law."""
+    speed: Mapping[str, str]
+    """The largest speed of each axis whose motion is imposed."""
+    limits: Mapping[str, tuple[Law, str]]
+    """Limits of any expression, {"stress": (lambda d, p: p.k * d.x, "300 MPa")}: its magnitude stays below the value."""
+    force_size: str
+    """The typical force with its unit, by default that of the full drive in N, or N*m."""
+    title: str
+    """The device in words; by default its name."""
+    source: str
+    """Where the model comes from."""
+    effect: Sequence[Mapping[str, Any]]
+    """Effects as `[[effect]]` tables state them."""
+
+
+def user_device(name: str, **given: Unpack[UserArguments]) -> Device:
+    """A device from the user's functions; `UserArguments` says what may be given. Raises InputError with every fault."""
+    known, needed = UserArguments.__annotations__, UserArguments.__required_keys__
+    if wrong := [key for key in given if key not in known]:
+        raise TypeError(f"user_device() has no argument {wrong[0]!r}; {suggestion(wrong[0], tuple(known))}")
+    if missing := sorted(needed - given.keys()):
+        raise TypeError(f"user_device() needs the arguments {', '.join(missing)}")
     read = ArgumentReader(name)
-    tables, domains, units = read.parameters(parameters)
-    imposed = needed_force is not None
-    ports = {"drive": drive or {}, "axes": axes, "speed": speed or {}, "state": {} if state is None else state}
-    sizes = {where: read.ports(where, given) for where, given in ports.items()}
+    tables, domains, units = read.parameters(given["parameters"])
+    imposed = given.get("needed_force") is not None
+    vectors = {
+        "drive": given.get("drive"),
+        "axes": given["axes"],
+        "speed": given.get("speed"),
+        "state": given.get("state"),
+    }
+    sizes = {where: read.ports(where, names or {}) for where, names in vectors.items()}
+    reading = given.get("reading")
     sizes["reading"] = sizes["axes"] if reading is None else read.ports("reading", reading)
     for where in ("axes", "speed") if imposed else ("drive", "axes"):
         if not sizes[where]:
@@ -155,36 +183,35 @@ def user_device(
             read.faults.append(
                 Fault(f"axes.{axis}", f"{q.text!r} is not of the dimension of {first.text!r}; all axes are")
             )
-    given = {
-        "force": force, "restoring_force": restoring_force, "damping_force": damping_force, "mass": mass, "acceleration": acceleration,
-        "rates": rates, "pose": pose, "needed_force": needed_force,
-    }  # fmt: skip
+    stated = {law: given.get(law) for law in ARGUMENTS}
     if imposed:
-        others = {
-            "drive": drive,
-            "drive_rate": drive_rate,
-            "drive_weight": drive_weight,
-            "state": state,
-            "reading": reading,
-        }
-        read.imposed(given, others, sizes)
-    elif speed is not None:
+        beside = ("drive", "drive_rate", "drive_weight", "state", "reading")
+        read.imposed(stated, {key: given.get(key) for key in beside}, sizes)
+    elif given.get("speed") is not None:
         read.faults.append(Fault("speed", "is of an imposed motion; give needed_force, or leave it out"))
-    rates_of_drives, weights = (
-        read.drive_rates(drive_rate or {}, sizes["drive"]),
-        read.weights(drive_weight or {}, sizes),
-    )
-    expressions = read.limits({} if limits is None else limits)
-    laws = read.laws(given, sizes["state"], reading is None or list(reading) == list(axes))
-    size = None if force_size is None else read.ports("force_size", {"force_size": force_size})["force_size"]
+    rates_of_drives = read.drive_rates(given.get("drive_rate") or {}, sizes["drive"])
+    weights = read.weights(given.get("drive_weight") or {}, sizes)
+    expressions = read.limits(given.get("limits") or {})
+    laws = read.laws(stated, sizes["state"], reading is None or list(reading) == list(given["axes"]))
+    size = given.get("force_size")
     description = UserDescription(
-        name, drive=sizes["drive"], axes=sizes["axes"], state=sizes["state"], reading=sizes["reading"], domains=domains, units=units,
-        laws=laws, force=size, ranges=read.ranges, limits=expressions,
-        speed=sizes["speed"], drive_rates=rates_of_drives, weights=weights,
-    )  # fmt: skip
-    return _validated(
-        description, tables, {"name": name, "title": title or name, "source": source, "effect": tuple(effect)}, read
+        name,
+        drive=sizes["drive"],
+        axes=sizes["axes"],
+        state=sizes["state"],
+        reading=sizes["reading"],
+        domains=domains,
+        units=units,
+        laws=laws,
+        force=None if size is None else read.ports("force_size", {"force_size": size})["force_size"],
+        ranges=read.ranges,
+        limits=expressions,
+        speed=sizes["speed"],
+        drive_rates=rates_of_drives,
+        weights=weights,
     )
+    plain = {"title": given.get("title") or name, "source": given.get("source", "a user's model")}
+    return _validated(description, tables, {"name": name, **plain, "effect": tuple(given.get("effect", ()))}, read)
 
 
 def _validated(
@@ -245,6 +272,3 @@ def _check_at_home(device: UserDevice, read: ArgumentReader) -> None:
             read.faults.append(Fault(law, what))
         elif law == "mass" and np.any(numbers <= 0):
             read.faults.append(Fault(law, f"is {numbers}; it must be above zero"))
-
-
-__all__ = ["UserDevice", "user_device"]

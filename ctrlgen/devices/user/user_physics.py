@@ -12,16 +12,15 @@ import numpy as np
 
 from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import Quantity, same_dimension, written_unit
-from ctrlgen.devices.base import (
+from ctrlgen.devices.device_physics import (
     BalancedPhysics,
     DevicePhysics,
     ImposedPhysics,
     InertialPhysics,
-    Limit,
-    Signal,
     imposed_motion,
-    rate_limit,
 )
+from ctrlgen.devices.limit import Limit, rate_limit
+from ctrlgen.devices.signal import Signal
 from ctrlgen.devices.user.ports import Law, Ports, evaluate_law
 
 ARGUMENTS = {  # of each law
@@ -188,14 +187,14 @@ class PhysicsBuilder:
         )  # fmt: skip
 
     def rate_limits(self, drive: Signal) -> tuple[Limit, ...]:
-        """Of the drives that have one."""
-        found = []
+        """The limits on the rates of those drives that have one."""
+        limits = []
         for i, name in enumerate(self.given.drive):
             if name in self.given.drive_rates:
                 q = self.given.drive_rates[name]
                 low, high = self.given.ranges.get(("drive_rate", name), (-q.si, q.si))
-                found.append(rate_limit(drive, i, low, high, written_unit(q.text)))
-        return tuple(found)
+                limits.append(rate_limit(drive, i, low, high, written_unit(q.text)))
+        return tuple(limits)
 
     def limits(self, signal: SimpleNamespace) -> list[Limit]:
         """Drives and displacements stay within their ranges or largest sizes, states within ranges, expressions below their limits."""

@@ -130,9 +130,7 @@ def _kept(simulator: Simulator, p: np.ndarray, record: Record) -> bool:
     for limit in m.limits:
         reached = values[:, first : first + limit.expr.numel()]
         first += limit.expr.numel()
-        size = max(abs(limit.lower or 0.0), abs(limit.upper or 0.0))
-        if limit.lower is not None and reached.min() < limit.lower - EXCITATION.limit_slack * size:
-            return False
-        if limit.upper is not None and reached.max() > limit.upper + EXCITATION.limit_slack * size:
+        (low, high), size = limit.bounds, max(abs(limit.lower or 0.0), abs(limit.upper or 0.0))
+        if reached.min() < low - EXCITATION.limit_slack * size or reached.max() > high + EXCITATION.limit_slack * size:
             return False
     return True

@@ -76,8 +76,7 @@ class UnmodelledForce:
 
     def sentences(self) -> list[str]:
         """What the input depends on at the axes where it is largest: it describes the residual and names no cause."""
-        told = (_statement(axis, self.maps[axis]) for axis in self.loudest[: MAPS.most_axes])
-        return [line for line in told if line]
+        return [_statement(axis, self.maps[axis]) for axis in self.loudest[: MAPS.most_axes] if self.maps[axis]]
 
     def record(self) -> UnmodelledForceEntry:
         """Its entry in diagnosis.json."""
@@ -178,10 +177,8 @@ def _map(
 
 
 def _statement(axis: str, maps: tuple[DependenceMap, ...]) -> str:
-    """What the input of one axis depends on; empty without maps."""
+    """What the input of one axis depends on; its maps are those of `_maps`, of which the position comes first."""
     single = [m for m in maps if m.coordinate not in ONE_SIDED]
-    if not single:
-        return ""
     best = max(single, key=lambda m: m.variance_share)
     text = f"{axis}: {best.coordinate} explains {best.variance_share:.0%} of the unknown input's variance"
     sides = {m.coordinate: m for m in maps if m.coordinate in ONE_SIDED}

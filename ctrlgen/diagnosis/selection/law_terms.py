@@ -10,11 +10,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from ctrlgen.effects import Effect, Place
+from ctrlgen.effects import Effect, LawInputs, Place
 from ctrlgen.estimation.settings import CANDIDATE_TERMS
 from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.model.model import Model
@@ -41,15 +42,17 @@ class Read:
         return ca.SX(value() if callable(value) else value)
 
 
-class _LawInputs(SimpleNamespace):
-    """What a law may read, with a symbol of `terms` in place of each expression of the model; None and numbers as they are."""
+class _SymbolicInputs(LawInputs):
+    """What a law may read, with a symbol of `terms` in place of each expression of the model that it does read; None and numbers as
+    they are."""
 
-    def __init__(self, terms: LawTerms, place: Place, order: int, actual: SimpleNamespace, states: dict[str, ca.SX]):
-        super().__init__(**states)
-        self.__dict__["_model"] = (terms, place, order, actual)
+    def __init__(self, terms: LawTerms, place: Place, order: int, actual: LawInputs, states: dict[str, ca.SX]) -> None:
+        vars(self).update(states=SimpleNamespace(**states), _model=(terms, place, order, actual))
 
-    def __getattr__(self, name: str) -> object:
-        terms, place, order, actual = self.__dict__["_model"]
+    def __getattribute__(self, name: str) -> Any:
+        if name.startswith("_") or name == "states":
+            return object.__getattribute__(self, name)
+        terms, place, order, actual = self._model
         value = getattr(actual, name)
         if callable(value):
             return lambda: terms.symbol(Read(place, order, actual.index, name), value())
@@ -134,9 +137,8 @@ class LawTerms:
             a = ca.SX.sym("a")
             p = SimpleNamespace(**shape, **{law.amplitude().name: a})
             actual = self.described.law_inputs(law.place, index, partner, {}, law.order)
-            s = _LawInputs(self, law.place, law.order, actual, states)
-            new = law.after_sample(s, p)
-            s.__dict__.update(new)
+            new = law.after_sample(_SymbolicInputs(self, law.place, law.order, actual, states), p)
+            s = _SymbolicInputs(self, law.place, law.order, actual, states | new)
             change = {state.name: ca.SX(float(state.clock)) for state in law.states} | law.rates(s, p)
             value, at = ca.SX(law.term(s, p)), finite or off
             if finite:

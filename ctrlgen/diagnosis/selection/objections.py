@@ -39,7 +39,7 @@ def objections(
             _outside_its_range(fit, k)
             or _on_the_lattice(recording, fit, k)
             or (
-                ""
+                None
                 if exact
                 else _no_pitch(recording, fit, k) or _no_line(recording, fit, k) or _no_event(recording, fit, k)
             )
@@ -53,8 +53,8 @@ def objections(
     return reasons
 
 
-def _outside_its_range(fit: Fit, k: int) -> str:
-    """Why the numbers of cause k are not those of its law; empty where they are."""
+def _outside_its_range(fit: Fit, k: int) -> str | None:
+    """Why the numbers of cause k are not those of its law; None where they are."""
     structure, cause = fit.structure, fit.structure.causes[k]
     if cause.effect != PARAMETER and (reason := cause.law.contradiction(fit.values(k))):
         return reason
@@ -71,7 +71,7 @@ def _outside_its_range(fit: Fit, k: int) -> str:
         span = OBJECTIONS.at_bound * (u.high - u.low)
         if value >= u.high - span or (value <= u.low + span and u.low != u.nominal):
             return f"{u.name} is at its bound of {shown(float(value))}"
-    return ""
+    return None
 
 
 def _same_line(recording: Recording, fit: Fit, j: int, k: int) -> bool:
@@ -82,27 +82,27 @@ def _same_line(recording: Recording, fit: Fit, j: int, k: int) -> bool:
     return abs(_line(fit, j) - _line(fit, k)) * _covered(recording, a) < OBJECTIONS.apart
 
 
-def _no_pitch(recording: Recording, fit: Fit, k: int) -> str:
-    """Why an error that repeats along a reading does not: the reading goes no farther than about its period; empty where it may."""
+def _no_pitch(recording: Recording, fit: Fit, k: int) -> str | None:
+    """Why an error that repeats along a reading does not: the reading goes no farther than about its period; None where it may."""
     cause = fit.structure.causes[k]
     if cause.effect == PARAMETER or not any(_is_spatial_period(cause, p) for p in cause.law.params):
-        return ""
+        return None
     periods = _line(fit, k) * _covered(recording, cause)
     if periods >= OBJECTIONS.fewest_pitches:
-        return ""
+        return None
     return (
         f"the reading covers {periods:.1f} periods of it, and {OBJECTIONS.fewest_pitches:g} are needed to see it repeat"
     )
 
 
-def _no_line(recording: Recording, fit: Fit, k: int) -> str:
+def _no_line(recording: Recording, fit: Fit, k: int) -> str | None:
     """Why a disturbance of one frequency is none: the records are too short to tell one, or the drive itself repeats with its
-    harmonic; empty where it may be one."""
+    harmonic; None where it may be one."""
     cause = fit.structure.causes[k]
     if cause.effect == PARAMETER or cause.prior.domain != "disturbance" or recording.kind != "series":
-        return ""
+        return None
     if not any(p.unit == "Hz" for p in cause.law.params):
-        return ""
+        return None
     line, covered = _line(fit, k), _covered(recording, cause)
     if line * covered < OBJECTIONS.fewest_periods:
         fewest = f"{OBJECTIONS.fewest_periods:.0f} are needed to tell a line"
@@ -113,7 +113,7 @@ def _no_line(recording: Recording, fit: Fit, k: int) -> str:
         near = max(OBJECTIONS.harmonic / covered, _line_interval(fit, k))
         if period and order > 0.5 and abs(order - round(order)) / period < near:
             return f"it is harmonic {round(order)} of the drive's period, as whatever the drive causes is"
-    return ""
+    return None
 
 
 def _line_interval(fit: Fit, k: int) -> float:
@@ -139,12 +139,12 @@ def _nearly_period(record: Record) -> float | None:
     return None
 
 
-def _no_event(recording: Recording, fit: Fit, k: int) -> str:
+def _no_event(recording: Recording, fit: Fit, k: int) -> str | None:
     """Why an event is none of its own: it is slow, as physics that was left out is, or begins where the drive begins or ceases
-    to move; empty where it may be one."""
+    to move; None where it may be one."""
     cause = fit.structure.causes[k]
     if cause.effect == PARAMETER or recording.kind != "series":
-        return ""
+        return None
     moments = [p.name for p in cause.law.params if cause.prior.of(p).start_from_data == "moments"]
     values = fit.values(k)
     for record in (r for r in recording.records if r.role == "fit" and moments):
@@ -154,7 +154,7 @@ def _no_event(recording: Recording, fit: Fit, k: int) -> str:
             return f"its rise of {values['rise']:.3g} s is slow beside the record; an event is sharp"
         if any(abs(values[name] - t) <= near for name in moments for t in _onsets(record)):
             return "it happens where the motion begins or ends, as friction, slack and delays do"
-    return ""
+    return None
 
 
 def _onsets(record: Record) -> np.ndarray:
@@ -171,18 +171,18 @@ def _onsets(record: Record) -> np.ndarray:
     return np.array([record.time[a + 1] for a in edges.tolist() if after_rest_or_before(a)])
 
 
-def _on_the_lattice(recording: Recording, fit: Fit, k: int) -> str:
-    """Why cause k is the rounding of its channel, which the readings show by themselves; empty where it is not."""
+def _on_the_lattice(recording: Recording, fit: Fit, k: int) -> str | None:
+    """Why cause k is the rounding of its channel, which the readings show by themselves; None where it is not."""
     cause = fit.structure.causes[k]
     channel = f"reading.{cause.at}"
     if cause.effect == PARAMETER or channel not in recording.channels:
-        return ""
+        return None
     i = recording.channels.index(channel)
     values = np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])
     read, *_ = detect_directly(cause.law, values) or ({},)
     steps = (p.name for p in cause.law.params if p.off is None and (_is_spatial_period(cause, p) or p.name in read))
     shortest = OBJECTIONS.shortest_period * quantisation_step(values)
-    return "it repeats with the steps of the reading" if any(fit.values(k)[name] < shortest for name in steps) else ""
+    return "it repeats with the steps of the reading" if any(fit.values(k)[name] < shortest for name in steps) else None
 
 
 def _is_spatial_period(cause: Hypothesis, p: Param) -> bool:

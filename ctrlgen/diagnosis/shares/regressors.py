@@ -130,8 +130,8 @@ class _Builder:
         """The drawn samples of one array a record."""
         return np.concatenate([np.asarray(part)[rows] for part, rows in zip(parts, self.rows, strict=True)])
 
-    def _same(self, u: np.ndarray) -> str:
-        """The signal that a drive follows up to `SHARES.same_signal`, '' where there is none or the drive does not vary."""
+    def _same(self, u: np.ndarray) -> str | None:
+        """The signal that a drive follows up to `SHARES.same_signal`, None where there is none or the drive does not vary."""
         groups = {"position": self.position}
         if not self.settled:
             groups |= {"speed": self.speed, "acceleration": self.acceleration}
@@ -142,7 +142,7 @@ class _Builder:
             for axis, x in group.items()
             if abs(float(np.mean(u * standardised(x)))) > SHARES.same_signal
         ]
-        return alike[0] if alike else ""
+        return alike[0] if alike else None
 
     def _unit(self, what: str, name: str) -> str:
         return self.signals[0].units.get(f"{what} {name}", "")

@@ -15,7 +15,7 @@ from ctrlgen.controller.lost_state import FAR
 from ctrlgen.controller.motion_feedforward import MotionKernels
 from ctrlgen.controller.nearest_displacement import SWEEPS
 from ctrlgen.controller.run_time_check import check_run_time
-from ctrlgen.core.units import base_unit, show
+from ctrlgen.core.units import base_unit, show, show_difference
 from ctrlgen.devices import Limit
 from ctrlgen.firmware.c.c_constants import DERIVED
 from ctrlgen.firmware.c.cprint import Kernel, Law, Printer
@@ -341,9 +341,10 @@ def _si_text(signal: Any) -> str:
 
 
 def _limit_text(limit: Limit) -> str:
-    low = "" if limit.lower is None else f"{show(limit.lower, limit.unit)} <= "
-    high = "" if limit.upper is None else f" <= {show(limit.upper, limit.unit)}"
-    step = "K" if limit.unit == "degC" else limit.unit
-    sides = zip((limit.lower, limit.upper), limit.reserve, strict=True)
-    reserved = [f"{show(limit.described(b), limit.unit)} less {show(r, step)}" for b, r in sides if b is not None and r]
-    return f"{low}{limit.label}{high}" + (f" ({'; '.join(reserved)} reserved)" if reserved else "")
+    sides = [(bound, by) for bound, by in zip((limit.lower, limit.upper), limit.reserve, strict=True) if by]
+    reserved = [
+        f"{show(limit.described(bound), limit.unit)} less {show_difference(by, limit.unit)}"
+        for bound, by in sides
+        if bound is not None
+    ]
+    return limit.text + (f" ({'; '.join(reserved)} reserved)" if reserved else "")

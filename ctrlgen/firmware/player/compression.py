@@ -15,6 +15,7 @@ from pydantic import Field
 
 from ctrlgen.core.errors import SolverError
 from ctrlgen.core.units import same_dimension
+from ctrlgen.devices.limit import ranges
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.player.spline import Spline, fit
 from ctrlgen.model.model import Model
@@ -234,7 +235,7 @@ def _keeps_rates(solution: Solution, compression: Compression) -> bool:
         drives = np.vstack([drives, drives[:1]])
     change = np.diff(drives, axis=0) / (h / BETWEEN)
     low, high = m.rate_bounds
-    rounded = np.where(np.isfinite(high - low), RATE_ROUNDING * (high - low), 0.0)
+    rounded = RATE_ROUNDING * ranges((low, high), 0.0)
     return bool(np.all(change >= low - rounded) and np.all(change <= high + rounded))
 
 

@@ -16,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 import scipy
 
+from ctrlgen.devices.limit import ranges
 from ctrlgen.firmware.c.real import Real
 
 DENSE = 400  # samples of a piece up to which the dense solver is as fast; it also takes rank-deficient fits
@@ -148,7 +149,7 @@ class Spline:
 
 def switches(drive: np.ndarray, low: np.ndarray, high: np.ndarray) -> list[int]:
     """Samples k at which a drive reaches or leaves a bound between k - 1 and k."""
-    span = np.where(np.isfinite(high - low), high - low, np.ptp(drive, axis=0))
+    span = ranges((low, high), np.ptp(drive, axis=0))
     held = np.hstack([drive <= low + AT_LIMIT * span, drive >= high - AT_LIMIT * span])
     return (np.flatnonzero(np.any(held[1:] != held[:-1], axis=1)) + 1).tolist()
 

@@ -13,11 +13,22 @@ import scipy  # its optimize takes a while to import, and comes when it is used
 import scipy.sparse as sp
 
 from ctrlgen.core.errors import SolverError
+from ctrlgen.devices.limit import ranges
 from ctrlgen.model.allocation import INDEPENDENT
-from ctrlgen.numerics.ipopt import check_signal
+from ctrlgen.numerics.ipopt import IpoptOptions, NonlinearProgramme, solve_nlp
 
 TOLERANCE = 1e-10  # of a share: IPOPT's of the optimality error, the linear programme's of each row
-MOST_ITERATIONS = 200
+OPTIONS = IpoptOptions(
+    tol=TOLERANCE,
+    max_iter=200,
+    mu_strategy="adaptive",
+    nlp_scaling_method="none",
+    bound_relax_factor=0.0,
+    # a quadratic programme with linear rows
+    jac_c_constant="yes",
+    jac_d_constant="yes",
+    hessian_constant="yes",
+)
 NEAR = 1e-6  # ranges from a limit within which a drive is at it
 
 
@@ -80,7 +91,7 @@ def limited_rows(
     limited = Rows(sp.eye(n * len(span), format="csr"), low, high, np.ones(n * len(span)))
     if rates is None:
         return limited
-    allowed = np.where(np.isfinite(rates[1] - rates[0]), rates[1] - rates[0], span)
+    allowed = ranges(rates, span)
     step = (sp.eye(n, k=1) - sp.eye(n) + sp.eye(n, k=1 - n)).tocsr()[: len(gaps)]
     change = sp.kron(sp.diags_array(1 / gaps) @ step, sp.diags_array(span / allowed), format="csr")
     slowest, fastest = (np.tile(rate / allowed, len(gaps)) for rate in rates)
@@ -126,22 +137,14 @@ def least_squares(
     """The drives of least effort among those that push as `wanted` within limits, by IPOPT. Raises SolverError where it finds none."""
     A = sp.vstack([pushed, limited.A], format="csc")
     s = ca.MX.sym("s", A.shape[1])
-    problem = {"x": s, "f": ca.dot(weights, s**2), "g": ca.mtimes(ca.DM(A), s)}
-    options = {
-        "print_time": False,
-        "ipopt": {
-            "print_level": 0, "sb": "yes", "tol": TOLERANCE, "max_iter": MOST_ITERATIONS, "nlp_scaling_method": "none",
-            "mu_strategy": "adaptive", "bound_relax_factor": 0.0, "jac_c_constant": "yes", "jac_d_constant": "yes",
-            "hessian_constant": "yes",
-        },
-    }  # fmt: skip
-    solver = ca.nlpsol("least_effort", "ipopt", problem, options)
-    answer = solver(x0=begin, lbg=np.append(wanted, limited.low), ubg=np.append(wanted, limited.high))
-    status = solver.stats()["return_status"]
-    check_signal(status)
-    if not solver.stats()["success"]:
-        raise SolverError(f"IPOPT found no drives of least effort ({status}); command a smaller or slower path")
-    return answer["x"].full().ravel()
+    row_bounds = np.append(wanted, limited.low), np.append(wanted, limited.high)
+    programme = NonlinearProgramme(s, ca.dot(weights, s**2), ca.mtimes(ca.DM(A), s), row_bounds)
+    solution = solve_nlp(programme, begin, OPTIONS)
+    if not solution.converged:
+        raise SolverError(
+            f"IPOPT found no drives of least effort ({solution.status}); command a smaller or slower path"
+        )
+    return solution.unknowns
 
 
 def polished(

@@ -26,6 +26,7 @@ from itertools import combinations
 import casadi as ca
 import numpy as np
 
+from ctrlgen.devices.limit import ranges, spans
 from ctrlgen.model.allocation import INDEPENDENT, Allocation, effort_weights
 from ctrlgen.model.model import Model
 from ctrlgen.trajectory.inverse.clock import Settled
@@ -201,7 +202,7 @@ class RedundantInverse(PathInverse):
     def _within_reach(self, z: np.ndarray, f: np.ndarray, margin: float) -> bool:
         """Whether the displacements `z` are in range, and drives within their limits give the forces `f` as far as `_facets` tell."""
         low, high = _narrowed(self.model.z_bounds, margin)
-        slack = NEGLIGIBLE * np.where(np.isfinite(high - low), high - low, self.model.z_scale)
+        slack = NEGLIGIBLE * ranges((low, high), self.model.z_scale)
         if not np.all(np.isfinite(f)) or np.any((z < low - slack) | (z > high + slack)):
             return False
         return self._facets is None or self._attainable(f, margin)
@@ -327,7 +328,6 @@ def _with_drives(needed: InverseTrajectory, u: np.ndarray) -> InverseTrajectory:
 def _narrowed(bounds: tuple[np.ndarray, np.ndarray], margin: float) -> tuple[np.ndarray, np.ndarray]:
     """Bounds moved inward by a share of the range, or of the bound where there is one."""
     low, high = bounds
-    both = np.isfinite(high - low)
-    size = np.where(both, high - low, np.where(np.isfinite(low), abs(low), abs(high)))
+    size = spans(bounds)
     by = margin * np.where(np.isfinite(size), size, 0.0)
     return low + by, high - by

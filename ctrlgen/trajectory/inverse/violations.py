@@ -69,10 +69,8 @@ def violations(
     """
     found = []
     for limit, values in limited_values(model, x, z, u, before):
-        given = [bound for bound in (limit.lower, limit.upper) if bound is not None]
-        unit = (max(given) - min(given) if len(given) == 2 else abs(given[0])) or model.force_scale
-        low = -np.inf if limit.lower is None else limit.lower + margin * unit
-        high = np.inf if limit.upper is None else limit.upper - margin * unit
+        unit = limit.span or model.force_scale
+        low, high = limit.bounds[0] + margin * unit, limit.bounds[1] - margin * unit
         for i, value in enumerate(values.T):
             beyond = np.nan_to_num(np.maximum(low - value, value - high), nan=0.0, posinf=np.finfo(float).max)
             beyond[beyond < NEGLIGIBLE * unit] = 0.0
