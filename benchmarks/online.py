@@ -15,7 +15,7 @@ from benchmarks.measure import Line, Note, interleave, timed
 from benchmarks.samples import NEAR, NEAR_FLOAT, Disagreement, Samples
 from benchmarks.timed_c import Program, build, generated
 from ctrlgen.budget.robust import solve
-from ctrlgen.controller.feedforward import ControllerStatus
+from ctrlgen.controller.controller_step import ControllerStatus
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import generate
 

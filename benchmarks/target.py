@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks import casadi_c
 from benchmarks.measure import Count, Note
 from benchmarks.samples import NEAR, NEAR_FLOAT, Disagreement, Samples
-from ctrlgen.controller.feedforward import ControllerStatus
+from ctrlgen.controller.controller_step import ControllerStatus
 from ctrlgen.core.errors import ToolError
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import CFolder, generate

@@ -10,9 +10,9 @@ from .budget.error_budget import error_budget as error_budget
 from .budget.robust import solve as solve
 from .calibration.calibrate import Calibration as Calibration
 from .calibration.calibrate import calibrate as calibrate
+from .controller.controller_step import ControllerStatus as ControllerStatus
+from .controller.controller_step import ControllerStep as ControllerStep
 from .controller.feedforward import Controller as Controller
-from .controller.feedforward import ControllerStatus as ControllerStatus
-from .controller.feedforward import ControllerStep as ControllerStep
 from .controller.motion_feedforward import controller_of as controller_of
 from .core.errors import CtrlgenError as CtrlgenError
 from .core.errors import Fault as Fault

@@ -97,7 +97,7 @@ def draw_single(parts: list[Parasitic]) -> Figure:
         command = from_si(part.command, unit)
         left.plot(command, from_si(part.measured, unit), "o-", ms=3, lw=1, color=BLUE, label="measured")
         beside = _second_axis(left)
-        beside.plot(command, from_si(part.own, unit), "s--", ms=3, lw=1, color=RED, label="error")
+        beside.plot(command, from_si(part.error, unit), "s--", ms=3, lw=1, color=RED, label="error")
         beside.set_ylabel(f"error [{unit}]", color=RED)
         left.set_xlabel(f"commanded {part.channel} [{unit}]")
         left.set_ylabel(f"measured [{unit}]", color=BLUE)

@@ -12,20 +12,27 @@ import sys
 import casadi as ca
 import numpy as np
 import pytest
-from conftest import ROOT
+import three_stacks
+from conftest import ROOT, SCENARIOS
+from one_kernel import print_function
 from package_programs import build
 
-from ctrlgen import CtrlgenError, __version__, build_model
+from ctrlgen import CtrlgenError, __version__, build_model, load_scenario
 from ctrlgen.controller.motion_feedforward import controller_of
-from ctrlgen.firmware.c.cprint import print_function
 from ctrlgen.firmware.c.elementary import elementary_text
 from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.templates import render
 from ctrlgen.firmware.fmi.fmu import write_fmus
 from ctrlgen.firmware.fmi.plant import plant_of, write_plant
 from ctrlgen.firmware.folder import generate, write_harness
+from ctrlgen.firmware.online.online import online_context
 from ctrlgen.version import program
 
-GOLDEN = ROOT / "codegen" / "golden" / "mems_hexapod"
+GOLDEN = [
+    *(f"golden/{d}/{d}_online_f32.{end}" for d in ("mems_hexapod", "flexure_axis", "three_stacks") for end in "ch"),
+    "golden/limiter/limiter.h",
+    "golden/limiter/limiter_config.h",
+]
 NUMBER = re.compile(r"-?\d+\.\d+(?:e[+-]?\d+)?|-?\d+e[+-]?\d+")
 
 
@@ -41,25 +48,54 @@ def test_the_same_input_gives_the_same_bytes(folder, circle, tmp_path):
         assert path.read_bytes() == (again.path / path.relative_to(folder.path)).read_bytes(), path.name
 
 
-@pytest.mark.parametrize("suffix", ["f32.h", "f32.c"])
-def test_golden_c_is_what_is_generated(folder, suffix, request):
+@pytest.fixture(scope="module")
+def online_f32(circle, tmp_path_factory) -> dict[str, str]:
+    """What is committed of generated C, in float: the controllers of three devices of different shape, and what codegen/limiter is
+    compiled with where it is compiled as it stands."""
+    made, folder = {}, tmp_path_factory.mktemp("golden")
+    axis = load_scenario(SCENARIOS / "flexure_axis_line")
+    stacks = three_stacks.loaded(folder, three_stacks.stage(drive_rate={"a": "5 V/ms"}), three_stacks.circle(20))
+    devices = {
+        "golden/mems_hexapod/mems_hexapod": (circle.scenario, circle.model),
+        "golden/flexure_axis/flexure_axis": (axis, build_model(axis.device)),
+        "golden/three_stacks/three_stacks": stacks,
+    }
+    for path, (scenario, model) in devices.items():
+        controller = controller_of(model, scenario.file.follow, scenario.sample_time)
+        name = f"{path.rpartition('/')[2]}_online_f32"
+        context = online_context(scenario, controller, Real.FLOAT, name)
+        made |= {f"{path}_online_f32.{end}": render(f"online.{end}", context) for end in "ch"}
+    controller = controller_of(circle.model, "pose", circle.scenario.sample_time)
+    context = online_context(circle.scenario, controller, Real.FLOAT, "limiter")
+    made["golden/limiter/limiter.h"] = render("online.h", context)
+    made["golden/limiter/limiter_config.h"] = render("limiter_config.h", context)
+    return made
+
+
+@pytest.mark.parametrize("name", GOLDEN)
+def test_golden_c_is_what_is_generated(online_f32, name, request):
     """Words exactly, constants to two roundings of a float, since libraries differ in the last digit between machines.
 
     Golden files state the version alone: with the commit each commit would have to change them.
     """
-    name = f"mems_hexapod_online_{suffix}"
-    made = (folder.path / name).read_text()
-    assert program() in made
-    new = made.replace(program(), f"ctrlgen {__version__}")
+    path = ROOT / "codegen" / name
+    assert program() in online_f32[name]
+    new = online_f32[name].replace(program(), f"ctrlgen {__version__}")
     if request.config.getoption("--update-golden"):
-        GOLDEN.mkdir(parents=True, exist_ok=True)
-        (GOLDEN / name).write_text(new)
-    old = (GOLDEN / name).read_text()
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(new)
+    old = path.read_text()
     same_words = NUMBER.sub("#", old) == NUMBER.sub("#", new)
     numbers = [np.array(NUMBER.findall(text), dtype=float) for text in (old, new)]
     if not same_words or not np.allclose(*numbers, rtol=3e-7, atol=0):
         diff = "".join(difflib.unified_diff(old.splitlines(True), new.splitlines(True), "golden", "generated", n=1))
         pytest.fail(f"{name} changed; if that is meant: pytest tests/test_codegen.py --update-golden\n{diff[:3000]}")
+
+
+def test_the_golden_controller_is_the_one_of_the_generated_folder(folder, online_f32):
+    for end in "ch":
+        text = (folder.path / f"mems_hexapod_online_f32.{end}").read_text()
+        assert text == online_f32[f"golden/mems_hexapod/mems_hexapod_online_f32.{end}"]
 
 
 def test_float_c_knows_no_double(folder):
@@ -87,9 +123,12 @@ def test_no_heap_no_globals_no_recursion_no_unbounded_loops(folder, compiler, tm
             assert not re.search(
                 r"\b(malloc|calloc|realloc|free|while|goto|do)\b", re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
             )
-            assert all(
-                re.fullmatch(r"\w+ = 0; \w+ < \d+; \w+\+\+", loop) for loop in re.findall(r"for \((.*?)\)", text)
-            )
+            # a function that loops over `count` numbers is told how many, by a number, wherever it is called
+            loops = re.findall(r"for \((.*?)\)", text)
+            assert all(re.fullmatch(r"\w+ = 0; \w+ < (\d+|count); \w+\+\+", loop) for loop in loops)
+            calls = re.findall(r"(?<!static int )\blimit_all\((.*)\);", text)
+            assert all(re.search(r", \d+$", call) for call in calls)
+            assert bool(calls) == any("count" in loop for loop in loops)
             build(compiler, [folder.path / f"{name}.c"], tmp_path / "o.o", "-c")
             if shutil.which("nm"):
                 table = subprocess.run(["nm", str(tmp_path / "o.o")], capture_output=True, text=True, check=True).stdout

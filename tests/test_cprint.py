@@ -7,8 +7,9 @@ import subprocess
 import casadi as ca
 import numpy as np
 import pytest
+from one_kernel import print_function
 
-from ctrlgen.firmware.c.cprint import Law, Printer, print_function
+from ctrlgen.firmware.c.cprint import Law, Printer
 from ctrlgen.firmware.c.elementary import elementary_text
 from ctrlgen.firmware.c.expression_graph import GIVEN, Graph, Node, reached
 from ctrlgen.firmware.c.real import Real

@@ -11,11 +11,11 @@ import casadi as ca
 import numpy as np
 import pytest
 from effect_cases import SAMPLE_TIME, Law, device_of, every_effect, place_of, shapes, size, tables, written
+from one_kernel import print_function
 
 from ctrlgen import Controller, build_model, simulate
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.effects import Effect, Place
-from ctrlgen.firmware.c.cprint import print_function
 from ctrlgen.firmware.c.elementary import elementary_text
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.toolchains import FLAGS

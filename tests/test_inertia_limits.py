@@ -26,7 +26,7 @@ from inertial_stages import (
 
 import ctrlgen
 from ctrlgen import InputError, Unreachable, build_model, load_scenario, solve
-from ctrlgen.controller.feedforward import ControllerStatus
+from ctrlgen.controller.controller_step import ControllerStatus
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.trajectory.scenario import model_of
 

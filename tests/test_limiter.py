@@ -1,4 +1,4 @@
-"""The limiter in Python (`Controller.step`) and in C (online.c.j2) answer alike on every combination of their branches.
+"""The limiter in Python (`Controller.step`) and in C (codegen/limiter) answer alike on every combination of their branches.
 
 The two are written separately, so each is the other's check; docs/limiter.md says why. The devices here are not physical:
 their kernels are exact in binary arithmetic (sums, products, a saw-tooth), and present state and target choose the branch

@@ -10,7 +10,7 @@ from scipy.optimize import linprog, minimize, nnls
 from three_stacks import HIGH, LOW, RANGE, WEIGHTS, B, W, can_push, circle, forces, heavy, loaded, reference, stage
 
 from ctrlgen import InputError, Unreachable, build_model, solve, user_device
-from ctrlgen.controller.feedforward import ControllerStatus
+from ctrlgen.controller.controller_step import ControllerStatus
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.trajectory.inverse.choice import choose_inverse
 from ctrlgen.trajectory.inverse.clock import Sampled

@@ -231,7 +231,9 @@ def test_parasitic_motion_is_read_where_one_channel_alone_is_commanded(data) -> 
     assert [part.channel for part in found] == ["theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z"]
     z = found[5]
     assert (z.poses + 1).tolist() == [24, 12, 6, 18] and z.command / UM == pytest.approx([-200, -100, 100, 200])
-    assert z.measured / UM == pytest.approx([-201, -100, 99.1, 199]) and z.own / UM == pytest.approx([-1, 0, -0.9, -1])
+    assert z.measured / UM == pytest.approx([-201, -100, 99.1, 199]) and z.error / UM == pytest.approx(
+        [-1, 0, -0.9, -1]
+    )
     assert z.others[0] == pytest.approx(data.measured[23, :5], rel=1e-14) and z.channels[-1] == "delta_y"
 
 

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 import three_stacks
 from conftest import SCENARIOS, effect_device
+from one_kernel import print_function
 
 from ctrlgen import build_model, load_scenario
-from ctrlgen.controller.feedforward import ControllerStatus
+from ctrlgen.controller.controller_step import ControllerStatus
 from ctrlgen.controller.motion_feedforward import controller_of
-from ctrlgen.firmware.c.cprint import print_function
 from ctrlgen.firmware.c.deviations import DEVIATIONS, permits
 from ctrlgen.firmware.c.elementary import elementary_text
 from ctrlgen.firmware.c.misra import ADVISORY, MANDATORY, rule_class

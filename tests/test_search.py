@@ -15,7 +15,8 @@ from ctrlgen.diagnosis.selection.candidates import fit_subsets, restart_elsewher
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection
 from ctrlgen.diagnosis.selection.objections import objections
 from ctrlgen.diagnosis.selection.rivals import replace_cause
-from ctrlgen.diagnosis.selection.screen import Screen, Screened, Suspect
+from ctrlgen.diagnosis.selection.screen import Screen, Screened
+from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.estimation.error_model import ErrorModel
 from ctrlgen.estimation.fit import Fit, Fitter

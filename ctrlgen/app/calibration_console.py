@@ -41,4 +41,4 @@ def print_calibration(calibration: Calibration, budgets: tuple[ErrorBudget, Erro
             what = f"largest combined standard uncertainty, {g.name}"
             out.print(f"budget of {title}: {what}: {both}", markup=False, soft_wrap=True)
     for note in calibration.notes:
-        out.print(note, markup=False, soft_wrap=True, style="yellow" if "diagnose" in note else None)
+        out.print(note, markup=False, soft_wrap=True, style="yellow")

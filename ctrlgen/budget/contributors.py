@@ -11,7 +11,7 @@ from ctrlgen.budget.linear import Propagated
 from ctrlgen.budget.monte_carlo import Drawn
 from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.core.units import difference, same_dimension
-from ctrlgen.model.model import Signal
+from ctrlgen.devices import Signal
 
 JITTER_STEP = 1e-6  # s
 

@@ -217,13 +217,21 @@ def safeties(
                 continue
             k = int(critical[side, i])
             margin, sd = float(found.margin[side, k, i]), float(found.sd[side, k, i])
+            bound = float(found.bounds[side, i])
             rows.append(
                 Safety(
-                    limit, limit.channels[i - own[0]], "lower" if side == 0 else "upper", k, float(found.bounds[side, i]), margin, sd,
-                    margin - z * sd, float(scipy.special.ndtr(margin / sd)) if sd else float(margin >= 0),
-                    _drawn_margin(drawn, slopes, side, k, i, float(found.bounds[side, i]), probability),
+                    limit,
+                    channel=limit.channels[i - own[0]],
+                    side="lower" if side == 0 else "upper",
+                    sample=k,
+                    bound=bound,
+                    margin=margin,
+                    sd=sd,
+                    kept=margin - z * sd,
+                    probability=float(scipy.special.ndtr(margin / sd)) if sd else float(margin >= 0),
+                    drawn=_drawn_margin(drawn, slopes, side, k, i, bound, probability),
                 )
-            )  # fmt: skip
+            )
     return tuple(rows)
 
 

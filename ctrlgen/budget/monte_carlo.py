@@ -88,10 +88,8 @@ def draw(
     pose, limits, broken = (np.concatenate(part) for part in zip(*found, strict=True))
     still, pose, limits, broken = pose[draws:], pose[:draws], limits[:draws], broken[:draws]
     good = np.isfinite(pose).all(axis=(1, 2)) & np.isfinite(limits).all(axis=(1, 2))
-    return Drawn(
-        kept, pose[good], limits[good], deviations[good], (still[:-1] - still[-1]).reshape(2, m, *still.shape[1:]),
-        int((~good).sum()), broken[good],
-    )  # fmt: skip
+    alone, lost = (still[:-1] - still[-1]).reshape(2, m, *still.shape[1:]), int((~good).sum())
+    return Drawn(kept, pose[good], limits[good], deviations[good], alone, lost, broken[good])
 
 
 class _Led:

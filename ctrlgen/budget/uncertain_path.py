@@ -199,10 +199,10 @@ class UncertainPath:
 def holding_drive(solution: Solution) -> np.ndarray:
     """(n_u,) the drive that holds the first sample of an open path."""
     m, trace = solution.model, solution.trace
-    still = ca.Function("still", [m.u], [ca.substitute(
-        ca.vertcat(ca.vertcat(ca.SX(0, 1), m.starting) / np.maximum(m.x_scale, 1e-300), m.balance / m.force_scale),
-        ca.vertcat(m.x, m.z, m.p), ca.vertcat(trace.x[0], trace.z[0], m.p_nominal),
-    )])  # fmt: skip
+    changes = ca.vertcat(ca.SX(0, 1), m.starting) / np.maximum(m.x_scale, 1e-300)
+    symbols, values = ca.vertcat(m.x, m.z, m.p), ca.vertcat(trace.x[0], trace.z[0], m.p_nominal)
+    at_first = ca.substitute(ca.vertcat(changes, m.balance / m.force_scale), symbols, values)
+    still = ca.Function("still", [m.u], [at_first])
     found = scipy.optimize.least_squares(
         lambda w: still(w * m.u_scale).full().ravel(), solution.drive[0] / m.u_scale, xtol=1e-15, gtol=1e-15
     )

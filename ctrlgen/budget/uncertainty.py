@@ -175,10 +175,9 @@ def load_uncertainties(scenario: Scenario, model: Model, path: Path | str | None
         texts["converter"], sources["converter"] = f"{drive.converter.bits} bit", drive.converter.source
     if drive.jitter is not None:
         texts["jitter"], sources["jitter"] = drive.jitter.sd, drive.jitter.source
-    return Uncertainties(
-        tuple(read.lines), correlation, None if drive.converter is None else drive.converter.bits, read.jitter,
-        drive.arithmetic == "float", texts, sources, inputs, drive.player,
-    )  # fmt: skip
+    bits, single = None if drive.converter is None else drive.converter.bits, drive.arithmetic == "float"
+    lines = tuple(read.lines)
+    return Uncertainties(lines, correlation, bits, read.jitter, single, texts, sources, inputs, drive.player)
 
 
 class _Reader:
@@ -249,9 +248,15 @@ class _Reader:
         self._add(name, "number", paths, tuple(sds), stated.sd, stated.source, self.numbers[paths[0]])
 
     def _add(
-        self, name: str, kind: Literal["number"], paths: tuple[str, ...], sds: tuple[float, ...], text: str, source: str,
+        self,
+        name: str,
+        kind: Literal["number"],
+        paths: tuple[str, ...],
+        sds: tuple[float, ...],
+        text: str,
+        source: str,
         number: Quantity,
-    ) -> None:  # fmt: skip
+    ) -> None:
         unit = written_unit(number.text)
         values = [abs(self.numbers[path].si) for path in paths]
         if to_si(0.0, unit):

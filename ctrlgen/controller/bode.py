@@ -38,9 +38,8 @@ def draw_bode(model: Model, pose: np.ndarray, path: Path) -> None:
         what = "has none: the pose follows the drive at once at all frequencies, so there is nothing to draw"
         raise InputError(model.name, [Fault("dynamics", what)])
     low, high = np.log10(poles.min()) - DECADES, max(np.log10(poles.min()) + DECADES, np.log10(poles.max()) + 1)
-    omega = np.unique(
-        np.concatenate([np.logspace(low, high, POINTS), poles])
-    )  # a resonance is narrower than the points are apart
+    # A resonance is narrower than the points are apart.
+    omega = np.unique(np.concatenate([np.logspace(low, high, POINTS), poles]))
     response = control.frequency_response(system, omega, squeeze=False)
     figure = _figure(model, response, np.atleast_2d(system.dcgain()), omega / (2 * np.pi))
     buffer = io.BytesIO()

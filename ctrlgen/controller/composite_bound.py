@@ -12,7 +12,8 @@ from itertools import product
 import casadi as ca
 import numpy as np
 
-from ctrlgen.model.model import Limit, Model
+from ctrlgen.devices import Limit
+from ctrlgen.model.model import Model
 
 NEGLIGIBLE = 1e-6  # of a limit: a direction that uses less of it over the whole range is left out of the bound
 

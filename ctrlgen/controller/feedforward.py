@@ -1,7 +1,7 @@
 """The feedforward controller: commanded signal -> drives, with every limit kept, in a fixed number of operations.
 
 It has no feedback: what it keeps of the device is the state that its own model predicts. The generated C
-(`online.c.j2`) makes the same decisions; docs/limiter.md says how their equality is shown.
+(codegen/limiter) makes the same decisions; docs/limiter.md says how their equality is shown.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ class Controller:
         return self.chosen(self._answer("drive", k.drive, *state[:2], wanted, state_wanted), state)
 
     def chosen(self, drive: np.ndarray, state: State) -> np.ndarray:
-        """Of all drives (n_u,) that push as `drive`, those of least effort within limits."""
+        """Gives, of all drives (n_u,) that push as `drive`, those of least effort within limits."""
         return of_least_effort(drive, self.kernels.redundancy, self.rate, *state[2:])
 
     def drive_rounding(

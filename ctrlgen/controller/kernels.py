@@ -32,7 +32,7 @@ COMPOSITE_ROUNDS = 8
 
 @dataclass(frozen=True)
 class ControllerKernels:
-    """Those of one device, one followed signal, one sample time (None: equilibria only), each worked out when it is first asked for."""
+    """The kernels of one device, one followed signal, one sample time (None: equilibria only), each worked out when first asked for."""
 
     model: Model
     follow: str
@@ -64,8 +64,8 @@ class ControllerKernels:
         device = self.model.device
         if not device.given_at_start:
             return None
-        found = given_inverses(device, self.follow, self._step_time)
-        return replace(found, model=found.model.limited_as(self.model))
+        inverses = given_inverses(device, self.follow, self._step_time)
+        return replace(inverses, model=inverses.model.limited_as(self.model))
 
     def at(self, values: dict[str, float]) -> Self:
         """The kernels of the device with its run-time constants at `values` [SI, by path]; the others as the file has them. What is
@@ -111,8 +111,9 @@ class ControllerKernels:
         x_then = ca.vertcat(m.x[: m.n_states], (self.moving or self.static).memory(m.x, m.z, wanted))
         squares = [
             ca.substitute(limit.expr, ca.vertcat(m.x, m.z), ca.vertcat(x_then, wanted)) ** 2 * (1 / limit.upper**2)
-            for limit in self.guarded_limits if limit.upper
-        ]  # fmt: skip
+            for limit in self.guarded_limits
+            if limit.upper
+        ]
         names = ["x", "z", "wanted"]
         return ca.Function(
             "composite_shares",
@@ -206,7 +207,7 @@ class ControllerKernels:
         return z_slack[0], state_slack[0], np.max(u_slacks, axis=0)
 
     def own_slacks(self, share: float) -> Slacks:
-        """The same without regard of run-time constants."""
+        """The slacks at the constants of the device file alone."""
         m, n = self.nominal, self.nominal.n_states
         z_slack, state_slack = share * m.z_scale, share * m.x_scale[:n]
         x, z = self.model.rest, np.zeros(len(self.model.axes))

@@ -28,15 +28,15 @@ def state_beyond(m: Model, static: Inverse, moving: Inverse, slacks: Slacks) -> 
 def drive_beyond(m: Model, static: Inverse, moving: Inverse, slacks: Slacks) -> tuple[bool, bool]:
     """Whether a displacement in range can need a drive beyond its limits by more than the slack, to settle there and to step there."""
     n, (low, high) = m.n_states, m.u_bounds
-    found = []
+    beyond = []
     for k in (static, moving):
         ranges = _ranges(m)
         if n:
             state = bounds(k.state, ranges)
             ranges["state"] = (np.maximum(state[0], m.x_bounds[0][:n]), np.minimum(state[1], m.x_bounds[1][:n]))
         least, most = bounds(k.drive, ranges)
-        found.append(not (np.all(least >= low - slacks[2]) and np.all(most <= high + slacks[2])))
-    return found[0], found[1]
+        beyond.append(not (np.all(least >= low - slacks[2]) and np.all(most <= high + slacks[2])))
+    return beyond[0], beyond[1]
 
 
 def _ranges(m: Model) -> dict[str, tuple[np.ndarray, np.ndarray]]:

@@ -6,7 +6,8 @@ import casadi as ca
 import control
 import numpy as np
 
-from ctrlgen.controller.feedforward import Controller, ControllerStatus
+from ctrlgen.controller.controller_step import ControllerStatus
+from ctrlgen.controller.feedforward import Controller
 from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.model.model import Model

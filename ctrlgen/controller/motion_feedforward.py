@@ -13,19 +13,20 @@ from functools import cached_property, lru_cache
 import casadi as ca
 import numpy as np
 
-from ctrlgen.controller.controller_step import State
-from ctrlgen.controller.feedforward import Controller, ControllerStatus, ControllerStep
+from ctrlgen.controller.controller_step import ControllerStatus, ControllerStep, State
+from ctrlgen.controller.feedforward import Controller
 from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.devices import Signal
 from ctrlgen.model.inverse_dynamics import InverseDynamics, inverse_dynamics
-from ctrlgen.model.model import Model, Signal
+from ctrlgen.model.model import Model
 from ctrlgen.model.state_vector import TYPICAL_RATE
 
 
 @dataclass(frozen=True)
 class MotionKernels(ControllerKernels):
-    """Those of one device with inertia. A target is (channels * (order + 1),): first the followed signal, then its first derivative by
-    time, and so on. Raises InputError for a device with states that a target does not determine, such as memories of effects."""
+    """The kernels of one device with inertia. A target is (channels * (order + 1),): first the followed signal, then its first derivative
+    by time, and so on. Raises InputError for a device with states that a target does not determine, such as memories of effects."""
 
     def __post_init__(self) -> None:
         if self.dynamics.internal:

@@ -61,7 +61,7 @@ class NullMotion:
 def of_least_effort(
     drive: np.ndarray, redundancy: NullMotion | None, rate: RateLimiter | None, *last: np.ndarray
 ) -> np.ndarray:
-    """Of all drives (n_u,) that push as `drive`, those of least effort within limits, and where there is a `rate` within it from the
+    """Gives, of all drives (n_u,) that push as `drive`, those of least effort within limits, and where there is a `rate` within it from the
     `last` ones as far as these allow."""
     if redundancy is None:
         return drive
@@ -110,9 +110,9 @@ def _parts(model: Model) -> list[tuple[np.ndarray, np.ndarray]]:
     )
     acts = (np.abs(B) > NOTHING * np.abs(B).max()).astype(float)
     count, part = scipy.sparse.csgraph.connected_components(acts.T @ acts, directed=False)
-    found = []
+    parts = []
     for k in range(count):
         columns = np.flatnonzero(part == k)
         rows = np.any(acts[:, columns] > 0, axis=1)
-        found.append((columns, scipy.linalg.null_space(B[np.ix_(rows, columns)], rcond=INDEPENDENT)))
-    return found
+        parts.append((columns, scipy.linalg.null_space(B[np.ix_(rows, columns)], rcond=INDEPENDENT)))
+    return parts

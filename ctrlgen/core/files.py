@@ -84,13 +84,13 @@ def validate(model: type[Model], table: dict[str, Any], path: Path | str) -> Mod
     try:
         return model.model_validate(table)
     except ValidationError as error:
-        found = error.errors()
-        wrong = [details["loc"] for details in found]
+        errors = error.errors()
+        wrong = [details["loc"] for details in errors]
         raise InputError(
             path,
             [
                 _fault(model, details)
-                for details in found
+                for details in errors
                 if details["type"] != "too_short" or not any(_inside(other, details["loc"]) for other in wrong)
             ],
         ) from None

@@ -59,7 +59,7 @@ def in_forks(
     os.close(give)
     context = multiprocessing.get_context("fork")
     workers: dict[Connection, Any] = {}
-    found: dict[int, tuple[bool, Any]] = {}  # whether it has a result, and the result or what was raised
+    answers: dict[int, tuple[bool, Any]] = {}  # whether it has a result, and the result or what was raised
     try:
         for _ in range(min(jobs, len(items))):
             receive, send = context.Pipe(duplex=False)
@@ -80,14 +80,14 @@ def in_forks(
                 if message is None:
                     begun(items[k])
                 elif message:
-                    found[k] = _Unpickler(io.BytesIO(message), shared).load()
+                    answers[k] = _Unpickler(io.BytesIO(message), shared).load()
     finally:
         os.close(waiting)
         for worker in workers.values():
             worker.terminate()
     results = []
     for k, item in enumerate(items):
-        done, result = found[k] if k in found else (True, function(item))
+        done, result = answers[k] if k in answers else (True, function(item))
         if not done:
             raise cast(Exception, result)
         results.append(result)

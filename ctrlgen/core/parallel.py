@@ -132,7 +132,7 @@ def _on_processes(function: Callable[[Any], Any], items: list[Any], jobs: int) -
     """
     waiting, alone = deque(range(len(items))), deque[int]()
     deaths: Counter[int] = Counter()
-    running: dict[Future, int] = {}
+    running: dict[Future[Any], int] = {}
     pool = _Pool(jobs)
     try:
         while waiting or alone or running:
@@ -142,7 +142,7 @@ def _on_processes(function: Callable[[Any], Any], items: list[Any], jobs: int) -
                 try:
                     running[pool.processes.submit(guarded, function, items[k])] = k
                 except BrokenProcessPool as error:  # a process died while it had nothing to do
-                    stillborn: Future = Future()
+                    stillborn: Future[Any] = Future()
                     stillborn.set_exception(error)
                     running[stillborn] = k
                     break
@@ -167,7 +167,7 @@ def _on_processes(function: Callable[[Any], Any], items: list[Any], jobs: int) -
         pool.end()
 
 
-def _wait(running: dict[Future, int]) -> tuple[list[tuple[int, Any]], set[int]]:
+def _wait(running: dict[Future[Any], int]) -> tuple[list[tuple[int, Any]], set[int]]:
     """Waits for an item: (index, result) of those that finished; or, where a process died, the items lost with it."""
     if not running:
         return [], set()

@@ -27,10 +27,10 @@ _NUMBER = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|[+-]?i
 
 
 @cache
-def _registry() -> pint.UnitRegistry:
+def _registry() -> pint.UnitRegistry[Any]:
     import pint  # takes a fifth of a second to import, its definitions as long to read
 
-    registry: pint.UnitRegistry = pint.UnitRegistry(
+    registry: pint.UnitRegistry[Any] = pint.UnitRegistry(
         autoconvert_offset_to_baseunit=True, cache_folder=None, on_redefinition="ignore"
     )
     registry.define(

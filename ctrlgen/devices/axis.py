@@ -106,11 +106,20 @@ class Axis(Device):
             command = AxisSignal("amplifier drive", unit, "u_", largest)
             loop = FeedbackLoop(control_law, lambda x, error: error, command, self.loop.measures)
         return InertialPhysics(
-            axes=axes, components=axes, pose_units=("um",), pose_scale=(stroke,), drive=drive,
-            state=integral if closed else None, rest=(0.0,) if closed else (),
-            displacement_scale=stroke, force_scale=force_scale, mass=(m.mass,),
+            axes=axes,
+            components=axes,
+            pose_units=("um",),
+            pose_scale=(stroke,),
+            drive=drive,
+            state=integral if closed else None,
+            rest=(0.0,) if closed else (),
+            displacement_scale=stroke,
+            force_scale=force_scale,
+            mass=(m.mass,),
             dynamics=lambda drive, x, d, v: (a.force_constant * drive, ca.SX(0, 1)),
             restoring_force=lambda d: m.stiffness * d,
             damping_force=lambda v: m.damping * v,
-            pose=lambda d: d, feedback=loop, limits=limits,
-        )  # fmt: skip
+            pose=lambda d: d,
+            feedback=loop,
+            limits=limits,
+        )

@@ -111,9 +111,9 @@ class Hinge(Section):
     ) -> table.Geometry:
         """The hinge with the numbers or symbols `p`, completed by the device's width `b` and material `E`, `nu`; SI. Raises
         ValueError where one is missing."""
-        own = {"b": p.b, "young": p.young, "poisson": p.poisson}
+        stated = {"b": p.b, "young": p.young, "poisson": p.poisson}
         given = {"b": b, "young": E, "poisson": nu}
-        complete = {key: given[key] if value is None else value for key, value in own.items()}
+        complete = {key: given[key] if value is None else value for key, value in stated.items()}
         missing = [key for key, value in complete.items() if value is None]
         if missing:
             raise ValueError(f"hinge: {missing[0]} is missing; give it in the hinge or in the device")

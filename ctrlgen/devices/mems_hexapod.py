@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -20,6 +21,7 @@ from ctrlgen.devices.signal import AxisSignal, Signal
 from ctrlgen.numerics.constraint_second_order import second_order
 from ctrlgen.physics import hexapod, thermal_actuator, xy_stage
 from ctrlgen.physics.damping import modal_damping
+from ctrlgen.physics.screw import Matrix
 
 Length = Annotated[Quantity, In("um", positive=True)]
 Angle = Annotated[Quantity, In("deg")]
@@ -232,53 +234,47 @@ class MemsHexapod(Device):
             else []
         )
 
+    def _drive(self) -> Signal:
+        """The heaters' drive, power or voltage."""
+        power, resistance = self.actuator.power_limit.si, self.actuator.heater_resistance.si
+        if self.actuator.drive == "voltage":
+            name, unit, column, largest = "voltage", "V", "V_", (power * resistance) ** 0.5
+        else:
+            name, unit, column, largest = "power", "W", "P_", power
+        return Signal(name, f"heater {name}", self.axes, (unit,) * 6, column, ca.SX.sym("u", 6), (largest,) * 6)
+
+    def _limits(
+        self, p: SimpleNamespace, loads: Matrix, drive: Signal, state: Signal, signal: SimpleNamespace
+    ) -> list[Limit]:
+        """The limits on what `signal` holds; `loads` are those of the wires per displacement."""
+        a, axes, d = p.actuator, self.axes, signal.displacement
+        most = (a.power_limit * a.heater_resistance) ** 0.5 if self.actuator.drive == "voltage" else a.power_limit
+        turn, turn_limit = xy_stage.rotation(d, p.stage), self.stage.notch_rotation_limit.si
+        # The moment is linear along a strut, so its magnitude is convex: largest at one of the strut's own ends.
+        wires = tuple(f"strut{i + 1}_{end}" for i in range(6) for end in ("base_bottom", "platform_top"))
+        outermost = [4 * i + end for i in range(6) for end in (0, 3)]
+        stress = hexapod.wire_stress(signal.mechanism_displacement, loads, p.hexapod)[outermost]
+        return [
+            Limit("drive", f"commanded {drive.label}", axes, drive.units[0], signal.drive, 0.0, most),
+            Limit("temperature", state.label, axes, "degC", signal.state, a.ambient, a.temperature_limit),
+            Limit("force", "actuator force", axes, "N", signal.force, 0.0, None),
+            Limit("stroke", "stage displacement", axes, "um", d, 0.0, self.stage.stroke.si),
+            Limit("notch_rotation", "notch rotation", axes, "deg", turn, None, turn_limit),
+            Limit("wire_stress", "wire flexure stress", wires, "MPa", stress, None, self.hexapod.stress_limit.si),
+        ]
+
     def physics(self, p: SimpleNamespace) -> DevicePhysics:
         """Equations of `ctrlgen.physics` with this device's numbers."""
         a, s, h = p.actuator, p.stage, p.hexapod
         C_XY = xy_stage.stage_compliance(s, a)
         J = hexapod.jacobian(h, C_XY)
-        loads = hexapod.wire_loads(h, C_XY, J)
-        voltage = self.actuator.drive == "voltage"
-        power_limit, resistance = self.actuator.power_limit.si, self.actuator.heater_resistance.si
-        drive_limit = (power_limit * resistance) ** 0.5 if voltage else power_limit
-        most = (a.power_limit * a.heater_resistance) ** 0.5 if voltage else a.power_limit
-        drive = Signal(
-            "voltage" if voltage else "power",
-            "heater voltage" if voltage else "heater power",
-            self.axes,
-            ("V" if voltage else "W",) * 6,
-            "V_" if voltage else "P_",
-            ca.SX.sym("u", 6),
-            (drive_limit,) * 6,
-        )
-        state = Signal(
-            "temperature", "actuator temperature", self.axes, ("degC",) * 6, "T_", ca.SX.sym("T", 6), (100.0,) * 6
-        )
+        loads, drive = hexapod.wire_loads(h, C_XY, J), self._drive()
+        T = ca.SX.sym("T", 6)
+        state = Signal("temperature", "actuator temperature", self.axes, ("degC",) * 6, "T_", T, (100.0,) * 6)
         rotation_scale = 1e-6 / self.hexapod.platform_radius.si  # moves the platform's rim by 1 um
 
         def heating_power(u: ca.SX) -> ca.SX:
-            return u**2 / a.heater_resistance if voltage else u
-
-        def limits(signal: SimpleNamespace) -> list[Limit]:
-            d = signal.displacement
-            # The moment is linear along a strut, so its magnitude is convex: largest at one of the strut's own ends.
-            wires = tuple(f"strut{i + 1}_{end}" for i in range(6) for end in ("base_bottom", "platform_top"))
-            wire_stress = hexapod.wire_stress(signal.mechanism_displacement, loads, h)
-            outermost = [4 * i + end for i in range(6) for end in (0, 3)]
-            return [
-                Limit("drive", f"commanded {drive.label}", self.axes, drive.units[0], signal.drive, 0.0, most),
-                Limit("temperature", state.label, self.axes, "degC", signal.state, a.ambient, a.temperature_limit),
-                Limit("force", "actuator force", self.axes, "N", signal.force, 0.0, None),
-                Limit("stroke", "stage displacement", self.axes, "um", d, 0.0, self.stage.stroke.si),
-                Limit(
-                    "notch_rotation", "notch rotation", self.axes, "deg", xy_stage.rotation(d, s),
-                    None, self.stage.notch_rotation_limit.si,
-                ),
-                Limit(
-                    "wire_stress", "wire flexure stress", wires, "MPa", wire_stress[outermost],
-                    None, self.hexapod.stress_limit.si,
-                ),
-            ]  # fmt: skip
+            return u**2 / a.heater_resistance if self.actuator.drive == "voltage" else u
 
         common: dict[str, Any] = dict(
             axes=self.axes,
@@ -297,7 +293,7 @@ class MemsHexapod(Device):
             },
             pose=lambda d: ca.mtimes(J, d),
             second_order_kinematics=lambda d: second_order(lambda pose, d: hexapod.loop_closure(pose, d, h), d),
-            limits=limits,
+            limits=partial(self._limits, p, loads, drive, state),
             bipolar=False,
             documented={
                 "force": (thermal_actuator.force, thermal_actuator.expansion),
@@ -308,7 +304,7 @@ class MemsHexapod(Device):
             return BalancedPhysics(
                 **common,
                 heating_power=heating_power,
-                power=AxisSignal("heater power", "W", "P_", power_limit),
+                power=AxisSignal("heater power", "W", "P_", self.actuator.power_limit.si),
                 rates=lambda T, P: thermal_actuator.temperature_rate(T, P, a),
                 force=lambda u, T, d: thermal_actuator.force(T, a),
                 tangent_compliance=lambda d: (

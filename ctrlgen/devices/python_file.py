@@ -66,12 +66,12 @@ def python_device(path: Path) -> Device:
 def changed_device(table: dict[str, Any], path: Path) -> Device:
     """The device of the Python file that `table` names, with the numbers, effects and sensors of `table` in place of its own."""
     device = python_device(python_file_of(table, path))
-    own = {key: getattr(device, key) for key in type(device).model_fields}
+    fields = {key: getattr(device, key) for key in type(device).model_fields}
     stated = {key: value for key, value in table.items() if key not in ("kind", "file")}
     for key, value in stated.items():
-        if isinstance(own.get(key), Section) and isinstance(value, dict):
-            stated[key] = {**{k: getattr(own[key], k) for k in type(own[key]).model_fields}, **value}
-    return validate(type(device), {**own, **stated}, path)
+        if isinstance(fields.get(key), Section) and isinstance(value, dict):
+            stated[key] = {**{k: getattr(fields[key], k) for k in type(fields[key]).model_fields}, **value}
+    return validate(type(device), {**fields, **stated}, path)
 
 
 def as_toml(device: Device, file: str) -> str:

@@ -193,7 +193,13 @@ def matrices(device: RrrStage) -> dict[str, np.ndarray]:
     """The matrices the paper prints, as (3, 3) arrays in SI, by their symbol, and those of the whole model."""
     k = stage(device)
     named = {
-        "C_oFo": k.C_oFo, "C_oFin": k.C_oFin, "C_inFo": k.C_inFo, "C_inFin": k.C_inFin, "J": k.J,
-        "C_in": k.input_compliance, "K_in": k.input_stiffness, "J_complete": k.complete_J,
-    }  # fmt: skip
+        "C_oFo": k.C_oFo,
+        "C_oFin": k.C_oFin,
+        "C_inFo": k.C_inFo,
+        "C_inFin": k.C_inFin,
+        "J": k.J,
+        "C_in": k.input_compliance,
+        "K_in": k.input_stiffness,
+        "J_complete": k.complete_J,
+    }
     return {name: ca.DM(matrix).full() for name, matrix in named.items()}

@@ -56,8 +56,8 @@ class RunTimeConstant:
     @property
     def base_unit(self) -> str:
         """Its unit in SI, as the C has it: the file's own where that is one."""
-        own = to_si(0.0, self.unit) == 0.0 and to_si(1.0, self.unit) == 1.0
-        return self.unit if own else base_unit(self.unit)
+        is_si = to_si(0.0, self.unit) == 0.0 and to_si(1.0, self.unit) == 1.0
+        return self.unit if is_si else base_unit(self.unit)
 
     @property
     def range_text(self) -> str:
@@ -75,22 +75,22 @@ def run_time_constants(device: Any) -> tuple[RunTimeConstant, ...]:
     stated: RunTime | None = device.run_time
     if stated is None:
         return ()
-    numbers, found, faults = dict(device.quantities()), list[RunTimeConstant](), list[str]()
+    numbers, constants, faults = dict(device.quantities()), list[RunTimeConstant](), list[str]()
     for entry in stated.constants:
         try:
-            if entry.number in {constant.path for constant in found}:
+            if entry.number in {constant.path for constant in constants}:
                 raise ValueError("is named twice; name it once")
             name = _name_of(device, entry.number)
-            while name in {constant.name for constant in found}:
+            while name in {constant.name for constant in constants}:
                 name += "_2"
-            found.append(_constant(device, numbers, entry, name))
+            constants.append(_constant(device, numbers, entry, name))
         except ValueError as error:
             faults.append(f"{entry.number}: {error}")
-    if stated.input is not None and not faults and stated.input not in {constant.path for constant in found}:
+    if stated.input is not None and not faults and stated.input not in {constant.path for constant in constants}:
         faults.append(f"input: {stated.input!r} is not among the constants; add it to them, or leave input out")
     if faults:
         raise ValueError("run_time: " + "; ".join(faults))
-    return tuple(found)
+    return tuple(constants)
 
 
 def _constant(device: Any, numbers: dict[str, Quantity], entry: RunTimeNumber, name: str) -> RunTimeConstant:

@@ -21,9 +21,17 @@ from ctrlgen.devices.section import Section
 from ctrlgen.physics import sensor_models
 
 NUMBERS = (
-    "sensitivity", "gain", "bandwidth", "noise", "filtered_noise", "filter_cutoff", "offset_rate", "calibrated_at",
-    "low", "high",
-)  # fmt: skip
+    "sensitivity",
+    "gain",
+    "bandwidth",
+    "noise",
+    "filtered_noise",
+    "filter_cutoff",
+    "offset_rate",
+    "calibrated_at",
+    "low",
+    "high",
+)
 Volt = Annotated[Quantity, In("V")]
 PositiveVolt = Annotated[Quantity, In("V", positive=True)]
 

@@ -65,7 +65,17 @@ class Servo(Device):
             return [Limit("drive", drive.label, axes, drive.units[0], signal.drive, -most, most)]
 
         return BalancedPhysics(
-            axes=axes, components=axes, pose_units=(unit,), pose_scale=(travel,), drive=drive,
-            displacement_scale=travel, force_scale=travel, force_unit=unit, travel_unit=unit,
-            force=lambda u, x, d: gain * u, restoring_force=lambda d: d, pose=lambda d: d, limits=limits,
-        )  # fmt: skip
+            axes=axes,
+            components=axes,
+            pose_units=(unit,),
+            pose_scale=(travel,),
+            drive=drive,
+            displacement_scale=travel,
+            force_scale=travel,
+            force_unit=unit,
+            travel_unit=unit,
+            force=lambda u, x, d: gain * u,
+            restoring_force=lambda d: d,
+            pose=lambda d: d,
+            limits=limits,
+        )

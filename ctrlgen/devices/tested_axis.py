@@ -24,8 +24,15 @@ Force = Annotated[Quantity, In("N", positive=True)] | Annotated[Quantity, In("N*
 # Units of (mass, damping, stiffness, stroke, speed, force).
 LINEAR, ROTARY = (
     {"mass": "kg", "damping": "N*s/m", "stiffness": "N/um", "stroke": "um", "speed": "um/s", "force": "N"},
-    {"mass": "kg*m^2", "damping": "N*m*s/rad", "stiffness": "N*m/rad", "stroke": "rad", "speed": "rad/s", "force": "N*m"},
-)  # fmt: skip
+    {
+        "mass": "kg*m^2",
+        "damping": "N*m*s/rad",
+        "stiffness": "N*m/rad",
+        "stroke": "rad",
+        "speed": "rad/s",
+        "force": "N*m",
+    },
+)
 
 
 class Mechanics(Section):
@@ -69,8 +76,8 @@ class Mechanics(Section):
             if not same_dimension(written_unit(getattr(self, key).text), unit)
         ]
         if faults:
-            kind, own = ("rotary", "an angle") if self.rotary else ("linear", "a length")
-            raise ValueError(f"the axis is {kind}, because its stroke is {own}: {'; '.join(faults)}")
+            kind, dimension = ("rotary", "an angle") if self.rotary else ("linear", "a length")
+            raise ValueError(f"the axis is {kind}, because its stroke is {dimension}: {'; '.join(faults)}")
         return self
 
 
@@ -136,14 +143,30 @@ def _physics(
 
     def limits(signal: SimpleNamespace) -> list[Limit]:
         return [
-            Limit("stroke" if names is None else f"stroke_{axis}", "stage displacement", (axis,), units["stroke"], d, -largest, largest)
+            Limit(
+                "stroke" if names is None else f"stroke_{axis}",
+                "stage displacement",
+                (axis,),
+                units["stroke"],
+                d,
+                -largest,
+                largest,
+            )
             for axis, d, largest in zip(kept, ca.vertsplit(signal.displacement), stroke, strict=True)
-        ]  # fmt: skip
+        ]
 
     return ImposedPhysics(
-        axes=kept, components=names or ("force",), pose_units=(units["force"],) * n, pose_scale=force,
+        axes=kept,
+        components=names or ("force",),
+        pose_units=(units["force"],) * n,
+        pose_scale=force,
         drive=imposed_motion(names, units["stroke"], (*stroke, *speed, *accelerations)),
-        displacement_scale=max(stroke), travel_unit=units["stroke"], force_scale=max(force), force_unit=units["force"],
+        displacement_scale=max(stroke),
+        travel_unit=units["stroke"],
+        force_scale=max(force),
+        force_unit=units["force"],
         force=lambda motion, d: mass * motion[2 * n :] + damping * motion[n : 2 * n],
-        restoring_force=lambda d: stiffness * d, pose=lambda f: f, limits=limits,
-    )  # fmt: skip
+        restoring_force=lambda d: stiffness * d,
+        pose=lambda f: f,
+        limits=limits,
+    )

@@ -75,11 +75,11 @@ class Channel:
         """The unit of a law's number at this channel, such as 'N/um^3' for 'channel/travel^3'."""
         units = dict(zip(PLACEHOLDERS, (self.unit, self.travel_unit, self.partner_unit), strict=True))
 
-        def own(word: re.Match[str]) -> str:
+        def in_place(word: re.Match[str]) -> str:
             unit = units[word[0]]
             return unit if unit.isalnum() or number.unit == word[0] else f"({unit})"
 
-        return re.sub("|".join(PLACEHOLDERS), own, number.unit)
+        return re.sub("|".join(PLACEHOLDERS), in_place, number.unit)
 
     def si(self, value: float, number: Param | State) -> float:
         """A bound, a start value or a scale of a law's number, in SI at this channel."""

@@ -63,17 +63,17 @@ def _read_parameter(param: Param, given: dict[str, Any]) -> Quantity:
 
 def faults_at(effect: Effect, channel: Channel) -> list[tuple[str, str]]:
     """(parameter, what is wrong with it) for units and bounds that depend on the channel."""
-    found = []
+    faults = []
     for param in effect.params:
         if not param.relative:
             continue
         number, unit = effect.values[param.name], channel.unit_of(param)
         low, high = (channel.si(bound, param) for bound in param.bounds)
         if not same_dimension(written_unit(number.text), unit):
-            found.append((param.name, f"{number.text!r} has the wrong unit at {channel.name}: {unit} is needed"))
+            faults.append((param.name, f"{number.text!r} has the wrong unit at {channel.name}: {unit} is needed"))
         elif not _is_between(number.si, low, high):
-            found.append((param.name, _outside(param, number, low, high, unit)))
-    return found
+            faults.append((param.name, _outside(param, number, low, high, unit)))
+    return faults
 
 
 def _is_between(si: float, low: float, high: float) -> bool:

@@ -20,13 +20,16 @@ class Cyclic(Effect):
     params = (
         Param("amplitude", "channel", (-0.5, 0.5), "largest error", off=0.0),
         Param(
-            "period", "channel", (1e-4, 2.0), "path of one period",
+            "period",
+            "channel",
+            (1e-4, 2.0),
+            "path of one period",
         ),
         Param("phase", "deg", (-360.0, 360.0), "phase at home"),
-    )  # fmt: skip
+    )
 
     @classmethod
-    def contradiction(cls, p):
+    def contradiction(cls, p: dict[str, float]) -> str:
         back = 2 * math.pi * abs(p["amplitude"]) >= p["period"]
         return "its amplitude is so large beside its period that the reading would turn back" if back else ""
 

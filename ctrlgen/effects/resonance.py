@@ -22,7 +22,7 @@ class Resonance(Effect):
     states = (State("q", "travel", 1.0), State("p", "travel", 1.0))
 
     @classmethod
-    def contradiction(cls, p):
+    def contradiction(cls, p: dict[str, float]) -> str:
         return (
             f"a damping ratio of {p['damping']:.2g} leaves no resonance, only a lag" if p["damping"] > 0.5**0.5 else ""
         )

@@ -40,6 +40,6 @@ class SlackFriction(Effect):
         return new | updated_plays(s, [reversal_point(s, s.states.d, s.states.v), s.displacement], self.widths(p))
 
     @staticmethod
-    def widths(p):
+    def widths(p: LawNumbers) -> list[Expression]:
         """Radii of the plays."""
         return [r + p.slack / 2 for r in radii(p.reach)]

@@ -21,7 +21,7 @@ class StitchingError(Effect):
     )
 
     @classmethod
-    def contradiction(cls, p):
+    def contradiction(cls, p: dict[str, float]) -> str:
         return (
             "its offset is so large beside its width that the reading would turn back"
             if p["offset"] <= -p["width"]

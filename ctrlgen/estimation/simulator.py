@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property, lru_cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -51,7 +52,7 @@ class Simulator:
         self.model: Model = build_model(device, free, self.ambient, look_back, per_record=True)
         self.poses = not self.model.inertial and (poses or np.isinf(sample_time))
         self._with_sensitivities: dict[bool, Recursion] = {}
-        self._by_pattern: dict[tuple, ca.Function] = {}
+        self._by_pattern: dict[tuple[Any, ...], ca.Function] = {}
         self.n_x, self.n_s = self.model.x.numel(), self.model.x.numel() + self.model.z.numel()
 
     @cached_property

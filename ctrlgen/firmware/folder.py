@@ -44,9 +44,8 @@ class CFolder:
     compression: dict[Real, Compression]
     operations: int
     worst_operations: int
-    given_numbers: int = (
-        0  # in the controller's state, behind its own: constants of the start and what follows from them
-    )
+    # In the controller's state, behind its own: constants of the start and what follows from them.
+    given_numbers: int = 0
 
     def sources(self, real: Real) -> list[Path]:
         """The C of the library in one arithmetic."""
@@ -102,9 +101,17 @@ def generate(
     cost = contexts[Real.FLOAT]["cost"]
     pieces = names if played else names | {"player": {}}
     return CFolder(
-        out, scenario.name, pieces["online"], pieces["player"], pieces["selftest"], pieces["vectors"], compression,
-        operations=cost["step"], worst_operations=cost["worst"], given_numbers=contexts[Real.FLOAT]["given_numbers"],
-    )  # fmt: skip
+        out,
+        scenario.name,
+        pieces["online"],
+        pieces["player"],
+        pieces["selftest"],
+        pieces["vectors"],
+        compression,
+        operations=cost["step"],
+        worst_operations=cost["worst"],
+        given_numbers=contexts[Real.FLOAT]["given_numbers"],
+    )
 
 
 def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Real, path: Path) -> None:

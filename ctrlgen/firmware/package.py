@@ -25,9 +25,13 @@ MANIFEST = "manifest.json"
 PIECES = ("online", "player", "selftest", "vectors")
 LICENCE = "The generated code belongs to the user of ctrlgen who generated it; no warranty."
 TEMPLATES = {
-    "package/README.md": "README.md", "CMakeLists.txt": "CMakeLists.txt", "package/library.properties": "library.properties",
-    "package/module.yml": "zephyr/module.yml", "package/zephyr.cmake": "zephyr/CMakeLists.txt", "package/Kconfig": "zephyr/Kconfig",
-}  # fmt: skip
+    "package/README.md": "README.md",
+    "CMakeLists.txt": "CMakeLists.txt",
+    "package/library.properties": "library.properties",
+    "package/module.yml": "zephyr/module.yml",
+    "package/zephyr.cmake": "zephyr/CMakeLists.txt",
+    "package/Kconfig": "zephyr/Kconfig",
+}
 
 
 def owners(scenario: Scenario) -> dict[str, str]:
@@ -59,10 +63,14 @@ def write_package(
         write_text(out / name, text)
         written.append(out / name)
     manifest = {
-        "name": scenario.name, "title": context["title"], "ctrlgen": __version__, "commit": commit(), "licence": LICENCE,
+        "name": scenario.name,
+        "title": context["title"],
+        "ctrlgen": __version__,
+        "commit": commit(),
+        "licence": LICENCE,
         "inputs": scenario.digest,
         "files": {name: _sha256(out / name) for name in sorted(path.relative_to(out).as_posix() for path in written)},
-    }  # fmt: skip
+    }
     write_text(out / MANIFEST, json.dumps(manifest, indent=1) + "\n")
 
 

@@ -62,19 +62,30 @@ def generate_player(solution: Solution, out: Path) -> list[Path]:
     for real, compression in compress(solution).items():
         name = f"{scenario.name}_player_{real.suffix}"
         context = player_context(solution, compression, name) | {
-            "real": real, "drive": drive, "drive_unit": drive.units[0], "nu": len(drive.channels), "motion": model.inertial,
-            "program": program(), "version": __version__, "digest": scenario.digest, "u_safe": np.clip(0.0, *model.u_bounds),
+            "real": real,
+            "drive": drive,
+            "drive_unit": drive.units[0],
+            "nu": len(drive.channels),
+            "motion": model.inertial,
+            "program": program(),
+            "version": __version__,
+            "digest": scenario.digest,
+            "u_safe": np.clip(0.0, *model.u_bounds),
             "source": comment(model.device.source),
-        }  # fmt: skip
+        }
         written += [write(f"player.{kind}", context, out / f"{name}.{kind}") for kind in ("h", "c")]
     texts = {f"device/{path}": text for path, text in input_files(scenario).items()}
     for name, text in texts.items():
         write_text(out / name, text)
     names = [*(path.name for path in written), *texts]
     manifest = {
-        "name": scenario.name, "title": scenario.file.title, "ctrlgen": __version__, "commit": commit(), "licence": LICENCE,
+        "name": scenario.name,
+        "title": scenario.file.title,
+        "ctrlgen": __version__,
+        "commit": commit(),
+        "licence": LICENCE,
         "inputs": scenario.digest,
         "files": {name: hashlib.sha256((out / name).read_bytes()).hexdigest() for name in sorted(names)},
-    }  # fmt: skip
+    }
     write_text(out / MANIFEST, json.dumps(manifest, indent=1) + "\n")
     return [path for path in written if path.suffix == ".c"]

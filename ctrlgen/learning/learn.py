@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -160,7 +161,7 @@ def _step(lifted: Lifted, wanted: Wanted, share: float, most: np.ndarray) -> np.
     raise SolverError("the limits leave no room for a next run; look at the margins of the drives so far")
 
 
-def _broken(lifted: Lifted, u: np.ndarray) -> list:
+def _broken(lifted: Lifted, u: np.ndarray) -> list[Any]:
     S, m = lifted.states(u), lifted.model
     x, z = np.split(S, [m.x.numel()], axis=1)
     before = None if lifted.static else Before(lifted.held(u), lifted.sample_time)

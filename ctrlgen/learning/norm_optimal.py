@@ -165,9 +165,15 @@ def _keeps(
 
 
 def _limited(
-    hessian: sp.csc_matrix, slope: np.ndarray, constraints: sp.csc_matrix, equations: int,
-    low: np.ndarray, high: np.ndarray, extra_low: np.ndarray, extra_high: np.ndarray,
-) -> np.ndarray:  # fmt: skip
+    hessian: sp.csc_matrix,
+    slope: np.ndarray,
+    constraints: sp.csc_matrix,
+    equations: int,
+    low: np.ndarray,
+    high: np.ndarray,
+    extra_low: np.ndarray,
+    extra_high: np.ndarray,
+) -> np.ndarray:
     """The optimum with all limits, by IPOPT, which is given the matrices as they are. Raises SolverError, and KeyboardInterrupt on a
     signal."""
     H, a = ca.MX(ca.DM(hessian)), ca.MX(ca.DM(constraints))

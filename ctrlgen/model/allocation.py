@@ -78,12 +78,19 @@ def allocate(model: Model) -> Allocation:
         return ca.substitute(ca.SX(e), model.u, u)
 
     ganged = replace(
-        model, u=f, u_scale=np.full(f.numel(), model.force_scale), drive_weights=np.ones(f.numel()), rate_limits=(),
+        model,
+        u=f,
+        u_scale=np.full(f.numel(), model.force_scale),
+        drive_weights=np.ones(f.numel()),
+        rate_limits=(),
         limits=tuple(replace(limit, expr=of(limit.expr)) for limit in model.limits),
         signals={name: replace(s, expr=of(s.expr)) for name, s in model.signals.items()},
-        heat_of_drive=of(model.heat_of_drive), rates_of_heat=of(model.rates_of_heat), sampled_rates=of(model.sampled_rates),
-        balance=of(model.balance), stepped={i: of(e) for i, e in model.stepped.items()},
-    )  # fmt: skip
+        heat_of_drive=of(model.heat_of_drive),
+        rates_of_heat=of(model.rates_of_heat),
+        sampled_rates=of(model.sampled_rates),
+        balance=of(model.balance),
+        stepped={i: of(e) for i, e in model.stepped.items()},
+    )
     return Allocation(ganged, ca.Function("least_effort", [model.z, f], [u], ["z", "f"], ["u"], {"cse": True}))
 
 

@@ -24,10 +24,9 @@ from ctrlgen.numerics.phi_functions import held_gain, increment, lag_increment
 NEWTON_STEPS = 4  # from the displacement one sample before, each step doubles the digits
 SETTLING_SWEEPS = 3  # memories that follow memories that follow heaters whose power depends on their temperature
 SETTLING_TIME_CONSTANTS = 14.0  # e^-14 is a millionth
-# Sample time times the fastest rate of coupled states:
-LONGEST_STEP = (
-    2.0**20
-)  # beyond it the sample time is refused; 20 doublings of the phi functions leave 1e-10 of rounding
+# Sample time times the fastest rate of coupled states, beyond which the sample time is refused; 20 doublings of the phi functions
+# leave 1e-10 of rounding.
+LONGEST_STEP = 2.0**20
 LONGEST_HELD_STEP = 1024.0  # beyond it a sample under a held drive, such as the dwell of a pose, is divided
 DWELL_STEPS = 4  # parts of such a sample: for states that settle in each, as many steps of Newton's method
 SLOWEST_RATE = 1e-6  # [1/s] a slower state is taken to stand: an integrator, not a lag

@@ -70,9 +70,17 @@ class EffectTerms:
     """
 
     def __init__(
-        self, device: Device, physics: DevicePhysics, p: SimpleNamespace, displacement: ca.SX, velocity: ca.SX,
-        acceleration: ca.SX, ambient: ca.SX, sample_time: float | None, per_record: bool,
-    ) -> None:  # fmt: skip
+        self,
+        device: Device,
+        physics: DevicePhysics,
+        p: SimpleNamespace,
+        displacement: ca.SX,
+        velocity: ca.SX,
+        acceleration: ca.SX,
+        ambient: ca.SX,
+        sample_time: float | None,
+        per_record: bool,
+    ) -> None:
         self.physics, self.ambient, self.sample_time, self.per_record = physics, ambient, sample_time, per_record
         self.displacement, self.velocity, self.acceleration = displacement, velocity, acceleration
         reach = REACH * physics.displacement_scale
@@ -239,17 +247,23 @@ def available(physics: DevicePhysics, sample_time: float | None = None) -> froze
     """What a device offers to an effect's law: words of `REQUIREMENTS`."""
     heated, balanced = _has_heaters(physics), isinstance(physics, BalancedPhysics)
     present = {
-        "unheated": not heated, "heat": heated, "state": heated,
-        "bipolar": physics.bipolar, "actuator": not isinstance(physics, ImposedPhysics),
-        "balanced": balanced, "velocity": not balanced, "acceleration": isinstance(physics, ImposedPhysics),
-        "ambient": True, "sample_time": sample_time is not None,
+        "unheated": not heated,
+        "heat": heated,
+        "state": heated,
+        "bipolar": physics.bipolar,
+        "actuator": not isinstance(physics, ImposedPhysics),
+        "balanced": balanced,
+        "velocity": not balanced,
+        "acceleration": isinstance(physics, ImposedPhysics),
+        "ambient": True,
+        "sample_time": sample_time is not None,
         "displacement_command": balanced and same_dimension(physics.force_unit, physics.travel_unit),
         "force": any(same_dimension(physics.force_unit, unit) for unit in ("N", "N*m")),
         "spatial": len(physics.components) == 6,
         "voltage": any(same_dimension(unit, "V") for unit in physics.drive.units),
         "second_order_kinematics": physics.second_order_kinematics is not None,
         "tangent_compliance": isinstance(physics, BalancedPhysics) and physics.tangent_compliance is not None,
-    }  # fmt: skip
+    }
     return frozenset(name for name, given in present.items() if given)
 
 

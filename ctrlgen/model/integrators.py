@@ -24,9 +24,8 @@ STIFFER_AWAY = 1.2  # a stage this much faster at the ends of its travel than at
 LEAST_IMPLICIT_STEPS = 4  # a sample, so that the moment of a reversal is followed
 MOST_STEPS = 16  # a sample
 VELOCITY_NEWTON_STEPS = 2  # from standstill they converge quadratically, from one side
-NEAR_HOME = (
-    1e-3  # typical displacements off home where slopes are taken: a law with a corner there is on one side of it
-)
+# Typical displacements off home where slopes are taken: a law with a corner there is on one side of it.
+NEAR_HOME = 1e-3
 VANISHED = 1e-300  # matrix entries below it are structural zeros that underflowed
 NonlinearRates = Callable[[ca.SX, ca.SX], ca.SX]  # (y, u) -> the rows `acting` of N
 

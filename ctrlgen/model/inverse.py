@@ -58,15 +58,22 @@ def invert(model: Model, follow: str, sample_time: float | None, symbolic: bool 
     p = model.p if symbolic else ca.SX(ca.DM(model.p_nominal))
     now, end = ca.vertcat(x, z, u, model.p), ca.vertcat(x_1, z_1, u_1, p)
     known = ExpansionPoint.of(
-        (x, model.rest, model.x_scale), (z, 0 * model.z_scale, model.z_scale), (target, np.zeros(target.numel()), np.zeros(target.numel())),
-        (x_1, model.rest, model.x_scale), (z_1, 0 * model.z_scale, model.z_scale), (u_1, 0 * model.u_scale, model.u_scale),
-        (heat, np.zeros(heat.numel()), np.ones(heat.numel())), (model.p, model.p_nominal, np.zeros(model.p.numel())),
-    )  # fmt: skip
+        (x, model.rest, model.x_scale),
+        (z, 0 * model.z_scale, model.z_scale),
+        (target, np.zeros(target.numel()), np.zeros(target.numel())),
+        (x_1, model.rest, model.x_scale),
+        (z_1, 0 * model.z_scale, model.z_scale),
+        (u_1, 0 * model.u_scale, model.u_scale),
+        (heat, np.zeros(heat.numel()), np.ones(heat.numel())),
+        (model.p, model.p_nominal, np.zeros(model.p.numel())),
+    )
     if symbolic:
         known = replace(
-            known, parameters=model.p, with_formula=ca.vertcat(x, x_1),
+            known,
+            parameters=model.p,
+            with_formula=ca.vertcat(x, x_1),
             base_formula=ca.vertcat(model.rest_formula, model.rest_formula),
-        )  # fmt: skip
+        )
     followed, balance, rates, produced = (
         ca.substitute(e, now, end)
         for e in (model.signals[follow].expr, model.balance, model.rates_of_heat, model.heat_of_drive)
@@ -161,11 +168,11 @@ def solve_by_blocks(known: ExpansionPoint, equations: ca.SX, unknowns: ca.SX) ->
     solution = [ca.SX(0)] * unknowns.numel()
     solved = values = ca.SX(0, 1)
     for block in range(count):
-        own = columns[column_starts[block] : column_starts[block + 1]]
+        places = columns[column_starts[block] : column_starts[block + 1]]
         own_equations = equations[rows[row_starts[block] : row_starts[block + 1]]]
-        v = unknowns[own]
+        v = unknowns[places]
         root = _solve_block(known, ca.substitute(own_equations, solved, values), v)
-        for k, i in enumerate(own):
+        for k, i in enumerate(places):
             solution[i] = root[k]
         solved, values = ca.vertcat(solved, v), ca.vertcat(values, root)
     return ca.vertcat(*solution)

@@ -78,17 +78,17 @@ def inverse_dynamics(model: Model, follow: str) -> InverseDynamics:
     x, z, u = (ca.SX.sym(name, v.numel()) for name, v in (("x1", model.x), ("z1", model.z), ("u1", model.u)))
     equations = ca.substitute(equations, ca.vertcat(model.x, model.z, model.u), ca.vertcat(x, z, u))
     equations = ca.substitute(equations, model.p, ca.DM(model.p_nominal))
-    own, last = range(model.n_states), model.x.numel() - model.v.numel()
+    states, last = range(model.n_states), model.x.numel() - model.v.numel()
     orders = ca.vertcat(NONE, *(symbol for symbol, _ in accelerations))
-    candidates = ca.vertcat(u, z, x[last:], orders, x[list(own)], x[model.n_states : last])
+    candidates = ca.vertcat(u, z, x[last:], orders, x[list(states)], x[model.n_states : last])
     chosen = _determined(equations, candidates)
     if len(chosen) < equations.numel() or not set(range(model.u.numel())) <= set(chosen):
         what = f"does not move the channels of the {follow} independently of one another"
         raise InputError(model.name, [Fault("drive", f"{what}; follow the displacement, or fewer channels")])
     unknowns = candidates[chosen]
-    found = {symbol.element_hash() for symbol in ca.vertsplit(unknowns)}
+    hashes = {symbol.element_hash() for symbol in ca.vertsplit(unknowns)}
     y, rest = ca.vertcat(x, z), ca.SX(ca.DM(np.concatenate([model.rest, np.zeros(z.numel())])))
-    internal = tuple(i for i in range(y.numel()) if y[i].element_hash() not in found)
+    internal = tuple(i for i in range(y.numel()) if y[i].element_hash() not in hashes)
     held, at_rest = (ca.vertcat(NONE, *(v[i] for i in internal)) for v in (y, rest))
     equations = ca.substitute(equations, held, at_rest)
     if ca.sprank(ca.jacobian(equations, unknowns).sparsity()) < equations.numel():
@@ -96,10 +96,12 @@ def inverse_dynamics(model: Model, follow: str) -> InverseDynamics:
         what = f"of the device ({kinds}) keep the drive from moving the {follow} near rest: there is no inverse; leave them out"
         raise InputError(model.name, [Fault("effect", what)])
     known = ExpansionPoint.of(
-        (x, model.rest, model.x_scale), (z, 0 * model.z_scale, model.z_scale), (u, 0 * model.u_scale, model.u_scale),
+        (x, model.rest, model.x_scale),
+        (z, 0 * model.z_scale, model.z_scale),
+        (u, 0 * model.u_scale, model.u_scale),
         (ca.vec(target), np.zeros(target.numel()), np.zeros(target.numel())),
         *((a, 0 * model.z_scale, model.z_scale * TYPICAL_RATE ** (k + 2)) for k, (a, _) in enumerate(accelerations)),
-    )  # fmt: skip
+    )
     solution = solve_by_blocks(known, equations, unknowns)
     result = [ca.substitute(ca.substitute(e, unknowns, solution), held, at_rest) for e in (x, z, u)]
     kernel = ca.Function("inverse_dynamics", [target], result, ["target"], ["x", "z", "u"], {"cse": True})
@@ -143,10 +145,10 @@ def _implicit(
     if model.mass.sparsity().is_diag() or len(set(degrees)) > 1:
         return None
     n, degree = len(model.axes), degrees[0]
-    own = model.rates[: model.x.numel() - n]
+    state_rates = model.rates[: model.x.numel() - n]
     force = ca.substitute(model.balance, model.heat, model.heat_of_drive)
     symbols = [ca.SX.sym(f"a{k}", n) for k in range(degree)]
-    y, F = ca.vertcat(model.x, model.z, *symbols[:-1]), ca.vertcat(own, symbols[0], model.v, *symbols[1:])
+    y, F = ca.vertcat(model.x, model.z, *symbols[:-1]), ca.vertcat(state_rates, symbols[0], model.v, *symbols[1:])
     equations: list[tuple[ca.SX, ca.SX]] = []
     for k, a in enumerate(symbols[:-1]):
         if k and ca.depends_on(force, model.u):

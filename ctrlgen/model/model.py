@@ -168,9 +168,12 @@ class Model:
     def dynamics(self) -> ca.Function:
         """(x, z, u, p) -> (rates, balance)."""
         return ca.Function(
-            f"{self.name}_dynamics", [self.x, self.z, self.u, self.p], [self.rates, self.balance],
-            ["x", "z", "u", "p"], ["rates", "balance"],
-        )  # fmt: skip
+            f"{self.name}_dynamics",
+            [self.x, self.z, self.u, self.p],
+            [self.rates, self.balance],
+            ["x", "z", "u", "p"],
+            ["rates", "balance"],
+        )
 
     @cached_property
     def x_bounds(self) -> tuple[np.ndarray, np.ndarray]:
@@ -208,7 +211,7 @@ class Model:
     def limited_variable(self, limit: Limit, channel: int) -> Literal["x", "z", "u", "rate"] | None:
         """Whether a limit is on one of the states, displacements or drives itself, or on the rate of a drive; None where it is on an
         expression of them."""
-        if any(limit is own for own in self.rate_limits):
+        if any(limit is limited for limited in self.rate_limits):
             return "rate"
         variables: tuple[tuple[Literal["x", "z", "u"], ca.SX], ...] = (("x", self.x), ("z", self.z), ("u", self.u))
         return next((name for name, s in variables if channel in dict(_positions(limit, s))), None)
@@ -234,11 +237,11 @@ class Model:
     def tightened(self, reserves: Mapping[str, tuple[float, float]], probability: float | None) -> Model:
         """The model with the bounds of the named limits moved inward by (below, above) [SI], which then hold with the `probability`:
         whatever reads its limits keeps the tightened ones."""
-        own = [reserves.get(limit.name, (0.0, 0.0)) for limit in self.limits]
-        limits = tuple(limit.tightened(*reserve) for limit, reserve in zip(self.limits, own, strict=True))
+        reserved = [reserves.get(limit.name, (0.0, 0.0)) for limit in self.limits]
+        limits = tuple(limit.tightened(*reserve) for limit, reserve in zip(self.limits, reserved, strict=True))
         formulas = tuple(
             (None if lower is None else lower + below, None if upper is None else upper - above)
-            for (lower, upper), (below, above) in zip(self.bounds_formulas, own, strict=True)
+            for (lower, upper), (below, above) in zip(self.bounds_formulas, reserved, strict=True)
         )
         return replace(self, limits=limits, bounds_formulas=formulas, probability=probability)
 
@@ -256,9 +259,8 @@ class Model:
     def composite_limits(self) -> list[Limit]:
         """Limits on an expression, such as a stress, and not on a state, displacement or drive itself."""
         return [
-            limit for limit in self.limits
-            if not any(_positions(limit, symbol) for symbol in (self.x, self.z, self.u))
-        ]  # fmt: skip
+            limit for limit in self.limits if not any(_positions(limit, symbol) for symbol in (self.x, self.z, self.u))
+        ]
 
 
 def _positions(limit: Limit, symbol: ca.SX) -> list[tuple[int, int]]:

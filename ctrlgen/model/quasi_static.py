@@ -22,10 +22,10 @@ OVERDAMPED = 0.999  # damping ratio, above which nothing vibrates
 def quasi_static(model: Model) -> Model:
     """`model`, which has inertia, in balance. Raises InputError for a device with a feedback loop, with effects that have memories, or with
     dry friction, which have no static drive."""
-    own = model.n_states
+    n_states = model.n_states
     inside = {
         "a feedback loop": bool(model.held.numel()),
-        "effects with memories": model.x.numel() > own + model.v.numel(),
+        "effects with memories": model.x.numel() > n_states + model.v.numel(),
         "dry friction": bool(model.set_valued_axes),
     }
     if faults := [name for name, there in inside.items() if there]:
@@ -37,13 +37,22 @@ def quasi_static(model: Model) -> Model:
 
     none = ca.SX(0, 1)
     return replace(
-        model, x=model.x[:own, :], v=none, acceleration=none, mass=ca.SX(0, 0),
-        rates_of_heat=of(model.rates_of_heat[:own, :]), sampled_rates=of(model.sampled_rates[:own, :]), balance=of(model.balance),
+        model,
+        x=model.x[:n_states, :],
+        v=none,
+        acceleration=none,
+        mass=ca.SX(0, 0),
+        rates_of_heat=of(model.rates_of_heat[:n_states, :]),
+        sampled_rates=of(model.sampled_rates[:n_states, :]),
+        balance=of(model.balance),
         signals={name: replace(s, expr=of(s.expr)) for name, s in model.signals.items()},
         limits=tuple(replace(limit, expr=of(limit.expr)) for limit in model.limits),
-        x_names=model.x_names[:own], x_units=model.x_units[:own], rest=model.rest[:own],
-        rest_formula=model.rest_formula[:own, :], x_scale=model.x_scale[:own],
-    )  # fmt: skip
+        x_names=model.x_names[:n_states],
+        x_units=model.x_units[:n_states],
+        rest=model.rest[:n_states],
+        rest_formula=model.rest_formula[:n_states, :],
+        x_scale=model.x_scale[:n_states],
+    )
 
 
 def natural_modes(model: Model, x: np.ndarray, z: np.ndarray, u: np.ndarray) -> list[tuple[float, float]]:

@@ -57,8 +57,8 @@ class Recursion:
             b = min(a + size, n)
             # the last block is filled with its last sample
             block = [np.concatenate([x[a:b], np.repeat(x[b - 1 : b], a + size - b, axis=0)]) for x in inputs]
-            after, found = evaluate(self.unrolled[size], state, *block)
-            states[a:b], results[a:b], state = after[: b - a], found[: b - a], after[-1]
+            after, values = evaluate(self.unrolled[size], state, *block)
+            states[a:b], results[a:b], state = after[: b - a], values[: b - a], after[-1]
         if self.one.spent(time.perf_counter() - begin):
             self.unrolled.clear()
         return states, results

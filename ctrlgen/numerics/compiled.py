@@ -19,12 +19,10 @@ from pathlib import Path
 import casadi as ca
 
 FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off", "-w")
-SECONDS_PER_CHARACTER = (
-    4e-6  # of generated C, for the compiler: measured with gcc 12 to 14 on steps of an axis and a hexapod
-)
-LARGE = (
-    400_000  # characters of generated C above which it is compiled in parts: four seconds and not fifteen for a million
-)
+# Of generated C, for the compiler: measured with gcc 12 to 14 on steps of an axis and a hexapod.
+SECONDS_PER_CHARACTER = 4e-6
+# Characters of generated C above which it is compiled in parts: four seconds and not fifteen for a million.
+LARGE = 400_000
 PART = 250  # statements of a part
 FUNCTION = re.compile(
     r"^static int (?P<name>casadi_f\d+)\((?P<arguments>[^)]*)\) \{\n(?P<body>.*?)  return 0;\n\}\n", re.M | re.S
@@ -68,7 +66,7 @@ def compiler() -> str | None:
     """The C compiler: $CC, cc or gcc; None where there is none or CTRLGEN_NO_COMPILER is set."""
     if os.environ.get("CTRLGEN_NO_COMPILER"):
         return None
-    return next((found for name in (os.environ.get("CC"), "cc", "gcc") if name and (found := shutil.which(name))), None)
+    return next((path for name in (os.environ.get("CC"), "cc", "gcc") if name and (path := shutil.which(name))), None)
 
 
 def c_code(function: ca.Function) -> str:
@@ -90,10 +88,10 @@ def _in_parts(code: str) -> str:
     time grows faster than the length of a function. What no other part reads is a local variable, as every access to the work vector
     is a memory access to the compiler too: in all half of the time."""
 
-    def parts(found: re.Match[str]) -> str:
-        name, body = found["name"], found["body"].splitlines(keepends=True)
+    def parts(match: re.Match[str]) -> str:
+        name, body = match["name"], match["body"].splitlines(keepends=True)
         if len(body) <= PART or not all(IN_WORK_VECTOR.match(line) for line in body):
-            return found[0]
+            return match[0]
         pieces = _with_locals([body[k : k + PART] for k in range(0, len(body), PART)])
         head = "(const casadi_real** arg, casadi_real** res, casadi_real* w)"
         defined = "".join(
@@ -101,7 +99,7 @@ def _in_parts(code: str) -> str:
             for k, piece in enumerate(pieces)
         )
         calls = "".join(f"  {name}_{k}(arg, res, w);\n" for k in range(len(pieces)))
-        return f"{defined}static int {name}({found['arguments']}) {{\n{calls}  return 0;\n}}\n"
+        return f"{defined}static int {name}({match['arguments']}) {{\n{calls}  return 0;\n}}\n"
 
     return FUNCTION.sub(parts, code)
 
@@ -115,10 +113,10 @@ def _with_locals(parts: list[list[str]]) -> list[str]:
         before: set[str] = set()
         lines = []
 
-        def local(found: re.Match[str], now: dict[str, str] = now, before: set[str] = before) -> str:
-            if found[1] not in now:
-                before.add(found[1])
-            return now.get(found[1], found[0])
+        def local(match: re.Match[str], now: dict[str, str] = now, before: set[str] = before) -> str:
+            if match[1] not in now:
+                before.add(match[1])
+            return now.get(match[1], match[0])
 
         for statement in part:
             place = PLACE.match(statement, 2)

@@ -70,7 +70,7 @@ _RULES: dict[int, Callable[..., Interval]] = {
 
 def interval_of(operation: int, operands: Sequence[Interval]) -> Interval:
     """The interval of one CasADi `operation` (such as `ca.OP_ADD`) on operands that lie in those given."""
-    rule = _RULES.get(operation, lambda *_: UNBOUNDED)
+    rule: Callable[..., Interval] = _RULES.get(operation, lambda *_: UNBOUNDED)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         value = rule(*operands)
     return UNBOUNDED if np.isnan(value).any() else value
@@ -82,7 +82,7 @@ def intervals(function: ca.Function, ranges: Mapping[str, tuple[np.ndarray, np.n
     `ranges`: argument (a dense column) by its name -> lower and upper bounds; arguments that are not named are unbounded.
     """
     at: dict[int, Interval] = {}  # by slot of CasADi's work vector
-    found = []
+    values = []
     for k in range(function.n_instructions()):
         op, inputs, outputs = function.instruction_id(k), function.instruction_input(k), function.instruction_output(k)
         if op == ca.OP_INPUT:
@@ -95,10 +95,10 @@ def intervals(function: ca.Function, ranges: Mapping[str, tuple[np.ndarray, np.n
             value = (function.instruction_constant(k),) * 2
         else:
             value = interval_of(op, [at[i] for i in inputs])
-        found.append(value)
+        values.append(value)
         if op != ca.OP_OUTPUT:
             at[outputs[0]] = value
-    return found
+    return values
 
 
 def bounds(function: ca.Function, ranges: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:

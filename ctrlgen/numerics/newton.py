@@ -21,9 +21,15 @@ def newton_root(residual: ca.SX, unknown: ca.SX, start: ca.SX, steps: int) -> ca
 
 
 def newton_solver(
-    name: str, residual: ca.SX | ca.MX, unknown: ca.SX | ca.MX, parameters: ca.SX | ca.MX,
-    *, residual_below: float = CONVERGED, step_below: float = CONVERGED, most_steps: int,
-) -> ca.Function:  # fmt: skip
+    name: str,
+    residual: ca.SX | ca.MX,
+    unknown: ca.SX | ca.MX,
+    parameters: ca.SX | ca.MX,
+    *,
+    residual_below: float = CONVERGED,
+    step_below: float = CONVERGED,
+    most_steps: int,
+) -> ca.Function:
     """(start, parameters) -> the root (n,), iterated until the residual or the step is below its bound.
 
     `residual` and `unknown` are to be scaled to order one. The function raises RuntimeError where `most_steps` do not

@@ -15,9 +15,8 @@ import scipy
 
 HELD_ORDER = 12  # of the series of phi_1 for a held drive: its remainder is 1/13! for |hA| = 1
 RAMP_ORDER = 18  # of the series of phi_1 to phi_3 for a linear drive: its remainder is 1/19!, below rounding
-SERIES_BELOW = (
-    1.0  # |h rate| below which phi_k of one lag is summed: its closed form loses digits to cancellation there
-)
+# |h rate| below which phi_k of one lag is summed: its closed form loses digits to cancellation there.
+SERIES_BELOW = 1.0
 
 
 def phi_matrices(M: np.ndarray, count: int) -> list[np.ndarray]:

@@ -19,9 +19,10 @@ import numpy as np
 import scipy
 
 from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.devices import Limit
 from ctrlgen.model.inverse import ExpansionPoint, solve_by_blocks
 from ctrlgen.model.inverse_dynamics import inverse_dynamics
-from ctrlgen.model.model import Limit, Model
+from ctrlgen.model.model import Model
 from ctrlgen.trajectory.inverse.balanced import BalancedInverse
 from ctrlgen.trajectory.inverse.clock import Sampled
 

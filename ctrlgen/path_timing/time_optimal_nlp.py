@@ -52,9 +52,14 @@ class SpeedProgramme:
     rest; `distances` (place, speed) -> how far each limit is from its bound, and the drives."""
 
     def __init__(
-        self, law: Law, places: Callable[[np.ndarray], np.ndarray], ends: tuple[float, float], closed: bool,
-        distances: ca.Function, rates: RateBound,
-    ) -> None:  # fmt: skip
+        self,
+        law: Law,
+        places: Callable[[np.ndarray], np.ndarray],
+        ends: tuple[float, float],
+        closed: bool,
+        distances: ca.Function,
+        rates: RateBound,
+    ) -> None:
         self.law, self.places, self.ends, self.closed, self.rates = law, places, ends, closed, rates
         self.distances = distances
 

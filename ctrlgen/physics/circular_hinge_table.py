@@ -64,9 +64,9 @@ class Geometry:
             raise ValueError("R or t is a symbol; give `at`, the number t/R at which the equation is chosen")
         return float(self.t) / float(self.R)
 
-    def shear(self, own: float) -> Scalar:
+    def shear(self, by_equation: float) -> Scalar:
         """The shear factor of the geometry if it gives one, else the equation's `own`."""
-        return own if self.shear_factor is None else self.shear_factor
+        return by_equation if self.shear_factor is None else self.shear_factor
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,13 @@ EQUATIONS = (
     Equation(ALPHA, "zhang_fasse", "C.10", "Zhang and Fasse (2001)", _plain(c.c10), (0.05, 0.8), OWN),
     Equation(DELTA_Y, "paros_weisbord", "C.2 + C.4", _PW, _with_shear(c.c2, c.c4), (0.05, 0.1), errors=(2, 4, 3.1)),
     Equation(
-        DELTA_Y, "paros_weisbord_simplified", "C.6 + C.8", _PW, _with_shear(c.c6, c.c8), (0.05, 0.1), errors=(3, 5.6, 4.3)
+        DELTA_Y,
+        "paros_weisbord_simplified",
+        "C.6 + C.8",
+        _PW,
+        _with_shear(c.c6, c.c8),
+        (0.05, 0.1),
+        errors=(3, 5.6, 4.3),
     ),
     Equation(DELTA_Y, "lobontiu", "C.19 + C.21", _LO, _lobontiu_y, (0.05, 0.1), errors=(2, 3.9, 2.9)),
     Equation(DELTA_Y, "wu_zhou", "C.12 + C.14", _WU, _with_shear(c.c12, c.c14), (0.05, 0.1), errors=(2, 4, 3.1)),
@@ -178,9 +184,17 @@ EQUATIONS = (
     Equation(DELTA_X, "paros_weisbord_simplified", "C.7", _PW, _plain(c.c7), None, "S3 Table 3: not recommended"),
     Equation(DELTA_X, "lobontiu", "C.20", _LO, _plain(c.c20), (0.25, 0.65), errors=(0.3, 4.9, 2.4)),
     Equation(DELTA_X, "wu_zhou", "C.13", _WU, _plain(c.c13), (0.25, 0.65), errors=(0.3, 4.9, 2.4)),
-    Equation(DELTA_X, "schotborgh", "C.24", _SC, _plain(c.c24), None, "not in S3 Table 3; includes the extension of the links"),
+    Equation(
+        DELTA_X,
+        "schotborgh",
+        "C.24",
+        _SC,
+        _plain(c.c24),
+        None,
+        "not in S3 Table 3; includes the extension of the links",
+    ),
     Equation(LOCKED, "schotborgh", "C.23", _SC, _plain(c.c23), (0.2, 0.8), OWN),
-)  # fmt: skip
+)
 BY_NAME = {(e.compliance, e.group): e for e in EQUATIONS}
 
 
@@ -272,20 +286,20 @@ def planar(geometry: Geometry, equation: str | Mapping[str, str] = "auto", outsi
     definite, delta_y/F_y <= R^2 alpha_z/M_z: the two then come from theories that contradict each other.
     """
     chosen = {key: equation if isinstance(equation, str) else equation.get(key, "auto") for key in PLANAR}
-    found = {key: compliance(key, geometry, chosen[key], outside) for key in PLANAR}
+    compliances = {key: compliance(key, geometry, chosen[key], outside) for key in PLANAR}
     faults = [
         f"{key} by {one.source} is {float(one.value):.4g} {UNITS[key]} at t/R = {geometry.ratio:.4g}; "
         "a compliance must be positive and finite"
-        for key, one in found.items()
+        for key, one in compliances.items()
         if not isinstance(one.value, ca.SX) and not 0 < float(one.value) < float("inf")
     ]
-    alpha, y, x = (found[key].value for key in PLANAR)
+    alpha, y, x = (compliances[key].value for key in PLANAR)
     by_rotation: Any = geometry.R**2 * alpha
     # Without shear C.6 is exactly R^2 C.5: rounding must not decide whether the matrix is positive definite.
     if not faults and not isinstance(y - by_rotation, ca.SX) and float(y - by_rotation) <= ROUNDING * float(y):
         faults.append(
-            f"the compliance is not positive definite: delta_y/F_y by {found[DELTA_Y].source} is {float(y):.4g} m/N, at "
-            f"least {float(by_rotation):.4g} m/N follows from alpha_z/M_z by {found[ALPHA].source} at "
+            f"the compliance is not positive definite: delta_y/F_y by {compliances[DELTA_Y].source} is {float(y):.4g} m/N, at "
+            f"least {float(by_rotation):.4g} m/N follows from alpha_z/M_z by {compliances[ALPHA].source} at "
             f't/R = {geometry.ratio:.4g}; include shear (shear_factor), use equation = "auto", or take both from one source'
         )
     if faults:

@@ -24,9 +24,8 @@ from ctrlgen.physics.flexure import beam_compliance
 from ctrlgen.physics.screw import Matrix, Scalar, inverse_adjoint, move
 from ctrlgen.physics.second_order_flexure import Segment
 
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(
-    4
-)  # exact to the seventh degree; squared cubic shapes are of the sixth
+# Exact to the seventh degree; squared cubic shapes are of the sixth.
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
 def flexure_mass(
@@ -46,7 +45,7 @@ def flexure_mass(
             within = s.length * (1 + node) / 2
             x = begun + within
             C = beam_compliance(within, *rigidity)
-            C += sum((move(own, None, (at - x, 0, 0)) for at, own in passed), ca.DM.zeros(6, 6))
+            C += sum((move(compliance, None, (at - x, 0, 0)) for at, compliance in passed), ca.DM.zeros(6, 6))
             here = inverse_adjoint(R, end - (length - x) * R[:, 0])
             T = ca.mtimes(here, first) + ca.mtimes([C, here, load])
             M += ca.mtimes([T.T, ca.diag(inertia * s.length * weight / 2), T])

@@ -255,7 +255,9 @@ def wire_stress(d: Matrix, loads: WireLoads, h: Any) -> Matrix:
     area, bending, torsion = round_section(h.wire_diameter)
     strut = [i // 4 for i in range(24)]
     return round_stress(
-        ca.mtimes(loads.bending_y / bending, d), ca.mtimes(loads.bending_z / bending, d),
-        ca.mtimes(loads.tension / area, d)[strut], ca.mtimes(loads.torque / torsion, d)[strut],
+        ca.mtimes(loads.bending_y / bending, d),
+        ca.mtimes(loads.bending_z / bending, d),
+        ca.mtimes(loads.tension / area, d)[strut],
+        ca.mtimes(loads.torque / torsion, d)[strut],
         1e-9 * h.stress_limit,
-    )  # fmt: skip
+    )

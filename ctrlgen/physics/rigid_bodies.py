@@ -65,10 +65,10 @@ def twists(count: int, elements: Sequence[Element], loads: Mapping[int, Matrix],
     swap = [3, 4, 5, 0, 1, 2]
     K: list[dict[int, Matrix]] = [{} for _ in range(count)]  # K[i][j]: the wrench on i per T_i - T_j
     for e in elements:
-        own = _mirrored(ca.mtimes([counted, e.stiffness[swap, :], counted]))
+        block = _mirrored(ca.mtimes([counted, e.stiffness[swap, :], counted]))
         for i, j in ((e.first, e.second), (e.second, e.first)):
             if i != GROUND:
-                K[i][j] = K[i][j] + own if j in K[i] else own
+                K[i][j] = K[i][j] + block if j in K[i] else block
     columns = next((W.shape[1] for W in loads.values()), 0)
     right = [ca.mtimes(counted, loads[i][swap, :]) if i in loads else ca.DM.zeros(6, columns) for i in range(count)]
     left = set(range(count))
@@ -101,7 +101,7 @@ def twists(count: int, elements: Sequence[Element], loads: Mapping[int, Matrix],
         K[k] = {j: K[k][j] for j in near if j != GROUND}
     for k in reversed(order):  # back substitution: T_k = S^-1 (sum_j K_kj T_j + W_k)
         if K[k]:
-            right[k] = right[k] + _solve(factors[k], sum(ca.mtimes(own, right[j]) for j, own in K[k].items()))
+            right[k] = right[k] + _solve(factors[k], sum(ca.mtimes(block, right[j]) for j, block in K[k].items()))
     return [ca.mtimes(counted, T) for T in right]
 
 

@@ -22,9 +22,8 @@ import numpy as np
 from ctrlgen.physics.screw import Matrix
 
 AXIS = ca.DM([1, 0, 0])
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(
-    3
-)  # exact to the fifth degree; the strains are of the fourth along a segment
+# Exact to the fifth degree; the strains are of the fourth along a segment.
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(3)
 AWTAR_2 = ca.DM([[-1 / 700, 1 / 1400], [1 / 1400, -11 / 6300]])  # of (displacement/l, rotation): p^2 in a beam-column
 
 
@@ -72,10 +71,10 @@ def _relative(point: Matrix, first: Matrix, second: Matrix, a: Sequence[int], b:
     return ca.vertcat(-cross(one[:, a], between[:, b]) / 2, turned / 2 - cross(one[:, a], moved))
 
 
-def point_flexure(own: Matrix, a: Sequence[int], b: Sequence[int]) -> Matrix:
+def point_flexure(twist: Matrix, a: Sequence[int], b: Sequence[int]) -> Matrix:
     """i (6, m) of a flexure that yields at one point, from its deformations `own` (6, k): a displacement counts in the axes halfway
     between those of both bodies, as the two are alike, -theta x delta/2."""
-    halves = cross(own[:3, a], own[3:, b]) + cross(own[:3, b], own[3:, a])
+    halves = cross(twist[:3, a], twist[3:, b]) + cross(twist[:3, b], twist[3:, a])
     return ca.vertcat(ca.DM.zeros(3, len(a)), -halves / 4)
 
 

@@ -12,8 +12,17 @@ from ctrlgen.physics.flexure import blade_compliance
 from ctrlgen.physics.screw import Matrix, Scalar, inverse, move, parallel, rotation_z
 
 STIFFENING = (
-    "beams", "beam_gap", "bar_width", "bar_half_height", "beam_length", "beam_width", "thickness", "beam_angle", "young", "poisson",
-)  # fmt: skip
+    "beams",
+    "beam_gap",
+    "bar_width",
+    "bar_half_height",
+    "beam_length",
+    "beam_width",
+    "thickness",
+    "beam_angle",
+    "young",
+    "poisson",
+)
 ZERO_CELSIUS = 273.15  # K; S1 Table 1 gives alpha as a function of degrees Celsius
 
 
@@ -52,9 +61,10 @@ def stiffness(a: Any) -> Matrix:
 
     Entries (1, 4), (2, 5) and (3, 6) are those of the paper; its moment entries do not follow from its beam spacing.
     """
-    own = {name: getattr(a, name) for name in STIFFENING}
-    if all(isinstance(value, float) for value in own.values()):
-        return ca.DM(_stiffness_of(**own))  # a model asks for it several times, and a budget for many models
+    dimensions = {name: getattr(a, name) for name in STIFFENING}
+    if all(isinstance(value, float) for value in dimensions.values()):
+        # a model asks for it several times, and a budget for many models
+        return ca.DM(_stiffness_of(**dimensions))
     return _stiffness(a)
 
 

@@ -151,8 +151,8 @@ def read_tables(path: Path) -> list[MeasurementTable]:
     rows = [(line, row) for line, row in rows if any(row) and not row[0].startswith("#")]
     if not rows:
         raise InputError(path, [Fault(path.name, "has no rows; write a header and one row per sample")])
-    if len({len(row) for _, row in rows}) > 1 and (found := _runs_of_numbers(rows, path)):
-        return found
+    if len({len(row) for _, row in rows}) > 1 and (tables := _runs_of_numbers(rows, path)):
+        return tables
     width = len(rows[0][1])
     ragged = [f"line {line} has {len(row)}" for line, row in rows if len(row) != width]
     if ragged:
@@ -181,7 +181,7 @@ def _text_table(path: Path, names: list[str], body: Sequence[tuple[int, list[str
 def _runs_of_numbers(rows: Sequence[tuple[int, list[str]]], path: Path) -> list[MeasurementTable]:
     """The tables among other text: runs of at least `FEWEST_ROWS` rows of numbers of one width. None where rows of numbers of
     different widths follow each other: there the file is damaged."""
-    found: list[MeasurementTable] = []
+    tables: list[MeasurementTable] = []
     above: list[list[str]] = []
     for numeric, group in groupby(rows, key=lambda row: _is_table([row]) and any(row[1])):
         run = list(group)
@@ -195,8 +195,8 @@ def _runs_of_numbers(rows: Sequence[tuple[int, list[str]]], path: Path) -> list[
         if len(set(names)) < width:
             names = [str(k) for k in range(width)]
         if len(run) >= FEWEST_ROWS:
-            found.append(_text_table(path, names, run))
-    return found
+            tables.append(_text_table(path, names, run))
+    return tables
 
 
 def _is_number(cell: str) -> bool:
@@ -321,7 +321,13 @@ def _package(name: str, path: Path) -> ModuleType:
 
 
 READERS: dict[str, Callable[[Path], MeasurementTable]] = {
-    ".csv": read_csv, ".dat": read_csv, ".txt": read_csv,
-    ".mat": read_mat, ".h5": read_hdf5, ".hdf5": read_hdf5, ".tdms": read_tdms, ".mf4": read_mdf4,
+    ".csv": read_csv,
+    ".dat": read_csv,
+    ".txt": read_csv,
+    ".mat": read_mat,
+    ".h5": read_hdf5,
+    ".hdf5": read_hdf5,
+    ".tdms": read_tdms,
+    ".mf4": read_mdf4,
     ".json": read_json,
-}  # fmt: skip
+}

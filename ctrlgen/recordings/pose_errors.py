@@ -62,7 +62,7 @@ class PoseErrors:
 class Parasitic:
     """The poses commanded in one channel alone, in order of command: S0 Figs. 9 and 10.
 
-    `command` (n,) and `measured` (n,) of the channel itself, `own` its error, `others` (n, 5) the errors of the five
+    `command` (n,) and `measured` (n,) of the channel itself, `error` its error, `others` (n, 5) the errors of the five
     other `channels`, which are not commanded to move.
     """
 
@@ -70,7 +70,7 @@ class Parasitic:
     poses: np.ndarray
     command: np.ndarray
     measured: np.ndarray
-    own: np.ndarray
+    error: np.ndarray
     others: np.ndarray
     channels: tuple[str, ...]
 
@@ -91,20 +91,25 @@ def parasitic(commanded: np.ndarray, measured: np.ndarray) -> list[Parasitic]:
     measured, commanded = _two(measured, commanded)
     errors = measured - commanded
     alone = np.count_nonzero(commanded, axis=1) == 1
-    found = []
+    motions = []
     for i, channel in enumerate(CHANNELS):
         poses = np.flatnonzero(alone & (commanded[:, i] != 0))
         if not poses.size:
             continue
         poses = poses[np.argsort(commanded[poses, i], kind="stable")]
         rest = [k for k in range(6) if k != i]
-        found.append(
+        motions.append(
             Parasitic(
-                channel, poses, commanded[poses, i], measured[poses, i], errors[poses, i],
-                errors[poses][:, rest], tuple(CHANNELS[k] for k in rest),
+                channel,
+                poses,
+                commanded[poses, i],
+                measured[poses, i],
+                errors[poses, i],
+                errors[poses][:, rest],
+                tuple(CHANNELS[k] for k in rest),
             )
-        )  # fmt: skip
-    return found
+        )
+    return motions
 
 
 def _two(measured: np.ndarray, expected: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -238,9 +238,14 @@ def rows_between(record: Record, a: int, b: int) -> Record:
     """Rows a to b, half open, of a record."""
     ambient = None if record.ambient is None else record.ambient[a:b]
     return replace(
-        record, time=record.time[a:b], drive=record.drive[a:b], observed=record.observed[a:b], valid=record.valid[a:b],
-        ambient=ambient, spikes=tuple((k - a, i, size) for k, i, size in record.spikes if a <= k < b),
-    )  # fmt: skip
+        record,
+        time=record.time[a:b],
+        drive=record.drive[a:b],
+        observed=record.observed[a:b],
+        valid=record.valid[a:b],
+        ambient=ambient,
+        spikes=tuple((k - a, i, size) for k, i, size in record.spikes if a <= k < b),
+    )
 
 
 def _joined(before: Record, after: Record) -> Record | None:

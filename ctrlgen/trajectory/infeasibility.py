@@ -8,7 +8,8 @@ import numpy as np
 
 from ctrlgen.core.errors import Fault, Infeasibility, InputError, SolverError, Unreachable
 from ctrlgen.core.units import from_si, show, show_difference
-from ctrlgen.model.model import Model, Signal
+from ctrlgen.devices import Signal
+from ctrlgen.model.model import Model
 from ctrlgen.trajectory.alternatives import Alternatives
 from ctrlgen.trajectory.inverse.choice import count_faults
 from ctrlgen.trajectory.inverse.clock import Settled

@@ -15,7 +15,8 @@ import numpy as np
 
 from ctrlgen.core.errors import SolverError
 from ctrlgen.core.units import show
-from ctrlgen.model.model import Limit, Model
+from ctrlgen.devices import Limit
+from ctrlgen.model.model import Model
 from ctrlgen.model.quasi_static import natural_modes
 from ctrlgen.model.simulation import Trace, periodic_start, simulate
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE, check_feasible, unreachable

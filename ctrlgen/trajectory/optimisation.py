@@ -21,8 +21,9 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import SolverError
+from ctrlgen.devices import Limit
 from ctrlgen.model.discretisation import held_step
-from ctrlgen.model.model import Limit, Model
+from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import Trace, trace
 from ctrlgen.numerics.ipopt import IpoptOptions, NonlinearProgramme, solve_nlp
 from ctrlgen.trajectory.inverse.clock import Clock, Sampled, Settled

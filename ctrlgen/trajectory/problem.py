@@ -11,8 +11,9 @@ import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import Quantity, read_quantity, show, written_unit
+from ctrlgen.devices import Signal
 from ctrlgen.model.inverse_dynamics import inverse_dynamics, relative_degrees
-from ctrlgen.model.model import Model, Signal
+from ctrlgen.model.model import Model
 from ctrlgen.model.quasi_static import natural_modes, quasi_static
 from ctrlgen.trajectory.frame import Frame
 from ctrlgen.trajectory.inverse.choice import choose_inverse

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ctrlgen.model.model import Limit, Model
+from ctrlgen.devices import Limit
+from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import Trace
 from ctrlgen.trajectory.inverse.violations import Before, limited_values
 from ctrlgen.trajectory.scenario import Scenario

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from ctrlgen.controller.feedforward import ControllerStatus
+from ctrlgen.controller.controller_step import ControllerStatus
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.core.units import base_unit, show
 from ctrlgen.devices import Limit, Signal

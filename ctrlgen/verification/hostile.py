@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from ctrlgen.controller.feedforward import ControllerStatus
+from ctrlgen.controller.controller_step import ControllerStatus
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.templates import write
 from ctrlgen.firmware.folder import CFolder
-from ctrlgen.firmware.online.online import rates_in_c
+from ctrlgen.firmware.online.limit_tables import rates_in_c
 from ctrlgen.model.model import Model
 from ctrlgen.trajectory.inverse.clock import Sampled
 from ctrlgen.trajectory.scenario import Scenario

@@ -5,9 +5,10 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from ctrlgen.controller.feedforward import SECANT_FRACTION, ControllerStatus
+from ctrlgen.controller.controller_step import ControllerStatus
+from ctrlgen.controller.feedforward import SECANT_FRACTION
 from ctrlgen.firmware.c.real import Real
-from ctrlgen.firmware.online.online import FLOAT_SLACK
+from ctrlgen.firmware.online.limit_tables import FLOAT_SLACK
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import simulate, trace
 from ctrlgen.numerics.newton import newton_solver

@@ -11,7 +11,7 @@ static const float U_LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
 static const float U_HIGH[6] = { 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f }; /* W */
 static const float U_SLACK[6] = { 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f }; /* W */
 static const float U_LEAST[6] = { -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f }; /* admissible, W */
-static const float U_MOST[6] = { 1.000004f, 1.000004f, 1.000004f, 1.000004f, 1.000004f, 1.000004f };
+static const float U_MOST[6] = { 1.000004f, 1.000004f, 1.000004f, 1.000004f, 1.000004f, 1.000004f }; /* admissible, W */
 static const float U_SAFE[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
 static const float X_REST[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
 
@@ -336,12 +336,22 @@ static int drive_inside(const float value[6])
     return (((d0 * d0) <= 0.24999952f) && ((d1 * d1) <= 0.24999952f) && ((d2 * d2) <= 0.24999952f) && ((d3 * d3) <= 0.24999952f) && ((d4 * d4) <= 0.24999952f) && ((d5 * d5) <= 0.24999952f)) ? 1 : 0;
 }
 
+/* 1 if a number of the state is NaN, infinite or far beyond its range. Asked first where displacements depend on the state or effects
+ * remember, else where a limit is met: until then it would show in the drives, or is written anew. Numbers with one range are judged
+ * together: the sum of their squares is at most their count times (4 times the largest magnitude of the range) squared. */
+static int is_lost(const mems_hexapod_online_f32_state *state)
+{
+    const float squares0 = (((((state->x[0] * state->x[0]) + (state->x[1] * state->x[1])) + (state->x[2] * state->x[2])) + (state->x[3] * state->x[3])) + (state->x[4] * state->x[4])) + (state->x[5] * state->x[5]);
+    const float squares1 = (((((state->z[0] * state->z[0]) + (state->z[1] * state->z[1])) + (state->z[2] * state->z[2])) + (state->z[3] * state->z[3])) + (state->z[4] * state->z[4])) + (state->z[5] * state->z[5]);
+    return ((squares0 <= 6.504729e+07f) && (squares1 <= 2.904e-07f)) ? 0 : 1;
+}
+
 /* Clips value to low ... high; 1 if a component changed by more than its slack or was NaN. */
-static int limit_all(float value[6], const float low[6], const float high[6], const float slack[6])
+static int limit_all(float value[], const float low[], const float high[], const float slack[], int count)
 {
     int hit = 0;
     int i;
-    for (i = 0; i < 6; i++) {
+    for (i = 0; i < count; i++) {
         const float wanted = value[i];
         const float raised = (wanted > low[i]) ? wanted : low[i];
         const float limited = (raised < high[i]) ? raised : high[i];
@@ -360,14 +370,15 @@ static int limit_displacement(float value[6])
     static const float LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* m */
     static const float HIGH[6] = { 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f }; /* m */
     static const float SLACK[6] = { 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f }; /* m */
-    return limit_all(value, LOW, HIGH, SLACK);
+    return limit_all(value, LOW, HIGH, SLACK, 6);
 }
 
 /* 1 if every drive is within its limits or beyond by no more than the slack. */
-static int drives_admissible(const float drive[6])
+static int drives_admissible(const mems_hexapod_online_f32_state *state, const float drive[6])
 {
     int admissible = 1;
     int i;
+    (void)state;
     for (i = 0; i < 6; i++) {
         if (!((drive[i] <= U_MOST[i]) && (drive[i] >= U_LEAST[i]))) {
             admissible = 0;
@@ -390,11 +401,14 @@ static int is_usable(const float target[6])
     return usable;
 }
 
-/* Scales a displacement that breaks wire flexure stress toward home: 0 untouched, 1 scaled, 2 scaled by more than the slack. */
-static int limit_composite(const mems_hexapod_online_f32_state *state, float wanted[6])
+/* Scales a displacement that breaks a composite limit toward home, several times where the limited quantity is not proportional to it: 0
+ * untouched, 1 scaled, 2 scaled by more than the slack. */
+static int scale_home(const mems_hexapod_online_f32_state *state, float wanted[6])
 {
     int hit = 0;
-    if (!(composite_bound(wanted) <= 1.0f)) {
+    int round;
+    (void)state;
+    for (round = 0; round < 1; round++) {
         float share[12];
         float worst;
         int i;
@@ -404,34 +418,43 @@ static int limit_composite(const mems_hexapod_online_f32_state *state, float wan
             worst = (share[i] > worst) ? share[i] : worst;
         }
         if (worst > 1.0f) {
+            int scaled = 1;
             worst = square_root(worst);
             if (worst > 1.000004f) {
-                hit = 2;
-            } else {
-                hit = 1;
+                scaled = 2;
             }
+            hit = (scaled > hit) ? scaled : hit;
             for (i = 0; i < 6; i++) {
                 wanted[i] = wanted[i] / worst;
             }
         }
     }
-    (void)state;
     return hit;
 }
 
-/* The displacement in range whose platform pose is nearest to that of the displacement beyond, to first order, from beyond clipped to
- * the range: 3 sweeps of projected coordinate descent (C. Hildreth, Naval Res. Logist. Quart. 4 (1957) 79) on |W (value - beyond)|^2,
- * W the slope of the platform pose at home. */
+/* The same where a cheap bound does not show that every composite limit is kept. */
+static int limit_composite(const mems_hexapod_online_f32_state *state, float wanted[6])
+{
+    int hit = 0;
+    if (!(composite_bound(wanted) <= 1.0f)) {
+        hit = scale_home(state, wanted);
+    }
+    return hit;
+}
+
+/* The displacement in range whose followed signal is nearest to that of the displacement beyond, to first order, from beyond clipped to
+ * the range: sweeps of projected coordinate descent (C. Hildreth, Naval Res. Logist. Quart. 4 (1957) 79) on |W (value - beyond)|^2,
+ * W the slope of the followed signal at home. */
 static void nearest_displacement(const float beyond[6], float value[6])
 {
-    static const float P[6][6] = { /* H_ij/H_jj of H = W^T W */
+    static const float P[6][6] = {
         { 1.0f, 0.49971864f, -0.2363756f, -0.07558483f, -0.2363756f, -0.20494296f },
         { 1.1193434f, 1.0f, -0.45906138f, -0.25956145f, -0.16930602f, -0.25956145f },
         { -0.2363756f, -0.20494296f, 1.0f, 0.49971864f, -0.2363756f, -0.07558483f },
         { -0.16930602f, -0.25956145f, 1.1193434f, 1.0f, -0.45906138f, -0.25956145f },
         { -0.2363756f, -0.07558483f, -0.2363756f, -0.20494296f, 1.0f, 0.49971864f },
         { -0.45906138f, -0.25956145f, -0.16930602f, -0.25956145f, 1.1193434f, 1.0f }
-    };
+    }; /* H_ij/H_jj of H = W^T W */
     static const float LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* m */
     static const float HIGH[6] = { 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f }; /* m */
     float slope[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f };
@@ -465,36 +488,48 @@ static void nearest_displacement(const float beyond[6], float value[6])
     }
 }
 
-/* Actuator state (limited) and drives (not limited) that out->displacement needs. */
-static void wanted_drives(const mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
+/* Actuator state (limited) and drives (not limited) that out->displacement needs: with settling at rest, else at the next sample. */
+static void wanted_drives(const mems_hexapod_online_f32_state *state, int settling, mems_hexapod_online_f32_output *out)
 {
+    (void)state;
+    (void)settling;
     wanted_state(out->displacement, out->state);
     step_drive(state->x, out->state, out->drive);
 }
 
-/* Line search from origin toward out->displacement, whose drives are inadmissible: 3 secants of the drive that is first
+/* Line search from origin toward out->displacement, whose drives are inadmissible: secants of the drive that is first
  * at its limit. Leaves the farthest admissible displacement found and its drives; 1 if even those of origin are inadmissible. */
-static int line_search(const mems_hexapod_online_f32_state *state, const float origin[6], mems_hexapod_online_f32_output *out)
+static int line_search(const mems_hexapod_online_f32_state *state, int settling, const float origin[6], mems_hexapod_online_f32_output *out)
 {
     float direction[6];
     float at_target[6];
     int i;
     for (i = 0; i < 6; i++) {
         direction[i] = out->displacement[i] - origin[i];
-        at_target[i] = out->drive[i];
         out->displacement[i] = origin[i];
     }
-    wanted_drives(state, out);
-    if (drives_admissible(out->drive) != 0) {
+    for (i = 0; i < 6; i++) {
+        at_target[i] = out->drive[i];
+    }
+    wanted_drives(state, settling, out);
+    if (drives_admissible(state, out->drive) != 0) {
         float at_start[6];
         float state_at_start[6];
         float accepted = 0.0f;
         float rejected = 1.0f;
         int trial;
-        for (i = 0; i < 6; i++) {
-            at_start[i] = out->drive[i];
-            state_at_start[i] = out->state[i];
-        }
+        at_start[0] = out->drive[0];
+        at_start[1] = out->drive[1];
+        at_start[2] = out->drive[2];
+        at_start[3] = out->drive[3];
+        at_start[4] = out->drive[4];
+        at_start[5] = out->drive[5];
+        state_at_start[0] = out->state[0];
+        state_at_start[1] = out->state[1];
+        state_at_start[2] = out->state[2];
+        state_at_start[3] = out->state[3];
+        state_at_start[4] = out->state[4];
+        state_at_start[5] = out->state[5];
         for (trial = 0; trial < 3; trial++) {
             float share = 1.0f;
             float fraction;
@@ -510,13 +545,21 @@ static int line_search(const mems_hexapod_online_f32_state *state, const float o
             for (i = 0; i < 6; i++) {
                 out->displacement[i] = origin[i] + (fraction * direction[i]);
             }
-            wanted_drives(state, out);
-            if (drives_admissible(out->drive) != 0) {
+            wanted_drives(state, settling, out);
+            if (drives_admissible(state, out->drive) != 0) {
                 accepted = fraction;
-                for (i = 0; i < 6; i++) {
-                    at_start[i] = out->drive[i];
-                    state_at_start[i] = out->state[i];
-                }
+                at_start[0] = out->drive[0];
+                at_start[1] = out->drive[1];
+                at_start[2] = out->drive[2];
+                at_start[3] = out->drive[3];
+                at_start[4] = out->drive[4];
+                at_start[5] = out->drive[5];
+                state_at_start[0] = out->state[0];
+                state_at_start[1] = out->state[1];
+                state_at_start[2] = out->state[2];
+                state_at_start[3] = out->state[3];
+                state_at_start[4] = out->state[4];
+                state_at_start[5] = out->state[5];
             } else {
                 rejected = fraction;
                 for (i = 0; i < 6; i++) {
@@ -526,11 +569,15 @@ static int line_search(const mems_hexapod_online_f32_state *state, const float o
         }
         for (i = 0; i < 6; i++) {
             out->displacement[i] = origin[i] + (accepted * direction[i]);
+        }
+        for (i = 0; i < 6; i++) {
             out->drive[i] = at_start[i];
+        }
+        for (i = 0; i < 6; i++) {
             out->state[i] = state_at_start[i];
         }
     }
-    return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
+    return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, 6);
 }
 
 void mems_hexapod_online_f32_init(mems_hexapod_online_f32_state *state)
@@ -547,16 +594,6 @@ void mems_hexapod_online_f32_init(mems_hexapod_online_f32_state *state)
     }
 }
 
-/* 1 if a number of the state is NaN, infinite or far beyond its range. Asked first where displacements depend on the state or effects
- * remember, else where a limit is met: until then it would show in the drives, or is written anew. Numbers with one range are judged
- * together: the sum of their squares is at most their count times (4 times the largest magnitude of the range) squared. */
-static int is_lost(const mems_hexapod_online_f32_state *state)
-{
-    const float squares0 = (((((state->x[0] * state->x[0]) + (state->x[1] * state->x[1])) + (state->x[2] * state->x[2])) + (state->x[3] * state->x[3])) + (state->x[4] * state->x[4])) + (state->x[5] * state->x[5]);
-    const float squares1 = (((((state->z[0] * state->z[0]) + (state->z[1] * state->z[1])) + (state->z[2] * state->z[2])) + (state->z[3] * state->z[3])) + (state->z[4] * state->z[4])) + (state->z[5] * state->z[5]);
-    return ((squares0 <= 6.504729e+07f) && (squares1 <= 2.904e-07f)) ? 0 : 1;
-}
-
 /* The answer to a lost state: the safe drive, under which the device comes to rest. The state stays lost until it is initialised. */
 static uint32_t set_lost(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
@@ -564,26 +601,51 @@ static uint32_t set_lost(mems_hexapod_online_f32_state *state, mems_hexapod_onli
     state->ready = 0U;
     for (i = 0; i < 6; i++) {
         out->drive[i] = U_SAFE[i];
+    }
+    for (i = 0; i < 6; i++) {
         out->displacement[i] = 0.0f;
+    }
+    for (i = 0; i < 6; i++) {
         out->state[i] = X_REST[i];
     }
     return MEMS_HEXAPOD_ONLINE_F32_LOST;
 }
 
-/* Without a usable target: the safe drive, and the state it leads to. */
+/* Without a usable target: the safe drive, as fast as it may change, and the state that it leads to. */
 static void settle_safe(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
     int i;
     for (i = 0; i < 6; i++) {
         out->drive[i] = U_SAFE[i];
+    }
+    for (i = 0; i < 6; i++) {
         out->displacement[i] = state->z[i];
+    }
+    for (i = 0; i < 6; i++) {
         out->state[i] = state->x[i];
     }
     wanted_advance(out->drive, state->x);
     balance_displacement(state->x, out->displacement, state->z);
 }
 
-/* Drives for out->displacement with every limit kept; advances the state to the next sample. */
+/* The state becomes that of the next sample. */
+static void settle_proceed(mems_hexapod_online_f32_state *state, const mems_hexapod_online_f32_output *out)
+{
+    state->x[0] = out->state[0];
+    state->x[1] = out->state[1];
+    state->x[2] = out->state[2];
+    state->x[3] = out->state[3];
+    state->x[4] = out->state[4];
+    state->x[5] = out->state[5];
+    state->z[0] = out->displacement[0];
+    state->z[1] = out->displacement[1];
+    state->z[2] = out->displacement[2];
+    state->z[3] = out->displacement[3];
+    state->z[4] = out->displacement[4];
+    state->z[5] = out->displacement[5];
+}
+
+/* Drives for out->displacement with every limit kept; the state becomes that of the next sample. */
 static uint32_t settle_within(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
     uint32_t status = 0U;
@@ -604,22 +666,11 @@ static uint32_t settle_within(mems_hexapod_online_f32_state *state, mems_hexapod
             status = set_lost(state, out);
             lost = 1;
         } else {
-            (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK); /* no displacement in range needs more than rounding beyond */
+            (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, 6);
         }
     }
     if (lost == 0) {
-        state->x[0] = out->state[0];
-        state->x[1] = out->state[1];
-        state->x[2] = out->state[2];
-        state->x[3] = out->state[3];
-        state->x[4] = out->state[4];
-        state->x[5] = out->state[5];
-        state->z[0] = out->displacement[0];
-        state->z[1] = out->displacement[1];
-        state->z[2] = out->displacement[2];
-        state->z[3] = out->displacement[3];
-        state->z[4] = out->displacement[4];
-        state->z[5] = out->displacement[5];
+        settle_proceed(state, out);
     }
     return status;
 }
@@ -650,29 +701,72 @@ uint32_t mems_hexapod_online_f32_settle(mems_hexapod_online_f32_state *state, co
             if ((hit != 0) && (status != MEMS_HEXAPOD_ONLINE_F32_LOST)) {
                 status |= MEMS_HEXAPOD_ONLINE_F32_DISPLACEMENT;
             }
-        } else if (is_lost(state) != 0) {
-            status = set_lost(state, out);
         } else {
-            settle_safe(state, out);
+            if (is_lost(state) != 0) {
+                status = set_lost(state, out);
+            } else {
+                settle_safe(state, out);
+            }
         }
     }
     return status;
 }
 
-/* Without a usable target: the safe drive, and the state it leads to. */
+/* Without a usable target: the safe drive, as fast as it may change, and the state that it leads to. */
 static void step_safe(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
     int i;
     for (i = 0; i < 6; i++) {
         out->drive[i] = U_SAFE[i];
+    }
+    for (i = 0; i < 6; i++) {
         out->displacement[i] = state->z[i];
+    }
+    for (i = 0; i < 6; i++) {
         out->state[i] = state->x[i];
     }
     step_advance(state->x, out->drive, state->x);
     balance_displacement(state->x, out->displacement, state->z);
 }
 
-/* Drives for out->displacement with every limit kept; advances the state to the next sample. */
+/* Keeps the limits of drives that out->drive does not keep; limited is 1 then if the device does not come to out->displacement. */
+static uint32_t step_limit_drives(const mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out, int *limited)
+{
+    uint32_t status = 0U;
+    if (drives_admissible(state, out->drive) != 0) {
+        (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, 6);
+    } else {
+        *limited = line_search(state, 0, state->z, out);
+        status = MEMS_HEXAPOD_ONLINE_F32_DRIVE;
+    }
+    return status;
+}
+
+/* The state becomes that of the next sample; so does out->displacement, which the device does not come to where limited is 1. */
+static void step_proceed(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out, int limited)
+{
+    if (limited != 0) {
+        step_advance(state->x, out->drive, state->x);
+    } else { /* the drive was computed for these; one by one, because a loop costs a small core twice as much */
+        state->x[0] = out->state[0];
+        state->x[1] = out->state[1];
+        state->x[2] = out->state[2];
+        state->x[3] = out->state[3];
+        state->x[4] = out->state[4];
+        state->x[5] = out->state[5];
+    }
+    if (limited != 0) {
+        balance_displacement(state->x, out->displacement, out->displacement);
+    }
+    state->z[0] = out->displacement[0];
+    state->z[1] = out->displacement[1];
+    state->z[2] = out->displacement[2];
+    state->z[3] = out->displacement[3];
+    state->z[4] = out->displacement[4];
+    state->z[5] = out->displacement[5];
+}
+
+/* Drives for out->displacement with every limit kept; the state becomes that of the next sample. */
 static uint32_t step_within(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
     uint32_t status = 0U;
@@ -693,31 +787,12 @@ static uint32_t step_within(mems_hexapod_online_f32_state *state, mems_hexapod_o
         if (is_lost(state) != 0) {
             status = set_lost(state, out);
             lost = 1;
-        } else if (drives_admissible(out->drive) != 0) {
-            (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK);
         } else {
-            limited = line_search(state, state->z, out);
-            status |= MEMS_HEXAPOD_ONLINE_F32_DRIVE;
+            status |= step_limit_drives(state, out, &limited);
         }
     }
     if (lost == 0) {
-        if (limited != 0) {
-            step_advance(state->x, out->drive, state->x);
-            balance_displacement(state->x, out->displacement, out->displacement);
-        } else { /* the drive was computed for these; one by one, because a loop costs a small core twice as much */
-            state->x[0] = out->state[0];
-            state->x[1] = out->state[1];
-            state->x[2] = out->state[2];
-            state->x[3] = out->state[3];
-            state->x[4] = out->state[4];
-            state->x[5] = out->state[5];
-        }
-        state->z[0] = out->displacement[0];
-        state->z[1] = out->displacement[1];
-        state->z[2] = out->displacement[2];
-        state->z[3] = out->displacement[3];
-        state->z[4] = out->displacement[4];
-        state->z[5] = out->displacement[5];
+        step_proceed(state, out, limited);
     }
     return status;
 }
@@ -748,11 +823,14 @@ uint32_t mems_hexapod_online_f32_step(mems_hexapod_online_f32_state *state, cons
             if ((hit != 0) && (status != MEMS_HEXAPOD_ONLINE_F32_LOST)) {
                 status |= MEMS_HEXAPOD_ONLINE_F32_DISPLACEMENT;
             }
-        } else if (is_lost(state) != 0) {
-            status = set_lost(state, out);
         } else {
-            step_safe(state, out);
+            if (is_lost(state) != 0) {
+                status = set_lost(state, out);
+            } else {
+                step_safe(state, out);
+            }
         }
     }
     return status;
 }
+

@@ -54,13 +54,13 @@ class Condensed:
         self.elements: list[Element] = []
         self.cubics: list[CubicSpring] = []
         for k, (e, R, end) in enumerate(zip(device.placed_elements, self.frames, self.ends, strict=True)):
-            own = p.element[e.index]
-            C = e.section.compliance(own, self.materials.get(getattr(e.section, "material", ""), SimpleNamespace()))
+            numbers = p.element[e.index]
+            C = e.section.compliance(numbers, self.materials.get(getattr(e.section, "material", ""), SimpleNamespace()))
             if C is not None and float(ca.det(e.turn)) < 0:
                 C = ca.mtimes([REFLECTED, C, -REFLECTED])
             self.compliances.append(C)
-            self.elements.append(Element(e.first, e.second, move(e.section.stiffness(C, own), R, end)))
-            for place, k3 in e.section.cubic_terms(own).items():
+            self.elements.append(Element(e.first, e.second, move(e.section.stiffness(C, numbers), R, end)))
+            for place, k3 in e.section.cubic_terms(numbers).items():
                 row, wrench = inverse_adjoint(R, end)[place, :], adjoint(R, end)[:, (place + 3) % 6]
                 self.cubics.append(CubicSpring(k, row, wrench, k3))
         self.directions = [
@@ -145,8 +145,8 @@ class Condensed:
     @property
     def held_stiffness(self) -> Matrix:
         """(n, n) force on the axes per displacement of them at home, with that of the actuators beside their force."""
-        own = [getattr(self.p.actuator[a.index], "stiffness", None) for a in self.device.placed_actuators]
-        return self.stiffness + ca.diag(ca.vertcat(*(0.0 if k is None else k for k in own)))
+        stiffnesses = [getattr(self.p.actuator[a.index], "stiffness", None) for a in self.device.placed_actuators]
+        return self.stiffness + ca.diag(ca.vertcat(*(0.0 if k is None else k for k in stiffnesses)))
 
     def restoring_force(self, d: Matrix) -> Matrix:
         """(n,) force that pulls the axes home from `d` (n,), that of cubic springs included."""
@@ -156,15 +156,15 @@ class Condensed:
     def body_mass(self, number: int) -> Matrix | None:
         """(6, 6) of a body, twist -> (angular momentum; momentum) at the global origin; None of one without a mass."""
         placed = self.device.placed_bodies[number]
-        own = self.p.body[placed.index]
-        if own.mass is None:
+        numbers = self.p.body[placed.index]
+        if numbers.mass is None:
             return None
-        R, centre = placed.turn, ca.DM.zeros(3) if own.centre is None else ca.vertcat(*own.centre)
+        R, centre = placed.turn, ca.DM.zeros(3) if numbers.centre is None else ca.vertcat(*numbers.centre)
         S = ca.skew(ca.mtimes(R, centre))
-        about = ca.mtimes([R, ca.diag(ca.vertcat(*own.inertia)), R.T]) - own.mass * ca.mtimes(S, S)
+        about = ca.mtimes([R, ca.diag(ca.vertcat(*numbers.inertia)), R.T]) - numbers.mass * ca.mtimes(S, S)
         return ca.vertcat(
-            ca.horzcat(about, own.mass * S), ca.horzcat(-own.mass * S, own.mass * ca.DM.eye(3))
-        )  # fmt: skip
+            ca.horzcat(about, numbers.mass * S), ca.horzcat(-numbers.mass * S, numbers.mass * ca.DM.eye(3))
+        )
 
     def flexure_mass(self, k: int, first: Matrix, second: Matrix) -> Matrix | None:
         """(m, m) of element k whose ends move by the twists `first` and `second` (6, m); None of one without a mass: those that are not
@@ -190,12 +190,12 @@ class Condensed:
         n = len(self.directions)
         M = ca.SX.zeros(n, n)
         for number, T in enumerate(self.twists):
-            if (own := self.body_mass(number)) is not None:
-                M += ca.mtimes([T[:, :n].T, own, T[:, :n]])
+            if (inertia := self.body_mass(number)) is not None:
+                M += ca.mtimes([T[:, :n].T, inertia, T[:, :n]])
         for k, e in enumerate(self.elements):
             first, second = (ca.SX.zeros(6, n) if b == GROUND else self.twists[b][:, :n] for b in (e.first, e.second))
-            if (own := self.flexure_mass(k, first, second)) is not None:
-                M += own
+            if (inertia := self.flexure_mass(k, first, second)) is not None:
+                M += inertia
         return M
 
     def point(self, a: Placed) -> Matrix:
@@ -295,8 +295,8 @@ class Condensed:
         for k, e in enumerate(self.device.placed_elements):
             if getattr(e.section, "material", None) != material:
                 continue
-            own = self.p.element[e.index]
-            for section in e.section.sections(own):
+            numbers = self.p.element[e.index]
+            for section in e.section.sections(numbers):
                 place = self.ends[k] - section.back * self.frames[k][:, 0]
                 load = ca.mtimes(inverse_adjoint(self.frames[k], place), self.wrench(k))
                 parts = (ca.mtimes(part, q) for part in section.stresses(load))

@@ -33,15 +33,15 @@ class Transduction:
 
     def limits(self, signal: SimpleNamespace) -> list[Limit]:
         """The ranges of drive and state, axis by axis."""
-        found = []
+        limits = []
         for name, of, expr, ranges in (
             ("drive", self.drive, signal.drive, self.drive_range),
             ("output" if self.power is None else "temperature", self.state, signal.state, self.state_range),
         ):
             if of is not None:
                 for i, (axis, unit, span) in enumerate(zip(of.channels, of.units, ranges, strict=True)):
-                    found.append(Limit(f"{name}_{axis}", f"{of.label} of {axis}", (axis,), unit, expr[i], *span))
-        return found
+                    limits.append(Limit(f"{name}_{axis}", f"{of.label} of {axis}", (axis,), unit, expr[i], *span))
+        return limits
 
 
 def transduction(c: Condensed) -> Transduction:
@@ -52,19 +52,26 @@ def transduction(c: Condensed) -> Transduction:
 def _proportional(c: Condensed) -> Transduction:
     """Force or displacement are the drive times the gain, at once or with a lag of first order."""
     actuators = c.device.placed_actuators
-    own, sections = [c.p.actuator[a.index] for a in actuators], [a.section for a in actuators]
+    numbers, sections = [c.p.actuator[a.index] for a in actuators], [a.section for a in actuators]
     axes, units = tuple(a.name for a in actuators), tuple(written_unit(s.low.text) for s in sections)
     ranges = tuple((s.low.si, s.high.si) for s in sections)
     sizes = tuple(max(map(abs, span)) for span in ranges)
-    gain, lags = ca.vertcat(*(q.gain for q in own)), [q.time_constant for q in own]
+    gain, lags = ca.vertcat(*(q.gain for q in numbers)), [q.time_constant for q in numbers]
     drive = Signal("drive", "drive", axes, units, "u_", ca.SX.sym("u", len(axes)), sizes)
     scale = float(max(abs(s.gain.si) * size for s, size in zip(sections, sizes, strict=True)))
     if any(tau is None for tau in lags):  # all of them, or none
         return Transduction(drive, ranges, lambda u, x: gain * u, scale)
     state = Signal("state", "amplifier output", axes, units, "x_", ca.SX.sym("x", len(axes)), sizes)
     return Transduction(
-        drive, ranges, lambda u, x: gain * x, scale, state, (0.0,) * len(axes), ranges, lambda x, u: (u - x) / ca.vertcat(*lags)
-    )  # fmt: skip
+        drive,
+        ranges,
+        lambda u, x: gain * x,
+        scale,
+        state,
+        (0.0,) * len(axes),
+        ranges,
+        lambda x, u: (u - x) / ca.vertcat(*lags),
+    )
 
 
 def _heated(c: Condensed) -> Transduction:
@@ -72,7 +79,7 @@ def _heated(c: Condensed) -> Transduction:
     actuators, n = c.device.placed_actuators, len(c.device.placed_actuators)
     axes, sections = tuple(a.name for a in actuators), [a.section for a in actuators]
     volts = sections[0].heater_resistance is not None  # of all, or of none
-    own, nominal = _heaters(c, c.p), _heaters(c, c.device.values())
+    heaters, nominal = _heaters(c, c.p), _heaters(c, c.device.values())
     highest = [s.power_limit.si for s in sections]
     if volts:
         highest = [(s.power_limit.si * s.heater_resistance.si) ** 0.5 for s in sections]
@@ -82,26 +89,33 @@ def _heated(c: Condensed) -> Transduction:
     hottest = max(float(thermal_actuator.force(a.temperature_limit, a)) for a in nominal)
 
     def rates(T: ca.SX, P: ca.SX) -> ca.SX:
-        return ca.vertcat(*(thermal_actuator.temperature_rate(T[i], P[i], a) for i, a in enumerate(own)))
+        return ca.vertcat(*(thermal_actuator.temperature_rate(T[i], P[i], a) for i, a in enumerate(heaters)))
 
     def force(u: ca.SX, T: ca.SX) -> ca.SX:
-        return ca.vertcat(*(thermal_actuator.force(T[i], a) for i, a in enumerate(own)))
+        return ca.vertcat(*(thermal_actuator.force(T[i], a) for i, a in enumerate(heaters)))
 
     def heat(u: ca.SX) -> ca.SX:
-        return u**2 / ca.vertcat(*(a.heater_resistance for a in own)) if volts else u
+        return u**2 / ca.vertcat(*(a.heater_resistance for a in heaters)) if volts else u
 
     return Transduction(
-        drive, tuple((0.0, most) for most in highest), force, hottest, state, tuple(a.ambient for a in own),
-        tuple((s.ambient.si, s.temperature_limit.si) for s in sections), rates, heat,
+        drive,
+        tuple((0.0, most) for most in highest),
+        force,
+        hottest,
+        state,
+        tuple(a.ambient for a in heaters),
+        tuple((s.ambient.si, s.temperature_limit.si) for s in sections),
+        rates,
+        heat,
         AxisSignal("heater power", "W", "P_", max(s.power_limit.si for s in sections)),
-    )  # fmt: skip
+    )
 
 
 def _heaters(c: Condensed, p: SimpleNamespace) -> list[SimpleNamespace]:
     """The numbers of each heater, its beams and their material among `p`, as `physics.thermal_actuator` reads them."""
-    found, materials = [], [m.name for m in c.device.material]
+    heaters, materials = [], [m.name for m in c.device.material]
     for a in c.device.placed_actuators:
         beams = c.device.placed_elements[c.element_of(a)]
         numbers = vars(p.element[beams.index]) | vars(p.material[materials.index(beams.section.material)])
-        found.append(SimpleNamespace(**numbers | vars(p.actuator[a.index])))
-    return found
+        heaters.append(SimpleNamespace(**numbers | vars(p.actuator[a.index])))
+    return heaters

@@ -70,10 +70,13 @@ class Mechanism(Device):
             raise ValueError("; ".join(f"{key}: there is none; add a [[{key}]] table" for key in empty))
         faults: list[str] = []
         for what, names in {
-            "material": [m.name for m in self.material], "pattern": [q.name for q in self.pattern], "body": list(self.bodies),
-            "element": [e.name for e in self.element], "actuator": [a.name for a in self.actuator],
+            "material": [m.name for m in self.material],
+            "pattern": [q.name for q in self.pattern],
+            "body": list(self.bodies),
+            "element": [e.name for e in self.element],
+            "actuator": [a.name for a in self.actuator],
             "reading": [*self.output.channels, *(r.name for r in self._copies(self.reading))],
-        }.items():  # fmt: skip
+        }.items():
             faults += [f"{what}: {name!r} is named twice" for name in dict.fromkeys(names) if names.count(name) > 1]
         if GROUND_NAME in self.bodies:
             faults.append('body: "ground" is the name of what does not move; choose another one')
@@ -175,9 +178,10 @@ class Mechanism(Device):
             ]
         least = MOVED * max(a.travel.si for a in self.actuator)
         unread = [
-            r.name for r, seen in zip(self.placed_readings, self.reading_scale, strict=True)
+            r.name
+            for r, seen in zip(self.placed_readings, self.reading_scale, strict=True)
             if seen * (1.0 if r.section.about is None else self.size) <= least
-        ]  # fmt: skip
+        ]
         return (
             [f"reading: no actuator moves what {', '.join(unread)} reads; read in another direction"] if unread else []
         )
@@ -188,8 +192,9 @@ class Mechanism(Device):
         for k, e in enumerate(self.element):
             faults += [
                 f"element[{k}].{key}: {name!r} is no body" + (f" with the pattern {e.pattern!r}" if e.pattern else "")
-                for key, name in (("from", e.from_), ("to", e.to)) if self._number(name, e.pattern, 1) is None
-            ]  # fmt: skip
+                for key, name in (("from", e.from_), ("to", e.to))
+                if self._number(name, e.pattern, 1) is None
+            ]
             if isinstance(e, Flexible) and e.material not in materials:
                 faults.append(f"element[{k}].material: {e.material!r} is no material")
         elements = {e.name: e for e in self.element}
@@ -212,13 +217,15 @@ class Mechanism(Device):
                 continue
             faults += [
                 f"actuator[{k}].{key}: {name!r} is no body"
-                for key, name in (("on", a.on), ("against", a.against)) if self._number(name, a.pattern, 1) is None
-            ]  # fmt: skip
+                for key, name in (("on", a.on), ("against", a.against))
+                if self._number(name, a.pattern, 1) is None
+            ]
         for k, r in enumerate(self.reading):
             faults += [
                 f"reading[{k}].{key}: {name!r} is no body" + (f" with the pattern {r.pattern!r}" if r.pattern else "")
-                for key, name in (("body", r.body), ("against", r.against)) if self._number(name, r.pattern, 1) is None
-            ]  # fmt: skip
+                for key, name in (("body", r.body), ("against", r.against))
+                if self._number(name, r.pattern, 1) is None
+            ]
         if self.output.body not in self.bodies:
             faults.append(f"output.body: {self.output.body!r} is no body; there are {', '.join(self.bodies)}")
         return faults
@@ -283,13 +290,13 @@ class Mechanism(Device):
     @cached_property
     def placed_actuators(self) -> tuple[Placed, ...]:
         """Every copy of every actuator; one that prescribes a displacement names an element and no bodies, a heater those of its."""
-        found, elements = [], {e.name: e for e in self.element}
+        placed, elements = [], {e.name: e for e in self.element}
         for c in self._copies(self.actuator):
             ends = (
                 (c.section, "against", "on") if c.section.kind != "thermal" else (elements[c.section.on], "from_", "to")
             )
-            found.append(self._between(c, *(getattr(ends[0], key) for key in ends[1:])))
-        return tuple(found)
+            placed.append(self._between(c, *(getattr(ends[0], key) for key in ends[1:])))
+        return tuple(placed)
 
     @cached_property
     def channel_scale(self) -> tuple[float, ...]:
@@ -355,8 +362,9 @@ class Mechanism(Device):
         dense = {m.name for m in self.material if m.density is not None}
         light = [
             f"{e.name}: a hinge has no mass of its own; count it to the bodies that it joins"
-            for e in hinges if e.material in dense
-        ]  # fmt: skip
+            for e in hinges
+            if e.material in dense
+        ]
         return [f"{e.name}: {note}" for e in hinges for note in e.hinge.notes()] + light + inertia_remarks(self)
 
     def physics(self, p: SimpleNamespace) -> DevicePhysics:

@@ -28,11 +28,11 @@ def mechanism_physics(c: Condensed) -> DevicePhysics:
         return {"linear": linear, "cubic": springs - linear} if c.cubics else {}
 
     def limits(signal: SimpleNamespace) -> list[Limit]:
-        found = acting.limits(signal)
+        limited = acting.limits(signal)
         for i, (axis, s) in enumerate(zip(axes, sections, strict=True)):
             d, reach = signal.displacement[i], s.travel.si
-            found.append(Limit(f"travel_{axis}", f"travel of {axis}", (axis,), "um", d, -reach, reach))
-        return found + _flexure_limits(c, signal.mechanism_displacement)
+            limited.append(Limit(f"travel_{axis}", f"travel of {axis}", (axis,), "um", d, -reach, reach))
+        return limited + _flexure_limits(c, signal.mechanism_displacement)
 
     J, channels, second = c.jacobian, device.output.channels, SecondOrder(c)
     bent = device.second_order
@@ -46,27 +46,44 @@ def mechanism_physics(c: Condensed) -> DevicePhysics:
         return linear + second.pose(d) if bent else linear
 
     common: dict[str, Any] = dict(
-        axes=axes, components=channels, pose_units=tuple("urad" if name.startswith("theta") else "um" for name in channels),
-        pose_scale=device.channel_scale, drive=acting.drive, state=acting.state, rest=acting.rest,
-        displacement_scale=max(s.travel.si for s in sections), bipolar=any(low < 0 for low, _ in acting.drive_range),
-        force_scale=acting.force_scale, force_unit="N" if c.pushes else "um",
-        restoring_force=restoring_force, restoring_force_parts=restoring_force_parts,
-        pose=pose, limits=limits, sensed=_sensed(c, second if bent else None),
+        axes=axes,
+        components=channels,
+        pose_units=tuple("urad" if name.startswith("theta") else "um" for name in channels),
+        pose_scale=device.channel_scale,
+        drive=acting.drive,
+        state=acting.state,
+        rest=acting.rest,
+        displacement_scale=max(s.travel.si for s in sections),
+        bipolar=any(low < 0 for low, _ in acting.drive_range),
+        force_scale=acting.force_scale,
+        force_unit="N" if c.pushes else "um",
+        restoring_force=restoring_force,
+        restoring_force_parts=restoring_force_parts,
+        pose=pose,
+        limits=limits,
+        sensed=_sensed(c, second if bent else None),
         second_order_kinematics=None if bent or c.cubics else second.pose,
         rate_limits=tuple(
             rate_limit(acting.drive, i, s.rate[0].si, s.rate[1].si, written_unit(s.rate[1].text))
-            for i, s in enumerate(sections) if getattr(s, "rate", None) is not None
+            for i, s in enumerate(sections)
+            if getattr(s, "rate", None) is not None
         ),
-    )  # fmt: skip
+    )
     if p.dynamics is None:
         return BalancedPhysics(
-            **common, force=lambda u, x, d: acting.force(u, x), rates=acting.rates, heating_power=acting.heat, power=acting.power
-        )  # fmt: skip
+            **common,
+            force=lambda u, x, d: acting.force(u, x),
+            rates=acting.rates,
+            heating_power=acting.heat,
+            power=acting.power,
+        )
     D = modal_damping(c.mass, c.held_stiffness, p.dynamics.damping_ratio)
     return InertialPhysics(
-        **common, mass=c.mass, dynamics=lambda u, x, d, v: (acting.force(u, x), acting.rates(x, u)),
+        **common,
+        mass=c.mass,
+        dynamics=lambda u, x, d, v: (acting.force(u, x), acting.rates(x, u)),
         damping_force=lambda v: ca.mtimes(D, v),
-    )  # fmt: skip
+    )
 
 
 def _sensed(c: Condensed, second: SecondOrder | None) -> SensedPoints | None:
@@ -86,16 +103,16 @@ def _sensed(c: Condensed, second: SecondOrder | None) -> SensedPoints | None:
 
 def _flexure_limits(c: Condensed, d: ca.SX) -> list[Limit]:
     """Rotations and stresses of the flexures with the axes displaced by `d` (n,), as they are at rest there."""
-    found = []
+    limits = []
     for k, e in enumerate(c.device.placed_elements):
         most = getattr(e.section, "rotation_limit", None)
         if most is not None:
             angle = ca.fabs(ca.mtimes(c.rotation(k), c.loads(d)))
-            found.append(Limit(f"rotation_{e.name}", f"rotation of {e.name}", (e.name,), "deg", angle, None, most.si))
+            limits.append(Limit(f"rotation_{e.name}", f"rotation of {e.name}", (e.name,), "deg", angle, None, most.si))
     for m in c.device.material:
         if m.stress_limit is not None:
             names, stress = c.stress(m.name, d, 1e-9 * m.stress_limit.si)
             if names:
                 label = f"stress of {m.name}"
-                found.append(Limit(f"stress_{m.name}", label, names, "MPa", stress, None, m.stress_limit.si))
-    return found
+                limits.append(Limit(f"stress_{m.name}", label, names, "MPa", stress, None, m.stress_limit.si))
+    return limits

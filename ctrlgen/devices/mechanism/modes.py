@@ -34,17 +34,18 @@ def freedoms(device: Drawing) -> tuple[int, int]:
     swap = [3, 4, 5, 0, 1, 2]
     yields = {
         k: turn[:, None] * ca.DM(ca.evalf(ca.SX(C))).full()[:, swap] * turn
-        for k, C in enumerate(c.compliances) if C is not None
-    }  # fmt: skip
+        for k, C in enumerate(c.compliances)
+        if C is not None
+    }
     largest = max((float(np.linalg.eigvalsh((C + C.T) / 2).max()) for C in yields.values()), default=0.0)
     for k, e in enumerate(device.placed_elements):
         if k not in yields:
             continue  # a spring holds nothing
         pivot = c.ends[k] - e.section.pivot(c.p.element[e.index]) * c.frames[k][:, 0]
         local = inverse_adjoint(c.frames[k], pivot)  # twist in the element's frame
-        own = e.section.constrained(yields[k], largest) * turn
-        A = np.zeros((len(own), 6 * count))
-        held = own @ ca.DM(ca.evalf(ca.SX(local))).full()
+        directions = e.section.constrained(yields[k], largest) * turn
+        A = np.zeros((len(directions), 6 * count))
+        held = directions @ ca.DM(ca.evalf(ca.SX(local))).full()
         for body, sign in ((e.second, 1), (e.first, -1)):
             if body != GROUND:
                 A[:, 6 * body : 6 * body + 6] = sign * held
@@ -136,12 +137,12 @@ def _mass(c: Condensed) -> tuple[np.ndarray, list[int]]:
     M = np.zeros((6 * count, 6 * count))
     heavy: set[int] = set()
     for i in range(count):
-        if (own := c.body_mass(i)) is not None:
-            M[6 * i : 6 * i + 6, 6 * i : 6 * i + 6] = ca.DM(ca.evalf(ca.SX(own))).full()
+        if (inertia := c.body_mass(i)) is not None:
+            M[6 * i : 6 * i + 6, 6 * i : 6 * i + 6] = ca.DM(ca.evalf(ca.SX(inertia))).full()
             heavy |= {i}
     for k, e in enumerate(c.elements):
-        if (own := c.flexure_mass(k, ca.DM.eye(12)[:6, :], ca.DM.eye(12)[6:, :])) is not None:
-            both = ca.DM(ca.evalf(ca.SX(own))).full()
+        if (inertia := c.flexure_mass(k, ca.DM.eye(12)[:6, :], ca.DM.eye(12)[6:, :])) is not None:
+            both = ca.DM(ca.evalf(ca.SX(inertia))).full()
             ends = [(b, slice(6 * at, 6 * at + 6)) for at, b in enumerate((e.first, e.second)) if b != GROUND]
             for i, row in ends:
                 for j, column in ends:
@@ -188,12 +189,12 @@ def summary(device: Drawing) -> list[str]:
 
 def _second_order_lines(c: Condensed) -> list[str]:
     """What the second order adds to the channels that are followed, at the largest travels, whatever their signs."""
-    found = np.abs(ca.DM(ca.evalf(ca.SX(SecondOrder(c).output))).full())
+    output = np.abs(ca.DM(ca.evalf(ca.SX(SecondOrder(c).output))).full())
     travel = np.array([a.section.travel.si for a in c.device.placed_actuators])
     reach = np.abs(ca.DM(SecondOrder(c).products(ca.DM(travel))).full()).ravel()
     shown = (
         f"{name} {show(value, 'urad' if name.startswith('theta') else 'um')}"
-        for name, value in zip(c.device.output.channels, found @ reach, strict=True)
+        for name, value in zip(c.device.output.channels, output @ reach, strict=True)
     )
     return [f"second order at the largest travels, at most: {', '.join(shown)}"]
 

@@ -38,7 +38,7 @@ def plain(value: Any) -> Any:
 @dataclass(frozen=True, eq=False)
 class Motions:
     """What k motions of the mechanism, the columns, do to an element at `place`, about which its frame `R` is: twists of its bodies
-    `first` and `second` (6, k) at the global origin; its deformation `own` and the `load` on its free end (6, k) in its frame. `shape`
+    `first` and `second` (6, k) at the global origin; its deformation `relative` and the `load` on its free end (6, k) in its frame. `shape`
     (6, 36) is that of `beam` per product of two components of its load; None where it yields at a point."""
 
     R: Matrix
@@ -46,7 +46,7 @@ class Motions:
     shape: Matrix | None
     first: Matrix
     second: Matrix
-    own: Matrix
+    relative: Matrix
     load: Matrix
 
     def deformation(self, a: Sequence[int], b: Sequence[int]) -> Matrix:
@@ -54,7 +54,7 @@ class Motions:
         seen = relative_motion(self.place, self.first, self.second, a, b)
         local = ca.vertcat(ca.mtimes(self.R.T, seen[:3, :]), ca.mtimes(self.R.T, seen[3:, :]))
         if self.shape is None:
-            return local + point_flexure(self.own, a, b)
+            return local + point_flexure(self.relative, a, b)
         return local + ca.mtimes(
             self.shape, ca.vertcat(*(ca.repmat(self.load[x, a], 6, 1) * self.load[:, b] for x in range(6)))
         )
@@ -82,16 +82,16 @@ class SecondOrder:
     @cached_property
     def parts(self) -> list[tuple[Matrix, tuple[Segment, ...], Matrix | None]]:
         """For every element: where it is looked at, its segments, and what its `beam` makes of products of its loads (6, 36)."""
-        c, found = self.c, []
+        c, parts = self.c, []
         materials = {m.name: q for m, q in zip(c.device.material, c.p.material, strict=True)}
         a, b = [x for x in range(6) for _ in range(6)], [y for _ in range(6) for y in range(6)]
         for k, e in enumerate(c.device.placed_elements):
-            own = c.p.element[e.index]
-            segments = e.section.segments(own, materials.get(getattr(e.section, "material", ""), SimpleNamespace()))
-            back = 0.0 if segments else e.section.pivot(own)
+            numbers = c.p.element[e.index]
+            segments = e.section.segments(numbers, materials.get(getattr(e.section, "material", ""), SimpleNamespace()))
+            back = 0.0 if segments else e.section.pivot(numbers)
             shape = plain(ca.sparsify(ca.SX(beam(segments, ca.DM.eye(6), a, b)))) if segments else None
-            found.append((plain(c.ends[k] - back * c.frames[k][:, 0]), segments, shape))
-        return found
+            parts.append((plain(c.ends[k] - back * c.frames[k][:, 0]), segments, shape))
+        return parts
 
     def products(self, d: Matrix) -> Matrix:
         """(m,): d_i d_j, twice where i and j differ."""
@@ -136,7 +136,7 @@ class SecondOrder:
     @cached_property
     def cubic(self) -> Matrix:
         """(n, m): V_3 = d' [cubic] products, the work of the loads of first order on the deformations of second."""
-        found = (
+        cubic = (
             -ca.mtimes(self.c.stiffness.T, self._travel(self.I, self.J))
             if self.c.pushes
             else ca.SX(self.n, len(self.pairs))
@@ -144,35 +144,35 @@ class SecondOrder:
         for k in range(len(self.parts)):
             e = self._motions(k)
             for p, deformed in enumerate(ca.horzsplit(e.deformation(self.I, self.J))):
-                found[:, p] += dot(e.load, ca.repmat(deformed, 1, self.n)).T
-        return self._without_rounding(found, self._energies(1))
+                cubic[:, p] += dot(e.load, ca.repmat(deformed, 1, self.n)).T
+        return self._without_rounding(cubic, self._energies(1))
 
     @cached_property
     def quartic(self) -> Matrix:
         """(m, m): V_4 = products' [quartic] products: half the load on the deformations of second order, T_2 included, and the work of
         the loads of first order on what both orders together make; of uniform beams the square of their axial load."""
         m, n = len(self.pairs), self.n
-        found = ca.SX(m, m)
+        quartic = ca.SX(m, m)
         columns = [(i, j, p) for p in range(m) for i in range(n) for j in range(n)]
         a, b = [i for i, _, _ in columns], [n + p for _, _, p in columns]
         turned = ca.SX(1, len(columns))
         for k in range(len(self.parts)):
             e = self._motions(k, self.twists)
-            E = e.own[:, n:] + e.deformation(self.I, self.J)
+            E = e.relative[:, n:] + e.deformation(self.I, self.J)
             load = self._local(k, ca.mtimes(plain(self.c.elements[k].stiffness), self._global(k, E)))
             for p, deformed in enumerate(ca.horzsplit(E)):
-                found[:, p] += dot(load, ca.repmat(deformed, 1, m)).T / 2
-            strained = replace(e, own=ca.horzcat(e.own[:, :n], E), load=ca.horzcat(e.load[:, :n], load))
+                quartic[:, p] += dot(load, ca.repmat(deformed, 1, m)).T / 2
+            strained = replace(e, relative=ca.horzcat(e.relative[:, :n], E), load=ca.horzcat(e.load[:, :n], load))
             turned += 2 * dot(e.load[:, a], strained.deformation([j for _, j, _ in columns], b))
             if len(segments := self.parts[k][1]) == 1:
-                found += self._beam_column(segments[0], e)
+                quartic += self._beam_column(segments[0], e)
         if self.c.pushes:
             moved = self._travel([j for _, j, _ in columns], b, self.twists)
             turned -= 2 * ca.sum1(self.c.stiffness[:, a] * moved)
         for (i, j, p), value in zip(columns, ca.horzsplit(turned), strict=True):
             q = self.pairs.index((min(i, j), max(i, j)))
-            found[q, p] += value / self.weight[q]
-        return self._without_rounding((found + found.T) / 2, self._energies(2))
+            quartic[q, p] += value / self.weight[q]
+        return self._without_rounding((quartic + quartic.T) / 2, self._energies(2))
 
     @cached_property
     def twists(self) -> list[Matrix]:
@@ -196,9 +196,10 @@ class SecondOrder:
             e = self._motions(k, between=unit)
             W, E, mixed = e.load, e.deformation(self.I, self.J), e.deformation(axis, turned)
             push(
-                placed.first, placed.second,
+                placed.first,
+                placed.second,
                 dot(W[:, u], E[:, p]) + dot(W[:, I], mixed[:, with_J]) + dot(W[:, J], mixed[:, with_I]),
-            )  # fmt: skip
+            )
         moved = ca.SX(n, m)
         if c.pushes:
             moved = self._travel(self.I, self.J)
@@ -245,9 +246,15 @@ class SecondOrder:
         return seen
 
     def _relative(
-        self, point: Matrix, first: int, second: int, a: Sequence[int], b: Sequence[int],
-        more: list[Matrix] | None = None, between: list[Matrix] | None = None,
-    ) -> Matrix:  # fmt: skip
+        self,
+        point: Matrix,
+        first: int,
+        second: int,
+        a: Sequence[int],
+        b: Sequence[int],
+        more: list[Matrix] | None = None,
+        between: list[Matrix] | None = None,
+    ) -> Matrix:
         """`relative_motion` of two bodies."""
         bodies = []
         for k, body in enumerate((first, second)):
@@ -264,9 +271,14 @@ class SecondOrder:
         return ca.vertcat(*(self._travel_of(i, x, a, b, more) for i, x in enumerate(self.c.device.placed_actuators)))
 
     def _travel_of(
-        self, i: int, placed: Placed, a: Sequence[int], b: Sequence[int],
-        more: list[Matrix] | None = None, between: list[Matrix] | None = None,
-    ) -> Matrix:  # fmt: skip
+        self,
+        i: int,
+        placed: Placed,
+        a: Sequence[int],
+        b: Sequence[int],
+        more: list[Matrix] | None = None,
+        between: list[Matrix] | None = None,
+    ) -> Matrix:
         """(1, m): that of actuator i, whose direction turns with the body against which it pushes."""
         moved = self._relative(self.c.point(placed), placed.first, placed.second, a, b, more, between)
         return ca.mtimes(self.c.directions[i].T, moved[3:, :])
@@ -276,12 +288,15 @@ class SecondOrder:
 
         Source: S. Awtar, A. H. Slocum, E. Sevincer, J. Mech. Des. 129 (2007) 625, eq. (5).
         """
-        found = ca.SX(len(self.pairs), len(self.pairs))
+        energy = ca.SX(len(self.pairs), len(self.pairs))
         for EI, shift, turn, sign in ((s.EI_z, 4, 2, 1), (s.EI_y, 5, 1, -1)):
-            p, y = e.load[0, :] * s.length**2 / EI, ca.vertcat(e.own[shift, :] / s.length, sign * e.own[turn, :])
+            p, y = (
+                e.load[0, :] * s.length**2 / EI,
+                ca.vertcat(e.relative[shift, :] / s.length, sign * e.relative[turn, :]),
+            )
             squares = ca.sum1(y[:, self.I] * ca.mtimes(AWTAR_2, y[:, self.J]))
-            found += EI / s.length / 2 * ca.mtimes((p[:, self.I] * p[:, self.J]).T, squares)
-        return found
+            energy += EI / s.length / 2 * ca.mtimes((p[:, self.I] * p[:, self.J]).T, squares)
+        return energy
 
     def _reach(self) -> np.ndarray:
         """(m,): products at the largest travels, each by its own sign."""
@@ -302,6 +317,6 @@ class SecondOrder:
         travel, where they are numbers: of a symmetric mechanism they are zero."""
         if scales is None or not ca.SX(forms).is_constant():
             return forms
-        found = ca.DM(ca.evalf(ca.SX(forms))).full()
-        small = np.abs(found) * self._reach() < LOST * np.asarray(scales)[:, None]
-        return ca.sparsify(ca.DM(np.where(small, 0.0, found)))
+        values = ca.DM(ca.evalf(ca.SX(forms))).full()
+        small = np.abs(values) * self._reach() < LOST * np.asarray(scales)[:, None]
+        return ca.sparsify(ca.DM(np.where(small, 0.0, values)))

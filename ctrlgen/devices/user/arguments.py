@@ -12,12 +12,8 @@ from ctrlgen.core.units import Quantity, read_quantity, same_dimension, to_si, w
 from ctrlgen.devices.section import Section
 from ctrlgen.devices.user.ports import Law
 
-SECTIONS = {
-    "mechanism": "mechanism",
-    "stage": "stage",
-    "actuator": "actuator",
-    "sensor": "sensing",
-}  # domain of a parameter -> section of the device
+# Domain of a parameter -> section of the device.
+SECTIONS = {"mechanism": "mechanism", "stage": "stage", "actuator": "actuator", "sensor": "sensing"}
 PLACEHOLDER = Quantity(1.0, "1")  # for a quantity that cannot be read, so that the rest is checked too
 NEED_MASS = ("damping_force", "acceleration")
 
@@ -33,24 +29,24 @@ class ArgumentReader:
     def ports(self, where: str, given: Mapping[str, Any]) -> dict[str, Quantity]:
         """Largest sizes by name; one that cannot be read is a fault and counts as 1. A pair of lowest and highest value also goes into
         `ranges`."""
-        found: dict[str, Quantity] = {}
+        sizes: dict[str, Quantity] = {}
         if not isinstance(given, Mapping) or not all(isinstance(n, str) and n.isidentifier() for n in given):
             self.faults.append(Fault(where, 'must be names with their largest size, such as {"motor": "10 V"}'))
-            return found
+            return sizes
         for name, text in given.items():
             try:
                 if isinstance(text, (tuple, list)):
-                    found[name] = self._pair(where, name, text)
+                    sizes[name] = self._pair(where, name, text)
                     continue
-                found[name] = read_quantity(None, text)
-                if found[name].si <= 0 or to_si(0.0, written_unit(found[name].text)):
+                sizes[name] = read_quantity(None, text)
+                if sizes[name].si <= 0 or to_si(0.0, written_unit(sizes[name].text)):
                     raise ValueError(
                         f"{text!r} is not a size; write the largest value, above zero, in a unit that begins at zero"
                     )
             except ValueError as error:
                 self.faults.append(Fault(f"{where}.{name}", str(error)))
-                found[name] = PLACEHOLDER
-        return found
+                sizes[name] = PLACEHOLDER
+        return sizes
 
     def _pair(self, where: str, name: str, given: Sequence[Any]) -> Quantity:
         """The larger end of a range, which is kept. Raises ValueError."""
@@ -94,7 +90,7 @@ class ArgumentReader:
 
     def limits(self, given: Mapping[str, Any]) -> dict[str, tuple[Law, Quantity]]:
         """The limits on expressions, each a law with the largest magnitude that it may have."""
-        found: dict[str, tuple[Law, Quantity]] = {}
+        limits: dict[str, tuple[Law, Quantity]] = {}
         for name, stated in given.items():
             if not (isinstance(stated, (tuple, list)) and len(stated) == 2 and callable(stated[0])):
                 what = 'must be (law, largest value), such as (lambda d, p: p.k * d.x, "300 MPa")'
@@ -103,13 +99,13 @@ class ArgumentReader:
             size = self.ports("limits", {name: stated[1]})[name]
             if ("limits", name) in self.ranges:
                 self.faults.append(Fault(f"limits.{name}", "has two values; a limit is on the magnitude, write one"))
-            found[name] = (stated[0], size)
-        return found
+            limits[name] = (stated[0], size)
+        return limits
 
     def drive_rates(self, given: Mapping[str, Any], drive: Mapping[str, Quantity]) -> dict[str, Quantity]:
         """The limits on the rates of drives, checked for names, dimensions and signs."""
-        found = self.ports("drive_rate", given)
-        for name, q in found.items():
+        rates = self.ports("drive_rate", given)
+        for name, q in rates.items():
             if name not in drive:
                 self.faults.append(Fault(f"drive_rate.{name}", f"is no drive; there are {', '.join(drive) or 'none'}"))
             elif q is not PLACEHOLDER and not same_dimension(
@@ -123,7 +119,7 @@ class ArgumentReader:
                 self.faults.append(
                     Fault(f"drive_rate.{name}", "must be a rate below zero and one above; else it never returns")
                 )
-        return {name: q for name, q in found.items() if name in drive}
+        return {name: q for name, q in rates.items() if name in drive}
 
     def weights(self, given: Mapping[str, Any], sizes: Mapping[str, Mapping[str, Quantity]]) -> dict[str, float]:
         """How much drives count, checked for names and sizes."""
@@ -165,12 +161,14 @@ class ArgumentReader:
         if "needed_force" in present:
             return present
         need = {
-            "mass": any(m in present for m in NEED_MASS) and f"is missing: {' and '.join(m for m in NEED_MASS if m in present)} "
+            "mass": any(m in present for m in NEED_MASS)
+            and f"is missing: {' and '.join(m for m in NEED_MASS if m in present)} "
             "needs the inertia of each axis, on which the forces of effects act",
             "rates": bool(state) and "is missing: a state needs its rate",
             "pose": not same and "is missing: readings that are not the axes themselves need pose(d, p)",
-            "restoring_force": "mass" not in present and "is missing: an axis without mass rests where restoring_force = force",
-        }  # fmt: skip
+            "restoring_force": "mass" not in present
+            and "is missing: an axis without mass rests where restoring_force = force",
+        }
         self.faults += [Fault(name, what) for name, what in need.items() if what and name not in present]
         if "acceleration" in present:
             for other in ("force", "restoring_force", "damping_force"):

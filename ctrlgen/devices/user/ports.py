@@ -76,8 +76,10 @@ def _arguments(where: str, law: Callable[..., Any], offered: Mapping[str, Ports]
     """(vectors, faults): the vectors that the arguments of a Python function name."""
     refused = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
     wanted = [
-        q for q in inspect.signature(law).parameters.values() if q.default is inspect.Parameter.empty or q.name in offered
-    ]  # fmt: skip
+        q
+        for q in inspect.signature(law).parameters.values()
+        if q.default is inspect.Parameter.empty or q.name in offered
+    ]
     unknown = [q.name for q in wanted if q.name not in offered or q.kind in refused]
     known = ", ".join(offered)
     faults = [Fault(where, f"has an argument {name!r}; its arguments may be {known}") for name in unknown]

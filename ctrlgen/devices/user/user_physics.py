@@ -24,9 +24,15 @@ from ctrlgen.devices.signal import Signal
 from ctrlgen.devices.user.ports import Law, Ports, evaluate_law
 
 ARGUMENTS = {  # of each law
-    "force": "uxdvp", "restoring_force": "dp", "damping_force": "vp", "mass": "p", "acceleration": "uxdvp", "rates": "uxdvp", "pose": "dp",
+    "force": "uxdvp",
+    "restoring_force": "dp",
+    "damping_force": "vp",
+    "mass": "p",
+    "acceleration": "uxdvp",
+    "rates": "uxdvp",
+    "pose": "dp",
     "needed_force": "dvap",
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)
@@ -142,11 +148,20 @@ class PhysicsBuilder:
 
         force_unit = written_unit(given.force.text) if given.force else "N*m" if same_dimension(unit, "rad") else "N"
         return ImposedPhysics(
-            axes=axes, components=axes, pose_units=(force_unit,) * n, pose_scale=(size,) * n,
-            drive=imposed_motion(axes, unit, (*travel, *speed, *accelerations)), displacement_scale=max(travel), travel_unit=unit,
-            force_scale=size, force_unit=force_unit, restoring_force=restoring, pose=lambda f: f, limits=self.limits,
+            axes=axes,
+            components=axes,
+            pose_units=(force_unit,) * n,
+            pose_scale=(size,) * n,
+            drive=imposed_motion(axes, unit, (*travel, *speed, *accelerations)),
+            displacement_scale=max(travel),
+            travel_unit=unit,
+            force_scale=size,
+            force_unit=force_unit,
+            restoring_force=restoring,
+            pose=lambda f: f,
+            limits=self.limits,
             force=lambda motion, d: needed(d, motion[n : 2 * n], motion[2 * n :]) - restoring(d),
-        )  # fmt: skip
+        )
 
     def physics(self, size: float) -> DevicePhysics:
         """The laws as a device's physics, `size` the typical force; faults of the laws are collected in the description."""
@@ -163,28 +178,42 @@ class PhysicsBuilder:
         unit = written_unit(next(iter(given.axes.values())).text)
         state = Signal("state", "state", tuple(given.state), _units(given.state), "x_", self.x, _sizes(given.state))
         common: dict[str, Any] = dict(
-            axes=axes, components=tuple(given.reading), pose_units=_units(given.reading), pose_scale=_sizes(given.reading),
+            axes=axes,
+            components=tuple(given.reading),
+            pose_units=_units(given.reading),
+            pose_scale=_sizes(given.reading),
             drive=Signal("drive", "drive", tuple(given.drive), _units(given.drive), "u_", u, _sizes(given.drive)),
             state=state if given.state else None,
-            rest=(0.0,) * len(given.state), displacement_scale=travel, travel_unit=unit, force_scale=size,
+            rest=(0.0,) * len(given.state),
+            displacement_scale=travel,
+            travel_unit=unit,
+            force_scale=size,
             force_unit=written_unit(given.force.text) if given.force else "N*m" if same_dimension(unit, "rad") else "N",
-            restoring_force=self.restoring_force, limits=self.limits,
+            restoring_force=self.restoring_force,
+            limits=self.limits,
             pose=(lambda d: given.evaluate("pose", self.p, d=d)) if "pose" in given.laws else (lambda d: d),
             drive_weights=tuple(given.weights.get(name, 1.0) for name in given.drive),
             bipolar=any(given.ranges.get(("drive", name), (-1.0, 1.0))[0] < 0 for name in given.drive),
-        )  # fmt: skip
+        )
         common["rate_limits"] = self.rate_limits(common["drive"])
         self.limits(SimpleNamespace(drive=u, displacement=d, mechanism_displacement=d))  # collects its faults too
         if not self.inertial:
             return BalancedPhysics(
-                **common, force=lambda u, x, d: self.applied_force(u, x, d, d[:0]),
+                **common,
+                force=lambda u, x, d: self.applied_force(u, x, d, d[:0]),
                 rates=lambda x, u: given.evaluate("rates", self.p, u=u, x=x),
-            )  # fmt: skip
+            )
         return InertialPhysics(
-            **common, mass=tuple(ca.vertsplit(self.mass)),
-            damping_force=(lambda v: given.evaluate("damping_force", self.p, v=v)) if "damping_force" in given.laws else None,
-            dynamics=lambda u, x, d, v: (self.applied_force(u, x, d, v), given.evaluate("rates", self.p, u=u, x=x, d=d, v=v)),
-        )  # fmt: skip
+            **common,
+            mass=tuple(ca.vertsplit(self.mass)),
+            damping_force=(lambda v: given.evaluate("damping_force", self.p, v=v))
+            if "damping_force" in given.laws
+            else None,
+            dynamics=lambda u, x, d, v: (
+                self.applied_force(u, x, d, v),
+                given.evaluate("rates", self.p, u=u, x=x, d=d, v=v),
+            ),
+        )
 
     def rate_limits(self, drive: Signal) -> tuple[Limit, ...]:
         """The limits on the rates of those drives that have one."""
@@ -198,7 +227,7 @@ class PhysicsBuilder:
 
     def limits(self, signal: SimpleNamespace) -> list[Limit]:
         """Drives and displacements stay within their ranges or largest sizes, states within ranges, expressions below their limits."""
-        given, found = self.given, []
+        given, limits = self.given, []
         for what, label, ports, expr in (
             ("drive", "drive", given.drive, signal.drive),
             ("axes", "travel", given.axes, signal.displacement),
@@ -209,7 +238,7 @@ class PhysicsBuilder:
                     continue
                 low, high = given.ranges.get((what, name), (-q.si, q.si))
                 unit = written_unit(q.text)
-                found.append(Limit(f"{label}_{name}", f"{label} of {name}", (name,), unit, expr[i], low, high))
+                limits.append(Limit(f"{label}_{name}", f"{label} of {name}", (name,), unit, expr[i], low, high))
         names = {"x": given.state, "d": given.axes}
         vectors = {"x": self.x, "d": signal.mechanism_displacement}
         for name, (law, q) in given.limits.items():
@@ -220,8 +249,8 @@ class PhysicsBuilder:
             }
             value, faults = evaluate_law(f"limits.{name}", law, offered | {"p": self.p}, (name,))
             given.faults.extend(fault for fault in faults if fault not in given.faults)
-            found.append(Limit(name, name, (name,), written_unit(q.text), value, -q.si, q.si))
-        return found
+            limits.append(Limit(name, name, (name,), written_unit(q.text), value, -q.si, q.si))
+        return limits
 
 
 def _units(ports: Mapping[str, Quantity]) -> tuple[str, ...]:

@@ -9,7 +9,8 @@ import numpy as np
 
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.model_selection import scored
-from ctrlgen.diagnosis.selection.screen import Screened, Suspect
+from ctrlgen.diagnosis.selection.screen import Screened
+from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
 from ctrlgen.estimation.fit import Fit

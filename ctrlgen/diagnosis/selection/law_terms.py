@@ -110,8 +110,8 @@ class LawTerms:
     def __init__(self, timing: Timing, described: Model) -> None:
         self.timing, self.described = timing, described
         self.symbols: dict[Read, ca.SX] = {}
-        self._terms: dict[tuple, LawTerm] = {}
-        self._compiled: dict[tuple, CompiledTerms] = {}
+        self._terms: dict[tuple[Any, ...], LawTerm] = {}
+        self._compiled: dict[tuple[Any, ...], CompiledTerms] = {}
 
     def symbol(self, read: Read, expression: ca.SX) -> ca.SX:
         """The symbol that stands for what is read."""

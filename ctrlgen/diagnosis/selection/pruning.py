@@ -7,6 +7,7 @@ what is refused is kept with its reason.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal
 from ctrlgen.diagnosis.selection.trials import Trials
@@ -15,7 +16,7 @@ from ctrlgen.estimation.hypothesis import Hypothesis
 
 def all_pruned(trials: Trials, current: CandidateModel, candidates: Sequence[CandidateModel]) -> list[CandidateModel]:
     """The candidates that meet no objection, and of the others what is left without the causes that do."""
-    by_causes: dict[frozenset, CandidateModel] = {}
+    by_causes: dict[frozenset[Any], CandidateModel] = {}
     for kept in trials.each(lambda branch, t: pruned(branch, t, current.causes), candidates):
         if kept is not None:
             by_causes.setdefault(frozenset(kept.causes), kept)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, linearised_optimum
 from ctrlgen.diagnosis.selection.candidates import significant, trying
 from ctrlgen.diagnosis.selection.confusable import explains_alike, explains_better
-from ctrlgen.diagnosis.selection.screen import Suspect
+from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
 from ctrlgen.diagnosis.settings import SEARCH
 from ctrlgen.estimation.fit import Fit

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -81,7 +82,7 @@ class SubsetSearch:
             best = best[more[best] > 0]
             gains.append(gain + more[best])
             places += [(member, int(j)) for j in best]
-        grown: dict[frozenset, tuple[float, tuple[int, ...]]] = {}
+        grown: dict[frozenset[Any], tuple[float, tuple[int, ...]]] = {}
         joined = np.concatenate([np.zeros(0), *gains])
         # the best with each group first
         for i in np.argsort(-joined, kind="stable"):

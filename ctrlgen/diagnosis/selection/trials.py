@@ -8,7 +8,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -29,7 +29,7 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 FAILURES = (CtrlgenError, ValueError, ArithmeticError, RuntimeError, np.linalg.LinAlgError)
 """What a trial may end with: a stage that cannot be built, a balance or integrator that does not converge."""
-_Learnt = tuple[dict[frozenset, tuple[CandidateModel, int]], list[Refusal], list[str]]
+_Learnt = tuple[dict[frozenset[Any], tuple[CandidateModel, int]], list[Refusal], list[str]]
 
 
 class Trials:
@@ -41,8 +41,8 @@ class Trials:
 
     def __init__(self, fitter: Fitter, screen: Screen, step: Callable[[str], None], jobs: int = 1) -> None:
         self.fitter, self.screen, self.step, self.jobs = fitter, screen, step, jobs
-        self.fitted: dict[frozenset, tuple[CandidateModel, int]] = {}
-        self.screens: dict[frozenset, tuple[Fit, Screened]] = {}
+        self.fitted: dict[frozenset[Any], tuple[CandidateModel, int]] = {}
+        self.screens: dict[frozenset[Any], tuple[Fit, Screened]] = {}
         self.mismatch: np.ndarray | None = None
         self.refused: list[Refusal] = []
         self.failed: list[str] = []

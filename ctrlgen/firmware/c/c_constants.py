@@ -13,13 +13,15 @@ from ctrlgen.firmware.c.expression_graph import Node
 from ctrlgen.firmware.c.real import Real
 
 WIDTH = 120  # columns of a line of C
-RESERVED = (  # names of the templates
-    "LOW", "HIGH", "SLACK", "P", "X_REST", "TARGET_LIMIT", "U_LOW", "U_HIGH", "U_SLACK", "U_LEAST", "U_MOST", "U_SAFE", "READY", "NULL",
-)  # fmt: skip
-LOCAL = (  # names of the kernels' and the templates' arguments and variables, which a member of `Derived` must not have
-    "x", "z", "i", "d", "state", "wanted", "target", "drive", "result", "next", "value", "step", "given", "derived", "constants", "out",
-    "beyond", "accepted", "origin", "hit",
-)  # fmt: skip
+# Names of the tables of the limiter.
+RESERVED = (
+    "LOW HIGH SLACK P X_REST TARGET_LIMIT U_LOW U_HIGH U_SLACK U_LEAST U_MOST U_SAFE READY NULL FALL RISE SHARE NULL_MOTION SET FIRST "
+    "HOME STATE_LEAST STATE_MOST STATE_SLACK"
+)
+# Names of arguments and variables of the kernels and of the limiter, which a member of `Derived` must not have.
+LOCAL = (
+    "x z i d state wanted target drive result next value step given derived constants out beyond accepted origin hit"
+)
 DERIVED = "derived"  # the structure's name in C
 
 
@@ -42,10 +44,10 @@ class Constants:
 
     def __init__(self, real: Real) -> None:
         self.real = real
-        self.names: dict[tuple[str, str], str] = {("", name): name for name in RESERVED}
+        self.names: dict[tuple[str, str], str] = {("", name): name for name in RESERVED.split()}
         self.lines: list[str] = []
         self.derived: dict[tuple[int, ...], Derived] = {}  # by the numbers of its nodes
-        self._reserved = set(LOCAL)
+        self._reserved = set(LOCAL.split())
 
     def reserve(self, *names: str) -> None:
         """Names that no member of `derived` may have."""

@@ -10,6 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import casadi as ca
 
@@ -25,18 +26,34 @@ PLACE = re.compile(r"<([a-z])(\d+)>")
 _BINARY = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/"}
 _COMPARE = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
 CALLS = {  # of `elementary`
-    ca.OP_SQRT: "square_root", ca.OP_EXP: "exponential", ca.OP_LOG: "logarithm", ca.OP_SIN: "sine", ca.OP_COS: "cosine",
-    ca.OP_TAN: "tangent", ca.OP_ASIN: "arcsine", ca.OP_ACOS: "arccosine", ca.OP_ATAN: "arctangent", ca.OP_ATAN2: "arctangent2",
-    ca.OP_TANH: "hyperbolic_tangent", ca.OP_SINH: "hyperbolic_sine", ca.OP_COSH: "hyperbolic_cosine",
-    ca.OP_POW: "power", ca.OP_CONSTPOW: "power", ca.OP_FLOOR: "whole_below", ca.OP_CEIL: "whole_above",
-}  # fmt: skip
+    ca.OP_SQRT: "square_root",
+    ca.OP_EXP: "exponential",
+    ca.OP_LOG: "logarithm",
+    ca.OP_SIN: "sine",
+    ca.OP_COS: "cosine",
+    ca.OP_TAN: "tangent",
+    ca.OP_ASIN: "arcsine",
+    ca.OP_ACOS: "arccosine",
+    ca.OP_ATAN: "arctangent",
+    ca.OP_ATAN2: "arctangent2",
+    ca.OP_TANH: "hyperbolic_tangent",
+    ca.OP_SINH: "hyperbolic_sine",
+    ca.OP_COSH: "hyperbolic_cosine",
+    ca.OP_POW: "power",
+    ca.OP_CONSTPOW: "power",
+    ca.OP_FLOOR: "whole_below",
+    ca.OP_CEIL: "whole_above",
+}
 _FORMS = {
-    ca.OP_FMIN: "({0} < {1}) ? {0} : {1}", ca.OP_FMAX: "({0} > {1}) ? {0} : {1}", ca.OP_FABS: "({0} < {zero}) ? -{0} : {0}",
+    ca.OP_FMIN: "({0} < {1}) ? {0} : {1}",
+    ca.OP_FMAX: "({0} > {1}) ? {0} : {1}",
+    ca.OP_FABS: "({0} < {zero}) ? -{0} : {0}",
     ca.OP_SIGN: "({0} > {zero}) ? {one} : (({0} < {zero}) ? -{one} : {zero})",
-    ca.OP_IF_ELSE_ZERO: "({0} != {zero}) ? {1} : {zero}", ca.OP_NOT: "({0} != {zero}) ? {zero} : {one}",
+    ca.OP_IF_ELSE_ZERO: "({0} != {zero}) ? {1} : {zero}",
+    ca.OP_NOT: "({0} != {zero}) ? {zero} : {one}",
     ca.OP_AND: "(({0} != {zero}) && ({1} != {zero})) ? {one} : {zero}",
     ca.OP_OR: "(({0} != {zero}) || ({1} != {zero})) ? {one} : {zero}",
-}  # fmt: skip
+}
 
 
 class Linear:
@@ -97,7 +114,7 @@ class Text:
     calls: frozenset[str]
 
     @property
-    def shape(self) -> tuple:
+    def shape(self) -> tuple[Any, ...]:
         """Equal for expressions that differ in their places only."""
         return self.lines, self.result, tuple(r.array for r in self.reads), tuple(array for array, _ in self.rows)
 
@@ -115,8 +132,13 @@ class Call:
 
 
 def text_of(
-    root: Node, ends: Mapping[int, Node], linear: Linear, real: Real, as_row: bool = False, laws: Mapping[int, Call] | None = None
-) -> Text:  # fmt: skip
+    root: Node,
+    ends: Mapping[int, Node],
+    linear: Linear,
+    real: Real,
+    as_row: bool = False,
+    laws: Mapping[int, Call] | None = None,
+) -> Text:
     """`root` as C, in terms of `ends`, what is stored in local arrays, and of `laws`, both by the number of a node."""
     return _Body(root, ends, linear, real, as_row, laws or {}).text()
 
@@ -162,16 +184,16 @@ class _Body:
 
     def _order(self) -> list[Node]:
         """Operands before what uses them, in an order that the structure alone decides."""
-        found, seen, left = list[Node](), set[int](), [(self.root, False)]
+        parts, seen, left = list[Node](), set[int](), [(self.root, False)]
         while left:
             node, done = left.pop()
             if done:
-                found.append(node)
+                parts.append(node)
             elif node.number not in seen:
                 seen.add(node.number)
                 left.append((node, True))
                 left.extend((n, False) for n in reversed(self._operands(node)))
-        return found
+        return parts
 
     def _own_operations(self, node: Node) -> int:
         if self._is_row(node):
@@ -227,19 +249,24 @@ class _Body:
 
     def _numbered(self, result: str) -> Text:
         """With the places numbered in the order of the text."""
-        found: dict[str, list[Node]] = {"c": [], "r": [], "d": []}
+        parts: dict[str, list[Node]] = {"c": [], "r": [], "d": []}
 
-        def renumbered(match: re.Match) -> str:
+        def renumbered(match: re.Match[str]) -> str:
             kind = match[1]
             if kind == "t":
                 return match[0]
-            found[kind].append(self.nodes[match[0]])
-            return f"<{kind}{len(found[kind]) - 1}>"
+            parts[kind].append(self.nodes[match[0]])
+            return f"<{kind}{len(parts[kind]) - 1}>"
 
         lines = tuple(PLACE.sub(renumbered, line) for line in self.lines)
         result = PLACE.sub(renumbered, result)
-        rows = tuple(self.linear.terms(node) for node in found["d"])
+        rows = tuple(self.linear.terms(node) for node in parts["d"])
         return Text(
-            lines, result, tuple(found["c"]), tuple(found["r"]), tuple(row for row in rows if row), self.operations,
+            lines,
+            result,
+            tuple(parts["c"]),
+            tuple(parts["r"]),
+            tuple(row for row in rows if row),
+            self.operations,
             frozenset(self.calls),
-        )  # fmt: skip
+        )

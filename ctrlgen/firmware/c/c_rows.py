@@ -22,9 +22,13 @@ class Rows:
     """The lines of one function."""
 
     def __init__(
-        self, rows: Sequence[Node], real: Real, constants: Constants, may_be_result: Sequence[str],
+        self,
+        rows: Sequence[Node],
+        real: Real,
+        constants: Constants,
+        may_be_result: Sequence[str],
         laws: Mapping[int, Call],
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.laws = laws
         self.rows, self.real, self.may_be_result = list(rows), real, set(may_be_result)
         self.named, self.array = constants.named, constants.array
@@ -35,9 +39,8 @@ class Rows:
         self.locals = self.parts = self.operations = 0
         self.calls: frozenset[str] = frozenset()
         self.loops = False
-        self.copies: dict[
-            str, str
-        ] = {}  # elements that every turn of a loop reads, by the name of their copy: they stay in registers
+        # Elements that every turn of a loop reads, by the name of their copy: they stay in registers.
+        self.copies: dict[str, str] = {}
         self.copied: set[str] = set()
         self.groups = 0
 
@@ -129,7 +132,7 @@ class Rows:
         offset = self.parts
         self.parts += len(first.lines)
 
-        def filled(match: re.Match) -> str:
+        def filled(match: re.Match[str]) -> str:
             kind, k = match[1], int(match[2])
             if kind == "t":
                 return f"t{offset + k + 1}"
@@ -242,8 +245,8 @@ def _shared(rows: Sequence[Node], linear: Linear) -> list[Node]:
     """The largest expressions that several rows, or several of these, need."""
     own = {row.number: row for row in rows if not _plain(row, linear)}
     roots = dict(own)
-    while found := _needed_by_several(roots, linear):
-        roots |= {node.number: node for node in found}
+    while shared := _needed_by_several(roots, linear):
+        roots |= {node.number: node for node in shared}
     used = {n.number for root in roots.values() for n in reached(root.operands, roots)}
     return [node for number, node in sorted(roots.items()) if number not in own or number in used]
 
@@ -260,9 +263,12 @@ def _needed_by_several(roots: Mapping[int, Node], linear: Linear) -> list[Node]:
             needed[operand.number] = needed.get(operand.number, 0) | those
             above.setdefault(operand.number, set()).add(those)
     return [
-        node for node in order
-        if node.number not in roots and needed.get(node.number, 0).bit_count() > 1 and above[node.number] != {needed[node.number]}
-    ]  # fmt: skip
+        node
+        for node in order
+        if node.number not in roots
+        and needed.get(node.number, 0).bit_count() > 1
+        and above[node.number] != {needed[node.number]}
+    ]
 
 
 def _plain(node: Node, linear: Linear) -> bool:

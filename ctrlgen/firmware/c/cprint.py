@@ -55,15 +55,6 @@ class Kernel:
         return f"{self.name}({', '.join(values[a] for a in self.arguments)})"
 
 
-def print_function(function: ca.Function, name: str, real: Real, ranges: Ranges | None = None) -> Kernel:
-    """`function` (SX, dense arguments, one result) as a static C function writing to its last parameter, which may be an argument too.
-
-    `ranges`: low and high of the arguments, where they are known. Raises CtrlgenError for an operation C has no
-    counterpart of.
-    """
-    return Printer(real, ranges or {}).kernel(function, name, may_be_result=function.name_in())
-
-
 @dataclass(frozen=True)
 class Law:
     """A law of every axis, (n,) in terms of the kernels' arguments, that is a C function of its own where a kernel needs it: `about`
@@ -131,7 +122,7 @@ class Printer:
 
     def _calls(self, arguments: Mapping[str, int], rows: Sequence[Node]) -> dict[int, Call]:
         """The laws that rows need, by the number of their node, for every array that may stand for a law's argument."""
-        needed, found = {node.number for node in reached(rows)}, dict[int, Call]()
+        needed, calls = {node.number for node in reached(rows)}, dict[int, Call]()
         for law in self.laws:
             names = [name for name in law.function.name_in() if name not in self.numbers]
             standing = [
@@ -143,8 +134,8 @@ class Printer:
                 renamed = dict(zip(names, chosen, strict=True))
                 nodes = self._rows(law.function, law.named, renamed)
                 if any(node.number in needed for node in nodes):
-                    found |= self._called(law, nodes)
-        return found
+                    calls |= self._called(law, nodes)
+        return calls
 
     def _rows(
         self, function: ca.Function, named: ca.Function | None, renamed: Mapping[str, str] | None = None
@@ -169,18 +160,18 @@ class Printer:
             return {}
         by_name = {read.array: read for read in texts[0].reads}
         given = tuple({node.source.number: node for node in texts[0].constants if node.source}.values())
-        found = {}
+        calls = {}
         for i, node in enumerate(nodes):
             reads = tuple(self._graph.read(array, i) for array in by_name)
-            found[node.number] = Call(law.name, reads, texts[0].operations, texts[0].calls, given)
+            calls[node.number] = Call(law.name, reads, texts[0].operations, texts[0].calls, given)
         if law.name not in self._law_texts:
             self._law_texts[law.name] = self._law_text(law, texts[0], list(by_name), given)
-        return found
+        return calls
 
     def _law_text(self, law: Law, text: Text, arrays: Sequence[str], given: Sequence[Node]) -> str:
         T = self.real.value
 
-        def filled(match: re.Match) -> str:
+        def filled(match: re.Match[str]) -> str:
             kind, k = match[1], int(match[2])
             if kind == "t":
                 return f"t{k + 1}"
@@ -201,9 +192,15 @@ class Printer:
         return self._constants.text()
 
     def kernel(
-        self, function: ca.Function, name: str, about: str = "", may_be_result: Sequence[str] = (),
-        steps: tuple[str, int] | None = None, returned: bool = False, named: ca.Function | None = None,
-    ) -> Kernel:  # fmt: skip
+        self,
+        function: ca.Function,
+        name: str,
+        about: str = "",
+        may_be_result: Sequence[str] = (),
+        steps: tuple[str, int] | None = None,
+        returned: bool = False,
+        named: ca.Function | None = None,
+    ) -> Kernel:
         """`function` (SX, dense arguments, one result) as a static C function writing to its last parameter.
 
         `about`: its comment. `may_be_result`: arguments that a caller may give as the result too. With `steps` (argument, count) the
@@ -246,9 +243,10 @@ class Printer:
 def _read(sizes: Mapping[str, int], lines: Sequence[str]) -> tuple[str, ...]:
     """The arguments that `lines` read."""
     return tuple(
-        a for a in (DERIVED, *sizes)
+        a
+        for a in (DERIVED, *sizes)
         if any(re.search(rf"\b{a}->" if a == DERIVED else rf"\b{a}\[", line) for line in lines)
-    )  # fmt: skip
+    )
 
 
 def _iterated(
@@ -258,7 +256,7 @@ def _iterated(
     iterated one after the other; others together, by a function that is one step."""
     size, T, own = len(body.rows), body.real.value, f"{argument}[i]"
     loop = body.lines[body.lines.index(f"for (i = 0; i < {size}; i++) {{") :] if body.single_loop else []
-    if loop and all(found == own for line in loop for found in re.findall(rf"\b{argument}\[[^]]*\]", line)):
+    if loop and all(index == own for line in loop for index in re.findall(rf"\b{argument}\[[^]]*\]", line)):
         head, inner = body.lines[: -len(loop)], [line.replace(own, "value") for line in loop[1:-1]]
         moving = {"value"}
         before, during = [], []
@@ -270,11 +268,24 @@ def _iterated(
             else:
                 moving |= {named[1]} if named else set()
                 during.append(f"    {line}".replace("result[i] =", "value ="))
-        return [(
-            name, about,
-            [*head, loop[0], f"    {T} value = {own};", "    int step;", *before, f"    for (step = 0; step < {count}; step++) {{",
-             *during, "    }", "    result[i] = value;", "}"],
-        )]  # fmt: skip
+        return [
+            (
+                name,
+                about,
+                [
+                    *head,
+                    loop[0],
+                    f"    {T} value = {own};",
+                    "    int step;",
+                    *before,
+                    f"    for (step = 0; step < {count}; step++) {{",
+                    *during,
+                    "    }",
+                    "    result[i] = value;",
+                    "}",
+                ],
+            )
+        ]
     read = _read(sizes, body.lines)
     call = ", ".join("result" if a == argument else a for a in read)
     start = [f"for (i = 0; i < {size}; i++) {{", f"    result[i] = {argument}[i];", "}"]
@@ -308,7 +319,11 @@ def _indented(lines: Sequence[str]) -> str:
     for line in lines:
         inner = len(line) - len(line.lstrip()) + 4
         wrapped += textwrap.wrap(
-            line.strip(), WIDTH, initial_indent=" " * inner, subsequent_indent=" " * (inner + 4), break_long_words=False,
+            line.strip(),
+            WIDTH,
+            initial_indent=" " * inner,
+            subsequent_indent=" " * (inner + 4),
+            break_long_words=False,
             break_on_hyphens=False,
-        )  # fmt: skip
+        )
     return "\n".join(wrapped)

@@ -28,42 +28,48 @@ class Deviation:
 
 DEVIATIONS = (
     Deviation(
-        "5.9", ("*_online_f??.c", "*_player_f??.c", "*_selftest_f??.c"),
+        "5.9",
+        ("*_online_f??.c", "*_player_f??.c", "*_selftest_f??.c"),
         "the same names of static functions and tables in several files",
         "Each file is complete without the others, and the linker does not see static names. The float and the double "
         "version use the same names, so they can be compared line by line.",
     ),
     Deviation(
-        "2.5", ("*_online_f??.h", "*_player_f??.h", "*_selftest_f??.h", "*_vectors_f??.h"),
+        "2.5",
+        ("*_online_f??.h", "*_player_f??.h", "*_selftest_f??.h", "*_vectors_f??.h"),
         "constants of an interface that its own source does not read",
         "The caller uses them: number of the interface, version, device, rate, sizes, number of samples, status values, tolerances.",
     ),
     Deviation(
-        "19.2", ("*_online_f??.c", "*_plant_f??.c"),
+        "19.2",
+        ("*_online_f??.c", "*_plant_f??.c"),
         "the unions in square_root(), exponential() and logarithm(), by which the exponent of a number is halved, set or read",
         "C99 defines the result of reading the other member, both members have the same size, and it avoids a library call.",
         "union",
     ),
     Deviation(
-        "19.2", ("*_online_f??.c",),
+        "19.2",
+        ("*_online_f??.c",),
         "the union in number_at(), by which a number is read from its bits",
         "C99 defines the result of reading the other member, and both members have the same size whatever the order of bytes.",
         "number_at",
     ),
     Deviation(
-        "19.2", ("*_selftest_f??.c",),
+        "19.2",
+        ("*_selftest_f??.c",),
         "the union by which NaN and infinity are written as bits",
         "C99 has no constant for them without a library header; a compiler may fold an operation that makes one, or it may trap.",
     ),
-)  # fmt: skip
+)
 # Required, not advisory: only in the program that prints the outcome of the test on a computer. No firmware contains it.
 HOST_ONLY = (
     Deviation(
-        "21.6", ("test_*.c",),
+        "21.6",
+        ("test_*.c",),
         "printf",
         "The test runs on a computer and prints which vector disagrees. It is not part of the firmware.",
     ),
-)  # fmt: skip
+)
 
 
 def permits(number: str, name: str) -> bool:
@@ -75,10 +81,12 @@ def deviations_context(texts: Mapping[str, str]) -> dict[str, Any]:
     """What the template of DEVIATIONS.md needs; `texts`: name -> text of every generated C file."""
 
     def rows(deviations: Sequence[Deviation]) -> list[dict[str, Any]]:
-        found = [
+        covered = [
             (d, [name for name, text in sorted(texts.items()) if d.covers(d.number, name) and d.where in text])
             for d in deviations
         ]
-        return [{"number": d.number, "files": files, "what": d.what, "reason": d.reason} for d, files in found if files]
+        return [
+            {"number": d.number, "files": files, "what": d.what, "reason": d.reason} for d, files in covered if files
+        ]
 
     return {"advisory": rows(DEVIATIONS), "host": rows(HOST_ONLY)}

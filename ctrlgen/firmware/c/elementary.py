@@ -26,25 +26,37 @@ from ctrlgen.firmware.c.templates import render
 PI = Fraction("3.14159265358979323846264338327950288419716939937510582097494459230781640628620899")
 ERROR_SHARE = 64  # a polynomial's error is at most one rounding divided by this
 BITS, TERMS = 200, 100  # of the series: far more than double needs
-TURNS = {
-    Real.DOUBLE: 1e5,
-    Real.FLOAT: 1e4,
-}  # angle [rad] up to which sine, cosine and tangent are accurate to the last digits
-TURN_END = {
-    Real.DOUBLE: 2.0**31,
-    Real.FLOAT: 2.0**20,
-}  # rad; beyond, quarter turns overflow 32 bits (double) or rounding is too coarse (float)
+# Angle [rad] up to which sine, cosine and tangent are accurate to the last digits.
+TURNS = {Real.DOUBLE: 1e5, Real.FLOAT: 1e4}
+# Angle [rad] beyond which quarter turns overflow 32 bits (double) or rounding is too coarse (float).
+TURN_END = {Real.DOUBLE: 2.0**31, Real.FLOAT: 2.0**20}
 ASIN_NEAR, TANH_NEAR, SINH_NEAR = 0.5625, 0.625, 1.0  # argument up to which the series itself is used
 ROOTS = {  # the instructions of cores, correctly rounded by IEEE 754
-    Real.FLOAT: {"arm": "vsqrt.f32 %0, %1", "arm_places": '"=t"(y) : "t"(a)', "aarch64": "fsqrt %s0, %s1", "sse": "sqrtss %1, %0"},
-    Real.DOUBLE: {"arm": "vsqrt.f64 %P0, %P1", "arm_places": '"=w"(y) : "w"(a)', "aarch64": "fsqrt %d0, %d1", "sse": "sqrtsd %1, %0"},
-}  # fmt: skip
+    Real.FLOAT: {
+        "arm": "vsqrt.f32 %0, %1",
+        "arm_places": '"=t"(y) : "t"(a)',
+        "aarch64": "fsqrt %s0, %s1",
+        "sse": "sqrtss %1, %0",
+    },
+    Real.DOUBLE: {
+        "arm": "vsqrt.f64 %P0, %P1",
+        "arm_places": '"=w"(y) : "w"(a)',
+        "aarch64": "fsqrt %d0, %d1",
+        "sse": "sqrtsd %1, %0",
+    },
+}
 NEEDS = {  # function -> the functions that it calls
-    "sine": ("quarters",), "cosine": ("quarters",), "tangent": ("quarters",), "arctangent2": ("arctangent",),
-    "arcsine": ("square_root", "small_arcsine"), "arccosine": ("square_root", "small_arcsine"),
-    "hyperbolic_tangent": ("exponential",), "hyperbolic_sine": ("exponential",), "hyperbolic_cosine": ("exponential",),
+    "sine": ("quarters",),
+    "cosine": ("quarters",),
+    "tangent": ("quarters",),
+    "arctangent2": ("arctangent",),
+    "arcsine": ("square_root", "small_arcsine"),
+    "arccosine": ("square_root", "small_arcsine"),
+    "hyperbolic_tangent": ("exponential",),
+    "hyperbolic_sine": ("exponential",),
+    "hyperbolic_cosine": ("exponential",),
     "power": ("exponential", "logarithm", "whole_below"),
-}  # fmt: skip
+}
 
 
 def elementary_text(calls: Iterable[str], real: Real) -> str:
@@ -68,25 +80,50 @@ def _context(real: Real) -> dict[str, Any]:
     high, low = float(ln2 * (bias + 1)), float(ln2 * (1 - bias))
     inward = 1 - 4 * real.epsilon
     return {
-        "real": real, "word": f"uint{width}_t", "signed": f"int{width}_t", "fraction": fraction, "bias": float(bias),
+        "real": real,
+        "word": f"uint{width}_t",
+        "signed": f"int{width}_t",
+        "fraction": fraction,
+        "bias": float(bias),
         # 1/sqrt from half the exponent (the constants minimise the largest relative error, 3.4 %; a step
         # y (1.5 - a y^2/2) takes an error e to 1.5 e^2), one step for the root itself, and the last digit in integers
-        "root_guess": "0x5F3759DFU" if real is Real.FLOAT else "0x5FE6EB50C7B537A9ULL", "root_steps": 2 if real is Real.FLOAT else 3,
-        "roots": ROOTS[real], "arm_fp": 4 if real is Real.FLOAT else 8, "bias_bits": f"{bias}{end}",
-        "root_up": 4.0 ** ((fraction + 2) // 2), "root_down": 0.5 ** ((fraction + 2) // 2),
-        "mask": f"0x{(1 << fraction) - 1:X}{end}", "hidden": f"0x{1 << fraction:X}{end}",
+        "root_guess": "0x5F3759DFU" if real is Real.FLOAT else "0x5FE6EB50C7B537A9ULL",
+        "root_steps": 2 if real is Real.FLOAT else 3,
+        "roots": ROOTS[real],
+        "arm_fp": 4 if real is Real.FLOAT else 8,
+        "bias_bits": f"{bias}{end}",
+        "root_up": 4.0 ** ((fraction + 2) // 2),
+        "root_down": 0.5 ** ((fraction + 2) // 2),
+        "mask": f"0x{(1 << fraction) - 1:X}{end}",
+        "hidden": f"0x{1 << fraction:X}{end}",
         "infinity": f"0x{2 * kind.maxexp - 1 << fraction:X}{end}",
-        "not_a_number": f"0x{(2 * kind.maxexp - 1 << fraction) + (1 << (fraction - 1)):X}{end}", "sign": f"0x{1 << (width - 1):X}{end}",
-        "largest": float(kind.max), "smallest": float(kind.tiny), "one_bits": f"0x{one_bits:X}{end}",
-        "log_offset": f"0x{one_bits - middle:X}{end}", "log_up": 2.0 ** (fraction + 2), "log_up_bits": float(fraction + 2),
-        "exp_high": high * inward, "exp_low": low * inward, "last": last, "per_ln2": float(1 / ln2),
+        "not_a_number": f"0x{(2 * kind.maxexp - 1 << fraction) + (1 << (fraction - 1)):X}{end}",
+        "sign": f"0x{1 << (width - 1):X}{end}",
+        "largest": float(kind.max),
+        "smallest": float(kind.tiny),
+        "one_bits": f"0x{one_bits:X}{end}",
+        "log_offset": f"0x{one_bits - middle:X}{end}",
+        "log_up": 2.0 ** (fraction + 2),
+        "log_up_bits": float(fraction + 2),
+        "exp_high": high * inward,
+        "exp_low": low * inward,
+        "last": last,
+        "per_ln2": float(1 / ln2),
         "ln2": _parts(ln2, fraction + 1, last.bit_length().bit_length(), 2),
-        "per_quarter": float(1 / half_pi), "quarter": _parts(half_pi, fraction + 1, exact, 3 if real is Real.DOUBLE else 4),
-        "half_pi": _parts(half_pi, fraction + 1, 0, 2), "turn_exact": TURNS[real], "turn_end": TURN_END[real],
-        "atan_half": _parts(_arctan_half(), fraction + 1, 0, 2), "asin_near": ASIN_NEAR,
-        "atan_low": math.sqrt(2) - 1, "atan_high": math.sqrt(2) + 1, "tanh_near": TANH_NEAR, "sinh_near": SINH_NEAR,
-        "all_whole": 2.0**fraction, "horner": partial(_horner, real),
-    }  # fmt: skip
+        "per_quarter": float(1 / half_pi),
+        "quarter": _parts(half_pi, fraction + 1, exact, 3 if real is Real.DOUBLE else 4),
+        "half_pi": _parts(half_pi, fraction + 1, 0, 2),
+        "turn_exact": TURNS[real],
+        "turn_end": TURN_END[real],
+        "atan_half": _parts(_arctan_half(), fraction + 1, 0, 2),
+        "asin_near": ASIN_NEAR,
+        "atan_low": math.sqrt(2) - 1,
+        "atan_high": math.sqrt(2) + 1,
+        "tanh_near": TANH_NEAR,
+        "sinh_near": SINH_NEAR,
+        "all_whole": 2.0**fraction,
+        "horner": partial(_horner, real),
+    }
 
 
 def _horner(real: Real, name: str, variable: str, indent: int = 4) -> str:
@@ -151,11 +188,11 @@ def polynomial(name: str, real: Real) -> tuple[float, ...]:
     tolerance = round(real.epsilon / 2 / ERROR_SHARE / one.weight * 2.0**100) << (BITS - 100)
     for degree in range(1, len(terms)):
         points = [_chebyshev(k + 0.5, degree + 1, one.low, one.high) for k in range(degree + 1)]
-        found = _through(points, [_sum(terms, x) for x in points])
+        coefficients = _through(points, [_sum(terms, x) for x in points])
         between = [_chebyshev(k, degree + 1, one.low, one.high) for k in range(degree + 2)]
-        if all(abs(_sum(found, x) - _sum(terms, x)) <= tolerance for x in between):
+        if all(abs(_sum(coefficients, x) - _sum(terms, x)) <= tolerance for x in between):
             break
-    return tuple(float(Fraction(c, 1 << BITS)) for c in found)
+    return tuple(float(Fraction(c, 1 << BITS)) for c in coefficients)
 
 
 @lru_cache
@@ -185,10 +222,10 @@ def _through(points: list[int], values: list[int]) -> list[int]:
     for order in range(1, len(points)):
         for i in range(len(points) - 1, order - 1, -1):
             differences[i] = ((differences[i] - differences[i - 1]) << BITS) // (points[i] - points[i - order])
-    found = [0] * len(points)
+    coefficients = [0] * len(points)
     for x, d in zip(reversed(points), reversed(differences), strict=True):
-        found = [d - (x * found[0] >> BITS), *(a - (x * b >> BITS) for a, b in pairwise(found))]
-    return found
+        coefficients = [d - (x * coefficients[0] >> BITS), *(a - (x * b >> BITS) for a, b in pairwise(coefficients))]
+    return coefficients
 
 
 def _arctan_half() -> Fraction:

@@ -15,6 +15,7 @@ import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -30,12 +31,27 @@ PRODUCT = {ca.OP_MUL: product_of, ca.OP_DIV: quotient_of}
 GIVEN = "given"  # the array of the numbers that the program is given when it starts
 TWICE_PRINTED = (ca.OP_SIGN, ca.OP_FABS, ca.OP_FMIN, ca.OP_FMAX)  # their operands appear twice in C
 _FORMULA = {
-    ca.OP_ADD: "{0} + {1}", ca.OP_SUB: "{0} - {1}", ca.OP_MUL: "{0} * {1}", ca.OP_DIV: "{0} / {1}", ca.OP_NEG: "-{0}", ca.OP_SQ: "{0}^2",
-    ca.OP_TWICE: "2 * {0}", ca.OP_INV: "1 / {0}", ca.OP_ASSIGN: "{0}", ca.OP_SQRT: "sqrt({0})",
-    ca.OP_EXP: "exp({0})", ca.OP_LOG: "log({0})",
-    ca.OP_SIN: "sin({0})", ca.OP_COS: "cos({0})", ca.OP_TAN: "tan({0})", ca.OP_ASIN: "asin({0})", ca.OP_ATAN: "atan({0})",
-    ca.OP_POW: "{0}^{1}", ca.OP_CONSTPOW: "{0}^{1}", ca.OP_TANH: "tanh({0})",
-}  # fmt: skip
+    ca.OP_ADD: "{0} + {1}",
+    ca.OP_SUB: "{0} - {1}",
+    ca.OP_MUL: "{0} * {1}",
+    ca.OP_DIV: "{0} / {1}",
+    ca.OP_NEG: "-{0}",
+    ca.OP_SQ: "{0}^2",
+    ca.OP_TWICE: "2 * {0}",
+    ca.OP_INV: "1 / {0}",
+    ca.OP_ASSIGN: "{0}",
+    ca.OP_SQRT: "sqrt({0})",
+    ca.OP_EXP: "exp({0})",
+    ca.OP_LOG: "log({0})",
+    ca.OP_SIN: "sin({0})",
+    ca.OP_COS: "cos({0})",
+    ca.OP_TAN: "tan({0})",
+    ca.OP_ASIN: "asin({0})",
+    ca.OP_ATAN: "atan({0})",
+    ca.OP_POW: "{0}^{1}",
+    ca.OP_CONSTPOW: "{0}^{1}",
+    ca.OP_TANH: "tanh({0})",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +90,7 @@ class Graph:
     """Makes nodes, each of them once. `given`: path and range of the parameters that the program is given when it starts."""
 
     def __init__(self, given: Mapping[str, Interval] | None = None) -> None:
-        self._nodes: dict[tuple, Node] = {}
+        self._nodes: dict[tuple[Any, ...], Node] = {}
         self._count = 0
         self._given = {path: self.read(GIVEN, k, within) for k, (path, within) in enumerate((given or {}).items())}
 
@@ -104,20 +120,22 @@ class Graph:
         not read when the C runs. `renamed`: arguments that have another name in the C.
         """
         at = dict[int, Node]()
-        found = [self.constant(0.0)] * function.size1_out(0)
+        values = [self.constant(0.0)] * function.size1_out(0)
         for k in range(function.n_instructions()):
             op, inputs, outputs = (
-                function.instruction_id(k), function.instruction_input(k), function.instruction_output(k),
-            )  # fmt: skip
+                function.instruction_id(k),
+                function.instruction_input(k),
+                function.instruction_output(k),
+            )
             if op == ca.OP_OUTPUT:
-                found[function.sparsity_out(0).row()[outputs[1]]] = at[inputs[0]]
+                values[function.sparsity_out(0).row()[outputs[1]]] = at[inputs[0]]
             elif op == ca.OP_CONST:
                 at[outputs[0]] = self.constant(function.instruction_constant(k))
             elif op == ca.OP_INPUT:
                 at[outputs[0]] = self._input(function, inputs, ranges, numbers or {}, renamed or {})
             else:
                 at[outputs[0]] = self.apply(op, [at[i] for i in inputs])
-        return found
+        return values
 
     def with_formulas(self, rows: Sequence[Node], named: Sequence[Node]) -> list[Node]:
         """`rows` with the formulas of the same rows in terms of parameters, `named`; a row of another form stays without formulas.
@@ -151,7 +169,12 @@ class Graph:
         return made[row.number, named.number]
 
     def _input(
-        self, function: ca.Function, place: Sequence[int], ranges: Mapping, numbers: Mapping, renamed: Mapping[str, str]
+        self,
+        function: ca.Function,
+        place: Sequence[int],
+        ranges: Mapping[str, Any],
+        numbers: Mapping[str, Any],
+        renamed: Mapping[str, str],
     ) -> Node:
         name, row = function.name_in(place[0]), int(function.sparsity_in(place[0]).row()[place[1]])
         if name in numbers:
@@ -282,9 +305,8 @@ class Graph:
         """The expression of a number in those that the program is given."""
         parts = [node.source or node for node in a]
         less_one = len(parts) == 2 and parts[1].fixed and parts[1].value == {ca.OP_SUB: 1.0, ca.OP_ADD: -1.0}.get(op)
-        if (
-            less_one and parts[0].operation == ca.OP_EXP
-        ):  # e^y - 1 = 2 t/(1 - t), t = tanh(y/2), which keeps the digits near y = 0
+        # e^y - 1 = 2 t/(1 - t), t = tanh(y/2), which keeps the digits near y = 0.
+        if less_one and parts[0].operation == ca.OP_EXP:
             half = self.apply(ca.OP_MUL, [self.constant(0.5), parts[0].operands[0]])
             t = self._operation(ca.OP_TANH, half)
             return self._operation(
@@ -298,7 +320,7 @@ class Graph:
             return self._nodes[key]
         return self._make(key, op, operands=operands, within=interval_of(op, [node.within for node in operands]))
 
-    def _make(self, key: tuple, op: int, **rest: object) -> Node:
+    def _make(self, key: tuple[Any, ...], op: int, **rest: object) -> Node:
         node = Node(self._count, op, **rest)  # type: ignore[arg-type]
         self._count += 1
         self._nodes[key] = node
@@ -339,10 +361,18 @@ def _computed(op: int, values: Sequence[float]) -> float:
 
 
 _FUNCTIONS: dict[tuple[int, int], ca.Function] = {}
-_EXACT: Mapping[int, Callable[..., float]] = {  # rounded correctly everywhere: Python's result is CasADi's, without a call of CasADi
-    ca.OP_ADD: operator.add, ca.OP_SUB: operator.sub, ca.OP_MUL: operator.mul, ca.OP_DIV: operator.truediv, ca.OP_NEG: operator.neg,
-    ca.OP_SQ: lambda a: a * a, ca.OP_TWICE: lambda a: 2.0 * a, ca.OP_INV: lambda a: 1.0 / a,
-}  # fmt: skip
+_EXACT: Mapping[
+    int, Callable[..., float]
+] = {  # rounded correctly everywhere: Python's result is CasADi's, without a call of CasADi
+    ca.OP_ADD: operator.add,
+    ca.OP_SUB: operator.sub,
+    ca.OP_MUL: operator.mul,
+    ca.OP_DIV: operator.truediv,
+    ca.OP_NEG: operator.neg,
+    ca.OP_SQ: lambda a: a * a,
+    ca.OP_TWICE: lambda a: 2.0 * a,
+    ca.OP_INV: lambda a: 1.0 / a,
+}
 
 
 def _term(node: Node) -> str:

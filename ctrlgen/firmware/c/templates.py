@@ -25,8 +25,11 @@ def render(template: str, context: dict[str, Any]) -> str:
     """`template` of `codegen/templates/` with `context`. A name that the template asks for and does not get is an error."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(codegen_folder() / "templates"),
-        undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
-    )  # fmt: skip
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
     environment.globals |= {"abi": ABI, "hertz": hertz}
     return environment.get_template(f"{template}.j2").render(context)
 

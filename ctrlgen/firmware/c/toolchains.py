@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ctrlgen.core.errors import ToolError
 
+# Without fused products and sums, so that the bits are those on targets.
 FLAGS = (
     "-std=c99",
     "-Wall",
@@ -19,7 +20,7 @@ FLAGS = (
     "-Werror",
     "-O2",
     "-ffp-contract=off",
-)  # as on targets: the same bits
+)
 COMPILERS = ("gcc", "clang")
 
 
@@ -27,18 +28,18 @@ def find_compilers() -> dict[str, str]:
     """C compilers found -> version line: gcc and clang, or else $CC or cc. Raises ToolError when there is none."""
     present = [name for name in COMPILERS if shutil.which(name)]
     others = [name for name in (os.environ.get("CC", ""), "cc") if name and shutil.which(name)]
-    found = {}
+    versions = {}
     for name in present or others[:1]:
         done = subprocess.run([name, "--version"], capture_output=True, text=True, check=False, start_new_session=True)
         if done.returncode != 0:
             raise ToolError(f"{name} --version ends with status {done.returncode}; repair or remove that compiler")
-        found[name] = (done.stdout.splitlines() or [name])[0]
-    if not found:
+        versions[name] = (done.stdout.splitlines() or [name])[0]
+    if not versions:
         raise ToolError(
             f"no C compiler found (looked for {', '.join(COMPILERS)}, $CC, cc); install one, on Debian: apt-get install gcc. "
             "`ctrlgen generate` writes the C without it"
         )
-    return found
+    return versions
 
 
 def compile_c(compiler: str, include: Path, words: list[str]) -> None:

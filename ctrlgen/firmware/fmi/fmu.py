@@ -3,6 +3,10 @@
 The internal step is the sample time; a communication step is a whole number of samples, inputs held over it.
 `target` is what the controller is to reach at the end of a step and its `drive` acts during that same step: in a
 loop, step the controller first, hand its drives on, then step the plant.
+
+FMI 2.0 stays beside 3.0 because tools that import it alone are in use: Simulink to R2022b, and OpenModelica, whose importer answered
+an FMI 3.0 unit with nothing until August 2026 and takes 3.0 for model exchange alone since (OpenModelica/OpenModelica#16268;
+OpenModelica/OMSimulator#1523). These units are for co-simulation. It costs two templates and a table of calls.
 """
 
 from __future__ import annotations
@@ -95,7 +99,7 @@ class _Unit:
 
     @property
     def variables(self) -> list[Variable]:
-        """All but the time, by value reference."""
+        """The variables, without the time, by value reference."""
         return [*self.inputs, *self.outputs, *(v for v in (self.status, self.settles) if v)]
 
 
@@ -153,12 +157,23 @@ def _controller_unit(scenario: Scenario, model: Model, sample_time: float, folde
     what += ", 128 rate of a drive" if controller.rate else ""
     status = Variable(1 + len(inputs) + len(outputs), "status", "output", "discrete", what, {}, "Int32")
     return _Unit(
-        "controller", core, f"online controller of {m.device.title}", inputs, outputs, status,
+        "controller",
+        core,
+        f"online controller of {m.device.title}",
+        inputs,
+        outputs,
+        status,
         _settled(status.reference + 1, "the first target"),
-        {"groups": groups, "n": len(m.axes), "nu": m.u.numel(), "n_s": m.n_states,
-         "drive_start": [Real.DOUBLE.literal(v) for v in controller.kernels.safe_drive],
-         "rated": controller.rate is not None, "most_settling": controller.rate.samples(*m.u_bounds) if controller.rate else 0},
-    )  # fmt: skip
+        {
+            "groups": groups,
+            "n": len(m.axes),
+            "nu": m.u.numel(),
+            "n_s": m.n_states,
+            "drive_start": [Real.DOUBLE.literal(v) for v in controller.kernels.safe_drive],
+            "rated": controller.rate is not None,
+            "most_settling": controller.rate.samples(*m.u_bounds) if controller.rate else 0,
+        },
+    )
 
 
 def _plant_unit(scenario: Scenario, plant: Plant, folder: Path) -> _Unit:
@@ -181,11 +196,16 @@ def _settled(reference: int, where: str) -> Variable:
 
 
 def _variables(
-    role: str, signal: Any, causality: str, variability: str, first: int, start: np.ndarray | None = None,
+    role: str,
+    signal: Any,
+    causality: str,
+    variability: str,
+    first: int,
+    start: np.ndarray | None = None,
     bounds: tuple[np.ndarray, np.ndarray] | None = None,
-) -> list[Variable]:  # fmt: skip
+) -> list[Variable]:
     """One variable a channel of `signal`, in SI, with its reader's unit to display it in."""
-    found = []
+    variables = []
     for k, (channel, unit, scale) in enumerate(zip(signal.channels, signal.units, signal.scale, strict=True)):
         attributes = {"unit": base_unit(unit)}
         if unit != attributes["unit"]:
@@ -197,10 +217,10 @@ def _variables(
         attributes["nominal"] = repr(float(scale))
         if start is not None:
             attributes["start"] = repr(float(start[k]))
-        found.append(
+        variables.append(
             Variable(first + k, f"{role}_{channel}", causality, variability, f"{signal.label} {channel}", attributes)
         )
-    return found
+    return variables
 
 
 def _units(variables: list[Variable]) -> list[FmiUnit]:
@@ -240,15 +260,29 @@ def _write_unit(
     digest = hashlib.sha256(identity + b"".join(core.values())).hexdigest()
     sources = [f"{identifier}.c", f"{unit.core}.c"]
     context = unit.more | {
-        "identifier": identifier, "fmi": f"{fmi}.0", "core": unit.core, "title": comment(unit.title), "unit": unit.kind,
-        "digest": scenario.digest, "version": __version__, "program": program(), "sources": sources, "sample_time": repr(plant.sample_time),
+        "identifier": identifier,
+        "fmi": f"{fmi}.0",
+        "core": unit.core,
+        "title": comment(unit.title),
+        "unit": unit.kind,
+        "digest": scenario.digest,
+        "version": __version__,
+        "program": program(),
+        "sources": sources,
+        "sample_time": repr(plant.sample_time),
         "token": f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}",
-        "inputs": unit.inputs, "outputs": unit.outputs, "status": unit.status, "settles": unit.settles,
-        "initial_inputs": [v.attributes["start"] for v in unit.inputs], "variables": unit.variables,
-        "units": _units(unit.variables), "stop_time": repr(len(scenario.bind(plant.model).samples) * plant.sample_time),
+        "inputs": unit.inputs,
+        "outputs": unit.outputs,
+        "status": unit.status,
+        "settles": unit.settles,
+        "initial_inputs": [v.attributes["start"] for v in unit.inputs],
+        "variables": unit.variables,
+        "units": _units(unit.variables),
+        "stop_time": repr(len(scenario.bind(plant.model).samples) * plant.sample_time),
         "description": _described(scenario, unit),
-        "foreign_types": FOREIGN_TYPES, "refused": REFUSED_3 if fmi == 3 else REFUSED_2,
-    }  # fmt: skip
+        "foreign_types": FOREIGN_TYPES,
+        "refused": REFUSED_3 if fmi == 3 else REFUSED_2,
+    }
     write(f"fmi{fmi}.c", context, folder / f"{identifier}.c")
     write(f"modelDescription{fmi}.xml", context, folder / "modelDescription.xml")
     files = {

@@ -117,16 +117,35 @@ def plant_context(scenario: Scenario, plant: Plant, real: Real, prefix: str) -> 
     called = frozenset().union(*(kernel.calls for kernel in kernels.values()))
     starts = np.cumsum([0, *(len(signal.channels) for signal in plant.signals)])
     return {
-        "prefix": prefix, "real": real, "version": __version__, "program": program(), "title": comment(m.device.title),
-        "source": comment(m.device.source), "device_sha256": scenario.device_sha256, "si": si_text, "drive": m.signals["drive"],
-        "rate": 1 / plant.sample_time, "n": len(m.axes), "nx": m.x.numel(), "nu": m.u.numel(),
+        "prefix": prefix,
+        "real": real,
+        "version": __version__,
+        "program": program(),
+        "title": comment(m.device.title),
+        "source": comment(m.device.source),
+        "device_sha256": scenario.device_sha256,
+        "si": si_text,
+        "drive": m.signals["drive"],
+        "rate": 1 / plant.sample_time,
+        "n": len(m.axes),
+        "nx": m.x.numel(),
+        "nu": m.u.numel(),
         "x_names": [f"{name} [{unit}]" for name, unit in zip(m.x_names, m.x_units, strict=True)],
-        "signals": list(zip(plant.signals, map(int, starts), strict=False)), "width": int(starts[-1]),
-        "inertial": plant.inertial, "constants": printer.constants, "laws": printer.laws_text, "kernels": kernels, "axes": m.axes,
+        "signals": list(zip(plant.signals, map(int, starts), strict=False)),
+        "width": int(starts[-1]),
+        "inertial": plant.inertial,
+        "constants": printer.constants,
+        "laws": printer.laws_text,
+        "kernels": kernels,
+        "axes": m.axes,
         "elementary": elementary_text(called, real),
-        "rest": m.rest, "z_scale": m.z_scale, "x_near": ARRIVED[real] * m.x_scale, "z_near": ARRIVED[real] * m.z_scale,
-        "newton": NEWTON_MOST, "rounds": ROUNDS,
-    }  # fmt: skip
+        "rest": m.rest,
+        "z_scale": m.z_scale,
+        "x_near": ARRIVED[real] * m.x_scale,
+        "z_near": ARRIVED[real] * m.z_scale,
+        "newton": NEWTON_MOST,
+        "rounds": ROUNDS,
+    }
 
 
 def write_plant(scenario: Scenario, plant: Plant, real: Real, out: Path) -> str:

@@ -83,11 +83,18 @@ def start_context(kernels: ControllerKernels, printer: Printer) -> dict[str, Any
         changing = {"constant": own, "kernel": kernel, "assigned": _assigned(some)}
     derive = printer.starting(members, "derive", "What follows from the constants that the controller is given.")
     return {
-        "given": [_described(c, real) for c in constants], "given_numbers": len(constants) + len(_assigned(members)),
-        "derived": members, "derive": derive, "assigned": _assigned(members), "changing": changing, "refused": FIRST,
-        "magic": int.from_bytes(MAGIC, "little"), "layout": VERSION + (len(constants) << 16), "crc_polynomial": CRC_POLYNOMIAL,
+        "given": [_described(c, real) for c in constants],
+        "given_numbers": len(constants) + len(_assigned(members)),
+        "derived": members,
+        "derive": derive,
+        "assigned": _assigned(members),
+        "changing": changing,
+        "refused": FIRST,
+        "magic": int.from_bytes(MAGIC, "little"),
+        "layout": VERSION + (len(constants) << 16),
+        "crc_polynomial": CRC_POLYNOMIAL,
         "overhead": OVERHEAD,
-    }  # fmt: skip
+    }
 
 
 def _described(c: RunTimeConstant, real: Real) -> dict[str, str]:
@@ -107,27 +114,53 @@ def derived_values(members: Sequence[Derived], given: Sequence[float], real: Rea
     numpy, which are within a rounding or two of the C's."""
     kind = np.float32 if real is Real.FLOAT else np.float64
     sources = [source for member in members for source in member.sources]
-    found: dict[int, Any] = {}
+    computed: dict[int, Any] = {}
     with np.errstate(all="ignore"):
         for node in reached(sources):
             if node.constant:
-                found[node.number] = kind(node.value)
+                computed[node.number] = kind(node.value)
             elif node.array:
-                found[node.number] = kind(given[node.index])
+                computed[node.number] = kind(given[node.index])
             else:
-                found[node.number] = kind(_OPERATIONS[node.operation](*(found[n.number] for n in node.operands)))
-    return np.array([found[source.number] for source in sources])
+                computed[node.number] = kind(_OPERATIONS[node.operation](*(computed[n.number] for n in node.operands)))
+    return np.array([computed[source.number] for source in sources])
 
 
 _OPERATIONS: Mapping[int, Callable[..., Any]] = {
-    ca.OP_ADD: np.add, ca.OP_SUB: np.subtract, ca.OP_MUL: np.multiply, ca.OP_DIV: np.divide, ca.OP_SQRT: np.sqrt, ca.OP_EXP: np.exp,
-    ca.OP_LOG: np.log, ca.OP_SIN: np.sin, ca.OP_COS: np.cos, ca.OP_TAN: np.tan, ca.OP_ASIN: np.arcsin, ca.OP_ACOS: np.arccos,
-    ca.OP_ATAN: np.arctan, ca.OP_ATAN2: np.arctan2, ca.OP_TANH: np.tanh, ca.OP_SINH: np.sinh, ca.OP_COSH: np.cosh, ca.OP_POW: np.power,
-    ca.OP_CONSTPOW: np.power, ca.OP_FMIN: np.fmin, ca.OP_FMAX: np.fmax, ca.OP_FABS: np.abs, ca.OP_SIGN: np.sign,
-    ca.OP_FLOOR: np.floor, ca.OP_CEIL: np.ceil, ca.OP_LT: np.less, ca.OP_LE: np.less_equal, ca.OP_EQ: np.equal, ca.OP_NE: np.not_equal,
-    ca.OP_NOT: np.logical_not, ca.OP_AND: np.logical_and, ca.OP_OR: np.logical_or,
+    ca.OP_ADD: np.add,
+    ca.OP_SUB: np.subtract,
+    ca.OP_MUL: np.multiply,
+    ca.OP_DIV: np.divide,
+    ca.OP_SQRT: np.sqrt,
+    ca.OP_EXP: np.exp,
+    ca.OP_LOG: np.log,
+    ca.OP_SIN: np.sin,
+    ca.OP_COS: np.cos,
+    ca.OP_TAN: np.tan,
+    ca.OP_ASIN: np.arcsin,
+    ca.OP_ACOS: np.arccos,
+    ca.OP_ATAN: np.arctan,
+    ca.OP_ATAN2: np.arctan2,
+    ca.OP_TANH: np.tanh,
+    ca.OP_SINH: np.sinh,
+    ca.OP_COSH: np.cosh,
+    ca.OP_POW: np.power,
+    ca.OP_CONSTPOW: np.power,
+    ca.OP_FMIN: np.fmin,
+    ca.OP_FMAX: np.fmax,
+    ca.OP_FABS: np.abs,
+    ca.OP_SIGN: np.sign,
+    ca.OP_FLOOR: np.floor,
+    ca.OP_CEIL: np.ceil,
+    ca.OP_LT: np.less,
+    ca.OP_LE: np.less_equal,
+    ca.OP_EQ: np.equal,
+    ca.OP_NE: np.not_equal,
+    ca.OP_NOT: np.logical_not,
+    ca.OP_AND: np.logical_and,
+    ca.OP_OR: np.logical_or,
     ca.OP_IF_ELSE_ZERO: lambda condition, value: value if condition else 0.0,
-}  # fmt: skip
+}
 
 
 def _check(kernels: ControllerKernels, members: Sequence[Derived], constants: Sequence[RunTimeConstant]) -> None:

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from ctrlgen.controller.feedforward import Controller, ControllerStep
+from ctrlgen.controller.controller_step import ControllerStep
+from ctrlgen.controller.feedforward import Controller
 
 AROUND = 8  # displacements drawn anywhere in the range, and on its corners
 MOVED = 0.05  # of its range, by which a displacement goes beyond
@@ -33,11 +35,11 @@ class Call:
 def limiter_calls(controller: Controller, epsilon: float, count: int) -> list[Call]:
     """At most `count` calls that take the decisions that can be taken; none whose status a rounding of `epsilon` could change."""
     watched, seen = _watched(controller)
-    known: set[tuple] = set()
+    known: set[tuple[Any, ...]] = set()
     kept: list[Call] = []
-    started: dict[Call, tuple[ControllerStep, set[tuple]]] = {}  # many cases begin with the same call
+    started: dict[Call, tuple[ControllerStep, set[tuple[Any, ...]]]] = {}  # many cases begin with the same call
     for case in _cases(controller):
-        decisions: set[tuple] = set()
+        decisions: set[tuple[Any, ...]] = set()
         states = [watched.rest()]
         statuses = []
         for call in case:
@@ -132,13 +134,13 @@ def _at_its_rate(controller: Controller, target: np.ndarray, settle: bool) -> np
     return high * target
 
 
-def _watched(controller: Controller) -> tuple[Controller, list[tuple]]:
+def _watched(controller: Controller) -> tuple[Controller, list[tuple[Any, ...]]]:
     """The `controller` with an observer, and the list of the decisions that the answers of its kernels ask for."""
     m, n = controller.kernels.nominal, controller.kernels.nominal.n_states
     x_low, x_high = (bound[:n] for bound in m.x_bounds)
     ranges = m.z_bounds, (x_low, x_high), m.u_bounds
     limits = dict(zip(("displacement", "state", "drive"), zip(ranges, controller.slacks, strict=True), strict=True))
-    seen: list[tuple] = []
+    seen: list[tuple[Any, ...]] = []
 
     def note(what: str, answer: np.ndarray) -> None:
         if what in limits:

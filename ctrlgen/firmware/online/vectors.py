@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ctrlgen.controller.feedforward import Controller, ControllerStatus
+from ctrlgen.controller.controller_step import ControllerStatus
+from ctrlgen.controller.feedforward import Controller
 from ctrlgen.firmware.c.real import Real
-from ctrlgen.firmware.online.online import FLOAT_SLACK
+from ctrlgen.firmware.online.limit_tables import FLOAT_SLACK
 from ctrlgen.firmware.online.vector_cases import Call, limiter_calls
 from ctrlgen.firmware.player.compression import Compression
 from ctrlgen.trajectory.inverse.clock import Clock, in_time
@@ -50,18 +51,20 @@ def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str
         rows.append({"target": target, "drive": step.drive, "status": int(step.status), "how": how, "exact": exact})
         if exact and not step.status & ControllerStatus.INPUT:
             tolerance = max(tolerance, controller.drive_rounding(before, target, step, call.settle, rounding))
-            if (
-                step.status & ControllerStatus.COMPOSITE
-            ):  # scaled from far away, it moves by the rounding of what it was scaled from
+            # Scaled from far away, it moves by the rounding of what it was scaled from.
+            if step.status & ControllerStatus.COMPOSITE:
                 for unit in np.eye(len(target)):
                     near = controller.step(before, target * (1 + rounding / 4 * unit), settle=call.settle)
                     if near.status == step.status:
                         tolerance = max(tolerance, float(np.max(np.abs(near.drive - step.drive))))
     tolerance = max(tolerance, 1e-12 * float(np.max(controller.kernels.nominal.u_scale)))
     return {
-        "rows": rows, "tolerance": tolerance, "unusable": UNUSABLE * command.shape[1], "beyond": min(len(command), VECTORS),
+        "rows": rows,
+        "tolerance": tolerance,
+        "unusable": UNUSABLE * command.shape[1],
+        "beyond": min(len(command), VECTORS),
         "lost": sum(part.size for part in controller.rest()) + 1,
-    }  # fmt: skip
+    }
 
 
 def played_vectors(compression: Compression | None, samples: int, clock: Clock) -> dict[str, Any]:

@@ -1,5 +1,9 @@
 """How the player stores the solved drive: as a table or as a piecewise cubic, whichever has fewer bytes (docs/player.md).
 
+Both stay. On the shipped scenarios the cubic takes 4 to 38 times fewer bytes than the table (circle20 in float: 648 instead of 24,000)
+for 60 to 110 instructions more a sample; ten seconds of six drives at 1 kHz would be a table of 240 kB. The table has no approximation,
+and paths of less than about twenty samples and drives that are noise have no shorter form.
+
 The tolerance is on the followed signal, not on the drive: the model is driven by what the C computes (a closed path for
 two laps), and may differ from the command by `LENGTH_TOLERANCE` and `ANGLE_TOLERANCE`.
 """
@@ -151,15 +155,15 @@ def _compress(solution: Solution, real: Real, spline: Callable[[int], Spline | N
         )
 
     table = SampleTable(np.clip(solution.drive, *bounds))
-    found: list[tuple[Curve | None, PlayerCandidate]] = [(table, measured(table))]
+    weighed: list[tuple[Curve | None, PlayerCandidate]] = [(table, measured(table))]
 
     cubic = _coarsest(spline, measured, table.bytes(real))
-    found.append(cubic or (None, _no_curve("cubic", "no shorter than the table within the tolerance")))
-    usable = [(curve, c) for curve, c in found if curve is not None and _within(c) and _affordable(c)]
-    curve, best = min(usable, key=lambda pair: pair[1].bytes or 0) if usable else found[0]
+    weighed.append(cubic or (None, _no_curve("cubic", "no shorter than the table within the tolerance")))
+    usable = [(curve, c) for curve, c in weighed if curve is not None and _within(c) and _affordable(c)]
+    curve, best = min(usable, key=lambda pair: pair[1].bytes or 0) if usable else weighed[0]
     assert curve is not None
     candidates = []
-    for _, c in found:
+    for _, c in weighed:
         told = {"chosen": c is best, "remark": c.remark or _remark(c, best, bool(usable))}
         candidates.append(c.model_copy(update=told))
     return Compression(real, curve, closed, *_kept(curve, bounds, real), tuple(candidates))

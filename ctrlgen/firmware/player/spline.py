@@ -204,9 +204,8 @@ def _segments(drive: np.ndarray, tolerance: np.ndarray, periodic: bool, most: in
     n = len(drive)
 
     def within(segments: int) -> bool:
-        if (
-            n > DENSE and segments + 3 * (not periodic) > n
-        ):  # more control points than samples: as many rows as the table
+        # More control points than samples: as many rows as the table.
+        if n > DENSE and segments + 3 * (not periodic) > n:
             return False
         fitted = _blending(n, segments, periodic) @ _control(drive, segments, periodic)
         return bool(np.all(np.abs(fitted - drive).max(axis=0) <= tolerance))

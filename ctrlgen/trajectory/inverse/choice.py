@@ -6,8 +6,9 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import Fault
+from ctrlgen.devices import Signal
 from ctrlgen.model.allocation import allocate, why_not_ganged
-from ctrlgen.model.model import Model, Signal
+from ctrlgen.model.model import Model
 from ctrlgen.trajectory.inverse.balanced import BalancedInverse
 from ctrlgen.trajectory.inverse.clock import Clock, Sampled
 from ctrlgen.trajectory.inverse.inertial import InertialInverse

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ctrlgen.model.model import Limit, Model
+from ctrlgen.devices import Limit
+from ctrlgen.model.model import Model
 
 NEGLIGIBLE = (
     1e-7  # of a limit: 5 pm of a stroke of 50 um; less is rounding, or what IPOPT's relaxed bounds (1e-8) leave

@@ -1,0 +1,285 @@
+/* flexure_axis_online_f32: see flexure_axis_online_f32.h. Made by ctrlgen 0.1.0; do not edit. */
+#include "flexure_axis_online_f32.h"
+
+#include <stddef.h>
+
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && (__FINITE_MATH_ONLY__ > 0)) || defined(_M_FP_FAST)
+#error "compile this without -ffast-math, -Ofast, -ffinite-math-only or /fp:fast: they remove the checks for NaN"
+#endif
+
+static const float U_LOW[1] = { -4.0f }; /* V */
+static const float U_HIGH[1] = { 4.0f }; /* V */
+static const float U_SLACK[1] = { 8e-06f }; /* V */
+static const float U_SAFE[1] = { 0.0f }; /* V */
+
+#define READY (0xA500A500U) /* in a state that was initialised; zeros and most other bytes are not this word */
+
+#define FORCE_CONSTANT_STIFFNESS_1 (20000.0f) /* (1 / actuator.force_constant) * mechanics.stiffness */
+#define FORCE_CONSTANT (10.0f) /* actuator.force_constant */
+#define STIFFNESS (200000.0f) /* mechanics.stiffness */
+#define DAMPING (30.0f) /* mechanics.damping */
+#define STIFFNESS_1 (5e-06f) /* 1 / mechanics.stiffness */
+
+/* Displacement at which the platform pose is `target`, axis [m]. */
+static void wanted_displacement(const float target[1], float result[1])
+{
+    result[0] = target[0];
+}
+
+/* Drive that keeps the displacement `wanted` at rest. */
+static void wanted_drive(const float wanted[1], float result[1])
+{
+    result[0] = FORCE_CONSTANT_STIFFNESS_1 * wanted[0];
+}
+
+/* States under `drive`, at rest: velocity_axis [m / s]. */
+static void wanted_advance(float result[1])
+{
+    result[0] = 0.0f;
+}
+
+/* Displacement at which the platform pose is `target`, axis [m]. */
+static void motion_displacement(const float target[3], float result[1])
+{
+    result[0] = target[0];
+}
+
+/* States that the displacement needs during the motion that `target` says: velocity_axis [m / s]. */
+static void motion_state(const float target[3], float result[1])
+{
+    result[0] = target[1];
+}
+
+/* Drive of the motion that `target` says. */
+static void motion_drive(const float target[3], float result[1])
+{
+    result[0] = (20000.0f * target[0]) + (3.0f * target[1]) + (0.05f * target[2]);
+}
+
+/* Displacement at which the forces balance, g(x, z, drive) = 0: the step z - g/(dg/dz) from z. */
+static void balance_displacement(const float x[1], const float z[1], const float drive[1], float result[1])
+{
+    const float t1 = ((FORCE_CONSTANT * drive[0]) - (STIFFNESS * z[0])) - (DAMPING * x[0]);
+    result[0] = z[0] + (STIFFNESS_1 * t1);
+}
+
+/* 1 if every displacement is inside its limits: distance from the middle squared, no more than the half width squared. 0 for NaN. */
+static int displacement_inside(const float value[1])
+{
+    const float d0 = value[0];
+    return (((d0 * d0) <= 9.99999e-09f)) ? 1 : 0;
+}
+
+/* 1 if every drive is inside its limits: distance from the middle squared, no more than the half width squared. 0 for NaN. */
+static int drive_inside(const float value[1])
+{
+    const float d0 = value[0];
+    return (((d0 * d0) <= 15.999985f)) ? 1 : 0;
+}
+
+/* 1 if a number of the state is NaN, infinite or far beyond its range. Asked first where displacements depend on the state or effects
+ * remember, else where a limit is met: until then it would show in the drives, or is written anew. Numbers with one range are judged
+ * together: the sum of their squares is at most their count times (4 times the largest magnitude of the range) squared. */
+static int is_lost(const flexure_axis_online_f32_state *state)
+{
+    const float squares0 = (state->x[0] * state->x[0]);
+    const float squares1 = (state->z[0] * state->z[0]);
+    return ((squares0 <= 1.6e+31f) && (squares1 <= 1.6e-07f)) ? 0 : 1;
+}
+
+/* Clips value to low ... high; 1 if a component changed by more than its slack or was NaN. */
+static int limit_all(float value[], const float low[], const float high[], const float slack[], int count)
+{
+    int hit = 0;
+    int i;
+    for (i = 0; i < count; i++) {
+        const float wanted = value[i];
+        const float raised = (wanted > low[i]) ? wanted : low[i];
+        const float limited = (raised < high[i]) ? raised : high[i];
+        const float moved = limited - wanted;
+        if (!((moved <= slack[i]) && (moved >= -slack[i]))) {
+            hit = 1;
+        }
+        value[i] = limited;
+    }
+    return hit;
+}
+
+/* Clips a displacement to its range; 1 if it was beyond by more than the slack. */
+static int limit_displacement(float value[1])
+{
+    static const float LOW[1] = { -1e-04f }; /* m */
+    static const float HIGH[1] = { 1e-04f }; /* m */
+    static const float SLACK[1] = { 4e-10f }; /* m */
+    return limit_all(value, LOW, HIGH, SLACK, 1);
+}
+
+/* 1 if every component is a number of a plausible size. */
+static int is_usable(const float target[3])
+{
+    static const float TARGET_LIMIT[3] = { 10.0f, 1000.0f, 100000.0f }; /* SI */
+    int usable = 1;
+    int i;
+    for (i = 0; i < 3; i++) {
+        if (!((target[i] <= TARGET_LIMIT[i]) && (target[i] >= -TARGET_LIMIT[i]))) {
+            usable = 0;
+        }
+    }
+    return usable;
+}
+
+void flexure_axis_online_f32_init(flexure_axis_online_f32_state *state)
+{
+    static const float X_REST[1] = { 0.0f }; /* SI */
+    if (state != NULL) {
+        int i;
+        for (i = 0; i < 1; i++) {
+            state->x[i] = X_REST[i];
+        }
+        for (i = 0; i < 1; i++) {
+            state->z[i] = 0.0f;
+        }
+        state->ready = READY;
+    }
+}
+
+/* The answer to a lost state: the safe drive, under which the device comes to rest. The state stays lost until it is initialised. */
+static uint32_t set_lost(flexure_axis_online_f32_state *state, flexure_axis_online_f32_output *out)
+{
+    int i;
+    state->ready = 0U;
+    for (i = 0; i < 1; i++) {
+        out->drive[i] = U_SAFE[i];
+    }
+    for (i = 0; i < 1; i++) {
+        out->displacement[i] = 0.0f;
+    }
+    return FLEXURE_AXIS_ONLINE_F32_LOST;
+}
+
+/* Without a usable target: the safe drive, as fast as it may change, and the state that it leads to. */
+static void settle_safe(flexure_axis_online_f32_state *state, flexure_axis_online_f32_output *out)
+{
+    int i;
+    for (i = 0; i < 1; i++) {
+        out->drive[i] = U_SAFE[i];
+    }
+    for (i = 0; i < 1; i++) {
+        out->displacement[i] = state->z[i];
+    }
+    wanted_advance(state->x);
+    balance_displacement(state->x, out->displacement, out->drive, state->z);
+}
+
+/* The state becomes that of the next sample. */
+static void settle_proceed(flexure_axis_online_f32_state *state, const flexure_axis_online_f32_output *out)
+{
+    wanted_advance(state->x);
+    state->z[0] = out->displacement[0];
+}
+
+/* Drives for out->displacement with every limit kept; the state becomes that of the next sample. */
+static uint32_t settle_within(flexure_axis_online_f32_state *state, flexure_axis_online_f32_output *out)
+{
+    uint32_t status = 0U;
+    wanted_drive(out->displacement, out->drive);
+    if (drive_inside(out->drive) == 0) {
+        (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, 1);
+    }
+    settle_proceed(state, out);
+    return status;
+}
+
+uint32_t flexure_axis_online_f32_settle(flexure_axis_online_f32_state *state, const float target[3], flexure_axis_online_f32_output *out)
+{
+    uint32_t status = FLEXURE_AXIS_ONLINE_F32_INPUT;
+    if ((state == NULL) || (target == NULL) || (out == NULL)) {
+        /* nothing is written */
+    } else if ((state->ready != READY) || (is_lost(state) != 0)) {
+        status = set_lost(state, out);
+    } else {
+        wanted_displacement(target, out->displacement);
+        if ((displacement_inside(out->displacement) != 0) && (is_usable(target) != 0)) {
+            status = settle_within(state, out);
+        } else if (is_usable(target) != 0) {
+            int hit;
+            hit = limit_displacement(out->displacement);
+            status = settle_within(state, out);
+            if (hit != 0) {
+                status |= FLEXURE_AXIS_ONLINE_F32_DISPLACEMENT;
+            }
+        } else {
+            settle_safe(state, out);
+        }
+    }
+    return status;
+}
+
+/* 1 if every one of count values is within its limits or beyond by no more than the slack; 0 for NaN. */
+static int all_within(const float value[], const float low[], const float high[], const float slack[], int count)
+{
+    int within = 1;
+    int i;
+    for (i = 0; i < count; i++) {
+        if (!((value[i] <= (high[i] + slack[i])) && (value[i] >= (low[i] - slack[i])))) {
+            within = 0;
+        }
+    }
+    return within;
+}
+
+/* The limits that a motion breaks beside those of the drives, as a status; 0 for none. */
+static uint32_t motion_broken(const flexure_axis_online_f32_state *at)
+{
+    static const float LOW[1] = { -1e-04f }; /* m */
+    static const float HIGH[1] = { 1e-04f }; /* m */
+    static const float SLACK[1] = { 4e-10f }; /* m */
+    uint32_t status = 0U;
+    if (all_within(at->z, LOW, HIGH, SLACK, 1) == 0) {
+        status = FLEXURE_AXIS_ONLINE_F32_DISPLACEMENT;
+    }
+    return status;
+}
+
+/* The drives of the motion whose state is at, within their limits. */
+static uint32_t motion_drives(flexure_axis_online_f32_state *at, const flexure_axis_online_f32_state *state, const float target[3], flexure_axis_online_f32_output *out)
+{
+    uint32_t status = 0U;
+    int i;
+    (void)state;
+    motion_drive(target, out->drive);
+    if (limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, 1) != 0) {
+        status = FLEXURE_AXIS_ONLINE_F32_DRIVE;
+    }
+    for (i = 0; i < 1; i++) {
+        out->displacement[i] = at->z[i];
+    }
+    at->ready = READY;
+    return status;
+}
+
+uint32_t flexure_axis_online_f32_step(flexure_axis_online_f32_state *state, const float target[3], flexure_axis_online_f32_output *out)
+{
+    uint32_t status = FLEXURE_AXIS_ONLINE_F32_INPUT;
+    if ((state == NULL) || (target == NULL) || (out == NULL)) {
+        /* nothing is written */
+    } else if ((state->ready != READY) || (is_lost(state) != 0)) {
+        status = set_lost(state, out);
+    } else if (is_usable(target) == 0) {
+        settle_safe(state, out);
+    } else {
+        flexure_axis_online_f32_state at;
+        uint32_t broken;
+        motion_displacement(target, at.z);
+        motion_state(target, at.x);
+        broken = motion_broken(&at);
+        if (broken == 0U) {
+            status = motion_drives(&at, state, target, out);
+            *state = at;
+        } else {
+            status = broken | flexure_axis_online_f32_settle(state, target, out);
+        }
+    }
+    return status;
+}
+

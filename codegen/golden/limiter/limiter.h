@@ -1,0 +1,73 @@
+/* limiter: feedforward controller of NIST MEMS hexapod nanopositioner, computed online.
+ *
+ * Commanded platform pose -> heater powers, one call per sample at 1000 Hz.
+ * No heap, no globals: the caller owns the state. All numbers are SI.
+ *
+ * target[6]  platform pose: theta_x [rad], theta_y [rad], theta_z [rad], delta_x [m], delta_y [m], delta_z [m]
+ * drive[6]   heater power: 1X [W], 1Y [W], 2X [W], 2Y [W], 3X [W], 3Y [W]
+ * displacement[6]: stage displacement [m] at the next sample (with status INPUT: the present one; LOST: zero)
+ * state[6]   actuator temperature at the next sample: 1X [K], 1Y [K], 2X [K], 2Y [K], 3X [K], 3Y [K]
+ *
+ * Limits kept:
+ *   0 W <= commanded heater power <= 1 W
+ *   22 degC <= actuator temperature <= 550 degC
+ *   0 N <= actuator force
+ *   0 um <= stage displacement <= 55 um
+ *   notch rotation <= 5 deg
+ *   wire flexure stress <= 550 MPa
+ *
+ * Arithmetic operations of the physics per call: 247 while all limits hold, 3320 at most
+ * (comparisons and the limiter's own arithmetic not counted). Arithmetic: float.
+ * Physics: S1: Mech. Mach. Theory 80 (2014) 246-264, doi 10.1016/j.mechmachtheory.2014.05.004
+ * Made by ctrlgen 0.1.0 from device 39f6d7972ef7d6f4 (sha256), whatever the trajectory. Do not edit.
+ */
+#ifndef LIMITER_H
+#define LIMITER_H
+
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* For _Static_assert(LIMITER_ABI == 1U, "..."): raised when code written for an older header must be changed. */
+#define LIMITER_ABI (1U)
+#define LIMITER_VERSION "0.1.0" /* of ctrlgen */
+#define LIMITER_DEVICE_HASH (0x39f6d797U) /* the first 32 bits of the SHA-256 of the device's description */
+#define LIMITER_RATE_HZ (1000U) /* samples a second */
+#define LIMITER_TARGET_SIZE (6U)
+#define LIMITER_DRIVE_SIZE (6U)
+#define LIMITER_DISPLACEMENT_SIZE (6U)
+#define LIMITER_STATE_SIZE (6U) /* of the output; x of the state is what the model remembers */
+
+/* Status: 0, or bits of these. The drive is within its limits in every case. */
+#define LIMITER_DISPLACEMENT (1U) /* target beyond the displacement range: the nearest target inside was taken */
+#define LIMITER_COMPOSITE (2U)    /* wire flexure stress: displacement scaled toward home */
+#define LIMITER_DRIVE (8U)        /* heater power at its limit: the target is approached as far as one sample allows */
+#define LIMITER_INPUT (16U)       /* NaN, infinite or absurdly large target, or NULL pointer: drives at zero or the nearest admissible value */
+#define LIMITER_LOST (32U)        /* the state was not initialised, or a number of it is NaN, infinite or absurd: drives as with INPUT, state kept, until limiter_init */
+
+typedef struct {
+    float x[6]; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
+    float z[LIMITER_DISPLACEMENT_SIZE]; /* displacement_1X, displacement_1Y, displacement_2X, displacement_2Y, displacement_3X, displacement_3Y [m] */
+    uint32_t ready; /* set by limiter_init */
+} limiter_state;
+
+typedef struct {
+    float drive[LIMITER_DRIVE_SIZE]; /* 1X [W], 1Y [W], 2X [W], 2Y [W], 3X [W], 3Y [W] */
+    float displacement[LIMITER_DISPLACEMENT_SIZE]; /* m */
+    float state[LIMITER_STATE_SIZE]; /* 1X [K], 1Y [K], 2X [K], 2Y [K], 3X [K], 3Y [K] */
+} limiter_output;
+
+/* A cold device at rest. Also the way out of status LOST: hold the safe drive until the device has settled, then call it. */
+void limiter_init(limiter_state *state);
+
+/* Drive of the equilibrium at target; the state becomes that equilibrium. Hold the drive until the device has settled. */
+uint32_t limiter_settle(limiter_state *state, const float target[LIMITER_TARGET_SIZE], limiter_output *out);
+/* Drive that brings the device to target at the next sample, held until then. Call once a sample. */
+uint32_t limiter_step(limiter_state *state, const float target[LIMITER_TARGET_SIZE], limiter_output *out);
+#ifdef __cplusplus
+}
+#endif
+
+#endif

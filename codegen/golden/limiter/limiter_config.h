@@ -1,0 +1,435 @@
+/* What codegen/limiter is compiled with where it is compiled as it stands: the macros, tables and kernels of one device,
+ * NIST MEMS hexapod nanopositioner. Made by ctrlgen 0.1.0; do not edit. */
+#include "limiter.h"
+
+#include <stddef.h>
+
+#define EACH_AXIS(F) F(0) \
+    F(1) \
+    F(2) \
+    F(3) \
+    F(4) \
+    F(5)
+#define EACH_STATE(F) F(0) \
+    F(1) \
+    F(2) \
+    F(3) \
+    F(4) \
+    F(5)
+#define EACH_DRIVE(F) F(0) \
+    F(1) \
+    F(2) \
+    F(3) \
+    F(4) \
+    F(5)
+#define real float
+#define REAL(x) x ## f
+#define STATE_LIMITED 0
+#define BOUNDED 1
+#define RATED 0
+#define PASSING 0
+#define REDUNDANT 0
+#define COUPLED 1
+#define MOVING 1
+#define MOTION 0
+#define U_BOUNDS_ONCE 0
+#define REST_GIVEN 0
+#define CHANGING 0
+#define DOUBLE 0
+#define STATE_BY_MODE 0
+#define DRIVE_BY_MODE 0
+#define SETTLE_DRIVE_LIMITED 0
+#define SETTLE_EXAMINED_FIRST 0
+#define STEP_DRIVE_LIMITED 1
+#define STEP_EXAMINED_FIRST 0
+#define N 6
+#define NU 6
+#define NS 6
+#define NX 6
+#define M 6
+#define SHARES 12
+#define COMPOSITE_ROUNDS 1
+#define SWEEPS 3
+#define SECANT_STEPS 3
+#define GROUPS 0
+#define GIVEN 0
+#define Z_LOW_TABLE { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }
+#define Z_HIGH_TABLE { 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f }
+#define Z_SLACK_TABLE { 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f }
+#define S_LOW_TABLE { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }
+#define S_HIGH_TABLE { 823.15f, 823.15f, 823.15f, 823.15f, 823.15f, 823.15f }
+#define S_SLACK_TABLE { 0.0004f, 0.0004f, 0.0004f, 0.0004f, 0.0004f, 0.0004f }
+#define U_LOW_TABLE { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }
+#define U_HIGH_TABLE { 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f }
+#define U_SLACK_TABLE { 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f }
+#define REST_TABLE { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }
+#define INPUT_LIMITS_TABLE { 63.61323f, 63.61323f, 63.61323f, 0.1f, 0.1f, 0.1f }
+#define HOME_TABLE { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }
+#define COMPOSITE_SLACK 1.000004f
+#define COMPOSITE_SLACK_SQUARED 1.000008f
+#define SECANT_FRACTION 0.99609375f
+#define UNLIMITED 1e+18f
+#define STATE_LOW LOW
+#define STATE_HIGH HIGH
+#define NEAREST_SLOPES { \
+        { 1.0f, 0.49971864f, -0.2363756f, -0.07558483f, -0.2363756f, -0.20494296f }, \
+        { 1.1193434f, 1.0f, -0.45906138f, -0.25956145f, -0.16930602f, -0.25956145f }, \
+        { -0.2363756f, -0.20494296f, 1.0f, 0.49971864f, -0.2363756f, -0.07558483f }, \
+        { -0.16930602f, -0.25956145f, 1.1193434f, 1.0f, -0.45906138f, -0.25956145f }, \
+        { -0.2363756f, -0.07558483f, -0.2363756f, -0.20494296f, 1.0f, 0.49971864f }, \
+        { -0.45906138f, -0.25956145f, -0.16930602f, -0.25956145f, 1.1193434f, 1.0f } \
+    }
+#define LIMITED_STATE STEP_STATE
+#define LIMITED_DRIVE STEP_DRIVE
+#define BALANCE(state, x, z, drive, result) balance_displacement(x, z, result)
+#define COMPOSITE_SHARES(state, wanted, result) composite_shares(wanted, result)
+#define SETTLE_DISPLACEMENT(state, target, result) wanted_displacement(target, result)
+#define SETTLE_STATE(state, wanted, result) wanted_state(wanted, result)
+#define SETTLE_DRIVE(state, wanted, limited, result) wanted_drive(limited, result)
+#define SETTLE_ADVANCE(state, z, drive, result) wanted_advance(drive, result)
+#define STEP_DISPLACEMENT(state, target, result) wanted_displacement(target, result)
+#define STEP_STATE(state, wanted, result) wanted_state(wanted, result)
+#define STEP_DRIVE(state, wanted, limited, result) step_drive(state->x, limited, result)
+#define STEP_ADVANCE(state, z, drive, result) step_advance(state->x, drive, result)
+#define COMPOSITE_BOUND(wanted) composite_bound(wanted)
+#define STATE_INSIDE(state, value) state_inside(value)
+#define DRIVE_INSIDE(state, value) drive_inside(value)
+
+static const float U_LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
+static const float U_HIGH[6] = { 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f }; /* W */
+static const float U_SLACK[6] = { 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f }; /* W */
+static const float U_LEAST[6] = { -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f }; /* admissible, W */
+static const float U_MOST[6] = { 1.000004f, 1.000004f, 1.000004f, 1.000004f, 1.000004f, 1.000004f }; /* admissible, W */
+static const float U_SAFE[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
+static const float X_REST[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
+
+#define READY (0xA500A500U) /* in a state that was initialised; zeros and most other bytes are not this word */
+
+/* Square root as IEEE 754 has it: rounded correctly, not a number for a negative one. The core's own instruction where it has one, or
+   the caller's CTRLGEN_SQRT(a), which must be rounded correctly too. Elsewhere, and with CTRLGEN_PORTABLE_SQRT, Newton steps and a
+   correction of the last digit in integers, S being the digits of the root and R those of a less S squared: the same bits. */
+static float square_root(float a)
+{
+    float y = a;
+#if defined(CTRLGEN_SQRT)
+    y = CTRLGEN_SQRT(a);
+#elif defined(__GNUC__) && !defined(CTRLGEN_PORTABLE_SQRT) && defined(__ARM_FP) && !defined(__aarch64__) && ((__ARM_FP & 4) != 0) && !defined(__SOFTFP__)
+    __asm__("vsqrt.f32 %0, %1" : "=t"(y) : "t"(a));
+#elif defined(__GNUC__) && !defined(CTRLGEN_PORTABLE_SQRT) && defined(__aarch64__)
+    __asm__("fsqrt %s0, %s1" : "=w"(y) : "w"(a));
+#elif defined(__GNUC__) && !defined(CTRLGEN_PORTABLE_SQRT) && defined(__SSE2__)
+    __asm__("sqrtss %1, %0" : "=x"(y) : "x"(a));
+#else
+    union { float number; uint32_t bits; } v;
+    v.number = a;
+    if ((a > 0.0f) && (v.bits < 0x7F800000U)) {
+        const float up = (a < 1.1754944e-38f) ? 1.6777216e+07f : 1.0f; /* where there are fewer digits */
+        const float h = 0.5f * (a * up);
+        uint32_t exponent;
+        uint32_t S;
+        uint32_t R;
+        v.number = a * up;
+        exponent = ((v.bits >> 23U) + 127U) >> 1U;
+        R = ((v.bits & 0x7FFFFFU) | 0x800000U) << ((24U) - ((uint32_t)(v.bits >> 23U) & 1U));
+        v.bits = 0x5F3759DFU - (v.bits >> 1U);
+        y = v.number;
+        y = y * (1.5f - ((h * y) * y));
+        y = y * (1.5f - ((h * y) * y));
+        v.number = (a * up) * y;
+        v.number = v.number + ((0.5f * y) * ((a * up) - (v.number * v.number)));
+        S = (v.bits - (exponent << 23U)) + 0x800000U;
+        R = R - (S * S);
+        if (((S - R) & 0x80000000U) != 0U) {
+            S = S + 1U;
+        } else if (((R + S) == 0U) || (((R + S) & 0x80000000U) != 0U)) {
+            S = S - 1U;
+        } else {
+            /* rounded correctly already */
+        }
+        v.bits = (exponent << 23U) + (S - 0x800000U);
+        y = v.number * ((up > 1.0f) ? 0.00024414062f : 1.0f);
+    } else if (a < 0.0f) {
+        v.bits = 0x7FC00000U;
+        y = v.number;
+    } else {
+        /* zero, infinity and what is not a number are their own roots */
+    }
+#endif
+    return y;
+}
+
+#define LEVER_LONG_1 (1e-06f) /* stage.lever_long^2 */
+#define LEVER_LONG (0.001f) /* stage.lever_long */
+/* f(actuator, stage, stage.lever_long, stage.lever_short, stage.notch.theta_z_per_M_z) */
+#define ACTUATOR_STAGE_1 (1895.5361f)
+/* (((2 * (stage.lever_long / stage.lever_short)) * stage.half_stage_stiffness) / stage.lever_long) / stage.lever_long */
+#define LEVER_LONG_LEVER_SHORT_1 (1.03154e+12f)
+#define BEAM_ANGLE_ACTUATOR_1 (0.0005435469f) /* sin(actuator.beam_angle) * f(actuator) */
+#define BEAM_ANGLE_ACTUATOR_2 (2.9544324e-07f) /* (sin(actuator.beam_angle) * f(actuator))^2 */
+/* 4 * (f(actuator.beam_angle, actuator.thickness, actuator.beam_width, actuator.young, actuator.expansion_slope) / 2) */
+#define BEAM_ANGLE_THICKNESS_1 (2.1273852e-06f)
+#define AMBIENT (295.15f) /* actuator.ambient */
+/* (1 / (actuator.thermal_resistance / actuator.time_constant)) * (1 / actuator.time_constant) */
+#define THERMAL_RESISTANCE_TIME_CONSTANT_1 (0.0018181818f)
+#define THERMAL_RESISTANCE (550.0f) /* actuator.thermal_resistance */
+/* -(((exp(-(0.001 / actuator.time_constant)) - 1) * actuator.time_constant) / actuator.time_constant) */
+#define TIME_CONSTANT_1 (0.18126924f)
+/* (-1) / f(actuator.time_constant, actuator.thermal_resistance) */
+#define TIME_CONSTANT_THERMAL_RESISTANCE_1 (0.010030283f)
+#define EXPANSION (3e-06f) /* actuator.expansion */
+#define EXPANSION_SLOPE (3e-09f) /* actuator.expansion_slope */
+/* sin(actuator.beam_angle) * (actuator.thickness * (actuator.beam_width * (actuator.young * 30))) */
+#define BEAM_ANGLE_THICKNESS_2 (177.2821f)
+
+/* Restoring force [N] of an axis: F = F^l + F^n [N] on the bar for a stage displacement `d` [m]. Source: S1 eq. (12).
+ * F^l = (K^t_14 / r + r N / (c e_4^2)) d [N] on the actuator bar, `d` [m] the stage displacement. r = e_4/e_3 is the
+ * lever ratio, N the number of notches, each rotating by d/e_4, and c = theta_z/M_z the rotational compliance of one.
+ * Source: S1 eq. (9), referred to the bar by virtual work. F^n = 2 r k_a sin(phi) cos(phi) delta_y [N] on the bar,
+ * sin(phi) = d/e_4, r = e_4/e_3. The axial stiffness k_a of one half stage, rotated by phi, resists the parasitic
+ * shortening delta_y of eq. (10). Source: S1 eq. (11), with K^n the rotated axial stiffness. */
+static inline float restoring_force(float z)
+{
+    const float t1 = z * z;
+    const float t2 = square_root(LEVER_LONG_1 - t1);
+    const float t3 = (z * t2) * (t1 / (LEVER_LONG + t2));
+    return (ACTUATOR_STAGE_1 * z) + (LEVER_LONG_LEVER_SHORT_1 * t3);
+}
+
+/* Actuator force [N] of an axis: F = 2 n alpha(T) (T - T_amb) E w_1 h sin(theta) [N] on the actuator bar, `T` [K].
+ * Source: S1 eq. (4), where T-bar is the average temperature above ambient. alpha(T) = alpha_0 + alpha_1 (T - 0 degC)
+ * [1/K], `T` [K]. Source: S1 Table 1. */
+static inline float actuator_force(float x)
+{
+    const float t1 = (EXPANSION + (EXPANSION_SLOPE * (x - 273.15f))) * (x - AMBIENT);
+    return BEAM_ANGLE_THICKNESS_2 * t1;
+}
+
+/* Displacement at which the platform pose is `target`, theta_x [rad], theta_y [rad], theta_z [rad], delta_x [m],
+ * delta_y [m], delta_z [m]. */
+static void wanted_displacement(const float target[6], float result[6])
+{
+    static const float TABLE_1[6][6] = {
+        { -0.0026423377f, -0.0037076124f, 0.0041873017f, 1.0f, 0.0f, 0.64624566f },
+        { 0.0006915413f, 0.0026864675f, -0.002447848f, 0.0f, 1.0f, 1.1192472f },
+        { -0.0018897178f, 0.0041421377f, 0.0041873017f, -0.5f, -0.8660254f, 0.64624566f },
+        { 0.0019807783f, -0.0019421261f, -0.002447848f, 0.8660254f, -0.5f, 1.1192472f },
+        { 0.0045320555f, -0.00043452534f, 0.0041873017f, -0.5f, 0.8660254f, 0.64624566f },
+        { -0.0026723198f, -0.00074434135f, -0.002447848f, -0.8660254f, -0.5f, 1.1192472f }
+    };
+    int i;
+    const float target_0 = target[0];
+    const float target_1 = target[1];
+    const float target_2 = target[2];
+    const float target_3 = target[3];
+    const float target_4 = target[4];
+    const float target_5 = target[5];
+    for (i = 0; i < 6; i++) {
+        result[i] = (TABLE_1[i][0] * target_0) + (TABLE_1[i][1] * target_1) + (TABLE_1[i][2] * target_2) +
+            (TABLE_1[i][3] * target_3) + (TABLE_1[i][4] * target_4) + (TABLE_1[i][5] * target_5);
+    }
+}
+
+/* States that the displacement needs at rest: temperature_1X [K], temperature_1Y [K], temperature_2X [K],
+ * temperature_2Y [K], temperature_3X [K], temperature_3Y [K]. */
+static void wanted_state(const float wanted[6], float result[6])
+{
+    int i;
+    for (i = 0; i < 6; i++) {
+        const float t1 = restoring_force(wanted[i]);
+        const float t2 = BEAM_ANGLE_ACTUATOR_1 + square_root(BEAM_ANGLE_ACTUATOR_2 + (BEAM_ANGLE_THICKNESS_1 * t1));
+        result[i] = AMBIENT + (2.0f * (t1 / t2));
+    }
+}
+
+/* Heater power that keeps the actuator temperatures `state` at rest. */
+static void wanted_drive(const float state[6], float result[6])
+{
+    int i;
+    for (i = 0; i < 6; i++) {
+        result[i] = THERMAL_RESISTANCE_TIME_CONSTANT_1 * (state[i] - AMBIENT);
+    }
+}
+
+/* States under `drive`, at rest: temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K],
+ * temperature_3X [K], temperature_3Y [K]. */
+static void wanted_advance(const float drive[6], float result[6])
+{
+    int i;
+    for (i = 0; i < 6; i++) {
+        result[i] = AMBIENT + (THERMAL_RESISTANCE * drive[i]);
+    }
+}
+
+/* Heater power that leads from x to the actuator temperatures `state` within one sample of 0.001 s. */
+static void step_drive(const float x[6], const float state[6], float result[6])
+{
+    int i;
+    for (i = 0; i < 6; i++) {
+        const float t1 = state[i] - (x[i] - (TIME_CONSTANT_1 * (x[i] - AMBIENT)));
+        result[i] = TIME_CONSTANT_THERMAL_RESISTANCE_1 * t1;
+    }
+}
+
+/* States under `drive`, one sample of 0.001 s later: temperature_1X [K], temperature_1Y [K], temperature_2X [K],
+ * temperature_2Y [K], temperature_3X [K], temperature_3Y [K]. */
+static void step_advance(const float x[6], const float drive[6], float result[6])
+{
+    int i;
+    for (i = 0; i < 6; i++) {
+        const float t1 = TIME_CONSTANT_1 * ((THERMAL_RESISTANCE * drive[i]) - (x[i] - AMBIENT));
+        result[i] = x[i] + t1;
+    }
+}
+
+/* Displacement at which the forces balance, g(x, z, drive) = 0: 6 Newton steps z - g/(dg/dz) from z. */
+static void balance_displacement(const float x[6], const float z[6], float result[6])
+{
+    int i;
+    for (i = 0; i < 6; i++) {
+        float value = z[i];
+        int step;
+        for (step = 0; step < 6; step++) {
+            const float t1 = value * value;
+            const float t2 = square_root(LEVER_LONG_1 - t1);
+            const float t3 = LEVER_LONG + t2;
+            const float t4 = t1 / t3;
+            const float t5 = value / t2;
+            const float t6 = (LEVER_LONG_LEVER_SHORT_1 * t2) - (LEVER_LONG_LEVER_SHORT_1 * (value * t5));
+            const float t7 = (2.0f * (value / t3)) + ((t4 / t3) * t5);
+            const float t8 = (t4 * t6) + (LEVER_LONG_LEVER_SHORT_1 * ((value * t2) * t7));
+            const float t9 = (actuator_force(x[i]) - restoring_force(value)) / (ACTUATOR_STAGE_1 + t8);
+            value = value + t9;
+        }
+        result[i] = value;
+    }
+}
+
+/* The square of each wire flexure stress over its limit at displacement `wanted`. */
+static void composite_shares(const float wanted[6], float result[12])
+{
+    static const float TABLE_1[6][6] = {
+        { 7.163396e+09f, -8.725365e+09f, -1.0396979e+10f, -4.441134e+09f, 2.0934612e+09f, 8.624482e+09f },
+        { 1.3912608e+09f, -1.1251239e+10f, -1.1180811e+10f, 1.8204311e+09f, 6.4256225e+09f, 6.1723305e+09f },
+        { 2.0934612e+09f, 8.624482e+09f, 7.163396e+09f, -8.725365e+09f, -1.0396979e+10f, -4.441134e+09f },
+        { 6.4256225e+09f, 6.1723305e+09f, 1.3912608e+09f, -1.1251239e+10f, -1.1180811e+10f, 1.8204311e+09f },
+        { -1.0396979e+10f, -4.441134e+09f, 2.0934612e+09f, 8.624482e+09f, 7.163396e+09f, -8.725365e+09f },
+        { -1.1180811e+10f, 1.8204311e+09f, 6.4256225e+09f, 6.1723305e+09f, 1.3912608e+09f, -1.1251239e+10f }
+    };
+    static const float TABLE_2[6][6] = {
+        { 1.1599883e+11f, 1.5950956e+11f, 7.835179e+11f, -1.2846023e+11f, 2.0036921e+11f, -5.625638e+11f },
+        { 5.0045413e+11f, -6.161432e+11f, -8.0449085e+10f, -1.7690893e+11f, 5.9039056e+11f, 1.0655088e+11f },
+        { 2.0036921e+11f, -5.625638e+11f, 1.1599883e+11f, 1.5950956e+11f, 7.835179e+11f, -1.2846023e+11f },
+        { 5.9039056e+11f, 1.0655088e+11f, 5.0045413e+11f, -6.161432e+11f, -8.0449085e+10f, -1.7690893e+11f },
+        { 7.835179e+11f, -1.2846023e+11f, 2.0036921e+11f, -5.625638e+11f, 1.1599883e+11f, 1.5950956e+11f },
+        { -8.0449085e+10f, -1.7690893e+11f, 5.9039056e+11f, 1.0655088e+11f, 5.0045413e+11f, -6.161432e+11f }
+    };
+    static const float TABLE_3[12][6] = {
+        { -4.4585724e+12f, 1.102723e+12f, 1.3200545e+11f, 1.7759255e+12f, -1.5802731e+12f, -2.536233e+12f },
+        { 2.3661778e+12f, 2.4000602e+12f, 1.4819732e+12f, -1.1901199e+12f, -1.1851115e+12f, 1.3707138e+12f },
+        { 1.4880515e+12f, 1.02434066e+12f, 3.1952187e+12f, -3.3340386e+12f, -1.4328322e+12f, -2.6332991e+12f },
+        { -1.7746715e+12f, 6.861064e+11f, 8.951435e+11f, 3.2527894e+12f, 1.7830487e+12f, -3.4267975e+11f },
+        { 1.0806304e+12f, 1.4966203e+12f, 3.0024456e+12f, -3.4103414e+12f, -2.2080156e+12f, -2.6212012e+12f },
+        { -1.883654e+12f, 7.064584e+11f, 1.1220354e+12f, 3.5960072e+12f, 2.1216132e+12f, -4.5177068e+11f },
+        { 9.697803e+11f, 1.4594866e+12f, -5.4737345e+11f, 2.2814135e+12f, 9.2301296e+11f, 3.1843436e+12f },
+        { -3.9721988e+12f, 1.851032e+12f, 3.843818e+12f, -2.6561623e+12f, -3.967535e+12f, -7.1714346e+12f },
+        { 2.2969296e+12f, 6.93611e+11f, 7.789762e+11f, 1.5153417e+12f, 2.2495927e+12f, 2.4190625e+12f },
+        { -4.2271263e+12f, 1.9982296e+12f, 3.5889726e+12f, -2.5090518e+12f, -4.222497e+12f, -7.0243514e+12f },
+        { -4.4247045e+12f, 8.9836945e+11f, 7.435699e+11f, 1.6559757e+12f, -1.1844611e+12f, -3.1986845e+12f },
+        { 2.5495121e+12f, 2.7678878e+12f, 1.5541005e+12f, -1.2738329e+12f, -1.4484263e+12f, 1.6090792e+12f }
+    };
+    static const float TABLE_4[12][6] = {
+        { 1.3734536e+11f, -3.5444797e+12f, -2.7926258e+12f, -1.9302325e+12f, 7.0338765e+10f, -1.9992656e+11f },
+        { 3.50037e+12f, 6.7848587e+12f, 4.059425e+12f, -1.6124403e+12f, -3.4923767e+12f, 2.1020536e+12f },
+        { 2.8585063e+11f, 3.333003e+12f, 3.0894944e+12f, 1.6695599e+12f, 2.4708851e+11f, 7.325468e+10f },
+        { 3.4239317e+12f, -2.704245e+12f, -4.1205613e+12f, -6.4245046e+12f, -3.5701538e+12f, 1.9693478e+12f },
+        { 1.1551834e+12f, 2.0573224e+12f, 3.2989472e+12f, 1.4659148e+12f, 1.7148913e+12f, -9.493543e+10f },
+        { 3.1706516e+12f, -2.4079872e+12f, -4.07338e+12f, -6.234046e+12f, -3.7648282e+12f, 1.952499e+12f },
+        { 1.0833221e+12f, 2.1930641e+12f, -1.4129366e+12f, -2.6369178e+12f, -4.3476942e+12f, 1.9398967e+12f },
+        { 3.8327186e+11f, -7.5461276e+11f, -3.1277734e+11f, 8.53514e+11f, 1.4279259e+12f, 6.522469e+11f },
+        { 1.5938316e+12f, 2.529548e+12f, -1.3767377e+12f, -2.0435721e+12f, -3.8518912e+12f, 2.8155762e+12f },
+        { -8.9809656e+11f, -1.5306036e+11f, 8.487993e+11f, 4.6308487e+10f, 1.4800983e+11f, -1.5662322e+12f },
+        { 4.1998467e+11f, -3.6188638e+12f, -1.2494657e+12f, -2.0487497e+12f, 9.450183e+11f, -1.3880204e+12f },
+        { 3.358615e+12f, 6.647834e+12f, 3.6755997e+12f, -1.5404901e+12f, -3.5741893e+12f, 2.279155e+12f }
+    };
+    float shared1[6];
+    float shared2[6];
+    int i;
+    const float wanted_0 = wanted[0];
+    const float wanted_1 = wanted[1];
+    const float wanted_2 = wanted[2];
+    const float wanted_3 = wanted[3];
+    const float wanted_4 = wanted[4];
+    const float wanted_5 = wanted[5];
+    for (i = 0; i < 6; i++) {
+        const float t1 = (TABLE_1[i][0] * wanted_0) + (TABLE_1[i][1] * wanted_1) + (TABLE_1[i][2] * wanted_2) +
+            (TABLE_1[i][3] * wanted_3) + (TABLE_1[i][4] * wanted_4) + (TABLE_1[i][5] * wanted_5);
+        shared1[i] = (t1 < 0.0f) ? -t1 : t1;
+    }
+    for (i = 0; i < 6; i++) {
+        const float t2 = (TABLE_2[i][0] * wanted_0) + (TABLE_2[i][1] * wanted_1) + (TABLE_2[i][2] * wanted_2) +
+            (TABLE_2[i][3] * wanted_3) + (TABLE_2[i][4] * wanted_4) + (TABLE_2[i][5] * wanted_5);
+        shared2[i] = 3.0f * (t2 * t2);
+    }
+    for (i = 0; i < 12; i++) {
+        const float t3 = (TABLE_3[i][0] * wanted_0) + (TABLE_3[i][1] * wanted_1) + (TABLE_3[i][2] * wanted_2) +
+            (TABLE_3[i][3] * wanted_3) + (TABLE_3[i][4] * wanted_4) + (TABLE_3[i][5] * wanted_5);
+        const float t4 = (TABLE_4[i][0] * wanted_0) + (TABLE_4[i][1] * wanted_1) + (TABLE_4[i][2] * wanted_2) +
+            (TABLE_4[i][3] * wanted_3) + (TABLE_4[i][4] * wanted_4) + (TABLE_4[i][5] * wanted_5);
+        const float t5 = ((t3 * t3) + (t4 * t4)) + 0.3025f;
+        const float t6 = square_root(t5) + shared1[i / 2];
+        result[i] = 3.3057851e-18f * ((t6 * t6) + shared2[i / 2]);
+    }
+}
+
+/* A cheap upper bound of the root of the largest of these shares: no more than 1 means that every limit is kept. */
+static float composite_bound(const float wanted[6])
+{
+    const float t1 = ((-7418.532f) * wanted[0]) - (4198.844f * wanted[1]) + (72.96058f * wanted[2]) + (8524.06f *
+        wanted[3]) + (7345.572f * wanted[4]) - (4325.2153f * wanted[5]);
+    const float t2 = (t1 < 0.0f) ? -t1 : t1;
+    const float t3 = ((-4731.5063f) * wanted[0]) + (8359.642f * wanted[1]) + (9605.415f * wanted[2]) - (82.2163f *
+        wanted[3]) - (4873.909f * wanted[4]) - (8277.426f * wanted[5]);
+    const float t4 = (t3 < 0.0f) ? -t3 : t3;
+    const float t5 = (3009.9507f * wanted[0]) - (1737.9247f * wanted[1]) + (3009.9507f * wanted[2]) - (1737.9247f *
+        wanted[3]) + (3009.9507f * wanted[4]) - (1737.9247f * wanted[5]);
+    const float t6 = (t5 < 0.0f) ? -t5 : t5;
+    const float t7 = (2774.401f * wanted[0]) + (4745.9053f * wanted[1]) + (2774.401f * wanted[2]) + (4745.9053f *
+        wanted[3]) + (2774.401f * wanted[4]) + (4745.9053f * wanted[5]);
+    const float t8 = (t7 < 0.0f) ? -t7 : t7;
+    const float t9 = (((t2 + t4) + t6) + t8) + 2.0006166e-09f;
+    return t9 + 1e-06f;
+}
+
+/* 1 if every displacement is inside its limits: distance from the middle squared, no more than the half width squared. 0 for NaN. */
+static int displacement_inside(const float value[6])
+{
+    const float d0 = value[0] - 2.75e-05f;
+    const float d1 = value[1] - 2.75e-05f;
+    const float d2 = value[2] - 2.75e-05f;
+    const float d3 = value[3] - 2.75e-05f;
+    const float d4 = value[4] - 2.75e-05f;
+    const float d5 = value[5] - 2.75e-05f;
+    return (((d0 * d0) <= 7.5624856e-10f) && ((d1 * d1) <= 7.5624856e-10f) && ((d2 * d2) <= 7.5624856e-10f) && ((d3 * d3) <= 7.5624856e-10f) && ((d4 * d4) <= 7.5624856e-10f) && ((d5 * d5) <= 7.5624856e-10f)) ? 1 : 0;
+}
+
+/* 1 if every heater power is inside its limits: distance from the middle squared, no more than the half width squared. 0 for NaN. */
+static int drive_inside(const float value[6])
+{
+    const float d0 = value[0] - 0.5f;
+    const float d1 = value[1] - 0.5f;
+    const float d2 = value[2] - 0.5f;
+    const float d3 = value[3] - 0.5f;
+    const float d4 = value[4] - 0.5f;
+    const float d5 = value[5] - 0.5f;
+    return (((d0 * d0) <= 0.24999952f) && ((d1 * d1) <= 0.24999952f) && ((d2 * d2) <= 0.24999952f) && ((d3 * d3) <= 0.24999952f) && ((d4 * d4) <= 0.24999952f) && ((d5 * d5) <= 0.24999952f)) ? 1 : 0;
+}
+
+/* 1 if a number of the state is NaN, infinite or far beyond its range. Asked first where displacements depend on the state or effects
+ * remember, else where a limit is met: until then it would show in the drives, or is written anew. Numbers with one range are judged
+ * together: the sum of their squares is at most their count times (4 times the largest magnitude of the range) squared. */
+static int is_lost(const limiter_state *state)
+{
+    const float squares0 = (((((state->x[0] * state->x[0]) + (state->x[1] * state->x[1])) + (state->x[2] * state->x[2])) + (state->x[3] * state->x[3])) + (state->x[4] * state->x[4])) + (state->x[5] * state->x[5]);
+    const float squares1 = (((((state->z[0] * state->z[0]) + (state->z[1] * state->z[1])) + (state->z[2] * state->z[2])) + (state->z[3] * state->z[3])) + (state->z[4] * state->z[4])) + (state->z[5] * state->z[5]);
+    return ((squares0 <= 6.504729e+07f) && (squares1 <= 2.904e-07f)) ? 0 : 1;
+}

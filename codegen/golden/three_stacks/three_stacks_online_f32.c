@@ -1,0 +1,596 @@
+/* three_stacks_online_f32: see three_stacks_online_f32.h. Made by ctrlgen 0.1.0; do not edit. */
+#include "three_stacks_online_f32.h"
+
+#include <stddef.h>
+
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && (__FINITE_MATH_ONLY__ > 0)) || defined(_M_FP_FAST)
+#error "compile this without -ffast-math, -Ofast, -ffinite-math-only or /fp:fast: they remove the checks for NaN"
+#endif
+
+static const float U_LOW[3] = { -100.0f, 0.0f, -20.0f }; /* V */
+static const float U_HIGH[3] = { 100.0f, 150.0f, 130.0f }; /* V */
+static const float U_SLACK[3] = { 0.0010786516f, 0.00015730337f, 0.00092134834f }; /* V */
+static const float U_LEAST[3] = { -100.001076f, -0.00015730337f, -20.000921f }; /* admissible, V */
+static const float U_MOST[3] = { 100.001076f, 150.00015f, 130.00092f }; /* admissible, V */
+static const float U_SAFE[3] = { 0.0f, 0.0f, 0.0f }; /* V */
+static const float FALL[3] = { -5.0f, -1e+18f, -1e+18f }; /* V a sample */
+static const float RISE[3] = { 5.0f, 1e+18f, 1e+18f }; /* V a sample */
+
+#define READY (0xA500A500U) /* in a state that was initialised; zeros and most other bytes are not this word */
+
+/* Displacement at which the platform pose is `target`, x [m], y [m]. */
+static void wanted_displacement(const float target[2], float result[2])
+{
+    int i;
+    for (i = 0; i < 2; i++) {
+        result[i] = target[i];
+    }
+}
+
+/* Drive that keeps the displacement `wanted` at rest. */
+static void wanted_drive(const float wanted[2], float result[3])
+{
+    static const float TABLE_1[2] = { 0.00056179776f, 0.00011235955f };
+    static const float TABLE_2[2] = { 0.00011235955f, 0.0009113608f };
+    static const float TABLE_3[2] = { 8000.0f, 4500.0f };
+    float shared1[2];
+    float shared2[2];
+    int i;
+    for (i = 0; i < 2; i++) {
+        shared1[i] = (1e+06f * wanted[i]) + (1e+13f * (wanted[i] * (wanted[i] * wanted[i])));
+    }
+    for (i = 0; i < 2; i++) {
+        shared2[i] = (TABLE_1[i] * shared1[0]) + (TABLE_2[i] * shared1[1]);
+    }
+    for (i = 0; i < 2; i++) {
+        result[(2 * i)] = TABLE_3[i] * shared2[i];
+    }
+    result[1] = (2250.0f * shared2[0]) - (2250.0f * shared2[1]);
+}
+
+/* Displacement at which the forces balance, g(x, z, drive) = 0: 6 Newton steps z - g/(dg/dz) from z. */
+static void balance_displacement_step(const float z[2], const float drive[3], float result[2])
+{
+    const float shared1 = 0.5f * drive[1];
+    const float t1 = z[0] * z[0];
+    const float t2 = (1e+06f * z[0]) + (1e+13f * (z[0] * t1));
+    const float t3 = 1e+06f + (1e+13f * (t1 + (2.0f * t1)));
+    const float t4 = ((0.2f * (drive[0] + shared1)) - t2) / t3;
+    result[0] = z[0] + t4;
+    const float t5 = z[1] * z[1];
+    const float t6 = (1e+06f * z[1]) + (1e+13f * (z[1] * t5));
+    const float t7 = 1e+06f + (1e+13f * (t5 + (2.0f * t5)));
+    const float t8 = ((0.2f * (drive[2] - shared1)) - t6) / t7;
+    result[1] = z[1] + t8;
+}
+
+/* 6 such steps. */
+static void balance_displacement(const float z[2], const float drive[3], float result[2])
+{
+    int i;
+    int step;
+    for (i = 0; i < 2; i++) {
+        result[i] = z[i];
+    }
+    for (step = 0; step < 6; step++) {
+        balance_displacement_step(result, drive, result);
+    }
+}
+
+/* 1 if every displacement is inside its limits: distance from the middle squared, no more than the half width squared. 0 for NaN. */
+static int displacement_inside(const float value[2])
+{
+    const float d0 = value[0];
+    const float d1 = value[1];
+    return (((d0 * d0) <= 2.4999975e-09f) && ((d1 * d1) <= 2.4999975e-09f)) ? 1 : 0;
+}
+
+/* 1 if every drive is inside its limits: distance from the middle squared, no more than the half width squared. 0 for NaN. */
+static int drive_inside(const float value[3])
+{
+    const float d0 = value[0];
+    const float d1 = value[1] - 75.0f;
+    const float d2 = value[2] - 55.0f;
+    return (((d0 * d0) <= 9999.99f) && ((d1 * d1) <= 5624.9893f) && ((d2 * d2) <= 5624.9907f)) ? 1 : 0;
+}
+
+/* 1 if a number of the state is NaN, infinite or far beyond its range. Asked first where displacements depend on the state or effects
+ * remember, else where a limit is met: until then it would show in the drives, or is written anew. Numbers with one range are judged
+ * together: the sum of their squares is at most their count times (4 times the largest magnitude of the range) squared. */
+static int is_lost(const three_stacks_online_f32_state *state)
+{
+    const float squares0 = (state->z[0] * state->z[0]) + (state->z[1] * state->z[1]);
+    const float squares1 = (state->u[0] * state->u[0]);
+    const float squares2 = (state->u[1] * state->u[1]);
+    const float squares3 = (state->u[2] * state->u[2]);
+    return ((squares0 <= 8e-08f) && (squares1 <= 160000.0f) && (squares2 <= 360000.0f) && (squares3 <= 270400.0f)) ? 0 : 1;
+}
+
+/* Clips value to low ... high; 1 if a component changed by more than its slack or was NaN. */
+static int limit_all(float value[], const float low[], const float high[], const float slack[], int count)
+{
+    int hit = 0;
+    int i;
+    for (i = 0; i < count; i++) {
+        const float wanted = value[i];
+        const float raised = (wanted > low[i]) ? wanted : low[i];
+        const float limited = (raised < high[i]) ? raised : high[i];
+        const float moved = limited - wanted;
+        if (!((moved <= slack[i]) && (moved >= -slack[i]))) {
+            hit = 1;
+        }
+        value[i] = limited;
+    }
+    return hit;
+}
+
+/* Clips a displacement to its range; 1 if it was beyond by more than the slack. */
+static int limit_displacement(float value[2])
+{
+    static const float LOW[2] = { -5e-05f, -5e-05f }; /* m */
+    static const float HIGH[2] = { 5e-05f, 5e-05f }; /* m */
+    static const float SLACK[2] = { 2e-10f, 2e-10f }; /* m */
+    return limit_all(value, LOW, HIGH, SLACK, 2);
+}
+
+/* 1 if every drive is within its limits or beyond by no more than the slack. */
+static int drives_admissible(const three_stacks_online_f32_state *state, const float drive[3])
+{
+    int admissible = 1;
+    int i;
+    (void)state;
+    for (i = 0; i < 3; i++) {
+        if (!((drive[i] <= U_MOST[i]) && (drive[i] >= U_LEAST[i]))) {
+            admissible = 0;
+        }
+    }
+    return admissible;
+}
+
+/* 1 if every component is a number of a plausible size. */
+static int is_usable(const float target[2])
+{
+    static const float TARGET_LIMIT[2] = { 5.0f, 5.0f }; /* SI */
+    int usable = 1;
+    int i;
+    for (i = 0; i < 2; i++) {
+        if (!((target[i] <= TARGET_LIMIT[i]) && (target[i] >= -TARGET_LIMIT[i]))) {
+            usable = 0;
+        }
+    }
+    return usable;
+}
+
+/* Goes from the last drives toward drive by the largest common share that every rate allows: 0 untouched, 1 changed, 2 by more than the
+ * slack. */
+static int limit_rate(const three_stacks_online_f32_state *state, float drive[3], float *share)
+{
+    float least = 1.0f;
+    int changed = 0;
+    int beyond = 0;
+    int i;
+    for (i = 0; i < 3; i++) {
+        const float change = drive[i] - state->u[i];
+        if (!((change <= RISE[i]) && (change >= FALL[i]))) {
+            const float reached = ((change > 0.0f) ? RISE[i] : FALL[i]) / change;
+            changed = 1;
+            least = (reached < least) ? reached : least;
+            if (!((change <= (RISE[i] + U_SLACK[i])) && (change >= (FALL[i] - U_SLACK[i])))) {
+                beyond = 1;
+            }
+        }
+    }
+    if (changed != 0) {
+        for (i = 0; i < 3; i++) {
+            drive[i] = state->u[i] + (least * (drive[i] - state->u[i]));
+        }
+        (void)limit_all(drive, U_LOW, U_HIGH, U_SLACK, 3);
+    }
+    *share = least;
+    return changed + beyond;
+}
+
+/* The number nearest to t of those by which the drives of a set may move along the null space to be in low ... high. */
+static float moved_into(float t, const float drive[3], const float low[3], const float high[3], const int set[], int count)
+{
+    static const float SHARE[3] = { -2.0f, 1.0f, 2.0f }; /* 1 over NULL_MOTION */
+    float least = -1e+18f;
+    float most = 1e+18f;
+    float raised;
+    int k;
+    for (k = 0; k < count; k++) {
+        const int i = set[k];
+        const float to_low = (low[i] - drive[i]) * SHARE[i];
+        const float to_high = (high[i] - drive[i]) * SHARE[i];
+        const float first = (to_high < to_low) ? to_high : to_low;
+        const float last = (to_high > to_low) ? to_high : to_low;
+        least = (first > least) ? first : least;
+        most = (last < most) ? last : most;
+    }
+    raised = (t < least) ? least : t;
+    return (raised > most) ? most : raised;
+}
+
+/* Of all drives that push as drive, the weighted pseudo-inverse, those of least effort within their limits, and as far as these allow
+ * within their rates: u + t w with the smallest |t|, B w = 0. Where there are none, they are beyond a limit. */
+static void choose_drives(const three_stacks_online_f32_state *state, float drive[3])
+{
+    static const float NULL_MOTION[3] = { -0.5f, 1.0f, 0.5f }; /* w */
+    static const int SET[] = { 0, 1, 2 }; /* drives of each group, one group after the other */
+    static const int FIRST[] = { 0, 3 };
+    float free[3];
+    float slowest[3];
+    float fastest[3];
+    int kept = drive_inside(drive);
+    int i;
+    (void)state;
+    for (i = 0; i < 3; i++) {
+        free[i] = drive[i];
+        slowest[i] = state->u[i] + FALL[i];
+        fastest[i] = state->u[i] + RISE[i];
+        if (!((drive[i] >= slowest[i]) && (drive[i] <= fastest[i]))) {
+            kept = 0;
+        }
+    }
+    if (kept == 0) {
+        int group;
+        for (group = 0; group < 1; group++) {
+            const int first = FIRST[group];
+            const int count = FIRST[group + 1] - first;
+            float t = 0.0f;
+            t = moved_into(t, free, slowest, fastest, &SET[first], count);
+            t = moved_into(t, free, U_LOW, U_HIGH, &SET[first], count);
+            for (i = 0; i < count; i++) {
+                const int k = SET[first + i];
+                drive[k] = free[k] + (t * NULL_MOTION[k]);
+            }
+        }
+    }
+}
+
+/* The limits beyond which the device is, led there by drives that may not change faster, as a status. */
+static uint32_t passed(const three_stacks_online_f32_state *state)
+{
+    float z[2];
+    uint32_t status = 0U;
+    int i;
+    for (i = 0; i < 2; i++) {
+        z[i] = state->z[i];
+    }
+    if (limit_displacement(z) != 0) {
+        status |= THREE_STACKS_ONLINE_F32_DISPLACEMENT;
+    }
+    return status;
+}
+
+/* Actuator state (limited) and drives (not limited) that out->displacement needs: with settling at rest, else at the next sample. */
+static void wanted_drives(const three_stacks_online_f32_state *state, int settling, three_stacks_online_f32_output *out)
+{
+    (void)state;
+    (void)settling;
+    wanted_drive(out->displacement, out->drive);
+    choose_drives(state, out->drive);
+}
+
+/* Line search from origin toward out->displacement, whose drives are inadmissible: secants of the drive that is first
+ * at its limit. Leaves the farthest admissible displacement found and its drives; 1 if even those of origin are inadmissible. */
+static int line_search(const three_stacks_online_f32_state *state, int settling, const float origin[2], three_stacks_online_f32_output *out)
+{
+    float direction[2];
+    float at_target[3];
+    int i;
+    for (i = 0; i < 2; i++) {
+        direction[i] = out->displacement[i] - origin[i];
+        out->displacement[i] = origin[i];
+    }
+    for (i = 0; i < 3; i++) {
+        at_target[i] = out->drive[i];
+    }
+    wanted_drives(state, settling, out);
+    if (drives_admissible(state, out->drive) != 0) {
+        float at_start[3];
+        float accepted = 0.0f;
+        float rejected = 1.0f;
+        int trial;
+        at_start[0] = out->drive[0];
+        at_start[1] = out->drive[1];
+        at_start[2] = out->drive[2];
+        for (trial = 0; trial < 3; trial++) {
+            float share = 1.0f;
+            float fraction;
+            for (i = 0; i < 3; i++) {
+                if ((at_target[i] > U_MOST[i]) || (at_target[i] < U_LEAST[i])) {
+                    const float limit = (at_target[i] > U_HIGH[i]) ? U_HIGH[i] : U_LOW[i];
+                    const float reached = (limit - at_start[i]) / (at_target[i] - at_start[i]);
+                    share = (reached < share) ? reached : share;
+                }
+            }
+            share = (share > 0.0f) ? share : 0.0f;
+            fraction = accepted + ((0.99609375f * share) * (rejected - accepted));
+            for (i = 0; i < 2; i++) {
+                out->displacement[i] = origin[i] + (fraction * direction[i]);
+            }
+            wanted_drives(state, settling, out);
+            if (drives_admissible(state, out->drive) != 0) {
+                accepted = fraction;
+                at_start[0] = out->drive[0];
+                at_start[1] = out->drive[1];
+                at_start[2] = out->drive[2];
+            } else {
+                rejected = fraction;
+                for (i = 0; i < 3; i++) {
+                    at_target[i] = out->drive[i];
+                }
+            }
+        }
+        for (i = 0; i < 2; i++) {
+            out->displacement[i] = origin[i] + (accepted * direction[i]);
+        }
+        for (i = 0; i < 3; i++) {
+            out->drive[i] = at_start[i];
+        }
+    }
+    return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, 3);
+}
+
+void three_stacks_online_f32_init(three_stacks_online_f32_state *state)
+{
+    if (state != NULL) {
+        int i;
+        for (i = 0; i < 2; i++) {
+            state->z[i] = 0.0f;
+        }
+        for (i = 0; i < 3; i++) {
+            state->u[i] = U_SAFE[i];
+        }
+        state->ready = READY;
+    }
+}
+
+/* The answer to a lost state: the safe drive, under which the device comes to rest. The state stays lost until it is initialised. */
+static uint32_t set_lost(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out)
+{
+    int i;
+    state->ready = 0U;
+    for (i = 0; i < 3; i++) {
+        out->drive[i] = U_SAFE[i];
+    }
+    for (i = 0; i < 2; i++) {
+        out->displacement[i] = 0.0f;
+    }
+    return THREE_STACKS_ONLINE_F32_LOST;
+}
+
+/* Without a usable target: the safe drive, as fast as it may change, and the state that it leads to. */
+static void settle_safe(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out)
+{
+    float share = 1.0f;
+    int i;
+    for (i = 0; i < 3; i++) {
+        out->drive[i] = U_SAFE[i];
+    }
+    for (i = 0; i < 2; i++) {
+        out->displacement[i] = state->z[i];
+    }
+    (void)limit_rate(state, out->drive, &share);
+    for (i = 0; i < 3; i++) {
+        state->u[i] = out->drive[i];
+    }
+    balance_displacement(out->displacement, out->drive, state->z);
+}
+
+/* Keeps the limits of drives that out->drive does not keep; limited is 1 then if the device does not come to out->displacement. */
+static uint32_t settle_limit_drives(const three_stacks_online_f32_state *state, three_stacks_online_f32_output *out, int *limited)
+{
+    static const float HOME[2] = { 0.0f, 0.0f };
+    uint32_t status = 0U;
+    if (drives_admissible(state, out->drive) != 0) {
+        (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, 3);
+    } else {
+        *limited = line_search(state, 1, HOME, out);
+        status = THREE_STACKS_ONLINE_F32_DRIVE;
+    }
+    return status;
+}
+
+/* The state becomes that of the next sample; so does out->displacement, which the device does not come to where limited is 1. */
+static void settle_proceed(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out, int limited)
+{
+    if (limited != 0) {
+        balance_displacement(out->displacement, out->drive, out->displacement);
+    }
+    state->z[0] = out->displacement[0];
+    state->z[1] = out->displacement[1];
+    state->u[0] = out->drive[0];
+    state->u[1] = out->drive[1];
+    state->u[2] = out->drive[2];
+}
+
+/* Drives for out->displacement with every limit kept; the state becomes that of the next sample. */
+static uint32_t settle_within(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out)
+{
+    uint32_t status = 0U;
+    int limited = 0;
+    int lost = 0;
+    float share = 1.0f;
+    int held = 0;
+    wanted_drive(out->displacement, out->drive);
+    choose_drives(state, out->drive);
+    if (drive_inside(out->drive) == 0) {
+        if (is_lost(state) != 0) {
+            status = set_lost(state, out);
+            lost = 1;
+        } else {
+            status |= settle_limit_drives(state, out, &limited);
+        }
+    }
+    if (lost == 0) {
+        held = limit_rate(state, out->drive, &share);
+        if ((held != 0) && (is_lost(state) != 0)) {
+            status = set_lost(state, out);
+            lost = 1;
+            held = 0;
+        }
+    }
+    if (held > 1) {
+        int i;
+        for (i = 0; i < 2; i++) {
+            out->displacement[i] = state->z[i] + (share * (out->displacement[i] - state->z[i]));
+        }
+        limited = 1;
+        status |= THREE_STACKS_ONLINE_F32_RATE;
+    }
+    if (lost == 0) {
+        settle_proceed(state, out, limited);
+    }
+    if (held > 1) {
+        status |= passed(state);
+    }
+    return status;
+}
+
+uint32_t three_stacks_online_f32_settle(three_stacks_online_f32_state *state, const float target[2], three_stacks_online_f32_output *out)
+{
+    uint32_t status = THREE_STACKS_ONLINE_F32_INPUT;
+    if ((state == NULL) || (target == NULL) || (out == NULL)) {
+        /* nothing is written */
+    } else if (state->ready != READY) {
+        status = set_lost(state, out);
+    } else {
+        wanted_displacement(target, out->displacement);
+        if (displacement_inside(out->displacement) != 0) {
+            status = settle_within(state, out);
+        } else if (is_usable(target) != 0) {
+            int hit;
+            hit = limit_displacement(out->displacement);
+            status = settle_within(state, out);
+            if ((hit != 0) && (status != THREE_STACKS_ONLINE_F32_LOST)) {
+                status |= THREE_STACKS_ONLINE_F32_DISPLACEMENT;
+            }
+        } else {
+            if (is_lost(state) != 0) {
+                status = set_lost(state, out);
+            } else {
+                settle_safe(state, out);
+            }
+        }
+    }
+    return status;
+}
+
+/* Without a usable target: the safe drive, as fast as it may change, and the state that it leads to. */
+static void step_safe(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out)
+{
+    float share = 1.0f;
+    int i;
+    for (i = 0; i < 3; i++) {
+        out->drive[i] = U_SAFE[i];
+    }
+    for (i = 0; i < 2; i++) {
+        out->displacement[i] = state->z[i];
+    }
+    (void)limit_rate(state, out->drive, &share);
+    for (i = 0; i < 3; i++) {
+        state->u[i] = out->drive[i];
+    }
+    balance_displacement(out->displacement, out->drive, state->z);
+}
+
+/* Keeps the limits of drives that out->drive does not keep; limited is 1 then if the device does not come to out->displacement. */
+static uint32_t step_limit_drives(const three_stacks_online_f32_state *state, three_stacks_online_f32_output *out, int *limited)
+{
+    uint32_t status = 0U;
+    if (drives_admissible(state, out->drive) != 0) {
+        (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, 3);
+    } else {
+        *limited = line_search(state, 0, state->z, out);
+        status = THREE_STACKS_ONLINE_F32_DRIVE;
+    }
+    return status;
+}
+
+/* The state becomes that of the next sample; so does out->displacement, which the device does not come to where limited is 1. */
+static void step_proceed(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out, int limited)
+{
+    if (limited != 0) {
+        balance_displacement(out->displacement, out->drive, out->displacement);
+    }
+    state->z[0] = out->displacement[0];
+    state->z[1] = out->displacement[1];
+    state->u[0] = out->drive[0];
+    state->u[1] = out->drive[1];
+    state->u[2] = out->drive[2];
+}
+
+/* Drives for out->displacement with every limit kept; the state becomes that of the next sample. */
+static uint32_t step_within(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out)
+{
+    uint32_t status = 0U;
+    int limited = 0;
+    int lost = 0;
+    float share = 1.0f;
+    int held = 0;
+    wanted_drive(out->displacement, out->drive);
+    choose_drives(state, out->drive);
+    if (drive_inside(out->drive) == 0) {
+        if (is_lost(state) != 0) {
+            status = set_lost(state, out);
+            lost = 1;
+        } else {
+            status |= step_limit_drives(state, out, &limited);
+        }
+    }
+    if (lost == 0) {
+        held = limit_rate(state, out->drive, &share);
+        if ((held != 0) && (is_lost(state) != 0)) {
+            status = set_lost(state, out);
+            lost = 1;
+            held = 0;
+        }
+    }
+    if (held > 1) {
+        int i;
+        for (i = 0; i < 2; i++) {
+            out->displacement[i] = state->z[i] + (share * (out->displacement[i] - state->z[i]));
+        }
+        limited = 1;
+        status |= THREE_STACKS_ONLINE_F32_RATE;
+    }
+    if (lost == 0) {
+        step_proceed(state, out, limited);
+    }
+    if (held > 1) {
+        status |= passed(state);
+    }
+    return status;
+}
+
+uint32_t three_stacks_online_f32_step(three_stacks_online_f32_state *state, const float target[2], three_stacks_online_f32_output *out)
+{
+    uint32_t status = THREE_STACKS_ONLINE_F32_INPUT;
+    if ((state == NULL) || (target == NULL) || (out == NULL)) {
+        /* nothing is written */
+    } else if (state->ready != READY) {
+        status = set_lost(state, out);
+    } else {
+        wanted_displacement(target, out->displacement);
+        if (displacement_inside(out->displacement) != 0) {
+            status = step_within(state, out);
+        } else if (is_usable(target) != 0) {
+            int hit;
+            hit = limit_displacement(out->displacement);
+            status = step_within(state, out);
+            if ((hit != 0) && (status != THREE_STACKS_ONLINE_F32_LOST)) {
+                status |= THREE_STACKS_ONLINE_F32_DISPLACEMENT;
+            }
+        } else {
+            if (is_lost(state) != 0) {
+                status = set_lost(state, out);
+            } else {
+                step_safe(state, out);
+            }
+        }
+    }
+    return status;
+}
+

@@ -1,0 +1,504 @@
+/* The limiter: brings what a target asks for into every limit of a device, sample by sample. `Controller.step` in
+ * ctrlgen/controller/feedforward.py is its twin; docs/limiter.md says how their equality is shown.
+ *
+ * ctrlgen writes a device's numbers and kernels, resolves the conditions and macros of this text with them, and puts it behind them
+ * (ctrlgen/firmware/c/preprocessor.py). limiter_config.h is the same as a header, so that this file is also C as it stands; that of the
+ * MEMS hexapod is in codegen/golden/limiter, where compile_flags.txt sends editors and clang-tidy.
+ *
+ * Sizes: N displacements, NU drives, NX states that the model remembers, of them NS of actuators, M numbers of a target.
+ * What a device has is 1, else 0: STATE_LIMITED (limits on states of actuators can be met), BOUNDED (a cheap bound of the shares of
+ * composite limits, of which there are SHARES), RATED (drives change only so fast), PASSING (they can lead the device beyond a
+ * limit), REDUNDANT (more drives than axes, of which GROUPS can be moved without a push), COUPLED (a displacement moves several
+ * channels), MOVING (kernels for the next sample), MOTION (targets with derivatives), GIVEN (constants that are given at the
+ * start). SETTLE_DRIVE_LIMITED and STEP_DRIVE_LIMITED: drives beyond their limits can be needed. SETTLE_EXAMINED_FIRST and
+ * STEP_EXAMINED_FIRST: whether a state is lost is asked before it is used. STATE_BY_MODE and DRIVE_BY_MODE: the line search calls one
+ * kernel to settle and another to step. U_BOUNDS_ONCE: one function alone reads the limits of drives.
+ *
+ * BALANCE, COMPOSITE_SHARES, SETTLE_STATE and other macros with arguments call a kernel, which may read fewer of them. Names that end
+ * in _TABLE are numbers in braces. EACH_AXIS(F), EACH_STATE(F) and EACH_DRIVE(F) are F(0) F(1) ..., one by one, because a loop costs a
+ * small core twice as much.
+ */
+#include "limiter_config.h"
+
+/* Clips value to low ... high; 1 if a component changed by more than its slack or was NaN. */
+static int limit_all(real value[], const real low[], const real high[], const real slack[], int count)
+{
+    int hit = 0;
+    int i;
+    for (i = 0; i < count; i++) {
+        const real wanted = value[i];
+        const real raised = (wanted > low[i]) ? wanted : low[i];
+        const real limited = (raised < high[i]) ? raised : high[i];
+        const real moved = limited - wanted;
+        if (!((moved <= slack[i]) && (moved >= -slack[i]))) {
+            hit = 1;
+        }
+        value[i] = limited;
+    }
+    return hit;
+}
+
+/* Clips a displacement to its range; 1 if it was beyond by more than the slack. */
+static int limit_displacement(real value[N])
+{
+    static const real LOW[N] = Z_LOW_TABLE; /* m */
+    static const real HIGH[N] = Z_HIGH_TABLE; /* m */
+    static const real SLACK[N] = Z_SLACK_TABLE; /* m */
+    return limit_all(value, LOW, HIGH, SLACK, N);
+}
+
+#if STATE_LIMITED
+/* Clips the states of actuators to their range; 1 if one was beyond by more than the slack. */
+static int limit_state(const limiter_state *state, real value[NS])
+{
+#if defined(S_LOW_TABLE)
+    static const real LOW[NS] = S_LOW_TABLE; /* SI */
+#endif
+#if defined(S_HIGH_TABLE)
+    static const real HIGH[NS] = S_HIGH_TABLE;
+#endif
+    static const real SLACK[NS] = S_SLACK_TABLE;
+    (void)state;
+    return limit_all(value, STATE_LOW, STATE_HIGH, SLACK, NS);
+}
+
+#endif
+#if SETTLE_DRIVE_LIMITED || STEP_DRIVE_LIMITED
+/* 1 if every drive is within its limits or beyond by no more than the slack. */
+static int drives_admissible(const limiter_state *state, const real drive[NU])
+{
+    int admissible = 1;
+    int i;
+    (void)state;
+    for (i = 0; i < NU; i++) {
+        if (!((drive[i] <= U_MOST[i]) && (drive[i] >= U_LEAST[i]))) {
+            admissible = 0;
+        }
+    }
+    return admissible;
+}
+
+#endif
+/* 1 if every component is a number of a plausible size. */
+static int is_usable(const real target[M])
+{
+    static const real TARGET_LIMIT[M] = INPUT_LIMITS_TABLE; /* SI */
+    int usable = 1;
+    int i;
+    for (i = 0; i < M; i++) {
+        if (!((target[i] <= TARGET_LIMIT[i]) && (target[i] >= -TARGET_LIMIT[i]))) {
+            usable = 0;
+        }
+    }
+    return usable;
+}
+
+#if RATED
+/* Goes from the last drives toward drive by the largest common share that every rate allows: 0 untouched, 1 changed, 2 by more than the
+ * slack. */
+static int limit_rate(const limiter_state *state, real drive[NU], real *share)
+{
+#if !REDUNDANT
+    static const real FALL[NU] = FALL_TABLE; /* SI, in one sample */
+    static const real RISE[NU] = RISE_TABLE;
+#endif
+    real least = REAL(1.0);
+    int changed = 0;
+    int beyond = 0;
+    int i;
+    for (i = 0; i < NU; i++) {
+        const real change = drive[i] - state->u[i];
+        if (!((change <= RISE[i]) && (change >= FALL[i]))) {
+            const real reached = ((change > REAL(0.0)) ? RISE[i] : FALL[i]) / change;
+            changed = 1;
+            least = (reached < least) ? reached : least;
+            if (!((change <= (RISE[i] + U_SLACK[i])) && (change >= (FALL[i] - U_SLACK[i])))) {
+                beyond = 1;
+            }
+        }
+    }
+    if (changed != 0) {
+        for (i = 0; i < NU; i++) {
+            drive[i] = state->u[i] + (least * (drive[i] - state->u[i]));
+        }
+        (void)limit_all(drive, U_LOW, U_HIGH, U_SLACK, NU);
+    }
+    *share = least;
+    return changed + beyond;
+}
+
+#endif
+#if REDUNDANT
+/* The number nearest to t of those by which the drives of a set may move along the null space to be in low ... high. */
+static real moved_into(real t, const real drive[NU], const real low[NU], const real high[NU], const int set[], int count)
+{
+    static const real SHARE[NU] = NULL_SHARE_TABLE; /* 1 over NULL_MOTION */
+    real least = -UNLIMITED;
+    real most = UNLIMITED;
+    real raised;
+    int k;
+    for (k = 0; k < count; k++) {
+        const int i = set[k];
+        const real to_low = (low[i] - drive[i]) * SHARE[i];
+        const real to_high = (high[i] - drive[i]) * SHARE[i];
+        const real first = (to_high < to_low) ? to_high : to_low;
+        const real last = (to_high > to_low) ? to_high : to_low;
+        least = (first > least) ? first : least;
+        most = (last < most) ? last : most;
+    }
+    raised = (t < least) ? least : t;
+    return (raised > most) ? most : raised;
+}
+
+/* Of all drives that push as drive, the weighted pseudo-inverse, those of least effort within their limits, and as far as these allow
+ * within their rates: u + t w with the smallest |t|, B w = 0. Where there are none, they are beyond a limit. */
+static void choose_drives(const limiter_state *state, real drive[NU])
+{
+    static const real NULL_MOTION[NU] = NULL_MOTION_TABLE; /* w */
+    static const int SET[] = GROUP_MEMBERS; /* drives of each group, one group after the other */
+    static const int FIRST[] = GROUP_STARTS;
+    real free[NU];
+#if RATED
+    real slowest[NU];
+    real fastest[NU];
+#endif
+    int kept = DRIVE_INSIDE(state, drive);
+    int i;
+    (void)state;
+    for (i = 0; i < NU; i++) {
+        free[i] = drive[i];
+#if RATED
+        slowest[i] = state->u[i] + FALL[i];
+        fastest[i] = state->u[i] + RISE[i];
+        if (!((drive[i] >= slowest[i]) && (drive[i] <= fastest[i]))) {
+            kept = 0;
+        }
+#endif
+    }
+    if (kept == 0) {
+        int group;
+        for (group = 0; group < GROUPS; group++) {
+            const int first = FIRST[group];
+            const int count = FIRST[group + 1] - first;
+            real t = REAL(0.0);
+#if RATED
+            t = moved_into(t, free, slowest, fastest, &SET[first], count);
+#endif
+            t = moved_into(t, free, U_LOW, U_HIGH, &SET[first], count);
+            for (i = 0; i < count; i++) {
+                const int k = SET[first + i];
+                drive[k] = free[k] + (t * NULL_MOTION[k]);
+            }
+        }
+    }
+}
+
+#endif
+#if SHARES
+/* Scales a displacement that breaks a composite limit toward home, several times where the limited quantity is not proportional to it: 0
+ * untouched, 1 scaled, 2 scaled by more than the slack. */
+static int scale_home(const limiter_state *state, real wanted[N])
+{
+    int hit = 0;
+    int round;
+    (void)state;
+    for (round = 0; round < COMPOSITE_ROUNDS; round++) {
+        real share[SHARES];
+        real worst;
+        int i;
+        COMPOSITE_SHARES(state, wanted, share);
+        worst = share[0];
+#if SHARES > 1
+        for (i = 0; i < SHARES; i++) {
+            worst = (share[i] > worst) ? share[i] : worst;
+        }
+#endif
+        if (worst > REAL(1.0)) {
+            int scaled = 1;
+            worst = square_root(worst);
+            if (worst > COMPOSITE_SLACK) {
+                scaled = 2;
+            }
+            hit = (scaled > hit) ? scaled : hit;
+            for (i = 0; i < N; i++) {
+                wanted[i] = wanted[i] / worst;
+            }
+        }
+    }
+    return hit;
+}
+
+#if BOUNDED
+/* The same where a cheap bound does not show that every composite limit is kept. */
+static int limit_composite(const limiter_state *state, real wanted[N])
+{
+    int hit = 0;
+    if (!(COMPOSITE_BOUND(wanted) <= REAL(1.0))) {
+        hit = scale_home(state, wanted);
+    }
+    return hit;
+}
+
+#else
+#define limit_composite scale_home
+#endif
+#endif
+#if STATE_LIMITED
+/* Clips out->state to its range. The displacement that the device then has is taken where that changes it by more than the slack. */
+static uint32_t keep_state(const limiter_state *state, limiter_output *out)
+{
+    uint32_t status = 0U;
+    if (limit_state(state, out->state) != 0) {
+        real x[NX];
+        int i;
+        for (i = 0; i < NS; i++) {
+            x[i] = out->state[i];
+        }
+#if NX > NS
+        for (i = NS; i < NX; i++) {
+            x[i] = state->x[i];
+        }
+#endif
+        BALANCE(state, x, out->displacement, U_SAFE, out->displacement);
+        status = LIMITER_STATE;
+    }
+    return status;
+}
+
+#endif
+#if PASSING
+/* The limits beyond which the device is, led there by drives that may not change faster, as a status. */
+static uint32_t passed(const limiter_state *state)
+{
+    real z[N];
+    uint32_t status = 0U;
+    int i;
+    for (i = 0; i < N; i++) {
+        z[i] = state->z[i];
+    }
+    if (limit_displacement(z) != 0) {
+        status |= LIMITER_DISPLACEMENT;
+    }
+#if STATE_LIMITED
+    {
+        real x[NS];
+        for (i = 0; i < NS; i++) {
+            x[i] = state->x[i];
+        }
+        if (limit_state(state, x) != 0) {
+            status |= LIMITER_STATE;
+        }
+    }
+#endif
+#if SHARES
+    for (i = 0; i < N; i++) {
+        z[i] = state->z[i];
+    }
+    if (limit_composite(state, z) > 1) {
+        status |= LIMITER_COMPOSITE;
+    }
+#endif
+    return status;
+}
+
+#endif
+#if COUPLED
+#define ADD_COLUMN(j) slope[j] = slope[j] + (P[i][j] * change);
+/* The displacement in range whose followed signal is nearest to that of the displacement beyond, to first order, from beyond clipped to
+ * the range: sweeps of projected coordinate descent (C. Hildreth, Naval Res. Logist. Quart. 4 (1957) 79) on |W (value - beyond)|^2,
+ * W the slope of the followed signal at home. */
+static void nearest_displacement(const real beyond[N], real value[N])
+{
+    static const real P[N][N] = NEAREST_SLOPES; /* H_ij/H_jj of H = W^T W */
+    static const real LOW[N] = Z_LOW_TABLE; /* m */
+    static const real HIGH[N] = Z_HIGH_TABLE; /* m */
+    real slope[N] = HOME_TABLE;
+    int sweep;
+    int i;
+    for (i = 0; i < N; i++) {
+        const real change = value[i] - beyond[i];
+        EACH_AXIS(ADD_COLUMN)
+    }
+    for (sweep = 0; sweep < SWEEPS; sweep++) {
+        for (i = 0; i < N; i++) {
+            const real wanted = value[i] - slope[i];
+            const real raised = (wanted > LOW[i]) ? wanted : LOW[i];
+            const real moved = (raised < HIGH[i]) ? raised : HIGH[i];
+            const real change = moved - value[i];
+            if ((change < REAL(0.0)) || (change > REAL(0.0))) {
+                EACH_AXIS(ADD_COLUMN)
+                value[i] = moved;
+            }
+        }
+    }
+}
+
+#endif
+#if SETTLE_DRIVE_LIMITED || STEP_DRIVE_LIMITED
+/* Actuator state (limited) and drives (not limited) that out->displacement needs: with settling at rest, else at the next sample. */
+static void wanted_drives(const limiter_state *state, int settling, limiter_output *out)
+{
+    (void)state;
+    (void)settling;
+#if NS && STATE_BY_MODE
+    if (settling != 0) {
+        SETTLE_STATE(state, out->displacement, out->state);
+    } else {
+        STEP_STATE(state, out->displacement, out->state);
+    }
+#elif NS
+    LIMITED_STATE(state, out->displacement, out->state);
+#endif
+#if STATE_LIMITED
+    if (STATE_INSIDE(state, out->state) == 0) {
+        (void)limit_state(state, out->state);
+    }
+#endif
+#if DRIVE_BY_MODE
+    if (settling != 0) {
+        SETTLE_DRIVE(state, out->displacement, out->state, out->drive);
+    } else {
+        STEP_DRIVE(state, out->displacement, out->state, out->drive);
+    }
+#else
+    LIMITED_DRIVE(state, out->displacement, out->state, out->drive);
+#endif
+#if REDUNDANT
+    choose_drives(state, out->drive);
+#endif
+}
+
+#define START_DRIVE(k) at_start[k] = out->drive[k];
+#define START_STATE(k) state_at_start[k] = out->state[k];
+/* Line search from origin toward out->displacement, whose drives are inadmissible: secants of the drive that is first
+ * at its limit. Leaves the farthest admissible displacement found and its drives; 1 if even those of origin are inadmissible. */
+static int line_search(const limiter_state *state, int settling, const real origin[N], limiter_output *out)
+{
+    real direction[N];
+    real at_target[NU];
+    int i;
+    for (i = 0; i < N; i++) {
+        direction[i] = out->displacement[i] - origin[i];
+        out->displacement[i] = origin[i];
+    }
+    for (i = 0; i < NU; i++) {
+        at_target[i] = out->drive[i];
+    }
+    wanted_drives(state, settling, out);
+    if (drives_admissible(state, out->drive) != 0) {
+        real at_start[NU];
+#if NS
+        real state_at_start[NS];
+#endif
+        real accepted = REAL(0.0);
+        real rejected = REAL(1.0);
+        int trial;
+        EACH_DRIVE(START_DRIVE)
+#if NS
+        EACH_STATE(START_STATE)
+#endif
+        for (trial = 0; trial < SECANT_STEPS; trial++) {
+            real share = REAL(1.0);
+            real fraction;
+            for (i = 0; i < NU; i++) {
+                if ((at_target[i] > U_MOST[i]) || (at_target[i] < U_LEAST[i])) {
+                    const real limit = (at_target[i] > U_HIGH[i]) ? U_HIGH[i] : U_LOW[i];
+                    const real reached = (limit - at_start[i]) / (at_target[i] - at_start[i]);
+                    share = (reached < share) ? reached : share;
+                }
+            }
+            share = (share > REAL(0.0)) ? share : REAL(0.0);
+            fraction = accepted + ((SECANT_FRACTION * share) * (rejected - accepted));
+            for (i = 0; i < N; i++) {
+                out->displacement[i] = origin[i] + (fraction * direction[i]);
+            }
+            wanted_drives(state, settling, out);
+            if (drives_admissible(state, out->drive) != 0) {
+                accepted = fraction;
+                EACH_DRIVE(START_DRIVE)
+#if NS
+                EACH_STATE(START_STATE)
+#endif
+            } else {
+                rejected = fraction;
+                for (i = 0; i < NU; i++) {
+                    at_target[i] = out->drive[i];
+                }
+            }
+        }
+        for (i = 0; i < N; i++) {
+            out->displacement[i] = origin[i] + (accepted * direction[i]);
+        }
+        for (i = 0; i < NU; i++) {
+            out->drive[i] = at_start[i];
+        }
+#if NS
+        for (i = 0; i < NS; i++) {
+            out->state[i] = state_at_start[i];
+        }
+#endif
+    }
+    return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, NU);
+}
+
+#endif
+#if GIVEN
+#include "start_constants.c"
+#else
+void limiter_init(limiter_state *state)
+{
+#if NX && !NS
+    static const real X_REST[NX] = REST_TABLE; /* SI */
+#endif
+    if (state != NULL) {
+        int i;
+#if NX
+        for (i = 0; i < NX; i++) {
+            state->x[i] = X_REST[i];
+        }
+#endif
+        for (i = 0; i < N; i++) {
+            state->z[i] = REAL(0.0);
+        }
+#if RATED
+        for (i = 0; i < NU; i++) {
+            state->u[i] = U_SAFE[i];
+        }
+#endif
+        state->ready = READY;
+    }
+}
+
+#endif
+/* The answer to a lost state: the safe drive, under which the device comes to rest. The state stays lost until it is initialised. */
+static uint32_t set_lost(limiter_state *state, limiter_output *out)
+{
+    int i;
+    state->ready = 0U;
+    for (i = 0; i < NU; i++) {
+        out->drive[i] = U_SAFE[i];
+    }
+    for (i = 0; i < N; i++) {
+        out->displacement[i] = REAL(0.0);
+    }
+#if NS
+    for (i = 0; i < NS; i++) {
+        out->state[i] = X_REST[i];
+    }
+#endif
+    return LIMITER_LOST;
+}
+
+#define SETTLING 1
+#include "sample.c"
+#undef SETTLING
+#if MOVING
+
+#define SETTLING 0
+#include "sample.c"
+#undef SETTLING
+#endif
+#if MOTION
+
+#include "motion.c"
+#endif

@@ -1,0 +1,306 @@
+/* One sample: an equilibrium where SETTLING, else the next one. limiter.c includes this once for each. */
+#if SETTLING
+#define SAMPLE limiter_settle
+#define SAFE settle_safe
+#define LIMIT_DRIVES settle_limit_drives
+#define PROCEED settle_proceed
+#define WITHIN settle_within
+#define DISPLACEMENT SETTLE_DISPLACEMENT
+#define STATE SETTLE_STATE
+#define DRIVE SETTLE_DRIVE
+#define NEXT_STATES SETTLE_ADVANCE
+#define NEXT_FROM out->displacement
+#define DRIVE_LIMITED SETTLE_DRIVE_LIMITED
+#define EXAMINED_FIRST SETTLE_EXAMINED_FIRST
+#else
+#define SAMPLE limiter_step
+#define SAFE step_safe
+#define LIMIT_DRIVES step_limit_drives
+#define PROCEED step_proceed
+#define WITHIN step_within
+#define DISPLACEMENT STEP_DISPLACEMENT
+#define STATE STEP_STATE
+#define DRIVE STEP_DRIVE
+#define NEXT_STATES STEP_ADVANCE
+#define NEXT_FROM state->z
+#define DRIVE_LIMITED STEP_DRIVE_LIMITED
+#define EXAMINED_FIRST STEP_EXAMINED_FIRST
+#endif
+#if EXAMINED_FIRST
+#define CANNOT_BE_USED (state->ready != READY) || (is_lost(state) != 0)
+#define WAS_BEYOND hit != 0
+#else
+#define CANNOT_BE_USED state->ready != READY
+#define WAS_BEYOND (hit != 0) && (status != LIMITER_LOST)
+#endif
+#if DRIVE_LIMITED
+#define KEEP_DRIVES status |= LIMIT_DRIVES(state, out, &limited);
+#define GO_ON PROCEED(state, out, limited);
+#else /* no displacement in range needs more than rounding beyond */
+#define KEEP_DRIVES (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, NU);
+#define GO_ON PROCEED(state, out);
+#endif
+#if MOTION
+#define CAN_BE_REACHED (displacement_inside(out->displacement) != 0) && (is_usable(target) != 0)
+#else
+#define CAN_BE_REACHED displacement_inside(out->displacement) != 0
+#endif
+#define KEEP_STATE(k) state->x[k] = out->state[k];
+#define TELL_STATE(k) out->state[k] = state->x[k];
+#define KEEP_DISPLACEMENT(k) state->z[k] = out->displacement[k];
+#define KEEP_DRIVE(k) state->u[k] = out->drive[k];
+
+/* Without a usable target: the safe drive, as fast as it may change, and the state that it leads to. */
+static void SAFE(limiter_state *state, limiter_output *out)
+{
+#if RATED
+    real share = REAL(1.0);
+#endif
+    int i;
+    for (i = 0; i < NU; i++) {
+        out->drive[i] = U_SAFE[i];
+    }
+    for (i = 0; i < N; i++) {
+        out->displacement[i] = state->z[i];
+    }
+#if NS
+    for (i = 0; i < NS; i++) {
+        out->state[i] = state->x[i];
+    }
+#endif
+#if RATED
+    (void)limit_rate(state, out->drive, &share);
+    for (i = 0; i < NU; i++) {
+        state->u[i] = out->drive[i];
+    }
+#endif
+#if NX
+    NEXT_STATES(state, state->z, out->drive, state->x);
+#endif
+    BALANCE(state, state->x, out->displacement, out->drive, state->z);
+}
+
+#if DRIVE_LIMITED
+/* Keeps the limits of drives that out->drive does not keep; limited is 1 then if the device does not come to out->displacement. */
+static uint32_t LIMIT_DRIVES(const limiter_state *state, limiter_output *out, int *limited)
+{
+#if SETTLING
+    static const real HOME[N] = HOME_TABLE;
+#endif
+    uint32_t status = 0U;
+    if (drives_admissible(state, out->drive) != 0) {
+        (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, NU);
+    } else {
+#if SETTLING
+        *limited = line_search(state, 1, HOME, out);
+#else
+        *limited = line_search(state, 0, state->z, out);
+#endif
+        status = LIMITER_DRIVE;
+    }
+    return status;
+}
+
+#endif
+#if DRIVE_LIMITED
+/* The state becomes that of the next sample; so does out->displacement, which the device does not come to where limited is 1. */
+static void PROCEED(limiter_state *state, limiter_output *out, int limited)
+#else
+/* The state becomes that of the next sample. */
+static void PROCEED(limiter_state *state, const limiter_output *out)
+#endif
+{
+#if NX > NS
+    NEXT_STATES(state, NEXT_FROM, out->drive, state->x);
+#elif NS && DRIVE_LIMITED
+    if (limited != 0) {
+        NEXT_STATES(state, NEXT_FROM, out->drive, state->x);
+    } else { /* the drive was computed for these; one by one, because a loop costs a small core twice as much */
+        EACH_STATE(KEEP_STATE)
+    }
+#elif NS
+    EACH_STATE(KEEP_STATE)
+#endif
+#if DRIVE_LIMITED
+    if (limited != 0) {
+        BALANCE(state, state->x, out->displacement, out->drive, out->displacement);
+    }
+#endif
+    EACH_AXIS(KEEP_DISPLACEMENT)
+#if RATED
+    EACH_DRIVE(KEEP_DRIVE)
+#endif
+}
+
+/* Drives for out->displacement with every limit kept; the state becomes that of the next sample. */
+static uint32_t WITHIN(limiter_state *state, limiter_output *out)
+{
+#if U_BOUNDS_ONCE && defined(U_LOW_TABLE)
+    static const real U_LOW[NU] = U_LOW_TABLE;
+#endif
+#if U_BOUNDS_ONCE && defined(U_HIGH_TABLE)
+    static const real U_HIGH[NU] = U_HIGH_TABLE;
+#endif
+#if U_BOUNDS_ONCE
+    static const real U_SLACK[NU] = U_SLACK_TABLE;
+#endif
+    uint32_t status = 0U;
+#if DRIVE_LIMITED
+    int limited = 0;
+#endif
+#if !EXAMINED_FIRST
+    int lost = 0;
+#endif
+#if RATED
+    real share = REAL(1.0);
+    int held = 0;
+#endif
+#if NS
+    STATE(state, out->displacement, out->state);
+#endif
+#if STATE_LIMITED
+    if (STATE_INSIDE(state, out->state) == 0) {
+        status |= keep_state(state, out);
+    }
+#endif
+#if SHARES
+    {
+        const int scaled = limit_composite(state, out->displacement);
+        if (scaled > 0) {
+            if (scaled > 1) {
+                status |= LIMITER_COMPOSITE;
+            }
+#if NS
+            STATE(state, out->displacement, out->state);
+#endif
+#if STATE_LIMITED
+            (void)limit_state(state, out->state);
+#endif
+        }
+    }
+#endif
+    DRIVE(state, out->displacement, out->state, out->drive);
+#if REDUNDANT
+    choose_drives(state, out->drive);
+#endif
+#if EXAMINED_FIRST
+    if (DRIVE_INSIDE(state, out->drive) == 0) {
+        KEEP_DRIVES
+    }
+#else
+    if (DRIVE_INSIDE(state, out->drive) == 0) {
+        if (is_lost(state) != 0) {
+            status = set_lost(state, out);
+            lost = 1;
+        } else {
+            KEEP_DRIVES
+        }
+    }
+#endif
+#if RATED && EXAMINED_FIRST
+    held = limit_rate(state, out->drive, &share);
+#elif RATED
+    if (lost == 0) {
+        held = limit_rate(state, out->drive, &share);
+        if ((held != 0) && (is_lost(state) != 0)) {
+            status = set_lost(state, out);
+            lost = 1;
+            held = 0;
+        }
+    }
+#endif
+#if RATED
+    if (held > 1) {
+        int i;
+        for (i = 0; i < N; i++) {
+            out->displacement[i] = state->z[i] + (share * (out->displacement[i] - state->z[i]));
+        }
+        limited = 1;
+        status |= LIMITER_RATE;
+    }
+#endif
+#if EXAMINED_FIRST
+    GO_ON
+#else
+    if (lost == 0) {
+        GO_ON
+    }
+#endif
+#if RATED && (NS || PASSING)
+    if (held > 1) {
+#if NS
+        EACH_STATE(TELL_STATE)
+#endif
+#if PASSING
+        status |= passed(state);
+#endif
+    }
+#endif
+    return status;
+}
+
+uint32_t SAMPLE(limiter_state *state, const real target[M], limiter_output *out)
+{
+    uint32_t status = LIMITER_INPUT;
+    if ((state == NULL) || (target == NULL) || (out == NULL)) {
+        /* nothing is written */
+    } else if (CANNOT_BE_USED) {
+        status = set_lost(state, out);
+    } else {
+        DISPLACEMENT(state, target, out->displacement);
+        if (CAN_BE_REACHED) {
+            status = WITHIN(state, out);
+        } else if (is_usable(target) != 0) {
+            int hit;
+#if COUPLED
+            real beyond[N];
+            int i;
+            for (i = 0; i < N; i++) {
+                beyond[i] = out->displacement[i];
+            }
+#endif
+            hit = limit_displacement(out->displacement);
+#if COUPLED
+            if (hit != 0) {
+                nearest_displacement(beyond, out->displacement);
+            }
+#endif
+            status = WITHIN(state, out);
+            if (WAS_BEYOND) {
+                status |= LIMITER_DISPLACEMENT;
+            }
+        } else {
+#if EXAMINED_FIRST
+            SAFE(state, out);
+#else
+            if (is_lost(state) != 0) {
+                status = set_lost(state, out);
+            } else {
+                SAFE(state, out);
+            }
+#endif
+        }
+    }
+    return status;
+}
+#undef SAMPLE
+#undef SAFE
+#undef LIMIT_DRIVES
+#undef PROCEED
+#undef WITHIN
+#undef DISPLACEMENT
+#undef STATE
+#undef DRIVE
+#undef NEXT_STATES
+#undef NEXT_FROM
+#undef DRIVE_LIMITED
+#undef EXAMINED_FIRST
+#undef KEEP_DRIVES
+#undef GO_ON
+#undef CANNOT_BE_USED
+#undef CAN_BE_REACHED
+#undef WAS_BEYOND
+#undef KEEP_STATE
+#undef TELL_STATE
+#undef KEEP_DISPLACEMENT
+#undef KEEP_DRIVE

@@ -1,0 +1,127 @@
+"""The limits of a controller as C: tables of numbers, or members of the state where they follow from the constants of the start."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen.controller.feedforward import Controller
+from ctrlgen.firmware.c.cprint import Printer
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.online.printed_kernels import UNLIMITED
+from ctrlgen.firmware.online.start_constants import Tables
+from ctrlgen.model.model import Model
+
+FLOAT_SLACK = 4e-6  # as SLACK of the controller, in float: four roundings of a temperature, 0.4 mK
+
+
+def limit_context(controller: Controller, printer: Printer) -> dict[str, Any]:
+    """The part of the context of online.c.j2 that holds the limits, their slacks, and what tests of them compare with."""
+    kernels, m, real = controller.kernels, controller.kernels.nominal, printer.real
+    share = FLOAT_SLACK if real is Real.FLOAT else controller.slack
+    z_slack, s_slack, u_slack = kernels.slacks(share)
+    n_s = m.n_states
+    return {
+        "relative_slack": share,
+        "z_low": m.z_bounds[0],
+        "z_high": m.z_bounds[1],
+        "z_slack": z_slack,
+        "s_low": np.maximum(m.x_bounds[0][:n_s], -UNLIMITED),
+        "s_high": np.minimum(m.x_bounds[1][:n_s], UNLIMITED),
+        "s_slack": s_slack,
+        "u_low": m.u_bounds[0],
+        "u_high": m.u_bounds[1],
+        "u_slack": u_slack,
+        "u_safe": kernels.safe_drive,
+        "input_limits": kernels.input_limits,
+        "unlimited": UNLIMITED,
+        "plausible": [([_member(i, m) for i in those], most) for those, most in controller.plausible],
+        **rates_in_c(controller),
+        **_limits_in_c(controller, printer, real, u_slack),
+    }
+
+
+def rates_in_c(controller: Controller) -> dict[str, Any]:
+    """What the C needs to keep limits on the rates of drives."""
+    if (rate := controller.rate) is None:
+        return {"rated": False, "passing": False}
+    return {"rated": True, "passing": controller.kernels.limits_can_be_passed, "fall": rate.fall, "rise": rate.rise}
+
+
+def _member(i: int, model: Model) -> str:
+    """Number `i` of x, then z, then the last drive in the C's state."""
+    for name, count in (("x", model.x.numel()), ("z", len(model.axes))):
+        if i < count:
+            return f"state->{name}[{i}]"
+        i -= count
+    return f"state->u[{i}]"
+
+
+def _middles(low: np.ndarray, high: np.ndarray, real: Real) -> tuple[np.ndarray, np.ndarray]:
+    """Middle and squared half width of ranges; the width is four roundings smaller, so that the test with it is on the safe side."""
+    centre, half = (low + high) / 2, (high - low) / 2
+    return centre, np.maximum(half - 4 * real.epsilon * (np.abs(centre) + half), 0.0) ** 2
+
+
+def _middle_formulas(low: ca.SX, high: ca.SX, real: Real) -> tuple[ca.SX, ca.SX]:
+    """`_middles` for ranges that are formulas."""
+    centre, half = (low + high) / 2, (high - low) / 2
+    return centre, ca.fmax(half - 4 * real.epsilon * (ca.fabs(centre) + half), 0.0) ** 2
+
+
+def _u_bounds(m: Model) -> tuple[ca.SX, ca.SX]:
+    return m.bounds_formula(m.u)
+
+
+def _s_bounds(m: Model) -> tuple[ca.SX, ca.SX]:
+    """Low and high of the actuators' states, `UNLIMITED` where there is no bound."""
+    low, high = m.bounds_formula(m.x[: m.n_states])
+    return ca.fmax(low, -UNLIMITED), ca.fmin(high, UNLIMITED)
+
+
+def _limits_in_c(controller: Controller, printer: Printer, real: Real, u_slack: np.ndarray) -> dict[str, Any]:
+    """Middles and squared half widths as C, by "z_middle", ..., and where each table of limits is found, by its name in "arrays"."""
+    model, tables, limited = (
+        controller.kernels.nominal,
+        Tables(controller.kernels, printer),
+        any(controller.drive_can_be_limited),
+    )
+    (u_low, u_high), n_s = model.u_bounds, model.n_states
+    s_low, s_high = np.maximum(model.x_bounds[0][:n_s], -UNLIMITED), np.minimum(model.x_bounds[1][:n_s], UNLIMITED)
+    arrays = {
+        "U_LOW": tables.array("U_LOW", lambda m: _u_bounds(m)[0], u_low),
+        "U_HIGH": tables.array("U_HIGH", lambda m: _u_bounds(m)[1], u_high),
+        "U_LEAST": "U_LEAST",
+        "U_MOST": "U_MOST",
+    }
+    if limited:
+        arrays |= {
+            "U_LEAST": tables.array("U_LEAST", lambda m: _u_bounds(m)[0] - ca.DM(u_slack), u_low - u_slack),
+            "U_MOST": tables.array("U_MOST", lambda m: _u_bounds(m)[1] + ca.DM(u_slack), u_high + u_slack),
+        }
+    middles = {
+        "z_middle": [[real.literal(v) if v else "" for v in row] for row in _middles(*model.z_bounds, real)],
+        "u_middle": _middle_texts(tables, _u_bounds, u_low, u_high, real),
+        "s_middle": [],
+    }
+    if controller.state_can_be_limited:
+        arrays |= {
+            "S_LOW": tables.array("S_LOW", lambda m: _s_bounds(m)[0], s_low),
+            "S_HIGH": tables.array("S_HIGH", lambda m: _s_bounds(m)[1], s_high),
+        }
+        middles["s_middle"] = _middle_texts(tables, _s_bounds, s_low, s_high, real)
+    rest = tables.each("X_REST", lambda m: m.rest_formula, model.rest)
+    return {"arrays": arrays, "rest_given": rest, **middles}
+
+
+def _middle_texts(
+    tables: Tables, bounds: Callable[[Model], tuple[ca.SX, ca.SX]], low: np.ndarray, high: np.ndarray, real: Real
+) -> list[list[str]]:
+    centre, square = _middles(low, high, real)
+    return [
+        tables.texts(lambda m: _middle_formulas(*bounds(m), real)[0], centre),
+        tables.texts(lambda m: _middle_formulas(*bounds(m), real)[1], square),
+    ]

@@ -1,0 +1,206 @@
+"""The C of the limiter, `codegen/limiter`, with the numbers, tables and kernels of one device: what its macros stand for, its text."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ctrlgen.controller.feedforward import SECANT_FRACTION, SECANT_STEPS
+from ctrlgen.controller.nearest_displacement import SWEEPS
+from ctrlgen.firmware.c.preprocessor import Macro, resolved
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.templates import codegen_folder
+
+CONFIGURATION = "limiter_config.h"  # what the macros are defined in, where the files are compiled as they are
+# Arrays of numbers of the context of online.c.j2: Z_LOW_TABLE is what stands in braces for "z_low".
+TABLES = "z_low z_high z_slack s_low s_high s_slack u_low u_high u_slack fall rise rest input_limits"
+# Parameters of the macros that call kernels, and what the kernels take for their arguments.
+CALLS = {
+    "balance": ("state x z drive result", {"x": "x", "z": "z", "drive": "drive"}),
+    "shares": ("state wanted result", {"x": "state->x", "z": "state->z", "wanted": "wanted"}),
+    "displacement": ("state target result", {"x": "state->x", "z": "state->z", "target": "target"}),
+    "state": ("state wanted result", {"x": "state->x", "z": "state->z", "wanted": "wanted"}),
+    "drive": (
+        "state wanted limited result",
+        {"x": "state->x", "z": "state->z", "wanted": "wanted", "state": "limited"},
+    ),
+    "advance": ("state z drive result", {"x": "state->x", "z": "z", "drive": "drive"}),
+    "motion": ("target result", {"target": "target"}),
+}
+
+
+def limiter_text(prefix: str, macros: Mapping[str, Macro]) -> str:
+    """The limiter as it stands in the C of one device, its public names with the `prefix`."""
+
+    def text(name: str) -> str | None:
+        if name == CONFIGURATION:
+            return None
+        source = (codegen_folder() / "limiter" / name).read_text(encoding="utf-8")
+        return source.partition("*/\n")[2].lstrip("\n")  # without what the file says of itself
+
+    whole = re.sub(r"\n{3,}", "\n\n", resolved(text("limiter.c") or "", macros, text).strip("\n"))
+    return whole.replace("limiter_", f"{prefix}_").replace("LIMITER_", f"{prefix.upper()}_") + "\n"
+
+
+def limiter_macros(context: Mapping[str, Any]) -> dict[str, Macro]:
+    """What stands for each macro of the limiter; `context` of online.c.j2."""
+    real: Real = context["real"]
+    counts = {"AXIS": context["n"], "STATE": context["n_s"], "DRIVE": context["nu"]}
+    macros = {f"EACH_{name}": Macro("\n".join(f"F({k})" for k in range(n)), ("F",)) for name, n in counts.items()}
+    macros |= {"real": Macro(real.value), "REAL": Macro("x ## f" if real is Real.FLOAT else "x", ("x",))}
+    macros |= {name: Macro(str(int(value))) for name, value in _features(context).items()}
+    macros |= {name: Macro(text) for name, text in (_texts(context) | _start_texts(context)).items()}
+    return macros | {name: Macro(body, tuple(given.split())) for name, (given, body) in _calls(context).items()}
+
+
+def _features(context: Mapping[str, Any]) -> dict[str, int]:
+    """Sizes, and 1 for what the device has, else 0."""
+    modes, limited, moves = (
+        {mode["name"]: mode for mode in context["modes"]},
+        limited_modes(context),
+        context["redundancy"],
+    )
+    has = {
+        "STATE_LIMITED": context["state_limited"],
+        "BOUNDED": context["bound"] is not None,
+        "RATED": context["rated"],
+        "PASSING": context["passing"],
+        "REDUNDANT": moves is not None,
+        "COUPLED": context["nearest_slopes"] is not None,
+        "MOVING": "step" in modes,
+        "MOTION": bool(context["motion"]),
+        "U_BOUNDS_ONCE": bounds_once(context),
+        "REST_GIVEN": bool(context["rest_given"]),
+        "CHANGING": context["changing"] is not None,
+        "DOUBLE": context["real"] is Real.DOUBLE,
+        # Whether the line search calls one kernel to settle and another to step
+        "STATE_BY_MODE": len({mode["state"].name for mode in limited if "state" in mode}) > 1,
+        "DRIVE_BY_MODE": len({mode["drive"].name for mode in limited}) > 1,
+    }
+    for name in ("settle", "step"):
+        for flag, key in (("DRIVE_LIMITED", "drive_can_be_limited"), ("EXAMINED_FIRST", "examined_first")):
+            has[f"{name}_{flag}".upper()] = name in modes and modes[name][key]
+    return has | {
+        "N": context["n"],
+        "NU": context["nu"],
+        "NS": context["n_s"],
+        "NX": len(context["x_names"]),
+        "M": context["m"],
+        "SHARES": context["shares_count"],
+        "COMPOSITE_ROUNDS": context["composite_rounds"],
+        "SWEEPS": SWEEPS,
+        "SECANT_STEPS": SECANT_STEPS,
+        "GROUPS": 0 if moves is None else len(moves.groups),
+        "GIVEN": len(context["given"]),
+    }
+
+
+def limited_modes(context: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The modes in which a drive beyond its limits can be needed."""
+    return [mode for mode in context["modes"] if mode["drive_can_be_limited"]]
+
+
+def bounds_once(context: Mapping[str, Any]) -> bool:
+    """Whether one function alone reads the limits of the drives."""
+    return len(context["modes"]) == 1 and not context["motion"] and not limited_modes(context)
+
+
+def _texts(context: Mapping[str, Any]) -> dict[str, str]:
+    """Tables, numbers and names."""
+    literal = context["real"].literal
+
+    def table(values: Iterable[float]) -> str:
+        return _braces(literal(v) for v in values)
+
+    texts = {f"{name}_table".upper(): table(context[name]) for name in TABLES.split() if name in context}
+    texts |= {
+        "HOME_TABLE": table(np.zeros(context["n"])),
+        "COMPOSITE_SLACK": literal(1.0 + context["relative_slack"]),
+        "COMPOSITE_SLACK_SQUARED": literal((1.0 + context["relative_slack"]) ** 2),
+        "SECANT_FRACTION": literal(SECANT_FRACTION),
+        "UNLIMITED": literal(context["unlimited"]),
+    }
+    # Of limits that follow from the constants of the start there is no table: they are members of the state.
+    given = {name: member for name, member in context["arrays"].items() if member != name}
+    for name in given:
+        texts.pop(f"{name}_TABLE", None)
+    texts |= {name: member for name, member in given.items() if name.startswith("U_")}
+    texts |= {"STATE_LOW": given.get("S_LOW", "LOW"), "STATE_HIGH": given.get("S_HIGH", "HIGH")}
+    if (moves := context["redundancy"]) is not None:
+        starts = np.cumsum([0, *(len(those) for those in moves.groups)])
+        texts |= {
+            "NULL_MOTION_TABLE": table(moves.direction),
+            "NULL_SHARE_TABLE": table([1.0 / w if w else 0.0 for w in moves.direction]),
+            "GROUP_MEMBERS": _braces(str(i) for those in moves.groups for i in those),
+            "GROUP_STARTS": _braces(map(str, starts)),
+        }
+    if context["nearest_slopes"] is not None:
+        rows = ",\n".join(f"    {table(row)}" for row in context["nearest_slopes"].T)
+        texts["NEAREST_SLOPES"] = f"{{\n{rows}\n}}"
+    for mode in limited_modes(context)[:1]:
+        texts |= {f"LIMITED_{part}": f"{mode['name']}_{part}".upper() for part in ("STATE", "DRIVE")}
+    return texts
+
+
+def _start_texts(context: Mapping[str, Any]) -> dict[str, str]:
+    """What the macros of start_constants.c stand for."""
+    given, changing, literal = context["given"], context["changing"], context["real"].literal
+    if not given:
+        return {}
+    of_state = {c["name"]: f"state->constants.{c['name']}" for c in given}
+    within = (f"((constants->{c['name']} >= {c['low']}) && (constants->{c['name']} <= {c['high']}))" for c in given)
+    texts = {name.upper(): f"0x{context[name]:08X}U" for name in ("crc_polynomial", "magic", "layout")}
+    texts |= {
+        "GIVEN_VALUES": _braces(of_state.values()),
+        "DERIVED_VALUES": str(len(context["assigned"])),
+        "SET_DERIVED": _assignments(context["assigned"]),
+        "CONSTANTS_WITHIN": " && ".join(within),
+        "DEFAULTS": _braces(c["default"] for c in given),
+        "SET_REST": "\n".join(f"state->x[{k}] = {member};" for k, member in enumerate(context["rest_given"])),
+        "READ_CONSTANTS": "\n".join(
+            f"read.{name} = number_at(bytes, {12 + 4 * k}U);" for k, name in enumerate(of_state)
+        ),
+    }
+    if changing is not None:
+        own = changing["constant"]
+        texts |= {
+            "input": own.name,
+            "limiter_set_input": f"limiter_set_{own.name}",
+            "derive_input": changing["kernel"].name,
+            "INPUT_LEAST": literal(own.low),
+            "INPUT_MOST": literal(own.high),
+            "CHANGED_VALUES": _braces((of_state | {own.name: own.name}).values()),
+            "CHANGED_DERIVED": str(len(changing["assigned"])),
+            "SET_CHANGED": _assignments(changing["assigned"]),
+        }
+    return texts
+
+
+def _braces(texts: Iterable[str]) -> str:
+    return f"{{ {', '.join(texts)} }}"
+
+
+def _assignments(assigned: Sequence[tuple[str, int]]) -> str:
+    return "\n".join(f"state->derived.{name} = value[{k}];" for name, k in assigned)
+
+
+def _calls(context: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
+    """Parameters and body of the macros that call kernels, each with the arguments that the kernel reads."""
+    kernels = {"BALANCE": ("balance", context["balance"])}
+    if context["shares"]:
+        kernels["COMPOSITE_SHARES"] = "shares", context["shares"]
+    for mode in context["modes"]:
+        kernels |= {f"{mode['name']}_{part}".upper(): (part, mode[part]) for part in CALLS if part in mode}
+    kernels |= {f"MOTION_{part.upper()}": ("motion", kernel) for part, kernel in context["motion"].items()}
+    calls = {
+        name: (CALLS[part][0], kernel.call("result", **CALLS[part][1])) for name, (part, kernel) in kernels.items()
+    }
+    if context["bound"]:
+        calls["COMPOSITE_BOUND"] = "wanted", context["bound"].value(wanted="wanted")
+    for name, middle in (("state_inside", context["s_middle"]), ("drive_inside", context["u_middle"])):
+        follows = any("derived" in text for texts in middle for text in texts)
+        calls[name.upper()] = "state value", f"{name}({'&state->derived, ' if follows else ''}value)"
+    return calls

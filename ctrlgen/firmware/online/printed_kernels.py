@@ -1,0 +1,187 @@
+"""The kernels of a controller as C functions, by the mode and the part that they compute."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen.controller.feedforward import Controller
+from ctrlgen.controller.kernels import ControllerKernels
+from ctrlgen.controller.motion_feedforward import MotionKernels
+from ctrlgen.core.units import base_unit
+from ctrlgen.devices import Signal
+from ctrlgen.firmware.c.cprint import Kernel, Law, Printer, Ranges
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.online.start_constants import given_ranges
+from ctrlgen.model.model import Model
+
+UNLIMITED = 1e18  # SI: written for the bound of an actuator state that has none beside one that has; its square is still a float
+
+
+@dataclass(frozen=True)
+class PrintedKernels:
+    """`modes`: for "settle" and "step" the kernels by part beside "name", "examined_first" and "drive_can_be_limited"; `motion`: those of
+    a target with derivatives, by part; `shares` and `bound` of composite limits; `every` kernel in the order of the file."""
+
+    modes: list[dict[str, Any]]
+    motion: dict[str, Kernel]
+    balance: Kernel
+    shares: Kernel | None
+    bound: Kernel | None
+    every: list[Kernel]
+
+    @property
+    def calls(self) -> frozenset[str]:
+        """The elementary functions that they call."""
+        return frozenset().union(*(kernel.calls for kernel in self.every))
+
+
+def kernel_printer(kernels: ControllerKernels, real: Real, prefix: str) -> Printer:
+    """What prints the kernels of a controller whose C has names with this `prefix`."""
+    own = kernels.given
+    laws = printed_laws(own.model if own else kernels.nominal, kernels.named.model)
+    numbers, given_numbers = {"p": kernels.named.numbers}, {"p": own.numbers} if own else {}
+    ranges = _argument_ranges(kernels)
+    return Printer(real, ranges, numbers, laws, given_ranges(kernels), given_numbers, f"{prefix}_derived")
+
+
+def _argument_ranges(kernels: ControllerKernels) -> Ranges:
+    """Low and high of the arguments of kernels; a target has none."""
+    model, every = kernels.nominal, (kernels, *kernels.variants)
+    x_low, u_low = (
+        np.min(lows, axis=0)
+        for lows in zip(*((k.nominal.x_bounds[0], k.nominal.u_bounds[0]) for k in every), strict=True)
+    )
+    x_high, u_high = (
+        np.max(highs, axis=0)
+        for highs in zip(*((k.nominal.x_bounds[1], k.nominal.u_bounds[1]) for k in every), strict=True)
+    )
+    n, z = model.n_states, model.z_bounds
+    state = np.maximum(x_low[:n], -UNLIMITED), np.minimum(x_high[:n], UNLIMITED)
+    return {"z": z, "wanted": z, "x": (x_low, x_high), "state": state, "drive": (u_low, u_high)}
+
+
+def printed_kernels(controller: Controller, printer: Printer) -> PrintedKernels:
+    """The kernels of a `controller`; where constants are given at the start, in terms of these."""
+    kernels, inverses, own = controller.kernels, controller.kernels.named, controller.kernels.given
+    static, moving = (own.static or kernels.static, own.moving) if own else (kernels.static, kernels.moving)
+    printed = _Kernels(printer, kernel_comments(kernels))
+    modes: list[dict[str, Any]] = []
+    for name, inverse, formulas in (("settle", static, inverses.static), ("step", moving, inverses.moving)):
+        if inverse is None:
+            continue
+        mode: dict[str, Any] = {
+            "name": name,
+            "examined_first": kernels.examined_first[name == "step"],
+            "drive_can_be_limited": controller.drive_can_be_limited[name == "step"],
+        }
+        for part in ("displacement", "state", "drive", "advance"):
+            function, named = getattr(inverse, part), None if formulas is None else getattr(formulas, part)
+            if function.size1_out(0):
+                mode[part] = printed.kernel(function, (name, part), (f"wanted_{part}", f"{name}_{part}"), named=named)
+        modes.append(mode)
+    motion = {}
+    if isinstance(kernels, MotionKernels):
+        motion = {part: printed.kernel(k, ("motion", part), (f"motion_{part}",)) for part, k in kernels.motion.items()}
+    steps = ("z", kernels.newton_steps) if kernels.newton_steps > 1 else None
+    named = None if inverses.static is None else inverses.static.newton
+    balance = printed.kernel(static.newton, "balance", ("balance_displacement",), steps=steps, named=named)
+    shares = bound = None
+    if kernels.guarded_limits:
+        shares = printed.kernel(kernels.composite_shares, "shares", ("composite_shares",))
+    if kernels.composite_bound:
+        bound = printed.kernel(kernels.composite_bound, "bound", ("composite_bound",), returned=True)
+    return PrintedKernels(modes, motion, balance, shares, bound, printed.kernels)
+
+
+@dataclass
+class _Kernels:
+    """The kernels of one file; one that several modes share is printed once."""
+
+    printer: Printer
+    comments: Mapping[Any, str]
+
+    def __post_init__(self) -> None:
+        self._by_body: dict[str, Kernel] = {}
+
+    def kernel(
+        self,
+        function: Any,
+        what: Any,
+        names: tuple[str, ...],
+        steps: tuple[str, int] | None = None,
+        returned: bool = False,
+        named: Any = None,
+    ) -> Kernel:
+        """`function` as C, named by the first of `names` that no other body has."""
+        may_be_result = {"advance": ["x"], "balance": ["z"]}.get(what if what == "balance" else what[-1], [])
+        taken = {kernel.name for kernel in self._by_body.values()}
+        kernel = self.printer.kernel(function, names[0], self.comments[what], may_be_result, steps, returned, named)
+        if kernel.body not in self._by_body and kernel.name in taken:
+            kernel = self.printer.kernel(
+                function, names[-1], self.comments[what], may_be_result, steps, returned, named
+            )
+        return self._by_body.setdefault(kernel.body, kernel)
+
+    @property
+    def kernels(self) -> list[Kernel]:
+        """In the order in which they were printed."""
+        return list(self._by_body.values())
+
+
+def printed_laws(model: Model, symbolic: Model) -> list[Law]:
+    """The named parts of a model's physics for `Printer`, with the equations and sources of their docstrings; `symbolic` is the same
+    model with its numbers as parameters."""
+    laws = []
+    for law, named in zip(model.laws, symbolic.laws, strict=True):
+        stated = " ".join(" ".join((function.__doc__ or "").split()) for function in law.documented)
+        about = f"{law.label[0].upper()}{law.label[1:]}" + (f": {stated}" if stated else ".")
+        functions = [
+            ca.Function(
+                law.name, [m.x, m.z, m.u, *([m.p] if more else [])], [part.expr], ["x", "z", "drive", *more], ["force"]
+            )
+            for m, part, more in ((model, law, ("p",) if model.p.numel() else ()), (symbolic, named, ("p",)))
+        ]
+        laws.append(Law(law.name, about, *functions))
+    return laws
+
+
+def kernel_comments(kernels: ControllerKernels) -> dict[Any, str]:
+    """What each kernel computes, in words, by mode and part or by name."""
+    m, follow, drive = (
+        kernels.nominal,
+        kernels.model.signals[kernels.follow],
+        kernels.nominal.signals["drive"],
+    )
+    state, within = m.signals.get("state"), f"one sample of {kernels.sample_time} s"
+    holds = f"the {state.label}s `state`" if state and m.n_states else "the displacement `wanted`"
+    states = ", ".join(f"{name} [{unit}]" for name, unit in zip(m.x_names, m.x_units, strict=True))
+    steps = "the step" if kernels.newton_steps == 1 else f"{kernels.newton_steps} Newton steps"
+    comments: dict[Any, str] = {
+        "balance": f"Displacement at which the forces balance, g(x, z, drive) = 0: {steps} z - g/(dg/dz) from z.",
+        "shares": f"The square of each {', '.join(limit.label for limit in kernels.guarded_limits)} over its limit at displacement "
+        "`wanted`.",
+        "bound": "A cheap upper bound of the root of the largest of these shares: no more than 1 means that every limit is kept.",
+    }
+    for mode in ("settle", "step", "motion"):
+        after = {"settle": "at rest", "step": within + " later", "motion": "during the motion that `target` says"}[mode]
+        comments |= {
+            (mode, "displacement"): f"Displacement at which the {follow.label} is `target`, {si_text(follow)}.",
+            (mode, "state"): f"States that the displacement needs {after}: {states}.",
+            (mode, "drive"): {
+                "settle": f"{drive.label.capitalize()} that keeps {holds} at rest.",
+                "step": f"{drive.label.capitalize()} that leads from x to {holds} within {within}.",
+                "motion": f"{drive.label.capitalize()} of the motion that `target` says.",
+            }[mode],
+            (mode, "advance"): f"States under `drive`, {after}: {states}.",
+        }
+    return comments
+
+
+def si_text(signal: Signal) -> str:
+    """'theta_x [rad], ... delta_z [m]' with the SI unit of each channel."""
+    return ", ".join(f"{c} [{base_unit(u)}]" for c, u in zip(signal.channels, signal.units, strict=True))
