@@ -152,9 +152,10 @@ def test_in_a_budget_constants_vary_together_as_they_were_fitted_beside_what_the
         (SCENARIOS / "circle20" / "scenario.toml").read_text().partition("[[expect]]")[0].replace('"1 kHz"', '"100 Hz"')
     )
     (tmp_path / "uncertainty.toml").write_text(
-        'title = "u"\n[numbers]\n' + "".join(f'"{name}" = {{ sd = "{sd}", source = "s" }}\n' for name, sd in lines.items())
+        'title = "u"\n[numbers]\n'
+        + "".join(f'"{name}" = {{ sd = "{sd}", source = "s" }}\n' for name, sd in lines.items())
         + '[[correlation]]\nbetween = ["actuator.beam_width", "stage.lever_long"]\ncoefficient = 0.5\nsource = "s"\n'
-    )  # fmt: skip
+    )
     text = DEVICE.read_text().replace('input = "actuator.ambient"', "")
     ambient = '    { number = "actuator.ambient", low = "10 degC", high = "40 degC" },\n'
     (tmp_path / "device.toml").write_text(text.replace(ambient, ""))
@@ -178,8 +179,13 @@ def test_in_a_budget_constants_vary_together_as_they_were_fitted_beside_what_the
     assert found.correlation == pytest.approx(expected)
     seen = [after.linear.sensitivity["pose"][:, :, i] * found.sds[i] for i in range(4)]
     variance = (
-        seen[R] ** 2 + seen[tau] ** 2 - 1.6 * seen[R] * seen[tau] + seen[edge] ** 2 + seen[lever] ** 2 + seen[edge] * seen[lever]
-    )  # fmt: skip
+        seen[R] ** 2
+        + seen[tau] ** 2
+        - 1.6 * seen[R] * seen[tau]
+        + seen[edge] ** 2
+        + seen[lever] ** 2
+        + seen[edge] * seen[lever]
+    )
     assert after.combined**2 == pytest.approx(variance, rel=1e-6, abs=1e-9 * variance.max())
     wide = dict(zip([line.name for line in before.uncertainties.lines], before.uncertainties.sds, strict=True))
     assert wide["actuator.thermal_resistance"] == pytest.approx(27.5, rel=1e-9)  # 5 % of 550 K/W, as stated

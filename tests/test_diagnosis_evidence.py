@@ -114,8 +114,9 @@ def test_a_step_is_placed_in_time():
 
 
 @pytest.mark.parametrize(
-    ("law", "word"), [(lambda q: q, "at the excited lines only"), (lambda q: q + 40 * q**2, "even"), (lambda q: q + 4e6 * q**3, "odd")]
-)  # fmt: skip
+    ("law", "word"),
+    [(lambda q: q, "at the excited lines only"), (lambda q: q + 40 * q**2, "even"), (lambda q: q + 4e6 * q**3, "odd")],
+)
 def test_the_lines_of_a_periodic_drive_tell_the_class_of_the_nonlinearity(law, word):
     t = np.arange(3000) * H
     u = sum(0.5 * np.cos(2 * np.pi * k * t + k**2) for k in (1, 3, 7))
@@ -151,8 +152,9 @@ def test_a_weak_actuator_and_a_wrong_reading_are_told_apart(meso):
     weak, wrong = np.ones(6), np.ones(6)
     weak[2], wrong[3] = 0.97, 0.97
     for on_drive, on_pose, kind, name in (
-        (weak, 1.0, "actuator", "2y"), (1.0, wrong, "reading", "reading.delta_x"),
-    ):  # fmt: skip
+        (weak, 1.0, "actuator", "2y"),
+        (1.0, wrong, "reading", "reading.delta_x"),
+    ):
         found = mapped(pose_fitter(meso, on_drive, on_pose), Structure(device))[2]
         assert found.coordinates.located_in == kind
         alone = found.coordinates.explained_by_one[kind]

@@ -266,8 +266,14 @@ def test_the_loader_reads_what_calibrate_writes_and_refuses_every_flipped_bit(li
     ]
     recording = Recording("bench", "mems_hexapod", "series", (), (), (), (), ())
     calibration = Calibration(
-        library.scenario.device, {"device": library.scenario.inputs["device"]}, recording, tuple(ends), np.eye(len(ends)), (), ()
-    )  # fmt: skip
+        library.scenario.device,
+        {"device": library.scenario.inputs["device"]},
+        recording,
+        tuple(ends),
+        np.eye(len(ends)),
+        (),
+        (),
+    )
     data = binary(calibration)
     status, read = library.load(data)
     # A float's rounding, or two
@@ -302,8 +308,13 @@ def test_bounds_that_are_not_stated_are_a_fifth_of_a_number_and_twenty_kelvins_o
 
 @pytest.mark.parametrize(
     ("low", "high", "unit", "text"),
-    [(0.01, 0.21, "1", "0.01 ... 0.21"), (1.0, 11.0, "1", "1 ... 11"), (1e-6, 2e-6, "um", "1 ... 2 um"), (0.1, 0.2, "%", "10 ... 20 %")],
-)  # fmt: skip
+    [
+        (0.01, 0.21, "1", "0.01 ... 0.21"),
+        (1.0, 11.0, "1", "1 ... 11"),
+        (1e-6, 2e-6, "um", "1 ... 2 um"),
+        (0.1, 0.2, "%", "10 ... 20 %"),
+    ],
+)
 def test_a_range_keeps_its_digits_whatever_its_unit(low, high, unit, text):
     assert RunTimeConstant("a.b", "b", low, low, high, unit).range_text == text
 

@@ -25,13 +25,18 @@ from ctrlgen.recordings.recording import Record, Recording
 H, N = 1e-3, 700
 HEXAPOD = load_device(DEVICE)
 LAWS = [
-    Hypothesis("creep", "stage:1X", "1X"), Hypothesis("stiffening", "stage:2Y", "2Y"),
-    Hypothesis("hysteresis", "stage:3X", "3X"), Hypothesis("drive_gain", "actuator:1Y", "1Y"),
-    Hypothesis("drive_gain", "actuator:all", "all"), Hypothesis("heater_resistance", "actuator:2X", "2X"),
-    Hypothesis("cubic_sensor", "sensor:delta_x", "delta_x"), Hypothesis("low_pass", "sensor:theta_z", "theta_z"),
-    Hypothesis("swapped", "actuator:1X", "1X", "2X"), Hypothesis("frame_rotation_z", "mechanism:delta_x", "delta_x"),
+    Hypothesis("creep", "stage:1X", "1X"),
+    Hypothesis("stiffening", "stage:2Y", "2Y"),
+    Hypothesis("hysteresis", "stage:3X", "3X"),
+    Hypothesis("drive_gain", "actuator:1Y", "1Y"),
+    Hypothesis("drive_gain", "actuator:all", "all"),
+    Hypothesis("heater_resistance", "actuator:2X", "2X"),
+    Hypothesis("cubic_sensor", "sensor:delta_x", "delta_x"),
+    Hypothesis("low_pass", "sensor:theta_z", "theta_z"),
+    Hypothesis("swapped", "actuator:1X", "1X", "2X"),
+    Hypothesis("frame_rotation_z", "mechanism:delta_x", "delta_x"),
     Hypothesis(PARAMETER, "actuator:thermal_resistance", path="actuator.thermal_resistance"),
-]  # fmt: skip
+]
 
 
 def shows_nothing(place, i):
@@ -127,9 +132,12 @@ def test_a_slope_is_the_difference_of_two_simulations(hexapod, law):
 
 
 POSED = [
-    Hypothesis("creep", "stage:1X", "1X"), Hypothesis("hysteresis", "stage:3X", "3X"), Hypothesis("second_pole", "actuator:2Y", "2Y"),
-    Hypothesis("degradation", "actuator:1Y", "1Y"), Hypothesis("cubic_sensor", "sensor:delta_x", "delta_x"),
-]  # fmt: skip
+    Hypothesis("creep", "stage:1X", "1X"),
+    Hypothesis("hysteresis", "stage:3X", "3X"),
+    Hypothesis("second_pole", "actuator:2Y", "2Y"),
+    Hypothesis("degradation", "actuator:1Y", "1Y"),
+    Hypothesis("cubic_sensor", "sensor:delta_x", "delta_x"),
+]
 
 
 @pytest.mark.long
@@ -138,9 +146,20 @@ def test_a_slope_of_poses_that_have_not_settled_is_the_difference_of_two_simulat
     count, dwell = 30, 0.02  # four time constants of the heaters
     u = build_model(HEXAPOD).u_scale * np.random.default_rng(5).uniform(0.2, 0.8, (count, 6))
     records = tuple(
-        Record(role, role, dwell * np.arange(count), dwell, u, np.zeros((count, 6)), False, None, np.ones((count, 6), bool), poses=True)
+        Record(
+            role,
+            role,
+            dwell * np.arange(count),
+            dwell,
+            u,
+            np.zeros((count, 6)),
+            False,
+            None,
+            np.ones((count, 6), bool),
+            poses=True,
+        )
         for role in ("fit", "hold_out")
-    )  # fmt: skip
+    )
     fitter = Fitter(replace(hexapod.recording, kind="poses", records=records), hexapod.noise)
     fit = fitter.fit(Structure(HEXAPOD), steps=0)
     slopes = ScoreGradient(fitter, fit, records[0], [law], shows_nothing, terms_at(records[0]))
