@@ -17,8 +17,8 @@ from ctrlgen import build_model, diagnose, load_device
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, hypotheses, nominal_physics
-from ctrlgen.estimation.noise import Noise
-from ctrlgen.estimation.simulator import Simulator
+from ctrlgen.estimation.noise import Noise, NoiseSource
+from ctrlgen.estimation.simulator import Simulator, compiled_simulator
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.model.assembly import movable
 from ctrlgen.recordings.recording import Record, Recording
@@ -56,12 +56,12 @@ def _screen(repeat: int) -> list[Line | Note]:
     record = Record("fit", "fit", t[:, 0], H, u, noisy, False, None, blank.valid)
     units = ("rad",) * 3 + ("m",) * 3
     recording = Recording("bench", device.name, "series", channels, units, (None,) * 6, (record,), ())
-    fitter = Fitter(recording, Noise(sd, (np.zeros(0),) * 6, np.ones(6, bool), ("",) * 6, np.full(6, np.inf)))
+    fitter = Fitter(recording, Noise(sd, (np.zeros(0),) * 6, (NoiseSource.STATED,) * 6, ("",) * 6, np.full(6, np.inf)))
     fit = fitter.fit(Structure(device))
     columns: list[int] = []
 
     def ours() -> None:
-        fitter.cache.clear()
+        compiled_simulator.cache_clear()
         with threadpool_limits(1):  # as `diagnose` does
             screened = Screen(fitter, open_).run(fit)
         if not any(s.hypothesis == creep for s in screened.suspects[:5]):

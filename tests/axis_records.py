@@ -17,7 +17,6 @@ SETTLING = 0.5  # s, some dozen time constants of the stage
 M, C, K, KF = 0.5, 30.0, 2e5, 10.0
 AXIS = load_device(AXIS_FILE)
 FINE = 10  # steps a sample
-CACHE: dict = {}  # compiled responses of the axis, the same in every test
 BACKLASH = Hypothesis("backlash", "stage:axis", "axis")
 LATE = Hypothesis("log_creep", "stage:axis", "axis")
 LIMIT = Hypothesis("saturation", "actuator:axis", "axis")
@@ -61,7 +60,7 @@ def axis_fitter(force=None, n=N, seed=3, change=lambda y, u: y, u=None, white=No
         y = change(move(given, force, numbers=numbers), given) + NOISE * (e if white is None else white(e))
         parts.append(record(given, y, role, first=0.0 if role == "fit" else n * H))
     recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (NOISE,), tuple(parts), ())
-    return Fitter(recording, estimate_noise(recording, SETTLING), cache=CACHE)
+    return Fitter(recording, estimate_noise(recording, SETTLING))
 
 
 def drives(n: int) -> tuple[np.ndarray, np.ndarray]:

@@ -16,7 +16,7 @@ from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.held_out import refit_to_held_out
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.misfit import Misfit
-from ctrlgen.estimation.noise import Noise
+from ctrlgen.estimation.noise import Noise, NoiseSource
 from ctrlgen.estimation.settings import FIT, HELD_OUT_REFIT
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Record
@@ -33,7 +33,8 @@ def record(role: str, n: int, n_y: int = 1, observed=None, drive=None) -> Record
 
 def noise_of(n_y: int = 1, known: bool = True, count: float = np.inf) -> Noise:
     """White noise of deviation one."""
-    return Noise(np.ones(n_y), (np.zeros(0),) * n_y, np.full(n_y, known), ("",) * n_y, np.full(n_y, count))
+    source = NoiseSource.REST if known else NoiseSource.MISFIT
+    return Noise(np.ones(n_y), (np.zeros(0),) * n_y, (source,) * n_y, ("",) * n_y, np.full(n_y, count))
 
 
 def left(excess: float = 0.0, n: int = 1000, blocks=None) -> Misfit:

@@ -16,7 +16,7 @@ from conftest import SCENARIOS
 
 from ctrlgen import InputError, build_model, calibrate, error_budget, load_device, load_scenario
 from ctrlgen.calibration.budgets_compared import budgets
-from ctrlgen.calibration.calibrate import CalibratedConstant, Calibration, sd_of_bounds, with_held
+from ctrlgen.calibration.calibrate import CalibratedConstant, Calibration, Determination, sd_of_bounds, with_held
 from ctrlgen.calibration.calibration_page import write_calibration
 from ctrlgen.calibration.device_file import NAME, write_calibrated_device
 from ctrlgen.controller.kernels import ControllerKernels
@@ -98,7 +98,7 @@ def test_a_constant_on_which_the_recording_says_nothing_keeps_its_default(tmp_pa
     found = {row.constant.path: row for row in calibrate(device, RECORDING).constants}
     for path in ("actuator.heater_resistance", "hexapod.stress_limit"):
         assert not found[path].determined and found[path].value == found[path].constant.default
-        assert "acts on nothing" in found[path].remark
+        assert found[path].determination is Determination.IDLE
     assert found["actuator.time_constant"].determined
 
 
@@ -131,13 +131,17 @@ def constant(path="actuator.thermal_resistance", low=450.0, high=650.0, unit="K/
 
 def test_an_interval_holds_nineteen_of_twenty_normal_numbers_and_ends_at_the_bounds(rng):
     """100,000 numbers tell 95 % to 0.07 %; beyond 650 K/W no specimen is accepted, and where nothing is told the bounds are all."""
-    low, high = CalibratedConstant(constant(), 560.0, 10.0, True).interval
+    low, high = CalibratedConstant(constant(), 560.0, 10.0, Determination.DETERMINED).interval
     assert np.mean((rng.normal(560, 10, 100_000) > low) & (rng.normal(560, 10, 100_000) < high)) == pytest.approx(
         0.95, abs=0.004
     )
-    assert CalibratedConstant(constant(), 640.0, 10.0, True).interval == pytest.approx((620.4, 650.0), abs=0.01)
-    assert CalibratedConstant(constant(), 460.0, 10.0, True).interval == pytest.approx((450.0, 479.6), abs=0.01)
-    assert CalibratedConstant(constant(), 550.0, 10.0, False).interval == (450.0, 650.0)
+    assert CalibratedConstant(constant(), 640.0, 10.0, Determination.DETERMINED).interval == pytest.approx(
+        (620.4, 650.0), abs=0.01
+    )
+    assert CalibratedConstant(constant(), 460.0, 10.0, Determination.DETERMINED).interval == pytest.approx(
+        (450.0, 479.6), abs=0.01
+    )
+    assert CalibratedConstant(constant(), 550.0, 10.0, Determination.BOUNDS_ALONE).interval == (450.0, 650.0)
 
 
 def test_in_a_budget_constants_vary_together_as_they_were_fitted_beside_what_the_path_states(tmp_path):
@@ -148,15 +152,16 @@ def test_in_a_budget_constants_vary_together_as_they_were_fitted_beside_what_the
         (SCENARIOS / "circle20" / "scenario.toml").read_text().partition("[[expect]]")[0].replace('"1 kHz"', '"100 Hz"')
     )
     (tmp_path / "uncertainty.toml").write_text(
-        'title = "u"\n[numbers]\n' + "".join(f'"{name}" = {{ sd = "{sd}", source = "s" }}\n' for name, sd in lines.items())
+        'title = "u"\n[numbers]\n'
+        + "".join(f'"{name}" = {{ sd = "{sd}", source = "s" }}\n' for name, sd in lines.items())
         + '[[correlation]]\nbetween = ["actuator.beam_width", "stage.lever_long"]\ncoefficient = 0.5\nsource = "s"\n'
-    )  # fmt: skip
+    )
     text = DEVICE.read_text().replace('input = "actuator.ambient"', "")
     ambient = '    { number = "actuator.ambient", low = "10 degC", high = "40 degC" },\n'
     (tmp_path / "device.toml").write_text(text.replace(ambient, ""))
     device = load_device(tmp_path / "device.toml")
     sds = {"actuator.thermal_resistance": 2.0, "actuator.time_constant": 50e-6}
-    rows = tuple(CalibratedConstant(c, c.default, sds[c.path], True) for c in device.given_at_start)
+    rows = tuple(CalibratedConstant(c, c.default, sds[c.path], Determination.DETERMINED) for c in device.given_at_start)
     each = np.array([row.sd for row in rows])
     covariance = np.outer(each, each) * np.array([[1, -0.8], [-0.8, 1]])
     recording = load_recordings([RECORDING], build_model(device))
@@ -174,8 +179,13 @@ def test_in_a_budget_constants_vary_together_as_they_were_fitted_beside_what_the
     assert found.correlation == pytest.approx(expected)
     seen = [after.linear.sensitivity["pose"][:, :, i] * found.sds[i] for i in range(4)]
     variance = (
-        seen[R] ** 2 + seen[tau] ** 2 - 1.6 * seen[R] * seen[tau] + seen[edge] ** 2 + seen[lever] ** 2 + seen[edge] * seen[lever]
-    )  # fmt: skip
+        seen[R] ** 2
+        + seen[tau] ** 2
+        - 1.6 * seen[R] * seen[tau]
+        + seen[edge] ** 2
+        + seen[lever] ** 2
+        + seen[edge] * seen[lever]
+    )
     assert after.combined**2 == pytest.approx(variance, rel=1e-6, abs=1e-9 * variance.max())
     wide = dict(zip([line.name for line in before.uncertainties.lines], before.uncertainties.sds, strict=True))
     assert wide["actuator.thermal_resistance"] == pytest.approx(27.5, rel=1e-9)  # 5 % of 550 K/W, as stated
@@ -196,7 +206,7 @@ def test_of_a_list_the_numbers_that_are_no_constants_stay_uncertain(tmp_path):
     device = load_device(tmp_path / "device.toml")
     (constant,) = device.given_at_start
     row, recording = (
-        CalibratedConstant(constant, constant.default, 1e-9, True),
+        CalibratedConstant(constant, constant.default, 1e-9, Determination.DETERMINED),
         load_recordings([RECORDING], build_model(device)),
     )
     made = Calibration(device, {}, recording, (row,), np.array([[1e-18]]), (), ())

@@ -229,10 +229,10 @@ def test_what_bends_a_reading_is_delayed_afterwards():
         start = {delay: {"delay": 1.4e-3}, bow: {"curvature": 2e3}}
         s = Structure(AXIS, order, tuple(start[c] for c in order))
         fitter = fitter_of()
-        simulator = s.simulators(fitter.recording, {})[fitter.fit_records[0].timing]
+        simulator = s.simulator(fitter.recording.channels, fitter.fit_records[0].timing)
         ends[order] = simulator.simulate(fitter.fit_records[0], s.start)[:, 0]
     plain = Structure(AXIS, (delay,), ({"delay": 1.4e-3},))
-    late = plain.simulators(fitter.recording, {})[fitter.fit_records[0].timing].simulate(
+    late = plain.simulator(fitter.recording.channels, fitter.fit_records[0].timing).simulate(
         fitter.fit_records[0], plain.start
     )[:, 0]
     assert np.array_equal(*ends.values())
@@ -247,10 +247,10 @@ def test_fringes_count_in_what_a_bowed_scale_says():
     fitter = fitter_of()
     plain = (
         Structure(AXIS)
-        .simulators(fitter.recording, {})[fitter.fit_records[0].timing]
+        .simulator(fitter.recording.channels, fitter.fit_records[0].timing)
         .simulate(fitter.fit_records[0], Structure(AXIS).start)[:, 0]
     )
-    read = both.simulators(fitter.recording, {})[fitter.fit_records[0].timing].simulate(
+    read = both.simulator(fitter.recording.channels, fitter.fit_records[0].timing).simulate(
         fitter.fit_records[0], both.start
     )[:, 0]
     said = plain + 1e3 * plain**2

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from axis_records import AXIS, CACHE, KF, NOISE, SETTLING, C, H, K, M, N, axis_fitter, drive, move, record
+from axis_records import AXIS, KF, NOISE, SETTLING, C, H, K, M, N, axis_fitter, drive, move, record
 from conftest import MESO_FILE
 from scipy.signal import lfilter
 
@@ -31,7 +31,7 @@ from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.search_history import search_history
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
-from ctrlgen.estimation.noise import Noise, estimate_noise
+from ctrlgen.estimation.noise import Noise, NoiseSource, estimate_noise
 from ctrlgen.estimation.profile_likelihood import BOUNDED, profiles
 from ctrlgen.estimation.robust_covariance import robust_deviations, sandwich_over_model
 from ctrlgen.estimation.simulator import Simulator
@@ -114,8 +114,9 @@ def test_a_step_is_placed_in_time():
 
 
 @pytest.mark.parametrize(
-    ("law", "word"), [(lambda q: q, "at the excited lines only"), (lambda q: q + 40 * q**2, "even"), (lambda q: q + 4e6 * q**3, "odd")]
-)  # fmt: skip
+    ("law", "word"),
+    [(lambda q: q, "at the excited lines only"), (lambda q: q + 40 * q**2, "even"), (lambda q: q + 4e6 * q**3, "odd")],
+)
 def test_the_lines_of_a_periodic_drive_tell_the_class_of_the_nonlinearity(law, word):
     t = np.arange(3000) * H
     u = sum(0.5 * np.cos(2 * np.pi * k * t + k**2) for k in (1, 3, 7))
@@ -151,8 +152,9 @@ def test_a_weak_actuator_and_a_wrong_reading_are_told_apart(meso):
     weak, wrong = np.ones(6), np.ones(6)
     weak[2], wrong[3] = 0.97, 0.97
     for on_drive, on_pose, kind, name in (
-        (weak, 1.0, "actuator", "2y"), (1.0, wrong, "reading", "reading.delta_x"),
-    ):  # fmt: skip
+        (weak, 1.0, "actuator", "2y"),
+        (1.0, wrong, "reading", "reading.delta_x"),
+    ):
         found = mapped(pose_fitter(meso, on_drive, on_pose), Structure(device))[2]
         assert found.coordinates.located_in == kind
         alone = found.coordinates.explained_by_one[kind]
@@ -269,7 +271,7 @@ def test_drift_and_creep_get_an_experiment_that_separates_them():
     y = y + NOISE * np.random.default_rng(9).standard_normal(len(u))
     new = Record(**{**found.proposed.__dict__, "observed": y[:, None]})
     parts = (*fitter.recording.records, new)
-    both = Fitter(Recording(**{**fitter.recording.__dict__, "records": parts}), fitter.noise, cache=CACHE)
+    both = Fitter(Recording(**{**fitter.recording.__dict__, "records": parts}), fitter.noise)
     gained = both.fit(drift.structure).objective - both.fit(creep.structure).objective
     assert 0.7 < gained / found.after**2 < 1.4  # measured, the proposal settles it as far as was promised
 
@@ -280,7 +282,7 @@ def test_a_drive_that_could_do_far_too_much_is_used_a_little():
     structure = Structure(AXIS.model_copy(update={"actuator": strong}))
     fitter = axis_fitter()
     template = fitter.fit_records[0]
-    simulator = structure.simulators(fitter.recording, {})[template.timing]
+    simulator = structure.simulator(fitter.recording.channels, template.timing)
     for shape in time_series(2000, 1, 1 / H, 0):
         record, strength = admissible(shape, simulator, structure.start, template, 0.0)
         assert strength < 0.02 and 0.3 < np.abs(record.drive).max() < 4.0
@@ -372,9 +374,13 @@ def test_noise_of_one_colour_is_taken_at_its_density():
     parts = (record(drive(), move(drive()) + e, "fit"), record(drive(), move(drive()) + e[::-1], "hold_out", N * H))
     recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (None,), parts, ())
     noise = Noise(
-        np.array([NOISE * np.sqrt(1 - 0.9**2)]), (np.array([0.9]),), np.array([True]), ("given",), np.array([np.inf])
+        np.array([NOISE * np.sqrt(1 - 0.9**2)]),
+        (np.array([0.9]),),
+        (NoiseSource.STATED,),
+        ("given",),
+        np.array([np.inf]),
     )
-    fitter = Fitter(recording, noise, cache=CACHE)
+    fitter = Fitter(recording, noise)
     left = mapped(fitter)[1]
     found = estimate_unknown_input(left[0], noise, np.array([K * NOISE]))
     assert np.mean(np.abs(found.f) < 1.96 * found.sd) > 0.9

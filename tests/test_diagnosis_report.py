@@ -56,9 +56,8 @@ def same_prediction(diagnosis, text: str, folder: Path) -> None:
     stated = {path: number.si for path, number in device.quantities()}
     theta = np.array([stated.pop(unknown.path) for unknown in fit.structure.free_parameters])
     assert stated.items() <= {path: number.si for path, number in diagnosis.device.quantities()}.items()
-    simulators = fit.structure.simulators(recording, diagnosis.fitter.cache)
     for record in recording.records:
-        simulator = simulators[record.timing]
+        simulator = fit.structure.simulator(recording.channels, record.timing)
         own = Simulator(device, (), recording.channels, *record.timing)
         wanted = simulator.simulate(record, fit.theta)
         size = np.abs(wanted).max(axis=0)

@@ -163,3 +163,14 @@ def test_the_modules_that_the_method_names_exist():
     text = (DOCS / "method" / "diagnosis.md").read_text(encoding="utf-8")
     named = {path.split("/")[-1] for path in re.findall(r"`([\w/]+\.py)`", text)}
     assert len(named) > 20 and named <= {path.name for path in (ROOT / "ctrlgen").rglob("*.py")}
+
+
+def test_every_file_that_a_page_names_is_there():
+    """Below the root, the package, or the folder of the diagnosis, of which one page tells."""
+    below = (ROOT, ROOT / "ctrlgen", ROOT / "ctrlgen" / "diagnosis")
+    pages = [page for page in DOCS.rglob("*.md") if "generated" not in page.parts]
+    named = [
+        (page, path) for page in pages for path in re.findall(r"`([a-z_]+/[\w/]+\.(?:py|c|h|j2))`", page.read_text())
+    ]
+    assert len(named) > 100
+    assert not [(page.name, path) for page, path in named if not any((folder / path).is_file() for folder in below)]

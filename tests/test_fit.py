@@ -18,8 +18,6 @@ from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.held_out import HeldOutRefit
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.robust_covariance import sandwich_over_model
-from ctrlgen.estimation.settings import SIMULATION
-from ctrlgen.estimation.simulator import RecentSimulators
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Record
 
@@ -148,15 +146,3 @@ def test_the_sandwich_of_each_number_is_by_the_record_that_shows_it(scale):
         SimpleNamespace(J=J, residual=residual, shapes=((n, 2), (n, 1), (n, 1)), theta=np.zeros(2))
     )
     assert ratio == pytest.approx([1.0, np.sqrt(10)], rel=0.3)
-
-
-def test_simulators_used_last_are_kept():
-    kept = RecentSimulators()
-    for k in range(SIMULATION.kept):
-        kept[k] = object()
-    first = kept[0]
-    kept["new"] = object()
-    assert 0 in kept and kept[0] is first and 1 not in kept and len(kept) == SIMULATION.kept
-    other = kept.copy()
-    other["beside"] = object()
-    assert "beside" not in kept and isinstance(other, RecentSimulators)

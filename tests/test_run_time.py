@@ -15,7 +15,7 @@ import pytest
 from conftest import SCENARIOS
 
 from ctrlgen import Controller, InputError, build_model, load_device, load_scenario
-from ctrlgen.calibration.calibrate import CalibratedConstant, Calibration
+from ctrlgen.calibration.calibrate import CalibratedConstant, Calibration, Determination
 from ctrlgen.calibration.constants_files import binary
 from ctrlgen.controller.controller_step import ControllerStatus
 from ctrlgen.controller.kernels import ControllerKernels
@@ -261,11 +261,19 @@ def test_what_follows_from_the_constants_is_computed_by_the_same_operations_in_c
 def test_the_loader_reads_what_calibrate_writes_and_refuses_every_flipped_bit(libraries, real):
     library = libraries[real]
     stated = library.scenario.device.given_at_start
-    ends = [CalibratedConstant(c, c.low if k % 2 else c.high, 1.0, True) for k, c in enumerate(stated)]
+    ends = [
+        CalibratedConstant(c, c.low if k % 2 else c.high, 1.0, Determination.DETERMINED) for k, c in enumerate(stated)
+    ]
     recording = Recording("bench", "mems_hexapod", "series", (), (), (), (), ())
     calibration = Calibration(
-        library.scenario.device, {"device": library.scenario.inputs["device"]}, recording, tuple(ends), np.eye(len(ends)), (), ()
-    )  # fmt: skip
+        library.scenario.device,
+        {"device": library.scenario.inputs["device"]},
+        recording,
+        tuple(ends),
+        np.eye(len(ends)),
+        (),
+        (),
+    )
     data = binary(calibration)
     status, read = library.load(data)
     # A float's rounding, or two
@@ -300,8 +308,13 @@ def test_bounds_that_are_not_stated_are_a_fifth_of_a_number_and_twenty_kelvins_o
 
 @pytest.mark.parametrize(
     ("low", "high", "unit", "text"),
-    [(0.01, 0.21, "1", "0.01 ... 0.21"), (1.0, 11.0, "1", "1 ... 11"), (1e-6, 2e-6, "um", "1 ... 2 um"), (0.1, 0.2, "%", "10 ... 20 %")],
-)  # fmt: skip
+    [
+        (0.01, 0.21, "1", "0.01 ... 0.21"),
+        (1.0, 11.0, "1", "1 ... 11"),
+        (1e-6, 2e-6, "um", "1 ... 2 um"),
+        (0.1, 0.2, "%", "10 ... 20 %"),
+    ],
+)
 def test_a_range_keeps_its_digits_whatever_its_unit(low, high, unit, text):
     assert RunTimeConstant("a.b", "b", low, low, high, unit).range_text == text
 

@@ -11,13 +11,12 @@ from conftest import DEVICE
 
 from ctrlgen import build_model, load_device
 from ctrlgen.diagnosis.selection import score_gradient as slopes_module
-from ctrlgen.diagnosis.selection.law_terms import LawTerms
 from ctrlgen.diagnosis.selection.ltv_propagation import LtvPropagation
-from ctrlgen.diagnosis.selection.score_gradient import ScoreGradient
+from ctrlgen.diagnosis.selection.score_gradient import ScoreGradient, law_terms
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis
-from ctrlgen.estimation.noise import Noise
+from ctrlgen.estimation.noise import Noise, NoiseSource
 from ctrlgen.estimation.settings import CANDIDATE_TERMS
 from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.estimation.structure import Structure
@@ -26,17 +25,28 @@ from ctrlgen.recordings.recording import Record, Recording
 H, N = 1e-3, 700
 HEXAPOD = load_device(DEVICE)
 LAWS = [
-    Hypothesis("creep", "stage:1X", "1X"), Hypothesis("stiffening", "stage:2Y", "2Y"),
-    Hypothesis("hysteresis", "stage:3X", "3X"), Hypothesis("drive_gain", "actuator:1Y", "1Y"),
-    Hypothesis("drive_gain", "actuator:all", "all"), Hypothesis("heater_resistance", "actuator:2X", "2X"),
-    Hypothesis("cubic_sensor", "sensor:delta_x", "delta_x"), Hypothesis("low_pass", "sensor:theta_z", "theta_z"),
-    Hypothesis("swapped", "actuator:1X", "1X", "2X"), Hypothesis("frame_rotation_z", "mechanism:delta_x", "delta_x"),
+    Hypothesis("creep", "stage:1X", "1X"),
+    Hypothesis("stiffening", "stage:2Y", "2Y"),
+    Hypothesis("hysteresis", "stage:3X", "3X"),
+    Hypothesis("drive_gain", "actuator:1Y", "1Y"),
+    Hypothesis("drive_gain", "actuator:all", "all"),
+    Hypothesis("heater_resistance", "actuator:2X", "2X"),
+    Hypothesis("cubic_sensor", "sensor:delta_x", "delta_x"),
+    Hypothesis("low_pass", "sensor:theta_z", "theta_z"),
+    Hypothesis("swapped", "actuator:1X", "1X", "2X"),
+    Hypothesis("frame_rotation_z", "mechanism:delta_x", "delta_x"),
     Hypothesis(PARAMETER, "actuator:thermal_resistance", path="actuator.thermal_resistance"),
-]  # fmt: skip
+]
 
 
 def shows_nothing(place, i):
     return DataHints()
+
+
+def terms_at(record):
+    """The terms of the laws of the hexapod, that any structure shares."""
+    channels = tuple(f"reading.{name}" for name in build_model(HEXAPOD).signals["reading"].channels)
+    return law_terms(HEXAPOD, LAWS, channels, record.timing)
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +67,7 @@ def hexapod():
         "t", HEXAPOD.name, "series", channels, ("rad",) * 3 + ("m",) * 3, (None,) * 6, tuple(records), ()
     )
     ar = tuple(np.array([0.4, -0.1]) if i % 2 else np.zeros(0) for i in range(6))
-    return Fitter(recording, Noise(sd, ar, np.ones(6, bool), ("",) * 6, np.full(6, np.inf)))
+    return Fitter(recording, Noise(sd, ar, (NoiseSource.REST,) * 6, ("",) * 6, np.full(6, np.inf)))
 
 
 def brute(slopes, start):
@@ -87,7 +97,7 @@ def test_the_sums_of_the_screen_are_those_of_a_plain_recursion(hexapod, monkeypa
     monkeypatch.setattr(slopes_module, "CANDIDATE_TERMS", replace(CANDIDATE_TERMS, block=123))
     fit = hexapod.fit(Structure(HEXAPOD))
     record = hexapod.fit_records[0]
-    slopes = ScoreGradient(hexapod, fit, record, LAWS, shows_nothing, LawTerms(record.timing))
+    slopes = ScoreGradient(hexapod, fit, record, LAWS, shows_nothing, terms_at(record))
     white, J = fit.residual[: N * 6].reshape(N, 6), fit.J[: N * 6].reshape(N, 6, -1)
     found = slopes.sums(white, J, fit.initial_states[0])
     noise, usable = hexapod.noise, hexapod.noise.usable(record.valid)
@@ -110,7 +120,7 @@ def test_the_sums_of_the_screen_are_those_of_a_plain_recursion(hexapod, monkeypa
 def test_a_slope_is_the_difference_of_two_simulations(hexapod, law):
     fit = hexapod.fit(Structure(HEXAPOD))
     record = hexapod.fit_records[0]
-    slopes = ScoreGradient(hexapod, fit, record, [law], shows_nothing, LawTerms(record.timing))
+    slopes = ScoreGradient(hexapod, fit, record, [law], shows_nothing, terms_at(record))
     column, start = slopes.columns[-1], np.zeros(len(fit.initial_states[0]))
     name, off = law.law.amplitude().name, slopes.laws.terms[column.terms[0]].off
     slope = brute(slopes, start)[:, :, -1]
@@ -122,9 +132,12 @@ def test_a_slope_is_the_difference_of_two_simulations(hexapod, law):
 
 
 POSED = [
-    Hypothesis("creep", "stage:1X", "1X"), Hypothesis("hysteresis", "stage:3X", "3X"), Hypothesis("second_pole", "actuator:2Y", "2Y"),
-    Hypothesis("degradation", "actuator:1Y", "1Y"), Hypothesis("cubic_sensor", "sensor:delta_x", "delta_x"),
-]  # fmt: skip
+    Hypothesis("creep", "stage:1X", "1X"),
+    Hypothesis("hysteresis", "stage:3X", "3X"),
+    Hypothesis("second_pole", "actuator:2Y", "2Y"),
+    Hypothesis("degradation", "actuator:1Y", "1Y"),
+    Hypothesis("cubic_sensor", "sensor:delta_x", "delta_x"),
+]
 
 
 @pytest.mark.long
@@ -133,12 +146,23 @@ def test_a_slope_of_poses_that_have_not_settled_is_the_difference_of_two_simulat
     count, dwell = 30, 0.02  # four time constants of the heaters
     u = build_model(HEXAPOD).u_scale * np.random.default_rng(5).uniform(0.2, 0.8, (count, 6))
     records = tuple(
-        Record(role, role, dwell * np.arange(count), dwell, u, np.zeros((count, 6)), False, None, np.ones((count, 6), bool), poses=True)
+        Record(
+            role,
+            role,
+            dwell * np.arange(count),
+            dwell,
+            u,
+            np.zeros((count, 6)),
+            False,
+            None,
+            np.ones((count, 6), bool),
+            poses=True,
+        )
         for role in ("fit", "hold_out")
-    )  # fmt: skip
+    )
     fitter = Fitter(replace(hexapod.recording, kind="poses", records=records), hexapod.noise)
     fit = fitter.fit(Structure(HEXAPOD), steps=0)
-    slopes = ScoreGradient(fitter, fit, records[0], [law], shows_nothing, LawTerms(records[0].timing))
+    slopes = ScoreGradient(fitter, fit, records[0], [law], shows_nothing, terms_at(records[0]))
     column, start = slopes.columns[-1], np.zeros(len(fit.initial_states[0]))
     lost = np.zeros(len(slopes.laws.terms) + len(slopes.sizes), bool)
     blocks = [list(readings) for _, _, readings in slopes.blocks(start, lost)]
@@ -157,14 +181,14 @@ def test_a_slope_of_poses_that_have_not_settled_is_the_difference_of_two_simulat
 
 def test_terms_written_down_for_one_structure_serve_another(hexapod):
     """What a law reads differs between structures: before the gain of 1Y its heater is told something else than after it."""
-    record, kept = hexapod.fit_records[0], LawTerms(hexapod.fit_records[0].timing)
+    record, kept = hexapod.fit_records[0], terms_at(hexapod.fit_records[0])
     structures = [Structure(HEXAPOD), Structure(HEXAPOD).with_cause(LAWS[3], {"gain": 0.2})]
     lag = Hypothesis("second_pole", "actuator:1Y", "1Y")
     found = []
     for structure in structures:
         fit = hexapod.fit(structure, steps=0)
         white, J = fit.residual[: N * 6].reshape(N, 6), fit.J[: N * 6].reshape(N, 6, -1)
-        for laws in (kept, LawTerms(record.timing)):
+        for laws in (kept, terms_at(record)):
             slopes = ScoreGradient(hexapod, fit, record, [*LAWS[:3], lag], shows_nothing, laws)
             found.append(slopes.sums(white, J, fit.initial_states[0]))
     first, _, second, alike = (np.sqrt(np.diag(sums.SS)) for sums in found)

@@ -21,6 +21,7 @@ from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.estimation.error_model import ErrorModel
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.noise import NoiseSource
 from ctrlgen.estimation.noise_update import update_noise, update_noise_colour
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
@@ -129,8 +130,8 @@ def test_a_colour_that_the_rest_has_not_is_not_the_noises(at_rest, learnt):
 def test_a_guessed_noise_is_corrected_downward_alone(times, learnt):
     fitter = fitter_of()
     fit = fitter.fit(Structure(AXIS))
-    guessed = np.ones(1, bool)
-    fitter = fitter.with_noise(replace(fitter.noise, sd=times * fitter.noise.sd, ar=(np.zeros(0),), guessed=guessed))
+    guessed = replace(fitter.noise, sources=(NoiseSource.FASTEST_PART,))
+    fitter = fitter.with_noise(replace(guessed, sd=times * guessed.sd, ar=(np.zeros(0),)))
     noise = update_noise(fitter, fit)
     assert (noise is not fitter.noise) == learnt
     assert not learnt or (noise.floor[0] == pytest.approx(NOISE, rel=0.1) and "move least" in noise.notes[0])

@@ -15,8 +15,9 @@ from ctrlgen.diagnosis.selection.model_selection import ModelSelection, wins_by_
 from ctrlgen.diagnosis.selection.objections import objections
 from ctrlgen.estimation.error_model import ErrorModel
 from ctrlgen.estimation.fit import Fit
+from ctrlgen.estimation.free_parameters import FreeParameter
 from ctrlgen.estimation.hypothesis import Hypothesis
-from ctrlgen.estimation.structure import FreeParameter, Structure
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Recording
 
 N = 1000  # samples to fit, and held out

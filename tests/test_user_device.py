@@ -122,9 +122,11 @@ def test_states_of_its_own_may_depend_on_everything():
     """A coil: L i' = V - R i - k v; against scipy."""
     device = pendulum(
         parameters={"inertia": "2 kg*cm^2", "k": "15 mN*m/A", "R": "3 ohm", "L": "20 mH", "weight": "20 mN*m"},
-        state={"current": "1 A"}, rates=lambda x, u, v, p: (u.motor - p.R * x.current - p.k * v.swing) / p.L,
-        force=lambda x, p: p.k * x.current, damping_force=None,
-    )  # fmt: skip
+        state={"current": "1 A"},
+        rates=lambda x, u, v, p: (u.motor - p.R * x.current - p.k * v.swing) / p.L,
+        force=lambda x, p: p.k * x.current,
+        damping_force=None,
+    )
     model = ctrlgen.build_model(device)
     assert model.signals["state"].channels == ("current",)
     t = STEP * np.arange(200)
@@ -161,15 +163,21 @@ def stage():
     """Two coupled axes on flexures, two coils; readings in a frame turned by a fixed angle."""
     return ctrlgen.user_device(
         "stage",
-        parameters={"mass": ("0.4 kg", "10 g"), "kx": ("20 N/mm", "0.5 N/mm"), "ky": ("30 N/mm", "0.5 N/mm"),
-                    "c": ("8 N*s/m", "0.8 N*s/m"), "coil": {"value": "5 N/V", "domain": "actuator"},
-                    "coupling": {"value": "2 N/mm", "domain": "stage"}},
-        drive={"coil_x": "4 V", "coil_y": "4 V"}, axes={"x": "1 mm", "y": "1 mm"},
+        parameters={
+            "mass": ("0.4 kg", "10 g"),
+            "kx": ("20 N/mm", "0.5 N/mm"),
+            "ky": ("30 N/mm", "0.5 N/mm"),
+            "c": ("8 N*s/m", "0.8 N*s/m"),
+            "coil": {"value": "5 N/V", "domain": "actuator"},
+            "coupling": {"value": "2 N/mm", "domain": "stage"},
+        },
+        drive={"coil_x": "4 V", "coil_y": "4 V"},
+        axes={"x": "1 mm", "y": "1 mm"},
         mass=lambda p: [p.mass, p.mass],
         force=lambda u, p: {"x": p.coil * u.coil_x, "y": p.coil * u.coil_y},
         restoring_force=lambda d, p: [p.kx * d.x + p.coupling * d.y, p.ky * d.y + p.coupling * d.x],
         damping_force=lambda v, p: p.c * v.vector,
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.long
@@ -190,10 +198,15 @@ def test_stiffening_of_one_axis_of_two_is_found_there(tmp_path):
 
 def test_without_mass_it_stands_in_balance_and_can_be_solved_backward(tmp_path):
     device = ctrlgen.user_device(
-        "lever", parameters={"k": "2 N/um", "gain": "0.5 N/V", "ratio": "3"}, drive={"piezo": "100 V"}, axes={"flexure": "25 um"},
-        force=lambda u, p: p.gain * u.piezo, restoring_force=lambda d, p: p.k * d.flexure,
-        reading={"tip": "75 um"}, pose=lambda d, p: p.ratio * d.flexure,
-    )  # fmt: skip
+        "lever",
+        parameters={"k": "2 N/um", "gain": "0.5 N/V", "ratio": "3"},
+        drive={"piezo": "100 V"},
+        axes={"flexure": "25 um"},
+        force=lambda u, p: p.gain * u.piezo,
+        restoring_force=lambda d, p: p.k * d.flexure,
+        reading={"tip": "75 um"},
+        pose=lambda d, p: p.ratio * d.flexure,
+    )
     model = ctrlgen.build_model(device, free=["mechanism.ratio"])
     trace = ctrlgen.simulate(model, np.full((3, 1), 40.0), 1e-3)
     assert trace.signals["reading"][-1, 0] == pytest.approx(3 * 0.5 * 40 / 2e6)
@@ -206,20 +219,41 @@ def test_without_mass_it_stands_in_balance_and_can_be_solved_backward(tmp_path):
 def test_every_fault_is_said_at_once():
     with pytest.raises(InputError) as caught:
         pendulum(
-            parameters={"inertia": "2 kg", "a b": "1", "odd": "1 flub", "weight": ("1 N*m",), "motor": {"value": "1 V", "domain": "moon"}},
-            axes={"swing": "60 deg", "slide": "1 um"}, drive={"motor": "0 V"},
-            force=lambda u, q: 1, restoring_force=lambda d, p: [p.wieght, 0], damping_force=lambda v: {"swing": 1, "z": 2},
-            mass=lambda p: [p.inertia, ca.SX.sym("strange")], rates=lambda x: x, effect=[{"kind": "nope", "at": "swing"}],
-            reading={"tip": "1 um"}, state={"hot": "20 degC"},
-        )  # fmt: skip
+            parameters={
+                "inertia": "2 kg",
+                "a b": "1",
+                "odd": "1 flub",
+                "weight": ("1 N*m",),
+                "motor": {"value": "1 V", "domain": "moon"},
+            },
+            axes={"swing": "60 deg", "slide": "1 um"},
+            drive={"motor": "0 V"},
+            force=lambda u, q: 1,
+            restoring_force=lambda d, p: [p.wieght, 0],
+            damping_force=lambda v: {"swing": 1, "z": 2},
+            mass=lambda p: [p.inertia, ca.SX.sym("strange")],
+            rates=lambda x: x,
+            effect=[{"kind": "nope", "at": "swing"}],
+            reading={"tip": "1 um"},
+            state={"hot": "20 degC"},
+        )
     text = str(caught.value)
     for part in (
-        "parameters.a b: is not a name", "parameters.odd: 'flub' is not a unit", "parameters.weight", "domain = 'moon'",
-        "axes.slide: '1 um' is not of the dimension of '60 deg'", "drive.motor: '0 V' is not a size", "state.hot",
-        "force: has an argument 'q'", "p has no 'wieght'; did you mean 'weight'?",
-        "damping_force: returns 'z'", "damping_force: returns no 'slide'",
-        "mass: contains the symbol 'strange'", "pose: is missing", "'nope' is not a known effect",
-    ):  # fmt: skip
+        "parameters.a b: is not a name",
+        "parameters.odd: 'flub' is not a unit",
+        "parameters.weight",
+        "domain = 'moon'",
+        "axes.slide: '1 um' is not of the dimension of '60 deg'",
+        "drive.motor: '0 V' is not a size",
+        "state.hot",
+        "force: has an argument 'q'",
+        "p has no 'wieght'; did you mean 'weight'?",
+        "damping_force: returns 'z'",
+        "damping_force: returns no 'slide'",
+        "mass: contains the symbol 'strange'",
+        "pose: is missing",
+        "'nope' is not a known effect",
+    ):
         assert part in text, part
 
 
@@ -235,11 +269,14 @@ def test_every_fault_is_said_at_once():
         ({"force": lambda u: u.motr}, "the drive has no 'motr'; did you mean 'motor'?"),
         ({"force": lambda d: 1 / d.swing}, "force: is [inf] at home"),
         ({"mass": lambda p: -p.inertia}, "mass: is [-0.0002]; it must be above zero"),
-        ({"force": ca.Function("f", [ca.SX.sym("a", 2)], [1], ["u"], ["o"])}, "input 'u' of f is 2 x 1, and u has 1 (motor)"),
+        (
+            {"force": ca.Function("f", [ca.SX.sym("a", 2)], [1], ["u"], ["o"])},
+            "input 'u' of f is 2 x 1, and u has 1 (motor)",
+        ),
         ({"force": ca.Function("f", [ca.SX.sym("a")], [1], ["w"], ["o"])}, "f has an input 'w'; name its inputs"),
         ({"axes": {}}, "axes: is empty"),
     ],
-)  # fmt: skip
+)
 def test_a_wrong_law_is_refused_with_what_to_do(other, said):
     with pytest.raises(InputError) as caught:
         pendulum(**other)
@@ -248,9 +285,12 @@ def test_a_wrong_law_is_refused_with_what_to_do(other, said):
 
 def test_it_travels_between_processes_where_its_functions_do():
     device = pendulum(
-        force=None, restoring_force=None, damping_force=None, acceleration=rhs(),
+        force=None,
+        restoring_force=None,
+        damping_force=None,
+        acceleration=rhs(),
         mass=ca.Function("mass", [J := ca.SX.sym("J")], [J], ["inertia"], ["m"]),
-    )  # fmt: skip
+    )
     other = pickle.loads(pickle.dumps(device))
     assert dict(other.quantities()) == dict(device.quantities())
     drive = np.ones((50, 1))

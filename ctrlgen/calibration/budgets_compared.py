@@ -64,14 +64,11 @@ def _joined(
     kept, columns, first = list[Uncertain](), list[int](), 0
     for line in others.lines:
         left = [i for i, path in enumerate(line.paths) if path not in paths]
-        if left:  # of a list the numbers that are no constants stay
+        # of a list the numbers that are no constants stay
+        if left:
             text, steps = line.per
-            specimen = (
-                tuple(line.paths[i] for i in left),
-                tuple(line.sds[i] for i in left),
-                tuple(steps[i] for i in left),
-            )
-            kept.append(replace(line, paths=specimen[0], sds=specimen[1], per=(text, specimen[2])))
+            rest = tuple(line.paths[i] for i in left), tuple(line.sds[i] for i in left), tuple(steps[i] for i in left)
+            kept.append(replace(line, paths=rest[0], sds=rest[1], per=(text, rest[2])))
             columns += [first + i for i in left]
         first += len(line.sds)
     k, n = len(constants), len(constants) + len(columns)

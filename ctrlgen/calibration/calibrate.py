@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from enum import Enum
 from pathlib import Path
 
 import casadi as ca
@@ -24,35 +24,56 @@ from ctrlgen.devices import Device, files_of, load_device
 from ctrlgen.devices.changed_numbers import changed
 from ctrlgen.devices.run_time import RunTimeConstant
 from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.free_parameters import FreeParameter
 from ctrlgen.estimation.isolated_outliers import mark_outliers
 from ctrlgen.estimation.noise import estimate_noise
 from ctrlgen.estimation.noise_update import update_guessed_noise
 from ctrlgen.estimation.robust_covariance import widening
 from ctrlgen.estimation.settings import DISCREPANCY, NOISE_UPDATE, SIMULATION, STATISTICS
-from ctrlgen.estimation.structure import FreeParameter, Structure
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.model.assembly import build_model, movable, symbolic_model
 from ctrlgen.model.discretisation import settling_time
 from ctrlgen.recordings.reader import load_recordings
-from ctrlgen.recordings.recording import Record, Recording
+from ctrlgen.recordings.recording import Recording
 from ctrlgen.trajectory.scenario import Input
 
-TOLD = (
-    0.5  # of the standard deviation that its bounds alone give a constant: above, the recording does not determine it
-)
-BEYOND = "at its bound: the specimen lies beyond it, or the device file leaves something out; run ctrlgen diagnose"
-FAR_READING = 3.0  # times the model's motion (rms), by which readings may be off it: more is another unit or origin
-AT_BOUND = 1e-4  # of the range: a value so near its end was held there
+TOLD = 0.5
+"""Share of the standard deviation that its bounds alone give a constant: above, the recording does not determine it."""
+FAR_READING = 3.0
+"""Times the model's motion (rms) by which readings may be off it: more is another unit or origin."""
+AT_BOUND = 1e-4
+"""Share of the range: a value so near its end was held there."""
+
+
+class Determination(Enum):
+    """What a recording says of a constant, in the words of the report."""
+
+    DETERMINED = ""
+    AT_BOUND = (
+        "at its bound: the specimen lies beyond it, or the device file leaves something out; run ctrlgen diagnose"
+    )
+    BOUNDS_ALONE = "not determined by this recording beyond its bounds"
+    IDLE = "acts on nothing that moves or is read"
 
 
 @dataclass(frozen=True)
 class CalibratedConstant:
-    """One constant, SI: its `value`, standard deviation `sd`, 95 % interval; `remark`: what its reader should know of it."""
+    """One constant, SI: its `value`, its standard deviation `sd`, and what the recording says of it."""
 
     constant: RunTimeConstant
     value: float
     sd: float
-    determined: bool
-    remark: str = ""
+    determination: Determination
+
+    @property
+    def determined(self) -> bool:
+        """Whether the recording tells the value; else it is the default."""
+        return self.determination in (Determination.DETERMINED, Determination.AT_BOUND)
+
+    @property
+    def remark(self) -> str:
+        """What the reader should know of it."""
+        return self.determination.value
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -94,29 +115,11 @@ class Calibration:
         return changed(self.device, {c.constant.path: c.value for c in self.constants if c.determined})
 
 
-class _Specimen(Structure):
-    """A device of which chosen run-time constants are free, and no other number. `held`: those with what their bounds say of them."""
-
-    chosen: tuple[RunTimeConstant, ...]
-    held: tuple[RunTimeConstant, ...]
-
-    @classmethod
-    def of(cls, device: Device, chosen: Sequence[RunTimeConstant], held: Sequence[RunTimeConstant] = ()) -> _Specimen:
-        """With these constants free."""
-        found = cls(device)
-        object.__setattr__(found, "chosen", tuple(chosen))
-        object.__setattr__(found, "held", tuple(held))
-        return found
-
-    @cached_property
-    def free_parameters(self) -> tuple[FreeParameter, ...]:
-        """The chosen constants within their bounds, then those held."""
-        return tuple(
-            FreeParameter(c.path, c.unit, c.default, c.low, c.high, c.high - c.low, sd)
-            for constants, given in ((self.chosen, False), (self.held, True))
-            for c in constants
-            for sd in (sd_of_bounds(c) if given else None,)
-        )
+def specimen(device: Device, chosen: Sequence[RunTimeConstant], held: Sequence[RunTimeConstant] = ()) -> Structure:
+    """The device with the `chosen` constants free within their bounds, then those `held` by what their bounds say of them."""
+    free = [FreeParameter(c.path, c.unit, c.default, c.low, c.high, c.high - c.low) for c in (*chosen, *held)]
+    known = [replace(p, sd=sd_of_bounds(c)) for p, c in zip(free[len(chosen) :], held, strict=True)]
+    return Structure(device, free=(*free[: len(chosen)], *known))
 
 
 def sd_of_bounds(c: RunTimeConstant) -> float:
@@ -146,144 +149,140 @@ def calibrate(
     }
     # A trial value may lead nowhere, and is then rejected.
     with threadpool_limits(1), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        return _Search(described, recording, progress).run(inputs)
+        return _calibration(described, recording, inputs, progress)
 
 
-class _Search:
-    """The fits of one calibration."""
+def _calibration(
+    device: Device, recording: Recording, inputs: dict[str, Input], progress: Callable[[str], None]
+) -> Calibration:
+    """The constants that the recording determines, and the errors that are left with them."""
+    constants, acting = device.given_at_start, set(movable(device))
+    chosen = [c for c in constants if c.path in acting]
+    progress("noise")
+    settling = settling_time(build_model(device, sample_time=SIMULATION.settling_sample_time))
+    usable, notes = _usable(device, recording, settling)
+    fitter = _weighed(Fitter(usable, estimate_noise(usable, settling)), specimen(device, chosen))
+    fit, told = _told(fitter, device, chosen, progress)
+    covariance = _covariance_within_bounds(fitter, device, fit, told, [c for c in chosen if c not in told])
+    rows = []
+    for k, c in enumerate(constants):
+        value = float(fit.theta[told.index(c)]) if c in told else c.default
+        state = Determination.BOUNDS_ALONE if c in chosen else Determination.IDLE
+        if c in told:
+            held = min(value - c.low, c.high - value) < AT_BOUND * (c.high - c.low)
+            state = Determination.AT_BOUND if held else Determination.DETERMINED
+        rows.append(CalibratedConstant(c, value, float(np.sqrt(covariance[k, k])), state))
+    errors = _errors(fitter, fitter.fit(specimen(device, told), steps=0), fit)
+    _check_readings(fitter, fit, errors)
+    more = [e.channel for e in errors if e.after > DISCREPANCY.ratio * 2 * e.noise]
+    if more:
+        what = "is read with more than its noise in error, whatever the constants: run ctrlgen diagnose for what is left out"
+        notes.append(f"{', '.join(more)} {what}")
+    noise = fitter.noise
+    notes += [note for note, source in zip(noise.notes, noise.sources, strict=True) if not source.stated]
+    unique = tuple(dict.fromkeys(notes))
+    return Calibration(device, inputs, fitter.recording, tuple(rows), covariance, errors, unique)
 
-    def __init__(self, device: Device, recording: Recording, progress: Callable[[str], None]) -> None:
-        self.device, self.progress = device, progress
-        ambient = [r for r in recording.records if r.ambient is not None]
-        self.notes = list(recording.notes)
-        if ambient:
-            self.notes.append(
-                "the recorded ambient temperature is not used: a constant of [run_time] holds for the whole recording"
-            )
-        progress("noise")
-        settling = settling_time(build_model(device, sample_time=SIMULATION.settling_sample_time))
-        recording = replace(
-            recording, records=tuple(self._settled(replace(r, ambient=None), settling) for r in recording.records)
+
+def _usable(device: Device, recording: Recording, settling: float) -> tuple[Recording, list[str]]:
+    """The recording as far as the constants are to explain it, and what its reader should know of that.
+
+    The ambient is a constant. Where the state of rest depends on a constant, rows count from when a record's start is forgotten,
+    `settling` [s] after it: a simulation begins at the rest of the file. Raises InputError for a record that is no longer.
+    """
+    notes = list(recording.notes)
+    if any(r.ambient is not None for r in recording.records):
+        notes.append(
+            "the recorded ambient temperature is not used: a constant of [run_time] holds for the whole recording"
         )
-        self.fitter = Fitter(recording, estimate_noise(recording, settling))
-
-    def _settled(self, record: Record, settling: float) -> Record:
-        """A record whose rows count from when its start is forgotten, where the state of rest depends on a constant: a simulation
-        begins at the rest of the file."""
-        free = [c.path for c in self.device.given_at_start]
-        rests = symbolic_model(self.device, free).rest_formula
+    records = [replace(r, ambient=None) for r in recording.records]
+    rests = symbolic_model(device, [c.path for c in device.given_at_start]).rest_formula
+    for k, record in enumerate(records):
         if not ca.symvar(rests) or not np.isfinite(record.sample_time):
-            return record
+            continue
         rows = int(np.ceil(settling / record.sample_time))
         if rows >= len(record.time):
             what = f"lasts no longer than {settling:.3g} s, in which its start is forgotten; record longer"
             raise InputError(record.name, [Fault("record", what)])
-        self.notes.append(
+        notes.append(
             f"{record.name}: the first {settling:.3g} s are not used, because the state of rest depends on a constant"
         )
         valid = record.valid.copy()
         valid[:rows] = False
-        return replace(record, valid=valid)
+        records[k] = replace(record, valid=valid)
+    return replace(recording, records=tuple(records)), notes
 
-    def run(self, inputs: dict[str, Input]) -> Calibration:
-        """Fits what the recording determines."""
-        constants = self.device.given_at_start
-        acting = set(movable(self.device))
-        why = {c.path: "acts on nothing that moves or is read" for c in constants if c.path not in acting}
-        chosen = [c for c in constants if c.path in acting]
-        self._weigh(chosen)
-        while chosen:
-            self.progress(f"fit of {', '.join(c.path for c in chosen)}")
-            fit = self._fit(chosen)
-            told = np.array([sd / sd_of_bounds(c) for c, sd in zip(chosen, self._sds(fit), strict=True)])
-            if np.all(told <= TOLD):
-                break
-            worst = chosen.pop(int(np.argmax(np.where(np.isfinite(told), told, np.inf))))
-            why[worst.path] = "not determined by this recording beyond its bounds"
-        if not chosen:
-            faults = [Fault(f"run_time.constants {path}", reason) for path, reason in why.items()]
-            what = "determines none of the constants: record a motion that depends on them"
-            raise InputError(self.fitter.recording.title, [Fault("recording", what), *faults])
-        return self._result(inputs, fit, chosen, why)
 
-    def _weigh(self, chosen: Sequence[RunTimeConstant]) -> None:
-        """Marks outliers, and estimates guessed noise and the discrepancy in turn with the fit."""
-        structure = _Specimen.of(self.device, chosen)
-        fit = self._fit(chosen)
-        before = self.fitter.with_errors_of(fit)
-        self.fitter = replace(
-            before, recording=mark_outliers(before.recording, lambda record: before.predict(fit, record)), errors=None
-        )
-        for _ in range(NOISE_UPDATE.guessed_refits if self.fitter.noise.guessed.any() else 0):
-            fit = self.fitter.fit(structure)
-            self.fitter = self.fitter.with_noise(update_guessed_noise(self.fitter.with_errors_of(fit), fit))
-        for _ in range(DISCREPANCY.updates):
-            self.fitter = self.fitter.with_errors_of(self.fitter.fit(structure))
+def _weighed(fitter: Fitter, structure: Structure) -> Fitter:
+    """The fitter without outliers, with guessed noise and the discrepancy estimated in turn with the fit."""
+    fit = fitter.fit(structure)
+    before = fitter.with_errors_of(fit)
+    good = mark_outliers(before.recording, lambda record: before.predict(fit, record))
+    fitter = replace(fitter, recording=good)
+    for _ in range(NOISE_UPDATE.guessed_refits if fitter.noise.guessed.any() else 0):
+        fit = fitter.fit(structure)
+        fitter = fitter.with_noise(update_guessed_noise(fitter.with_errors_of(fit), fit))
+    for _ in range(DISCREPANCY.updates):
+        fitter = fitter.with_errors_of(fitter.fit(structure))
+    return fitter
 
-    def _fit(self, chosen: Sequence[RunTimeConstant]) -> Fit:
-        """The optimum with these constants free, in simulators of their own."""
-        self.fitter = replace(self.fitter, cache={})
-        return self.fitter.fit(_Specimen.of(self.device, chosen))
 
-    def _sds(self, fit: Fit) -> np.ndarray:
-        return np.sqrt(np.maximum(np.diag(_covariance(fit)), 0.0))
+def _told(
+    fitter: Fitter, device: Device, chosen: Sequence[RunTimeConstant], progress: Callable[[str], None]
+) -> tuple[Fit, list[RunTimeConstant]]:
+    """The fit of those constants that the recording tells better than their bounds, left out one at a time, and these.
 
-    def _result(
-        self, inputs: dict[str, Input], fit: Fit, chosen: Sequence[RunTimeConstant], why: dict[str, str]
-    ) -> Calibration:
-        constants = self.device.given_at_start
-        held = [c for c in constants if c not in chosen and "acts on nothing" not in why[c.path]]
-        every = replace(self.fitter, cache={})
-        values = np.concatenate([fit.theta, [c.default for c in held]])
-        joint = every.fit(_Specimen.of(self.device, chosen, held), values, steps=0)
-        order = [constants.index(c) for c in (*chosen, *held)]
-        covariance = np.diag([sd_of_bounds(c) ** 2 for c in constants])
-        covariance[np.ix_(order, order)] = with_held(
-            _covariance(fit), joint.covariance, np.array([sd_of_bounds(c) for c in held])
-        )
-        rows = []
-        for k, c in enumerate(constants):
-            determined = c in chosen
-            value = float(fit.theta[chosen.index(c)]) if determined else c.default
-            remark = why.get(c.path, "")
-            if determined and min(value - c.low, c.high - value) < AT_BOUND * (c.high - c.low):
-                remark = BEYOND
-            rows.append(CalibratedConstant(c, value, float(np.sqrt(covariance[k, k])), determined, remark))
-        start = replace(self.fitter, cache={}).fit(_Specimen.of(self.device, chosen), steps=0)
-        errors = self._errors(start, fit)
-        self._check_readings(fit, errors)
-        more = [e.channel for e in errors if e.after > DISCREPANCY.ratio * 2 * e.noise]
-        if more:
-            what = "is read with more than its noise in error, whatever the constants: run ctrlgen diagnose for what is left out"
-            self.notes.append(f"{', '.join(more)} {what}")
-        return Calibration(
-            self.device, inputs, self.fitter.recording, tuple(rows), covariance, errors,
-            tuple(dict.fromkeys((*self.notes, *(note for note in self.fitter.noise.notes if "as stated" not in note)))),
-        )  # fmt: skip
+    Raises InputError where it tells none.
+    """
+    told = list(chosen)
+    while told:
+        progress(f"fit of {', '.join(c.path for c in told)}")
+        fit = fitter.fit(specimen(device, told))
+        sds = np.sqrt(np.maximum(np.diag(_covariance(fit)), 0.0))
+        shares = np.array([sd / sd_of_bounds(c) for c, sd in zip(told, sds, strict=True)])
+        if np.all(shares <= TOLD):
+            return fit, told
+        del told[int(np.argmax(np.where(np.isfinite(shares), shares, np.inf)))]
+    why = {c.path: Determination.BOUNDS_ALONE if c in chosen else Determination.IDLE for c in device.given_at_start}
+    faults = [Fault(f"run_time.constants {path}", reason.value) for path, reason in why.items()]
+    what = "determines none of the constants: record a motion that depends on them"
+    raise InputError(fitter.recording.title, [Fault("recording", what), *faults])
 
-    def _check_readings(self, fit: Fit, errors: Sequence[ReadingError]) -> None:
-        """Refuses readings that are farther off than the stage moves. Raises InputError."""
-        moved = np.concatenate([self.fitter.predict(fit, record) for record in self.fitter.held_out_records])
-        size = np.sqrt(np.mean(moved**2, axis=0))
-        faults = [
-            Fault(e.channel, f"is {e.after / s:.2g} times the motion of the model away from it; check its column, unit, sign and origin")
-            for e, s in zip(errors, size, strict=True) if e.after > FAR_READING * s > 0
-        ]  # fmt: skip
-        if faults:
-            raise InputError(self.fitter.recording.title, faults)
 
-    def _errors(self, before: Fit, after: Fit) -> tuple[ReadingError, ...]:
-        """Of held-out records, channel by channel."""
-        recording, rows = self.fitter.recording, []
-        records = self.fitter.held_out_records
-        squares = [
-            [np.where(r.valid, r.observed - self.fitter.predict(fit, r), np.nan) ** 2 for r in records]
-            for fit in (before, after)
-        ]
-        for i, (channel, unit) in enumerate(zip(recording.channels, recording.units, strict=True)):
-            start, end = (float(np.sqrt(np.nanmean(np.concatenate([s[:, i] for s in by])))) for by in squares)
-            rows.append(ReadingError(channel, unit, start, end, float(self.fitter.noise.floor[i])))
-        return tuple(rows)
+def _covariance_within_bounds(
+    fitter: Fitter, device: Device, fit: Fit, told: Sequence[RunTimeConstant], held: Sequence[RunTimeConstant]
+) -> np.ndarray:
+    """(k, k) [SI] of all constants in their order: those `told` as fitted beside those `held`, the others as their bounds say."""
+    constants, sds = device.given_at_start, np.array([sd_of_bounds(c) for c in held])
+    values = np.concatenate([fit.theta, [c.default for c in held]])
+    joint = fitter.fit(specimen(device, told, held), values, steps=0)
+    order = [constants.index(c) for c in (*told, *held)]
+    covariance = np.diag([sd_of_bounds(c) ** 2 for c in constants])
+    covariance[np.ix_(order, order)] = with_held(_covariance(fit), joint.covariance, sds)
+    return covariance
+
+
+def _check_readings(fitter: Fitter, fit: Fit, errors: Sequence[ReadingError]) -> None:
+    """Refuses readings that are farther off than the stage moves. Raises InputError."""
+    moved = np.concatenate([fitter.predict(fit, record) for record in fitter.held_out_records])
+    size = np.sqrt(np.mean(moved**2, axis=0))
+    off = [(e, e.after / s) for e, s in zip(errors, size, strict=True) if e.after > FAR_READING * s > 0]
+    what = "times the motion of the model away from it; check its column, unit, sign and origin"
+    if faults := [Fault(e.channel, f"is {ratio:.2g} {what}") for e, ratio in off]:
+        raise InputError(fitter.recording.title, faults)
+
+
+def _errors(fitter: Fitter, before: Fit, after: Fit) -> tuple[ReadingError, ...]:
+    """The errors on held-out records, channel by channel."""
+    recording, records, rows = fitter.recording, fitter.held_out_records, []
+    squares = [
+        [np.where(r.valid, r.observed - fitter.predict(fit, r), np.nan) ** 2 for r in records]
+        for fit in (before, after)
+    ]
+    for i, (channel, unit) in enumerate(zip(recording.channels, recording.units, strict=True)):
+        start, end = (float(np.sqrt(np.nanmean(np.concatenate([s[:, i] for s in by])))) for by in squares)
+        rows.append(ReadingError(channel, unit, start, end, float(fitter.noise.floor[i])))
+    return tuple(rows)
 
 
 def with_held(fitted: np.ndarray, joint: np.ndarray, sds: np.ndarray) -> np.ndarray:

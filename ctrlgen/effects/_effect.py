@@ -65,6 +65,16 @@ class Effect:
         self.values = values
         self.of = of
 
+    def _value(self) -> tuple[object, ...]:
+        return type(self), self.place, self.at, self.of, tuple(self.values.items())
+
+    def __eq__(self, other: object) -> bool:
+        """Two effects are equal where one law acts at one place with the same numbers."""
+        return isinstance(other, Effect) and self._value() == other._value()
+
+    def __hash__(self) -> int:
+        return hash(self._value())
+
     def __init_subclass__(cls, listed: bool = True) -> None:
         cls.kind = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", cls.__name__).lower()
         if "title" not in vars(cls):

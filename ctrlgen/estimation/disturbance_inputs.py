@@ -47,7 +47,8 @@ def _unread_axes(device: Device, physics: DevicePhysics) -> frozenset[int]:
     bare = device.model_copy(update={"effect": ()})
     any_numbers = {path: ca.SX.sym(path) for path, number in bare.quantities() if not number.whole}
     general = bare.physics(bare.values(any_numbers))
-    assert isinstance(general, ImposedPhysics)  # as with the device's own numbers
+    # as with the device's own numbers
+    assert isinstance(general, ImposedPhysics)
     d = ca.SX.sym("d", len(physics.axes))
     forces = ca.vertcat(general.restoring_force(d), general.force(general.drive.expr, d))
     return frozenset(i for i in range(d.numel()) if not ca.depends_on(forces, d[i]))

@@ -16,7 +16,7 @@ its spectrum is known too poorly, and differencing would give all weight to the 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -53,18 +53,18 @@ class ErrorModel:
     def weighted(self) -> Noise:
         """White noise with the deviation s in place of the noise of every channel with discrepancy."""
         sd = np.where(self.rms > 0, self.rms * np.sqrt(self.tau), self.noise.sd)
-        return Noise(sd, self.ar, self.noise.known, self.noise.notes, self.noise.count, self.noise.guessed)
+        return replace(self.noise, sd=sd, ar=self.ar)
 
     def whiten(self, values: np.ndarray, valid: np.ndarray) -> np.ndarray:
-        """As `Noise.whiten`, of noise and discrepancy."""
+        """Whitens noise and discrepancy; arguments as of `Noise.whiten`."""
         return self.weighted.whiten(values, valid)
 
     def whiten_channel(self, values: np.ndarray, i: int) -> np.ndarray:
-        """As `Noise.whiten_channel`."""
+        """Whitens one channel; arguments as of `Noise.whiten_channel`."""
         return self.weighted.whiten_channel(values, i)
 
     def usable(self, valid: np.ndarray) -> np.ndarray:
-        """As `Noise.usable`."""
+        """Says which samples can be whitened; arguments as of `Noise.usable`."""
         return self.weighted.usable(valid)
 
     @property
@@ -106,7 +106,8 @@ def _slow_excess(noise: Noise, i: int, stretches: Sequence[np.ndarray], most: fl
     if not len(a):
         return False
     values = np.clip(np.concatenate(stretches) / noise.floor[i], -DISCREPANCY.huber_corner, DISCREPANCY.huber_corner)
-    correlated = (noise.sd[i] / noise.floor[i] / max(1 - float(np.sum(a)), 1e-3)) ** 2  # spectrum at zero over variance
+    # spectrum at zero over variance
+    correlated = (noise.sd[i] / noise.floor[i] / max(1 - float(np.sum(a)), 1e-3)) ** 2
     chance = STATISTICS.chance_excess * np.sqrt(2 * max(correlated, 1.0) / max(len(values), 1))
     return bool(np.mean(values**2) > most * (1 + chance))
 
@@ -122,7 +123,8 @@ def correlation_time(stretches: Sequence[np.ndarray]) -> float:
     if length < 2:
         return 1.0
     r = np.zeros(length)
-    for e in (e - np.mean(e) for e in stretches if len(e)):  # an offset has no correlation time
+    # an offset has no correlation time
+    for e in (e - np.mean(e) for e in stretches if len(e)):
         spectrum = np.abs(np.fft.rfft(e, 2 * len(e))) ** 2
         r[: len(e)] += np.fft.irfft(spectrum)[: len(e)]
     if r[0] <= 0:

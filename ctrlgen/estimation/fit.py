@@ -6,9 +6,8 @@ jointly, with the initial states of the records.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from ctrlgen.estimation.error_model import ErrorModel, error_model
 from ctrlgen.estimation.least_squares import LeastSquaresProblem, initial_state_sd, limited, whiten_residual
 from ctrlgen.estimation.noise import Noise
 from ctrlgen.estimation.settings import DISCREPANCY, FIT, HELD_OUT_REFIT, STATISTICS
-from ctrlgen.estimation.simulator import RecentSimulators, Simulator
+from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 from ctrlgen.recordings.recording import Record, Recording
@@ -71,16 +70,17 @@ class Fit:
     def restarted(self) -> Structure:
         """Its structure with all parameters starting at their fitted values."""
         s = self.structure
-        own = {u.path: float(v) for u, v in zip(s.free_parameters, self.theta, strict=True) if u.cause is None}
-        return Structure(s.device, s.causes, tuple(self.values(k) for k in range(len(s.causes))), own)
+        nominal = {p.path: float(v) for p, v in zip(s.free_parameters, self.theta, strict=True) if p.cause is None}
+        starts = tuple(self.values(k) for k in range(len(s.causes)))
+        return replace(s, starts=starts, nominal_starts=nominal, expansion=s.expanded_at)
 
     def values(self, cause: int) -> dict[str, float]:
         """The parameters [SI] by name of one cause, by its place in the structure."""
-        found = dict(self.structure.starts[cause])
+        values = dict(self.structure.starts[cause])
         for p, value in zip(self.structure.free_parameters, self.theta, strict=True):
             if p.cause == cause:
-                found[p.name] = float(value)
-        return found
+                values[p.name] = float(value)
+        return values
 
     def nested_case(self, cause: int) -> str | None:
         """The effect that the law of one cause contains as a special case, where that lies in the 95 % interval; else None."""
@@ -97,15 +97,13 @@ class Fit:
 class Fitter:
     """Fits structures to one recording under the noise of its channels and the discrepancy `errors` of the models fitted.
 
-    Without `errors` there is noise alone. The compiled simulators used last are kept in `cache`, which copies share, and optima in the
-    `checkpoint` where there is one.
+    Without `errors` there is noise alone. Optima are kept in the `checkpoint` where there is one.
     """
 
     recording: Recording
     noise: Noise
     checkpoint: Checkpoint | None = None
     errors: ErrorModel | None = None
-    cache: dict[Any, Any] = field(default_factory=RecentSimulators)
 
     @property
     def error(self) -> ErrorModel:
@@ -133,11 +131,11 @@ class Fitter:
 
     def simulator(self, structure: Structure, record: Record) -> Simulator:
         """The compiled simulator of a structure for a record's sample time and drive convention."""
-        return structure.simulators(self.recording, self.cache)[record.timing]
+        return structure.simulator(self.recording.channels, record.timing)
 
     def problem(self, structure: Structure) -> LeastSquaresProblem:
         """The least-squares problem of a structure."""
-        return LeastSquaresProblem(structure, self.recording, self.error, self.cache)
+        return LeastSquaresProblem(structure, self.recording, self.error)
 
     def fit(
         self,
@@ -154,9 +152,9 @@ class Fitter:
         """
         problem = self.problem(structure)
         start = np.concatenate([structure.start if theta is None else theta, np.zeros(problem.n_initial)])
-        found = self._optimum(problem, start, steps)
-        if nested is None or found.objective <= nested.objective:
-            return found
+        first = self._optimum(problem, start, steps)
+        if nested is None or first.objective <= nested.objective:
+            return first
         near = start.copy()
         for i, p in enumerate(structure.free_parameters):
             if p.amplitude and structure.cause_of(p) not in nested.structure.causes:
@@ -168,7 +166,7 @@ class Fitter:
             if p.cause is None:
                 stated[i] = p.nominal
         again = (self._optimum(problem, x, steps) for x in (near, stated))
-        return min(found, *again, key=lambda fit: fit.objective)
+        return min(first, *again, key=lambda fit: fit.objective)
 
     def described(self, device: Device) -> tuple[Fitter, Fit]:
         """The device as described, without causes, and the fitter with the discrepancy that it leaves.
@@ -179,18 +177,18 @@ class Fitter:
         """
         fitter = self.with_errors_of(self.fit(Structure(device), steps=0))
         for _ in range(DISCREPANCY.updates):
-            before, found = fitter, fitter.fit(Structure(device))
-            fitter = fitter.with_errors_of(found)
+            before, fit = fitter, fitter.fit(Structure(device))
+            fitter = fitter.with_errors_of(fit)
             if np.allclose(fitter.error.weighted.sd, before.error.weighted.sd, rtol=DISCREPANCY.same):
                 break
-        found = fitter.fit(Structure(device))
+        fit = fitter.fit(Structure(device))
         if np.all(fitter.error.rms < FIT.poor_start_rms * self.noise.floor):
-            return fitter, found
-        for p in found.structure.free_parameters:
+            return fitter, fit
+        for p in fit.structure.free_parameters:
             for start in (p.nominal - p.sd, p.nominal + p.sd) if p.sd else ():
                 again = fitter.fit(Structure(device, nominal_starts={p.path: start}))
-                found = min(found, again, key=lambda fit: fit.objective)
-        return fitter.with_errors_of(found), found
+                fit = min(fit, again, key=lambda fit: fit.objective)
+        return fitter.with_errors_of(fit), fit
 
     def initial_objective(self, structure: Structure) -> float:
         """The objective at the structure's starting values."""
@@ -205,9 +203,8 @@ class Fitter:
             return _fit_at(problem, levenberg_marquardt(problem, problem.to_scaled(start), steps))
         s, noise, corner = problem.structure, self.error.weighted, self.error.corner
         valid = [int(r.valid.sum()) for r in self.recording.records]
-        key = key_of(
-            s.causes, s.starts, sorted(s.nominal_starts.items()), start, steps, noise.sd, corner, *noise.ar, valid
-        )
+        begun = (s.starts, s.expanded_at, sorted(s.nominal_starts.items()), s.free)
+        key = key_of(s.causes, *begun, start, steps, noise.sd, corner, *noise.ar, valid)
         optimum = self.checkpoint.recall(key)
         if optimum is None:
             optimum = levenberg_marquardt(problem, problem.to_scaled(start), steps)
@@ -235,7 +232,8 @@ class Fitter:
             return rest, y
         with_prior = np.vstack([J, np.eye(len(sd))])
         step = np.linalg.lstsq(with_prior, np.concatenate([white, rest]), rcond=None)[0]
-        for _ in range(HELD_OUT_REFIT.halvings):  # a gap or a friction threshold makes the first step useless
+        # a gap or a friction threshold makes the first step useless
+        for _ in range(HELD_OUT_REFIT.halvings):
             shifted = simulator.simulate(record, fit.theta, sd * step)
             residual = self._white(record, shifted)
             if residual @ residual + step @ step <= white @ white:

@@ -18,7 +18,8 @@ import casadi as ca
 from ctrlgen.estimation.sample_equations import SampleEquations
 from ctrlgen.model.integrators import ExponentialRungeKutta, ImplicitRadau
 
-POINTS = 4  # at which a step of ETD-RK4 evaluates N
+# at which a step of ETD-RK4 evaluates N
+POINTS = 4
 
 Step = Callable[[ca.MX, ca.MX, list[ca.MX]], tuple[ca.MX, ca.MX]]
 """(T, seed, [Y, u, u at the end of the step, held values, ambient, c]) -> Y and T one step on. Y = (x, z) as in
@@ -44,7 +45,8 @@ def forward_sensitivities(
         following, y, *by = one(*given)
         return following, chain(*by[: len(symbols)]), y, chain(*by[len(symbols) :])
     m = equations.model
-    once = [equations.y, m.held_value, ca.vertcat(ca.SX(0, 1), *m.stepped.values())]  # once a sample, at its beginning
+    # once a sample, at its beginning
+    once = [equations.y, m.held_value, ca.vertcat(ca.SX(0, 1), *m.stepped.values())]
     first = ca.Function("first", equations.given, [*once, *_transposed_jacobians(once, symbols)], {"cse": True})
     y, held, stepped, *by = first(*given)
     Y, of_held, of_stepped = (chain(*by[i * len(symbols) : (i + 1) * len(symbols)]) for i in range(3))
@@ -144,6 +146,6 @@ def _step_with_jacobians(equations: SampleEquations, c_varies: bool) -> ca.Funct
 
 def _columns(M: ca.DM, wanted: list[int]) -> ca.DM:
     """M, sparse, with zeros in the other columns."""
-    found = ca.DM(*M.shape)
-    found[:, wanted] = M[:, wanted]
-    return ca.sparsify(found)
+    kept = ca.DM(*M.shape)
+    kept[:, wanted] = M[:, wanted]
+    return ca.sparsify(kept)

@@ -34,7 +34,8 @@ def refit_to_held_out(fitter: Fitter, fit: Fit, steps: int = 1) -> HeldOutRefit:
     sd[~fit.J[:, : len(sd)].any(axis=0) | ~np.isfinite(sd)] = 0.0
     if not sd.any():
         return HeldOutRefit(fit, 0.0, 0.0)
-    unit = np.where(sd > 0, sd, 1.0)  # dp counts in standard deviations
+    # dp counts in standard deviations
+    unit = np.where(sd > 0, sd, 1.0)
     C = fit.covariance / np.outer(unit, unit) * np.outer(sd > 0, sd > 0)
     R = fit.information_root * sd
     low, high = (np.array([getattr(p, end) for p in fit.structure.free_parameters]) for end in ("low", "high"))

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import product
 
 from ctrlgen.core.errors import Fault, InputError
@@ -19,10 +20,16 @@ from ctrlgen.estimation.settings import CANDIDATE_TERMS
 from ctrlgen.model.effect_terms import available, channels, partner_channels
 
 DOMAIN = {
-    Place.DRIVE: "actuator", Place.HEAT: "actuator", Place.FORCE: "stage", Place.DISPLACEMENT: "stage",
-    Place.POSE: "mechanism", Place.SENSOR: "sensor",
-}  # fmt: skip
+    Place.DRIVE: "actuator",
+    Place.HEAT: "actuator",
+    Place.FORCE: "stage",
+    Place.DISPLACEMENT: "stage",
+    Place.POSE: "mechanism",
+    Place.SENSOR: "sensor",
+}
 PARAMETER = "parameter"
+DEVICES_KEPT = 8
+"""Devices of which what is derived is kept: a diagnosis has one, the bootstrap and the tests a few."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +94,15 @@ class Hypothesis:
         """The effect's class. Raises KeyError for a parameter."""
         return Effect.library[self.effect]
 
+    def channel_on(self, device: Device) -> Channel:
+        """The channel of `device` at which the effect acts; the first one where it acts at all of them."""
+        physics = nominal_physics(device)
+        every = {c.name: c for c in channels(physics, self.law.place)}
+        channel = next(iter(every.values())) if self.at == "all" else every[self.at]
+        if self.of is None:
+            return channel
+        return channel.paired_with(next(c for c in partner_channels(physics, self.law) if c.name == self.of))
+
     def shapes(self, channel: Channel, hints: DataHints) -> list[dict[str, float]]:
         """Every combination of start values of the shape parameters, which are all but the amplitude [SI].
 
@@ -149,8 +165,8 @@ def hypotheses(
     `sample_time` [s] is None for settled poses; `ambient` says whether the recording has the temperature of the surroundings.
     """
     laws = selected_laws() if laws is None else laws
-    found = [h for law in laws for h in _of_law(law, physics, observed, sample_time, ambient)]
-    return found + [Hypothesis(PARAMETER, location, path=path) for path, location in _numbers(device)]
+    effects = [h for law in laws for h in _of_law(law, physics, observed, sample_time, ambient)]
+    return effects + [Hypothesis(PARAMETER, location, path=path) for path, location in _numbers(device)]
 
 
 def _of_law(
@@ -185,9 +201,8 @@ def _numbers(device: Device) -> Iterator[tuple[str, str]]:
     """(path, location) of every number that is not a count."""
     for path, section, number in numbers(device):
         if not number.whole:
-            owner = (
-                "" if isinstance(section, Device) else getattr(section, "name", "")
-            )  # of several alike, such as axes
+            # the name of one of several alike, such as axes
+            owner = "" if isinstance(section, Device) else getattr(section, "name", "")
             yield path, f"{section.domain}:{f'{owner}.' if owner else ''}{path.rpartition('.')[2]}"
 
 
@@ -196,22 +211,7 @@ def numbers(device: Device) -> Iterator[tuple[str, Section, Quantity]]:
     return (place for place in walk(device) if isinstance(place[1], Section))
 
 
-_PHYSICS: dict[int, tuple[Device, DevicePhysics]] = {}
-
-
+@lru_cache(maxsize=DEVICES_KEPT)
 def nominal_physics(device: Device) -> DevicePhysics:
     """The physics of a device with its own numbers, made once: a hexapod's takes a tenth of a second."""
-    if id(device) not in _PHYSICS:
-        _PHYSICS.clear()
-        _PHYSICS[id(device)] = (device, device.physics(device.values()))
-    return _PHYSICS[id(device)][1]
-
-
-def nuisances(device: Device) -> dict[str, float]:
-    """Path and standard deviation [SI] of every number with a stated `sd`, or of a section with a tolerance."""
-    found = {}
-    for path, section, number in numbers(device):
-        sd = number.sd if number.sd is not None else (section.relative_sd or 0.0) * abs(number.si)
-        if sd and not number.whole:
-            found[path] = sd
-    return found
+    return device.physics(device.values())

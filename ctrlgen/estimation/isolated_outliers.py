@@ -31,8 +31,8 @@ def mark_outliers(recording: Recording, predicted: Callable[[Record], np.ndarray
 def _marked(record: Record, predicted: np.ndarray) -> Record:
     residual = np.nan_to_num(np.where(record.valid, record.observed - predicted, 0.0))
     marked = record.valid & isolated_outliers(residual)
-    found = tuple((int(k), int(i), float(residual[k, i])) for k, i in np.argwhere(marked))
-    return replace(record, valid=record.valid & ~marked, spikes=(*record.spikes, *found)) if found else record
+    spikes = tuple((int(k), int(i), float(residual[k, i])) for k, i in np.argwhere(marked))
+    return replace(record, valid=record.valid & ~marked, spikes=(*record.spikes, *spikes)) if spikes else record
 
 
 def isolated_outliers(residual: np.ndarray) -> np.ndarray:
@@ -57,5 +57,6 @@ def isolated_outliers(residual: np.ndarray) -> np.ndarray:
                 continue
             neighbours = [size[k] for k in (run[0] - 1, run[-1] + 1) if 0 <= k < len(size)]
             if len(run) > OUTLIERS.widest or max(neighbours, default=0.0) > OUTLIERS.neighbour_share * size[run].max():
-                column[run] = False  # a mass that is pushed moves before and after, too
+                # a mass that is pushed moves before and after, too
+                column[run] = False
     return marked

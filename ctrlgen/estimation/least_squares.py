@@ -8,15 +8,15 @@ near what is stated of them.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
 from ctrlgen.estimation.error_model import ErrorModel, huber, huber_curvature
+from ctrlgen.estimation.free_parameters import FreeParameter
 from ctrlgen.estimation.noise import Noise
 from ctrlgen.estimation.settings import FIT
 from ctrlgen.estimation.simulator import Simulator
-from ctrlgen.estimation.structure import FreeParameter, Structure
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Record, Recording
 
 
@@ -50,10 +50,10 @@ class LeastSquaresProblem:
     size; of a time or a speed that shapes a law, which may lie anywhere within decades, x is the logarithm.
     """
 
-    def __init__(self, structure: Structure, recording: Recording, error: ErrorModel, cache: dict[Any, Any]) -> None:
+    def __init__(self, structure: Structure, recording: Recording, error: ErrorModel) -> None:
         self.structure, self.error = structure, error
-        self.simulators = structure.simulators(recording, cache)
         self.records = [r for r in recording.records if r.role == "fit"]
+        self.simulators = {t: structure.simulator(recording.channels, t) for t in {r.timing for r in self.records}}
         self.initial_sd = [initial_state_sd(self.simulators[r.timing]) for r in self.records]
         self.n_initial = sum(map(len, self.initial_sd))
         parameters = structure.free_parameters
@@ -96,10 +96,10 @@ class LeastSquaresProblem:
         """The residual (m,) alone, without the work that the Jacobian takes."""
         values = self.to_si(x)
         rows = [
-            huber(self._white(record, simulator.simulate(record, values[: self.k], values[own])), self.error.corner)[
+            huber(self._white(record, simulator.simulate(record, values[: self.k], values[places])), self.error.corner)[
                 0
             ].ravel()
-            for record, simulator, own in self._records()
+            for record, simulator, places in self._records()
         ]
         return self._with_prior(rows, x)
 
@@ -110,15 +110,15 @@ class LeastSquaresProblem:
         values, k = self.to_si(x), self.k
         si_by_scaled = self.si_by_scaled(values)
         rows, blocks, curvature = [], [], []
-        for record, simulator, own in self._records():
-            y, Y = simulator.sensitivities(record, values[:k], values[own])
+        for record, simulator, places in self._records():
+            y, Y = simulator.sensitivities(record, values[:k], values[places])
             white = self._white(record, y)
             robust, weight = huber(white, self.error.corner)
             rows.append(robust.ravel())
             curvature.append(huber_curvature(white, self.error.corner).ravel())
             W = self.error.whiten(_clipped(Y), record.valid).reshape(len(rows[-1]), Y.shape[2]) * weight.reshape(-1, 1)
             J = np.zeros((len(W), len(x)))
-            J[:, :k], J[:, own] = -W[:, :k], -W[:, k:]
+            J[:, :k], J[:, places] = -W[:, :k], -W[:, k:]
             blocks.append(J * si_by_scaled)
         P = np.zeros((len(self.prior), len(x)))
         for row, (i, p) in enumerate(self.prior):

@@ -54,7 +54,8 @@ def misfit(noise: Noise, records: Sequence[Record], residuals: Sequence[np.ndarr
     return Misfit(*(np.vstack(part) for part in parts))
 
 
-LARGEST = 1e30  # squares that stand for larger or undefined ones
+# squares that stand for larger or undefined ones
+LARGEST = 1e30
 
 
 def _of_record(noise: Noise, record: Record, residual: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -64,7 +65,8 @@ def _of_record(noise: Noise, record: Record, residual: np.ndarray) -> tuple[np.n
         white = np.clip(np.nan_to_num(noise.whiten(e, record.valid), nan=1e15, posinf=1e15), -1e15, 1e15)
     corner = np.full(e.shape[1], DISCREPANCY.huber_corner)
     loss = huber(white, corner)[0] ** 2 / _huber_mean(DISCREPANCY.huber_corner)
-    seen = np.flatnonzero(record.valid.any(axis=1))  # a lead-in is not judged
+    # a lead-in is not judged
+    seen = np.flatnonzero(record.valid.any(axis=1))
     n = len(seen)
     blocks = n if record.poses else min(DISCREPANCY.blocks, n)
     edges = seen[np.linspace(0, n, blocks + 1).astype(int)[:-1]] if n else np.zeros(1, int)

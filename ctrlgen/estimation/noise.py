@@ -9,6 +9,7 @@ poses: the stated standard deviation; then the scatter of repeated poses, which 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import Enum
 from itertools import pairwise
 
 import numpy as np
@@ -21,22 +22,56 @@ from ctrlgen.numerics.spectral_peaks import local_floor, periodogram
 from ctrlgen.recordings.recording import Record, Recording
 
 
+class NoiseSource(Enum):
+    """What tells the noise of a channel, with the words that say so."""
+
+    REST = "from a record at rest"
+    PERIODS = "from repeated periods"
+    DWELLS = "from dwells of the drive"
+    POSES = "from repeated poses"
+    STATED = "as stated"
+    STATED_WHITE = "as stated, taken as white"
+    """Of a time series: its size is corrected where the residual shows another one."""
+    RESIDUAL = "what is left is taken as the noise"
+    """It was stated, and wrongly."""
+    FASTEST_PART = "from the fastest part of the readings, taken as white"
+    MISFIT = "not stated"
+    """Only the misfit of the best model tells it."""
+
+    @property
+    def stated(self) -> bool:
+        """Whether the noise is as the recording's author stated it."""
+        return self in (NoiseSource.STATED, NoiseSource.STATED_WHITE)
+
+
 @dataclass(frozen=True)
 class Noise:
     """Autoregressive noise e of each channel: e[k] = a[0] e[k-1] + a[1] e[k-2] + ... + sd w[k], w white with unit variance.
 
-    `sd` (n_y,) [SI] of the innovations, `ar` the coefficients a of each channel, `notes` a sentence a channel on their
-    source. `known` (n_y,) is False where only the misfit tells the noise, `guessed` (n_y,) True where only the fastest part
-    of the readings does. `count` (n_y,) is the number of independent samples that the estimate rests on, infinite where it
-    was stated.
+    `sd` (n_y,) [SI] of the innovations, `ar` the coefficients a of each channel, `sources` what tells them, `notes` a sentence a
+    channel on that. `count` (n_y,) is the number of independent samples that the estimate rests on or, of a stated one, counts for;
+    infinite where it is not doubted.
     """
 
     sd: np.ndarray
     ar: tuple[np.ndarray, ...]
-    known: np.ndarray
+    sources: tuple[NoiseSource, ...]
     notes: tuple[str, ...]
     count: np.ndarray
-    guessed: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
+
+    def from_source(self, source: NoiseSource) -> np.ndarray:
+        """Which channels (n_y,) have their noise from one source."""
+        return np.array([s is source for s in self.sources], bool)
+
+    @property
+    def known(self) -> np.ndarray:
+        """(n_y,), False where only the misfit tells the noise."""
+        return ~self.from_source(NoiseSource.MISFIT)
+
+    @property
+    def guessed(self) -> np.ndarray:
+        """(n_y,), True where only the fastest part of the readings tells the noise, until a residual does."""
+        return self.from_source(NoiseSource.FASTEST_PART)
 
     def whiten(self, values: np.ndarray, valid: np.ndarray) -> np.ndarray:
         """`values` (n, n_y, ...) [SI] filtered so that the noise in them becomes white with unit variance.
@@ -86,14 +121,13 @@ def stationary_deviation(sd: float, a: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class _ChannelNoise:
-    """The fields of `Noise` for one channel."""
+    """The fields of `Noise` for one channel; `details` follow what the source says."""
 
     sd: float
-    note: str
+    source: NoiseSource
     count: float
+    details: str = ""
     ar: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    known: bool = True
-    guessed: bool = False
 
 
 def estimate_noise(recording: Recording, settling: float) -> Noise:
@@ -106,34 +140,34 @@ def estimate_noise(recording: Recording, settling: float) -> Noise:
     return Noise(
         sd=np.array([r.sd for r in rows]),
         ar=tuple(r.ar for r in rows),
-        known=np.array([r.known for r in rows]),
-        notes=tuple(f"{name}: {r.note}" for name, r in zip(recording.channels, rows, strict=True)),
+        sources=tuple(r.source for r in rows),
+        notes=tuple(f"{c}: {r.source.value}{r.details}" for c, r in zip(recording.channels, rows, strict=True)),
         count=np.array([r.count for r in rows]),
-        guessed=np.array([r.guessed for r in rows]),
     )
 
 
 def _of_poses(recording: Recording, i: int, settling: float) -> _ChannelNoise:
     """Channel i of settled poses."""
     if stated := recording.noise[i]:
-        return _ChannelNoise(stated, "as stated", np.inf)
+        return _ChannelNoise(stated, NoiseSource.STATED, np.inf)
     sd, count = _repeatability(recording.records, i)
     if count >= NOISE.fewest_repeats and sd > 0:
-        return _ChannelNoise(sd, f"from repeated poses, {count} beyond the first of each", float(count))
+        return _ChannelNoise(sd, NoiseSource.POSES, float(count), f", {count} beyond the first of each")
     few = f"only {count} poses repeat an earlier one" if count else "no pose repeats"
-    note = f"not stated, and {few}; estimated from the residual of the best model"
-    return _ChannelNoise(1.0, note, np.inf, known=False)
+    return _ChannelNoise(1.0, NoiseSource.MISFIT, np.inf, f", and {few}; estimated from the residual of the best model")
 
 
 def _of_series(recording: Recording, i: int, settling: float) -> _ChannelNoise:
     """Channel i of a time series."""
     values = np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])
-    rounding = quantisation_step(values) / np.sqrt(12.0)  # standard deviation of a uniform rounding error
+    # standard deviation of a uniform rounding error
+    rounding = quantisation_step(values) / np.sqrt(12.0)
     moving = [r for r in recording.records if r.role != "rest"]
-    sources = {  # degree of the polynomial to subtract, stretches of noise
-        "a record at rest": (1, [_at_rest(r, i) for r in recording.records if r.role == "rest"]),
-        "repeated periods": (1, [e for r in moving for e in _period_differences(r, i)]),
-        "dwells of the drive": (NOISE.dwell_degree, [e for r in moving for e in _dwells(r, i, settling)]),
+    # degree of the polynomial to subtract, stretches of noise
+    sources = {
+        NoiseSource.REST: (1, [_at_rest(r, i) for r in recording.records if r.role == "rest"]),
+        NoiseSource.PERIODS: (1, [e for r in moving for e in _period_differences(r, i)]),
+        NoiseSource.DWELLS: (NOISE.dwell_degree, [e for r in moving for e in _dwells(r, i, settling)]),
     }
     for source, (degree, stretches) in sources.items():
         # a constant stretch is a dead or coarse channel: it tells no noise
@@ -143,17 +177,17 @@ def _of_series(recording: Recording, i: int, settling: float) -> _ChannelNoise:
             return _from_stretches(quiet, source, rounding, degree + 1)
     if stated := recording.noise[i]:
         sd, _ = _with_rounding(stated, np.zeros(0), rounding)
-        return _ChannelNoise(sd, "as stated, taken as white", NOISE.stated_samples)
+        return _ChannelNoise(sd, NoiseSource.STATED_WHITE, NOISE.stated_samples)
     thirds = [d for r in recording.records for d in _third_differences(r, i)]
     banded = any(r.band for r in recording.records)
     # third differences of white noise have 1 + 9 + 9 + 1 = 20 times its variance
     deviation = _quiet_deviation if banded else _robust_deviation
     sd = max(deviation(np.concatenate(thirds)) / np.sqrt(20.0), rounding, 1e-300)
-    note = "from the fastest part of the readings, taken as white; a record at rest would tell it better"
-    return _ChannelNoise(sd, note, sum(map(len, thirds)) / NOISE.robust_cost, guessed=True)
+    count = sum(map(len, thirds)) / NOISE.robust_cost
+    return _ChannelNoise(sd, NoiseSource.FASTEST_PART, count, "; a record at rest would tell it better")
 
 
-def _from_stretches(stretches: list[np.ndarray], source: str, rounding: float, removed: int) -> _ChannelNoise:
+def _from_stretches(stretches: list[np.ndarray], source: NoiseSource, rounding: float, removed: int) -> _ChannelNoise:
     """The autoregressive noise of stretches of pure noise.
 
     A polynomial with as many coefficients as were `removed` takes the power of so many of the L/tau independent samples of a
@@ -164,10 +198,10 @@ def _from_stretches(stretches: list[np.ndarray], source: str, rounding: float, r
     kept = sum(max(len(s) - removed * max(tau, 1.0), len(s) / 2) for s in stretches) / sum(map(len, stretches))
     sd, a = _with_rounding(innovation / np.sqrt(kept), a, rounding)
     n, ratio = sum(map(len, stretches)), stationary_deviation(sd, a) / sd
-    note = f"from {source}, {n} samples, autoregressive of order {len(a)}"
+    details = f", {n} samples, autoregressive of order {len(a)}"
     if ratio > NOISE.slow_ratio:
-        note += f"; it is slow, {ratio:.0f} times its innovations: part of it may be motion of the device, not of its sensor"
-    return _ChannelNoise(sd, note, float(n), a)
+        details += f"; it is slow, {ratio:.0f} times its innovations: part of it may be motion of the device, not of its sensor"
+    return _ChannelNoise(sd, source, float(n), details, a)
 
 
 def _repeatability(records: tuple[Record, ...], i: int) -> tuple[float, int]:
@@ -259,7 +293,8 @@ def drive_period(drive: np.ndarray) -> int | None:
     for lag in lags[lags >= 50]:
         if 2 * lag > n:
             return None
-        begins = np.all(np.abs(drive[lag : lag + 32] - first) <= near)  # cheap: tried before the whole record
+        # cheap: tried before the whole record
+        begins = np.all(np.abs(drive[lag : lag + 32] - first) <= near)
         if begins and np.all(np.abs(drive[lag:] - drive[:-lag]) <= near):
             return int(lag)
     return None

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from ctrlgen.estimation.fit import Fit, Fitter
-from ctrlgen.estimation.noise import Noise, autoregression, cross_correlation, ljung_box, without_lines
+from ctrlgen.estimation.noise import Noise, NoiseSource, autoregression, cross_correlation, ljung_box, without_lines
 from ctrlgen.estimation.residual_noise import noise_from_residual
-from ctrlgen.estimation.settings import DISCREPANCY, NOISE, NOISE_UPDATE, STATISTICS
+from ctrlgen.estimation.settings import DISCREPANCY, NOISE_UPDATE, STATISTICS
 from ctrlgen.recordings.recording import Record
 
 
@@ -23,15 +23,15 @@ def update_noise(fitter: Fitter, fit: Fit) -> Noise:
     noise = fitter.noise
     if not noise.guessed.any():
         return correct_stated_noise(fitter.with_noise(update_noise_colour(fitter, fit)), fit)
-    found = update_guessed_noise(fitter, fit)
-    smaller = found.floor < noise.floor
+    update = update_guessed_noise(fitter, fit)
+    smaller = update.floor < noise.floor
     if not smaller.any():
         return noise
-    source = [found if s else noise for s in smaller]
+    source = [update if s else noise for s in smaller]
     return replace(
         noise,
-        sd=np.where(smaller, found.sd, noise.sd),
-        count=np.where(smaller, found.count, noise.count),
+        sd=np.where(smaller, update.sd, noise.sd),
+        count=np.where(smaller, update.count, noise.count),
         ar=tuple(source[i].ar[i] for i in range(len(smaller))),
         notes=tuple(source[i].notes[i] for i in range(len(smaller))),
     )
@@ -79,8 +79,8 @@ def correct_stated_noise(fitter: Fitter, fit: Fit) -> Noise:
     it has nothing to do with the drive. Physics of a stage that moves smoothly is never white.
     """
     noise = fitter.noise
-    sd, notes, count = noise.sd.copy(), list(noise.notes), noise.count.copy()
-    for i in np.flatnonzero(noise.count == NOISE.stated_samples).tolist():
+    sd, notes, count, sources = noise.sd.copy(), list(noise.notes), noise.count.copy(), list(noise.sources)
+    for i in np.flatnonzero(noise.from_source(NoiseSource.STATED_WHITE)).tolist():
         records = [r for r in fitter.recording.records if r.role != "rest"]
         residuals = [_residual(fitter, fit, r, i) for r in records]
         size = float(np.sqrt(np.mean(np.concatenate(residuals) ** 2)))
@@ -91,12 +91,14 @@ def correct_stated_noise(fitter: Fitter, fit: Fit) -> Noise:
             _is_noise_alone(e, r.drive[r.valid[:, i]]) for e, r in zip(residuals, records, strict=True)
         ):
             continue
-        sd[i], count[i] = size, sum(map(len, residuals))
+        sd[i], count[i], sources[i] = size, sum(map(len, residuals)), NoiseSource.RESIDUAL
         notes[i] = (
             f"{fitter.recording.channels[i]}: the stated noise is {1 / ratio:.2f} of what is left, which is white and has nothing to do "
-            "with the drive; what is left is taken as the noise"
+            f"with the drive; {NoiseSource.RESIDUAL.value}"
         )
-    return noise if np.array_equal(sd, noise.sd) else replace(noise, sd=sd, notes=tuple(notes), count=count)
+    if np.array_equal(sd, noise.sd):
+        return noise
+    return replace(noise, sd=sd, sources=tuple(sources), notes=tuple(notes), count=count)
 
 
 def _is_noise_alone(e: np.ndarray, drive: np.ndarray) -> bool:

@@ -25,8 +25,8 @@ def prediction_uncertainty(fitter: Fitter, fit: Fit) -> np.ndarray:
         variance = np.einsum("nij,jk,nik->ni", Y, fit.covariance, Y)
         squares += np.sum(np.where(record.valid, np.maximum(variance, 0.0), 0.0), axis=0)
         count += record.valid.sum(axis=0)
-    found = np.sqrt(squares / np.maximum(count, 1))
-    return np.where(np.isfinite(found), found, np.inf)
+    rms = np.sqrt(squares / np.maximum(count, 1))
+    return np.where(np.isfinite(rms), rms, np.inf)
 
 
 def _sensitivities(fitter: Fitter, fit: Fit, record: Record) -> np.ndarray:

@@ -19,8 +19,11 @@ from ctrlgen.estimation.robust_covariance import sandwich_over_model, widening
 from ctrlgen.estimation.settings import PROFILE, STATISTICS
 
 BOUNDED, ABOVE, BELOW, FLAT = (
-    "bounded", "not bounded above by these data", "not bounded below by these data", "not bounded by these data",
-)  # fmt: skip
+    "bounded",
+    "not bounded above by these data",
+    "not bounded below by these data",
+    "not bounded by these data",
+)
 
 
 @dataclass(frozen=True)
@@ -98,7 +101,8 @@ class _Side:
         self.points: list[tuple[float, float]] = []
         self.verified, self.bounded = False, STATISTICS.z_95 * sd <= room
         self.end = value + self.sign * min(STATISTICS.z_95 * sd, room)
-        t, before = PROFILE.first_distance * sd, (0.0, 0.0)  # before: (distance, root of the rise)
+        # before: (distance, root of the rise)
+        t, before = PROFILE.first_distance * sd, (0.0, 0.0)
         for _ in range(PROFILE.doublings + 1):
             if not objective.affordable or room == 0:
                 return

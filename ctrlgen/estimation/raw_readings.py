@@ -7,7 +7,8 @@ import numpy as np
 from ctrlgen.effects import Effect
 from ctrlgen.numerics.quantisation_step import quantisation_step
 
-Detected = tuple[dict[str, float], float]  # parameters [SI], and the rms change that the law makes to the readings
+# parameters [SI], and the rms change that the law makes to the readings
+Detected = tuple[dict[str, float], float]
 
 
 def detect_directly(law: type[Effect], readings: np.ndarray) -> Detected | None:

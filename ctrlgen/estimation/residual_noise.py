@@ -14,7 +14,8 @@ from scipy.signal.windows import blackmanharris
 from ctrlgen.estimation.settings import RESIDUAL_NOISE
 from ctrlgen.numerics.spectral_peaks import local_floor, periodogram
 
-MEAN_OVER_MEDIAN = 1 / np.log(2)  # of an exponential variable, as the bins of a noise spectrum are
+# of an exponential variable, as the bins of a noise spectrum are
+MEAN_OVER_MEDIAN = 1 / np.log(2)
 
 
 def noise_from_residual(
@@ -37,7 +38,8 @@ def noise_from_residual(
     bins = slice(RESIDUAL_NOISE.first_bin, last)
     power, moving = (periodogram(y - np.mean(y), window)[bins] for y in (residual, motion))
     moving, level = (local_floor(spectrum, RESIDUAL_NOISE.smoothing_bins) for spectrum in (moving, power))
-    turn = np.exp(-2j * np.pi * (np.arange(len(power)) + RESIDUAL_NOISE.first_bin) / n)  # exp(-i w) of each bin
+    # exp(-i w) of each bin
+    turn = np.exp(-2j * np.pi * (np.arange(len(power)) + RESIDUAL_NOISE.first_bin) / n)
     lines = power > RESIDUAL_NOISE.line_ratio * level
     chosen = (moving <= np.median(moving)) & ~lines
     if not np.any(power[chosen] > 0):
@@ -46,7 +48,8 @@ def noise_from_residual(
         sd, a = _whittle_fit(power[chosen], turn[chosen], n)
         fitted = sd**2 / np.abs(1 - a * turn) ** 2
         chosen |= (level * MEAN_OVER_MEDIAN <= RESIDUAL_NOISE.agreement * fitted) & ~lines
-    if a > 0.999 * RESIDUAL_NOISE.largest_pole:  # at its bound
+    # at its bound
+    if a > 0.999 * RESIDUAL_NOISE.largest_pole:
         return None
     return sd, np.array([a] if a else []), np.count_nonzero(chosen) / RESIDUAL_NOISE.window_bins
 
@@ -66,6 +69,7 @@ def _whittle_fit(power: np.ndarray, turn: np.ndarray, n: int) -> tuple[float, fl
 
     most = RESIDUAL_NOISE.largest_pole
     best = minimize_scalar(deviance, bounds=(-most, most), method="bounded").x
-    gain = (deviance(0.0) - deviance(best)) / RESIDUAL_NOISE.window_bins  # the window makes bins dependent
+    # the window makes bins dependent
+    gain = (deviance(0.0) - deviance(best)) / RESIDUAL_NOISE.window_bins
     a = best if gain > np.log(n) else 0.0
     return float(np.sqrt(np.mean(power * inverse_shape(a)))), a

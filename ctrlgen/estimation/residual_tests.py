@@ -22,7 +22,8 @@ from ctrlgen.estimation.settings import DISCREPANCY, HELD_OUT_REFIT, OUTLIERS, R
 from ctrlgen.numerics.quantisation_step import quantisation_step
 from ctrlgen.recordings.recording import Record
 
-SHORTEST = STATISTICS.fewest_per_lag * STATISTICS.whiteness_lags  # samples of a test of whiteness
+# samples of a test of whiteness
+SHORTEST = STATISTICS.fewest_per_lag * STATISTICS.whiteness_lags
 
 
 @dataclass(frozen=True)
@@ -113,7 +114,8 @@ def _is_no_noise(fitter: Fitter, fit: Fit, record: Record, i: int) -> bool:
     e = fitter.whitened_residual(fit, quiet)[fitter.noise.usable(quiet.valid)[:, i], i]
     if len(e) < SHORTEST:
         return False
-    e = without_lines(e)  # a vibration is a candidate of its own
+    # a vibration is a candidate of its own
+    e = without_lines(e)
     return min(ljung_box(e), float(stats.kurtosistest(e).pvalue)) < RESIDUAL_TESTS.rest_p
 
 

@@ -48,7 +48,8 @@ def build_sample_equations(
     sample = None if model.inertial else _one_step(model, sample_time, linear, poses)
     if sample is not None:
         following = ca.vertcat(sample.x, sample.z)
-        if poses:  # read at the end of the dwell
+        # read at the end of the dwell
+        if poses:
             y = ca.substitute(y, ca.vertcat(model.x, model.z, model.u), ca.vertcat(following, sample.u_next))
         expressions = [following, y]
     in_symbols, symbols, parametric = ca.extract_parametric(expressions, model.p, {"extract_trivial": True})
@@ -66,7 +67,8 @@ def build_sample_equations(
         following = ca.vertcat(sample.x, sample.z)
     else:
         following, y = expressions
-    following, y = ca.cse([following, y])  # before differentiation: afterwards it takes ten times as long
+    # before differentiation: afterwards it takes ten times as long
+    following, y = ca.cse([following, y])
     given = [ca.vertcat(model.x, model.z), model.u, sample.u_next, model.ambient_symbol, c]
     steps = integrator_of(model, sample_time) if model.inertial else None
     return SampleEquations(constants, model, steps, linear, following, y, given)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import casadi as ca
@@ -25,13 +25,14 @@ from ctrlgen.model.assembly import build_model
 from ctrlgen.model.discretisation import balanced
 from ctrlgen.model.model import Model
 from ctrlgen.numerics.batched_evaluation import Recursion, evaluate
-from ctrlgen.recordings.recording import Record
+from ctrlgen.recordings.recording import Record, Timing
 
 
 class Simulator:
     """Simulates the readings `channels` (n_y) of `device`, compiled once for records of one `Timing`.
 
-    `free` are the paths of the k parameters p that may change between simulations. A device with inertia settles in no pose:
+    `free` are the paths of the k parameters p that may change between simulations; the steps of a device with inertia are expanded
+    about their values in `device`. A device with inertia settles in no pose:
     its readings are those of the instants at which the drive changes.
     """
 
@@ -132,7 +133,8 @@ class Simulator:
         if key not in self._by_pattern:
             c_f, n_s = ca.MX.sym("c_f", pattern), self.n_s
             m = pattern.size2()
-            T = ca.MX(ca.DM(np.eye(n_s + m, n_s)))  # dense: steps fill it
+            # dense: steps fill it
+            T = ca.MX(ca.DM(np.eye(n_s + m, n_s)))
             seed = ca.vertcat(ca.MX(n_s, pattern.size1()), c_f.T)
             _, T, _, Y = forward_sensitivities(self.equations, T, seed, self._symbols)
             jacobians = [part.T for values in (T, Y) for part in (values[:n_s, :], values[n_s:, :])]
@@ -240,22 +242,10 @@ class Simulator:
         return np.vstack([u[:1], u[:-1]]), u, ambient
 
 
-class RecentSimulators(dict[Any, Simulator]):
-    """Simulators by what they simulate; of more than `SIMULATION.kept` the one used longest ago is forgotten."""
-
-    def __getitem__(self, key: Any) -> Simulator:
-        found = self.pop(key)
-        super().__setitem__(key, found)  # now the last one
-        return found
-
-    def __setitem__(self, key: Any, simulator: Simulator) -> None:
-        super().__setitem__(key, simulator)
-        while len(self) > SIMULATION.kept:
-            del self[next(iter(self))]
-
-    def copy(self) -> RecentSimulators:
-        """Another one with the same simulators."""
-        return RecentSimulators(self)
+@lru_cache(maxsize=SIMULATION.kept)
+def compiled_simulator(device: Device, free: tuple[str, ...], channels: tuple[str, ...], timing: Timing) -> Simulator:
+    """The simulator of these arguments, by their value: whether one was compiled before changes no result."""
+    return Simulator(device, free, channels, *timing)
 
 
 class Linearised:

@@ -45,7 +45,7 @@ class Spikes:
 def find_spikes(fitter: Fitter, fit: Fit, known: np.ndarray) -> tuple[Spikes, ...]:
     """The spikes of each channel that has some: outliers that were marked, and smaller ones in what `fit` leaves where that is
     noise. `known` (n_y,) says whose noise is known. None of settled poses, which have no neighbours in time."""
-    recording, found = fitter.recording, []
+    recording, rows = fitter.recording, []
     for i, (channel, unit) in enumerate(zip(recording.channels, recording.units, strict=True)):
         sizes = [abs(size) for r in recording.records for _, k, size in r.spikes if k == i]
         samples = sum(int(r.valid[:, i].sum()) for r in recording.records) + len(sizes)
@@ -54,8 +54,8 @@ def find_spikes(fitter: Fitter, fit: Fit, known: np.ndarray) -> tuple[Spikes, ..
         if sizes:
             size, floor = float(np.median(sizes)), float(fitter.noise.floor[i])
             in_noise = size / floor if known[i] and floor > 0 else None
-            found.append(Spikes(channel, len(sizes), samples, float(difference(size, unit)), unit, in_noise))
-    return tuple(found)
+            rows.append(Spikes(channel, len(sizes), samples, float(difference(size, unit)), unit, in_noise))
+    return tuple(rows)
 
 
 def _beyond_noise(fitter: Fitter, fit: Fit, i: int, marked: int) -> list[float]:

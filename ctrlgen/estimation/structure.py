@@ -12,45 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from ctrlgen.core.units import Quantity, written_unit
 from ctrlgen.devices import Device
-from ctrlgen.devices.changed_numbers import changed, written
-from ctrlgen.effects import Channel, Param
-from ctrlgen.estimation.hypothesis import (
-    PARAMETER,
-    Hypothesis,
-    nominal_physics,
-    nuisances,
-    numbers,
-)
-from ctrlgen.estimation.settings import FIT
-from ctrlgen.estimation.simulator import Simulator
-from ctrlgen.model.assembly import movable
-from ctrlgen.model.effect_terms import channels, partner_channels
-from ctrlgen.recordings.recording import Recording, Timing
-
-
-@dataclass(frozen=True)
-class FreeParameter:
-    """One free number [SI]: `sd` is its stated deviation from `nominal`, None where nothing is known beforehand.
-
-    `cause` is the place of its hypothesis in the structure, None for the device's own uncertain numbers.
-    """
-
-    path: str
-    unit: str
-    nominal: float
-    low: float
-    high: float
-    size: float
-    sd: float | None = None
-    cause: int | None = None
-    amplitude: bool = False
-
-    @property
-    def name(self) -> str:
-        """Of the parameter in its effect; "value" for a number of the device."""
-        return self.path.rpartition(".")[2] if self.path.startswith("effect[") else "value"
+from ctrlgen.estimation.device_with_causes import device_with_causes
+from ctrlgen.estimation.free_parameters import FreeParameter, free_parameters
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.estimation.simulator import Simulator, compiled_simulator
+from ctrlgen.recordings.recording import Timing
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,44 +25,63 @@ class Structure:
     """`device` as described, with `causes` and their starting values ({parameter: SI}, one mapping a cause).
 
     `nominal_starts`: where a fit begins of the device's uncertain numbers, by path [SI]; those not given begin as stated.
+    `expansion`: the values of the causes about which a simulator is expanded, as `starts`, and those where None. They are where each
+    cause was first suspected, wherever a later fit of the structure begins.
+    `free`: the numbers that are free, None for the device's uncertain ones and the parameters of the causes.
     """
 
     device: Device
     causes: tuple[Hypothesis, ...] = ()
     starts: tuple[dict[str, float], ...] = ()
     nominal_starts: dict[str, float] = field(default_factory=dict)
+    expansion: tuple[dict[str, float], ...] | None = None
+    free: tuple[FreeParameter, ...] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Its fields: what is derived from them need not be sent to another process, and cannot be where a user wrote the device."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
+    @property
+    def expanded_at(self) -> tuple[dict[str, float], ...]:
+        """The values of the causes about which a simulator is expanded, one mapping a cause."""
+        return self.starts if self.expansion is None else self.expansion
+
     def with_cause(self, cause: Hypothesis, start: dict[str, float]) -> Structure:
         """The same with one cause more."""
-        return replace(self, causes=(*self.causes, cause), starts=(*self.starts, start))
+        return replace(
+            self,
+            causes=(*self.causes, cause),
+            starts=(*self.starts, start),
+            expansion=(*self.expanded_at, start),
+        )
 
     def without(self, index: int) -> Structure:
         """The same with one cause less."""
-        keep = [k for k in range(len(self.causes)) if k != index]
-        return replace(self, causes=tuple(self.causes[k] for k in keep), starts=tuple(self.starts[k] for k in keep))
+        causes, starts, expansion = (
+            (*row[:index], *row[index + 1 :]) for row in (self.causes, self.starts, self.expanded_at)
+        )
+        return replace(self, causes=causes, starts=starts, expansion=expansion)
 
     def restarted(self, index: int, start: dict[str, float]) -> Structure:
         """The same with the fit of one cause begun elsewhere."""
-        return replace(self, starts=(*self.starts[:index], start, *self.starts[index + 1 :]))
+        starts = (*self.starts[:index], start, *self.starts[index + 1 :])
+        return replace(self, starts=starts, expansion=self.expanded_at)
 
     def halved(self, known: Collection[Hypothesis]) -> Structure:
-        """The same with the causes that are not `known` begun with half the amplitude."""
-        starts = list(self.starts)
+        """The same with the causes that are not `known` begun, and expanded, with half the amplitude: at the whole one, no such
+        device may stand."""
+        starts, expansion = list(self.starts), list(self.expanded_at)
         for k, cause in enumerate(self.causes):
             if cause in known or cause.effect == PARAMETER:
                 continue
             if (p := cause.law.amplitude()).name in starts[k]:
-                off = self.channel_of(cause).si(p.off or 0.0, p)
-                starts[k] = starts[k] | {p.name: (starts[k][p.name] + off) / 2}
-        return replace(self, starts=tuple(starts))
+                off = cause.channel_on(self.device).si(p.off or 0.0, p)
+                starts[k] = expansion[k] = starts[k] | {p.name: (starts[k][p.name] + off) / 2}
+        return replace(self, starts=tuple(starts), expansion=tuple(expansion))
 
     @property
     def log_prior_odds(self) -> float:
-        """The sum over its causes."""
+        """The sum of the log prior odds of its causes."""
         return sum(c.prior.log_prior_odds for c in self.causes)
 
     def cause_of(self, parameter: FreeParameter) -> Hypothesis:
@@ -113,152 +99,34 @@ class Structure:
         plausible = cause.prior.of(p).plausible_range
         if plausible is None:
             return None
-        channel = self.channel_of(cause)
+        channel = cause.channel_on(self.device)
         return channel.si(plausible[0], p), channel.si(plausible[1], p)
-
-    def channel_of(self, cause: Hypothesis) -> Channel:
-        """The channel at which a cause acts; the first one where it acts at all of them."""
-        physics, law = nominal_physics(self.device), cause.law
-        every = {c.name: c for c in channels(physics, law.place)}
-        own = next(iter(every.values())) if cause.at == "all" else every[cause.at]
-        if cause.of is None:
-            return own
-        return own.paired_with(next(c for c in partner_channels(physics, law) if c.name == cause.of))
 
     @cached_property
     def device_with_causes(self) -> Device:
-        """The device with the causes' effects at their starting values."""
-        added, values = [], {}
-        for cause, start in zip(self.causes, self.starts, strict=True):
-            if cause.effect == PARAMETER:
-                number = next(q for path, _, q in numbers(self.device) if path == cause.path)
-                low, high = _reach(number)
-                values[cause.path] = min(max(start["value"], low), high)  # a stage of negative size cannot be built
-                continue
-            channel = self.channel_of(cause)
-            law = cause.law
-            numbers_ = {
-                p.name: written(_inside(_fixed(start[p.name], p, cause, channel), p, channel), channel.unit_of(p))
-                for p in law.params
-            }
-            added.append(law(cause.at, numbers_, cause.of))
-        return changed(self.device, values).model_copy(update={"effect": (*self.device.effect, *added)})
+        """The device with the causes at their starting values."""
+        return device_with_causes(self.device, self.causes, self.starts)
+
+    @cached_property
+    def expanded_device(self) -> Device:
+        """The device with the causes where a simulator is expanded: what is simulated, with other values of the free numbers."""
+        return device_with_causes(self.device, self.causes, self.expanded_at)
 
     @cached_property
     def free_parameters(self) -> tuple[FreeParameter, ...]:
-        """The device's uncertain numbers, then every parameter of every cause."""
-        causes = {c.path for c in self.causes if c.effect == PARAMETER}
-        acting = _movable(self.device)
-        sections = {path: (section, number) for path, section, number in numbers(self.device)}
-        rows = []
-        for path, sd in nuisances(self.device).items():
-            if path in acting and path not in causes:
-                q = sections[path][1]
-                rows.append(
-                    FreeParameter(path, written_unit(q.text), q.si, *_around(q.si, FIT.nuisance_reach * sd), sd, sd)
-                )
-        k = len(self.device.effect)
-        for index, (cause, start) in enumerate(zip(self.causes, self.starts, strict=True)):
-            if cause.effect == PARAMETER:
-                q = sections[cause.path][1]
-                rows.append(
-                    FreeParameter(
-                        cause.path,
-                        written_unit(q.text),
-                        q.si,
-                        *_reach(q),
-                        (abs(q.si) or 1e-3) * 1e-3,
-                        None,
-                        index,
-                        True,
-                    )
-                )
-                continue
-            channel, law = self.channel_of(cause), cause.law
-            for p in law.params:
-                if cause.prior.of(p).fixed_range:  # present or absent: nothing to fit
-                    continue
-                low, high = cause.bounds(p, channel)
-                off = 0.0 if p.off is None else channel.si(p.off, p)
-                size = (
-                    max(abs(start[p.name] - off), 1e-6 * (high - low))
-                    if p.off is not None
-                    else abs(start[p.name]) or high - low
-                )
-                rows.append(
-                    FreeParameter(
-                        f"effect[{k}].{p.name}",
-                        channel.unit_of(p),
-                        off,
-                        low,
-                        high,
-                        size,
-                        None,
-                        index,
-                        p is law.amplitude(),
-                    )
-                )
-            k += 1
-        return tuple(rows)
+        """The numbers given as `free`; else the device's uncertain ones, then every parameter of every cause."""
+        return tuple(free_parameters(self.device, self.causes, self.starts)) if self.free is None else self.free
 
     @cached_property
     def start(self) -> np.ndarray:
-        """Where a fit begins, one SI number an unknown."""
+        """Where a fit begins, one SI number a free parameter."""
         values = []
-        for unknown in self.free_parameters:
-            if unknown.cause is None:
-                values.append(
-                    min(max(self.nominal_starts.get(unknown.path, unknown.nominal), unknown.low), unknown.high)
-                )
-            else:
-                values.append(min(max(self.starts[unknown.cause][unknown.name], unknown.low), unknown.high))
+        for p in self.free_parameters:
+            begin = self.nominal_starts.get(p.path, p.nominal) if p.cause is None else self.starts[p.cause][p.name]
+            values.append(min(max(begin, p.low), p.high))
         return np.array(values)
 
-    def simulators(self, recording: Recording, cache: dict[Any, Any]) -> dict[Timing, Simulator]:
-        """One simulator for every timing in the recording."""
-        timings = {r.timing for r in recording.records}
-        free = tuple(u.path for u in self.free_parameters)
-        found = {}
-        for timing in timings:
-            key = (self.causes, timing, tuple(cause.effect for cause in self.causes))
-            if key not in cache:
-                cache[key] = Simulator(self.device_with_causes, free, recording.channels, *timing)
-            found[timing] = cache[key]
-        return found
-
-
-def _fixed(value: float, p: Param, cause: Hypothesis, channel: Channel) -> float:
-    """The middle of the range in which an amplitude is fixed; the value where it is free."""
-    fixed = cause.prior.of(p).fixed_range
-    return value if fixed is None else channel.si(sum(fixed) / 2, p)
-
-
-def _inside(value: float, p: Param, channel: Channel) -> float:
-    low, high = (channel.si(b, p) for b in p.bounds)
-    return min(max(value, low), high)
-
-
-def _around(value: float, reach: float) -> tuple[float, float]:
-    """Bounds of an uncertain number, which does not change its sign."""
-    low, high, least = value - reach, value + reach, FIT.smallest_share * value
-    return (max(low, least), high) if value > 0 else (low, min(high, least)) if value < 0 else (low, high)
-
-
-def _reach(number: Quantity) -> tuple[float, float]:
-    """How far a suspected number is looked for [SI]: a tenth to ten times of it, half a radian for an angle."""
-    span = (
-        (abs(number.si) or 1e-3) * FIT.suspected_reach
-        if written_unit(number.text) not in ("deg", "rad")
-        else FIT.suspected_angle
-    )
-    return number.si - span, number.si + 10 * span
-
-
-_MOVABLE: dict[int, tuple[Device, frozenset[str]]] = {}
-
-
-def _movable(device: Device) -> frozenset[str]:
-    if id(device) not in _MOVABLE:
-        _MOVABLE.clear()  # the device is kept with its answer, so that no other one gets its id meanwhile
-        _MOVABLE[id(device)] = (device, frozenset(movable(device)))
-    return _MOVABLE[id(device)][1]
+    def simulator(self, channels: tuple[str, ...], timing: Timing) -> Simulator:
+        """The compiled simulator of the readings `channels` for records of one timing."""
+        paths = tuple(p.path for p in self.free_parameters)
+        return compiled_simulator(self.expanded_device, paths, channels, timing)

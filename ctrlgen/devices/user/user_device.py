@@ -50,6 +50,17 @@ class UserDevice(Device):
             raise InputError(self.name, given.faults)
         return physics
 
+    def __eq__(self, other: object) -> bool:
+        """Two devices are equal where their functions and their numbers are: each has a class of its own."""
+        return isinstance(other, UserDevice) and self._value() == other._value()
+
+    def __hash__(self) -> int:
+        return hash(self._value()[1:])
+
+    def _value(self) -> tuple[Any, ...]:
+        plain = (getattr(self, key) for key in Device.model_fields)
+        return self.description, *plain, *self.quantities()
+
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickles the user's functions, which must be picklable, and the values; the class is made again from them."""
         sections = {s: dict(getattr(self, s)) for s in SECTIONS.values() if s in type(self).model_fields}

@@ -35,7 +35,7 @@ ARGUMENTS = {  # of each law
 }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class UserDescription:
     """What the user gave: components {name: largest size} of each vector, domains and units of the parameters, the laws by
     name, the typical `force` if any, the `ranges` [SI] of components given by a lowest and a highest value, the `limits` on
@@ -57,7 +57,7 @@ class UserDescription:
     drive_rates: dict[str, Quantity] = field(default_factory=dict)
     weights: dict[str, float] = field(default_factory=dict)
     speed: dict[str, Quantity] = field(default_factory=dict)
-    faults: list[Fault] = field(default_factory=list)
+    faults: list[Fault] = field(default_factory=list, compare=False)
 
     def components(self, law: str) -> tuple[str, ...]:
         """Names of the components of what a law returns."""

@@ -10,10 +10,8 @@ Source: H. R. Kuensch, Ann. Statist. 17 (1989) 1217.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -25,7 +23,7 @@ from ctrlgen.diagnosis.selection.candidate_model import SearchResult
 from ctrlgen.diagnosis.selection.findings import Estimate
 from ctrlgen.diagnosis.settings import BOOTSTRAP
 from ctrlgen.estimation.fit import Fitter
-from ctrlgen.estimation.structure import FreeParameter, Structure
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Record, Recording
 from ctrlgen.reporting.result_file import FiniteOrNull, Keys
 
@@ -53,21 +51,6 @@ class Bootstrap(Keys):
 
 
 @dataclass(frozen=True, eq=False)
-class _Drawn(Structure):
-    """A structure whose parameters have other stated values."""
-
-    stated: tuple[float, ...] = ()
-
-    @cached_property
-    def free_parameters(self) -> tuple[FreeParameter, ...]:
-        """Those of the structure, with the drawn nominal value where a standard deviation is stated."""
-        base = Structure(self.device, self.causes, self.starts).free_parameters
-        return tuple(
-            replace(u, nominal=nominal) if u.sd else u for u, nominal in zip(base, self.stated, strict=True)
-        )  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
 class Replicate:
     """The refit of one replicate as a function of its seed; it can be sent to another process."""
 
@@ -77,7 +60,6 @@ class Replicate:
     fitter: Fitter
     predicted: tuple[np.ndarray, ...]
     blocks: tuple[int, ...]
-    token: str
 
     def __call__(self, seed: list[int]) -> np.ndarray:
         """The refitted parameters [SI]."""
@@ -86,21 +68,12 @@ class Replicate:
             replace(r, observed=y + redrawn(r, y, block, rng))
             for r, y, block in zip(self.recording.records, self.predicted, self.blocks, strict=True)
         )
-        if self.token not in _COMPILED:
-            _COMPILED.clear()
-            _COMPILED[self.token] = {}
-        fitter = replace(self.fitter, recording=replace(self.recording, records=records), cache=_COMPILED[self.token])
-        s = self.structure
+        fitter = replace(self.fitter, recording=replace(self.recording, records=records))
         stated = tuple(
-            float(np.clip(value + u.sd * rng.standard_normal(), u.low, u.high)) if u.sd else u.nominal
-            for u, value in zip(s.free_parameters, self.theta, strict=True)
+            replace(p, nominal=float(np.clip(value + p.sd * rng.standard_normal(), p.low, p.high))) if p.sd else p
+            for p, value in zip(self.structure.free_parameters, self.theta, strict=True)
         )
-        return fitter.fit(_Drawn(s.device, s.causes, s.starts, stated=stated), self.theta).theta
-
-
-_COMPILED: dict[
-    str, dict[Any, Any]
-] = {}  # by bootstrap, the last one only: all its replicates integrate the same expressions
+        return fitter.fit(replace(self.structure, free=stated), self.theta).theta
 
 
 def redrawn(record: Record, predicted: np.ndarray, block: int, rng: np.random.Generator) -> np.ndarray:
@@ -111,7 +84,8 @@ def redrawn(record: Record, predicted: np.ndarray, block: int, rng: np.random.Ge
         left = left - np.nansum(left, axis=0) / count
     n = len(left)
     begins = rng.integers(0, n, -(-n // block))
-    rows = ((begins[:, None] + np.arange(block)) % n).ravel()[:n]  # circular, so that every sample is equally likely
+    # circular, so that every sample is equally likely
+    rows = ((begins[:, None] + np.arange(block)) % n).ravel()[:n]
     return np.nan_to_num(left[rows])
 
 
@@ -152,18 +126,17 @@ def bootstrap(
         fit.structure,
         fit.theta,
         recording,
-        replace(fitter, cache={}, checkpoint=None),
+        replace(fitter, checkpoint=None),
         predicted,
         blocks,
-        os.urandom(8).hex(),
     )
     if scheduler is None and not sendable(work):
         jobs = 0
     items = [[seed, k] for k in range(replicates)]
     results: list[Any] = [None] * replicates
     if len(fit.theta):
-        for k, found in run_all(work, items, scheduler, jobs, progress):
-            results[k] = found
+        for k, theta in run_all(work, items, scheduler, jobs, progress):
+            results[k] = theta
     thetas = [r for r in results if isinstance(r, np.ndarray)]
     failed = tuple(dict.fromkeys(r.what for r in results if isinstance(r, Failure)))
     return _summary(fit.structure, fit.theta, np.array(thetas), blocks, failed)

@@ -58,7 +58,7 @@ def detectability(fit: Fit, screened: Screened, n: float) -> DetectabilityEntry:
         if h.effect == PARAMETER:
             unit, weight = written_unit(nominal[h.path].text), 1 / max(abs(nominal[h.path].si), 1e-300)
         else:
-            where = fit.structure.channel_of(h)
+            where = h.channel_on(fit.structure.device)
             unit, weight = where.unit_of(h.law.amplitude()), 1 / abs(where.si(_span(h), h.law.amplitude()))
         kinds.setdefault(h.effect, {})[h] = (float(difference(sd, unit)), sd * weight, unit)
     beyond = [h for places in kinds.values() for h, (_, weight, _) in places.items() if screened.threshold * weight > 1]

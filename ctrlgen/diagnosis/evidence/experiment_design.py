@@ -132,7 +132,7 @@ def separate(fitter: Fitter, a: Fit, b: Fit, reason: str, seed: int = 0) -> Expe
     )
     family = pose_sets(n, n_u, seed) if poses else time_series(n, n_u, 1 / template.sample_time, seed)
     first = 0.0 if poses else max(r.time[-1] for r in fitter.recording.records) + template.sample_time
-    simulator = a.structure.simulators(fitter.recording, fitter.cache)[template.timing]
+    simulator = fitter.simulator(a.structure, template)
     now = [_Sums.present(fitter, *pair) for pair in ((a, b), (b, a))]
     rows = []
     for shape in family:
@@ -187,9 +187,9 @@ class _Sums:
 
     def plus(self, fitter: Fitter, truth: Fit, refitted: Fit, record: Record) -> _Sums:
         """The same with one more record."""
-        simulator = refitted.structure.simulators(fitter.recording, fitter.cache)[record.timing]
+        simulator = fitter.simulator(refitted.structure, record)
         y, slopes = simulator.sensitivities(record, refitted.theta)
-        other = truth.structure.simulators(fitter.recording, fitter.cache)[record.timing]
+        other = fitter.simulator(truth.structure, record)
         delta = fitter.noise.whiten(other.simulate(record, truth.theta) - y, record.valid).ravel()
         J = fitter.noise.whiten(slopes, record.valid).reshape(len(delta), -1)
         sizes = initial_state_sd(simulator)

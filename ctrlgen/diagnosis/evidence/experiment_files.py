@@ -25,7 +25,7 @@ def files(fitter: Fitter, fit: Fit, chosen: Experiment, device_file: str) -> dic
     A device with inertia gets no scenario: the solver handles devices in quasi-static balance.
     """
     record = chosen.proposed
-    simulator = fit.structure.simulators(fitter.recording, fitter.cache)[record.timing]
+    simulator = fitter.simulator(fit.structure, record)
     texts = {DRIVE: _drive(simulator, chosen), RECORDING: _recording(fitter, simulator, chosen)}
     return texts | (_scenario(simulator, fit, chosen, device_file) if _solved(simulator.model) else {})
 

@@ -20,7 +20,7 @@ from ctrlgen.estimation.disturbance_inputs import with_disturbance_inputs
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import nominal_physics
 from ctrlgen.estimation.least_squares import initial_state_sd
-from ctrlgen.estimation.simulator import Simulator
+from ctrlgen.estimation.simulator import Simulator, compiled_simulator
 from ctrlgen.recordings.recording import Record
 
 
@@ -128,13 +128,11 @@ def linearise_along(fitter: Fitter, fit: Fit, record: Record) -> LtvModel:
 def _probed(fitter: Fitter, fit: Fit, record: Record, place: Place) -> tuple[Simulator, np.ndarray, list[int]]:
     """A simulator with disturbance inputs, its parameters, and the positions of the inputs at `place` among them."""
     known = [unknown.path for unknown in fit.structure.free_parameters]
-    device, probes = with_disturbance_inputs(fit.structure.device_with_causes, nominal_physics(fit.structure.device))
+    device, probes = with_disturbance_inputs(fit.structure.expanded_device, nominal_physics(fit.structure.device))
     paths = [path for (where, _), path in probes.items() if where is place]
-    key = ("along", fit.structure.causes, record.timing)
-    if key not in fitter.cache:
-        fitter.cache[key] = Simulator(device, [*known, *paths], fitter.recording.channels, *record.timing)
+    simulator = compiled_simulator(device, (*known, *paths), fitter.recording.channels, record.timing)
     p = np.concatenate([fit.theta, np.zeros(len(paths))])
-    return fitter.cache[key], p, list(range(len(known), len(p)))
+    return simulator, p, list(range(len(known), len(p)))
 
 
 def _start(fitter: Fitter, fit: Fit, record: Record) -> np.ndarray | None:

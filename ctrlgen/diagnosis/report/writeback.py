@@ -32,9 +32,9 @@ from ctrlgen.diagnosis.report.narrative import (
     sentence,
 )
 from ctrlgen.diagnosis.selection.verdict import Verdict
+from ctrlgen.estimation.free_parameters import FreeParameter
 from ctrlgen.estimation.hypothesis import PARAMETER, numbers
 from ctrlgen.estimation.robust_covariance import robust_deviations
-from ctrlgen.estimation.structure import FreeParameter
 from ctrlgen.version import program
 
 WIDTH = 110

@@ -24,11 +24,12 @@ from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.trials import FAILURES
 from ctrlgen.diagnosis.settings import ATTRIBUTION
 from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.free_parameters import FreeParameter
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.least_squares import LeastSquaresProblem
 from ctrlgen.estimation.misfit import Misfit, misfit
 from ctrlgen.estimation.settings import STATISTICS
-from ctrlgen.estimation.structure import FreeParameter, Structure
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 from ctrlgen.recordings.recording import Record
 from ctrlgen.reporting.result_file import FiniteOrNull, Keys
@@ -170,7 +171,7 @@ class _WithinStated(LeastSquaresProblem):
     """A fit in which numbers stay as they are, but for those of the device that are hardly known, within their stated 95 %."""
 
     def __init__(self, structure: Structure, fitter: Fitter, theta: np.ndarray) -> None:
-        super().__init__(structure, fitter.recording, fitter.error, fitter.cache)
+        super().__init__(structure, fitter.recording, fitter.error)
         self.start = self.to_scaled(np.concatenate([theta, np.zeros(self.n_initial)]))
 
     @property

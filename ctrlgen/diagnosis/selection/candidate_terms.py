@@ -48,11 +48,10 @@ def signal_peaks(fitter: Fitter, fit: Fit) -> Peaks:
     """How far the signals at every place go in the records to fit."""
     peaks: Peaks = {}
     physics = nominal_physics(fit.structure.device)
-    simulators = fit.structure.simulators(fitter.recording, fitter.cache)
     reached = (Place.DRIVE, Place.FORCE, Place.DISPLACEMENT)
     places = [(place, i) for place in reached for i in range(len(channels(physics, place)))]
     for record, start in zip(fitter.fit_records, fit.initial_states, strict=True):
-        simulator = simulators[record.timing]
+        simulator = fitter.simulator(fit.structure, record)
         m, n = simulator.model, len(record.time)
         seen = [m.law_inputs(place, i, None, {}) for place, i in places]
         still = ca.SX.zeros(1)
@@ -104,7 +103,7 @@ class CandidateTerms:
         probes: dict[tuple[Place, int], int],
         seen: Callable[[Place, int], DataHints],
     ) -> Iterator[CandidateTerm]:
-        law, where = h.law, structure.channel_of(h)
+        law, where = h.law, h.channel_on(structure.device)
         names = [c.name for c in channels(nominal_physics(structure.device), law.place)]
         partner = names.index(h.of) if h.of else None
         at: list[tuple[int, int | None]] = [
@@ -129,7 +128,7 @@ class CandidateTerms:
         self, law: Effect, i: int, partner: int | None, shape: dict[str, float], off: float, size: float, finite: float
     ) -> int:
         """The place in `terms` of the slope at `off`, or from there to the amplitude `finite`."""
-        term = self.laws.term(self.simulator.model, law, i, partner, shape, off, size, finite)
+        term = self.laws.term(law, i, partner, shape, off, size, finite)
         if term not in self._places:
             self._places[term] = len(self.terms)
             self.terms.append(term)

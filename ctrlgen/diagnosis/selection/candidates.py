@@ -110,10 +110,12 @@ def fit_other_clocks(
         begun: list[tuple[float, Hypothesis, Structure]] = []
         for cause in shifts:
             p = cause.law.amplitude()
-            low, high = cause.bounds(p, current.fit.structure.channel_of(cause))
+            low, high = cause.bounds(p, cause.channel_on(current.fit.structure.device))
             try:
-                for start in (2**k * h for k in range(SEARCH.clock_doublings) if low <= 2**k * h <= high):
-                    structure = beside.fit.restarted.with_cause(cause, {p.name: start})
+                starts = [2**k * h for k in range(SEARCH.clock_doublings) if low <= 2**k * h <= high]
+                for start in starts:
+                    suspected = beside.fit.restarted.with_cause(cause, {p.name: starts[0]})
+                    structure = suspected.restarted(len(beside.causes), {p.name: start})
                     begun.append((branch.fitter.initial_objective(structure), cause, structure))
             except FAILURES as error:
                 branch.note_failure(cause, error)

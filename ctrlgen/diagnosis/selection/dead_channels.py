@@ -51,8 +51,7 @@ def without_dead_channels(
         ]
         raise InputError(recording.title, faults)
     structure = Structure(device)
-    simulators = structure.simulators(recording, {})
-    predicted = [simulators[r.timing].simulate(r, structure.start) for r in moving]
+    predicted = [structure.simulator(recording.channels, r.timing).simulate(r, structure.start) for r in moving]
     places = {f"reading.{c.name}": c for c in channels(nominal_physics(device), Place.SENSOR)}
     findings, notes = [], []
     for i, level in dead.items():

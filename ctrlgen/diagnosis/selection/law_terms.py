@@ -92,17 +92,23 @@ class LawTerm:
         else:
             step = h * rates
         changes = zip(self.states, self.stepped, self.clocks, ca.vertsplit(step), strict=True)
-        return ca.vertcat(*(
-            new if new is not None else state + (1.0 if settled else h) if clock else state + change
-            for state, new, clock, change in changes
-        ))  # fmt: skip
+        return ca.vertcat(
+            *(
+                new if new is not None else state + (1.0 if settled else h) if clock else state + change
+                for state, new, clock, change in changes
+            )
+        )
 
 
 class LawTerms:
-    """The terms of laws along motions of one timing; `symbols` of what they read."""
+    """The terms of laws along motions of one timing; `symbols` of what they read.
 
-    def __init__(self, timing: Timing) -> None:
-        self.timing = timing
+    What a law reads that is a number, such as a typical size, is that of the `described` device in every structure: a term is the
+    same whichever structure needs it first.
+    """
+
+    def __init__(self, timing: Timing, described: Model) -> None:
+        self.timing, self.described = timing, described
         self.symbols: dict[Read, ca.SX] = {}
         self._terms: dict[tuple[Any, ...], LawTerm] = {}
         self._compiled: dict[tuple[Any, ...], CompiledTerms] = {}
@@ -114,9 +120,15 @@ class LawTerms:
         return self.symbols[read]
 
     def term(
-        self, model: Model, law: Effect, index: int, partner: int | None, shape: dict[str, float],
-        off: float, size: float, finite: float,
-    ) -> LawTerm:  # fmt: skip
+        self,
+        law: Effect,
+        index: int,
+        partner: int | None,
+        shape: dict[str, float],
+        off: float,
+        size: float,
+        finite: float,
+    ) -> LawTerm:
         """The slope at `off`, or from there to the amplitude `finite`, times `size`."""
         key = (law.kind, index, partner, tuple(shape.items()), off, size, finite)
         if key not in self._terms:
@@ -124,7 +136,7 @@ class LawTerms:
             states = {s.name: ca.SX.sym(f"m{n}_{s.name}") for s in law.states}
             a = ca.SX.sym("a")
             p = SimpleNamespace(**shape, **{law.amplitude().name: a})
-            actual = model.law_inputs(law.place, index, partner, {}, law.order)
+            actual = self.described.law_inputs(law.place, index, partner, {}, law.order)
             new = law.after_sample(_SymbolicInputs(self, law.place, law.order, actual, states), p)
             s = _SymbolicInputs(self, law.place, law.order, actual, states | new)
             change = {state.name: ca.SX(float(state.clock)) for state in law.states} | law.rates(s, p)
@@ -144,7 +156,7 @@ class LawTerms:
 
     def compiled(self, terms: Sequence[LawTerm], driven: Sequence[bool]) -> CompiledTerms:
         """`terms` as functions of what they read; those `driven` also at the end of a sample."""
-        key = (tuple(map(id, terms)), tuple(driven))
+        key = (tuple(terms), tuple(driven))
         if key not in self._compiled:
             self._compiled[key] = CompiledTerms(self, terms, driven)
         return self._compiled[key]
@@ -158,16 +170,16 @@ class CompiledTerms:
     def __init__(self, laws: LawTerms, terms: Sequence[LawTerm], driven: Sequence[bool]) -> None:
         memory = ca.vertcat(NONE, *(s for term in terms for s in term.states))
         after = ca.vertcat(NONE, *(term.after(laws.timing.sample_time) for term in terms))
-        found = ca.vertcat(NONE, *(term.slope for term in terms))
-        own = {s.name() for s in ca.symvar(ca.vertcat(found, after))}
-        self.reads = [r for r, symbol in laws.symbols.items() if own & {s.name() for s in ca.symvar(symbol)}]
+        slopes = ca.vertcat(NONE, *(term.slope for term in terms))
+        names = {s.name() for s in ca.symvar(ca.vertcat(slopes, after))}
+        self.reads = [r for r, symbol in laws.symbols.items() if names & {s.name() for s in ca.symvar(symbol)}]
         read = ca.vertcat(NONE, *(laws.symbols[r] for r in self.reads))
         end = ca.SX.sym("end", read.numel())
-        chosen = found[[k for k, is_driven in enumerate(driven) if is_driven]]
+        chosen = slopes[[k for k, is_driven in enumerate(driven) if is_driven]]
         (at_end,) = ca.substitute([chosen], [memory, read], [after, end]) if chosen.numel() else (NONE,)
         if laws.timing.poses:
-            found = ca.substitute(found, memory, after)
-        results = [ca.densify(value) for value in (after, found, at_end)]
+            slopes = ca.substitute(slopes, memory, after)
+        results = [ca.densify(value) for value in (after, slopes, at_end)]
         self._one = ca.Function("laws", [memory, read, end], results, {"cse": True})
         self._many: dict[int, ca.Function] = {}
 

@@ -102,7 +102,7 @@ def replace_cause(trials: Trials, fit: Fit, k: int, others: Structure, suspect: 
     if cause.family is None or (cause.family, cause.at) != (suspect.hypothesis.family, suspect.hypothesis.at):
         return structure
     common = {name: value for name, value in fit.values(k).items() if name in suspect.start}
-    kin = (others.with_cause(suspect.hypothesis, s | common) for s in (suspect.start, *suspect.other_starts))
+    kin = (structure.restarted(len(others.causes), s | common) for s in (suspect.start, *suspect.other_starts))
     return min((structure, *kin), key=trials.fitter.initial_objective)
 
 

@@ -6,11 +6,12 @@ S+ = F(S, u) + F_delta delta, y = H(S, u) + H_delta delta, linearised along the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ctrlgen.devices import Device
 from ctrlgen.diagnosis.selection.candidate_terms import CandidateTerm, CandidateTerms
 from ctrlgen.diagnosis.selection.law_terms import LawTerms
 from ctrlgen.diagnosis.selection.ltv_propagation import LtvPropagation
@@ -19,8 +20,9 @@ from ctrlgen.estimation.disturbance_inputs import with_disturbance_inputs
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis, nominal_physics
 from ctrlgen.estimation.settings import CANDIDATE_TERMS
-from ctrlgen.estimation.simulator import Simulator
-from ctrlgen.recordings.recording import Record
+from ctrlgen.estimation.simulator import Simulator, compiled_simulator
+from ctrlgen.estimation.structure import Structure
+from ctrlgen.recordings.recording import Record, Timing
 
 
 @dataclass(eq=False)
@@ -42,6 +44,24 @@ class Sums:
         return Sums(self.US + other.US, self.Sr + other.Sr, self.SS + other.SS)
 
 
+def _probed(
+    structure: Structure, hypotheses: Sequence[Hypothesis], channels: tuple[str, ...], timing: Timing
+) -> tuple[Simulator, dict[tuple[Place, int], int]]:
+    """A simulator of which the numbers of the structure, those suspected and a disturbance at every place are free, and where each
+    disturbance is among them."""
+    device, probes = with_disturbance_inputs(structure.expanded_device, nominal_physics(structure.device))
+    known = [p.path for p in structure.free_parameters]
+    suspected = [h.path for h in hypotheses if h.effect == PARAMETER and h.path not in known]
+    free = (*known, *suspected, *probes.values())
+    entered = {where: free.index(path) for where, path in probes.items()}
+    return compiled_simulator(device, free, channels, timing), entered
+
+
+def law_terms(device: Device, hypotheses: Sequence[Hypothesis], channels: tuple[str, ...], timing: Timing) -> LawTerms:
+    """The terms of laws in any structure of a device."""
+    return LawTerms(timing, _probed(Structure(device), hypotheses, channels, timing)[0].model)
+
+
 class ScoreGradient:
     """The slopes of the readings by every hypothesis' amplitude on one record."""
 
@@ -55,21 +75,12 @@ class ScoreGradient:
         laws: LawTerms,
     ) -> None:
         self.fitter, self.record = fitter, record
-        probed, probes = with_disturbance_inputs(
-            fit.structure.device_with_causes, nominal_physics(fit.structure.device)
-        )
-        known = [u.path for u in fit.structure.free_parameters]
-        numbers = [h for h in hypotheses if h.effect == PARAMETER]
-        number_paths = [h.path for h in numbers if h.path not in known]
-        free = [*known, *number_paths, *probes.values()]
-        key = ("screen", fit.structure.causes, tuple(free), record.timing)
-        if key not in fitter.cache:
-            fitter.cache[key] = Simulator(probed, free, fitter.recording.channels, *record.timing)
-        self.simulator: Simulator = fitter.cache[key]
+        self.simulator, entered = _probed(fit.structure, hypotheses, fitter.recording.channels, record.timing)
+        free = self.simulator.free
         self.p = self.simulator.model.p_nominal.copy()
-        self.p[: len(known)] = fit.theta
-        self.p[len(known) + len(number_paths) :] = 0.0
-        entered = {where: free.index(path) for where, path in probes.items()}
+        self.p[: len(fit.theta)] = fit.theta
+        self.p[list(entered.values())] = 0.0
+        numbers = [h for h in hypotheses if h.effect == PARAMETER]
         others = [h for h in hypotheses if h.effect != PARAMETER]
         self.laws = CandidateTerms(laws, self.simulator, fit.structure, others, entered, seen)
         places = [free.index(h.path) for h in numbers]

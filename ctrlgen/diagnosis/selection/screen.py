@@ -18,7 +18,7 @@ import numpy as np
 
 from ctrlgen.diagnosis.selection.candidate_terms import CandidateTerm, Peaks, signal_peaks
 from ctrlgen.diagnosis.selection.law_terms import LawTerms
-from ctrlgen.diagnosis.selection.score_gradient import ScoreGradient, Sums
+from ctrlgen.diagnosis.selection.score_gradient import ScoreGradient, Sums, law_terms
 from ctrlgen.diagnosis.selection.spatial_periods import jump_positions, merged_periods, spatial_periods
 from ctrlgen.diagnosis.selection.subset_search import SubsetSearch, Suspect
 from ctrlgen.diagnosis.settings import SCREEN
@@ -69,8 +69,7 @@ class Screen:
         for record, start in zip(
             self.fitter.fit_records, fit.initial_states or [None] * len(self.fitter.fit_records), strict=True
         ):
-            laws = self.laws.setdefault(record.timing, LawTerms(record.timing))
-            slopes = ScoreGradient(self.fitter, fit, record, open_, seen, laws)
+            slopes = ScoreGradient(self.fitter, fit, record, open_, seen, self._laws(fit, record.timing))
             # the columns must be the same on every record
             if slopes.laws.unusable:
                 return self.run(fit, dropped | slopes.laws.unusable)
@@ -86,6 +85,13 @@ class Screen:
         size = np.linalg.norm(fit.J[:first], axis=0)
         likeness = np.abs(back @ sums.US) / np.maximum(size, 1e-150)[:, None]
         return replace(self._screened(columns, sums, U.T @ fit.residual, likeness), dropped=dropped)
+
+    def _laws(self, fit: Fit, timing: Timing) -> LawTerms:
+        """The terms of the hypotheses' laws for records of one timing."""
+        if timing not in self.laws:
+            channels = self.fitter.recording.channels
+            self.laws[timing] = law_terms(fit.structure.device, self.hypotheses, channels, timing)
+        return self.laws[timing]
 
     def data_hints(self, fit: Fit) -> Callable[[Place, int], DataHints]:
         """What the records show at each place, after what `fit` explains."""

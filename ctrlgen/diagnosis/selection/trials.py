@@ -78,16 +78,13 @@ class Trials:
         def work(item: Item) -> tuple[Result, _Learnt]:
             branch = copy.copy(self)
             branch.jobs, branch.step = 1, (lambda _: None)
-            if any(simulator.model.inertial for simulator in self.fitter.cache.values()):
-                # steps in time are expanded about the numbers of the structure that was first in need of them
-                branch.fitter = replace(self.fitter, cache=self.fitter.cache.copy())
             branch.fitted, branch.screens, branch.refused, branch.failed = dict(self.fitted), dict(self.screens), [], []
             result = function(branch, item)
             new = {key: value for key, value in branch.fitted.items() if self.fitted.get(key) is not value}
             return result, (new, branch.refused, branch.failed)
 
-        devices = {id(c.fit.structure.device): c.fit.structure.device for c, _ in self.fitted.values()}
-        shared = (self.fitter.recording, self.fitter.noise, self.fitter.errors, *devices.values())
+        devices = {c.fit.structure.device for c, _ in self.fitted.values()}
+        shared = (self.fitter.recording, self.fitter.noise, self.fitter.errors, *devices)
         begun = (lambda item: self.step(sentence(item))) if sentence else (lambda item: None)
         results = []
         for result, (new, refused, failed) in in_forks(work, items, self.jobs, begun, shared):

@@ -151,10 +151,11 @@ def _fitted(fitter: Fitter, fit: Fit, smoother: _Smoother) -> Fit:
     # as in a fit, spikes bend nothing
     trust = np.minimum(1.0, corner / np.maximum(np.abs(whole), 1e-300))
     best, least = fit, np.inf
+    # one simulator for all trials
+    smooth, last = fit.restarted.with_cause(smoother.cause, smoother.trials[0]), len(fit.structure.causes)
     for numbers in smoother.trials:
-        structure = fit.restarted.with_cause(smoother.cause, numbers)
+        structure = smooth.restarted(last, numbers)
         free, theta = structure.free_parameters, structure.start.copy()
-        last = len(structure.causes) - 1
         weights = [k for k, p in enumerate(free) if p.cause == last and p.name.startswith("c")]
         slopes = [
             fitter.simulator(structure, r).sensitivities(r, theta, start)[1][:, :, weights]
@@ -169,11 +170,9 @@ def _fitted(fitter: Fitter, fit: Fit, smoother: _Smoother) -> Fit:
         c, left = ridge_regression(trust[seen, None] * X[seen], trust[seen] * whole[seen])
         if left < least:
             theta[weights] = np.clip(c, [free[k].low for k in weights], [free[k].high for k in weights])
-            smooth = fit.restarted.with_cause(
-                smoother.cause, numbers | {free[k].name: float(theta[k]) for k in weights}
-            )
+            weighed = smooth.restarted(last, numbers | {free[k].name: float(theta[k]) for k in weights})
             empty = np.zeros(0)
-            best = replace(fit, structure=smooth, theta=theta, initial_states=(), residual=empty, J=empty)
+            best = replace(fit, structure=weighed, theta=theta, initial_states=(), residual=empty, J=empty)
             least = left
     return best
 
