@@ -202,7 +202,7 @@ def test_the_c_with_other_constants_is_the_controller_of_a_device_file_with_thes
 def test_an_ambient_that_changes_acts_from_the_next_sample_on(libraries, controller, real):
     library = libraries[real]
     assert library.init({}) == 0
-    cold, warm = (controller.kernels.at({"actuator.ambient": 273.15 + degC}) for degC in (22, 31))
+    cold, warm = (Controller(controller.kernels.at({"actuator.ambient": 273.15 + degC})) for degC in (22, 31))
     target = np.array([0, 0, 0, 2e-6, 0, 20e-6])
     state = cold.step(cold.rest(), target, settle=True).state
     library.call("settle", target)
