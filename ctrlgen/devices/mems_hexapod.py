@@ -234,13 +234,15 @@ class MemsHexapod(Device):
             else []
         )
 
+    def _resistance(self, actuator: Any) -> Any:
+        """The heaters' resistance where the drive is a voltage; None where it is the power."""
+        return actuator.heater_resistance if self.actuator.drive == "voltage" else None
+
     def _drive(self) -> Signal:
         """The heaters' drive, power or voltage."""
-        power, resistance = self.actuator.power_limit.si, self.actuator.heater_resistance.si
-        if self.actuator.drive == "voltage":
-            name, unit, column, largest = "voltage", "V", "V_", (power * resistance) ** 0.5
-        else:
-            name, unit, column, largest = "power", "W", "P_", power
+        name, unit, column = ("voltage", "V", "V_") if self.actuator.drive == "voltage" else ("power", "W", "P_")
+        actuator = self.values().actuator
+        _, largest = thermal_actuator.drive_range(actuator.power_limit, self._resistance(actuator))
         return Signal(name, f"heater {name}", self.axes, (unit,) * 6, column, ca.SX.sym("u", 6), (largest,) * 6)
 
     def _limits(
@@ -248,14 +250,14 @@ class MemsHexapod(Device):
     ) -> list[Limit]:
         """The limits on what `signal` holds; `loads` are those of the wires per displacement."""
         a, axes, d = p.actuator, self.axes, signal.displacement
-        most = (a.power_limit * a.heater_resistance) ** 0.5 if self.actuator.drive == "voltage" else a.power_limit
+        least, most = thermal_actuator.drive_range(a.power_limit, self._resistance(a))
         turn, turn_limit = xy_stage.rotation(d, p.stage), self.stage.notch_rotation_limit.si
         # The moment is linear along a strut, so its magnitude is convex: largest at one of the strut's own ends.
         wires = tuple(f"strut{i + 1}_{end}" for i in range(6) for end in ("base_bottom", "platform_top"))
         outermost = [4 * i + end for i in range(6) for end in (0, 3)]
         stress = hexapod.wire_stress(signal.mechanism_displacement, loads, p.hexapod)[outermost]
         return [
-            Limit("drive", f"commanded {drive.label}", axes, drive.units[0], signal.drive, 0.0, most),
+            Limit("drive", f"commanded {drive.label}", axes, drive.units[0], signal.drive, least, most),
             Limit("temperature", state.label, axes, "degC", signal.state, a.ambient, a.temperature_limit),
             Limit("force", "actuator force", axes, "N", signal.force, 0.0, None),
             Limit("stroke", "stage displacement", axes, "um", d, 0.0, self.stage.stroke.si),
@@ -272,9 +274,6 @@ class MemsHexapod(Device):
         T = ca.SX.sym("T", 6)
         state = Signal("temperature", "actuator temperature", self.axes, ("degC",) * 6, "T_", T, (100.0,) * 6)
         rotation_scale = 1e-6 / self.hexapod.platform_radius.si  # moves the platform's rim by 1 um
-
-        def heating_power(u: ca.SX) -> ca.SX:
-            return u**2 / a.heater_resistance if self.actuator.drive == "voltage" else u
 
         common: dict[str, Any] = dict(
             axes=self.axes,
@@ -303,7 +302,7 @@ class MemsHexapod(Device):
         if p.dynamics is None:
             return BalancedPhysics(
                 **common,
-                heating_power=heating_power,
+                heating_power=lambda u: thermal_actuator.heating_power(u, self._resistance(a)),
                 power=AxisSignal("heater power", "W", "P_", self.actuator.power_limit.si),
                 rates=lambda T, P: thermal_actuator.temperature_rate(T, P, a),
                 force=lambda u, T, d: thermal_actuator.force(T, a),
@@ -317,7 +316,7 @@ class MemsHexapod(Device):
             mass=M,
             dynamics=lambda u, T, d, v: (
                 thermal_actuator.force(T, a),
-                thermal_actuator.temperature_rate(T, heating_power(u), a),
+                thermal_actuator.temperature_rate(T, thermal_actuator.heating_power(u, self._resistance(a)), a),
             ),
             damping_force=lambda v: p.dynamics.damping_ratio * ca.mtimes(D, v),
         )

@@ -48,6 +48,17 @@ def temperature_rate(T: Scalar, P: Scalar, a: Any) -> Scalar:
     return (a.thermal_resistance * P - (T - a.ambient)) / a.time_constant
 
 
+def drive_range(power_limit: Scalar, resistance: Scalar | None) -> tuple[float, Scalar]:
+    """(lowest, highest) drive of a heater, which can only heat: 0 <= P <= P_max [W]; as a voltage 0 <= V <= sqrt(P_max R) [V], where a
+    `resistance` R [ohm] is given."""
+    return 0.0, power_limit if resistance is None else (power_limit * resistance) ** 0.5
+
+
+def heating_power(u: Scalar, resistance: Scalar | None) -> Scalar:
+    """P [W] of the drive `u`: itself, or V^2/R where a `resistance` [ohm] is given."""
+    return u if resistance is None else u**2 / resistance
+
+
 def beam_stiffness(a: Any) -> Matrix:
     """[K^tb] of one beam, wrench per twist, shape (6, 6). Source: S1 eq. (5).
 

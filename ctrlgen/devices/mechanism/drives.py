@@ -80,11 +80,20 @@ def _heated(c: Condensed) -> Transduction:
     axes, sections = tuple(a.name for a in actuators), [a.section for a in actuators]
     volts = sections[0].heater_resistance is not None  # of all, or of none
     heaters, nominal = _heaters(c, c.p), _heaters(c, c.device.values())
-    highest = [s.power_limit.si for s in sections]
-    if volts:
-        highest = [(s.power_limit.si * s.heater_resistance.si) ** 0.5 for s in sections]
+    ranges = tuple(
+        thermal_actuator.drive_range(s.power_limit.si, s.heater_resistance.si if s.heater_resistance else None)
+        for s in sections
+    )
     label, unit, column = ("heater voltage", "V", "V_") if volts else ("heater power", "W", "P_")
-    drive = Signal("voltage" if volts else "power", label, axes, (unit,) * n, column, ca.SX.sym("u", n), tuple(highest))
+    drive = Signal(
+        "voltage" if volts else "power",
+        label,
+        axes,
+        (unit,) * n,
+        column,
+        ca.SX.sym("u", n),
+        tuple(most for _, most in ranges),
+    )
     state = Signal("temperature", "actuator temperature", axes, ("degC",) * n, "T_", ca.SX.sym("T", n), (100.0,) * n)
     hottest = max(float(thermal_actuator.force(a.temperature_limit, a)) for a in nominal)
 
@@ -95,11 +104,11 @@ def _heated(c: Condensed) -> Transduction:
         return ca.vertcat(*(thermal_actuator.force(T[i], a) for i, a in enumerate(heaters)))
 
     def heat(u: ca.SX) -> ca.SX:
-        return u**2 / ca.vertcat(*(a.heater_resistance for a in heaters)) if volts else u
+        return thermal_actuator.heating_power(u, ca.vertcat(*(a.heater_resistance for a in heaters)) if volts else None)
 
     return Transduction(
         drive,
-        tuple((0.0, most) for most in highest),
+        ranges,
         force,
         hottest,
         state,
