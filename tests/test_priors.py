@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from ctrlgen.effects import Effect, Param
-from ctrlgen.estimation.priors import DEFAULT, PRIORS, LawPrior, default_starts, prior_of
+from ctrlgen.estimation.law_prior import LawPrior, default_starts
+from ctrlgen.estimation.priors import DEFAULT, PRIORS, prior_of
 
 STARTS_FROM_DATA = {"", "moments", "spatial_periods", "jump_positions"}
 every_law = pytest.mark.parametrize("law", Effect.library.values(), ids=Effect.library)

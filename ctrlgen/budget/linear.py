@@ -73,9 +73,8 @@ def propagate(path: UncertainPath) -> Propagated:
             P = {of: carried[of] + B[j] @ Q[k] @ B[j].T for of, Q in scatters.items()}
     if not all(np.isfinite(Y).all() for Y in (*sensitivity.values(), *nominal.values())):
         raise FloatingPointError("the sensitivities of the path are no numbers")
-    scatter = {  # what cancels in a channel leaves a variance of rounding's sign
-        name: {of: np.sqrt(np.maximum(value, 0.0)) for of, value in by.items()} for name, by in variance.items()
-    }
+    # What cancels in a channel leaves a variance of rounding's sign
+    scatter = {name: {of: np.sqrt(np.maximum(value, 0.0)) for of, value in by.items()} for name, by in variance.items()}
     return Propagated(nominal, sensitivity, scatter, S)
 
 

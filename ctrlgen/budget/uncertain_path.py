@@ -89,9 +89,8 @@ class UncertainPath:
             self._add("states", x)
             z = balanced(m, m.x, m.u, NEWTON_STEPS)
             rises = ca.mmax(ca.substitute(ca.diag(ca.jacobian(m.balance, m.z)), m.z, z)) < 0
-            self._add(
-                "balanced", ca.if_else(rises, z, np.nan)
-            )  # where the restoring force does not rise, no stage stays
+            # Where the restoring force does not rise, no stage stays
+            self._add("balanced", ca.if_else(rises, z, np.nan))
         return True
 
     def _add(self, name: str, value: ca.SX) -> None:

@@ -33,9 +33,8 @@ def _registry() -> pint.UnitRegistry[Any]:
     registry: pint.UnitRegistry[Any] = pint.UnitRegistry(
         autoconvert_offset_to_baseunit=True, cache_folder=None, on_redefinition="ignore"
     )
-    registry.define(
-        "radian = [angle] = rad"
-    )  # a dimension of its own: rpm is not Hz, and a plain number is not an angle
+    # a dimension of its own: rpm is not Hz, and a plain number is not an angle
+    registry.define("radian = [angle] = rad")
     registry._build_cache()  # degrees and milliradians still refer to the radian that was replaced
     return registry
 

@@ -15,7 +15,8 @@ from ctrlgen.devices import Device, DevicePhysics
 from ctrlgen.devices.quantities import walk
 from ctrlgen.devices.section import Section
 from ctrlgen.effects import Channel, Effect, Param, Place
-from ctrlgen.estimation.priors import DEFAULT, LawPrior, prior_of
+from ctrlgen.estimation.law_prior import LawPrior
+from ctrlgen.estimation.priors import DEFAULT, prior_of
 from ctrlgen.estimation.settings import CANDIDATE_TERMS
 from ctrlgen.model.effect_terms import available, channels, partner_channels
 

@@ -9,89 +9,10 @@ by judgement and has no measurement or source behind it; such numbers were check
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from math import exp, log
 from types import MappingProxyType
 
-from ctrlgen.effects import Effect, Param
-
-ONE_IN_TEN = -2.3  # ln(1/10)
-ONE_IN_A_HUNDRED = -4.6
-
-
-@dataclass(frozen=True)
-class ParameterPrior:
-    """Where the search looks for one parameter. Numbers count in the unit of the parameter's bounds.
-
-    start_values: values from which a fit may start; of an amplitude, values at which the law is also linearised (by the secant
-        from `off`), for laws whose effect is not proportional to a small amplitude.
-    scales_with_peak: the start values are multiples of the largest value in the recording of the signal of that unit: the
-        channel's, the travel's, the travel's rate, or, for a time, one twelfth of the recording's duration.
-    start_from_data: starts that the recording suggests are tried too: "spatial_periods" (periods along the path that stand
-        out of the residual), "jump_positions" (places along the path at which it jumps), "moments" (times spread over the
-        recording). Frequencies in Hz always take the lines of the residual's spectrum as well.
-    plausible_range: of an amplitude: a fit that ends outside is another cause under this law's name, and is rejected.
-    fixed_range: of an amplitude: the law is present or absent. Its amplitude is set to the middle of the range, not fitted.
-    """
-
-    start_values: tuple[float, ...] = ()
-    scales_with_peak: bool = False
-    start_from_data: str = ""
-    plausible_range: tuple[float, float] | None = None
-    fixed_range: tuple[float, float] | None = None
-
-
-@dataclass(frozen=True)
-class NestedCase:
-    """The law `effect` that this law becomes where `parameter` is at `value` [SI]."""
-
-    effect: str
-    parameter: str
-    value: float
-
-
-@dataclass(frozen=True)
-class LawPrior:
-    """What the search believes of one law.
-
-    log_prior_odds: ln of how many times commoner the law is than a wrong gain; decides among causes that explain alike.
-    model_form_error: error of the law's form after its parameters are fitted, as a share of what the law explains.
-    family: name shared by laws that are forms of one physics; a place has at most one of a family.
-    nested_case: the simpler law inside this one; where the fit does not exclude it, it is named as an alternative.
-    unless: what a device must not have (words of `Effect.requires`) for the law to be suspected there: another law says the same.
-    suspected: False for what a device file may state, and no recording shows beside what else it shows.
-    repeatable: the law may act more than once at one place, as harmonics do.
-    acts_on_all: the law is suspected at all channels at once only.
-    domain: where a finding is reported to be; by default what the law's place says.
-    parameters: by name; one that is not listed gets `default_starts`.
-    """
-
-    reason: str = "Default: as common as a wrong gain, its form exact."
-    log_prior_odds: float = 0.0
-    model_form_error: float = 0.0
-    family: str | None = None
-    nested_case: NestedCase | None = None
-    unless: frozenset[str] = frozenset()
-    suspected: bool = True
-    repeatable: bool = False
-    acts_on_all: bool = False
-    domain: str | None = None
-    parameters: Mapping[str, ParameterPrior] = field(default_factory=dict)
-
-    def of(self, parameter: Param) -> ParameterPrior:
-        """The row of one parameter of the law, or its default."""
-        return self.parameters.get(parameter.name) or ParameterPrior(default_starts(parameter))
-
-
-def default_starts(parameter: Param) -> tuple[float, ...]:
-    """Three start values, at 1/6, 1/2 and 5/6 of the way between the bounds, on a logarithmic scale where both are positive
-    and a decade or more apart; none for an amplitude."""
-    low, high = parameter.bounds
-    if parameter.off is not None:
-        return ()
-    if low > 0 and high >= 10 * low:
-        return tuple(exp(log(low) + k / 6 * log(high / low)) for k in (1, 3, 5))
-    return tuple(low + k / 6 * (high - low) for k in (1, 3, 5))
+from ctrlgen.effects import Effect
+from ctrlgen.estimation.law_prior import ONE_IN_A_HUNDRED, ONE_IN_TEN, LawPrior, NestedCase, ParameterPrior
 
 
 def prior_of(law: type[Effect]) -> LawPrior:
@@ -123,260 +44,297 @@ _IN_BALANCE = (
 )
 _CREEP = "Forms of one relaxation spectrum; 1 %: judgement."
 
-PRIORS: Mapping[str, LawPrior] = MappingProxyType({
-    # Sensor ---------------------------------------------------------------------------------------------------------------
-    "bow": LawPrior("No sensor is bent by its first even term alone; 5 %: judgement.", model_form_error=0.05),
-    "cyclic": LawPrior(
-        "Harmonics: several at one place. Periods from a twentieth of the typical size to twice it, and those seen in the residual.",
-        repeatable=True,
-        parameters={
-            "period": ParameterPrior(
-                (2.0, 4 / 3, 1.0, 2 / 3, 0.5, 1 / 3, 0.25, 1 / 6, 0.125, 0.1, 0.05), start_from_data="spatial_periods"
-            ),
-            "phase": _starts((0.0, 90.0)),
-        },
-    ),
-    "clock_offset": LawPrior(
-        "One pair of recorders for all readings; rarer than a late reading, which is named first: judgement.",
-        log_prior_odds=ONE_IN_TEN,
-        acts_on_all=True,
-        domain="recording",
-    ),
-    "delay": LawPrior("Error of the interpolation between samples; 0.1 %: judgement.", model_form_error=0.001),
-    "drift": LawPrior("What drifts also wanders; 10 %: judgement.", model_form_error=0.1),
-    "home_offset": LawPrior(
-        "Readings are zeroed before a run, and an offset fits the mean of any residual of one sign, as of friction in one "
-        "direction: judgement.",
-        log_prior_odds=ONE_IN_TEN,
-    ),
-    "low_pass": LawPrior(
-        "No filter has exactly two poles; 0.5 %: judgement. A real filter acts on the whole reading: one that is fitted to a part "
-        "of it stands for something else.",
-        model_form_error=0.005,
-        parameters={
-            "share": ParameterPrior(plausible_range=(0.8, 1.2)),
-            "tau": _starts((1e-3, 8e-3, 0.06, 0.5)),
-            "damping": _starts((0.7, 4.0)),
-        },
-    ),
-    "quantisation": LawPrior(
-        "Steps of half a decade each, from 1e-4 to 0.1 of the typical size.",
-        parameters={"quantum": _starts((1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1))},
-    ),
-    "sensor_step": LawPrior(_EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, domain="disturbance", parameters=_EVENT),
-    "stitching_error": LawPrior(
-        "Rarer than errors that act along the whole path: judgement. A scale may have several joints.",
-        log_prior_odds=-1.0,
-        repeatable=True,
-        parameters={
-            "position": ParameterPrior(start_from_data="jump_positions"),
-            "width": _starts((0.005, 0.03)),
-        },
-    ),
-    "stuck": LawPrior(
-        "A dead channel is rarer than a wrong gain: judgement. A channel is dead or it is not.",
-        log_prior_odds=ONE_IN_TEN,
-        parameters={"share": ParameterPrior(fixed_range=(0.8, 1.2)), "level": _starts((0.0, 1.0))},
-    ),
-    "temperature_sensitivity": LawPrior(
-        "Right at the rise at which home was set, unless the fit says otherwise.", parameters={"reference": _starts((0.0,))}
-    ),
-    "vibration": LawPrior(
-        "From outside. Frequencies of mains and rotating machines, and the lines of the residual's spectrum.",
-        domain="disturbance",
-        parameters={
-            "frequency": _starts((10.0, 16.7, 25.0, 33.0, 50.0, 60.0, 100.0, 120.0)),
-            "phase": _starts((0.0, 90.0)),
-        },
-    ),
-    "zero_per_record": LawPrior(
-        "Within one record it is a home offset, and over several it fits the mean of whatever is missing: it is stated.",
-        suspected=False,
-        parameters={"share": ParameterPrior(fixed_range=(0.8, 1.2))},
-    ),
-    # Drive and heat -------------------------------------------------------------------------------------------------------
-    "asymmetric_gain": LawPrior("Rarer than a gain that is wrong in both directions: judgement.", log_prior_odds=ONE_IN_TEN),
-    "butterfly": LawPrior(
-        "Actuators without bias are rare: judgement. " + _HYSTERESIS,
-        log_prior_odds=ONE_IN_TEN,
-        unless=frozenset({"heat"}),
-        model_form_error=0.02,
-        family="hysteresis",
-        parameters={
-            "linear": _starts((0.0, 1.0)),
-            "reach": _starts((0.03, 0.1, 0.3, 1.0)),
-            "taper": _starts((0.0,)),
-        },
-    ),
-    "dead_zone": LawPrior(
-        "Between contacts that open (0.03) and an electronic crossover (1).", parameters={"rounding": _starts((0.3,))}
-    ),
-    "degradation": LawPrior(
-        "From a loss that ends within the recording to a steady one.", parameters={"levels_off": _starts((3.0, 30.0, 1e4))}
-    ),
-    "drive_hysteresis": LawPrior(
-        "Rarer than hysteresis of the stage, which explains the same in a stage of constant stiffness: judgement. Heaters have none. "
-        + _HYSTERESIS,
-        log_prior_odds=ONE_IN_TEN,
-        unless=frozenset({"heat"}),
-        model_form_error=0.02,
-        family="hysteresis",
-        parameters={"reach": _starts((0.03, 0.1, 0.3, 1.0)), "taper": _starts((0.0,))},
-    ),
-    "reversed": LawPrior(
-        "A wiring fault is rarer than a wrong gain: judgement. A lead is swapped or it is not.",
-        log_prior_odds=ONE_IN_TEN,
-        domain="mechanism",
-        parameters={"share": ParameterPrior(fixed_range=(0.9, 1.1))},
-    ),
-    "saturation": LawPrior(
-        "A limit beyond the peak shows nowhere; one far below it would have been noticed. An amplifier clips or it does not.",
-        parameters={
-            "share": ParameterPrior(fixed_range=(0.5, 1.5)),
-            "level": _peaks(0.2, 0.4, 0.6, 0.8, 0.9, 0.97),
-        },
-    ),
-    "second_pole": LawPrior(
-        "Time constants from a chip's to a room's.", parameters={"tau": _starts((2e-3, 0.01, 0.05, 0.3, 2.0, 20.0))}
-    ),
-    "swapped": LawPrior(
-        "A wiring fault is rarer than a wrong gain: judgement. Two leads are exchanged or they are not.",
-        log_prior_odds=ONE_IN_TEN,
-        domain="mechanism",
-        parameters={"share": ParameterPrior(fixed_range=(0.9, 1.1))},
-    ),
-    "thermal_lag": LawPrior(
-        "Three time constants stand for a continuous body; 2 %: judgement. Their ratio: between one mass and a rod (1/9) and above.",
-        model_form_error=0.02,
-        parameters={
-            "tau": _starts((0.01, 0.05, 0.3, 1.0, 3.0, 10.0, 60.0)),
-            "second": _starts((0.05, 0.3)),
-        },
-    ),
-    # Force ----------------------------------------------------------------------------------------------------------------
-    "asymmetric_hysteresis": LawPrior(
-        "Rarer than a symmetric loop: judgement. " + _HYSTERESIS + _IN_BALANCE,
-        log_prior_odds=ONE_IN_TEN,
-        unless=frozenset({"balanced"}),
-        model_form_error=0.02,
-        family="hysteresis",
-        parameters={"reach": _starts((0.01, 0.03, 0.1, 0.3, 1.0)), "skew": _starts((-0.6, 0.6))},
-    ),
-    "bouc_wen": LawPrior(
-        _HYSTERESIS + _IN_BALANCE,
-        unless=frozenset({"balanced"}),
-        model_form_error=0.02,
-        family="hysteresis",
-        parameters={"reach": _starts((0.01, 0.03, 0.1, 0.3, 1.0)), "loop": _starts((0.55, 0.9))},
-    ),
-    "coulomb": LawPrior(
-        _DRY_FRICTION,
-        model_form_error=0.02,
-        family="dry friction",
-        parameters={"reach": _peaks(3e-4, 3e-3, 0.03), "smoothing": _peaks(1e-4, 0.1)},
-    ),
-    "directional_friction": LawPrior(
-        "Dry friction alike in both directions is commoner: judgement. " + _DRY_FRICTION,
-        log_prior_odds=-1.0,
-        model_form_error=0.02,
-        family="dry friction",
-        nested_case=NestedCase("coulomb", "skew", 0.0),
-        parameters={"skew": _starts((-0.3, 0.3)), "reach": _peaks(3e-4, 3e-3, 0.03)},
-    ),
-    "end_stop": LawPrior(
-        "A contact is neither a spring nor Hertz's ball; 5 %: judgement. A stop beyond the peak is never touched.",
-        model_form_error=0.05,
-        parameters={"gap": _peaks(-0.97, -0.9, -0.7, -0.4, 0.4, 0.7, 0.9, 0.97), "power": _starts((1.0, 1.5))},
-    ),
-    "force_step": LawPrior(_EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, domain="disturbance", parameters=_EVENT),
-    "hysteresis": LawPrior(
-        _HYSTERESIS + _IN_BALANCE,
-        unless=frozenset({"balanced"}),
-        model_form_error=0.02,
-        family="hysteresis",
-        parameters={"reach": _starts((0.03, 0.1, 0.3, 1.0, 2.0)), "taper": _starts((0.5,))},
-    ),
-    "lost_beams": LawPrior(_EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, parameters=_EVENT),
-    "one_sided_stiffening": LawPrior(
-        "A flexure that is straight at home stiffens alike to both sides: rarer than that. Judgement.", log_prior_odds=-1.0
-    ),
-    "resonance": LawPrior(
-        "A payload has more than one mode; 1 %: judgement. Octaves of frequency, lightly and well damped.",
-        model_form_error=0.01,
-        parameters={"frequency": _starts((10.0, 20.0, 40.0, 80.0, 160.0, 320.0)), "damping": _starts((0.02, 0.2))},
-    ),
-    "slack_friction": LawPrior(
-        "Friction without a slack before it is commoner: judgement. " + _HYSTERESIS + _IN_BALANCE,
-        log_prior_odds=-1.0,
-        unless=frozenset({"balanced"}),
-        model_form_error=0.02,
-        family="hysteresis",
-        parameters={"slack": _peaks(0.1, 0.3, 0.6), "reach": _peaks(0.03, 0.1, 0.3)},
-    ),
-    "stribeck": LawPrior(
-        "Dry friction that does not fall with speed is commoner: judgement. " + _DRY_FRICTION,
-        log_prior_odds=-1.0,
-        model_form_error=0.02,
-        family="dry friction",
-        nested_case=NestedCase("coulomb", "breakaway", 1.0),
-        parameters={"breakaway": _starts((1.8,)), "speed": _peaks(0.01, 0.05, 0.2), "reach": _peaks(1e-3, 0.01)},
-    ),
-    # Displacement and pose ------------------------------------------------------------------------------------------------
-    "backlash": LawPrior(
-        "Reversals between two samples are placed to 1 %: measured on simulated play.",
-        model_form_error=0.01,
-        parameters={"gap": _peaks(1e-4, 1e-3, 0.01, 0.1, 0.3)},
-    ),
-    "creep": LawPrior(
-        _CREEP,
-        model_form_error=0.01,
-        family="creep",
-        parameters={"tau": _starts((0.03, 0.3, 3.0, 30.0, 300.0)), "slow": _starts((0.0, 0.25))},
-    ),
-    "displacement_bouc_wen": LawPrior(
-        _HYSTERESIS,
-        model_form_error=0.02,
-        family="hysteresis",
-        parameters={"reach": _peaks(0.01, 0.03, 0.1, 0.3, 1.0), "loop": _starts((0.55, 0.9))},
-    ),
-    "displacement_hysteresis": LawPrior(
-        _HYSTERESIS,
-        model_form_error=0.02,
-        family="hysteresis",
-        parameters={"reach": _peaks(0.03, 0.1, 0.3, 1.0), "taper": _starts((0.5,)), "reversible": _starts((0.0, 1.0))},
-    ),
-    "finite_rotation": LawPrior("One geometry for all components.", acts_on_all=True),
-    "lever_ratio": LawPrior(
-        "Explains nearly the same as a gain of the drive, which is named first: judgement; where the drive is a displacement, just "
-        "the same.",
-        log_prior_odds=ONE_IN_TEN,
-        unless=frozenset({"displacement_command"}),
-    ),
-    "link_load": LawPrior("One mechanism loads all stages.", acts_on_all=True),
-    "log_creep": LawPrior(
-        _CREEP,
-        model_form_error=0.01,
-        family="creep",
-        parameters={"tau": _starts((0.01, 0.1, 1.0)), "decades": _starts((3.25,))},
-    ),
-    "lost_motion": LawPrior(
-        "On a stage of constant stiffness the same as a gain of the drive, which is named first: judgement.",
-        log_prior_odds=ONE_IN_TEN,
-    ),
-    "payload": LawPrior("Upright, or hanging out sideways.", parameters={"lean": _starts((0.0, 90.0))}),
-    # Empirical: written where no law reaches what is left, never suspected ---------------------------------------------------
-    **dict.fromkeys(
-        ("empirical_history", "empirical_position", "empirical_speed"),
-        LawPrior("A smoother of what no law reaches: `shares.empirical_terms` gives it its numbers.", suspected=False),
-    ),
-    # One amplitude and no shape: the default ------------------------------------------------------------------------------
-    **dict.fromkeys(
-        (
-            "abbe_arm", "asymmetric_viscous", "coupling", "cubic_sensor", "damping_coupling", "drive_gain", "drive_offset",
-            "expansion", "frame_rotation_x", "frame_rotation_y", "frame_rotation_z", "heat_crosstalk", "heater_resistance",
-            "inertia_coupling", "link_compliance", "quadratic_damping", "raised_point", "screw_motion", "sensor_gain",
-            "stiffening", "stiffness", "stiffness_coupling",
+PRIORS: Mapping[str, LawPrior] = MappingProxyType(
+    {
+        # Sensor ---------------------------------------------------------------------------------------------------------------
+        "bow": LawPrior("No sensor is bent by its first even term alone; 5 %: judgement.", model_form_error=0.05),
+        "cyclic": LawPrior(
+            "Harmonics: several at one place. Periods from a twentieth of the typical size to twice it, and those seen in the residual.",
+            repeatable=True,
+            parameters={
+                "period": ParameterPrior(
+                    (2.0, 4 / 3, 1.0, 2 / 3, 0.5, 1 / 3, 0.25, 1 / 6, 0.125, 0.1, 0.05),
+                    start_from_data="spatial_periods",
+                ),
+                "phase": _starts((0.0, 90.0)),
+            },
         ),
-        DEFAULT,
-    ),
-})  # fmt: skip
+        "clock_offset": LawPrior(
+            "One pair of recorders for all readings; rarer than a late reading, which is named first: judgement.",
+            log_prior_odds=ONE_IN_TEN,
+            acts_on_all=True,
+            domain="recording",
+        ),
+        "delay": LawPrior("Error of the interpolation between samples; 0.1 %: judgement.", model_form_error=0.001),
+        "drift": LawPrior("What drifts also wanders; 10 %: judgement.", model_form_error=0.1),
+        "home_offset": LawPrior(
+            "Readings are zeroed before a run, and an offset fits the mean of any residual of one sign, as of friction in one "
+            "direction: judgement.",
+            log_prior_odds=ONE_IN_TEN,
+        ),
+        "low_pass": LawPrior(
+            "No filter has exactly two poles; 0.5 %: judgement. A real filter acts on the whole reading: one that is fitted to a part "
+            "of it stands for something else.",
+            model_form_error=0.005,
+            parameters={
+                "share": ParameterPrior(plausible_range=(0.8, 1.2)),
+                "tau": _starts((1e-3, 8e-3, 0.06, 0.5)),
+                "damping": _starts((0.7, 4.0)),
+            },
+        ),
+        "quantisation": LawPrior(
+            "Steps of half a decade each, from 1e-4 to 0.1 of the typical size.",
+            parameters={"quantum": _starts((1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1))},
+        ),
+        "sensor_step": LawPrior(
+            _EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, domain="disturbance", parameters=_EVENT
+        ),
+        "stitching_error": LawPrior(
+            "Rarer than errors that act along the whole path: judgement. A scale may have several joints.",
+            log_prior_odds=-1.0,
+            repeatable=True,
+            parameters={
+                "position": ParameterPrior(start_from_data="jump_positions"),
+                "width": _starts((0.005, 0.03)),
+            },
+        ),
+        "stuck": LawPrior(
+            "A dead channel is rarer than a wrong gain: judgement. A channel is dead or it is not.",
+            log_prior_odds=ONE_IN_TEN,
+            parameters={"share": ParameterPrior(fixed_range=(0.8, 1.2)), "level": _starts((0.0, 1.0))},
+        ),
+        "temperature_sensitivity": LawPrior(
+            "Right at the rise at which home was set, unless the fit says otherwise.",
+            parameters={"reference": _starts((0.0,))},
+        ),
+        "vibration": LawPrior(
+            "From outside. Frequencies of mains and rotating machines, and the lines of the residual's spectrum.",
+            domain="disturbance",
+            parameters={
+                "frequency": _starts((10.0, 16.7, 25.0, 33.0, 50.0, 60.0, 100.0, 120.0)),
+                "phase": _starts((0.0, 90.0)),
+            },
+        ),
+        "zero_per_record": LawPrior(
+            "Within one record it is a home offset, and over several it fits the mean of whatever is missing: it is stated.",
+            suspected=False,
+            parameters={"share": ParameterPrior(fixed_range=(0.8, 1.2))},
+        ),
+        # Drive and heat -------------------------------------------------------------------------------------------------------
+        "asymmetric_gain": LawPrior(
+            "Rarer than a gain that is wrong in both directions: judgement.", log_prior_odds=ONE_IN_TEN
+        ),
+        "butterfly": LawPrior(
+            "Actuators without bias are rare: judgement. " + _HYSTERESIS,
+            log_prior_odds=ONE_IN_TEN,
+            unless=frozenset({"heat"}),
+            model_form_error=0.02,
+            family="hysteresis",
+            parameters={
+                "linear": _starts((0.0, 1.0)),
+                "reach": _starts((0.03, 0.1, 0.3, 1.0)),
+                "taper": _starts((0.0,)),
+            },
+        ),
+        "dead_zone": LawPrior(
+            "Between contacts that open (0.03) and an electronic crossover (1).",
+            parameters={"rounding": _starts((0.3,))},
+        ),
+        "degradation": LawPrior(
+            "From a loss that ends within the recording to a steady one.",
+            parameters={"levels_off": _starts((3.0, 30.0, 1e4))},
+        ),
+        "drive_hysteresis": LawPrior(
+            "Rarer than hysteresis of the stage, which explains the same in a stage of constant stiffness: judgement. Heaters have none. "
+            + _HYSTERESIS,
+            log_prior_odds=ONE_IN_TEN,
+            unless=frozenset({"heat"}),
+            model_form_error=0.02,
+            family="hysteresis",
+            parameters={"reach": _starts((0.03, 0.1, 0.3, 1.0)), "taper": _starts((0.0,))},
+        ),
+        "reversed": LawPrior(
+            "A wiring fault is rarer than a wrong gain: judgement. A lead is swapped or it is not.",
+            log_prior_odds=ONE_IN_TEN,
+            domain="mechanism",
+            parameters={"share": ParameterPrior(fixed_range=(0.9, 1.1))},
+        ),
+        "saturation": LawPrior(
+            "A limit beyond the peak shows nowhere; one far below it would have been noticed. An amplifier clips or it does not.",
+            parameters={
+                "share": ParameterPrior(fixed_range=(0.5, 1.5)),
+                "level": _peaks(0.2, 0.4, 0.6, 0.8, 0.9, 0.97),
+            },
+        ),
+        "second_pole": LawPrior(
+            "Time constants from a chip's to a room's.", parameters={"tau": _starts((2e-3, 0.01, 0.05, 0.3, 2.0, 20.0))}
+        ),
+        "swapped": LawPrior(
+            "A wiring fault is rarer than a wrong gain: judgement. Two leads are exchanged or they are not.",
+            log_prior_odds=ONE_IN_TEN,
+            domain="mechanism",
+            parameters={"share": ParameterPrior(fixed_range=(0.9, 1.1))},
+        ),
+        "thermal_lag": LawPrior(
+            "Three time constants stand for a continuous body; 2 %: judgement. Their ratio: between one mass and a rod (1/9) and above.",
+            model_form_error=0.02,
+            parameters={
+                "tau": _starts((0.01, 0.05, 0.3, 1.0, 3.0, 10.0, 60.0)),
+                "second": _starts((0.05, 0.3)),
+            },
+        ),
+        # Force ----------------------------------------------------------------------------------------------------------------
+        "asymmetric_hysteresis": LawPrior(
+            "Rarer than a symmetric loop: judgement. " + _HYSTERESIS + _IN_BALANCE,
+            log_prior_odds=ONE_IN_TEN,
+            unless=frozenset({"balanced"}),
+            model_form_error=0.02,
+            family="hysteresis",
+            parameters={"reach": _starts((0.01, 0.03, 0.1, 0.3, 1.0)), "skew": _starts((-0.6, 0.6))},
+        ),
+        "bouc_wen": LawPrior(
+            _HYSTERESIS + _IN_BALANCE,
+            unless=frozenset({"balanced"}),
+            model_form_error=0.02,
+            family="hysteresis",
+            parameters={"reach": _starts((0.01, 0.03, 0.1, 0.3, 1.0)), "loop": _starts((0.55, 0.9))},
+        ),
+        "coulomb": LawPrior(
+            _DRY_FRICTION,
+            model_form_error=0.02,
+            family="dry friction",
+            parameters={"reach": _peaks(3e-4, 3e-3, 0.03), "smoothing": _peaks(1e-4, 0.1)},
+        ),
+        "directional_friction": LawPrior(
+            "Dry friction alike in both directions is commoner: judgement. " + _DRY_FRICTION,
+            log_prior_odds=-1.0,
+            model_form_error=0.02,
+            family="dry friction",
+            nested_case=NestedCase("coulomb", "skew", 0.0),
+            parameters={"skew": _starts((-0.3, 0.3)), "reach": _peaks(3e-4, 3e-3, 0.03)},
+        ),
+        "end_stop": LawPrior(
+            "A contact is neither a spring nor Hertz's ball; 5 %: judgement. A stop beyond the peak is never touched.",
+            model_form_error=0.05,
+            parameters={"gap": _peaks(-0.97, -0.9, -0.7, -0.4, 0.4, 0.7, 0.9, 0.97), "power": _starts((1.0, 1.5))},
+        ),
+        "force_step": LawPrior(
+            _EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, domain="disturbance", parameters=_EVENT
+        ),
+        "hysteresis": LawPrior(
+            _HYSTERESIS + _IN_BALANCE,
+            unless=frozenset({"balanced"}),
+            model_form_error=0.02,
+            family="hysteresis",
+            parameters={"reach": _starts((0.03, 0.1, 0.3, 1.0, 2.0)), "taper": _starts((0.5,))},
+        ),
+        "lost_beams": LawPrior(_EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, parameters=_EVENT),
+        "one_sided_stiffening": LawPrior(
+            "A flexure that is straight at home stiffens alike to both sides: rarer than that. Judgement.",
+            log_prior_odds=-1.0,
+        ),
+        "resonance": LawPrior(
+            "A payload has more than one mode; 1 %: judgement. Octaves of frequency, lightly and well damped.",
+            model_form_error=0.01,
+            parameters={"frequency": _starts((10.0, 20.0, 40.0, 80.0, 160.0, 320.0)), "damping": _starts((0.02, 0.2))},
+        ),
+        "slack_friction": LawPrior(
+            "Friction without a slack before it is commoner: judgement. " + _HYSTERESIS + _IN_BALANCE,
+            log_prior_odds=-1.0,
+            unless=frozenset({"balanced"}),
+            model_form_error=0.02,
+            family="hysteresis",
+            parameters={"slack": _peaks(0.1, 0.3, 0.6), "reach": _peaks(0.03, 0.1, 0.3)},
+        ),
+        "stribeck": LawPrior(
+            "Dry friction that does not fall with speed is commoner: judgement. " + _DRY_FRICTION,
+            log_prior_odds=-1.0,
+            model_form_error=0.02,
+            family="dry friction",
+            nested_case=NestedCase("coulomb", "breakaway", 1.0),
+            parameters={"breakaway": _starts((1.8,)), "speed": _peaks(0.01, 0.05, 0.2), "reach": _peaks(1e-3, 0.01)},
+        ),
+        # Displacement and pose ------------------------------------------------------------------------------------------------
+        "backlash": LawPrior(
+            "Reversals between two samples are placed to 1 %: measured on simulated play.",
+            model_form_error=0.01,
+            parameters={"gap": _peaks(1e-4, 1e-3, 0.01, 0.1, 0.3)},
+        ),
+        "creep": LawPrior(
+            _CREEP,
+            model_form_error=0.01,
+            family="creep",
+            parameters={"tau": _starts((0.03, 0.3, 3.0, 30.0, 300.0)), "slow": _starts((0.0, 0.25))},
+        ),
+        "displacement_bouc_wen": LawPrior(
+            _HYSTERESIS,
+            model_form_error=0.02,
+            family="hysteresis",
+            parameters={"reach": _peaks(0.01, 0.03, 0.1, 0.3, 1.0), "loop": _starts((0.55, 0.9))},
+        ),
+        "displacement_hysteresis": LawPrior(
+            _HYSTERESIS,
+            model_form_error=0.02,
+            family="hysteresis",
+            parameters={
+                "reach": _peaks(0.03, 0.1, 0.3, 1.0),
+                "taper": _starts((0.5,)),
+                "reversible": _starts((0.0, 1.0)),
+            },
+        ),
+        "finite_rotation": LawPrior("One geometry for all components.", acts_on_all=True),
+        "lever_ratio": LawPrior(
+            "Explains nearly the same as a gain of the drive, which is named first: judgement; where the drive is a displacement, just "
+            "the same.",
+            log_prior_odds=ONE_IN_TEN,
+            unless=frozenset({"displacement_command"}),
+        ),
+        "link_load": LawPrior("One mechanism loads all stages.", acts_on_all=True),
+        "log_creep": LawPrior(
+            _CREEP,
+            model_form_error=0.01,
+            family="creep",
+            parameters={"tau": _starts((0.01, 0.1, 1.0)), "decades": _starts((3.25,))},
+        ),
+        "lost_motion": LawPrior(
+            "On a stage of constant stiffness the same as a gain of the drive, which is named first: judgement.",
+            log_prior_odds=ONE_IN_TEN,
+        ),
+        "payload": LawPrior("Upright, or hanging out sideways.", parameters={"lean": _starts((0.0, 90.0))}),
+        # Empirical: written where no law reaches what is left, never suspected ---------------------------------------------------
+        **dict.fromkeys(
+            ("empirical_history", "empirical_position", "empirical_speed"),
+            LawPrior(
+                "A smoother of what no law reaches: `shares.empirical_terms` gives it its numbers.", suspected=False
+            ),
+        ),
+        # One amplitude and no shape: the default ------------------------------------------------------------------------------
+        **dict.fromkeys(
+            (
+                "abbe_arm",
+                "asymmetric_viscous",
+                "coupling",
+                "cubic_sensor",
+                "damping_coupling",
+                "drive_gain",
+                "drive_offset",
+                "expansion",
+                "frame_rotation_x",
+                "frame_rotation_y",
+                "frame_rotation_z",
+                "heat_crosstalk",
+                "heater_resistance",
+                "inertia_coupling",
+                "link_compliance",
+                "quadratic_damping",
+                "raised_point",
+                "screw_motion",
+                "sensor_gain",
+                "stiffening",
+                "stiffness",
+                "stiffness_coupling",
+            ),
+            DEFAULT,
+        ),
+    }
+)

@@ -52,9 +52,8 @@ class Spectrum:
     def __init__(self, n: int, periodic: bool) -> None:
         self.n, self.periodic = n, periodic
         k = np.arange(n)
-        harmonic = (
-            k + 1
-        ) // 2  # of the Fourier series: constant, cos, sin, cos, sin; a cosine transform has half the step
+        # Of the Fourier series: constant, cos, sin, cos, sin; a cosine transform has half the step
+        harmonic = (k + 1) // 2
         self.block = harmonic // max(1, round(np.log(n) / 2))
         self.share = harmonic / max(1, harmonic[-1])  # of the highest frequency
 

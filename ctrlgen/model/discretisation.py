@@ -150,9 +150,8 @@ def balanced(model: Model, x: ca.SX, u: ca.SX, newton_steps: int = NEWTON_STEPS)
 
     `x` may be an expression in model.z. One step where the balance is linear in z.
     """
-    balance = ca.substitute(  # both at once: x may hold the drive of the sample before
-        model.balance, ca.vertcat(model.x, model.u), ca.vertcat(x, u)
-    )
+    # Both at once: x may hold the drive of the sample before
+    balance = ca.substitute(model.balance, ca.vertcat(model.x, model.u), ca.vertcat(x, u))
     linear = not ca.depends_on(ca.jacobian(balance, model.z), model.z)
     return newton_root(balance, model.z, model.z, 1 if linear else newton_steps)
 

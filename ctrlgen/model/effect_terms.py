@@ -19,7 +19,8 @@ from ctrlgen.effects import Channel, Effect, LawInputs, Place, State, faults_at
 # Typical displacements beyond which a law reads the stage's force at that end: a search may try values farther out, where
 # no stage goes and a restoring force may have no value (a root of a negative number).
 REACH = 10.0
-REQUIREMENTS = {  # the words of `Effect.requires`, in messages
+# The words of `Effect.requires`, in messages
+REQUIREMENTS = {
     "acceleration": "an imposed motion",
     "actuator": "an actuator, and not an imposed motion",
     "ambient": "the temperature of the surroundings",

@@ -81,11 +81,12 @@ def invert(model: Model, follow: str, sample_time: float | None, symbolic: bool 
     if sample_time is None:
         motion = rates[:]
         velocities = range(x.numel() - model.v.numel(), x.numel())
+        # The first two have no equilibrium: they start anew, at zero
         for i in (
             *model.stepped,
             *model.clocks,
             *velocities,
-        ):  # the first two have no equilibrium: they start anew, at zero
+        ):
             motion[i] = x_1[i]
         reached = ca.substitute(solve_by_blocks(known, motion, x_1), z_1, z)  # the equilibrium states at the given z
         at_rest = ca.vertcat(reached, z, u_1, p)

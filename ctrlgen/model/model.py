@@ -68,9 +68,8 @@ class Model:
     free_memories: tuple[int, ...]  # states of effects that begin differently in each record
 
     # What is read from the equations
-    signals: dict[
-        str, Signal
-    ]  # drive, power, state where there are some, force, displacement, pose, reading; in this order
+    # Drive, power, state where there are some, force, displacement, pose, reading; in this order
+    signals: dict[str, Signal]
     force_parts: dict[str, ca.SX]  # parts of the restoring force by name
     limits: tuple[Limit, ...]
     bounds_formulas: tuple[tuple[float | ca.SX | None, float | ca.SX | None], ...]  # of each limit, in terms of p

@@ -15,10 +15,11 @@ import numpy as np
 from scipy import special
 
 MEMORY = 2**26  # bytes of a block's intermediate results, at most
+# Points of a block: with fewer the calls take longer than what they compute, and more gain nothing
 FEWEST, MOST = (
     64,
     2048,
-)  # points of a block: with fewer the calls take longer than what they compute, and more gain nothing
+)
 
 
 def _assign(a: Any, out: np.ndarray) -> None:
@@ -29,7 +30,8 @@ def _if_else_zero(condition: Any, value: Any, out: np.ndarray) -> None:
     np.copyto(out, np.where(condition, value, 0.0))
 
 
-OPERATIONS: Mapping[int, Callable[..., Any]] = {  # each takes its operands and where the result is to stand
+# Each takes its operands and where the result is to stand
+OPERATIONS: Mapping[int, Callable[..., Any]] = {
     ca.OP_ASSIGN: _assign,
     ca.OP_ADD: np.add,
     ca.OP_SUB: np.subtract,

@@ -22,9 +22,8 @@ def quantisation_step(values: np.ndarray, fewest: int = FEWEST) -> float:
     if not len(gaps):
         return 0.0
     step, distance = float(gaps.min()), levels - levels[0]
-    reach = distance[distance > step / 2][
-        0
-    ]  # the first level that is another one, not the lowest one rounded otherwise
+    # The first level that is another one, not the lowest one rounded otherwise
+    reach = distance[distance > step / 2][0]
     # the longer the distance, the more precise the step, and the farther it can be counted without an error of one
     while True:
         near = distance[distance <= reach]

@@ -72,10 +72,11 @@ class Curve:
         """Shares, corners among them, and the length up to each, in typical sizes of the channels."""
         share = np.unique(np.concatenate([np.linspace(0, 1, DENSE), *self.pieces]))
         signal = self.model.signals[self.scenario.file.follow]
+        # Alike for channels of one dimension, so that a circle is evenly round
         sizes = [
             max(size for size, other in zip(signal.scale, signal.units, strict=True) if same_dimension(other, unit))
             for unit in signal.units
-        ]  # alike for channels of one dimension, so that a circle is evenly round
+        ]
         step = np.diff(self.samples(share), axis=0) / sizes
         return share, np.concatenate([[0.0], np.cumsum(np.linalg.norm(step, axis=1))])
 

@@ -163,11 +163,12 @@ def low_pass(signal: np.ndarray, cutoff: float, rate: float, settled: bool = Tru
 
     S2 gives the cutoff only; a first-order filter would pass more noise than S2 states.
     """
+    # Most of a second to import, which no device file should wait for
     from scipy.signal import (
         butter,
         lfilter,
         lfilter_zi,
-    )  # most of a second to import, which no device file should wait for
+    )
 
     b, a = butter(2, cutoff, fs=rate)
     start = lfilter_zi(b, a) * (signal[0] if settled else 0.0)

@@ -341,9 +341,8 @@ class _RecordReader:
             what = f"is not here; the recording does not bring it along. Source: {source}. Put it at {path.resolve()}"
             raise InputError(path, [Fault(path.name, what)])
         actual = hashlib.sha256(path.read_bytes()).hexdigest()
-        if (
-            actual != stated
-        ):  # rows, units and filters were chosen for that file and would mean something else in another
+        # Rows, units and filters were chosen for that file and would mean something else in another
+        if actual != stated:
             what = f"is another file, SHA-256 {actual}. Wanted: {source}. If you mean this one, state its SHA-256 in [sha256]"
             raise InputError(path, [Fault(path.name, what)])
         return read_table(path, which)

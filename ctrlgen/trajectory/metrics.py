@@ -14,8 +14,11 @@ from ctrlgen.core.units import difference_unit, from_si, parse
 from ctrlgen.trajectory.solution import Solution
 
 _STATISTICS: dict[str, Callable[[np.ndarray], np.floating]] = {
-    "min": np.min, "max": np.max, "rms": lambda column: np.sqrt(np.mean(column**2)), "abs": lambda column: np.abs(column).max(),
-}  # fmt: skip
+    "min": np.min,
+    "max": np.max,
+    "rms": lambda column: np.sqrt(np.mean(column**2)),
+    "abs": lambda column: np.abs(column).max(),
+}
 _NAME = re.compile(r"^(\w+)\.(\w+)(?:\.(min|max|rms|abs)|\[(\d+)\])?$")
 
 

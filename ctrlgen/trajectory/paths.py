@@ -33,9 +33,8 @@ def _length_or_angle(given: Quantity) -> Quantity:
     return given
 
 
-Size = Annotated[
-    Quantity, In(None, positive=True), AfterValidator(_length_or_angle)
-]  # as the channels that it is along
+# A length or an angle, as the channels are that it is along
+Size = Annotated[Quantity, In(None, positive=True), AfterValidator(_length_or_angle)]
 
 
 def smooth_step(s: Any, p: int) -> Any:

@@ -127,9 +127,8 @@ class Workspace:
     def excess(self, poses: np.ndarray) -> np.ndarray:
         """The largest violation of a limit in each pose, over the limit's range, (n,): negative where the pose can be held."""
         value = self._excess.map(len(poses))(poses.T)[0].full().ravel()
-        return np.where(
-            np.isnan(value), np.inf, value
-        )  # far outside, the square root of an actuator's law has no value
+        # Far outside, the square root of an actuator's law has no value
+        return np.where(np.isnan(value), np.inf, value)
 
     def holds(self, pose: np.ndarray) -> bool:
         """Whether one pose can be held."""

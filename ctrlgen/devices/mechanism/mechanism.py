@@ -123,11 +123,12 @@ class Mechanism(Device):
             faults += self._without_inertia()
         if faults:
             raise ValueError("; ".join(faults))
+        # Those of the file: a copy with other numbers keeps them
         _ = (
             self.channel_scale,
             self.reading_scale,
             self.cubic_steps,
-        )  # those of the file: a copy with other numbers keeps them
+        )
         return self
 
     def _without_inertia(self) -> list[str]:

@@ -43,9 +43,8 @@ class Compliance(Joining):
     def _stores_energy(self) -> Compliance:
         given = ((key, getattr(self, key)) for key in type(self).model_fields)
         p = SimpleNamespace(**{key: value.si if isinstance(value, Quantity) else None for key, value in given})
-        C = ca.DM(self.compliance(p, SimpleNamespace())).full()[
-            [3, 4, 5, 0, 1, 2]
-        ]  # deflection per load, now symmetric
+        # Deflection per load, now symmetric
+        C = ca.DM(self.compliance(p, SimpleNamespace())).full()[[3, 4, 5, 0, 1, 2]]
         if np.linalg.eigvalsh(C / np.sqrt(np.outer(np.diag(C), np.diag(C)))).min() <= 0:
             raise ValueError(
                 "the compliance is not positive definite: a load would gain energy from it; check the couplings"

@@ -257,7 +257,8 @@ def _check_at_home(device: UserDevice, read: ArgumentReader) -> None:
     if isinstance(physics, InertialPhysics):
         laws |= {"damping_force": physics.damping_force(v)} if physics.damping_force else {}
         laws["mass"] = ca.vertcat(*physics.mass)
-    named = {  # kept online by scaling the displacement toward home
+    # Kept online by scaling the displacement toward home
+    named = {
         f"limits.{limit.name}": limit.expr
         for limit in physics.limits(SimpleNamespace(drive=u, displacement=d, mechanism_displacement=d))
         if limit.name in device.description.limits

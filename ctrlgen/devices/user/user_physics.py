@@ -23,7 +23,8 @@ from ctrlgen.devices.limit import Limit, rate_limit
 from ctrlgen.devices.signal import Signal
 from ctrlgen.devices.user.ports import Law, Ports, evaluate_law
 
-ARGUMENTS = {  # of each law
+# Of each law
+ARGUMENTS = {
     "force": "uxdvp",
     "restoring_force": "dp",
     "damping_force": "vp",

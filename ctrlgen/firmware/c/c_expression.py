@@ -25,7 +25,8 @@ PLACE = re.compile(r"<([a-z])(\d+)>")
 
 _BINARY = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/"}
 _COMPARE = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
-CALLS = {  # of `elementary`
+# The functions of `elementary` that a printed expression calls
+CALLS = {
     ca.OP_SQRT: "square_root",
     ca.OP_EXP: "exponential",
     ca.OP_LOG: "logarithm",

@@ -31,7 +31,8 @@ TURNS = {Real.DOUBLE: 1e5, Real.FLOAT: 1e4}
 # Angle [rad] beyond which quarter turns overflow 32 bits (double) or rounding is too coarse (float).
 TURN_END = {Real.DOUBLE: 2.0**31, Real.FLOAT: 2.0**20}
 ASIN_NEAR, TANH_NEAR, SINH_NEAR = 0.5625, 0.625, 1.0  # argument up to which the series itself is used
-ROOTS = {  # the instructions of cores, correctly rounded by IEEE 754
+# Square roots by the instructions of cores, correctly rounded by IEEE 754
+ROOTS = {
     Real.FLOAT: {
         "arm": "vsqrt.f32 %0, %1",
         "arm_places": '"=t"(y) : "t"(a)',
@@ -45,7 +46,8 @@ ROOTS = {  # the instructions of cores, correctly rounded by IEEE 754
         "sse": "sqrtsd %1, %0",
     },
 }
-NEEDS = {  # function -> the functions that it calls
+# Function -> the functions that it calls
+NEEDS = {
     "sine": ("quarters",),
     "cosine": ("quarters",),
     "tangent": ("quarters",),

@@ -361,9 +361,8 @@ def _computed(op: int, values: Sequence[float]) -> float:
 
 
 _FUNCTIONS: dict[tuple[int, int], ca.Function] = {}
-_EXACT: Mapping[
-    int, Callable[..., float]
-] = {  # rounded correctly everywhere: Python's result is CasADi's, without a call of CasADi
+# Rounded correctly everywhere: Python's result is CasADi's, without a call of CasADi
+_EXACT: Mapping[int, Callable[..., float]] = {
     ca.OP_ADD: operator.add,
     ca.OP_SUB: operator.sub,
     ca.OP_MUL: operator.mul,

@@ -83,8 +83,12 @@ def diagonal(blocks: np.ndarray) -> sp.csr_array:
 
 
 def limited_rows(
-    bounds: tuple[np.ndarray, np.ndarray], rates: tuple[np.ndarray, np.ndarray] | None, span: np.ndarray, gaps: np.ndarray, n: int
-) -> Rows:  # fmt: skip
+    bounds: tuple[np.ndarray, np.ndarray],
+    rates: tuple[np.ndarray, np.ndarray] | None,
+    span: np.ndarray,
+    gaps: np.ndarray,
+    n: int,
+) -> Rows:
     """The limits of the drives of `n` samples, and of their changes, `gaps` times the `rates`, from each to the next, of a closed path also
     from the last to the first."""
     low, high = (np.tile(bound / span, n) for bound in bounds)
@@ -119,10 +123,15 @@ def _programme(
     given = np.isfinite(limited.bounds)
     A = sp.vstack([sp.hstack([limited.A, -beyond]), sp.hstack([-limited.A, -beyond])], format="csr")[given]
     answer = scipy.optimize.linprog(
-        np.append(np.zeros(n), np.ones(m)), A_ub=A, b_ub=limited.bounds[given], b_eq=wanted,
-        A_eq=sp.hstack([pushed, sp.csr_array((len(wanted), m))]), method="highs", options={"primal_feasibility_tolerance": TOLERANCE},
+        np.append(np.zeros(n), np.ones(m)),
+        A_ub=A,
+        b_ub=limited.bounds[given],
+        b_eq=wanted,
+        A_eq=sp.hstack([pushed, sp.csr_array((len(wanted), m))]),
+        method="highs",
+        options={"primal_feasibility_tolerance": TOLERANCE},
         bounds=np.column_stack([np.append(np.full(n, -np.inf), np.full(m, least)), np.full(n + m, np.inf)]),
-    )  # fmt: skip
+    )
     if answer.x is None:
         raise SolverError(f"no drives push as the path needs ({answer.message}); command a smaller or slower path")
     y = np.zeros(len(given))

@@ -1,0 +1,90 @@
+"""What can be believed of a law beforehand: how common it is, how far its form may be from nature, where a fit of it may start.
+
+`priors` has a row of these for each law.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import exp, log
+
+from ctrlgen.effects import Param
+
+ONE_IN_TEN = -2.3  # ln(1/10)
+ONE_IN_A_HUNDRED = -4.6
+
+
+@dataclass(frozen=True)
+class ParameterPrior:
+    """Where the search looks for one parameter. Numbers count in the unit of the parameter's bounds.
+
+    start_values: values from which a fit may start; of an amplitude, values at which the law is also linearised (by the secant
+        from `off`), for laws whose effect is not proportional to a small amplitude.
+    scales_with_peak: the start values are multiples of the largest value in the recording of the signal of that unit: the
+        channel's, the travel's, the travel's rate, or, for a time, one twelfth of the recording's duration.
+    start_from_data: starts that the recording suggests are tried too: "spatial_periods" (periods along the path that stand
+        out of the residual), "jump_positions" (places along the path at which it jumps), "moments" (times spread over the
+        recording). Frequencies in Hz always take the lines of the residual's spectrum as well.
+    plausible_range: of an amplitude: a fit that ends outside is another cause under this law's name, and is rejected.
+    fixed_range: of an amplitude: the law is present or absent. Its amplitude is set to the middle of the range, not fitted.
+    """
+
+    start_values: tuple[float, ...] = ()
+    scales_with_peak: bool = False
+    start_from_data: str = ""
+    plausible_range: tuple[float, float] | None = None
+    fixed_range: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class NestedCase:
+    """The law `effect` that this law becomes where `parameter` is at `value` [SI]."""
+
+    effect: str
+    parameter: str
+    value: float
+
+
+@dataclass(frozen=True)
+class LawPrior:
+    """What the search believes of one law.
+
+    log_prior_odds: ln of how many times commoner the law is than a wrong gain; decides among causes that explain alike.
+    model_form_error: error of the law's form after its parameters are fitted, as a share of what the law explains.
+    family: name shared by laws that are forms of one physics; a place has at most one of a family.
+    nested_case: the simpler law inside this one; where the fit does not exclude it, it is named as an alternative.
+    unless: what a device must not have (words of `Effect.requires`) for the law to be suspected there: another law says the same.
+    suspected: False for what a device file may state, and no recording shows beside what else it shows.
+    repeatable: the law may act more than once at one place, as harmonics do.
+    acts_on_all: the law is suspected at all channels at once only.
+    domain: where a finding is reported to be; by default what the law's place says.
+    parameters: by name; one that is not listed gets `default_starts`.
+    """
+
+    reason: str = "Default: as common as a wrong gain, its form exact."
+    log_prior_odds: float = 0.0
+    model_form_error: float = 0.0
+    family: str | None = None
+    nested_case: NestedCase | None = None
+    unless: frozenset[str] = frozenset()
+    suspected: bool = True
+    repeatable: bool = False
+    acts_on_all: bool = False
+    domain: str | None = None
+    parameters: Mapping[str, ParameterPrior] = field(default_factory=dict)
+
+    def of(self, parameter: Param) -> ParameterPrior:
+        """The row of one parameter of the law, or its default."""
+        return self.parameters.get(parameter.name) or ParameterPrior(default_starts(parameter))
+
+
+def default_starts(parameter: Param) -> tuple[float, ...]:
+    """Three start values, at 1/6, 1/2 and 5/6 of the way between the bounds, on a logarithmic scale where both are positive
+    and a decade or more apart; none for an amplitude."""
+    low, high = parameter.bounds
+    if parameter.off is not None:
+        return ()
+    if low > 0 and high >= 10 * low:
+        return tuple(exp(log(low) + k / 6 * log(high / low)) for k in (1, 3, 5))
+    return tuple(low + k / 6 * (high - low) for k in (1, 3, 5))
