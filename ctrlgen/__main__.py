@@ -16,7 +16,7 @@ class Interruption:
     seen = False
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
-        """The signal handler."""
+        """Handles the signal: remembers it and raises KeyboardInterrupt."""
         self.seen = True
         raise KeyboardInterrupt
 

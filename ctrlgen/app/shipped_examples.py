@@ -33,15 +33,15 @@ class Example:
 
     @property
     def complete(self) -> bool:
-        """Whether all its data are here."""
+        """Whether all data that it names are part of the package."""
         records = read_toml(self.file).get("record", [])
         return all((self.file.parent / record["file"]).is_file() for record in records)
 
     @property
     def files(self) -> list[Path]:
         """Everything it consists of, the device included."""
-        found = {path for path in self.file.parent.rglob("*") if path.is_file() and "__pycache__" not in path.parts}
-        return sorted(found | {self.device})
+        paths = {path for path in self.file.parent.rglob("*") if path.is_file() and "__pycache__" not in path.parts}
+        return sorted(paths | {self.device})
 
     def command(self, folder: Path) -> str:
         """What to type to try its copy in `folder`."""
@@ -53,20 +53,20 @@ class Example:
 
 
 def examples() -> list[Example]:
-    """All of them, by name."""
-    found = []
+    """All shipped examples, sorted by name."""
+    listed = []
     for folder in sorted(path for path in shipped("scenarios").iterdir() if path.is_dir()):
         tables = {path: read_toml(path) for path in sorted(folder.glob("*.toml"))}
         scenario = folder / SCENARIO
         records = [path for path, table in tables.items() if "record" in table]
         if scenario in tables:
             device = Path(scenario.parent / tables[scenario]["device"]).resolve()
-            found.append(Example(folder.name, tables[scenario]["title"], scenario.resolve(), device))
+            listed.append(Example(folder.name, tables[scenario]["title"], scenario.resolve(), device))
         elif records:
             first = next((path for path in records if path.name == "recording.toml"), records[0])
             device = _device(folder, tables[first]["device"])
-            found.append(Example(folder.name, tables[first]["title"], first.resolve(), device))
-    return found
+            listed.append(Example(folder.name, tables[first]["title"], first.resolve(), device))
+    return listed
 
 
 def _device(folder: Path, name: str) -> Path:

@@ -33,7 +33,7 @@ def schemas() -> dict[str, str]:
 
 
 def write_schemas(folder: Path = SCHEMAS) -> None:
-    """Every schema into `folder`."""
+    """Writes the JSON Schema of every file format into `folder`."""
     for name, text in schemas().items():
         write_text(folder / name, text)
 

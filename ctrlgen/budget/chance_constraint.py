@@ -42,7 +42,7 @@ class ChanceConstraint:
 
     @cached_property
     def _scatter(self) -> np.ndarray:
-        """(n, channels) z_s u_s."""
+        """What scatter takes of each margin: z_s u_s (n, channels) [SI]."""
         m = self.margins
         if not self._share:
             return m.scattered
@@ -51,7 +51,7 @@ class ChanceConstraint:
 
     @cached_property
     def _beta(self) -> np.ndarray:
-        """(2, channels) of each limited quantity."""
+        """The least margin over its lasting uncertainty of each lower and upper bound: beta (2, channels)."""
         left = self.margins.margin - self._scatter
         with np.errstate(divide="ignore", invalid="ignore"):
             beta = np.where(self.margins.lasting > 0, left / self.margins.lasting, np.where(left < 0, -np.inf, np.inf))
@@ -74,7 +74,7 @@ class ChanceConstraint:
 
     @cached_property
     def quantile(self) -> float:
-        """z of the back-off."""
+        """The quantile z of the back-off z u that every bound takes."""
         z = float(-scipy.special.ndtri(self._allowed))
 
         def risk(raised: float) -> float:

@@ -32,7 +32,7 @@ FEWEST_DRAWS = 200  # the sd of as many draws is itself known to 5 %
 MOST_DRAWS = 1_000_000
 PROBABILITY = 0.999
 COVERAGE = 0.95
-MOST_LOST = 0.01  # share of draws that may end in no number, as a device beyond buckling does
+MOST_LOST = 0.01  # share of draws whose pose may be not finite, as that of a device beyond buckling
 KEPT = 60  # samples along the path at which draws are kept
 TOLERANCE = 0.10  # of the first-order result, within which the draws confirm it
 COMPARED = 0.5  # of the largest uncertainty along the path: smaller ones are not compared
@@ -56,7 +56,7 @@ class Agreement:
 
     @property
     def passed(self) -> bool:
-        """Whether both agree within `TOLERANCE`."""
+        """Whether standard deviation and interval agree within `TOLERANCE`."""
         return max(self.difference, self.difference_of_interval) <= TOLERANCE
 
 
@@ -110,9 +110,7 @@ class ErrorBudget:
     def notes(self) -> tuple[str, ...]:
         """What a reader should know of how the budget was made."""
         lost = 0 if self.drawn is None else self.drawn.lost
-        what = (
-            f"{lost} of {self.draws} draws ended in no number, as of a device that no longer works, and were left out"
-        )
+        what = f"{lost} of {self.draws} draws were left out: their simulated pose is not finite, as that of a stage that buckles"
         return (what,) if lost else ()
 
     @property
@@ -202,17 +200,18 @@ def budget_of(
     combined = linear.combined("pose", stated)
     groups = groups_of(path.signal)
     slopes = slopes_of_limits(path, linear)
-    found = margins(path, linear, slopes)
-    critical = critical_samples(found, probability)
+    path_margins = margins(path, linear, slopes)
+    critical = critical_samples(path_margins, probability)
     drawn = None
     if draws:
         progress(f"{draws} draws")
-        drawn = draw(path, linear, DrawnLimits(found, slopes), _kept(combined, groups), critical, draws, seed)
+        drawn = draw(path, linear, DrawnLimits(path_margins, slopes), _kept(combined, groups), critical, draws, seed)
         if drawn.lost > MOST_LOST * draws:
             raise SolverError(
-                f"{drawn.lost} of {draws} draws ended in no number: some sds are so large that a draw is no device any more; lower them"
+                f"the simulated pose of {drawn.lost} of {draws} draws is not finite, as that of a stage that buckles: some "
+                "standard deviations are too large for this device; lower them"
             )
-    rows = safeties(path, found, slopes, drawn, critical, probability)
+    rows = safeties(path, path_margins, slopes, drawn, critical, probability)
     lines = budget_lines(path, linear, groups, drawn)
     agreements = () if drawn is None else tuple(agreement(g, combined, drawn, path) for g in groups)
     return ErrorBudget(

@@ -57,10 +57,10 @@ def load_finer(scenario: Scenario, model: Model, finer: Device | Path | str) -> 
     other = model_of(replace(scenario, device=device))
     faults = []
     for role in ("drive", scenario.file.follow):
-        own, found = model.signals[role], other.signals.get(role)
-        if _channels(own) != (() if found is None else _channels(found)):
-            shown = "none" if found is None else ", ".join(found.columns)
-            what = f"of the finer model: {shown}; those of {model.name} are {', '.join(own.columns)}: describe the same device"
+        signal, finer_signal = model.signals[role], other.signals.get(role)
+        if _channels(signal) != (() if finer_signal is None else _channels(finer_signal)):
+            shown = "none" if finer_signal is None else ", ".join(finer_signal.columns)
+            what = f"of the finer model: {shown}; those of {model.name} are {', '.join(signal.columns)}: describe the same device"
             faults.append(Fault(role, what))
     if other.inertial and scenario.sample_time is None:
         what = f"has inertia, but the scenario is a row of equilibria: give it sample_rate and duration, or leave {other.name} out"
@@ -97,7 +97,7 @@ def difference_to(finer: FinerModel, path: UncertainPath, linear: Propagated) ->
         raise SolverError(
             f"the finer model under the drives of {scenario.name} {what}; give it damping, or make the path open"
         )
-    own = slice(-parts * (path.n - 1) - 1, None, parts)  # the samples of the path
-    states = moved.time[own], moved.x[own], moved.z[own]
+    on_path = slice(-parts * (path.n - 1) - 1, None, parts)  # the samples of the path
+    states = moved.time[on_path], moved.x[on_path], moved.z[on_path]
     reached = trace(model, *states, drives[-path.n :]).signals[scenario.file.follow]
     return ModelDifference(finer, reached - linear.nominal["pose"])

@@ -44,8 +44,8 @@ class JudgedPath:
     def largest(self, reserve: np.ndarray) -> Reserves:
         """Of the `reserve` (2, n, channels) that of each limit where it is least safe."""
         left, reserves = self.margins.margin - reserve, Reserves()
-        for limit, own in self.path.places:
-            below, above = (float(reserve[s, :, own].flat[int(np.argmin(left[s, :, own]))]) for s in (0, 1))
+        for limit, columns in self.path.places:
+            below, above = (float(reserve[s, :, columns].flat[int(np.argmin(left[s, :, columns]))]) for s in (0, 1))
             reserves[limit.name] = (0.0 if limit.lower is None else below, 0.0 if limit.upper is None else above)
         return reserves
 
@@ -54,8 +54,8 @@ class JudgedPath:
         where the device rests: there is nothing uncertain of a device at rest, and its controller starts there."""
         largest, y = self.largest(reserve), self.linear.nominal["limits"]
         rest, reserves = _at_rest(model), Reserves()
-        for limit, own in self.path.places:
-            values = np.concatenate([y[:, own].ravel(), rest[limit.name]])
+        for limit, columns in self.path.places:
+            values = np.concatenate([y[:, columns].ravel(), rest[limit.name]])
             below, above = largest[limit.name]
             low, high = limit.bounds
             room_below, room_above = max(float(values.min()) - low, 0.0), max(high - float(values.max()), 0.0)

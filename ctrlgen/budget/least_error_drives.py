@@ -41,8 +41,8 @@ def of_least_error(model: Model, stated: Uncertainties, follow: str) -> Model:
             variance += np.array(line.sds) ** 2 * np.sum((C @ pushed) ** 2, axis=0)
         elif line.kind == "number":
             for path, sd in zip(line.paths, line.sds, strict=True):
-                own = C @ by_number[:, :, free.index(path)] if path in free else np.zeros((1, n_u))
-                size = np.sum(own**2, axis=0) * sd**2
+                deviation = C @ by_number[:, :, free.index(path)] if path in free else np.zeros((1, n_u))
+                size = np.sum(deviation**2, axis=0) * sd**2
                 variance += size if np.count_nonzero(size) == 1 else 0.0
     weights = variance * drive_ranges(model) ** 2
     if not weights.any():

@@ -64,7 +64,7 @@ def slopes_of_limits(path: UncertainPath, linear: Propagated) -> Slopes:
     names = [name for line in path.uncertainties.lines for name in line.paths]
     kinds = [line.kind for line in path.uncertainties.lines for _ in line.paths]
     sds, n = path.uncertainties.sds, len(names)
-    own = [i for i in range(n) if kinds[i] == "number" and not names[i].startswith("effect[")]
+    numbers = [i for i in range(n) if kinds[i] == "number" and not names[i].startswith("effect[")]
     values = {path_: number.si for path_, number in path.model.device.quantities()}
     channels = len(path.channels)
     slopes = Slopes(np.zeros((channels, n)), np.zeros((channels, n)), np.zeros((path.n, channels, n)))
@@ -91,8 +91,8 @@ def slopes_of_limits(path: UncertainPath, linear: Propagated) -> Slopes:
             second, after if same(bounds, before) else _bounds(path, model_with(second))
         )
 
-    idle, faults = [i for i in own if names[i] in path.idle], list[Fault]()
-    moving = [i for i in own if i not in idle]
+    idle, faults = [i for i in numbers if names[i] in path.idle], list[Fault]()
+    moving = [i for i in numbers if i not in idle]
     for i in {*moved(moving, _bounds(path, model_with(moving))), *idle}:
         other = model_with([i])
         after = _bounds(path, other)
@@ -114,8 +114,8 @@ def slopes_of_limits(path: UncertainPath, linear: Propagated) -> Slopes:
 def _bounds(path: UncertainPath, model: Model) -> np.ndarray:
     """(2, channels) lower and upper bounds; infinite where there is none."""
     by_name = {limit.name: limit for limit in model.limits}
-    found = [by_name[limit.name] for limit, _ in path.channels]
-    return np.array([limit.bounds for limit in found]).reshape(-1, 2).T
+    limits = [by_name[limit.name] for limit, _ in path.channels]
+    return np.array([limit.bounds for limit in limits]).reshape(-1, 2).T
 
 
 def _limited(path: UncertainPath, model: Model, x: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -142,7 +142,7 @@ class Margins:
 
     @property
     def sd(self) -> np.ndarray:
-        """(2, n, channels) both together."""
+        """Standard uncertainty (2, n, channels) [SI]: what lasts and what scatters together."""
         return np.hypot(self.lasting, self.scattered)
 
     def least(self, z: float) -> np.ndarray:
@@ -167,12 +167,12 @@ def margins(path: UncertainPath, linear: Propagated, slopes: Slopes) -> Margins:
 class DrawnLimits:
     """The limits of draws along the path."""
 
-    found: Margins
+    margins: Margins
     slopes: Slopes
 
     @cached_property
     def _near(self) -> np.ndarray:
-        return np.asarray(self.found.margin < FAR * self.found.sd)
+        return np.asarray(self.margins.margin < FAR * self.margins.sd)
 
     def near(self, sample: int) -> np.ndarray:
         """(2, channels) which bounds some draws may break at a sample."""
@@ -180,7 +180,7 @@ class DrawnLimits:
 
     def of(self, columns: np.ndarray) -> LimitsOfDraws:
         """Those of draws with the deviations (draws, m)."""
-        lower, upper = self.found.bounds
+        lower, upper = self.margins.bounds
         return LimitsOfDraws(
             self, columns, lower + columns @ self.slopes.lower.T, upper + columns @ self.slopes.upper.T
         )
@@ -203,25 +203,30 @@ class LimitsOfDraws:
 
 
 def safeties(
-    path: UncertainPath, found: Margins, slopes: Slopes, drawn: Drawn | None, critical: np.ndarray, probability: float
+    path: UncertainPath,
+    path_margins: Margins,
+    slopes: Slopes,
+    drawn: Drawn | None,
+    critical: np.ndarray,
+    probability: float,
 ) -> tuple[Safety, ...]:
     """Each bound of each limit where it is least safe; `critical` (2, channels) are the samples of the draws."""
     z = float(scipy.special.ndtri(probability))
-    least, rows = found.least(z), []
+    least, rows = path_margins.least(z), []
     places = [limit.name for limit, _ in path.channels]
     for limit in path.limits:
-        own = [i for i, name in enumerate(places) if name == limit.name]
+        columns = [i for i, name in enumerate(places) if name == limit.name]
         for side in (0, 1):
-            i = min(own, key=lambda i: least[side, critical[side, i], i])
-            if not np.isfinite(found.bounds[side, i]):
+            i = min(columns, key=lambda i: least[side, critical[side, i], i])
+            if not np.isfinite(path_margins.bounds[side, i]):
                 continue
             k = int(critical[side, i])
-            margin, sd = float(found.margin[side, k, i]), float(found.sd[side, k, i])
-            bound = float(found.bounds[side, i])
+            margin, sd = float(path_margins.margin[side, k, i]), float(path_margins.sd[side, k, i])
+            bound = float(path_margins.bounds[side, i])
             rows.append(
                 Safety(
                     limit,
-                    channel=limit.channels[i - own[0]],
+                    channel=limit.channels[i - columns[0]],
                     side="lower" if side == 0 else "upper",
                     sample=k,
                     bound=bound,
@@ -246,6 +251,6 @@ def _drawn_margin(
     return float(np.quantile(y - b if side == 0 else b - y, 1 - probability))
 
 
-def critical_samples(found: Margins, probability: float) -> np.ndarray:
+def critical_samples(path_margins: Margins, probability: float) -> np.ndarray:
     """(2, channels) the sample at which each limited quantity is nearest to its lower and to its upper bound, at the `probability`."""
-    return np.asarray(np.argmin(found.least(float(scipy.special.ndtri(probability))), axis=1))
+    return np.asarray(np.argmin(path_margins.least(float(scipy.special.ndtri(probability))), axis=1))

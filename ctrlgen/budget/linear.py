@@ -108,7 +108,7 @@ def drive_deviations(path: UncertainPath, name: str) -> tuple[np.ndarray, bool]:
 
 
 def _drive_covariance(path: UncertainPath, name: str) -> np.ndarray:
-    """Q (before + n, n_u, n_u)."""
+    """The covariance Q (before + n, n_u, n_u) of the drives' errors at each sample [SI]."""
     sd, together = drive_deviations(path, name)
     return sd[:, :, None] * sd[:, None, :] * (1.0 if together else np.eye(sd.shape[1]))
 

@@ -43,7 +43,7 @@ class Limited(Protocol):
 class Drawn:
     """What the draws gave, SI: deviations of the followed signal `pose` (draws, kept, n_y) at the samples `kept`; limited quantities
     `limits` (draws, 2, channels), each at its own sample for the lower and the upper bound; `columns` (draws, m) the deviations that
-    were drawn; `lost`, how many further draws ended in no number; `broken` (draws,), which of them break a limit anywhere on the path.
+    were drawn; `lost`, how many more have a pose that is not finite; `broken` (draws,), which of them break a limit anywhere on the path.
 
     `alone` (2, m, kept, n_y): the pose's deviations with each column alone at plus and minus its standard deviation, nothing scattering.
     """
@@ -77,15 +77,17 @@ def draw(
     deviations = np.random.default_rng(first).standard_normal((draws, m)) @ _square_root(stated.covariance)
     one_by_one = np.diag(stated.sds)
     alone = np.vstack([one_by_one, -one_by_one, np.zeros((1, m))])  # the last one: the described device
-    blocks = [(deviations[k : k + BLOCK], own) for k, own in zip(range(0, draws, BLOCK), seeds, strict=True)]
+    blocks = [
+        (deviations[k : k + BLOCK], block_seed) for k, block_seed in zip(range(0, draws, BLOCK), seeds, strict=True)
+    ]
     led, last = _Led(path, linear, limited, kept, critical), blocks[-1]
     blocks[-1] = np.vstack([last[0], alone]), last[1]
 
     def one(k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return led.all(*blocks[k], still=len(alone) if k == len(blocks) - 1 else 0)
 
-    found = in_forks(one, range(len(blocks)), usable_cores())
-    pose, limits, broken = (np.concatenate(part) for part in zip(*found, strict=True))
+    results = in_forks(one, range(len(blocks)), usable_cores())
+    pose, limits, broken = (np.concatenate(part) for part in zip(*results, strict=True))
     still, pose, limits, broken = pose[draws:], pose[:draws], limits[:draws], broken[:draws]
     good = np.isfinite(pose).all(axis=(1, 2)) & np.isfinite(limits).all(axis=(1, 2))
     alone, lost = (still[:-1] - still[-1]).reshape(2, m, *still.shape[1:]), int((~good).sum())
@@ -114,7 +116,7 @@ class _Led:
         step, of_pose, of_limits = self.step.of(q), self.pose.of(q), self.limits.of(q)
         bounds = self.limited.of(columns)
         S = np.tile(path.start[:, None], n)
-        found = np.empty((n, len(self.place), pose.shape[1]))
+        deviations = np.empty((n, len(self.place), pose.shape[1]))
         limits, broken = np.empty((n, *self.critical.shape)), np.zeros(n, bool)
         for k, v in enumerate(path.drive):
             drive = (v * gain + scatter.at(k)).T
@@ -123,12 +125,12 @@ class _Led:
             limiting = sample >= 0 and bool(np.any(here) or self.limited.near(sample).any())
             S = step(k, S, drive, limiting or sample in self.place)
             if sample in self.place:
-                found[:, self.place[sample]] = of_pose(S, drive).T - pose[sample] + scatter.replayed()
+                deviations[:, self.place[sample]] = of_pose(S, drive).T - pose[sample] + scatter.replayed()
             if limiting:
                 values = of_limits(S, drive).T
                 limits[:, here] = np.stack([values] * 2, axis=1)[:, here]
                 broken |= bounds.broken(sample, values)
-        return found, limits, broken
+        return deviations, limits, broken
 
 
 def _square_root(covariance: np.ndarray) -> np.ndarray:
@@ -143,16 +145,16 @@ def _numbers(path: UncertainPath, columns: np.ndarray) -> tuple[np.ndarray, np.n
     q = np.tile(path.q_nominal, (len(columns), 1))
     gain, k = np.ones((len(columns), path.drive.shape[1])), 0
     for line in path.uncertainties.lines:
-        own = columns[:, k : k + len(line.sds)]
+        deviations = columns[:, k : k + len(line.sds)]
         k += len(line.sds)
         if line.kind == "surroundings":
-            q[:, -1] += own[:, 0]
+            q[:, -1] += deviations[:, 0]
         elif line.kind != "number":
-            gain += own
+            gain += deviations
         else:
             for i, name in enumerate(line.paths):
                 if name in path.free:
-                    q[:, path.free.index(name)] += own[:, i]
+                    q[:, path.free.index(name)] += deviations[:, i]
     return q, gain
 
 

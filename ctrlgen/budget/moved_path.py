@@ -40,7 +40,7 @@ class MovablePath:
 
     @property
     def signal(self) -> Signal:
-        """The followed signal."""
+        """The signal that the scenario follows."""
         return self.model.signals[self.scenario.file.follow]
 
     @property

@@ -107,8 +107,8 @@ class UncertainPath:
         exact = self.evaluate("pose", states, self.drive)
         for newton_steps in range(1, NEWTON_STEPS if not self.model.inertial else 1):
             self._add("quick_step", self._following(newton_steps))
-            found = self.evaluate("pose", self.nominal(step="quick_step"), self.drive)
-            if np.all(np.abs(found - exact).max(axis=0) <= allowed):
+            quick = self.evaluate("pose", self.nominal(step="quick_step"), self.drive)
+            if np.all(np.abs(quick - exact).max(axis=0) <= allowed):
                 return "quick_step"
         return "step"
 
@@ -202,10 +202,10 @@ def holding_drive(solution: Solution) -> np.ndarray:
     symbols, values = ca.vertcat(m.x, m.z, m.p), ca.vertcat(trace.x[0], trace.z[0], m.p_nominal)
     at_first = ca.substitute(ca.vertcat(changes, m.balance / m.force_scale), symbols, values)
     still = ca.Function("still", [m.u], [at_first])
-    found = scipy.optimize.least_squares(
+    fit = scipy.optimize.least_squares(
         lambda w: still(w * m.u_scale).full().ravel(), solution.drive[0] / m.u_scale, xtol=1e-15, gtol=1e-15
     )
-    return found.x * m.u_scale
+    return fit.x * m.u_scale
 
 
 def _warmed(model: Model, free: Sequence[str], rise: ca.SX) -> Model:
@@ -215,7 +215,7 @@ def _warmed(model: Model, free: Sequence[str], rise: ca.SX) -> Model:
         return model
 
     def warmer(rates: ca.SX) -> ca.SX:
-        own = ca.substitute(rates[: model.n_states], model.p[places], model.p[places] + rise)
-        return ca.vertcat(own, rates[model.n_states :])
+        actuator_rates = ca.substitute(rates[: model.n_states], model.p[places], model.p[places] + rise)
+        return ca.vertcat(actuator_rates, rates[model.n_states :])
 
     return replace(model, rates_of_heat=warmer(model.rates_of_heat), sampled_rates=warmer(model.sampled_rates))

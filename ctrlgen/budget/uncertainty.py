@@ -153,19 +153,19 @@ def load_uncertainties(scenario: Scenario, model: Model, path: Path | str | None
     """What is uncertain of `scenario` with its `model`: its device's stated sds, and the file at `path`, by default uncertainty.toml
     beside the scenario where there is one. Raises InputError listing every fault."""
     beside = scenario.path.parent / FILE
-    found = Path(path) if path is not None else beside if beside.is_file() else None
+    file_path = Path(path) if path is not None else beside if beside.is_file() else None
     file, inputs = UncertaintyFile(title=""), dict[str, Input]()
-    if found is not None:
-        file = validate(UncertaintyFile, read_toml(found), found)
-        inputs["uncertainty"] = Input(found, read_text(found))
+    if file_path is not None:
+        file = validate(UncertaintyFile, read_toml(file_path), file_path)
+        inputs["uncertainty"] = Input(file_path, read_text(file_path))
     read = _Reader(scenario, model, file)
     if read.faults:
-        raise InputError(found or scenario.path, read.faults)
+        raise InputError(file_path or scenario.path, read.faults)
     drive = file.drive or DriveChain()
     if not (read.lines or drive.converter or drive.jitter or drive.arithmetic == "float" or drive.player):
         what = f"is not stated of anything: no number of {scenario.device.name} has an sd; write {beside} with, for example,\n{EXAMPLE}"
-        raise InputError(found or scenario.path, [Fault("uncertainty", what)])
-    correlation = read.correlation(found or scenario.path)
+        raise InputError(file_path or scenario.path, [Fault("uncertainty", what)])
+    correlation = read.correlation(file_path or scenario.path)
     texts = {"arithmetic": "float", "player": PLAYER}
     sources = {
         "arithmetic": "IEEE 754, round to nearest",

@@ -44,10 +44,10 @@ def _missing(
 ) -> Iterator[tuple[float, str, int]]:
     """For each bound that is not kept: what is missing in standard uncertainties, a line of text, the worst sample."""
     m = judged.margins
-    for limit, own in judged.path.places:
+    for limit, columns in judged.path.places:
         for side, away in enumerate(("above", "below")):
-            k, i = np.unravel_index(int(np.argmax(short[side, :, own])), short[side, :, own].shape)
-            at = side, int(k), own.start + int(i)
+            k, i = np.unravel_index(int(np.argmax(short[side, :, columns])), short[side, :, columns].shape)
+            at = side, int(k), columns.start + int(i)
             if not short[at]:
                 continue
             bound, margin = float(m.bounds[side, at[2]]), float(m.margin[at])

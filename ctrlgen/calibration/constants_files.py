@@ -62,7 +62,7 @@ def c_header(calibration: Calibration) -> str:
 
 
 def binary(calibration: Calibration) -> bytes:
-    """constants.bin."""
+    """The bytes of constants.bin: head, values as float32, CRC-32."""
     values = [inside(row, Real.FLOAT) for row in calibration.constants]
     body = MAGIC + struct.pack(f"<HHI{len(values)}f", VERSION, len(values), device_hash(calibration), *values)
     return body + struct.pack("<I", zlib.crc32(body))

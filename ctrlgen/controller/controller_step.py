@@ -38,7 +38,7 @@ class ControllerStep:
 
 
 def row(value: ca.DM) -> np.ndarray:
-    """A vector (n,) of numbers."""
+    """A vector of CasADi as an array (n,)."""
     return value.full().ravel()
 
 

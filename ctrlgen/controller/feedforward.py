@@ -27,7 +27,7 @@ SECANT_FRACTION = 1 - 2**-8  # of the secant estimate is taken, because the driv
 
 
 def unobserved(what: str, answer: np.ndarray) -> None:
-    """Takes no notice of an answer."""
+    """The observer that does nothing with an answer."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Controller:
 
     @cached_property
     def plausible(self) -> Groups:
-        """What a state is judged by."""
+        """The sums of squares by which a state is judged lost, see `lost_state`."""
         return self.kernels.plausible(self.rate is not None)
 
     def is_lost(self, *state: np.ndarray) -> bool:
@@ -105,7 +105,7 @@ class Controller:
         return self.kernels.modes[not settle]
 
     def _toward(self, rate: RateLimiter, last: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, float, bool, bool]:
-        """`RateLimiter.toward`, observed."""
+        """The answer of `RateLimiter.toward`, of which the observer is told."""
         drive, share, touched, held = rate.toward(last, wanted)
         self.observe("rate", np.array([touched, held]))
         return drive, share, touched, held

@@ -40,7 +40,7 @@ class ControllerKernels:
 
     @cached_property
     def static(self) -> Inverse:
-        """Kernels for equilibria."""
+        """The kernels of the inverse for equilibria."""
         return inverse_of(self.nominal, self.follow, None)
 
     @property
@@ -187,7 +187,7 @@ class ControllerKernels:
 
     @property
     def target(self) -> Signal:
-        """What a target holds."""
+        """The signal whose channels a target gives."""
         return self.model.signals[self.follow]
 
     @cached_property
@@ -217,9 +217,9 @@ class ControllerKernels:
 
     def plausible(self, with_drive: bool) -> Groups:
         """What a state is judged by, which holds the last drive or not, see `plausible_sums`."""
-        own, *others = (plausible_sums(k.nominal, with_drive) for k in (self, *self.variants))
+        nominal, *others = (plausible_sums(k.nominal, with_drive) for k in (self, *self.variants))
         wider = [{those: most for those, most in sums} for sums in others]
-        return tuple((those, max(most, *(w.get(those, most) for w in wider), most)) for those, most in own)
+        return tuple((those, max(most, *(w.get(those, most) for w in wider), most)) for those, most in nominal)
 
     @cached_property
     def examined_first(self) -> tuple[bool, bool]:

@@ -36,7 +36,7 @@ class MotionKernels(ControllerKernels):
 
     @cached_property
     def dynamics(self) -> InverseDynamics:
-        """The inverse dynamics."""
+        """The inverse dynamics of the nominal model, from the followed signal."""
         return inverse_dynamics(self.nominal, self.follow)
 
     @property

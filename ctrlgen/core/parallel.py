@@ -111,7 +111,7 @@ class _Pool:
         self.begin()
 
     def begin(self) -> None:
-        """Starts new processes."""
+        """Starts `jobs` new processes."""
         self.processes = ProcessPoolExecutor(self.jobs, get_context("spawn"), _begin_worker)
 
     def end(self) -> None:

@@ -66,7 +66,7 @@ class RunTimeConstant:
         return f"{ends[0]} ... {ends[1]} {'' if self.unit == '1' else self.unit}".strip()
 
     def shown(self, si: float, digits: int = 6) -> str:
-        """A value in the file's unit."""
+        """The value `si` [SI] as text, in the unit of the device file."""
         return show(si, self.unit, digits)
 
 

@@ -36,7 +36,7 @@ class ErrorModel:
 
     @classmethod
     def of_noise(cls, noise: Noise) -> ErrorModel:
-        """Without discrepancy."""
+        """The error model of `noise` alone, without discrepancy."""
         return cls(noise, np.zeros(len(noise.sd)), np.ones(len(noise.sd)))
 
     @property

@@ -107,7 +107,7 @@ class Fitter:
 
     @property
     def error(self) -> ErrorModel:
-        """Noise and discrepancy."""
+        """The error model: noise and, where it has been estimated, discrepancy."""
         return self.errors or ErrorModel.of_noise(self.noise)
 
     def with_noise(self, noise: Noise) -> Fitter:
@@ -126,7 +126,7 @@ class Fitter:
 
     @property
     def held_out_records(self) -> list[Record]:
-        """The held-out records."""
+        """The records with the role "hold_out", which no fit reads."""
         return [r for r in self.recording.records if r.role == "hold_out"]
 
     def simulator(self, structure: Structure, record: Record) -> Simulator:
@@ -242,7 +242,7 @@ class Fitter:
         return rest, y
 
     def _white(self, record: Record, y: np.ndarray) -> np.ndarray:
-        """Whitened residual (n n_y,), not bounded."""
+        """The whitened residual (n n_y,); large values are not limited."""
         return self.error.whiten(np.where(record.valid, record.observed - y, 0.0), record.valid).ravel()
 
     def whitened_residual(self, fit: Fit, record: Record) -> np.ndarray:

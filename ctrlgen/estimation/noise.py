@@ -147,7 +147,7 @@ def estimate_noise(recording: Recording, settling: float) -> Noise:
 
 
 def _of_poses(recording: Recording, i: int, settling: float) -> _ChannelNoise:
-    """Channel i of settled poses."""
+    """The noise of channel `i` of a recording of settled poses."""
     if stated := recording.noise[i]:
         return _ChannelNoise(stated, NoiseSource.STATED, np.inf)
     sd, count = _repeatability(recording.records, i)
@@ -158,7 +158,7 @@ def _of_poses(recording: Recording, i: int, settling: float) -> _ChannelNoise:
 
 
 def _of_series(recording: Recording, i: int, settling: float) -> _ChannelNoise:
-    """Channel i of a time series."""
+    """The noise of channel `i` of a recording in time."""
     values = np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])
     # standard deviation of a uniform rounding error
     rounding = quantisation_step(values) / np.sqrt(12.0)

@@ -230,7 +230,7 @@ class ResidualTestsSettings:
 
 @dataclass(frozen=True)
 class ProfileSettings:
-    """Profile likelihood."""
+    """Settings of the profile likelihood."""
 
     first_distance: float = 2.0
     """Distance from the optimum of the first point [standard deviations by curvature]: just outside of 95 %."""

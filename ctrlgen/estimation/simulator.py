@@ -202,7 +202,7 @@ class Simulator:
 
     @cached_property
     def _recursion(self) -> Recursion:
-        """S -> S+, y."""
+        """The map (S, u, ...) -> (S+, y) of one sample."""
         q = self.equations
         return Recursion(ca.Function("one", q.given, [ca.densify(q.following), ca.densify(q.y)]))
 
@@ -223,7 +223,7 @@ class Simulator:
 
     @cached_property
     def _symbols(self) -> list[ca.MX]:
-        """S, u, u+, ambient, c."""
+        """The arguments of one sample: S, u, u+, ambient, c."""
         n_u, n_c = self.model.u.numel(), self.equations.constants.size1_out(0)
         return [ca.MX.sym(name, n) for name, n in (("S", self.n_s), ("u", n_u), ("u1", n_u), ("e", 1), ("c", n_c))]
 

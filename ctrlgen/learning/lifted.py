@@ -114,11 +114,11 @@ class Lifted:
         parts = list[list[np.ndarray]]()
         for a in range(0, len(S), BLOCK):
             b = min(a + BLOCK, len(S))
-            found = evaluate(of_sample.map(b - a), S[a:b], v[a:b]) if of_sample.n_out() else []
+            values = evaluate(of_sample.map(b - a), S[a:b], v[a:b]) if of_sample.n_out() else []
             parts.append(
                 [
                     value.reshape(b - a, of_sample.size2_out(i), of_sample.size1_out(i)).transpose(0, 2, 1)
-                    for i, value in enumerate(found)
+                    for i, value in enumerate(values)
                 ]
             )
         tables = [np.concatenate(blocks) for blocks in zip(*parts, strict=True)]

@@ -71,7 +71,7 @@ class Spectrum:
         return np.moveaxis(c, 0, axis)
 
     def samples(self, coefficients: np.ndarray) -> np.ndarray:
-        """(n, .) from coefficients (n, .)."""
+        """The samples (n, m) that the `coefficients` (n, m) stand for."""
         c = coefficients
         if not self.periodic:
             return idct(c, axis=0, norm="ortho")
@@ -99,8 +99,8 @@ class Spectrum:
         if m > 1:
             return Repeated(mean, np.sqrt(self.pooled(((c - mean) ** 2).sum(axis=0) / (m - 1)) / m), m)
         upper = (self.share[:, None] > 0.5 * measured) & held
-        found = np.nanmedian(np.where(upper, np.abs(mean), np.nan), axis=0) / NORMAL_MAD
-        sd = np.where(np.isfinite(stated), stated / np.sqrt(measured), found)
+        scattered = np.nanmedian(np.where(upper, np.abs(mean), np.nan), axis=0) / NORMAL_MAD
+        sd = np.where(np.isfinite(stated), stated / np.sqrt(measured), scattered)
         return Repeated(mean, sd * held, 1)
 
     def threshold(self, freedom: float) -> np.ndarray:

@@ -110,7 +110,7 @@ def _exchanged(
     noise: float,
 ) -> tuple[int, int] | None:
     """The two actuators whose exchange explains what gains alone do not; None where none does."""
-    scale, found = np.array(lifted.signal.scale), None
+    scale, best = np.array(lifted.signal.scale), None
     least = SWAPPED * max(_left(X, seen, gain) - noise, 0.0)
     for pair in combinations(range(len(gain)), 2):
         order = np.arange(len(gain))
@@ -120,34 +120,34 @@ def _exchanged(
             moved = lifted.run(change.then[:, order]) - lifted.run(change.u[:, order])
             left += float(np.sum((y - (moved / scale)[:, change.observed]) ** 2))
         if left - noise < least:
-            least, found = left - noise, pair
-    return found
+            least, best = left - noise, pair
+    return best
 
 
 def _reasons(lifted: Lifted, gain: np.ndarray, se: np.ndarray, exchanged: tuple[int, int] | None) -> dict[str, str]:
     """Why learning would not converge, by drive."""
-    names, k, found = lifted.model.signals["drive"].channels, float(norm.ppf(0.5 + CONFIDENCE / 2)), dict[str, str]()
+    names, k, reasons = lifted.model.signals["drive"].channels, float(norm.ppf(0.5 + CONFIDENCE / 2)), dict[str, str]()
     if exchanged is not None:
         a, b = (names[i] for i in exchanged)
-        found[f"drive.{a}, drive.{b}"] = (
+        reasons[f"drive.{a}, drive.{b}"] = (
             f"the change from run to run is that of a device in which {a} and {b} are exchanged; check their wiring, or the columns of the "
             "recording"
         )
-        return found
+        return reasons
     for name, g, s in zip(names, gain, se, strict=True):
         if not np.isfinite(g):
             continue
         seen = f"from run to run it moved the pose by {g:.2f} ± {k * s:.2f} of what was predicted ({100 * CONFIDENCE:g} % confidence)"
         if g + k * s < -LEAST_GAIN:
-            found[f"drive.{name}"] = (
+            reasons[f"drive.{name}"] = (
                 f"{seen}: it acts the other way; check its polarity, its wiring and the sign of the column"
             )
         elif g + k * s < LEAST_GAIN:
-            found[f"drive.{name}"] = (
+            reasons[f"drive.{name}"] = (
                 f"{seen}: it hardly acts, or the other way; check that it is connected, or describe what holds it"
             )
         elif g - k * s > MOST_GAIN:
-            found[f"drive.{name}"] = (
+            reasons[f"drive.{name}"] = (
                 f"{seen}: a step would overshoot and grow from run to run; correct its gain in the device file first"
             )
-    return found
+    return reasons

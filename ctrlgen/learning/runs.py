@@ -43,7 +43,7 @@ class Run:
 
     @property
     def name(self) -> str:
-        """The records' names."""
+        """The names of its records, separated by commas."""
         return ", ".join(self.names)
 
 
@@ -78,20 +78,20 @@ def load_runs(paths: Sequence[Path | str], lifted: Lifted) -> Runs:
     runs = list[Run]()
     for record in records:
         try:
-            found = _run(record, places, lifted)
+            run = _run(record, places, lifted)
         except ValueError as error:
             faults.append(Fault(record.name, str(error)))
             continue
-        if runs and _alike(runs[-1].drive, found.drive, lifted):
+        if runs and _alike(runs[-1].drive, run.drive, lifted):
             last = runs[-1]
             runs[-1] = Run(
-                (*last.names, *found.names),
+                (*last.names, *run.names),
                 last.drive,
-                np.concatenate([last.y, found.y]),
-                last.unsettled + found.unsettled,
+                np.concatenate([last.y, run.y]),
+                last.unsettled + run.unsettled,
             )
         else:
-            runs.append(found)
+            runs.append(run)
     if faults:
         raise InputError(source, faults)
     if not runs:
@@ -171,9 +171,9 @@ def _every(record: Record, lifted: Lifted) -> int:
     rows = lifted.sample_time / record.sample_time
     every = max(1, round(rows))
     if abs(rows / every - 1) * lifted.n > RATE:
-        own, its = (show(1 / t, "Hz") for t in (lifted.sample_time, record.sample_time))
+        path_rate, record_rate = (show(1 / t, "Hz") for t in (lifted.sample_time, record.sample_time))
         raise ValueError(
-            f"was recorded at {its}, the path runs at {own}; record at that rate or a whole multiple, or resample it so"
+            f"was recorded at {record_rate}, the path runs at {path_rate}; record at that rate or a whole multiple, or resample it so"
         )
     return every
 

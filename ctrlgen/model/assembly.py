@@ -161,7 +161,7 @@ def _physics(without_effects: Device, free: tuple[str, ...]) -> tuple[dict[str, 
 
 
 def _limited(physics: DevicePhysics, signals: dict[str, Signal], z: ca.SX) -> SimpleNamespace:
-    """What `DevicePhysics.limits` reads."""
+    """The expressions that `DevicePhysics.limits` may read, by name."""
     return SimpleNamespace(
         drive=physics.drive.expr,
         command=signals.get("command", physics.drive).expr,

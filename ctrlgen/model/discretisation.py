@@ -126,7 +126,7 @@ def _with_sampled_states(model: Model, x: ca.SX) -> ca.SX:
 
 
 def _uncoupled(A: ca.SX) -> bool:
-    """Whether no state acts on another."""
+    """Whether no state's rate depends on another state."""
     return (A.sparsity() + ca.Sparsity.diag(A.size1())).is_diag()
 
 

@@ -55,7 +55,7 @@ class Curve:
         return np.stack([middle + self.scale * (tables[0] - middle), *(self.scale * t for t in tables[1:])])
 
     def samples(self, share: np.ndarray) -> np.ndarray:
-        """(n, channels) [SI]."""
+        """The curve (n, channels) [SI] at the shares (n,) of the path."""
         return self.derivatives(share, 0)[0]
 
     def scaled(self, scale: float) -> Curve:

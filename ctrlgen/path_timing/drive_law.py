@@ -42,7 +42,7 @@ class Side:
 
     @property
     def name(self) -> str:
-        """The limited quantity."""
+        """The name of the limited channel."""
         return self.limit.channels[self.channel]
 
 
@@ -110,7 +110,7 @@ class BalancedLaw:
 
     @property
     def place_size(self) -> int:
-        """How many numbers describe a place."""
+        """The number of values that describe a place of the path."""
         return sum(self._sizes)
 
 
@@ -159,7 +159,7 @@ class InertialLaw:
 
     @property
     def place_size(self) -> int:
-        """How many numbers describe a place."""
+        """The number of values that describe a place of the path."""
         return self._channels * (self.order + 1)
 
 

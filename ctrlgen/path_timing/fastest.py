@@ -60,7 +60,7 @@ class FastestPath:
 
     @property
     def sample_time(self) -> float:
-        """Seconds between set-points."""
+        """Time between set-points [s]."""
         return in_time(self.solution.scenario.clock).sample_time
 
     @property
@@ -78,7 +78,7 @@ class FastestPath:
 
     @cached_property
     def bindings(self) -> tuple[Binding, ...]:
-        """Which limit binds where."""
+        """Which limit bounds the speed in which stretch of the path."""
         return bindings(self.optimum)
 
 
@@ -151,7 +151,7 @@ def _rate(scenario: Scenario, given: str | None) -> Quantity:
 
 
 def _quantity(option: str, text: str) -> Quantity:
-    """A frequency above zero. Raises InputError."""
+    """The frequency that an option's `text` states. Raises InputError unless it is above zero."""
     example = f'write for example "{EXAMPLES[option]}"'
     try:
         frequency = read_quantity("Hz", text)

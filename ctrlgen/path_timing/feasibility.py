@@ -42,7 +42,7 @@ class Followed:
 
     @property
     def sample_time(self) -> float:
-        """Seconds between set-points."""
+        """Time between set-points [s]."""
         return 1 / self.rate.si
 
     @property

@@ -71,7 +71,7 @@ class Optimum:
 
     @property
     def duration(self) -> float:
-        """[s]"""
+        """Duration of all pieces together [s]."""
         return sum(float(p.time[-1]) for p in self.pieces)
 
     def law(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -86,11 +86,11 @@ class Optimum:
 
     def samples(self, sample_time: float, more: int = 0) -> np.ndarray:
         """The shares of the samples, `more` of them than needed at least spread over the pieces in proportion."""
-        found = [np.zeros(1)]
+        shares = [np.zeros(1)]
         for piece in self.pieces:
-            own = int(np.ceil(piece.time[-1] / self.duration * more))
-            found.append(piece.sampled(sample_time, own)[1:])
-        return np.concatenate(found)
+            extra = int(np.ceil(piece.time[-1] / self.duration * more))
+            shares.append(piece.sampled(sample_time, extra)[1:])
+        return np.concatenate(shares)
 
 
 class Optimiser:
@@ -104,7 +104,7 @@ class Optimiser:
         self.law: Law = drive_law(model, follow, sample_time)
         self.sides = sides_of(model.limits, model)
         self.distances = distances_at(self.law, self.sides)
-        by_speed = [s for s, own in zip(self.sides, depends_on_speed(self.distances), strict=True) if own]
+        by_speed = [s for s, dependent in zip(self.sides, depends_on_speed(self.distances), strict=True) if dependent]
         self.speed_distances = distances_at(self.law, by_speed)
 
     @property
@@ -163,18 +163,18 @@ class Optimiser:
             path = self._path(curve, ends)
             places = partial(self._places, curve, ends) if path is None else path.places
             programme = SpeedProgramme(self.law, places, ends, curve.closed, self.distances, rates)
-            found = programme.fastest(_begin(programme, PACE_SAMPLES * self.sample_time), progress)
+            law = programme.fastest(_begin(programme, PACE_SAMPLES * self.sample_time), progress)
             distances, u = (
-                v.full().T for v in self.distances.map(len(found.share))(places(found.share).T, found.derivatives.T)
+                v.full().T for v in self.distances.map(len(law.share))(places(law.share).T, law.derivatives.T)
             )
-            changes = np.diff(u, axis=0) / np.diff(found.time)[:, None]
+            changes = np.diff(u, axis=0) / np.diff(law.time)[:, None]
             changes = np.vstack([changes, changes[:1] if curve.closed else changes[-1:]])
             near = [(-1 if s.upper else 1) * (changes[:, i] - s.bound) / s.unit for i, s in rate_sides]
             bound = None
             if path is not None and self.model.n_states:
-                bound = largest_speeds(self.distances, self.speed_distances, path, found.share, 1 / found.duration)
+                bound = largest_speeds(self.distances, self.speed_distances, path, law.share, 1 / law.duration)
             table = np.column_stack([distances, *near])
-            pieces.append(Piece(found.time, found.share, found.derivatives[:, 0], table, None, found, bound))
+            pieces.append(Piece(law.time, law.share, law.derivatives[:, 0], table, None, law, bound))
         return Optimum(tuple(pieces), (*self.sides, *(s for _, s in rate_sides)))
 
     def _places(self, curve: Curve, ends: tuple[float, float], share: np.ndarray) -> np.ndarray:
@@ -197,15 +197,15 @@ def _rates(law: Law, sample_time: float) -> tuple[RateBound, list[tuple[int, Sid
         for i in map(int, np.flatnonzero(np.isfinite(span))):
             fastest = span[i] / (SWING * sample_time)
             label = f"change of drive {signal.channels[i]} by its range in {SWING} samples"
-            own = Limit(
+            sampled_limit = Limit(
                 "sampled_drive", label, (signal.channels[i],), f"{signal.units[i]}/s", model.u[i], -fastest, fastest
             )
             if fastest < high[i]:
                 high[i] = fastest
-                sides.append((i, Side(own, 0, True, fastest, 2 * fastest)))
+                sides.append((i, Side(sampled_limit, 0, True, fastest, 2 * fastest)))
             if -fastest > low[i]:
                 low[i] = -fastest
-                sides.append((i, Side(own, 0, False, -fastest, 2 * fastest)))
+                sides.append((i, Side(sampled_limit, 0, False, -fastest, 2 * fastest)))
     return RateBound(low, high), sides
 
 

@@ -93,8 +93,8 @@ def at_frequency(
     solution = None
     if share is not None and sampled is not None:
         title = f"{followed.curve.scenario.file.title}: {sampled:.4g} times as large, {frequency.text}"
-        own = replace(followed, curve=followed.curve.scaled(sampled))
-        solution = solve(own.scenario(share, title, "repeated"), followed.model, progress)
+        scaled = replace(followed, curve=followed.curve.scaled(sampled))
+        solution = solve(scaled.scenario(share, title, "repeated"), followed.model, progress)
     return Repetition(frequency.si, best, even, diameter.si if diameter else None, unit, sampled, solution)
 
 

@@ -22,7 +22,7 @@ class TimingLaw:
 
     @property
     def duration(self) -> float:
-        """[s]"""
+        """Duration of the motion [s]."""
         return float(self.time[-1] - self.time[0])
 
     @cached_property

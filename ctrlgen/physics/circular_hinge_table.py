@@ -57,7 +57,7 @@ class Geometry:
 
     @property
     def ratio(self) -> float:
-        """The numeric t/R."""
+        """The number t/R at which the equation is chosen. Raises ValueError where it is a symbol."""
         if self.at is not None:
             return self.at
         if isinstance(self.R, ca.SX) or isinstance(self.t, ca.SX):
@@ -119,7 +119,7 @@ class Compliance:
 
     @property
     def within(self) -> Range | None:
-        """The equation's range of t/R."""
+        """The range of t/R in which the equation holds."""
         return self.equation.within
 
 

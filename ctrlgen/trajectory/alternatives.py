@@ -116,12 +116,12 @@ class Alternatives:
         """The least shift of `motion` (channels,) and its direction: along `way` where that is given, else along one channel; where
         none of them does, along all of them as the least shift into range says."""
         ways = list(np.diag(self.scale)) if way is None else [way]
-        found = [(s, each) for each in ways if (s := self._along(motion, each)) is not None]
-        if not found and way is None:
+        shifts = [(s, each) for each in ways if (s := self._along(motion, each)) is not None]
+        if not shifts and way is None:
             several = self._least_shift(motion)
             shift = None if several is None else self._along(motion, several)
             return shift, several
-        return min(found, key=lambda f: float(np.linalg.norm(f[0] / self.scale)), default=(None, way))
+        return min(shifts, key=lambda f: float(np.linalg.norm(f[0] / self.scale)), default=(None, way))
 
     def _shifted_by(self, shift: np.ndarray) -> str:
         rows = zip(self.signal.channels, self.signal.units, shift, self.scale, strict=True)

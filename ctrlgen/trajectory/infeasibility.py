@@ -117,7 +117,7 @@ def _grouped(model: Model, causes: Sequence[Violation]) -> tuple[list[Violation]
     for cause in causes:
         composite = model.limited_variable(cause.limit, cause.channel) is None
         listed.setdefault(cause.limit.name if composite else (cause.limit.name, cause.channel), []).append(cause)
-    return [own[0] for own in listed.values()], [len(own) - 1 for own in listed.values()]
+    return [broken[0] for broken in listed.values()], [len(broken) - 1 for broken in listed.values()]
 
 
 def _said(model: Model, cause: Violation, held: bool) -> str:
@@ -132,13 +132,13 @@ def _said(model: Model, cause: Violation, held: bool) -> str:
     if variable is None:
         return f"{limit.label} at {channel} would be {amount}"
     whose = limit.label if channel in limit.label.split() else f"{limit.label} of {channel}"
-    own = f"{whose} would have to be {amount}"
+    needed = f"{whose} would have to be {amount}"
     if variable == "rate":
-        return f"{own} (the path is too fast)"
+        return f"{needed} (the path is too fast)"
     if variable == "u" and not held:
         heated = below and "power" in model.signals
-        return f"{own} ({'it cannot cool faster than passively' if heated else 'the path is too fast'})"
-    return own
+        return f"{needed} ({'it cannot cool faster than passively' if heated else 'the path is too fast'})"
+    return needed
 
 
 def _nearest_pose(model: Model, follow: str, target: np.ndarray) -> np.ndarray | None:

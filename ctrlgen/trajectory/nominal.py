@@ -109,7 +109,7 @@ def _driven(problem: PathProblem, needed: InverseTrajectory, u: np.ndarray) -> T
 
 
 def _first(trace: Trace, n: int) -> Trace:
-    """Its first n samples."""
+    """The first n samples of a trace."""
     return Trace(trace.time[:n], {k: v[:n] for k, v in trace.signals.items()}, trace.x[:n], trace.z[:n])
 
 

@@ -124,12 +124,12 @@ class Periodic_(Curve_):
 
     @property
     def closed(self) -> bool:
-        """Periodic unless it starts from rest."""
+        """Whether the motion repeats: unless it starts from rest."""
         return not self.from_rest
 
     @property
     def continuous(self) -> int:
-        """All where there is no rest point."""
+        """All derivatives where there is no rest point."""
         return super().continuous if self.from_rest else PERIODIC
 
 
@@ -148,7 +148,7 @@ class Circle(Periodic_):
     """Whole turns in the duration."""
 
     def curve(self, frame: Frame, k: Any, n: int) -> list[Any]:
-        """The circle."""
+        """Each channel [SI] of the circle at the position `k`."""
         angle = 2 * np.pi * self.turns * k / n if self.closed else 2 * np.pi * self.turns * self._law(k, n)
         first, second = frame.directions(self.plane, "plane")
         radius = frame.size(self.diameter, self.plane[0], "diameter") / 2
@@ -168,7 +168,7 @@ class Legs_(Smooth_):
         return (times - times[0]) / (times[-1] - times[0])
 
     def derivatives(self, frame: Frame, n: int, order: int, at: np.ndarray) -> np.ndarray:
-        """The law of time on each leg."""
+        """The straight legs with the law of time on each, and their derivatives."""
         corners, times = self.corners(frame)
         per_sample = (times[-1] - times[0]) / (n - 1)
         t = times[0] + per_sample * np.clip(at, 0, n - 1)
@@ -199,7 +199,7 @@ class Line(Legs_):
         return 0 if self.even else super().continuous
 
     def corners(self, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
-        """The two ends."""
+        """The ends (2, channels) [SI] of the line, reached at the times 0 and 1."""
         return np.array([frame.point(self.start, "start"), frame.point(self.end, "end")]), np.array([0.0, 1.0])
 
 
@@ -225,7 +225,7 @@ class Raster(Legs_):
     """Time of a step to the next line as a share of the time of a line."""
 
     def corners(self, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
-        """The ends of the lines."""
+        """The ends (2 lines, channels) [SI] of the lines, in units of the time of one line."""
         fast, slow = frame.directions(self.plane, "plane")
         length = frame.size(self.length, self.plane[0], "length")
         spacing = frame.size(self.spacing, self.plane[1], "spacing")
@@ -254,7 +254,7 @@ class Spiral(Curve_):
     """Two channels of one dimension that span the plane of the path, first and second."""
 
     def curve(self, frame: Frame, k: Any, n: int) -> list[Any]:
-        """The spiral."""
+        """Each channel [SI] of the spiral at the position `k`, from rest to rest."""
         s = self._law(k, n)
         first, second = frame.directions(self.plane, "plane")
         radius, angle = frame.size(self.diameter, self.plane[0], "diameter") / 2 * s, 2 * np.pi * self.turns * s
@@ -278,7 +278,7 @@ class Lissajous(Periodic_):
     """Two channels of one dimension that span the plane of the path, first and second."""
 
     def curve(self, frame: Frame, k: Any, n: int) -> list[Any]:
-        """The figure."""
+        """Each channel [SI] of the figure at the position `k`."""
         t = self._law(k, n) if self.from_rest else k / n
         first, second = frame.directions(self.plane, "plane")
         a_1, a_2 = (frame.size(a, at, "amplitudes") for a, at in zip(self.amplitudes, self.plane, strict=True))
@@ -309,7 +309,7 @@ class Poses(Path_):
 
     @property
     def closed(self) -> bool:
-        """As stated."""
+        """Whether the first sample follows the last one, as `periodic` states."""
         return self.periodic
 
     def samples(self, frame: Frame, n: int) -> np.ndarray:
@@ -324,7 +324,7 @@ class Poses(Path_):
         return read_poses(self.folder / self.file, frame)
 
     def derivatives(self, frame: Frame, n: int, order: int, at: np.ndarray) -> np.ndarray:
-        """The spline."""
+        """The spline through the samples, and its derivatives. Raises InputError where there are too few samples."""
         listed = self.samples(frame, n)
         still = [(k, np.zeros(listed.shape[1])) for k in range(1, order + 1)]
         if len(listed) < 2 * order + 2:

@@ -48,12 +48,12 @@ class PathProblem:
 
     @property
     def signal(self) -> Signal:
-        """The followed signal."""
+        """The signal that the scenario follows."""
         return self.model.signals[self.file.follow]
 
     @property
     def clock(self) -> Clock:
-        """When its samples are."""
+        """When the samples are: settled one by one, or in time."""
         return self.file.clock
 
     @property

@@ -71,7 +71,7 @@ class Scenario:
 
     @property
     def clock(self) -> Clock:
-        """When the samples are."""
+        """When the samples are: settled one by one, or in time."""
         return self.file.clock
 
     @property

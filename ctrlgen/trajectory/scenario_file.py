@@ -93,7 +93,7 @@ class ScenarioFile(Section):
 
     @property
     def clock(self) -> Clock:
-        """When the samples are."""
+        """When the samples are: settled one by one, or in time."""
         return Settled() if self.sample_rate is None else Sampled(1 / self.sample_rate.si)
 
     @property

@@ -52,7 +52,7 @@ class Solution:
 
     @property
     def solver(self) -> str:
-        """What `iterations` counts."""
+        """The method whose iterations `iterations` counts."""
         return "Newton's method" if self.model.inertial else "IPOPT"
 
     @property

@@ -26,7 +26,7 @@ class ComparedProgram:
 
     @property
     def real(self) -> Real:
-        """Its arithmetic."""
+        """The arithmetic in which the program computes."""
         return self.build.real
 
     def run(self, mode: str, records: np.ndarray, width: int, start: tuple[np.ndarray, ...] = ()) -> np.ndarray:

@@ -92,7 +92,7 @@ class Target(Keys):
 
     @property
     def short_name(self) -> str:
-        """'Cortex-M4F float, zig'."""
+        """Core, arithmetic and compiler, such as 'Cortex-M4F float, zig'."""
         return f"{self.core} {self.real.value}, {self.compiler.split()[0]}"
 
     @property

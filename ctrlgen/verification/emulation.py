@@ -90,13 +90,13 @@ class Machine:
             self.emulator.emu_stop()
 
     def reserve(self, count: int, real: Real) -> int:
-        """Address of `count` numbers in RAM."""
+        """The address in RAM of space for `count` numbers."""
         address = self._next
         self._next += -(-count * real.bytes // 16) * 16
         return address
 
     def write(self, address: int, values: np.ndarray, real: Real) -> None:
-        """Numbers into RAM."""
+        """Writes the numbers `values` into RAM from `address` on."""
         self.emulator.mem_write(address, np.asarray(values, dtype=_dtype(real)).tobytes())
 
     def read(self, address: int, count: int, real: Real) -> np.ndarray:

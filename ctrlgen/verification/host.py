@@ -67,13 +67,13 @@ class Host:
         self._drives, self._width = model.u.numel(), reference.width
 
     def followed(self, targets: np.ndarray, start: tuple[np.ndarray, ...]) -> np.ndarray:
-        """Steps from the state `start` (x, z)."""
+        """Status and answers (n, 1 + width) of steps from the state `start` (x, z)."""
         return run_host(self._program, "follow", targets, self._width, start)
 
     def settled(self, targets: np.ndarray) -> np.ndarray:
-        """Equilibria, from a device at rest."""
+        """Status and answers (n, 1 + width) at equilibria of `targets`, from a device at rest."""
         return run_host(self._program, "settle", targets, self._width)
 
     def played(self, samples: np.ndarray) -> np.ndarray:
-        """The player's drives."""
+        """Status and drives (n, 1 + n_u) that the player gives for the `samples` (n,)."""
         return run_host(self._program, "sample", samples, self._drives)

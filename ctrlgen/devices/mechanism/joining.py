@@ -78,7 +78,7 @@ class Joining(Section):
 
     @property
     def thin(self) -> Direction:
-        """`across`, or what stands for it."""
+        """The thin direction: `across`, or without it the axis z or y that is not along the element."""
         if self.across is not None:
             return self.across
         return (0.0, 0.0, 1.0) if abs(self.along[1]) > 0.9 * np.linalg.norm(self.along) else (0.0, 1.0, 0.0)

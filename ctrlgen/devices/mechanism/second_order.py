@@ -98,7 +98,7 @@ class SecondOrder:
         return self.weight * d[self.I] * d[self.J]
 
     def pose(self, d: Matrix) -> Matrix:
-        """(channels,): second order of the pose."""
+        """The second order of the pose (channels,) [SI] from the displacements `d`."""
         return ca.mtimes(self.output, self.products(d))
 
     def sensed(self, d: Matrix) -> Matrix:

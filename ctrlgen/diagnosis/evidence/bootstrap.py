@@ -62,7 +62,7 @@ class Replicate:
     blocks: tuple[int, ...]
 
     def __call__(self, seed: list[int]) -> np.ndarray:
-        """The refitted parameters [SI]."""
+        """The parameters [SI] refitted to records with the residual redrawn."""
         rng = np.random.default_rng(seed)
         records = tuple(
             replace(r, observed=y + redrawn(r, y, block, rng))

@@ -186,7 +186,7 @@ class _Sums:
         return cls._of(-refitted.J, delta, len(refitted.theta))
 
     def plus(self, fitter: Fitter, truth: Fit, refitted: Fit, record: Record) -> _Sums:
-        """The same with one more record."""
+        """The sums with one more `record`."""
         simulator = fitter.simulator(refitted.structure, record)
         y, slopes = simulator.sensitivities(record, refitted.theta)
         other = fitter.simulator(truth.structure, record)

@@ -47,7 +47,7 @@ class FrequencyBandEntry(Keys):
 
     @property
     def label(self) -> str:
-        """'1 ... 5 Hz'."""
+        """The band in words, such as '1 ... 5 Hz'."""
         return f"{number(self.low, 3)} ... {number(self.high, 3)} Hz"
 
 

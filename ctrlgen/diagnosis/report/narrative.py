@@ -87,7 +87,7 @@ def channel_sentence(channel: str, error: ChannelErrorEntry) -> str:
 
 
 def short(channel: str) -> str:
-    """'delta_x' for 'reading.delta_x'."""
+    """The name of a channel without its signal: 'delta_x' for 'reading.delta_x'."""
     return channel.removeprefix("reading.")
 
 

@@ -120,7 +120,7 @@ def _abscissa(table: SharesTable, channel: ChannelShares, kind: Kind) -> tuple[n
         time = next(b for b in table.design.blocks if b.kind is Kind.TIME).abscissa
         return (time / period) % 1.0, f"phase of {1 / period:.4g} Hz", "periods"
     stands_for = {Kind.PITCH: Kind.POSITION, Kind.RATE: Kind.SPEED}
-    blocks = list(table.design.of_kind(stands_for.get(kind, kind), channel.own))
+    blocks = list(table.design.of_kind(stands_for.get(kind, kind), channel.axes))
     blocks = blocks or [b for b in table.design.blocks if b.kind is Kind.TIME]
     best = max(blocks, key=lambda block: _explained(block, channel.predictions[kind]))
     x, name = best.abscissa, best.signal

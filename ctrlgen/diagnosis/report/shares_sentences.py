@@ -138,7 +138,7 @@ def with_interval(share: Share) -> str:
 
 
 def interval(ci95: tuple[float, float]) -> str:
-    """'80 ... 88 %'."""
+    """The interval in per cent, such as '80 ... 88 %'."""
     low, high = (per_cent(end).removesuffix(" %") for end in ci95)
     return f"{low} ... {high} %"
 

@@ -147,7 +147,7 @@ class CandidateTerms:
 
     @cached_property
     def signals(self) -> SignalsRead:
-        """What the laws read."""
+        """The signals that the laws read."""
         return SignalsRead(self.simulator, self.laws.symbols)
 
     @cached_property

@@ -65,7 +65,7 @@ def fit_each(
 
 
 def trying(*causes: Hypothesis) -> str:
-    """What is told of a trial."""
+    """The message of progress while `causes` are tried."""
     return "trying " + ", ".join(f"{c.effect} at {c.location}" for c in causes)
 
 

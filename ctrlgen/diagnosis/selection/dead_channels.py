@@ -77,7 +77,7 @@ def _detected(
 
 
 def _only(recording: Recording, kept: list[int]) -> Recording:
-    """The recording of these channels alone."""
+    """The recording of the channels `kept` alone."""
     channels, units = (tuple(row[i] for i in kept) for row in (recording.channels, recording.units))
     noise, tolerance = (tuple(row[i] for i in kept) for row in (recording.noise, recording.tolerance))
     place = {i: k for k, i in enumerate(kept)}

@@ -36,7 +36,7 @@ class Sums:
 
     @classmethod
     def none(cls, k: int, m: int) -> Sums:
-        """The sums over no sample."""
+        """The sums over no sample, from which adding begins."""
         return cls(np.zeros((k, m)), np.zeros(m), np.zeros((m, m)))
 
     def plus(self, other: Sums) -> Sums:

@@ -154,5 +154,5 @@ def poorly_determined(search: SearchResult) -> bool:
 
 
 def _n_held(fitter: Fitter) -> int:
-    """Usable samples of the held-out records."""
+    """Number of usable samples of the held-out records."""
     return sum(int(fitter.noise.usable(r.valid).sum()) for r in fitter.held_out_records)

@@ -115,7 +115,7 @@ class ExperimentSettings:
 
 @dataclass(frozen=True)
 class BootstrapSettings:
-    """Residual block bootstrap."""
+    """Settings of the residual block bootstrap."""
 
     percentiles: tuple[float, float] = (2.5, 97.5)
     """Ends of an interval [percent]."""

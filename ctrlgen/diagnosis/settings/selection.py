@@ -234,7 +234,7 @@ class AttributionSettings:
 
 @dataclass(frozen=True)
 class VerdictSettings:
-    """The verdict."""
+    """Thresholds of the verdict."""
 
     most: float = 0.75
     """Share of the mismatch, of energy, that confirmed causes must take away to explain it partly. Judgement."""

@@ -26,7 +26,7 @@ class Blocks:
 
     @property
     def count(self) -> int:
-        """Number of blocks."""
+        """Number of blocks of all records."""
         return int(self.block.max(initial=-1)) + 1
 
     def drawn(self, parts: Sequence[np.ndarray]) -> np.ndarray:

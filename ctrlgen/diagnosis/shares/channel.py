@@ -40,19 +40,19 @@ class ChannelSmoothers:
         parts: Sequence[np.ndarray],
         design: Design,
         common: Folds,
-        own: frozenset[str],
+        axes: frozenset[str],
         numbers: np.ndarray,
         sample_time: float,
         rates: np.ndarray,
     ) -> None:
-        self.design, self.common, self.own, self.sample_time = design, common, own, sample_time
+        self.design, self.common, self.axes, self.sample_time = design, common, axes, sample_time
         self.blocks: Blocks = common.blocks
         self.rates = rates
         self.parts = [np.nan_to_num(part) for part in parts]
         self.y = self.blocks.drawn(self.parts)
         self.energy = self.blocks.sums(np.where(common.usable, self.y**2, 0.0))
         self.every_fold = np.tile(self.y, (common.count, 1))
-        self.kinds = design.kinds(own)
+        self.kinds = design.kinds(axes)
         self.fitted: dict[tuple[frozenset[Kind], int], OutOfBlock] = {}
         numbers = standardised(numbers)[:, np.ptp(numbers, axis=0) > 0]
         extra, self.periods = self._found_in_residual()
@@ -114,7 +114,7 @@ class ChannelSmoothers:
         """The columns of own past, pitch and line of each fold, and the median of the folds' periods."""
         extra: list[dict[Kind, np.ndarray]] = []
         periods: dict[Kind, list[float]] = {}
-        past, positions = self._past(), [b.abscissa for b in self.design.of_kind(Kind.POSITION, self.own)]
+        past, positions = self._past(), [b.abscissa for b in self.design.of_kind(Kind.POSITION, self.axes)]
         without = self.every_fold
         # the trend with position would pass for a long pitch
         if positions:

@@ -93,10 +93,10 @@ class Design:
                 X[places] = np.clip(X[places], seen_values.min(axis=0)[:, None], seen_values.max(axis=0)[:, None])
         return X
 
-    def one_way(self, own: frozenset[str]) -> bool:
-        """Whether the axes `own` move in one direction only, so that dry friction and an offset are one."""
-        turning = [b for b in self.of_kind(Kind.DIRECTION, own) if np.ptp(np.sign(b.abscissa)) == 2]
-        return bool(own) and not any(
+    def one_way(self, channel_axes: frozenset[str]) -> bool:
+        """Whether the `channel_axes` move in one direction only, so that dry friction and an offset are one."""
+        turning = [b for b in self.of_kind(Kind.DIRECTION, channel_axes) if np.ptp(np.sign(b.abscissa)) == 2]
+        return bool(channel_axes) and not any(
             min(np.mean(b.abscissa > 0), np.mean(b.abscissa < 0)) > SHARES.one_way for b in turning
         )
 
@@ -106,22 +106,22 @@ class Design:
         ends = np.cumsum([0, *(b.values.shape[1] for b in self.blocks)])
         return [np.arange(a, b) for a, b in pairwise(ends)]
 
-    def kinds(self, own: frozenset[str]) -> dict[Kind, np.ndarray]:
-        """Columns of X by kind, for a channel that sees the axes `own`."""
+    def kinds(self, channel_axes: frozenset[str]) -> dict[Kind, np.ndarray]:
+        """Columns of X by kind, for a channel that sees the `channel_axes`."""
         places_by_kind: dict[Kind, list[np.ndarray]] = {}
         for block, places in zip(self.blocks, self.places, strict=True):
-            if (kind := kind_for(block, own)) is not None:
+            if (kind := kind_for(block, channel_axes)) is not None:
                 places_by_kind.setdefault(kind, []).append(places)
         return {kind: np.concatenate(places_by_kind[kind]) for kind in Kind if kind in places_by_kind}
 
-    def of_kind(self, kind: Kind, own: frozenset[str]) -> Iterator[Columns]:
-        """The blocks of one kind, for a channel that sees the axes `own`."""
-        return (block for block in self.blocks if kind_for(block, own) is kind)
+    def of_kind(self, kind: Kind, channel_axes: frozenset[str]) -> Iterator[Columns]:
+        """The blocks of one kind, for a channel that sees the `channel_axes`."""
+        return (block for block in self.blocks if kind_for(block, channel_axes) is kind)
 
 
-def kind_for(block: Columns, own: frozenset[str]) -> Kind | None:
-    """The kind of a block for a channel that sees the axes `own`: what belongs to another axis counts as that; None where it
+def kind_for(block: Columns, channel_axes: frozenset[str]) -> Kind | None:
+    """The kind of a block for a channel that sees the `channel_axes`: what belongs to another axis counts as that; None where it
     is not looked at."""
-    if not block.axes or block.axes & own:
+    if not block.axes or block.axes & channel_axes:
         return block.kind
     return Kind.OTHER_AXIS if block.kind in (Kind.POSITION, Kind.SPEED, Kind.ACCELERATION) else None

@@ -129,7 +129,7 @@ def _axis(table: SharesTable, channel: ChannelShares, kind: Kind) -> str | None:
     usable = np.isfinite(y)
     named = {Kind.DRIVE: Kind.POSITION, Kind.DRIVE_HISTORY: Kind.TRAVEL_HISTORY}.get(kind, kind)
     left: dict[str, float] = {}
-    for block in table.design.of_kind(named, channel.own):
+    for block in table.design.of_kind(named, channel.axes):
         if kind is Kind.OTHER_AXIS and block.kind is not Kind.POSITION:
             continue
         X = np.column_stack([np.ones(usable.sum()), block.values[usable]])

@@ -13,7 +13,7 @@ from ctrlgen.diagnosis.shares.shares_table import SharesTable
 
 
 class Family(Enum):
-    """Families of laws."""
+    """Families of laws, as the report names them."""
 
     FRICTION = "dry friction"
     HYSTERESIS = "hysteresis"
@@ -145,7 +145,7 @@ def ranking(table: SharesTable, noise: dict[str, float] | None = None) -> list[t
                     beside[family] = max(beside[family], row.additional)
         selected[Family.GAIN] += channel.constant + channel.numbers
         # friction without a change of direction is an offset
-        if table.design.one_way(channel.own):
+        if table.design.one_way(channel.axes):
             selected[Family.FRICTION] += channel.constant
         for family in Family:
             share[family] += weights[channel.channel] / whole * (selected[family] or beside[family])

@@ -107,7 +107,7 @@ def _shares(name: str, channel: ChannelSmoothers, spikes: float) -> ChannelShare
     return ChannelShares(
         channel=name,
         rms=float(np.sqrt(total / usable.sum())),
-        own=channel.own,
+        axes=channel.axes,
         constant=float((channel.energy - channel.mean.squares).sum() / total),
         numbers=float((channel.mean.squares - channel.base.squares).sum() / total),
         kinds=tuple(rows),

@@ -107,7 +107,7 @@ def _channel_record(c: ChannelShares, unit: str) -> ChannelSharesEntry:
     return ChannelSharesEntry(
         rms=float(difference(c.rms, unit)),
         unit=unit,
-        own_axes=sorted(c.own),
+        own_axes=sorted(c.axes),
         constant=c.constant,
         numbers=c.numbers,
         kinds=kinds,

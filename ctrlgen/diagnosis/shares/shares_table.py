@@ -38,7 +38,7 @@ class KindShare:
 class ChannelShares:
     """The shares of one channel, of the energy sum y^2 of its residual.
 
-    rms: of the residual [SI]. own: the axes that the channel sees.
+    rms: of the residual [SI]. axes: those that the channel sees.
     constant: share of the mean. numbers: what other values of the device's own free numbers would add to it, beyond what
         their stated deviations allowed; 0 where the kinds predict as well without them.
     kinds: by falling share alone, the own past last.
@@ -52,7 +52,7 @@ class ChannelShares:
 
     channel: str
     rms: float
-    own: frozenset[str]
+    axes: frozenset[str]
     constant: float
     numbers: float
     kinds: tuple[KindShare, ...]

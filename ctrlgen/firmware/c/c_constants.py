@@ -35,7 +35,7 @@ class Derived:
 
     @property
     def sources(self) -> tuple[Node, ...]:
-        """What its numbers are computed by."""
+        """The nodes that its numbers are computed by."""
         return tuple(node.source or node for node in self.nodes)
 
 
@@ -85,7 +85,7 @@ class Constants:
         return self.derived[key]
 
     def text(self) -> str:
-        """Their lines."""
+        """The lines of C that define the constants."""
         return "\n".join(self.lines)
 
 

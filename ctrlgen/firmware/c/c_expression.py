@@ -205,7 +205,7 @@ class _Body:
         return 0 if self._leaf(node) else 1
 
     def _expression(self, node: Node) -> tuple[str, int]:
-        """Text and the operations in it."""
+        """The text of a node in C, and the number of operations in it."""
         if node.number in self.ends and node is not self.root:
             return self._place("r", self.ends[node.number]), 0
         if self._is_row(node):

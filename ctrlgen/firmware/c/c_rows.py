@@ -50,7 +50,7 @@ class Rows:
         return self.groups == 1 and self.loops and not self.declared
 
     def run(self) -> Rows:
-        """Itself, with `lines`, `operations` and `calls`."""
+        """These rows, with `lines`, `operations` and `calls` filled in."""
         linear = Linear({})
         shared = _shared(self.rows, linear)
         for level in _levels(shared):
@@ -243,22 +243,22 @@ class _Group:
 
 def _shared(rows: Sequence[Node], linear: Linear) -> list[Node]:
     """The largest expressions that several rows, or several of these, need."""
-    own = {row.number: row for row in rows if not _plain(row, linear)}
-    roots = dict(own)
+    row_roots = {row.number: row for row in rows if not _plain(row, linear)}
+    roots = dict(row_roots)
     while shared := _needed_by_several(roots, linear):
         roots |= {node.number: node for node in shared}
     used = {n.number for root in roots.values() for n in reached(root.operands, roots)}
-    return [node for number, node in sorted(roots.items()) if number not in own or number in used]
+    return [node for number, node in sorted(roots.items()) if number not in row_roots or number in used]
 
 
 def _needed_by_several(roots: Mapping[int, Node], linear: Linear) -> list[Node]:
     """The largest expressions below several `roots`: other roots need them than need what they are a part of."""
-    own = {number: 1 << k for k, number in enumerate(roots)}  # sets of roots are bits: unions are what this costs
+    bits = {number: 1 << k for k, number in enumerate(roots)}  # sets of roots are bits: unions are what this costs
     needed: dict[int, int] = {}  # node -> the roots above it
     above: dict[int, set[int]] = {}  # node -> those of each expression that it is a part of
     order = [node for node in reached(roots.values()) if not _plain(node, linear)]
     for node in reversed(order):  # what uses a node before the node
-        those = own.get(node.number) or needed.get(node.number, 0)
+        those = bits.get(node.number) or needed.get(node.number, 0)
         for operand in node.operands if those else ():  # below the row of a matrix nothing is needed by itself
             needed[operand.number] = needed.get(operand.number, 0) | those
             above.setdefault(operand.number, set()).add(those)

@@ -241,7 +241,7 @@ class Printer:
 
 
 def _read(sizes: Mapping[str, int], lines: Sequence[str]) -> tuple[str, ...]:
-    """The arguments that `lines` read."""
+    """The names of the arguments that `lines` read."""
     return tuple(
         a
         for a in (DERIVED, *sizes)
@@ -254,10 +254,10 @@ def _iterated(
 ) -> list[tuple[str, str, list[str]]]:
     """Functions that take `count` steps of an iteration on `argument`: name, comment, lines. Axes that do not depend on each other are
     iterated one after the other; others together, by a function that is one step."""
-    size, T, own = len(body.rows), body.real.value, f"{argument}[i]"
+    size, T, entry = len(body.rows), body.real.value, f"{argument}[i]"
     loop = body.lines[body.lines.index(f"for (i = 0; i < {size}; i++) {{") :] if body.single_loop else []
-    if loop and all(index == own for line in loop for index in re.findall(rf"\b{argument}\[[^]]*\]", line)):
-        head, inner = body.lines[: -len(loop)], [line.replace(own, "value") for line in loop[1:-1]]
+    if loop and all(index == entry for line in loop for index in re.findall(rf"\b{argument}\[[^]]*\]", line)):
+        head, inner = body.lines[: -len(loop)], [line.replace(entry, "value") for line in loop[1:-1]]
         moving = {"value"}
         before, during = [], []
         for line in inner:
@@ -275,7 +275,7 @@ def _iterated(
                 [
                     *head,
                     loop[0],
-                    f"    {T} value = {own};",
+                    f"    {T} value = {entry};",
                     "    int step;",
                     *before,
                     f"    for (step = 0; step < {count}; step++) {{",

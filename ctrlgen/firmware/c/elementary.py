@@ -70,7 +70,7 @@ def elementary_text(calls: Iterable[str], real: Real) -> str:
 
 @lru_cache
 def _context(real: Real) -> dict[str, Any]:
-    """Names and constants of one arithmetic."""
+    """What the templates of elementary functions read in one arithmetic: names, numbers and tables."""
     kind = np.finfo(np.float64 if real is Real.DOUBLE else np.float32)
     fraction, bias = kind.nmant, kind.maxexp - 1
     width, end = (64, "ULL") if real is Real.DOUBLE else (32, "U")

@@ -185,7 +185,7 @@ class Graph:
         return self.read(name, row, UNBOUNDED if low is None else (float(low[row]), float(high[row])))
 
     def apply(self, op: int, a: Sequence[Node]) -> Node:
-        """CasADi's operation `op` on nodes."""
+        """The node of CasADi's operation `op` on the nodes `a`."""
         a = list(a)
         if all(node.constant for node in a):
             return self._folded(op, a)

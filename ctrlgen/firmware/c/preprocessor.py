@@ -24,12 +24,12 @@ class Macro:
     parameters: tuple[str, ...] | None = None
 
     def called(self, arguments: str) -> str:
-        """The body with these arguments."""
+        """The body with the `arguments` in place of the parameters."""
         names = dict(zip(self.parameters or (), (a.strip() for a in arguments.split(",")), strict=True))
         return re.sub(r"\s*##\s*", "", WORD.sub(lambda match: names.get(match[0], match[0]), self.body))
 
     def defined_as(self, name: str) -> str:
-        """Its definition in C."""
+        """The #define in C of a macro of that `name`."""
         parameters = "" if self.parameters is None else f"({', '.join(self.parameters)})"
         lines = self.body.split("\n")
         return f"#define {name}{parameters} " + " \\\n    ".join(lines)

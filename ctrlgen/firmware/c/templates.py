@@ -17,7 +17,7 @@ ABI = 1
 
 
 def codegen_folder() -> Path:
-    """Templates and harness."""
+    """The folder of the C templates and of the test harness."""
     return shipped("codegen")
 
 

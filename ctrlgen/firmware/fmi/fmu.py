@@ -58,7 +58,7 @@ class Variable:
 
     @property
     def type_2(self) -> str:
-        """The type's name in FMI 2.0."""
+        """The name of the variable's type in FMI 2.0."""
         return {"Float64": "Real", "Int32": "Integer", "Boolean": "Boolean"}[self.type]
 
 

@@ -72,8 +72,8 @@ class Plant:
         m = self.model
         x = m.x[:]
         rows = [i for i in range(x.numel()) if i not in m.stepped and i not in m.clocks and not m.rates[i].is_zero()]
-        rates, own = m.rates[rows], m.x[rows]
-        x[rows] = own - ca.solve(ca.jacobian(rates, own), rates)
+        rates, states = m.rates[rows], m.x[rows]
+        x[rows] = states - ca.solve(ca.jacobian(rates, states), rates)
         for i, value in m.stepped.items():
             x[i] = value
         return self._kernel("rest", x)

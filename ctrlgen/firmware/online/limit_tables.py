@@ -67,7 +67,7 @@ def _middles(low: np.ndarray, high: np.ndarray, real: Real) -> tuple[np.ndarray,
 
 
 def _middle_formulas(low: ca.SX, high: ca.SX, real: Real) -> tuple[ca.SX, ca.SX]:
-    """`_middles` for ranges that are formulas."""
+    """Middle and squared half width as in `_middles`, of ranges that are formulas."""
     centre, half = (low + high) / 2, (high - low) / 2
     return centre, ca.fmax(half - 4 * real.epsilon * (ca.fabs(centre) + half), 0.0) ** 2
 

@@ -109,7 +109,7 @@ def bounds_once(context: Mapping[str, Any]) -> bool:
 
 
 def _texts(context: Mapping[str, Any]) -> dict[str, str]:
-    """Tables, numbers and names."""
+    """The texts that limiter.c takes, by name: tables, numbers and names."""
     literal = context["real"].literal
 
     def table(values: Iterable[float]) -> str:
@@ -165,14 +165,14 @@ def _start_texts(context: Mapping[str, Any]) -> dict[str, str]:
         ),
     }
     if changing is not None:
-        own = changing["constant"]
+        constant = changing["constant"]
         texts |= {
-            "input": own.name,
-            "limiter_set_input": f"limiter_set_{own.name}",
+            "input": constant.name,
+            "limiter_set_input": f"limiter_set_{constant.name}",
             "derive_input": changing["kernel"].name,
-            "INPUT_LEAST": literal(own.low),
-            "INPUT_MOST": literal(own.high),
-            "CHANGED_VALUES": _braces((of_state | {own.name: own.name}).values()),
+            "INPUT_LEAST": literal(constant.low),
+            "INPUT_MOST": literal(constant.high),
+            "CHANGED_VALUES": _braces((of_state | {constant.name: constant.name}).values()),
             "CHANGED_DERIVED": str(len(changing["assigned"])),
             "SET_CHANGED": _assignments(changing["assigned"]),
         }

@@ -42,9 +42,9 @@ class PrintedKernels:
 
 def kernel_printer(kernels: ControllerKernels, real: Real, prefix: str) -> Printer:
     """What prints the kernels of a controller whose C has names with this `prefix`."""
-    own = kernels.given
-    laws = printed_laws(own.model if own else kernels.nominal, kernels.named.model)
-    numbers, given_numbers = {"p": kernels.named.numbers}, {"p": own.numbers} if own else {}
+    given = kernels.given
+    laws = printed_laws(given.model if given else kernels.nominal, kernels.named.model)
+    numbers, given_numbers = {"p": kernels.named.numbers}, {"p": given.numbers} if given else {}
     ranges = _argument_ranges(kernels)
     return Printer(real, ranges, numbers, laws, given_ranges(kernels), given_numbers, f"{prefix}_derived")
 
@@ -67,8 +67,8 @@ def _argument_ranges(kernels: ControllerKernels) -> Ranges:
 
 def printed_kernels(controller: Controller, printer: Printer) -> PrintedKernels:
     """The kernels of a `controller`; where constants are given at the start, in terms of these."""
-    kernels, inverses, own = controller.kernels, controller.kernels.named, controller.kernels.given
-    static, moving = (own.static or kernels.static, own.moving) if own else (kernels.static, kernels.moving)
+    kernels, inverses, given = controller.kernels, controller.kernels.named, controller.kernels.given
+    static, moving = (given.static or kernels.static, given.moving) if given else (kernels.static, kernels.moving)
     printed = _Kernels(printer, kernel_comments(kernels))
     modes: list[dict[str, Any]] = []
     for name, inverse, formulas in (("settle", static, inverses.static), ("step", moving, inverses.moving)):

@@ -77,10 +77,12 @@ def start_context(kernels: ControllerKernels, printer: Printer) -> dict[str, Any
     _check(kernels, members, constants)
     changing = None
     if device.run_time is not None and device.run_time.input is not None:
-        own = next(c for c in constants if c.path == device.run_time.input)
-        some = [member for member in members if printer.depends(member, own.path)]
-        kernel = printer.starting(some, f"derive_{own.name}", f"What follows from {own.path}, which may change.")
-        changing = {"constant": own, "kernel": kernel, "assigned": _assigned(some)}
+        constant = next(c for c in constants if c.path == device.run_time.input)
+        some = [member for member in members if printer.depends(member, constant.path)]
+        kernel = printer.starting(
+            some, f"derive_{constant.name}", f"What follows from {constant.path}, which may change."
+        )
+        changing = {"constant": constant, "kernel": kernel, "assigned": _assigned(some)}
     derive = printer.starting(members, "derive", "What follows from the constants that the controller is given.")
     return {
         "given": [_described(c, real) for c in constants],

@@ -48,12 +48,12 @@ class Spline:
 
     @property
     def samples(self) -> int:
-        """Number of samples."""
+        """Number of samples of the path."""
         return self.pieces[-1].stop
 
     @property
     def axes(self) -> int:
-        """Number of drives."""
+        """Number of drives of each sample."""
         return self.pieces[0].control.shape[1]
 
     @property
@@ -78,7 +78,7 @@ class Spline:
 
     @property
     def first_rows(self) -> list[int]:
-        """Where each piece's control points begin."""
+        """The row of each piece's first control point."""
         return [0, *np.cumsum([len(p.control) for p in self.pieces])[:-1].tolist()]
 
     @property
@@ -88,7 +88,7 @@ class Spline:
 
     @property
     def block_word(self) -> int:
-        """Bytes of a piece's number."""
+        """Bytes of the number of a piece."""
         return 1 if len(self.pieces) <= 2**8 else self.word
 
     def bytes(self, real: Real) -> int:

@@ -65,12 +65,12 @@ class BalancedInverse(PathInverse):
         return self._checked(motion, InverseTrajectory(x, z, u, u_held[0], self.clock, motion.closed, True))
 
     def at_rest(self, target: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The equilibrium at `target`."""
+        """The equilibrium at `target`, by the static kernels."""
         x, z, u = self.equilibria(target[None])
         return x[0], z[0], u[0]
 
     def slope(self, target: np.ndarray) -> np.ndarray:
-        """Of the kernel of the displacement."""
+        """The derivative of the displacement's static kernel."""
         m, r = self.model, ca.SX.sym("target", len(target))
         z = self.static.displacement(ca.DM(m.rest), ca.DM.zeros(m.z.numel()), r)
         return ca.Function("slope", [r], [ca.jacobian(z, r)])(target).full()
@@ -95,14 +95,14 @@ class BalancedInverse(PathInverse):
         return bool(np.all(np.isfinite(u))) and not violations(self.model, x, z, u, margin)
 
     def equilibria_at(self, motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """Where nothing is remembered."""
+        """The equilibria at the samples; None where effects have memories."""
         if self.remembers:
             return None
         x, z, u = self.equilibria(motion.position)
         return x, z, u
 
     def leads_to(self, motion: Motion, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """Where nothing is remembered, of a motion in time."""
+        """Drives and next displacements of a motion in time; None where effects have memories, and for equilibria."""
         if self.remembers or self.moving is None:
             return None
         _, _, u, z_then = self._at(motion, chosen)

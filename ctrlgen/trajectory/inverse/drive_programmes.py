@@ -47,7 +47,7 @@ class Rows:
             object.__setattr__(self, name, getattr(self, name)[kept])
 
     def joined(self, other: Rows) -> Rows:
-        """Both."""
+        """These rows and those of `other` below each other."""
         A = sp.vstack([self.A, other.A], format="csr")
         low, high = np.append(self.low, other.low), np.append(self.high, other.high)
         return Rows(A, low, high, np.append(self.over, other.over))
@@ -161,7 +161,7 @@ def polished(
 ) -> np.ndarray:
     """`u` with what IPOPT's tolerance leaves of the forces `f` taken up by the drives that are not at a limit."""
     s = u / span
-    for k, own in enumerate(shares):
-        free = own * ~np.any(np.abs(s[k] - np.array(bounds)) < NEAR, axis=0)
-        s[k] += np.linalg.lstsq(free, f[k] - own @ s[k], rcond=INDEPENDENT)[0]
+    for k, share in enumerate(shares):
+        free = share * ~np.any(np.abs(s[k] - np.array(bounds)) < NEAR, axis=0)
+        s[k] += np.linalg.lstsq(free, f[k] - share @ s[k], rcond=INDEPENDENT)[0]
     return s * span

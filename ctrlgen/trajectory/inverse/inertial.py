@@ -68,7 +68,7 @@ class InertialInverse(PathInverse):
         return u[0] if motion.closed or not self.model.rate_limits else self.at_rest(motion.position[0])[2]
 
     def held(self, motion: Motion) -> InverseTrajectory:
-        """By `SampledInverse`."""
+        """The inverse of held drives by `SampledInverse`. Raises SolverError where there are no such drives."""
         x, z, u = self._begin(motion)
         exact = self._exact(self._continuous(motion)[2])
         begin = np.hstack([x, z])
@@ -99,7 +99,7 @@ class InertialInverse(PathInverse):
         return tuple(i for i in self.dynamics.internal if m.n_states <= i < m.x.numel() - m.v.numel())
 
     def at_rest(self, target: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """In closed form, or by Newton's method."""
+        """The equilibrium in closed form where that is exact, else by Newton's method."""
         still = Motion(target[None], np.zeros((self.dynamics.order, 1, len(target))), False)
         x, z, u = (v[0] for v in self._begin(still))
         if self._exact(self._continuous(still)[2]):
@@ -113,14 +113,14 @@ class InertialInverse(PathInverse):
         return x, z, u
 
     def slope(self, target: np.ndarray) -> np.ndarray:
-        """Of the kernel of the inverse dynamics."""
+        """The derivative of the kernel of the inverse dynamics, at rest."""
         r = ca.SX.sym("r", len(target))
         still = ca.horzcat(r, ca.SX.zeros(len(target), self.dynamics.order))
         z = self.dynamics.kernel(still)[1]
         return ca.Function("slope", [r], [ca.jacobian(z, r)])(target).full()
 
     def leads_to(self, motion: Motion, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """In continuous time, where that gives all states."""
+        """Drives and next displacements in continuous time; None where the motion alone does not give all states."""
         if not self.approximate and self.remembers:
             return None
         _, _, u = self._continuous(motion.at(chosen))
@@ -143,9 +143,9 @@ class InertialInverse(PathInverse):
             return exact
         m, plain = self.model, self._without(lambda effect: True)
         x, z, u = plain._continuous(motion)
-        own, n_v = m.n_states, m.v.numel()
-        memories = np.tile(m.rest[own : m.x.numel() - n_v], (len(motion), 1))
-        return [np.hstack([x[:, :own], memories, x[:, own:]]), z, u]
+        n_states, n_v = m.n_states, m.v.numel()
+        memories = np.tile(m.rest[n_states : m.x.numel() - n_v], (len(motion), 1))
+        return [np.hstack([x[:, :n_states], memories, x[:, n_states:]]), z, u]
 
     def _without(self, left_out: Callable[[Effect], bool], approximate: bool = False) -> InertialInverse:
         device = self.model.device

@@ -18,12 +18,12 @@ class Motion:
 
     @classmethod
     def of_samples(cls, position: np.ndarray, closed: bool = False) -> Motion:
-        """The samples (n, channels) alone."""
+        """A motion of the samples (n, channels) [SI], without derivatives."""
         return cls(position, np.zeros((0, *position.shape)), closed)
 
     @property
     def order(self) -> int:
-        """How many derivatives it has."""
+        """The number of its derivatives."""
         return len(self.derivatives)
 
     def __len__(self) -> int:
@@ -50,7 +50,7 @@ class Motion:
         return np.append(np.arange(1, n), 0 if self.closed else n - 1)
 
     def at(self, chosen: np.ndarray) -> Motion:
-        """Some of its samples."""
+        """The motion at the samples `chosen` alone."""
         return Motion(self.position[chosen], self.derivatives[:, chosen], self.closed)
 
     def stacked(self) -> np.ndarray:

@@ -71,24 +71,24 @@ class RedundantInverse(PathInverse):
         return self if plain is self.inner else RedundantInverse(self.model, plain, self.allocation)
 
     def trajectory(self, motion: Motion, periods: int = PERIODS) -> InverseTrajectory:
-        """The drives break limits only where none keep them."""
+        """The trajectory of the forces, with drives instead of these. The drives break limits only where none keep them."""
         return self._allocated(self.inner.trajectory(motion, periods), motion)
 
     def held(self, motion: Motion) -> InverseTrajectory:
-        """The drives of the held forces."""
+        """The trajectory of held forces, with drives instead of these."""
         return self._allocated(self.inner.held(motion), motion)
 
     def displacements(self, motion: Motion) -> np.ndarray:
-        """Those of the forces."""
+        """The displacements (n, n_axes) of the inverse of the forces."""
         return self.inner.displacements(motion)
 
     def at_rest(self, target: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """With the drives of least effort."""
+        """The equilibrium of the inverse of the forces, with the drives of least effort."""
         x, z, f = self.inner.at_rest(target)
         return x, z, self.drives(z[None], f[None])[0]
 
     def slope(self, target: np.ndarray) -> np.ndarray:
-        """That of the forces."""
+        """The slope (n_axes, channels) of the inverse of the forces."""
         return self.inner.slope(target)
 
     def keeps_limits(
@@ -142,7 +142,7 @@ class RedundantInverse(PathInverse):
     def _allocated(
         self, needed: InverseTrajectory, motion: Motion, margin: float = 0.0, wanted: Wanted = Wanted.LEAST
     ) -> InverseTrajectory:
-        """`needed` with drives instead of forces."""
+        """The trajectory `needed` of the forces, with the `wanted` drives instead of these."""
         if not np.all(np.isfinite(needed.u)):
             u = np.full((len(needed.u), self.model.u.numel()), np.nan)
             return replace(needed, u=u, u_start=u[0])
@@ -194,12 +194,12 @@ class RedundantInverse(PathInverse):
         if ca.depends_on(ca.jacobian(m.balance, m.u), m.z) or not np.all(np.isfinite(high - low)):
             return None
         B, n = self._slopes(np.zeros((1, len(m.axes))))[0] * (high - low) / m.force_scale, len(m.axes)
-        found = []
+        normals = []
         for columns in combinations(range(B.shape[1]), n - 1):
             _, sizes, rows = np.linalg.svd(B[:, columns].T, full_matrices=True)
             if n == 1 or sizes.min() > INDEPENDENT * np.abs(B).max():
-                found.append(rows[-1])
-        return np.array(found) / m.force_scale
+                normals.append(rows[-1])
+        return np.array(normals) / m.force_scale
 
     def _within_reach(self, z: np.ndarray, f: np.ndarray, margin: float) -> bool:
         """Whether the displacements `z` are in range, and drives within their limits give the forces `f` as far as `_facets` tell."""
@@ -310,7 +310,7 @@ class RedundantInverse(PathInverse):
         at = np.arange(n)
         if closed:
             k, coarse = np.append(k, n), np.vstack([coarse, coarse[:1]])
-        u = np.column_stack([np.interp(at, k, own) for own in coarse.T])
+        u = np.column_stack([np.interp(at, k, drive) for drive in coarse.T])
         yields = np.where(np.isfinite(rates[1] - rates[0]), FOLLOWS, 1.0) * span  # most where no rate is limited
         missing = np.linalg.solve((B * yields**2) @ B.swapaxes(1, 2), f[:, :, None] - B @ u[:, :, None])
         u += (yields[:, None] ** 2 * (B.swapaxes(1, 2) @ missing))[:, :, 0]

@@ -52,11 +52,11 @@ def limited_values(
     (n, n_u); those on the rates of drives where the drives `before` are given."""
     n = len(x)
     tables = model.evaluate_limits.map(n)(x.T, z.T, u.T, np.tile(model.p_nominal[:, None], (1, n)))
-    found = [(limit, values.full().T) for limit, values in zip(model.limits, tables, strict=True)]
+    limited = [(limit, values.full().T) for limit, values in zip(model.limits, tables, strict=True)]
     if before is not None and model.rate_limits:
         rates = model.limited_rates(u, before.drive, before.sample_time)
-        found += [(limit, rate[:, None]) for limit, rate in zip(model.rate_limits, rates, strict=True)]
-    return found
+        limited += [(limit, rate[:, None]) for limit, rate in zip(model.rate_limits, rates, strict=True)]
+    return limited
 
 
 def violations(
@@ -68,7 +68,7 @@ def violations(
 
     A value that is not finite breaks no limit: where the equations end, a displacement is out of range.
     """
-    found = []
+    broken = []
     for limit, values in limited_values(model, x, z, u, before):
         unit = limit.span or model.force_scale
         low, high = limit.bounds[0] + margin * unit, limit.bounds[1] - margin * unit
@@ -77,7 +77,7 @@ def violations(
             beyond[beyond < NEGLIGIBLE * unit] = 0.0
             if beyond.any():
                 k = int(np.argmax(beyond))
-                found.append(
+                broken.append(
                     Violation(limit, i, low if value[k] < low else high, value, beyond, float(beyond[k] / unit))
                 )
-    return sorted(found, key=lambda e: -e.share)
+    return sorted(broken, key=lambda e: -e.share)
