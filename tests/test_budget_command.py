@@ -67,7 +67,7 @@ def test_every_fault_is_named_at_once(circle, tmp_path):
             "acts on neither motion nor limits",
         ),
         ("xy_stage_force", '[drive]\njitter = { sd = "1 us", source = "a" }', "row of equilibria"),
-        ("mirror_spiral", '[surroundings]\nsd = "1 K"\nsource = "a"', "act on nothing"),
+        ("mirror_spiral", '[surroundings]\nsd = "1 K"\nsource = "a"', "have no effect"),
         ("circle20", "[drive]\nplayer = 3", "drive.player"),
         ("circle20", "[drive]\nplayer = false", "is not stated of anything"),
         ("circle20", "", "is not stated of anything"),

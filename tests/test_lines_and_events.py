@@ -123,7 +123,7 @@ def test_a_line_at_a_harmonic_of_the_drive_is_the_drives(apart, own):
     """A quarter of a cycle within ten seconds, of a drive that is stated to repeat each half second."""
     recording = timed(np.linspace(0.0, 10.0, 1001))
     recording.records[0].period = 0.5
-    reason = "it is harmonic 3 of the drive's period, as whatever the drive causes is"
+    reason = "it is harmonic 3 of the drive's period, as everything is that the drive causes"
     assert objections(recording, line([HUM], 6.0 + apart / 10)) == ({} if own else {0: reason})
     assert objections(recording, line([HUM], 6.0), exact=True) == {}
 

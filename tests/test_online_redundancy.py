@@ -99,7 +99,7 @@ def test_pairs_that_act_on_axes_of_their_own_are_chosen_each_by_itself():
             stage(
                 drive=dict.fromkeys("abcd", "100 V"), force=lambda u, p: [p.g * (u.a + u.b + u.d), p.g * (u.c - u.b)]
             ),
-            r"drives \(a, b, c, d\) of which 2 at a time can be chosen.*use the player",
+            r"drives \(a, b, c, d\) with 2 free choices.*use the player",
         ),
         (
             stage(force=lambda u, d, p: [p.g * (u.a + 0.5 * u.b), p.g * (1 + d.x / 1e-3) * (u.c - 0.5 * u.b)]),

@@ -190,7 +190,7 @@ def test_where_two_drives_are_too_many_the_online_c_is_refused_and_the_player_pl
     for command in ("generate", "run"):
         done = run(command, tmp_path, "--out", tmp_path / "c")
         assert done.returncode == 1
-        assert "(a, b, c, d) of which 2 at a time can be chosen" in done.stderr and "--player" in done.stderr
+        assert "(a, b, c, d) with 2 free choices" in done.stderr and "--player" in done.stderr
         assert not (tmp_path / "c").exists()
     assert run("generate", tmp_path, "--player", "--out", tmp_path / "c").returncode == 0
     assert "as it was generated" in run("check", tmp_path / "c").stdout

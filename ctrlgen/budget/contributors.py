@@ -151,7 +151,7 @@ class _Combination:
         self.linear, self.covariance = linear, path.uncertainties.covariance
 
     def of(self, changed: Sequence[_Seen], factor: float) -> np.ndarray:
-        """(n, channels) [SI] with the sds of what is `changed` times a factor."""
+        """The combined uncertainty (n, channels) [SI] with the standard deviations of what is `changed` times `factor`."""
         Y, scale = self.linear.sensitivity["pose"], np.ones(len(self.covariance))
         for one in changed:
             if one.columns is not None:

@@ -129,8 +129,8 @@ class ErrorBudget:
             elif a.outlying and not a.passed:
                 why.append(
                     f"{group.name}: {a.outlying} of {self.draws} draws lie more than {OUTLYING:g} standard uncertainties off and make "
-                    "the sd of the draws: the device is near a pole or resonates, or the simulation grows, whose steps are exact for the "
-                    "numbers as described; lower the sds, or simulate such a device by itself"
+                    "the sd of the draws: such a device resonates or is nearly unstable, or its simulation diverges, for the integrator is "
+                    "exact for the described numbers alone; lower the sds, or simulate that device on its own"
                 )
             if off > TOLERANCE:
                 most = max(self.lines, key=lambda line: line.alone[group.name])
@@ -223,7 +223,7 @@ def _propagated(path: UncertainPath) -> Propagated:
     try:
         return propagate(path)
     except FloatingPointError as error:
-        raise SolverError(f"{error}; a law of the device has no slope along it") from None
+        raise SolverError(f"{error}: a law of the device has no derivative there; smooth it, or leave it out") from None
 
 
 def _kept(combined: np.ndarray, groups: tuple[Group, ...]) -> np.ndarray:

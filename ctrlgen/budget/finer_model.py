@@ -60,7 +60,7 @@ def load_finer(scenario: Scenario, model: Model, finer: Device | Path | str) -> 
         signal, finer_signal = model.signals[role], other.signals.get(role)
         if _channels(signal) != (() if finer_signal is None else _channels(finer_signal)):
             shown = "none" if finer_signal is None else ", ".join(finer_signal.columns)
-            what = f"of the finer model: {shown}; those of {model.name} are {', '.join(signal.columns)}: describe the same device"
+            what = f"has {', '.join(signal.columns)} in {model.name} and {shown} in the finer model; describe the same device"
             faults.append(Fault(role, what))
     if other.inertial and scenario.sample_time is None:
         what = f"has inertia, but the scenario is a row of equilibria: give it sample_rate and duration, or leave {other.name} out"

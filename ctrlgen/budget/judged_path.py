@@ -35,7 +35,9 @@ class JudgedPath:
         try:
             linear = propagate(path)
         except FloatingPointError as fault:
-            raise SolverError(f"{fault}; a law of the device has no slope along it") from None
+            raise SolverError(
+                f"{fault}: a law of the device has no derivative there; smooth it, or leave it out"
+            ) from None
         slopes = slopes_of_limits(path, linear) if like is None else like.slopes
         combined = linear.combined("pose", stated) / np.array(path.signal.scale)
         error = float(np.sqrt(np.mean(np.sum(combined**2, axis=1))))

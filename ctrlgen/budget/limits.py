@@ -112,14 +112,14 @@ def slopes_of_limits(path: UncertainPath, linear: Propagated) -> Slopes:
 
 
 def _bounds(path: UncertainPath, model: Model) -> np.ndarray:
-    """(2, channels) lower and upper bounds; infinite where there is none."""
+    """The lower and upper bounds (2, channels); infinite where there is none."""
     by_name = {limit.name: limit for limit in model.limits}
     limits = [by_name[limit.name] for limit, _ in path.channels]
     return np.array([limit.bounds for limit in limits]).reshape(-1, 2).T
 
 
 def _limited(path: UncertainPath, model: Model, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """(n, channels) the limited quantities of a `model` at the path's states."""
+    """The limited quantities (n, channels) of a `model` at the path's states."""
     n, wanted = path.n, [limit.name for limit in path.limits]
     u = path.drive[path.before :]
     values = model.evaluate_limits.map(n)(x.T, z.T, u.T, np.tile(model.p_nominal[:, None], (1, n)))
@@ -146,12 +146,12 @@ class Margins:
         return np.hypot(self.lasting, self.scattered)
 
     def least(self, z: float) -> np.ndarray:
-        """(2, n, channels) what is left of the margins at the quantile z."""
+        """What is left of the margins (2, n, channels) at the quantile z."""
         return self.margin - z * self.sd
 
 
 def margins(path: UncertainPath, linear: Propagated, slopes: Slopes) -> Margins:
-    """Both sides' margins with their standard uncertainties, to first order."""
+    """The margins to both bounds of each limit with their standard uncertainties, to first order."""
     y, bounds = linear.nominal["limits"], _bounds(path, path.model)
     margin = np.stack([y - bounds[0], bounds[1] - y])
     by_numbers = linear.sensitivity["limits"] + slopes.direct
@@ -179,7 +179,7 @@ class DrawnLimits:
         return self._near[:, sample]
 
     def of(self, columns: np.ndarray) -> LimitsOfDraws:
-        """Those of draws with the deviations (draws, m)."""
+        """The limits of draws with the deviations `columns` (draws, m)."""
         lower, upper = self.margins.bounds
         return LimitsOfDraws(
             self, columns, lower + columns @ self.slopes.lower.T, upper + columns @ self.slopes.upper.T

@@ -44,7 +44,7 @@ class Propagated:
 
 
 def propagate(path: UncertainPath) -> Propagated:
-    """The sensitivities and the scatter of a path. Raises FloatingPointError where they are no numbers."""
+    """The sensitivities and the scatter of a path. Raises FloatingPointError where these are not finite."""
     S = path.nominal()
     before, n, n_s = path.before, path.n, S.shape[1]
     columns = _columns(path)
@@ -72,7 +72,7 @@ def propagate(path: UncertainPath) -> Propagated:
                         variance[name][of][k - before] = total
             P = {of: carried[of] + B[j] @ Q[k] @ B[j].T for of, Q in scatters.items()}
     if not all(np.isfinite(Y).all() for Y in (*sensitivity.values(), *nominal.values())):
-        raise FloatingPointError("the sensitivities of the path are no numbers")
+        raise FloatingPointError("the sensitivities along the path are not finite")
     # What cancels in a channel leaves a variance of rounding's sign
     scatter = {name: {of: np.sqrt(np.maximum(value, 0.0)) for of, value in by.items()} for name, by in variance.items()}
     return Propagated(nominal, sensitivity, scatter, S)

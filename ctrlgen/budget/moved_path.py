@@ -132,7 +132,7 @@ def shown_home(signal: Signal, home: Mapping[str, float]) -> str:
 
 
 def _slope(f: Callable[[np.ndarray], np.ndarray], place: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """(m, n) differences of f (m,), toward the inside."""
+    """The differences (m, n) of f (m,), toward the inside."""
     here, columns = f(place), []
     for i in range(len(place)):
         step = np.zeros(len(place))
@@ -142,6 +142,6 @@ def _slope(f: Callable[[np.ndarray], np.ndarray], place: np.ndarray, low: np.nda
 
 
 def _rounded(value: float, unit: str) -> float:
-    """With as many digits as are shown."""
+    """The `value` with as many digits as are shown in its `unit`."""
     one = 1 / difference(1.0, unit)
     return float(f"{value / one:.{DIGITS}g}") * one

@@ -151,7 +151,7 @@ class UncertainPath:
         return np.vstack([np.tile(held, (before + 1, 1)), u[:-1]]), before
 
     def _start(self) -> np.ndarray:
-        """(n_s,) S before the first of the drives: of the path as solved."""
+        """The state S (n_s,) before the first of the drives, taken from the solved path."""
         trace, closed = self.solution.trace, self.solution.scenario.closed
         k = -(self.before + 1) % self.n if closed else 0
         x = trace.x[k].copy()

@@ -299,10 +299,10 @@ class _Reader:
             )
             self.faults.append(Fault("drive.converter", what))
         if self.drive.jitter is not None and scenario.sample_time is None:
-            what = "is of a motion in time, but the scenario is a row of equilibria; leave it out"
+            what = "is for motion in time, but the scenario is a row of equilibria; leave it out"
             self.faults.append(Fault("drive.jitter", what))
         if self.drive.player and not playback_tolerance(model.signals[scenario.file.follow].units).any():
-            what = "acts on nothing that it judges: the followed signal has neither lengths nor angles; leave it out"
+            what = "has no effect: its tolerance is one of lengths and angles, and the followed signal has neither; leave it out"
             self.faults.append(Fault("drive.player", what))
         heated = model.n_states > 0 and any(path.endswith(AMBIENT) for path in self.numbers)
         if (
@@ -310,7 +310,7 @@ class _Reader:
             and not heated
             and not any("ambient" in e.requires for e in model.device.effect)
         ):
-            what = "act on nothing: no heater of this device cools to them, no effect reads them; leave them out"
+            what = "have no effect: no heater of this device cools to them, and no law reads their temperature; leave them out"
             self.faults.append(Fault("surroundings", what))
 
     def _check_correlations(self) -> None:

@@ -176,7 +176,7 @@ def _calibration(
     _check_readings(fitter, fit, errors)
     more = [e.channel for e in errors if e.after > DISCREPANCY.ratio * 2 * e.noise]
     if more:
-        what = "is read with more than its noise in error, whatever the constants: run ctrlgen diagnose for what is left out"
+        what = "differs from the model by more than its noise whatever the constants are: run ctrlgen diagnose to find what the model lacks"
         notes.append(f"{', '.join(more)} {what}")
     noise = fitter.noise
     notes += [note for note, source in zip(noise.notes, noise.sources, strict=True) if not source.stated]
@@ -267,7 +267,7 @@ def _check_readings(fitter: Fitter, fit: Fit, errors: Sequence[ReadingError]) ->
     moved = np.concatenate([fitter.predict(fit, record) for record in fitter.held_out_records])
     size = np.sqrt(np.mean(moved**2, axis=0))
     off = [(e, e.after / s) for e, s in zip(errors, size, strict=True) if e.after > FAR_READING * s > 0]
-    what = "times the motion of the model away from it; check its column, unit, sign and origin"
+    what = "times as far from the model as the model moves; check its column, unit, sign and origin"
     if faults := [Fault(e.channel, f"is {ratio:.2g} {what}") for e, ratio in off]:
         raise InputError(fitter.recording.title, faults)
 

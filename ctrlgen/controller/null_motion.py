@@ -78,7 +78,9 @@ def why_no_null_motion(model: Model) -> str | None:
     for columns, moves in _parts(model):
         if moves.shape[1] > 1:
             names = ", ".join(model.signals["drive"].channels[i] for i in columns)
-            return f"has drives ({names}) of which {moves.shape[1]} at a time can be chosen; one can be online"
+            return (
+                f"has drives ({names}) with {moves.shape[1]} free choices for each motion; the controller can make one"
+            )
     return None
 
 

@@ -68,7 +68,7 @@ class Fit:
 
     @property
     def restarted(self) -> Structure:
-        """Its structure with all parameters starting at their fitted values."""
+        """The fitted structure, with all parameters starting at their fitted values."""
         s = self.structure
         nominal = {p.path: float(v) for p, v in zip(s.free_parameters, self.theta, strict=True) if p.cause is None}
         starts = tuple(self.values(k) for k in range(len(s.causes)))

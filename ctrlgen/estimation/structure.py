@@ -47,7 +47,7 @@ class Structure:
         return self.starts if self.expansion is None else self.expansion
 
     def with_cause(self, cause: Hypothesis, start: dict[str, float]) -> Structure:
-        """The same with one cause more."""
+        """This structure with one cause more."""
         return replace(
             self,
             causes=(*self.causes, cause),
@@ -56,7 +56,7 @@ class Structure:
         )
 
     def without(self, index: int) -> Structure:
-        """The same with one cause less."""
+        """This structure with one cause less."""
         causes, starts, expansion = (
             (*row[:index], *row[index + 1 :]) for row in (self.causes, self.starts, self.expanded_at)
         )

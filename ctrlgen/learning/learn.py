@@ -114,7 +114,7 @@ def learn_from(
     options: LearningOptions = DEFAULT,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Learning:
-    """As `learn`, from runs that were read."""
+    """The same as `learn`, from runs that have been read."""
     job = _Job(lifted, runs, options)
     progress("answer of the device")
     answer = job.response(len(job.runs))
@@ -319,4 +319,4 @@ class _Job:
         worth = self.options.first_worth if len(self.runs) == 1 else self.options.worth
         if any(then[g] < worth * now[g] for g in now if now[g]):
             return ""
-        return "no more improvement is predicted: the limits, or how well the device answers as described, leave none"
+        return "no more improvement is predicted: the limits leave none, or the device answers too differently from its description"

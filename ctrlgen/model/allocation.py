@@ -62,7 +62,7 @@ def allocate(model: Model) -> Allocation:
     """The closed form of the least effort. Raises InputError where there is none, and where the drives do not push the axes
     independently."""
     if (why := why_not_ganged(model)) is not None:
-        what = f"has more drives than axes and {why}: which drives are least has no closed form"
+        what = f"has more drives than axes and {why}: the drives of least effort have no closed form"
         raise InputError(model.name, [Fault("drive", f"{what}; use the player of a solved path")])
     B = ca.substitute(ca.jacobian(model.balance, model.u), model.p, ca.DM(model.p_nominal))
     at_home = ca.Function("B", [model.z], [B])(0 * model.z_scale).full() * model.u_scale / model.force_scale

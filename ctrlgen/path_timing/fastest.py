@@ -211,9 +211,8 @@ def _stated(scenario: Scenario, followed: Followed, least: int) -> float | None:
 def _notes(followed: Followed, share: np.ndarray) -> tuple[str, ...]:
     notes = []
     if len(share) - followed.curve.closed < COARSE:
-        notes.append(
-            f"{len(share) - followed.curve.closed} set-points are few for the path, which is left between them; give a higher --sample-rate"
-        )
+        few = f"{len(share) - followed.curve.closed} set-points are few for this path"
+        notes.append(f"{few}: between them the device may leave it; give a higher --sample-rate")
     if followed.inverse.without_memories is not followed.inverse:
         notes.append(
             "the law of time is the fastest without the memories of effects, slowed until limits are kept with them"

@@ -127,7 +127,7 @@ class Optimiser:
         return self.law.along(curve.derivatives(share, 0, ends)[0], share, curve.closed)
 
     def _bounded(self, curve: Curve, ends: tuple[float, float], sampled: bool) -> Piece:
-        """By the largest speed at each place."""
+        """A piece of the fastest law by the largest speed at each place."""
         path = self._path(curve, ends)
         assert path is not None and path.law.inverse.moving is not None
         share = path.share
@@ -156,7 +156,7 @@ class Optimiser:
         return Piece(time, share, speeds, distances, steps, None, speeds)
 
     def _programmed(self, curve: Curve, progress: Callable[[str], None]) -> Optimum:
-        """By IPOPT, piece by piece; an open piece from rest to rest."""
+        """The fastest law by IPOPT, piece by piece; an open piece from rest to rest."""
         rates, rate_sides = _rates(self.law, self.sample_time)
         pieces = []
         for ends in curve.pieces:
@@ -178,7 +178,7 @@ class Optimiser:
         return Optimum(tuple(pieces), (*self.sides, *(s for _, s in rate_sides)))
 
     def _places(self, curve: Curve, ends: tuple[float, float], share: np.ndarray) -> np.ndarray:
-        """(n, place_size) the target with its derivatives by the share."""
+        """The target with its derivatives by the share, (n, place_size)."""
         return np.hstack(list(curve.derivatives(share, self.law.order, ends)))
 
 

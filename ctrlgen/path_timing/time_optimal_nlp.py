@@ -72,7 +72,7 @@ class SpeedProgramme:
         return law
 
     def _shares(self, intervals: int) -> np.ndarray:
-        """Where the path is cut: evenly, or closer together at rest."""
+        """The shares (intervals + 1,) at which the path is cut: evenly, or closer together toward points of rest."""
         even = np.linspace(0, 1, intervals + 1)
         inner = even if self.closed else (1 - np.cos(np.pi * even)) / 2
         return self.ends[0] + (self.ends[1] - self.ends[0]) * inner

@@ -151,7 +151,7 @@ def _nearest_pose(model: Model, follow: str, target: np.ndarray) -> np.ndarray |
 
 
 def _runs(samples: Sequence[int]) -> str:
-    """'3-5, 9': the first few runs of successive samples."""
+    """The first few runs of successive samples as text, such as '3-5, 9'."""
     runs: list[list[int]] = []
     for k in samples:
         if runs and k == runs[-1][1] + 1:

@@ -139,7 +139,7 @@ def _exact(scenario: Scenario, problem: PathProblem, needed: InverseTrajectory) 
 
 
 def _optimal(scenario: Scenario, problem: PathProblem, needed: InverseTrajectory, progress: Progress) -> Solution:
-    """By IPOPT, begun at the inverse of the path."""
+    """The solution by IPOPT, begun at the inverse of the path."""
     programme = _programme(problem)
 
     def step(rows: Sequence[Limit]) -> None:
@@ -170,7 +170,7 @@ def _from_result(
     model = problem.model
     if broken := violations(model, result.x, result.z, result.u, before=result.before):
         names = ", ".join(dict.fromkeys(v.limit.label for v in broken))
-        raise SolverError(f"what the solver calls a solution breaks limits ({names}); command a smaller or slower path")
+        raise SolverError(f"the computed solution breaks limits ({names}); command a smaller or slower path")
     margins = tuple(closest_margins(model, result.x, result.z, result.u, result.before))
     return Solution(scenario, model, problem.motion.position, result.trace, result.u, margins, result.iterations, added)
 

@@ -191,7 +191,7 @@ class TrajectoryProgramme:
     def _result(
         self, x: np.ndarray, z: np.ndarray, u: np.ndarray, before: np.ndarray, slack: np.ndarray, iterations: int
     ) -> OptimisationResult:
-        """With the signals that follow the drive `before` each sample, where time passes."""
+        """The result, with the signals that follow the drive `before` each sample where the path is in time."""
         result = trace(self.model, self.clock.times(len(x)), x, z, u)
         if isinstance(self.clock, Settled):
             return OptimisationResult(x, z, u, None, slack, result, iterations)
@@ -200,7 +200,7 @@ class TrajectoryProgramme:
         return OptimisationResult(x, z, u, Before(before, self.clock.sample_time), slack, result, iterations)
 
     def _start(self, begin: InverseTrajectory | None, starts_settled: bool) -> np.ndarray:
-        """Where IPOPT begins, scaled, inside the bounds."""
+        """The scaled unknowns from which IPOPT begins, inside the bounds."""
         m = self.model
         if begin is None or not all(np.all(np.isfinite(v)) for v in (begin.x, begin.z, begin.u)):
             guess = [np.ones(self.sizes[0]), np.ones(self.sizes[1]), np.full(self.sizes[2], DRIVE_GUESS)]

@@ -87,11 +87,11 @@ class Smooth_(Path_):
 
     @property
     def continuous(self) -> int:
-        """Those that are zero at the rest points."""
+        """The number of derivatives that are zero at rest points."""
         return MINIMUM_JERK if self.smooth is None else self.smooth
 
     def geometry(self, frame: Frame, order: int, share: np.ndarray) -> np.ndarray:
-        """By the law of time of degree one, in which the share is the time: of n samples, n or n - 1 lie between the ends."""
+        """The curve by the law of time of degree one, whose share is the time: of n samples, n or n - 1 lie between the ends."""
         return self.model_copy(update={"smooth": 0}).derivatives(frame, 1 if self.closed else 2, order, share)
 
 

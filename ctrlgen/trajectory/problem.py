@@ -188,7 +188,7 @@ class PathProblem:
 
     @property
     def _longer(self) -> int:
-        """By how many samples a path is longer that is shaped."""
+        """The number of samples by which shaping makes the path longer."""
         if self.shaper is None or not isinstance(self.clock, Sampled):
             return 0
         return self.shaper.samples(self.clock.sample_time)
@@ -219,7 +219,7 @@ class PathProblem:
 
     @property
     def _moved(self) -> np.ndarray:
-        """(channels,) by how much the path is moved."""
+        """The shift (channels,) [SI] of the path that `home` states."""
         return np.array([self.home.get(channel, 0.0) for channel in self.signal.channels])
 
     def _check_smoothness(self, order: int) -> None:

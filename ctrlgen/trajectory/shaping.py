@@ -47,7 +47,7 @@ class Shaper:
     times: np.ndarray
 
     def samples(self, sample_time: float) -> int:
-        """By how many samples a shaped path is longer."""
+        """The number of samples by which shaping makes a path longer."""
         return ceil(self.times[-1] / sample_time - WHOLE)
 
 

@@ -30,7 +30,7 @@ class ComparedProgram:
         return self.build.real
 
     def run(self, mode: str, records: np.ndarray, width: int, start: tuple[np.ndarray, ...] = ()) -> np.ndarray:
-        """Its answers, as `run_host` gives them."""
+        """The answers of the program as `run_host` gives them."""
         return run_host(self.path, mode, records, width, start)
 
     def shipped_test(self) -> ComparisonEntry:

@@ -87,7 +87,7 @@ class Target(Keys):
 
     @property
     def name(self) -> str:
-        """'Cortex-M4F, zig 0.13.0, float'."""
+        """Core, compiler and arithmetic, such as 'Cortex-M4F, zig 0.13.0, float'."""
         return f"{self.core}, {self.compiler}, {self.real.value}"
 
     @property
@@ -119,7 +119,7 @@ class StoppedTarget(Keys):
 
     @property
     def name(self) -> str:
-        """'Cortex-M4F, zig 0.13.0, float'."""
+        """Core, compiler and arithmetic, such as 'Cortex-M4F, zig 0.13.0, float'."""
         return f"{self.core}, {self.compiler}, {self.real.value}"
 
 

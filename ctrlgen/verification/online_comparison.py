@@ -93,7 +93,7 @@ def _status_difference(ref: ReferenceAnswers, real: Real, answer: np.ndarray, ex
 
 
 def _last_trial(m: Model, role: str) -> float:
-    """[SI] what the third trial of the line search can still change."""
+    """The largest change [SI] that the third trial of the line search can still make."""
     states = (m.x_bounds[0][: m.n_states], m.x_bounds[1][: m.n_states])
     low, high = {"displacement": m.z_bounds, "state": states, "drive": m.u_bounds}[role]
     return (1 - SECANT_FRACTION) ** 2 * float(np.max(high - low, initial=0.0))

@@ -45,7 +45,7 @@ class Transduction:
 
 
 def transduction(c: Condensed) -> Transduction:
-    """That of the actuators of a mechanism, which are of one kind."""
+    """The transduction of a mechanism, whose actuators are of one kind."""
     return _heated(c) if c.device.actuator[0].kind == "thermal" else _proportional(c)
 
 

@@ -188,7 +188,9 @@ def user_device(name: str, **given: Unpack[UserArguments]) -> Device:
         beside = ("drive", "drive_rate", "drive_weight", "state", "reading")
         read.imposed(stated, {key: given.get(key) for key in beside}, sizes)
     elif given.get("speed") is not None:
-        read.faults.append(Fault("speed", "is of an imposed motion; give needed_force, or leave it out"))
+        read.faults.append(
+            Fault("speed", "is for an imposed motion, which has needed_force; give that as well, or leave speed out")
+        )
     rates_of_drives = read.drive_rates(given.get("drive_rate") or {}, sizes["drive"])
     weights = read.weights(given.get("drive_weight") or {}, sizes)
     expressions = read.limits(given.get("limits") or {})

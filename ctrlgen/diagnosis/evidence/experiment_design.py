@@ -75,7 +75,7 @@ class Experiment:
         return self.after >= EXPERIMENT.settles
 
     def record(self) -> NextExperimentEntry:
-        """Its entry in diagnosis.json."""
+        """The entry of the experiment in diagnosis.json."""
         best = self.candidates[0]
         return NextExperimentEntry(
             discriminates_between=self.rivals,

@@ -79,11 +79,11 @@ class UnmodelledForce:
         return [_statement(axis, self.maps[axis]) for axis in self.loudest[: MAPS.most_axes] if self.maps[axis]]
 
     def record(self) -> UnmodelledForceEntry:
-        """Its entry in diagnosis.json."""
+        """The entry of the unknown input in diagnosis.json."""
         return UnmodelledForceEntry(statements=self.sentences())
 
     def figures(self) -> dict[str, Figure]:
-        """'unknown': the input against what explains it best."""
+        """The figure 'unknown': the input over what explains it best; none where nothing does."""
         maps = [(axis, m) for axis, several in self.maps.items() for m in several if m.variance_share >= SHOWN_SHARE]
         maps = sorted(maps, key=lambda row: -row[1].variance_share)[:PANELS]
         if not maps:

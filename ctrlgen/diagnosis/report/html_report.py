@@ -88,7 +88,7 @@ def _entries(diagnosis: Diagnosis) -> dict[str, Keys | None]:
 
 
 def counts(diagnosis: Diagnosis) -> str:
-    """'3000 samples to fit, 1500 held out'."""
+    """The number of samples in words, such as '3000 samples to fit, 1500 held out'."""
     word = "poses" if diagnosis.recording.kind == "poses" else "samples"
     sizes = {
         role: sum(len(r.time) for r in diagnosis.recording.records if r.role == role)

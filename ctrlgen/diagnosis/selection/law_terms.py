@@ -37,7 +37,7 @@ class Read:
     name: str
 
     def of(self, model: Model) -> ca.SX:
-        """Its expression in a model, which is not closed yet."""
+        """The expression of the signal in a `model` that is not closed yet."""
         value = getattr(model.law_inputs(self.place, self.index, None, {}, self.order), self.name)
         return ca.SX(value() if callable(value) else value)
 

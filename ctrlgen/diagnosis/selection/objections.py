@@ -112,7 +112,7 @@ def _no_line(recording: Recording, fit: Fit, k: int) -> str | None:
         order = line * period if period else 0.5
         near = max(OBJECTIONS.harmonic / covered, _line_interval(fit, k))
         if period and order > 0.5 and abs(order - round(order)) / period < near:
-            return f"it is harmonic {round(order)} of the drive's period, as whatever the drive causes is"
+            return f"it is harmonic {round(order)} of the drive's period, as everything is that the drive causes"
     return None
 
 

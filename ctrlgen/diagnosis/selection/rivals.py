@@ -56,7 +56,7 @@ def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Rou
 
 
 def _in_place_of(k: int, there: Sequence[Hypothesis], tried: Sequence[CandidateModel]) -> list[CandidateModel]:
-    """Those `tried` that hold the causes `there`, but another one instead of cause k."""
+    """Those of the `tried` models that hold the causes `there`, but another one instead of cause k."""
     others = set(there) - {there[k]}
     replaced = []
     for t in tried:

@@ -238,7 +238,7 @@ class _Body:
         return _FORMS[op].format(*a, zero=zero, one=one), inside
 
     def _operand(self, node: Node) -> str:
-        """As it may stand beside an operator."""
+        """The text of a node as it may stand beside an operator, in brackets where it has to be."""
         text, inside = self.parts[node.number]
         whole = not inside or node.number in self.laws or (node.operation in CALLS and not self._leaf(node))
         return text if whole else f"({text})"
@@ -249,7 +249,7 @@ class _Body:
         return place
 
     def _numbered(self, result: str) -> Text:
-        """With the places numbered in the order of the text."""
+        """The text of a result with its places numbered in the order in which they stand."""
         parts: dict[str, list[Node]] = {"c": [], "r": [], "d": []}
 
         def renumbered(match: re.Match[str]) -> str:

@@ -42,7 +42,7 @@ class Kernel:
 
     @property
     def body(self) -> str:
-        """Its text without its name: equal for equal functions."""
+        """The text without the function's name: the same for functions that compute the same."""
         return self.text.partition("static ")[2].replace(self.name, "")
 
     def call(self, result: str, **values: str) -> str:

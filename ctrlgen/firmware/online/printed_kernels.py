@@ -129,7 +129,7 @@ class _Kernels:
 
     @property
     def kernels(self) -> list[Kernel]:
-        """In the order in which they were printed."""
+        """The different kernels, in the order in which they were printed."""
         return list(self._by_body.values())
 
 

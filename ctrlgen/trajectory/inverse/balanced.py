@@ -53,7 +53,7 @@ class BalancedInverse(PathInverse):
         return BalancedInverse(model, self.follow, self.clock)
 
     def trajectory(self, motion: Motion, periods: int = PERIODS) -> InverseTrajectory:
-        """By equilibria; carried along the path where effects have memories."""
+        """The trajectory by equilibria; carried along the path where effects have memories."""
         if self.remembers and self.moving is not None:
             return self._carried(motion, periods)
         x, z, u_held = self.equilibria(motion.position)
@@ -88,7 +88,7 @@ class BalancedInverse(PathInverse):
     def keeps_limits(
         self, motion: Motion, chosen: np.ndarray | None = None, margin: float = 0.0, periods: int = PERIODS
     ) -> bool:
-        """By the samples `chosen` where nothing is remembered and no rate is limited."""
+        """Whether limits are kept, by the samples `chosen` alone where nothing is remembered and no rate is limited."""
         if chosen is None or self.remembers or self.moving is None or self.model.rate_limits:
             return super().keeps_limits(motion, chosen, margin, periods)
         x, z, u, _ = self._at(motion, chosen)

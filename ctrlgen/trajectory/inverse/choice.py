@@ -37,7 +37,8 @@ def count_faults(model: Model, follow: str) -> list[Fault]:
     if drives > axes and not model.redundant:
         return [Fault("device", f"{model.name} has an imposed motion and no drives; nothing leads it along a path")]
     if model.redundant and (why := why_not_ganged(model)) is not None:
-        what = f"has {drives} drives for {axes} axes and {why}: which are least is not computed; let one drive act on several actuators"
+        lacking = f"has {drives} drives for {axes} axes and {why}"
+        what = f"{lacking}: the drives of least effort cannot be computed; let one drive act on several actuators"
         return [Fault("device", f"{model.name} {what}")]
     if drives < channels:
         ways = "; ".join(_direction(signal, way) for way in _reached(model, signal).T)

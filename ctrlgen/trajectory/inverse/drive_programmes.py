@@ -54,7 +54,7 @@ class Rows:
 
     @property
     def bounds(self) -> np.ndarray:
-        """Of A s and -A s from above, infinite where there is none."""
+        """The upper bounds of A s and -A s, infinite where there is none."""
         return np.append(self.high, -self.low)
 
 
@@ -133,7 +133,9 @@ def _programme(
         bounds=np.column_stack([np.append(np.full(n, -np.inf), np.full(m, least)), np.full(n + m, np.inf)]),
     )
     if answer.x is None:
-        raise SolverError(f"no drives push as the path needs ({answer.message}); command a smaller or slower path")
+        raise SolverError(
+            f"no drives give the forces that the path needs ({answer.message}); command a smaller or slower path"
+        )
     y = np.zeros(len(given))
     y[given] = answer.ineqlin.marginals
     refutation = Refutation(y / np.tile(limited.over, 2), answer.eqlin.marginals)

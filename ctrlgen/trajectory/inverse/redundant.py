@@ -161,7 +161,7 @@ class RedundantInverse(PathInverse):
         return np.vstack([z_start, z]), np.vstack([f_start, needed.u])
 
     def _pushed_at(self, motion: Motion, places: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """The same at some `places` alone; None where these take all samples."""
+        """Displacements and forces as in `_pushed`, at some `places` alone; None where these take all samples."""
         if motion.closed:
             return self.inner.leads_to(motion, places)
         later = self.inner.leads_to(motion, places[1:] - 1)
