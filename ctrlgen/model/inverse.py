@@ -52,51 +52,15 @@ def invert(model: Model, follow: str, sample_time: float | None, symbolic: bool 
     Free parameters take their nominal values, and where it is `symbolic` stay a last argument "p" of every kernel: the
     inverse at the nominal values, with its numbers as formulas of the parameters (those of the followed signal excepted).
     """
-    x, z, u, n, n_s = model.x, model.z, model.u, len(model.axes), model.n_states
-    x_1, z_1, u_1 = (ca.SX.sym(f"{s}1", v.numel()) for s, v in (("x", x), ("z", z), ("u", u)))
-    heat, target = model.heat, ca.SX.sym("target", model.signals[follow].expr.numel())
-    p = model.p if symbolic else ca.SX(ca.DM(model.p_nominal))
-    now, end = ca.vertcat(x, z, u, model.p), ca.vertcat(x_1, z_1, u_1, p)
-    known = ExpansionPoint.of(
-        (x, model.rest, model.x_scale),
-        (z, 0 * model.z_scale, model.z_scale),
-        (target, np.zeros(target.numel()), np.zeros(target.numel())),
-        (x_1, model.rest, model.x_scale),
-        (z_1, 0 * model.z_scale, model.z_scale),
-        (u_1, 0 * model.u_scale, model.u_scale),
-        (heat, np.zeros(heat.numel()), np.ones(heat.numel())),
-        (model.p, model.p_nominal, np.zeros(model.p.numel())),
-    )
-    if symbolic:
-        known = replace(
-            known,
-            parameters=model.p,
-            with_formula=ca.vertcat(x, x_1),
-            base_formula=ca.vertcat(model.rest_formula, model.rest_formula),
-        )
-    followed, balance, rates, produced = (
-        ca.substitute(e, now, end)
-        for e in (model.signals[follow].expr, model.balance, model.rates_of_heat, model.heat_of_drive)
-    )
+    x, z, u, n, n_s, heat = model.x, model.z, model.u, len(model.axes), model.n_states, model.heat
+    end = _SampleEnd.of(model, follow, symbolic)
+    x_1, z_1, u_1, target = end.x, end.z, end.u, end.target
+    known = _expansion_point(model, end, symbolic)
+    followed, balance = (end.of_end(model, e) for e in (model.signals[follow].expr, model.balance))
     if sample_time is None:
-        motion = rates[:]
-        velocities = range(x.numel() - model.v.numel(), x.numel())
-        # The first two have no equilibrium: they start anew, at zero
-        for i in (
-            *model.stepped,
-            *model.clocks,
-            *velocities,
-        ):
-            motion[i] = x_1[i]
-        reached = ca.substitute(solve_by_blocks(known, motion, x_1), z_1, z)  # the equilibrium states at the given z
-        at_rest = ca.vertcat(reached, z, u_1, p)
-        for i, value in model.stepped.items():
-            reached[i] = ca.substitute(value, now, at_rest)
+        reached, motion, produced = _equilibrium(model, end, known)
     else:
-        reached = ca.substitute(held_step(model, sample_time, model.rates_of_heat), model.p, p)
-        reached = ca.substitute(reached, u, u_1)
-        motion = x_1 - reached
-        produced = ca.substitute(model.heat_of_drive, ca.vertcat(u, model.p), ca.vertcat(u_1, p))
+        reached, motion, produced = _held(model, end, sample_time)
     heating = heat - produced
     followed = ca.substitute(followed, model.p, ca.DM(model.p_nominal))
     wanted_z = solve_by_blocks(
@@ -109,7 +73,7 @@ def invert(model: Model, follow: str, sample_time: float | None, symbolic: bool 
     wanted_u = (
         solve_by_blocks(known, drive_of_state, ca.vertcat(heat, u_1))[n:] if n_s else later[x.numel() : x.numel() + n]
     )
-    settled = ca.substitute(model.balance, model.p, p)
+    settled = ca.substitute(model.balance, model.p, end.p)
     advance = ca.substitute(reached, heat, ca.substitute(produced, x_1, reached) if sample_time is None else produced)
     states = x_1[:n_s]
     results: dict[str, tuple[dict[str, ca.SX], ca.SX]] = {
@@ -123,6 +87,72 @@ def invert(model: Model, follow: str, sample_time: float | None, symbolic: bool 
     }
     more = {"p": model.p} if symbolic else {}
     return Inverse(**{name: _kernel(name, arguments | more, result) for name, (arguments, result) in results.items()})
+
+
+@dataclass(frozen=True)
+class _SampleEnd:
+    """The symbols at the end of a sample: states `x`, displacements `z`, drives `u`, and the `target` of the followed signal; and the
+    parameters `p`, symbols or nominal values."""
+
+    x: ca.SX
+    z: ca.SX
+    u: ca.SX
+    target: ca.SX
+    p: ca.SX
+
+    @classmethod
+    def of(cls, model: Model, follow: str, symbolic: bool) -> _SampleEnd:
+        """The end of a sample of `model`, whose parameters stay symbols where it is `symbolic`."""
+        x, z, u = (ca.SX.sym(f"{s}1", v.numel()) for s, v in (("x", model.x), ("z", model.z), ("u", model.u)))
+        target = ca.SX.sym("target", model.signals[follow].expr.numel())
+        return cls(x, z, u, target, model.p if symbolic else ca.SX(ca.DM(model.p_nominal)))
+
+    def of_end(self, model: Model, expression: ca.SX) -> ca.SX:
+        """An `expression` of the model with the symbols of the end."""
+        now = ca.vertcat(model.x, model.z, model.u, model.p)
+        return ca.substitute(expression, now, ca.vertcat(self.x, self.z, self.u, self.p))
+
+
+def _expansion_point(model: Model, end: _SampleEnd, symbolic: bool) -> ExpansionPoint:
+    """Rest and typical sizes of a `model`, for its symbols now and at the `end`; rest as formulas where it is `symbolic`."""
+    target, heat = end.target.numel(), model.heat.numel()
+    known = ExpansionPoint.of(
+        (model.x, model.rest, model.x_scale),
+        (model.z, 0 * model.z_scale, model.z_scale),
+        (end.target, np.zeros(target), np.zeros(target)),
+        (end.x, model.rest, model.x_scale),
+        (end.z, 0 * model.z_scale, model.z_scale),
+        (end.u, 0 * model.u_scale, model.u_scale),
+        (model.heat, np.zeros(heat), np.ones(heat)),
+        (model.p, model.p_nominal, np.zeros(model.p.numel())),
+    )
+    if not symbolic:
+        return known
+    formulas = ca.vertcat(model.rest_formula, model.rest_formula)
+    return replace(known, parameters=model.p, with_formula=ca.vertcat(model.x, end.x), base_formula=formulas)
+
+
+def _equilibrium(model: Model, end: _SampleEnd, known: ExpansionPoint) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """The states of the equilibrium at the displacements now, the residual of the states at the `end`, and the heat produced there."""
+    rates, produced = (end.of_end(model, e) for e in (model.rates_of_heat, model.heat_of_drive))
+    motion = rates[:]
+    velocities = range(model.x.numel() - model.v.numel(), model.x.numel())
+    # The first two have no equilibrium: they start anew, at zero
+    for i in (*model.stepped, *model.clocks, *velocities):
+        motion[i] = end.x[i]
+    reached = ca.substitute(solve_by_blocks(known, motion, end.x), end.z, model.z)
+    now, at_rest = ca.vertcat(model.x, model.z, model.u, model.p), ca.vertcat(reached, model.z, end.u, end.p)
+    for i, value in model.stepped.items():
+        reached[i] = ca.substitute(value, now, at_rest)
+    return reached, motion, produced
+
+
+def _held(model: Model, end: _SampleEnd, sample_time: float) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """The states after one sample under the held drives of its `end`, the residual of the states there, and the heat produced."""
+    reached = ca.substitute(held_step(model, sample_time, model.rates_of_heat), model.p, end.p)
+    reached = ca.substitute(reached, model.u, end.u)
+    produced = ca.substitute(model.heat_of_drive, ca.vertcat(model.u, model.p), ca.vertcat(end.u, end.p))
+    return reached, end.x - reached, produced
 
 
 def _kernel(name: str, arguments: dict[str, ca.SX], result: ca.SX) -> ca.Function:
