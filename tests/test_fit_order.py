@@ -6,13 +6,15 @@ import pickle
 from dataclasses import replace
 from itertools import product
 
+import casadi as ca
 import numpy as np
+import pytest
 from axis_records import AXIS, BACKLASH, H, axis_fitter
-from conftest import AXIS_FILE, DEVICE
+from conftest import AXIS_FILE, DEVICE, SCENARIOS
 
 from ctrlgen import build_model, load_device, user_device
 from ctrlgen.devices.changed_numbers import changed
-from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, nominal_physics
 from ctrlgen.estimation.simulator import compiled_simulator
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Record, Timing
@@ -121,3 +123,27 @@ def test_a_device_in_python_is_equal_to_what_another_process_gets_of_it():
     sent = pickle.loads(pickle.dumps(device))
     assert type(sent) is not type(device) and sent == device and hash(sent) == hash(device)
     assert changed(device, {"mechanism.k": 1e6}) != device
+    u, d, p = ca.SX.sym("u"), ca.SX.sym("d"), ca.SX.sym("p", 2)
+    laws = {
+        "force": ca.Function("F", [u, p], [p[1] * u], ["u", "p"], ["F"]),
+        "restoring_force": ca.Function("R", [d, p], [p[0] * d], ["d", "p"], ["R"]),
+    }
+    of_functions = user_device("lever", parameters={"k": "2 N/um", "gain": "0.5 N/V"}, **words | laws)
+    one, other = (pickle.loads(pickle.dumps(of_functions)) for _ in range(2))
+    assert one == of_functions == other == one and nominal_physics(one) is nominal_physics(other)
+    again = user_device("lever", parameters={"k": "2 N/um", "gain": "0.5 N/V"}, **words)
+    assert again != device, "what a function reads may have changed between two calls"
+
+
+def test_a_copy_of_a_mechanism_depends_on_its_arguments_alone():
+    """Typical sizes stay those of the device that the file describes, all else is that of the copy, whatever was asked for before."""
+    fresh, asked = (load_device(SCENARIOS / "devices" / "parallelogram.toml") for _ in range(2))
+    sizes = asked.channel_scale, asked.reading_scale, asked.size
+    other = {"actuator[0].travel": 1.25 * asked.placed_actuators[0].section.travel.si}
+    copies = [changed(device, other) for device in (fresh, asked)]
+    assert copies[0] == copies[1] and copies[0] != asked
+    for copy in copies:
+        assert (copy.channel_scale, copy.reading_scale, copy.size) == sizes
+        assert copy.placed_actuators[0].section.travel.si == pytest.approx(other["actuator[0].travel"])
+    written = type(asked).model_validate({key: getattr(copies[0], key) for key in type(asked).model_fields})
+    assert written != copies[0] and written.channel_scale != copies[0].channel_scale

@@ -54,6 +54,7 @@ def test_the_budgets_of_a_calibration_are_those_of_a_robust_path(robust):
     before, after = budgets(made, robust, RUN_TIME)
     assert before.solution.model.probability == after.solution.model.probability == pytest.approx(0.999)
     assert after.peak(after.groups[0]) < before.peak(before.groups[0])
+    assert after.solution.scenario.home == before.solution.scenario.home != {}
 
 
 def test_the_fastest_motion_is_refused_for_limits_that_hold_at_a_probability(robust):

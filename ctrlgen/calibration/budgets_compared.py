@@ -37,6 +37,10 @@ def budgets(
     wide = np.diag([sd_of_bounds(c) ** 2 for c in unknown])
     before = _budget(read, calibration.device, _joined(stated, unknown, wide, [BOUNDS] * len(unknown)), progress)
     sources = ["calibration" if row.determined else BOUNDS for row in calibration.constants]
+    # A path that is moved for the least error is moved once: both budgets are of the same one
+    if (robust := read.file.robust) is not None:
+        still = read.file.model_copy(update={"robust": robust.model_copy(update={"home": []})})
+        read = replace(read, file=still, home=before.solution.scenario.home)
     after = _budget(read, calibration.calibrated, _joined(stated, constants, calibration.covariance, sources), progress)
     return before, after
 

@@ -30,6 +30,7 @@ from ctrlgen.estimation.noise import estimate_noise
 from ctrlgen.estimation.noise_update import update_guessed_noise
 from ctrlgen.estimation.robust_covariance import widening
 from ctrlgen.estimation.settings import DISCREPANCY, NOISE_UPDATE, SIMULATION, STATISTICS
+from ctrlgen.estimation.simulator import compiled_simulator
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.model.assembly import build_model, movable, symbolic_model
 from ctrlgen.model.discretisation import settling_time
@@ -136,6 +137,8 @@ def calibrate(
 
     Raises InputError for a device without run-time constants, or of which none acts on what was recorded.
     """
+    # Those of an earlier calibration only take memory
+    compiled_simulator.cache_clear()
     described = load_device(device)
     if not described.given_at_start:
         what = 'is missing: it names what differs between specimens; write [run_time] and under it constants = ["actuator.ambient"]'

@@ -30,11 +30,15 @@ def shipped_package(name: str) -> ModuleType:
     folder = shipped(name)
     if folder.name != name:
         return import_module(f"ctrlgen.{folder.name}")
-    if name not in sys.modules:
-        first = folder / "__init__.py"
-        spec = spec_from_file_location(name, first, submodule_search_locations=[str(folder)])
+    loaded = sys.modules.get(name)
+    if loaded is not None and [Path(part) for part in getattr(loaded, "__path__", ())] == [folder]:
+        return loaded
+    # Under a name of its own, since another package may have that one; within it all imports are relative
+    private, first = f"_ctrlgen_{name}", folder / "__init__.py"
+    if private not in sys.modules:
+        spec = spec_from_file_location(private, first, submodule_search_locations=[str(folder)])
         if spec is None or spec.loader is None or not first.is_file():
             raise CtrlgenError(f"{folder} is missing: {name} comes with a clone of ctrlgen and with its wheel")
-        module = sys.modules[name] = module_from_spec(spec)
+        module = sys.modules[private] = module_from_spec(spec)
         spec.loader.exec_module(module)
-    return sys.modules[name]
+    return sys.modules[private]

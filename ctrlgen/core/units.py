@@ -80,7 +80,8 @@ def difference_unit(unit: str) -> str:
 
 def shown_difference_unit(unit: str) -> str:
     """The unit of differences of quantities in `unit`, as reports show it: 'degC' -> 'K', 'degF' -> 'delta_degF', 'um' -> 'um'."""
-    return "K" if unit == "degC" else difference_unit(unit)
+    scale, offset = _affine(unit)
+    return "K" if offset and scale == 1 else difference_unit(unit)
 
 
 def base_unit(unit: str) -> str:

@@ -45,6 +45,7 @@ from ctrlgen.estimation.noise_update import correct_stated_noise, update_guessed
 from ctrlgen.estimation.profile_likelihood import profiles
 from ctrlgen.estimation.residual_tests import run_residual_tests
 from ctrlgen.estimation.settings import NOISE_UPDATE, SIMULATION
+from ctrlgen.estimation.simulator import compiled_simulator
 from ctrlgen.estimation.spikes import Spikes, find_spikes
 from ctrlgen.model.assembly import build_model, movable
 from ctrlgen.model.discretisation import settling_time
@@ -71,6 +72,8 @@ def diagnose_recording(
     hypotheses to the effects of these names and the device's own parameters.
     Raises InputError where no record has the role fit or hold_out, where no channel varies, or for an unknown effect.
     """
+    # Those of an earlier diagnosis only take memory
+    compiled_simulator.cache_clear()
     # One thread: the matrices are small. No warnings: a candidate model may diverge, and is then rejected.
     with threadpool_limits(1), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         processes = usable_cores() if jobs is None else max(jobs, 1)

@@ -16,6 +16,7 @@ from ctrlgen.diagnosis.report.html_report import page
 from ctrlgen.diagnosis.report.writeback import write_next
 from ctrlgen.diagnosis.selection.candidate_model import SearchResult
 from ctrlgen.estimation.checkpoint import Checkpoint
+from ctrlgen.estimation.simulator import compiled_simulator
 from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recorded_files import recording_files, sha256
@@ -107,6 +108,8 @@ def diagnose_into(
         write_text(draft / "report.html", page(diagnosis, provenance))
     # only now: a diagnosis interrupted during its replicates need not repeat its fits
     checkpoint.done()
+    # Those of a hexapod take 20 MB each
+    compiled_simulator.cache_clear()
     return diagnosis
 
 

@@ -6,14 +6,14 @@ Motions are small: stiffness, Jacobian and loads are those of the mechanism as d
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from functools import cached_property
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cached_property, wraps
 from types import SimpleNamespace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 import casadi as ca
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
 from ctrlgen.devices.base import Device
 from ctrlgen.devices.device_physics import DevicePhysics
@@ -37,6 +37,18 @@ AnyElement = Annotated[
 ]
 AnyActuator = Annotated[Actuator | ThermalActuator, Field(discriminator="kind")]
 MOVED = 1e-6  # of the largest motion, below which a channel is not moved on purpose: symmetry leaves rounding, 1e-9
+
+T = TypeVar("T")
+
+
+def _as_described(method: Callable[[Mechanism], T]) -> cached_property[T]:
+    """A cached property that copies with other numbers take from the device that the file describes."""
+
+    @wraps(method)
+    def described(device: Mechanism) -> T:
+        return method(device) if device._described is None else getattr(device._described, method.__name__)
+
+    return cached_property(described)
 
 
 class Mechanism(Device):
@@ -62,6 +74,18 @@ class Mechanism(Device):
     """`[dynamics]`: where inertia counts."""
     kinematics: Literal["first_order", "second_order"] = "first_order"
     """Pose and force to first order in the displacements, or with finite rotations and with flexures that shorten as they bend."""
+    _described: Mechanism | None = PrivateAttr(default=None)
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy with other values. What follows from them is worked out anew, but typical sizes stay those of the device that the file
+        describes, whoever asked for them first: they are part of the copy's value."""
+        copy = super().model_copy(update=update, deep=deep)
+        for kind in type(self).__mro__:
+            for name, member in vars(kind).items():
+                if isinstance(member, cached_property):
+                    vars(copy).pop(name, None)
+        copy._described = self._described or self
+        return copy
 
     @model_validator(mode="after")
     def _refers_to_what_there_is(self) -> Mechanism:
@@ -246,7 +270,7 @@ class Mechanism(Device):
         """The names of all bodies, copies with their number."""
         return tuple(b.name for b in self.placed_bodies)
 
-    @cached_property
+    @_as_described
     def size(self) -> float:
         """The largest distance of an element's end from the origin [m]."""
         return max(float(np.linalg.norm([x.si for x in e.at])) for e in self.element) or 1e-3
@@ -299,14 +323,14 @@ class Mechanism(Device):
             placed.append(self._between(c, *(getattr(ends[0], key) for key in ends[1:])))
         return tuple(placed)
 
-    @cached_property
+    @_as_described
     def channel_scale(self) -> tuple[float, ...]:
         """A typical size [rad, m] of each channel that is followed: what all actuators at the largest travel make of it, as the
         file describes it."""
         reach = np.abs(self._output_motion).sum(axis=1) * max(a.travel.si for a in self.actuator)
         return tuple(float(reach[TWIST.index(c)]) for c in self.output.channels)
 
-    @cached_property
+    @_as_described
     def cubic_steps(self) -> int:
         """Steps of Newton's method that find the stretch of the cubic springs, as the file describes them; above `MOST_STEPS` where
         so many do not."""
@@ -339,7 +363,7 @@ class Mechanism(Device):
         """Every copy of every reading."""
         return tuple(self._between(c, c.section.against, c.section.body) for c in self._copies(self.reading))
 
-    @cached_property
+    @_as_described
     def reading_scale(self) -> tuple[float, ...]:
         """A typical size [rad, m] of each reading, as `channel_scale`."""
         travel, n = max(a.travel.si for a in self.actuator), len(self.placed_actuators)

@@ -51,15 +51,18 @@ class UserDevice(Device):
         return physics
 
     def __eq__(self, other: object) -> bool:
-        """Two devices are equal where their functions and their numbers are: each has a class of its own."""
-        return isinstance(other, UserDevice) and self._value() == other._value()
+        """Two devices are equal where they come from one call of `user_device` and their numbers are equal: what its functions read
+        may change between calls."""
+        if not isinstance(other, UserDevice):
+            return False
+        return self._value() == other._value()
 
     def __hash__(self) -> int:
-        return hash(self._value()[1:])
+        return hash(self._value())
 
     def _value(self) -> tuple[Any, ...]:
         plain = (getattr(self, key) for key in Device.model_fields)
-        return self.description, *plain, *self.quantities()
+        return self.description.identity, *plain, *self.quantities()
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickles the user's functions, which must be picklable, and the values; the class is made again from them."""
@@ -170,7 +173,7 @@ def user_device(name: str, **given: Unpack[UserArguments]) -> Device:
         "speed": given.get("speed"),
         "state": given.get("state"),
     }
-    sizes = {where: read.ports(where, names or {}) for where, names in vectors.items()}
+    sizes = {where: read.ports(where, {} if names is None else names) for where, names in vectors.items()}
     reading = given.get("reading")
     sizes["reading"] = sizes["axes"] if reading is None else read.ports("reading", reading)
     for where in ("axes", "speed") if imposed else ("drive", "axes"):

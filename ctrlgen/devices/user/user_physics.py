@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
+from uuid import uuid4
 
 import casadi as ca
 import numpy as np
@@ -59,6 +60,8 @@ class UserDescription:
     weights: dict[str, float] = field(default_factory=dict)
     speed: dict[str, Quantity] = field(default_factory=dict)
     faults: list[Fault] = field(default_factory=list, compare=False)
+    identity: str = field(default_factory=lambda: uuid4().hex, compare=False)
+    """Of what one call of `user_device` was given, in other processes too: laws such as a `ca.Function` do not equal their copies there."""
 
     def components(self, law: str) -> tuple[str, ...]:
         """Names of the components of what a law returns."""

@@ -59,6 +59,7 @@ def page(diagnosis: Diagnosis, provenance: Provenance) -> str:
         title=diagnosis.recording.title,
         device_title=diagnosis.device.title,
         counts=counts(diagnosis),
+        held_out={channel: entry.as_json() for channel, entry in diagnosis.held_out.items()},
         sentence=sentence(diagnosis),
         findings=[_row(f) for f in diagnosis.findings],
         steps=next_steps(diagnosis),

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Self
 
 import casadi as ca
 import numpy as np
@@ -50,13 +50,18 @@ class _SymbolicInputs(LawInputs):
         vars(self).update(states=SimpleNamespace(**states), _model=(terms, place, order, actual))
 
     def __getattribute__(self, name: str) -> Any:
-        if name.startswith("_") or name == "states":
+        if name.startswith("_") or name in {"states", "with_states"}:
             return object.__getattribute__(self, name)
         terms, place, order, actual = self._model
         value = getattr(actual, name)
         if callable(value):
             return lambda: terms.symbol(Read(place, order, actual.index, name), value())
         return terms.symbol(Read(place, order, actual.index, name), value) if isinstance(value, ca.SX) else value
+
+    def with_states(self, states: Mapping[str, ca.SX]) -> Self:
+        other = object.__new__(type(self))
+        vars(other).update(vars(self) | {"states": SimpleNamespace(**{**vars(self.states), **states})})
+        return other
 
 
 @dataclass(frozen=True, eq=False)
