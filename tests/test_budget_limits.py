@@ -110,5 +110,5 @@ def test_draws_far_off_are_counted_and_named(circle, tmp_path, turned):
 
 def test_sds_with_which_a_draw_is_no_device_are_refused(circle, tmp_path):
     text = '[numbers]\n"stage.half_stage_stiffness" = { sd = "60 %", source = "not measured" }\n'
-    with pytest.raises(SolverError, match="draws is not finite"):
+    with pytest.raises(SolverError, match=r"pose or a limited quantity of [0-9]+ of 1000 draws is not finite"):
         budget_of(circle, stated(circle, text, tmp_path), draws=1000)

@@ -83,6 +83,14 @@ def test_a_forgotten_limit_is_found_by_the_hostile_sequence(folder, circle):
     assert "hostile sequence -> model: excess over a limit" in failed
 
 
+def test_a_controller_that_always_reports_a_limit_is_held_to_every_equilibrium(folder, circle):
+    """Its drive is off by a thousandth, and its status says each time that a limit moved it."""
+    status = "    if (out != NULL) { out->drive[0] *= 1.001; }\n    return status | MEMS_HEXAPOD_ONLINE_F64_COMPOSITE;"
+    spoil(folder, Real.DOUBLE, "online", r"(?s)(_settle\([^;]*\)\n\{\n.*?)    return status;", rf"\g<1>{status}")
+    failed = {(row.build.real, row.what) for row in compare(folder, circle).rows if not row.passed}
+    assert (Real.DOUBLE, ComparisonKind.EQUILIBRIA) in failed
+
+
 def test_c_with_a_warning_is_refused_with_the_compilers_words(folder, circle):
     spoil(folder, Real.DOUBLE, "online", r"uint32_t status = 0U;", "uint32_t status = 0U; int unused_thing;")
     with pytest.raises(ToolError, match="unused_thing"):

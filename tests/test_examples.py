@@ -107,6 +107,8 @@ def test_a_wheel_in_a_clean_environment_runs_an_example_and_reproduces(tmp_path)
     assert (tmp_path / "out" / "circle20" / "report.html").is_file()
     device = ("--device", "scenarios/devices/meso_hexapod.toml")
     assert run(scripts / "ctrlgen", "check", "scenarios/nist_hexapod", *device).returncode == 0
+    account = f"import runpy; runpy.run_path({str(SCENARIOS / 'nist_hexapod' / 'account.py')!r})"
+    assert (read := run(scripts / "python", "-c", account)).returncode == 0, read.stderr
     reproduced = run(scripts / "ctrlgen", "reproduce", "--out", "page.html")
     assert reproduced.returncode == 0, reproduced.stderr
     assert "S0, meso-scale hexapod" in reproduced.stdout and (tmp_path / "page.html").is_file()

@@ -21,6 +21,7 @@ from ctrlgen.path_timing.drive_law import InertialLaw, bell_polynomials
 from ctrlgen.path_timing.fastest_plots import draw_fastest
 from ctrlgen.path_timing.optimum import Optimum, Piece
 from ctrlgen.path_timing.repetition import crossing, largest
+from ctrlgen.path_timing.retimed import retimed, write_inputs
 from ctrlgen.trajectory.frame import Frame
 from ctrlgen.trajectory.paths import Poses
 
@@ -212,8 +213,6 @@ def test_a_tripod_on_its_cone_is_faster_than_at_even_speed_and_keeps_its_current
 
 def test_the_set_points_are_a_scenario_that_says_the_same(circle20, tmp_path):
     """A rounding: written in um with all digits."""
-    from ctrlgen.path_timing.retimed import write_inputs
-
     write_inputs(tmp_path, circle20.solution.scenario)
     scenario = load_scenario(tmp_path / "circle20_fastest.toml")
     assert scenario.closed and scenario.name == "circle20_fastest"
@@ -323,6 +322,27 @@ def test_what_cannot_be_answered_is_refused_with_what_to_do(scenario, options, s
     with pytest.raises((InputError, SolverError), match=said) as caught:
         ctrlgen.fastest(SCENARIOS / scenario, **options)
     assert str(caught.value).count("for example") <= 1
+
+
+@pytest.fixture(params=["raster", "flexure_axis_line"])
+def shaped(request, tmp_path):
+    """A scenario that asks for shaping, of a device without inertia and of one with it."""
+    source = load_scenario(SCENARIOS / request.param)
+    shaping = '\n[shaping]\nkind = "ZV"\nfrequency = "200 Hz"\n'
+    (tmp_path / "scenario.toml").write_text(source.inputs["scenario"].text + shaping)
+    return load_scenario(tmp_path, source.inputs["device"].path)
+
+
+def test_a_shaped_motion_is_refused(shaped):
+    with pytest.raises(InputError, match="shaping: asks for a shaped motion, for which the fastest path is not"):
+        ctrlgen.fastest(shaped)
+
+
+def test_set_points_are_not_shaped_again(shaped):
+    model = build_model(shaped.device)
+    samples = np.linspace(0, 1e-6, 9)[:, None] * np.ones(len(model.signals[shaped.file.follow].channels))
+    again = retimed(shaped, model, samples, shaped.file.sample_rate, "set-points")
+    assert np.array_equal(again.bind(model).samples, samples)
 
 
 def test_a_path_that_cannot_even_be_held_is_explained(tmp_path):

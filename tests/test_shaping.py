@@ -217,6 +217,19 @@ def test_a_drive_that_depends_on_the_motion_is_not_static(tmp_path, more, what):
         quasi_static(build_model(load_device(tmp_path / "device.toml")))
 
 
+def test_without_inertia_feedforward_and_slowed_a_path_is_shaped_for_the_mode_of_the_device(tmp_path):
+    """Half the sample rate is below the mode: a stated frequency would be refused, the mode of the device is taken as with inertia."""
+    problems = []
+    for feedforward in ("static", "inertia"):
+        scenario = written(tmp_path, 'shaping = { kind = "ZV" }', feedforward, rate="150 Hz", duration="0.2 s")
+        problems.append(scenario.bind(build_model(scenario.device)))
+    for problem in problems:
+        still = problem.in_balance
+        assert still.shaper.frequency == pytest.approx(MODE) and not still.model.inertial
+        assert np.array_equal(still.samples, problems[1].samples)
+        assert len(problem.slowed(2.0)) == 60 + len(problem.samples) - 30
+
+
 def test_a_device_in_balance_is_shaped_for_a_stated_frequency(tmp_path):
     path = 'kind = "line"\nstart = { delta_z = "5 um" }\nend = { delta_z = "10 um" }\n'
     words = {

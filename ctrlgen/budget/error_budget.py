@@ -32,7 +32,9 @@ FEWEST_DRAWS = 200  # the sd of as many draws is itself known to 5 %
 MOST_DRAWS = 1_000_000
 PROBABILITY = 0.999
 COVERAGE = 0.95
-MOST_LOST = 0.01  # share of draws whose pose may be not finite, as that of a device beyond buckling
+MOST_LOST = (
+    0.01  # share of draws whose pose or limited quantities may be not finite, as those of a device beyond buckling
+)
 KEPT = 60  # samples along the path at which draws are kept
 TOLERANCE = 0.10  # of the first-order result, within which the draws confirm it
 COMPARED = 0.5  # of the largest uncertainty along the path: smaller ones are not compared
@@ -110,7 +112,8 @@ class ErrorBudget:
     def notes(self) -> tuple[str, ...]:
         """What a reader should know of how the budget was made."""
         lost = 0 if self.drawn is None else self.drawn.lost
-        what = f"{lost} of {self.draws} draws were left out: their simulated pose is not finite, as that of a stage that buckles"
+        why = "their simulated pose or a limited quantity is not finite, as those of a stage that buckles"
+        what = f"{lost} of {self.draws} draws were left out: {why}"
         return (what,) if lost else ()
 
     @property
@@ -208,8 +211,8 @@ def budget_of(
         drawn = draw(path, linear, DrawnLimits(path_margins, slopes), _kept(combined, groups), critical, draws, seed)
         if drawn.lost > MOST_LOST * draws:
             raise SolverError(
-                f"the simulated pose of {drawn.lost} of {draws} draws is not finite, as that of a stage that buckles: some "
-                "standard deviations are too large for this device; lower them"
+                f"the simulated pose or a limited quantity of {drawn.lost} of {draws} draws is not finite, as those of a stage that "
+                "buckles: some standard deviations are too large for this device; lower them"
             )
     rows = safeties(path, path_margins, slopes, drawn, critical, probability)
     lines = budget_lines(path, linear, groups, drawn)

@@ -43,7 +43,8 @@ class Limited(Protocol):
 class Drawn:
     """What the draws gave, SI: deviations of the followed signal `pose` (draws, kept, n_y) at the samples `kept`; limited quantities
     `limits` (draws, 2, channels), each at its own sample for the lower and the upper bound; `columns` (draws, m) the deviations that
-    were drawn; `lost`, how many more have a pose that is not finite; `broken` (draws,), which of them break a limit anywhere on the path.
+    were drawn; `lost`, how many more have a pose or a limited quantity that is not finite; `broken` (draws,), which of them break a limit
+    anywhere on the path.
 
     `alone` (2, m, kept, n_y): the pose's deviations with each column alone at plus and minus its standard deviation, nothing scattering.
     """

@@ -106,6 +106,9 @@ def fastest(
     if scenario.file.robust is not None:
         what = "asks for limits that hold at a probability, for which the fastest path is not computed; leave it out of a copy"
         raise InputError(scenario.path, [Fault("robust", what)])
+    if scenario.file.shaping is not None:
+        what = "asks for a shaped motion, for which the fastest path is not computed; leave it out of a copy"
+        raise InputError(scenario.path, [Fault("shaping", what)])
     if model.clocks:
         what = "changes with time by itself, so that the fastest path depends on when it begins; leave the effect out"
         raise InputError(model.name, [Fault("effect", what)])

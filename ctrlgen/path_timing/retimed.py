@@ -45,7 +45,7 @@ def retimed(
     poses = Poses(
         kind="poses", file=f"{name}.csv", periodic=closed, folder=folder, listed=tuple(map(tuple, samples.tolist()))
     )
-    timing = {"sample_rate": rate, "duration": None, "points": None, "path": poses}
+    timing = {"sample_rate": rate, "duration": None, "points": None, "path": poses, "shaping": None}
     changed = {"title": title, "device": device.path.name, "outcome": "solved", "expect": ()} | timing
     inputs = {
         **scenario.inputs,

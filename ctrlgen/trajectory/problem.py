@@ -22,7 +22,7 @@ from ctrlgen.trajectory.inverse.motion import Motion
 from ctrlgen.trajectory.inverse.path_inverse import PathInverse
 from ctrlgen.trajectory.paths import PathKind, Poses
 from ctrlgen.trajectory.scenario_file import MOST_SAMPLES, ScenarioFile
-from ctrlgen.trajectory.shaping import Shaper, Shaping
+from ctrlgen.trajectory.shaping import Shaper
 from ctrlgen.trajectory.shaping import shaper as make_shaper
 
 WHOLE = 1e-6  # of the number of samples, by which rate times duration may be off a whole one: durations are written with six digits
@@ -34,12 +34,14 @@ RESOLVED = 0.5  # of the largest value of a derivative, by which it may change f
 @dataclass(frozen=True, eq=False)
 class PathProblem:
     """The path of the scenario `file` that was read from `source`, moved by `home` [SI] by channel, to be followed by a `model`. What it
-    gives raises InputError where the file or the model does not determine it."""
+    gives raises InputError where the file or the model does not determine it. `given_shaper` shapes the path instead of what the file and
+    the model determine; None where these do."""
 
     source: Path
     file: ScenarioFile
     model: Model
     home: Mapping[str, float]
+    given_shaper: Shaper | None = None
 
     @property
     def follow(self) -> str:
@@ -70,8 +72,8 @@ class PathProblem:
         elif isinstance(self.clock, Settled):
             what = "is of motions: give sample_rate and duration"
         else:
-            given = {"path": self._path} | self._shaping_as_given()
-            return replace(self, file=self.file.model_copy(update=given), model=quasi_static(self.model))
+            file = self.file.model_copy(update={"path": self._path})
+            return replace(self, file=file, model=quasi_static(self.model), given_shaper=self.shaper)
         raise InputError(self.source, [Fault("feedforward", f"{what}; leave it out")])
 
     @cached_property
@@ -143,19 +145,21 @@ class PathProblem:
         if isinstance(self.file.path, Poses) or self.file.duration is None or self.file.sample_rate is None:
             return None
         n, rate = self._sample_count(self.file.sample_rate, self.file.duration), self.file.sample_rate
-        given, most = self._shaping_as_given(), MOST_SAMPLES - self._longer
+        shaper, most = self.shaper, MOST_SAMPLES - self._longer
 
         def motion(times: float) -> Motion:
             samples = min(round(times * n), most)
             longer = read_quantity("s", f"{samples / rate.si!r} s")
-            return replace(self, file=self.file.model_copy(update={"duration": longer} | given)).motion
+            return replace(self, file=self.file.model_copy(update={"duration": longer}), given_shaper=shaper).motion
 
         return motion
 
     @cached_property
     def shaper(self) -> Shaper | None:
         """The impulses with which the path is convolved; None where it is not shaped. Raises InputError for a closed path, for a
-        frequency too high for the samples, and where the model has no mode and none is stated."""
+        stated frequency too high for the samples, and where the model has no mode and none is stated."""
+        if self.given_shaper is not None:
+            return self.given_shaper
         given = self.file.shaping
         if given is None or not isinstance(self.clock, Sampled):
             return None
@@ -178,13 +182,6 @@ class PathProblem:
             raise InputError(self.source, [Fault("shaping.frequency", what)])
         ratio = mode[1] if given.damping_ratio is None else given.damping_ratio.si
         return make_shaper(given.kind, mode[0], ratio)
-
-    def _shaping_as_given(self) -> dict[str, Shaping]:
-        """The table of a shaped scenario with its numbers written out."""
-        if self.shaper is None:
-            return {}
-        numbers = {"frequency": f"{self.shaper.frequency!r} Hz", "damping_ratio": repr(self.shaper.damping_ratio)}
-        return {"shaping": Shaping.model_validate({"kind": self.shaper.kind} | numbers)}
 
     @property
     def _longer(self) -> int:

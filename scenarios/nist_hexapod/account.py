@@ -5,20 +5,22 @@ python scenarios/nist_hexapod/account.py
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 
 import ctrlgen
 from ctrlgen import Diagnosis
+from ctrlgen.core.shipped_files import shipped_package
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.calibration import calibrate_jacobian
 from ctrlgen.recordings.pose_errors import PoseErrors
 from ctrlgen.recordings.reader import load_recordings
-from papers.s0_data import load_s0
 
 HERE = Path(__file__).parent
+S0 = import_module(f"{shipped_package('papers').__name__}.s0_data")
 TWO_COMPONENTS = slice(24, 54)  # the poses held out
 
 
@@ -48,7 +50,7 @@ def main() -> None:
     """Diagnoses and prints."""
     device = ctrlgen.load_device(HERE.parent / "devices" / "meso_hexapod.toml")
     found = ctrlgen.diagnose(device, load_recordings([HERE], build_model(device)))
-    _, data = load_s0()
+    _, data = S0.load_s0()
     paper = PoseErrors(data.measured - data.commanded)  # commanded through its calibrated Jacobian
     unseen = PoseErrors(paper.errors[TWO_COMPONENTS])
     fit = found.search.chosen.fit
