@@ -9,11 +9,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from conftest import ROOT, SCENARIOS
+from conftest import DEVICE, ROOT, SCENARIOS
+from creeping_axis import CREEP
+from inertial_stages import LINE, coil
+from package_programs import build
 from three_stacks import circle, loaded, stage
 
-from ctrlgen import build_model, load_device, load_scenario
+from ctrlgen import build_model, generate, load_device, load_scenario, user_device
 from ctrlgen.controller.motion_feedforward import controller_of
+from ctrlgen.devices.run_time import RunTime
 from ctrlgen.firmware.c.preprocessor import Macro, resolved
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.templates import write
@@ -21,15 +25,40 @@ from ctrlgen.firmware.c.toolchains import FLAGS
 from ctrlgen.firmware.online.online import online_context
 
 LIMITER = ROOT / "codegen" / "limiter"
-DEVICES = ("hexapod in balance", "axis with inertia", "redundant stage", "constants of the start")
+DEVICES = (
+    "hexapod in balance",
+    "axis with inertia",
+    "redundant stage",
+    "constants of the start",
+    "hexapod that creeps",
+    "axes that settle",
+    "redundant stage that settles",
+    "coil with inertia",
+)
+SETTLED = "points = 3\n"
+# A stage so weak that no displacement in range needs a drive beyond its limits
+WEAK = {"parameters": {"g": "0.2 N/V", "k": "0.01 N/um", "k3": "0 N/m^3"}}
+
+
+def pushed(u, p):
+    return [p.g * u.a, p.g * u.b]
 
 
 def written(name: str, real: Real, folder: Path) -> None:
     """`limiter.h`, `generated.c` and `limiter_config.h` of a device, its controller named limiter."""
-    if name == "redundant stage":
-        scenario, model = loaded(folder, stage(drive_rate={"a": "5 V/ms"}), circle(20))
+    stages = {
+        "redundant stage": (stage(drive_rate={"a": "5 V/ms"}), circle(20)),
+        "axes that settle": (stage(**WEAK, drive={"a": "100 V", "b": "100 V"}, force=pushed), circle(20), SETTLED),
+        "redundant stage that settles": (stage(**WEAK), circle(20), SETTLED),
+        "coil with inertia": (coil(), LINE, 'sample_rate = "5 kHz"\nduration = "0.1 s"\n'),
+    }
+    if name in stages:
+        scenario, model = loaded(folder, *stages[name])
     else:
         scenario = load_scenario(SCENARIOS / ("flexure_axis_line" if name == "axis with inertia" else "circle20"))
+        if name == "hexapod that creeps":
+            (folder / "device.toml").write_text(DEVICE.read_text() + CREEP.replace('"axis"', '"1X"'))
+            scenario = replace(scenario, device=load_device(folder / "device.toml"))
         if name == "constants of the start":
             scenario = replace(scenario, device=load_device(SCENARIOS / "devices" / "mems_hexapod_run_time.toml"))
         model = build_model(scenario.device)
@@ -44,7 +73,13 @@ def tokens(source: Path, folder: Path) -> list[str]:
     words = ["gcc", "-std=c99", "-E", "-P", f"-I{folder}", str(source)]
     done = subprocess.run(words, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    return re.findall(r"\w+|[^\w\s]", done.stdout)
+    return re.findall(r"\w+|[^\w\s]", without_type(done.stdout))
+
+
+def without_type(text: str) -> str:
+    """`text` with the type itself where limiter.c has a name for it."""
+    named = re.search(r"\btypedef (float|double) real;", text)
+    return re.sub(r"\breal\b", named[1], text.replace(named[0], "")) if named else text
 
 
 @pytest.mark.parametrize("name", DEVICES)
@@ -97,3 +132,39 @@ def test_what_is_open_or_unknown_is_refused():
     for text in ("#if 1\nx", "#warning x"):
         with pytest.raises(ValueError):
             resolved(text, {}, {}.get)
+
+
+# Of the limiter, of the kernels and of C: names that a user may well give to a number
+HOSTILE = (
+    "input real limiter rate_limiter_gain N NU NX double state target value low high i t1 z x u out derive int constants derived hit "
+    "READY TABLE_1 EACH_AXIS limit_composite status s_low wanted step REAL"
+)
+
+
+@pytest.mark.parametrize("changing", ["input", "real", "limiter", "state", "N"])
+def test_constants_may_have_any_name(changing, tmp_path):
+    """Springs beside each other, one a name, each given at the start: the C compiles and passes its own test."""
+    names = HOSTILE.split()
+    device = user_device(
+        "stage",
+        parameters={"gain": "0.2 N/V"} | dict.fromkeys(names, f"{1 / len(names):.6g} N/um"),
+        drive={"a": "100 V", "b": "100 V"},
+        axes={"x": "50 um", "y": "50 um"},
+        force=lambda u, p: [p.gain * u.a, p.gain * u.b],
+        restoring_force=lambda d, p: sum(p[name] for name in names) * d.vector,
+    )
+    numbers = {path.rpartition(".")[2]: path for path, _ in device.quantities()}
+    given = [{"number": numbers[name], "low": "0.03 N/um", "high": "0.04 N/um"} for name in names]
+    run_time = RunTime.model_validate({"constants": given, "input": numbers[changing]})
+    scenario, model = loaded(tmp_path, device.model_copy(update={"run_time": run_time}), circle(10, 10, 10))
+    folder = generate(scenario, model, tmp_path / "c")
+    for real in Real:
+        sources = [*folder.sources(real), folder.runner(real)]
+        build("gcc", sources, tmp_path / "test", f"-I{folder.path}")
+        ran = subprocess.run([tmp_path / "test"], capture_output=True, text=True)
+        assert ran.returncode == 0 and "vectors agree" in ran.stdout, ran.stdout[-2000:]
+
+
+def test_a_macro_is_not_expanded_within_itself():
+    macros = {"a": Macro("a + b"), "b": Macro("a"), "f": Macro("f(x)", ("x",))}
+    assert resolved("a; b; f(1);", macros, lambda name: None).strip() == "a + a; a + b; f(1);"

@@ -16,7 +16,7 @@
  *
  * BALANCE, COMPOSITE_SHARES, SETTLE_STATE and other macros with arguments call a kernel, which may read fewer of them. Names that end
  * in _TABLE are numbers in braces. EACH_AXIS(F), EACH_STATE(F) and EACH_DRIVE(F) are F(0) F(1) ..., one by one, because a loop costs a
- * small core twice as much.
+ * small core twice as much. Macros are in upper case, because a device may name a constant as it likes, in lower case.
  */
 #include "limiter_config.h"
 
@@ -239,8 +239,9 @@ static int limit_composite(const limiter_state *state, real wanted[N])
     return hit;
 }
 
+#define LIMIT_COMPOSITE limit_composite
 #else
-#define limit_composite scale_home
+#define LIMIT_COMPOSITE scale_home
 #endif
 #endif
 #if STATE_LIMITED
@@ -294,7 +295,7 @@ static uint32_t passed(const limiter_state *state)
     for (i = 0; i < N; i++) {
         z[i] = state->z[i];
     }
-    if (limit_composite(state, z) > 1) {
+    if (LIMIT_COMPOSITE(state, z) > 1) {
         status |= LIMITER_COMPOSITE;
     }
 #endif

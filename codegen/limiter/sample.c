@@ -165,7 +165,7 @@ static uint32_t WITHIN(limiter_state *state, limiter_output *out)
 #endif
 #if SHARES
     {
-        const int scaled = limit_composite(state, out->displacement);
+        const int scaled = LIMIT_COMPOSITE(state, out->displacement);
         if (scaled > 0) {
             if (scaled > 1) {
                 status |= LIMITER_COMPOSITE;

@@ -113,7 +113,7 @@ uint32_t limiter_load(limiter_constants *constants, const uint8_t *bytes, uint32
 }
 #if CHANGING
 
-uint32_t limiter_set_input(limiter_state *state, real input)
+uint32_t SET_INPUT(limiter_state *state, real input)
 {
     uint32_t status = LIMITER_INPUT;
     if (state == NULL) {
@@ -127,7 +127,7 @@ uint32_t limiter_set_input(limiter_state *state, real input)
         real value[CHANGED_DERIVED];
         derive_input(given, value);
         SET_CHANGED
-        state->constants.input = input;
+        state->constants.INPUT_NAME = input;
         status = 0U;
     }
     return status;

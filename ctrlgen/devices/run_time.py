@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, ValidationError
 
+from ctrlgen.core.c_names import c_name
 from ctrlgen.core.units import Quantity, base_unit, parse, show, to_si, written_unit
 from ctrlgen.devices.quantities import member_at
 from ctrlgen.devices.section import Section
@@ -147,10 +148,10 @@ def _name_of(device: Any, path: str) -> str:
     if match and int(match[1]) < len(device.effect):
         effect: Effect = device.effect[int(match[1])]
         words = (effect.kind, effect.at) if match[2] in effect.kind else (effect.kind, match[2], effect.at)
-        return re.sub(r"\W+", "_", "_".join(words)).strip("_").lower()
-    last = re.sub(r"\W+", "_", path.rpartition(".")[2]).strip("_").lower()
-    same = [p for p in paths_of(device) if p.rpartition(".")[2] == path.rpartition(".")[2]]
-    return last if len(same) == 1 else re.sub(r"\W+", "_", path).strip("_").lower()
+        return c_name("_".join(words))
+    last = path.rpartition(".")[2]
+    same = [p for p in paths_of(device) if p.rpartition(".")[2] == last]
+    return c_name(last if len(same) == 1 else path)
 
 
 def paths_of(device: Any) -> Iterator[str]:

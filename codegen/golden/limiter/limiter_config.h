@@ -4,6 +4,8 @@
 
 #include <stddef.h>
 
+typedef float real;
+
 #define EACH_AXIS(F) F(0) \
     F(1) \
     F(2) \
@@ -22,7 +24,6 @@
     F(3) \
     F(4) \
     F(5)
-#define real float
 #define REAL(x) x ## f
 #define STATE_LIMITED 0
 #define BOUNDED 1

@@ -9,19 +9,15 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ctrlgen.core.c_names import KEYWORDS
 from ctrlgen.firmware.c.expression_graph import Node
 from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.templates import words_of_c
 
 WIDTH = 120  # columns of a line of C
-# Names of the tables of the limiter.
-RESERVED = (
-    "LOW HIGH SLACK P X_REST TARGET_LIMIT U_LOW U_HIGH U_SLACK U_LEAST U_MOST U_SAFE READY NULL FALL RISE SHARE NULL_MOTION SET FIRST "
-    "HOME STATE_LEAST STATE_MOST STATE_SLACK"
-)
-# Names of arguments and variables of the kernels and of the limiter, which a member of `Derived` must not have.
-LOCAL = (
-    "x z i d state wanted target drive result next value step given derived constants out beyond accepted origin hit"
-)
+# Names of arguments, variables and tables of the kernels, and members of `Derived` that are tables of limits.
+LOCAL = "x z i d state wanted target drive result next value step given derived s_low s_high"
+NUMBERED = re.compile(r"(t|TABLE_)\d+", re.IGNORECASE)  # what a kernel numbers
 DERIVED = "derived"  # the structure's name in C
 
 
@@ -44,13 +40,13 @@ class Constants:
 
     def __init__(self, real: Real) -> None:
         self.real = real
-        self.names: dict[tuple[str, str], str] = {("", name): name for name in RESERVED.split()}
+        self.names: dict[tuple[str, str], str] = {}
         self.lines: list[str] = []
         self.derived: dict[tuple[int, ...], Derived] = {}  # by the numbers of its nodes
-        self._reserved = set(LOCAL.split())
+        self._reserved = {*LOCAL.split(), *KEYWORDS, *words_of_c()}
 
     def reserve(self, *names: str) -> None:
-        """Names that no member of `derived` may have."""
+        """Names that no constant and no member of `derived` may have."""
         self._reserved |= set(names)
 
     def named(self, node: Node) -> str:
@@ -62,7 +58,7 @@ class Constants:
             return f"({literal})" if literal.startswith("-") else literal
         key = literal, node.formula
         if key not in self.names:
-            name = self.names[key] = _name_of(node.formula, set(self.names.values()))
+            name = self.names[key] = _name_of(node.formula, self._reserved | set(self.names.values()))
             line = f"#define {name} ({literal}) /* {node.formula} */"
             if len(line) > WIDTH:
                 line = f"/* {node.formula} */\n#define {name} ({literal})"
@@ -96,7 +92,7 @@ def _name_of(formula: str, taken: set[str]) -> str:
     words = dict.fromkeys(re.sub(r"\W", "_", path.split(".")[part]).strip("_").upper() for path in paths)
     base = "_".join(list(words)[:2])
     name, k = (base if formula in paths else f"{base}_1"), 1
-    while name in taken:
+    while name in taken or NUMBERED.fullmatch(name):
         k += 1
         name = f"{base}_{k}"
     return name

@@ -115,12 +115,15 @@ class _Preprocessor:
         return "".join([*parts, self._replaced(line[at:]).replace("\n", f"\n{indent}")])
 
     def _replaced(self, code: str) -> str:
-        """`code` without comments, its macros expanded until none is left."""
+        """`code` without comments, its macros expanded until none is left but, as in C, in what it stands for itself."""
         at = 0
+        # Of each expansion that may not have ended: the macro, and how many characters stand behind it.
+        expanding: list[tuple[str, int]] = []
         while match := WORD.search(code, at):
             at = match.end()
+            expanding = [(name, behind) for name, behind in expanding if match.end() <= len(code) - behind]
             macro = self.macros.get(match[0])
-            if macro is None:
+            if macro is None or match[0] in (name for name, _ in expanding):
                 continue
             end, body = match.end(), macro.body
             if macro.parameters is not None:
@@ -128,6 +131,7 @@ class _Preprocessor:
                 if call is None:
                     continue  # its name alone is an argument
                 end, body = call.end(), macro.called(call[1])
+            expanding.append((match[0], len(code) - end))
             code = code[: match.start()] + body + code[end:]
             at = match.start()
         return code

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +11,7 @@ import jinja2
 
 from ctrlgen.core.files import write_text
 from ctrlgen.core.shipped_files import shipped
+from ctrlgen.firmware.c.preprocessor import COMMENT, WORD
 from ctrlgen.firmware.c.real import Real
 
 # Of the interface of the generated C, in every header: raised when code that was written for an older header must be changed because a
@@ -19,6 +22,15 @@ ABI = 1
 def codegen_folder() -> Path:
     """The folder of the C templates and of the test harness."""
     return shipped("codegen")
+
+
+@cache
+def words_of_c() -> frozenset[str]:
+    """The words of the C into which the constants of a device are written, comments left out: no constant may have one for its name."""
+    files = [*(codegen_folder() / "limiter").glob("*.c")]
+    files += [codegen_folder() / "templates" / f"{name}.c.j2" for name in ("device", "elementary", "plant")]
+    texts = (re.sub(r"\{[{%].*?[%}]\}", "", COMMENT.sub("", file.read_text(encoding="utf-8"))) for file in files)
+    return frozenset(word for text in texts for word in WORD.findall(text))
 
 
 def render(template: str, context: dict[str, Any]) -> str:

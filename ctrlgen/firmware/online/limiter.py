@@ -32,17 +32,19 @@ CALLS = {
 }
 
 
-def limiter_text(prefix: str, macros: Mapping[str, Macro]) -> str:
-    """The limiter as it stands in the C of one device, its public names with the `prefix`."""
+def limiter_text(prefix: str, real: Real, macros: Mapping[str, Macro]) -> str:
+    """The limiter as it stands in the C of one device, its public names with the `prefix`, its numbers `real`."""
 
-    def text(name: str) -> str | None:
-        if name == CONFIGURATION:
-            return None
+    def text(name: str) -> str:
         source = (codegen_folder() / "limiter" / name).read_text(encoding="utf-8")
-        return source.partition("*/\n")[2].lstrip("\n")  # without what the file says of itself
+        # Without what the file says of itself.
+        source = source.partition("*/\n")[2].lstrip("\n").replace(f'#include "{CONFIGURATION}"\n', "")
+        # Before macros are expanded: these hold names that the device gives.
+        for word, written in ((r"real\b", real.value), ("limiter_", f"{prefix}_"), ("LIMITER_", f"{prefix.upper()}_")):
+            source = re.sub(rf"\b{word}", written, source)
+        return source
 
-    whole = re.sub(r"\n{3,}", "\n\n", resolved(text("limiter.c") or "", macros, text).strip("\n"))
-    return whole.replace("limiter_", f"{prefix}_").replace("LIMITER_", f"{prefix.upper()}_") + "\n"
+    return re.sub(r"\n{3,}", "\n\n", resolved(text("limiter.c"), macros, text).strip("\n")) + "\n"
 
 
 def limiter_macros(context: Mapping[str, Any]) -> dict[str, Macro]:
@@ -50,7 +52,7 @@ def limiter_macros(context: Mapping[str, Any]) -> dict[str, Macro]:
     real: Real = context["real"]
     counts = {"AXIS": context["n"], "STATE": context["n_s"], "DRIVE": context["nu"]}
     macros = {f"EACH_{name}": Macro("\n".join(f"F({k})" for k in range(n)), ("F",)) for name, n in counts.items()}
-    macros |= {"real": Macro(real.value), "REAL": Macro("x ## f" if real is Real.FLOAT else "x", ("x",))}
+    macros |= {"REAL": Macro("x ## f" if real is Real.FLOAT else "x", ("x",))}
     macros |= {name: Macro(str(int(value))) for name, value in _features(context).items()}
     macros |= {name: Macro(text) for name, text in (_texts(context) | _start_texts(context)).items()}
     return macros | {name: Macro(body, tuple(given.split())) for name, (given, body) in _calls(context).items()}
@@ -105,7 +107,8 @@ def limited_modes(context: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def bounds_once(context: Mapping[str, Any]) -> bool:
     """Whether one function alone reads the limits of the drives."""
-    return len(context["modes"]) == 1 and not context["motion"] and not limited_modes(context)
+    another = context["motion"] or context["redundancy"] or limited_modes(context)
+    return len(context["modes"]) == 1 and not another
 
 
 def _texts(context: Mapping[str, Any]) -> dict[str, str]:
@@ -167,12 +170,11 @@ def _start_texts(context: Mapping[str, Any]) -> dict[str, str]:
     if changing is not None:
         constant = changing["constant"]
         texts |= {
-            "input": constant.name,
-            "limiter_set_input": f"limiter_set_{constant.name}",
-            "derive_input": changing["kernel"].name,
+            "INPUT_NAME": constant.name,
+            "SET_INPUT": f"{context['prefix']}_set_{constant.name}",
             "INPUT_LEAST": literal(constant.low),
             "INPUT_MOST": literal(constant.high),
-            "CHANGED_VALUES": _braces((of_state | {constant.name: constant.name}).values()),
+            "CHANGED_VALUES": _braces((of_state | {constant.name: "input"}).values()),
             "CHANGED_DERIVED": str(len(changing["assigned"])),
             "SET_CHANGED": _assignments(changing["assigned"]),
         }

@@ -65,7 +65,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     context["blocks"] = [text.strip("\n") for text in texts if text]
     context["tables"] = _tables(context)
     context["macros"] = limiter_macros(context)
-    context["limiter"] = limiter_text(prefix, context["macros"])
+    context["limiter"] = limiter_text(prefix, real, context["macros"])
     return context
 
 

@@ -79,9 +79,7 @@ def start_context(kernels: ControllerKernels, printer: Printer) -> dict[str, Any
     if device.run_time is not None and device.run_time.input is not None:
         constant = next(c for c in constants if c.path == device.run_time.input)
         some = [member for member in members if printer.depends(member, constant.path)]
-        kernel = printer.starting(
-            some, f"derive_{constant.name}", f"What follows from {constant.path}, which may change."
-        )
+        kernel = printer.starting(some, "derive_input", f"What follows from {constant.path}, which may change.")
         changing = {"constant": constant, "kernel": kernel, "assigned": _assigned(some)}
     derive = printer.starting(members, "derive", "What follows from the constants that the controller is given.")
     return {
