@@ -253,7 +253,7 @@ def test_a_device_without_dynamics_has_no_frequency_response(tmp_path):
     devices = DEVICES
     refused(
         ctrlgen("bode", devices / "meso_hexapod.toml", "--out", tmp_path / "b.svg", "--at", "delta_x=1um"),
-        "dynamics: has none",
+        "dynamics: the device has none",
     )
     done = ctrlgen("bode", devices / "rrr_case2.toml", "--out", tmp_path / "b.png", "--at", "theta_z=-2mrad")
     assert done.returncode == 0, done.stderr

@@ -35,7 +35,7 @@ def draw_bode(model: Model, pose: np.ndarray, path: Path) -> None:
     poles = np.abs(system.poles())
     poles = poles[poles > 0]
     if not len(poles):
-        what = "is missing: the pose follows the drive without delay at every frequency, so there is nothing to draw"
+        what = "the device has none: the pose follows the drive without delay at every frequency, so there is nothing to draw"
         raise InputError(model.name, [Fault("dynamics", what)])
     low, high = np.log10(poles.min()) - DECADES, max(np.log10(poles.min()) + DECADES, np.log10(poles.max()) + 1)
     # A resonance is narrower than the points are apart.
