@@ -49,7 +49,7 @@ def written(name: str, real: Real, folder: Path) -> None:
     stages = {
         "redundant stage": (stage(drive_rate={"a": "5 V/ms"}), circle(20)),
         "axes that settle": (stage(**WEAK, drive={"a": "100 V", "b": "100 V"}, force=pushed), circle(20), SETTLED),
-        "redundant stage that settles": (stage(**WEAK), circle(20), SETTLED),
+        "redundant stage that settles": (stage(**WEAK, drive=dict.fromkeys("abc", "100 V")), circle(20), SETTLED),
         "coil with inertia": (coil(), LINE, 'sample_rate = "5 kHz"\nduration = "0.1 s"\n'),
     }
     if name in stages:

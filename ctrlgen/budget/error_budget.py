@@ -32,9 +32,8 @@ FEWEST_DRAWS = 200  # the sd of as many draws is itself known to 5 %
 MOST_DRAWS = 1_000_000
 PROBABILITY = 0.999
 COVERAGE = 0.95
-MOST_LOST = (
-    0.01  # share of draws whose pose or limited quantities may be not finite, as those of a device beyond buckling
-)
+# Share of draws whose pose or limited quantities may be not finite, as those of a device beyond buckling
+MOST_LOST = 0.01
 KEPT = 60  # samples along the path at which draws are kept
 TOLERANCE = 0.10  # of the first-order result, within which the draws confirm it
 COMPARED = 0.5  # of the largest uncertainty along the path: smaller ones are not compared
