@@ -291,7 +291,9 @@ def test_readings_in_another_unit_are_refused(tmp_path):
     shutil.copytree(RECORDING, tmp_path / "mm")
     told = tmp_path / "mm" / "recording.toml"
     told.write_text(told.read_text().replace('"nm"', '"mm"'))
-    with pytest.raises(InputError, match=r"reading.delta_x: is .* times as far from the model as the model moves") as error:
+    with pytest.raises(
+        InputError, match=r"reading.delta_x: is .* times as far from the model as the model moves"
+    ) as error:
         calibrate(DEVICE, tmp_path / "mm")
     assert len(error.value.faults) == 3
 

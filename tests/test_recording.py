@@ -202,7 +202,7 @@ def test_held_out_data_must_not_be_the_fitted(tmp_path, model):
     assert "holds the data of fit.csv" in refused([tmp_path], model)["record[1]"]
     record = {"file": "fit.csv"}
     described(tmp_path, {**record, "role": "fit", "rows": [0, 300]}, {**record, "role": "hold_out", "rows": [290, 400]})
-    assert "share samples of fit.csv" in refused([tmp_path], model)["record[1].rows"]
+    assert "share samples of column 'x' of fit.csv" in refused([tmp_path], model)["record[1].rows"]
 
 
 def test_a_record_in_which_nothing_happens_is_refused(tmp_path, model):

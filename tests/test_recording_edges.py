@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from recorded import csv_text, described, samples
+from recorded import COLUMNS, csv_text, described, refused, samples
 
 from ctrlgen.core.errors import InputError
 from ctrlgen.recordings.reader import load_recordings
@@ -53,3 +53,25 @@ def test_surroundings_are_a_temperature(tmp_path, model, ambient, fault):
             load_recordings([folder], model)
     else:
         load_recordings([folder], model)
+
+
+@pytest.mark.parametrize("start", [None, "0 s"])
+def test_records_may_share_rows_where_they_read_different_columns(tmp_path, model, start):
+    """Official splits keep the readings to fit and those to judge beside each other in one file."""
+    fit, other = samples(400, seed=1), samples(400, seed=2)
+    (tmp_path / "both.csv").write_text(csv_text({**fit, "y": other["x"]}))
+    judged = {"reading.delta_x": {"column": "y", "unit": "um"}}
+    rows = {"file": "both.csv", "rows": [0, 300], "start": start}
+    held_out = {**rows, "role": "hold_out", "rows": [100, 400], "columns": judged}
+    recording = load_recordings([described(tmp_path, {**rows, "role": "fit"}, held_out)], model)
+    np.testing.assert_allclose(recording.records[0].observed[:, 0], 1e-6 * fit["x"][:300])
+    np.testing.assert_allclose(recording.records[1].observed[:, 0], 1e-6 * other["x"][100:])
+
+
+def test_records_of_two_files_share_no_reading_of_a_third(tmp_path, model):
+    for name in ("fit", "held", "readings"):
+        (tmp_path / f"{name}.csv").write_text(csv_text(samples(seed=len(name))))
+    columns = {**COLUMNS, "reading.delta_x": {"column": "x", "unit": "um", "file": "readings.csv"}}
+    records = {"file": "fit.csv", "role": "fit"}, {"file": "held.csv", "role": "hold_out"}
+    faults = refused([described(tmp_path, *records, columns=columns)], model)
+    assert "share samples of column 'x' of readings.csv" in faults["record[1].rows"]

@@ -184,7 +184,7 @@ class _File:
             )
             for k, table, begin, _ in spans
             for _, other, earliest, last in spans
-            if other is not table and earliest <= begin < last
+            if other is not table and earliest <= begin < last and not table.shares_rows(other)
         ]
 
 

@@ -98,6 +98,11 @@ class RecordTable(Section):
         a, b = self.rows or (0, LAST_ROW)
         return a + self.lead_in, b
 
+    def shares_rows(self, other: RecordTable) -> bool:
+        """Whether both have rows of one file in common: they were taken at the same time."""
+        (first, end), (begin, last) = self.used_rows, other.used_rows
+        return (self.file, self.table) == (other.file, other.table) and max(first, begin) < min(end, last)
+
 
 class RecordingFile(Section):
     """The file beside the measurements: on which device they were made, and what their columns are."""
@@ -262,23 +267,25 @@ class _Check:
             except ValueError as error:
                 self._fault(where, f"{key}: {error}")
 
-    def _observed(self, record: RecordTable) -> set[str]:
-        return {name for name in self.written.columns_of(record) if not name.startswith("drive.")}
+    def _readings(self, record: RecordTable) -> set[tuple[object, ...]]:
+        """The columns of a record that are no drive, each by its file, table and column: other columns are other readings."""
+        return {
+            (c.file or record.file, None if c.file else record.table, c.column)
+            for name, c in self.written.columns_of(record).items()
+            if not name.startswith("drive.")
+        }
 
     def _check_rows(self, k: int, record: RecordTable) -> None:
-        """The rows are not empty, and no sample is both fitted and held out."""
+        """The rows are not empty, and no reading is used twice, or fitted and held out."""
         if record.rows and record.used_rows[0] >= record.used_rows[1]:
             what = f"{list(record.rows)} is empty" + (f" after a lead-in of {record.lead_in}" if record.lead_in else "")
             self._fault(f"record[{k}].rows", f"{what}; write [first, one past the last]")
         for i, other in enumerate(self.written.record[:k]):
             a, b = record.used_rows, other.used_rows
-            if (
-                (record.file, record.table) == (other.file, other.table)
-                and max(a[0], b[0]) < min(a[1], b[1])
-                and "rest" not in (record.role, other.role)
-                and self._observed(record) & self._observed(other)
-            ):
-                what = f"share samples of {record.file} with record[{i}]; no sample may be fitted twice, or fitted and held out"
+            twice = self._readings(record) & self._readings(other)
+            if max(a[0], b[0]) < min(a[1], b[1]) and "rest" not in (record.role, other.role) and twice:
+                file, _, column = min(twice, key=repr)
+                what = f"share samples of column {column!r} of {file} with record[{i}]; no reading is fitted twice, or fitted and held out"
                 self._fault(f"record[{k}].rows", what)
 
     def _check_filter(self) -> None:
