@@ -91,7 +91,7 @@ def test_a_readme_names_source_files_and_hashes_of_data_that_are_not_here(path):
 
 def test_data_that_lie_outside_the_repository_are_named_with_their_hash():
     outside = {p for p in SCENARIOS.glob("*/*.toml") if 'file = "../../../' in p.read_text()}
-    assert outside == set(ELSEWHERE) and len(outside) >= 18
+    assert outside == set(ELSEWHERE) and len(outside) >= 25
 
 
 def test_another_file_under_the_stated_name_is_refused(tmp_path):
@@ -209,6 +209,30 @@ def test_the_rotary_axis_comes_late_and_its_resolver_has_harmonics(run, limit, p
     assert period is None or largest.parameters["period"].value == pytest.approx(period, rel=0.01)
     # More harmonics than there are periods to tell, and a noise of 1 to 6 mdeg: what is left is more.
     assert found.verdict not in ("explained", "consistent")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["recording"])
+def test_the_slit_axis_repeats_an_error_four_times_a_millimetre(name):
+    """At its one speed a pitch and a line in time are one signal: the answer names both."""
+    found = diagnosed("slit_axis", f"{name}.toml")
+    first = found.findings[0]
+    period, amplitude = first.parameters["period"], first.parameters["amplitude"]
+    assert first.effect == "cyclic" and first.share.value > 0.9
+    assert period.value == pytest.approx(0.25, rel=0.002) and period.unit == "mm"
+    assert abs(amplitude.value) == pytest.approx(0.02057, rel=0.02) and amplitude.unit == "mm"  # by least squares
+    assert left(found, "reading.axis") < 0.12
+    assert found.verdict == "ambiguous" and "vibration" in {a.effect for a in first.alternatives}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["recording"])
+def test_the_piezo_stack_has_hysteresis_and_comes_late(name):
+    found = diagnosed("piezo_stack", f"{name}.toml")
+    assert found.findings[0].effect in {"displacement_hysteresis", "drive_hysteresis", "asymmetric_hysteresis"}
+    assert {"delay", "low_pass", "clock_offset"} & {f.effect for f in found.findings}
+    assert not {"vibration", "drift", "sensor_step", "cyclic"} & {f.effect for f in found.findings}
+    assert left(found, "reading.axis") < 0.2
 
 
 @pytest.mark.long
