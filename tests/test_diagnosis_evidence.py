@@ -16,6 +16,7 @@ from ctrlgen.core.to_json import plain
 from ctrlgen.devices.changed_numbers import written
 from ctrlgen.diagnosis.evidence import unmodelled_dynamics
 from ctrlgen.diagnosis.evidence.detectability import detectability
+from ctrlgen.diagnosis.evidence.drive_envelope import DriveEnvelope
 from ctrlgen.diagnosis.evidence.excitation_signals import admissible, time_series
 from ctrlgen.diagnosis.evidence.experiment_design import separate
 from ctrlgen.diagnosis.evidence.experiment_files import files
@@ -283,8 +284,10 @@ def test_a_drive_that_could_do_far_too_much_is_used_a_little():
     fitter = axis_fitter()
     template = fitter.fit_records[0]
     simulator = structure.simulator(fitter.recording.channels, template.timing)
-    for shape in time_series(2000, 1, 1 / H, 0):
-        record, strength = admissible(shape, simulator, structure.start, template, 0.0)
+    endless = np.full(1, np.inf)
+    stated = DriveEnvelope(*simulator.model.u_bounds, endless, endless)
+    for shape in time_series(2000, stated, H, 0, 1):
+        record, strength = admissible(shape, simulator, structure.start, template, 0.0, stated)
         assert strength < 0.02 and 0.3 < np.abs(record.drive).max() < 4.0
 
 

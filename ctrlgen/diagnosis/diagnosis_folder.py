@@ -101,7 +101,7 @@ def diagnose_into(
         step("report")
         write_next(diagnosis, Path(device), draft / "device.next.toml")
         experiment = diagnosis.next_experiment
-        for name, content in experiment.files.items() if experiment is not None and experiment.settles else ():
+        for name, content in experiment.files.items() if experiment is not None and experiment.offered else ():
             write_text(draft / "next_experiment" / name, content)
         provenance = Provenance(digests(Path(device), recordings), seed)
         write_text(draft / "diagnosis.json", json_text(diagnosis_record(diagnosis, provenance)))

@@ -7,21 +7,30 @@ J (N, k) the sensitivities of the rival that is refitted to the other's predicti
 
 over this recording and the new one together; of the two directions the smaller, in standard deviations.
 
+Every drive that is considered can be done: it stays within the range, rate and band that the records hold (`drive_envelope.py`). Where
+none of them decides, the best one is recorded several times, which adds the squares; or a drive goes as far as the device file
+allows, or an imposed motion back as well.
+
 Source: A. C. Atkinson, V. V. Fedorov, Biometrika 62 (1975) 57.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from pydantic import Field
 
+from ctrlgen.core.units import difference
+from ctrlgen.diagnosis.evidence.drive_envelope import DriveEnvelope, fastest, free_drives, occupied_band
 from ctrlgen.diagnosis.evidence.excitation_signals import admissible, pose_sets, time_series
 from ctrlgen.diagnosis.selection.candidate_model import SearchResult
 from ctrlgen.diagnosis.settings import EXPERIMENT
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.least_squares import initial_state_sd
+from ctrlgen.model.model import Model
 from ctrlgen.recordings.recording import Record
 from ctrlgen.reporting.result_file import FiniteOrNull, Keys
 
@@ -33,6 +42,32 @@ class CandidateExperimentEntry(Keys):
     description: str = Field(description="The drive in words.")
     strength: float = Field(description="Amplitude as a share of the drive's range.")
     separation: float = Field(description="Separation of the rivals with it [standard deviations].")
+
+
+class ProposedDriveEntry(Keys):
+    """What a proposed drive asks of one drive of the device, and what was recorded of it."""
+
+    drive: str = Field(description="Name of the drive.")
+    unit: str = Field(description="Unit of the numbers.")
+    range: tuple[float, float] = Field(description="Smallest and largest value [unit].")
+    rate: FiniteOrNull = Field(description="Largest change by time [unit/s]; null for settled poses.")
+    band: FiniteOrNull = Field(
+        description="Frequency below which 99 % of the energy of its changes lies [Hz]; null for settled poses."
+    )
+    recorded_range: tuple[float, float] = Field(description="The same of what was recorded.")
+    recorded_rate: FiniteOrNull = Field(description="The same of what was recorded, or the device's stated limit.")
+    recorded_band: FiniteOrNull = Field(description="The same of what was recorded.")
+
+
+class AlternativeEntry(Keys):
+    """What decides where no drive does that was seen to be possible; one of `repeats` and `beyond`."""
+
+    repeats: int | None = Field(description="How often the proposed drive has to be recorded.")
+    beyond: CandidateExperimentEntry | None = Field(
+        description="A drive beyond what was recorded: within the limits that the device file states, or a motion the other way."
+    )
+    drives: list[ProposedDriveEntry] = Field(description="What it asks of each drive.")
+    separation_after: float = Field(description="Separation of the rivals with it [standard deviations].")
 
 
 class NextExperimentEntry(Keys):
@@ -49,6 +84,10 @@ class NextExperimentEntry(Keys):
     separation_after: FiniteOrNull = Field(description="Separation by both recordings [standard deviations].")
     settles: bool = Field(description="Whether separation_after decides between them.")
     candidates: list[CandidateExperimentEntry] = Field(description="All drives considered, the best first.")
+    drives: list[ProposedDriveEntry] = Field(description="What the best drive asks of each drive of the device.")
+    alternative: AlternativeEntry | None = Field(
+        description="What decides where the best drive does not; null where nothing does."
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +97,7 @@ class Experiment:
     rivals: the two models by their causes. reason: why these two.
     before, after: separation [standard deviations] by this recording, and with the new one.
     candidates: all drives considered, the best first. proposed: the best drive as a record without readings.
+    drives: what the best asks of each drive. alternative: what decides where the best does not, None where nothing does.
     files: the content of each file of the folder next_experiment/.
     """
 
@@ -67,12 +107,19 @@ class Experiment:
     after: float
     candidates: tuple[CandidateExperimentEntry, ...]
     proposed: Record
+    drives: tuple[ProposedDriveEntry, ...] = ()
+    alternative: AlternativeEntry | None = None
     files: dict[str, str] = field(default_factory=dict)
 
     @property
     def settles(self) -> bool:
         """Whether the separation with the new recording decides between them."""
         return self.after >= EXPERIMENT.settles
+
+    @property
+    def offered(self) -> bool:
+        """Whether the drive is worth recording: it settles the doubt, once or repeated."""
+        return self.settles or (self.alternative is not None and self.alternative.repeats is not None)
 
     def record(self) -> NextExperimentEntry:
         """The entry of the experiment in diagnosis.json."""
@@ -89,6 +136,8 @@ class Experiment:
             separation_after=self.after,
             settles=self.settles,
             candidates=list(self.candidates),
+            drives=list(self.drives),
+            alternative=self.alternative,
         )
 
 
@@ -124,34 +173,123 @@ def _open(search: SearchResult, explained: bool) -> tuple[list[tuple[Fit, Fit]],
 
 def separate(fitter: Fitter, a: Fit, b: Fit, reason: str, seed: int = 0) -> Experiment | None:
     """The excitation signal that best separates two fits; None where none is admissible. `seed` draws the signals."""
-    template = max(fitter.fit_records, key=lambda r: len(r.time))
-    poses = template.poses
-    n, n_u = (
-        min(len(template.time), EXPERIMENT.most_poses if poses else EXPERIMENT.most_samples),
-        template.drive.shape[1],
-    )
-    family = pose_sets(n, n_u, seed) if poses else time_series(n, n_u, 1 / template.sample_time, seed)
-    first = 0.0 if poses else max(r.time[-1] for r in fitter.recording.records) + template.sample_time
-    simulator = fitter.simulator(a.structure, template)
-    now = [_Sums.present(fitter, *pair) for pair in ((a, b), (b, a))]
-    rows = []
-    for shape in family:
-        given = admissible(shape, simulator, a.theta, template, first)
-        if given is None:
-            continue
-        record, strength = given
-        both = [s.plus(fitter, *pair, record).separation for s, pair in zip(now, ((a, b), (b, a)), strict=True)]
-        if np.all(np.isfinite(both)):
-            entry = CandidateExperimentEntry(
-                kind=shape.kind, description=shape.description, strength=strength, separation=min(both)
-            )
-            rows.append((entry, record))
+    records, model = fitter.recording.records, fitter.simulator(a.structure, fitter.fit_records[0]).model
+    recorded = DriveEnvelope.recorded(records, model)
+    contest = _Contest.between(fitter, a, b)
+    rows = contest.ranked(recorded, seed)
     if not rows:
         return None
-    rows.sort(key=lambda row: -row[0].separation)
     best, record = rows[0]
-    before = min(s.separation for s in now)
-    return Experiment((_named(a, b), _named(b, a)), reason, before, best.separation, tuple(r[0] for r in rows), record)
+    return Experiment(
+        (_named(a, b), _named(b, a)),
+        reason,
+        contest.before,
+        best.separation,
+        tuple(r[0] for r in rows),
+        record,
+        drives=_asked(record, recorded, model),
+        alternative=None if best.separation >= EXPERIMENT.settles else contest.alternative(rows[0], recorded, seed),
+    )
+
+
+Row = tuple[CandidateExperimentEntry, Record]
+
+
+@dataclass(frozen=True, eq=False)
+class _Contest:
+    """Two fits and the sums over what is recorded already, with either of them as the truth."""
+
+    fitter: Fitter
+    pairs: tuple[tuple[Fit, Fit], ...]
+    now: tuple[_Sums, ...]
+
+    @classmethod
+    def between(cls, fitter: Fitter, a: Fit, b: Fit) -> _Contest:
+        pairs = ((a, b), (b, a))
+        return cls(fitter, pairs, tuple(_Sums.present(fitter, *pair) for pair in pairs))
+
+    @property
+    def before(self) -> float:
+        """Separation by the recording [standard deviations]."""
+        return min(s.separation for s in self.now)
+
+    def ranked(self, envelope: DriveEnvelope, seed: int) -> list[Row]:
+        """Every drive within the `envelope` that keeps the device's limits, the one that separates best first."""
+        fitter, fit = self.fitter, self.pairs[0][0]
+        template = max(fitter.fit_records, key=lambda r: len(r.time))
+        simulator = fitter.simulator(fit.structure, template)
+        n, poses = len(template.time), template.poses
+        first = 0.0 if poses else max(r.time[-1] for r in fitter.recording.records) + template.sample_time
+        family = (
+            pose_sets(min(n, EXPERIMENT.most_poses), template.drive.shape[1], seed)
+            if poses
+            else time_series(
+                min(n, EXPERIMENT.most_samples), envelope, template.sample_time, seed, free_drives(simulator.model)
+            )
+        )
+        rows: list[Row] = []
+        for shape in family:
+            given = admissible(shape, simulator, fit.theta, template, first, envelope)
+            if given is None:
+                continue
+            record, strength = given
+            both = [s.plus(fitter, *pair, record).separation for s, pair in zip(self.now, self.pairs, strict=True)]
+            if np.all(np.isfinite(both)):
+                entry = CandidateExperimentEntry(
+                    kind=shape.kind, description=shape.description, strength=strength, separation=min(both)
+                )
+                rows.append((entry, record))
+        return sorted(rows, key=lambda row: -row[0].separation)
+
+    def alternative(self, best: Row, recorded: DriveEnvelope, seed: int) -> AlternativeEntry | None:
+        """What decides although the `best` recorded drive does not: the same several times, or one beyond the recorded range."""
+        entry, record = best
+        model = self.fitter.simulator(self.pairs[0][0].structure, record).model
+        gained, wanted = entry.separation**2 - self.before**2, EXPERIMENT.settles**2 - self.before**2
+        if gained * EXPERIMENT.most_repeats >= wanted:
+            repeats = math.ceil(wanted / gained)
+            return AlternativeEntry(
+                repeats=repeats,
+                beyond=None,
+                drives=list(_asked(record, recorded, model)),
+                separation_after=math.sqrt(self.before**2 + repeats * gained),
+            )
+        wider = recorded.widened(model)
+        rows = self.ranked(wider, seed) if wider is not None else []
+        if not rows or rows[0][0].separation < EXPERIMENT.settles:
+            return None
+        farther, record = rows[0]
+        return AlternativeEntry(
+            repeats=None,
+            beyond=farther,
+            drives=list(_asked(record, recorded, model)),
+            separation_after=farther.separation,
+        )
+
+
+def _asked(record: Record, recorded: DriveEnvelope, model: Model) -> tuple[ProposedDriveEntry, ...]:
+    """What a proposed `record` asks of each drive, beside what was recorded of it."""
+    signal, h = model.signals["drive"], record.sample_time
+    timed = not record.poses and len(record.drive) > 1
+    rate, band = (fastest(record.drive, h), occupied_band(record.drive, h)) if timed else (recorded.rate, recorded.band)
+
+    def shown(values: Sequence[float], unit: str) -> tuple[float, float]:
+        low, high = (float(difference(v, unit)) for v in values)
+        return low, high
+
+    return tuple(
+        ProposedDriveEntry(
+            drive=channel,
+            unit=unit,
+            range=shown((record.drive[:, i].min(), record.drive[:, i].max()), unit),
+            rate=float(difference(rate[i], unit)),
+            band=float(band[i]),
+            recorded_range=shown((recorded.low[i], recorded.high[i]), unit),
+            recorded_rate=float(difference(recorded.rate[i], unit)),
+            recorded_band=float(recorded.band[i]),
+        )
+        for i, (channel, unit) in enumerate(zip(signal.channels, signal.units, strict=True))
+    )
 
 
 def _named(fit: Fit, other: Fit) -> str:

@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
+from ctrlgen.diagnosis.report.experiment_sentences import experiment_sentence
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding
 from ctrlgen.diagnosis.selection.verdict import Verdict, contradicts_datasheet, within_tolerance
@@ -207,11 +208,8 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
     if verdict == Verdict.EXPLAINED:
         return [use]
     if verdict == Verdict.AMBIGUOUS:
-        first = "None of the drives considered would decide between the alternatives: measure one directly, with another sensor."
-        if diagnosis.next_experiment is not None and diagnosis.next_experiment.settles:
-            first = "Run the next experiment (next_experiment/) to decide between the alternatives; until then the cause is not known."
         return [
-            first,
+            experiment_sentence(diagnosis.next_experiment),
             "device.next.toml holds the best of them, which predicts recordings of this kind as well as the others do."
             + rest,
         ]

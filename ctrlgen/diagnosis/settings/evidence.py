@@ -93,6 +93,16 @@ class ExcitationSettings:
     """Lines of a multisine, logarithmic and odd."""
     levels: tuple[float, ...] = (0.0, 1.0, 0.0, -1.0, 0.0, 0.5, 0.0, -0.5)
     """Levels of the drive of steps and rests."""
+    slowest: float = 0.1
+    """Slowest over fastest speed of a stroke at several speeds: a decade. Judgement."""
+    band_share: float = 0.99
+    """Share of the energy of a drive's changes that lies in its band: the hundredth is for the rounding of recorded numbers."""
+    wider: float = 1.5
+    """Each window that smooths a drive, over the one before. Judgement: at most half as much smoothing again as is needed."""
+    both_ways: float = 0.5
+    """Smaller over larger side of zero, from which on a drive counts as one of both signs, which rests at zero. Judgement."""
+    rounding: float = 1e-9
+    """Share of a range, rate or band that counts as rounding."""
 
 
 @dataclass(frozen=True)
@@ -109,6 +119,8 @@ class ExperimentSettings:
     """Rejected models that are compared where nothing explains the recording."""
     settles: float = 3.0
     """Standard deviations between two models' predictions that settle a doubt."""
+    most_repeats: int = 30
+    """Times that a proposed drive may have to be recorded: somebody has to do it. Judgement."""
     fitted_share: float = 0.6
     """Share of a proposed record that is to be fitted; the rest is held out."""
 
