@@ -33,3 +33,12 @@ def highest_peaks(power: np.ndarray, count: int, distance: int, height: float | 
     """
     bins, _ = find_peaks(power, height=height, distance=distance)
     return bins[np.argsort(-power[bins])][:count]
+
+
+def vertex(power: np.ndarray, k: int) -> float:
+    """Place of the maximum of `power` near its local maximum k, in bins from k: that of the parabola through three bins."""
+    if not 0 < k < len(power) - 1:
+        return 0.0
+    below, at, above = power[k - 1 : k + 2]
+    bend = below - 2 * at + above
+    return float((below - above) / (2 * bend)) if bend < 0 else 0.0

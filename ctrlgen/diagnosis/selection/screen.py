@@ -19,7 +19,7 @@ import numpy as np
 from ctrlgen.diagnosis.selection.candidate_terms import CandidateTerm, Peaks, signal_peaks
 from ctrlgen.diagnosis.selection.law_terms import LawTerms
 from ctrlgen.diagnosis.selection.score_gradient import ScoreGradient, Sums, law_terms
-from ctrlgen.diagnosis.selection.spatial_periods import jump_positions, merged_periods, spatial_periods
+from ctrlgen.diagnosis.selection.spatial_periods import jump_positions, merged_periods, resolved_way, spatial_periods
 from ctrlgen.diagnosis.selection.subset_search import SubsetSearch, Suspect
 from ctrlgen.diagnosis.settings import SCREEN
 from ctrlgen.effects import Place
@@ -139,11 +139,16 @@ class Screen:
         residual = record.observed - foreseen
         names = [c.name for c in channels(nominal_physics(fit.structure.device), Place.SENSOR)]
         read = [(i, c.removeprefix("reading.")) for i, c in enumerate(self.fitter.recording.channels)]
+        paths = (record.observed, foreseen, behind)
+
+        def periods(i: int, good: np.ndarray) -> tuple[float, ...]:
+            # what is read may be evenly sampled, and bent
+            shortest = max(resolved_way(y[good, i]) for y in paths)
+            return merged_periods(spatial_periods(y[good, i], residual[good, i], shortest) for y in paths)
+
         return {
             (Place.SENSOR, names.index(name)): {
-                "spatial_periods": merged_periods(
-                    spatial_periods(y[good, i], residual[good, i]) for y in (record.observed, foreseen, behind)
-                ),
+                "spatial_periods": periods(i, good),
                 "jump_positions": jump_positions(record.observed[good, i], residual[good, i]),
             }
             for i, name in read

@@ -11,26 +11,85 @@ from collections.abc import Iterable
 import numpy as np
 
 from ctrlgen.diagnosis.settings import SPATIAL_PERIODS
-from ctrlgen.numerics.spectral_peaks import highest_peaks, periodogram
+from ctrlgen.numerics.spectral_peaks import highest_peaks, periodogram, vertex
 
 
-def spatial_periods(path: np.ndarray, left: np.ndarray) -> tuple[float, ...]:
-    """The ways [path's unit] after which `left` (n,) repeats along `path` (n,), the most conspicuous first.
+def spatial_periods(path: np.ndarray, left: np.ndarray, shortest: float = 0.0) -> tuple[float, ...]:
+    """The ways [path's unit] after which `left` (n,) repeats along `path` (n,), the most conspicuous first; none below
+    `shortest`, nor below what the samples along the path resolve (`resolved_way`).
 
-    From |sum left exp(-2 pi i path/way)|^2 over the mean square and n, which is exponential where nothing repeats.
+    From |sum left exp(-2 pi i path/way)|^2 over its mean where nothing repeats, in units of which it is exponential. Each wave is
+    taken out before the next is sought, so that neither its side lobes nor its images in the sampling come again (D. H. Roberts
+    et al., Astron. J. 93 (1987) 968). A place where the path stands counts no more than twice as much as others do.
     """
     span = float(np.ptp(path))
-    power = float(np.sum((left - np.mean(left)) ** 2))
-    if span == 0 or power == 0:
+    if span == 0:
         return ()
     n, padding = SPATIAL_PERIODS.cells, SPATIAL_PERIODS.padding
-    cell = np.minimum(((path - path.min()) / span * n).astype(int), n - 1)
-    along = np.bincount(cell, weights=left - np.mean(left), minlength=n)
-    spectrum = periodogram(along, padding=padding) / power
-    first, last = padding * SPATIAL_PERIODS.fewest_cycles, padding * n // SPATIAL_PERIODS.finest_cells
+    cell = _cells(path, n)
+    count = np.bincount(cell, minlength=n)
+    weight = np.minimum(1.0, 2 * np.median(count[count > 0]) / count[cell])
+    rest = left - np.average(left, weights=weight)
+    if not np.any(rest):
+        return ()
+    shortest = max(shortest, resolved_way(path), SPATIAL_PERIODS.finest_cells * span / n)
+    first, last = padding * SPATIAL_PERIODS.fewest_cycles, int(padding * span / shortest)
+    if last <= first:
+        return ()
     least = np.log((last - first) / SPATIAL_PERIODS.false_alarm_p)
-    best = highest_peaks(spectrum[first:last], SPATIAL_PERIODS.most, distance=2 * padding, height=least)
-    return tuple(float(padding * span / (first + k)) for k in best)
+    found: list[float] = []
+    for _ in range(SPATIAL_PERIODS.most):
+        along = np.bincount(cell, weights=weight * rest, minlength=n)
+        power = (periodogram(along, padding=padding) / np.sum((weight * rest) ** 2))[first:last]
+        for cycles in found:
+            power[max(int(padding * (cycles - 2)) - first, 0) : max(int(padding * (cycles + 2)) + 1 - first, 0)] = 0.0
+        best = highest_peaks(power, 1, distance=2 * padding, height=least)
+        if not len(best):
+            break
+        found.append((first + int(best[0]) + vertex(power, int(best[0]))) / padding)
+        rest = _without_wave((path - np.mean(path)) / span, found[-1], rest, weight)
+    return tuple(span / cycles for cycles in found)
+
+
+def resolved_way(path: np.ndarray) -> float:
+    """The shortest way [path's unit] that samples along `path` (n,) tell from its images; zero where they tell any.
+
+    Samples at even distances tell none below two distances. In general their places repeat after a way where
+    |sum exp(-2 pi i place/way)|^2, each place counted once however often it was visited, comes back to nearly its first value,
+    and twice that is the shortest. Uneven places do not repeat. What is left differs by the direction of motion where anything
+    lags, so that the places of one do not fill the gaps of the other.
+    """
+    span = float(np.ptp(path))
+    if span == 0:
+        return 0.0
+    n, padding = SPATIAL_PERIODS.image_cells, 2
+    cell, ahead = _cells(path, n), np.gradient(path) > 0
+    power, whole = np.zeros(padding * n // 2 + 1), 0.0
+    for visited in (cell[ahead], cell[~ahead]):
+        places = np.zeros(n)
+        places[visited] = 1.0
+        power += periodogram(places, padding=padding)
+        whole += np.sum(places) ** 2
+    # what the width of a cell takes away
+    power /= whole * np.sinc(np.arange(len(power)) / (padding * n)) ** 2
+    first = padding * SPATIAL_PERIODS.fewest_cycles
+    repeating = np.flatnonzero(power[first:] > SPATIAL_PERIODS.image)
+    return 2 * padding * span / float(first + repeating[0]) if len(repeating) else 0.0
+
+
+def _cells(path: np.ndarray, n: int) -> np.ndarray:
+    """In which of n equal cells of the path each sample is."""
+    return np.minimum(((path - path.min()) / np.ptp(path) * n).astype(int), n - 1)
+
+
+def _without_wave(place: np.ndarray, cycles: float, values: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """`values` (n,) without the wave of so many cycles over the path that suits them best, its amplitude and phase linear in the
+    `place`: the frequency of a peak is not exact."""
+    angle = 2 * np.pi * cycles * place
+    wave = np.column_stack([np.cos(angle), np.sin(angle)])
+    columns = np.column_stack([np.ones(len(angle)), wave, place[:, None] * wave])
+    root = np.sqrt(weight)
+    return values - columns @ np.linalg.lstsq(columns * root[:, None], values * root, rcond=None)[0]
 
 
 def merged_periods(periods: Iterable[tuple[float, ...]]) -> tuple[float, ...]:
@@ -48,7 +107,7 @@ def jump_positions(path: np.ndarray, left: np.ndarray) -> tuple[float, ...]:
     if span == 0:
         return ()
     n, side = SPATIAL_PERIODS.jump_cells, SPATIAL_PERIODS.jump_side
-    cell = np.minimum(((path - path.min()) / span * n).astype(int), n - 1)
+    cell = _cells(path, n)
     count = np.bincount(cell, minlength=n)
     total = np.bincount(cell, weights=left, minlength=n)
     read = np.flatnonzero(count)

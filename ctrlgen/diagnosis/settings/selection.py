@@ -45,6 +45,12 @@ class SpatialPeriodSettings:
     """Relative difference below which two periods are one."""
     false_alarm_p: float = 1e-4
     """p of a peak so high anywhere in a spectrum without periods."""
+    image: float = 0.8
+    """Power of the image of a period, over that of the period itself, from which on samples do not tell which of both is there.
+    One for even samples; places that jitter by a twelfth of their distance give 0.76. Judgement."""
+    image_cells: int = 2**16
+    """Equal cells of the path in which the samples' places are counted: four times those of the spectrum, so that the width of
+    a cell takes 5 % off the image of its shortest period."""
     most: int = 3
     """Periods, and jumps, that are tried. Judgement."""
     jump_cells: int = 512

@@ -1,0 +1,67 @@
+"""Periods along a path: which the sampling can tell, which it only feigns."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ctrlgen.diagnosis.selection.spatial_periods import resolved_way, spatial_periods
+
+LENGTH = 10e-3  # m
+
+
+def sampled(kind: str, step: float, rng) -> np.ndarray:
+    """Places [m] along a path of 10 mm at even speed, there and back, at two speeds, swinging, or between two rests."""
+    there = np.arange(0.0, LENGTH, step)
+    if kind == "even":
+        return there
+    if kind == "back":
+        return np.concatenate([there, LENGTH - np.arange(0.0, LENGTH, rng.uniform(0.6, 1.0) * step)])
+    if kind == "two speeds":
+        return np.concatenate([there[there < LENGTH / 2], np.arange(LENGTH / 2, LENGTH, 0.63 * step)])
+    if kind == "swinging":
+        return LENGTH / 2 * np.sin(np.linspace(0, 4 * np.pi, int(4 * LENGTH / step)))
+    speed = np.clip(np.linspace(0, 30, int(1.3 * LENGTH / step)), 0, 1) * step
+    return np.concatenate([np.zeros(600), np.cumsum(speed), np.full(600, np.sum(speed))])
+
+
+@pytest.mark.parametrize("kind", ["even", "back", "two speeds", "swinging", "rests"])
+def test_of_any_pitch_sampling_and_noise_the_pitch_comes_first_and_no_image_of_it(kind):
+    rng = np.random.default_rng(11)
+    for samples_a_pitch in (2.6, 3.7, 10.0, 47.0):
+        for pitch in LENGTH / np.array([31.0, 97.3, 250.9]):
+            path = sampled(kind, pitch / samples_a_pitch, rng)
+            error = 0.1 * pitch * np.sin(2 * np.pi * path / pitch + rng.uniform(0, 6))
+            for noise in (0.001, 0.03):
+                left = error + noise * pitch * rng.standard_normal(len(path))
+                first, *others = spatial_periods(path, left)
+                # a quarter of a cycle over the path
+                assert LENGTH / first == pytest.approx(LENGTH / pitch, abs=0.25)
+                assert others == []
+
+
+@pytest.mark.parametrize("step", [2.5e-6, 7e-6])
+def test_even_samples_tell_no_way_below_two_of_their_distances(step):
+    path = np.arange(0.0, LENGTH, step)
+    both_ways = np.concatenate([path, path[::-1] + 0.37 * step])
+    assert resolved_way(path) == pytest.approx(2 * step, rel=1e-3)
+    # the places of the way back lie between those of the way there
+    assert resolved_way(both_ways) == pytest.approx(2 * step, rel=1e-3)
+    shaken = path + step * np.random.default_rng(1).standard_normal(len(path))
+    assert resolved_way(shaken) == 0.0
+
+
+def test_a_lag_of_which_only_the_images_are_short_has_no_period():
+    """Each way is late by the same, and the places of both interleave: at the distance of the samples both add up."""
+    path = np.arange(0.0, LENGTH, 1e-5)
+    there_and_back = np.concatenate([path, path[::-1] + 5e-6])
+    late = np.repeat([1e-6, -1e-6], len(path))
+    noise = 1e-8 * np.random.default_rng(2).standard_normal(len(late))
+    assert spatial_periods(there_and_back, late + noise) == ()
+
+
+def test_a_way_below_the_shortest_is_not_told():
+    path = np.linspace(0.0, LENGTH, 20001)
+    left = np.sin(2 * np.pi * path / 5e-5) + 0.1 * np.random.default_rng(3).standard_normal(len(path))
+    assert spatial_periods(path, left, 4e-5) == (pytest.approx(5e-5, rel=1e-3),)
+    assert spatial_periods(path, left, 6e-5) == ()
