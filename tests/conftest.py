@@ -2,14 +2,20 @@ from __future__ import annotations
 
 import os
 import shutil
+import sys
+from functools import wraps
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from package_programs import STRICT, run
 
+from battery.consistency import contradictions
 from ctrlgen import build_model, generate, load_device, load_scenario, solve
+from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
+from ctrlgen.diagnosis.report.diagnosis_record import Provenance, diagnosis_record
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.trajectory.solution_plots import draw_solution
 
@@ -35,6 +41,26 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.get_closest_marker("exhaustive"):
             item.add_marker("long")
+
+
+@pytest.hookimpl
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Every diagnosis that a test makes in this process is held to the checker of contradictions, wherever it is called from."""
+    called = sys.modules.get("ctrlgen.diagnosis.diagnose")
+    if called is None:
+        return
+    diagnose_recording = called.diagnose_recording
+
+    @wraps(diagnose_recording)
+    def checked(*args: Any, **options: Any) -> Diagnosis:
+        found = diagnose_recording(*args, **options)
+        wrong = contradictions(diagnosis_record(found, Provenance({}, 0)).as_json())
+        assert not wrong, "\n".join(wrong)
+        return found
+
+    for module in list(sys.modules.values()):
+        if getattr(module, "diagnose_recording", None) is diagnose_recording:
+            module.diagnose_recording = checked
 
 
 @pytest.fixture

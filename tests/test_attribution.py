@@ -23,29 +23,37 @@ from ctrlgen.estimation.structure import Structure
 HUM = Hypothesis("vibration", "disturbance:axis", "axis")
 
 
-def shared(monkeypatch, energy, causes: int, held: float = 1.0, blocks=None, described=None) -> Attribution:
+def shared(
+    monkeypatch, energy, causes: int, held: float = 1.0, blocks=None, described=None, known=True, names=()
+) -> Attribution:
     """Shares of `causes` causes where those of a set S leave energy(S) on the records to fit; held out `held` times as much."""
 
     def misfit_of(present, times=1.0):
         return left(times * energy(frozenset(present)), blocks=blocks)
 
+    def of_records(records):
+        return held if records == ["held"] else 1.0
+
     monkeypatch.setattr(
-        attribution,
-        "left_by",
-        lambda fitter, fit, present, records: misfit_of(present, held if records == ["held"] else 1.0),
+        attribution, "left_by", lambda fitter, fit, present, records: misfit_of(present, of_records(records))
     )
-    fitter = SimpleNamespace(with_errors_of=lambda fit: None, held_out_records=["held"], fit_records=["fit"])
-    trial = {
-        name: SimpleNamespace(
-            fit=SimpleNamespace(structure=SimpleNamespace(causes=(None,) * causes)),
-            fitted=misfit_of(present),
-            held_out=misfit_of(present, held),
-        )
-        for name, present in (("nominal", ()), ("chosen", range(causes)))
-    }
-    if described is not None:
-        trial["nominal"].fitted = trial["nominal"].held_out = left(described)
-    return attribute(fitter, trial["nominal"], trial["chosen"])
+    monkeypatch.setattr(attribution, "as_fitted", lambda fitter, fit, records: fit.leaves(of_records(records)))
+    fitter = SimpleNamespace(
+        with_errors_of=lambda fit: None,
+        held_out_records=["held"],
+        fit_records=["fit"],
+        noise=SimpleNamespace(known=np.array([known])),
+        recording=SimpleNamespace(channels=("reading.axis",)),
+    )
+    places = names or tuple(f"stage:{k}" for k in range(causes))
+    structure = SimpleNamespace(causes=tuple(Hypothesis("coulomb", place) for place in places))
+
+    def trial(leaves):
+        fit = SimpleNamespace(structure=structure, leaves=leaves)
+        return SimpleNamespace(fit=fit, fitted=leaves(1.0), held_out=leaves(held))
+
+    nominal = trial(lambda times: misfit_of((), times) if described is None else left(described))
+    return attribute(fitter, nominal, trial(lambda times: misfit_of(range(causes), times)))
 
 
 def values(found: Attribution) -> list[float]:
@@ -72,11 +80,41 @@ def test_causes_that_cannot_stand_alone_take_nothing_away_alone(monkeypatch):
     assert values(found) == pytest.approx([(0.4 + 0.9) / 2, (0.0 + 0.5) / 2, 0.1])
 
 
-@pytest.mark.parametrize("leaves, share", [(1.9e3, 0.99), (2.1e3, 1 - 1 / 2.1)])
-def test_numbers_that_bend_until_they_hide_a_mismatch_do_not_hide_its_share(monkeypatch, leaves, share):
-    """The device as described leaves twice what the model leaves, its numbers bent; with the model's own it leaves a hundred times."""
-    found = shared(monkeypatch, lambda S: 1e3 if S else 1e5, 1, described=leaves)
-    assert found.shares[0].value == pytest.approx(share)
+def test_shares_are_of_the_error_that_the_table_calls_before(monkeypatch):
+    """The numbers of the device bend until it leaves 1500; with those of the model it would leave 100,000: two thirds are left."""
+    found = shared(monkeypatch, lambda S: 1e3 if S else 1e5, 1, described=1.5e3)
+    assert values(found) == pytest.approx([1 / 3, 2 / 3]) and found.explained == pytest.approx(1 / 3)
+    assert found.channels == {"reading.axis": pytest.approx((1 / 3, 2 / 3))}
+
+
+def test_nothing_is_taken_away_where_more_is_left_than_there_was(monkeypatch):
+    found = shared(monkeypatch, lambda S: 3e3 if S else 1e5, 1, described=1.5e3)
+    assert found.rest.value == pytest.approx(2.0) and found.explained == 0.0
+
+
+def test_where_the_noise_is_not_known_the_whole_error_counts(monkeypatch):
+    """Of 1000 samples that leave 1000 and 4000 squares beyond those of a guessed noise."""
+    found = shared(monkeypatch, lambda S: 1e3 if S else 4e3, 1, known=False)
+    assert found.rest.value == pytest.approx(2e3 / 5e3)
+
+
+def test_terms_of_one_law_at_one_place_are_one(monkeypatch):
+    takes = (5e4, 3e4, 1e4)
+    found = shared(monkeypatch, lambda S: 1e5 - sum(takes[k] for k in S), 3, names=("sensor:a", "sensor:b", "sensor:a"))
+    assert [s.value for s in found.shares] == pytest.approx([0.6, 0.3, 0.6]) and found.rest.value == pytest.approx(0.1)
+
+
+def test_a_cause_that_takes_nothing_away_has_no_share_and_says_whom_it_serves(monkeypatch):
+    """Alone the first leaves as much again; the second takes away 50 beside it and 10 without; the third never cares."""
+
+    def energy(S):
+        return 1e5 + 2e4 * (0 in S) - (5e4 if {0, 1} <= S else 1e4 * (1 in S)) - 2e4 * (2 in S)
+
+    found = shared(monkeypatch, energy, 3)
+    first, second, third = found.shares
+    assert first is None and found.serves[0] == 1
+    assert second.value + third.value + found.rest.value == pytest.approx(1.0)
+    assert found.rest.value == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("over, adapted", [(1.01, False), (0.99, True)])
@@ -116,10 +154,13 @@ def test_shares_and_the_rest_are_one(monkeypatch, causes):
 
 
 def test_a_set_that_diverges_counts_as_four_times_the_mismatch(monkeypatch):
+    """Parts of (1 - 4 + 4)/2 and (5 + 39)/2 tenths without the limit; of -1.3 and 2.2 of the whole with it."""
     assert ATTRIBUTION.diverged == 4.0
-    table = {(): 1e5, (0,): 1e30, (1,): 5e4, (0, 1): 1e4}
+    table = {(): 1e5, (0,): 1.5e5, (1,): 1e30, (0, 1): 1e4}
+    parts = np.array([(-0.5 + 3.9) / 2, (1 - 4 + 1.4) / 2])
     found = shared(monkeypatch, lambda S: table[tuple(sorted(S))], 2)
-    assert values(found) == pytest.approx([((1 - 4) + 0.4) / 2, (0.5 + 3.9) / 2, 0.1])
+    assert parts[1] < 0 and found.shares[1] is None
+    assert found.shares[0].value == pytest.approx(0.9) and found.rest.value == pytest.approx(0.1)
 
 
 def test_where_the_held_out_records_show_no_mismatch_the_shares_are_of_those_to_fit(monkeypatch):

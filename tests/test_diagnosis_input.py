@@ -12,7 +12,8 @@ from recording_folders import SERVO, axis_recording, poses_recording, servo_pose
 import ctrlgen
 from ctrlgen.core.errors import InputError
 from ctrlgen.diagnosis.diagnosis_folder import diagnose_into
-from ctrlgen.diagnosis.report.narrative import next_steps, sentence
+from ctrlgen.diagnosis.report.answer import sentence
+from ctrlgen.diagnosis.report.narrative import next_steps
 from ctrlgen.diagnosis.selection.verdict import Verdict
 
 # The answer is the same, and quick

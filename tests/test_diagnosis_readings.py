@@ -19,11 +19,11 @@ from axis_records import (
 )
 from scipy.signal import lfilter
 
-from ctrlgen.diagnosis.selection.candidate_model import SearchResult
 from ctrlgen.diagnosis.selection.direct_detection import directly_detected_findings
 from ctrlgen.diagnosis.selection.objections import objections
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
+from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.selection.spatial_periods import jump_positions, merged_periods, spatial_periods
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.effects import Place

@@ -22,10 +22,11 @@ from ctrlgen.diagnosis.evidence.detectability import DetectabilityEntry, Smalles
 from ctrlgen.diagnosis.evidence.experiment_design import CandidateExperimentEntry, Experiment
 from ctrlgen.diagnosis.evidence.residual_location import ResidualPartEntry
 from ctrlgen.diagnosis.evidence.unmodelled_dynamics import Coordinate, DependenceMap, UnmodelledForce
+from ctrlgen.diagnosis.report.answer import sentence
 from ctrlgen.diagnosis.report.diagnosis_record import Provenance, diagnosis_record
 from ctrlgen.diagnosis.report.figures import POINTS, residual_density, thinned
 from ctrlgen.diagnosis.report.html_report import page
-from ctrlgen.diagnosis.report.narrative import gathered, interval, next_steps, sentence
+from ctrlgen.diagnosis.report.narrative import gathered, interval, next_steps
 from ctrlgen.diagnosis.report.plot_uncertainty import draw_rivals
 from ctrlgen.diagnosis.report.writeback import next_text
 from ctrlgen.diagnosis.selection.findings import Estimate, Finding
@@ -76,7 +77,21 @@ def test_the_json_is_the_contract(found):
     assert result["notes"] == list(found.notes)
     assert result["verdict"] == Verdict.EXPLAINED
     (finding,) = result["findings"]
-    assert set(finding) == {"effect", "location", "of", "parameters", "share", "worth", "alternatives", "source"}
+    assert set(finding) == {
+        *(
+            "effect",
+            "location",
+            "of",
+            "role",
+            "serves",
+            "parameters",
+            "terms",
+            "share",
+            "worth",
+            "alternatives",
+            "source",
+        )
+    }
     assert (finding["effect"], finding["location"]) == ("creep", "stage:axis")
     assert finding["of"] is None and finding["parameters"]["tau"]["unit"] == "s"
     share, worth, rest = finding["share"], finding["worth"]["reading.axis"], result["attribution"]["rest"]

@@ -194,6 +194,15 @@ def test_what_is_left_is_said_by_its_kind(shares, said):
 
 
 def test_shares_are_shown_in_whole_per_cent_and_near_the_whole_in_tenths():
-    assert [per_cent(s) for s in (0.0, 0.123, 0.9951, 0.9999)] == ["0 %", "12 %", "99.5 %", "100 %"]
+    told = {
+        0.0: "0 %",
+        4e-4: "< 0.1 %",
+        0.004: "0.4 %",
+        0.123: "12 %",
+        0.9951: "99.5 %",
+        0.9999: "> 99.9 %",
+        1.0: "100 %",
+    }
+    assert {share: per_cent(share) for share in told} == told
     assert with_interval(Share(0.5, (0.4, 0.6))) == "50 % (40 ... 60 %)"
     assert with_interval(Share(1.0, (1.0, 1.0))) == "100 %"

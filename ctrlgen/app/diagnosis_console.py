@@ -30,18 +30,13 @@ def print_recording(recording: Recording) -> None:
 
 def print_diagnosis(diagnosis: Diagnosis) -> None:
     """The verdict, the findings and the held-out errors of a diagnosis."""
-    from ctrlgen.diagnosis.report.narrative import (
-        gathered,
-        hypothesis_name,
-        interval,
-        next_steps,
-        sentence,
-        share_text,
-    )
+    from ctrlgen.diagnosis.report.answer import answer
+    from ctrlgen.diagnosis.report.narrative import gathered, hypothesis_name, interval, next_steps, share_text
     from ctrlgen.diagnosis.report.shares_sentences import shares_sentences
     from ctrlgen.reporting.numbers import number
 
-    out.print(f"[bold]{escape(sentence(diagnosis))}[/bold]", soft_wrap=True)
+    for line in answer(diagnosis):
+        out.print(f"[bold]{escape(line)}[/bold]", soft_wrap=True)
     for line in shares_sentences(diagnosis):
         out.print(line, markup=False, soft_wrap=True)
     if diagnosis.findings:
@@ -53,10 +48,11 @@ def print_diagnosis(diagnosis: Diagnosis) -> None:
             ("estimate, 95 % interval", "left"),
         )
         for finding in diagnosis.findings:
-            rows = [(name, interval(e)) for name, e in finding.parameters.items()]
+            sets = (finding.parameters, *finding.terms)
+            rows = [(name, interval(e)) for numbers in sets for name, e in numbers.items()]
             alike = ", ".join(map(hypothesis_name, finding.alternatives))
             for k, (name, text) in enumerate(rows):
-                first = (finding.effect, finding.location, share_text(finding.share)) if k == 0 else ("",) * 3
+                first = (finding.effect, finding.location, share_text(finding)) if k == 0 else ("",) * 3
                 table.add_row(*first, name, text, escape(f"or {alike}") if alike and k == 0 else "")
         show_table(table)
     table = table_of(

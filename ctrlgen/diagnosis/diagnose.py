@@ -24,13 +24,12 @@ from ctrlgen.core.forks import usable_cores
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.evidence.supporting_analyses import run_supporting_analyses
-from ctrlgen.diagnosis.selection.attribution import attribute
-from ctrlgen.diagnosis.selection.candidate_model import SearchResult
 from ctrlgen.diagnosis.selection.dead_channels import without_dead_channels
 from ctrlgen.diagnosis.selection.direct_detection import directly_detected_findings
 from ctrlgen.diagnosis.selection.findings import findings, held_out_errors
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
+from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.selection.trials import FAILURES
 from ctrlgen.diagnosis.selection.verdict import Verdict, in_another_unit, verdict
 from ctrlgen.diagnosis.shares.empirical_terms import EmpiricalTerm, empirical_terms
@@ -101,7 +100,7 @@ def _diagnose(
     search = Searcher(fitter, Screen(fitter, suspected, seed), step, jobs).run(device)
     step("residual tests")
     tests = run_residual_tests(search.fitter, search.chosen.fit)
-    attribution = attribute(search.fitter, search.nominal, search.chosen, seed, jobs)
+    attribution = search.account
     detected = (*live.findings, *directly_detected_findings(search, effects))
     unit_is_wrong = in_another_unit(search)
     answer = verdict(search, tests, attribution, bool(detected), unit_is_wrong)

@@ -14,7 +14,7 @@ from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.diagnosis_record import Provenance, diagnosis_record
 from ctrlgen.diagnosis.report.html_report import page
 from ctrlgen.diagnosis.report.writeback import write_next
-from ctrlgen.diagnosis.selection.candidate_model import SearchResult
+from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.estimation.checkpoint import Checkpoint
 from ctrlgen.estimation.simulator import compiled_simulator
 from ctrlgen.model.assembly import build_model

@@ -19,8 +19,8 @@ from pydantic import Field
 
 from ctrlgen.core.parallel import Failure, run_all, sendable
 from ctrlgen.core.units import from_si
-from ctrlgen.diagnosis.selection.candidate_model import SearchResult
 from ctrlgen.diagnosis.selection.findings import Estimate
+from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.settings import BOOTSTRAP
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.structure import Structure

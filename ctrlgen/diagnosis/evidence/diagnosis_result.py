@@ -14,9 +14,9 @@ from ctrlgen.diagnosis.evidence.experiment_design import Experiment
 from ctrlgen.diagnosis.evidence.residual_location import ResidualLocations
 from ctrlgen.diagnosis.evidence.unmodelled_dynamics import UnmodelledForce
 from ctrlgen.diagnosis.selection.attribution import Attribution
-from ctrlgen.diagnosis.selection.candidate_model import SearchResult
-from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding, estimated_values
-from ctrlgen.diagnosis.selection.verdict import Verdict, unconfirmed
+from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding, Role, estimated_values
+from ctrlgen.diagnosis.selection.search_result import SearchResult
+from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.diagnosis.shares.empirical_terms import EmpiricalTerm
 from ctrlgen.diagnosis.shares.gather import ResidualShares
 from ctrlgen.estimation.fit import Fitter
@@ -69,7 +69,7 @@ class Diagnosis:
     @property
     def unconfirmed(self) -> tuple[Hypothesis, ...]:
         """Causes that the held-out records do not confirm."""
-        return unconfirmed(self.search)
+        return tuple(f.cause for f in self.findings if f.role is Role.UNSEEN)
 
     @cached_property
     def corrected(self) -> Device:

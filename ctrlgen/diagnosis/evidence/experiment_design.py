@@ -26,7 +26,7 @@ from pydantic import Field
 from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.evidence.drive_envelope import DriveEnvelope, fastest, free_drives, occupied_band
 from ctrlgen.diagnosis.evidence.excitation_signals import admissible, pose_sets, time_series
-from ctrlgen.diagnosis.selection.candidate_model import SearchResult
+from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.settings import EXPERIMENT
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.least_squares import initial_state_sd

@@ -14,11 +14,11 @@ from ctrlgen.diagnosis.evidence.detectability import DetectabilityEntry
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.evidence.experiment_design import NextExperimentEntry
 from ctrlgen.diagnosis.evidence.residual_location import ResidualLocations
-from ctrlgen.diagnosis.report.narrative import sentence
+from ctrlgen.diagnosis.report.answer import sentence
 from ctrlgen.diagnosis.report.shares_sentences import noise_of, shares_sentences
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.cause_entry import Cause
-from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, WorthEntry
+from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Role, WorthEntry
 from ctrlgen.diagnosis.selection.search_history import RoundEntry, search_history
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.diagnosis.shares.shares_record import FractionEntry, SharesEntry, table_record
@@ -43,17 +43,29 @@ class AttributionEntry(Keys):
 
     explained: Number = Field(description="Share of the mismatch that all findings take away, of energy.")
     rest: ShareEntry | None = Field(description="Share that is left; null where there is no mismatch to share.")
+    left: dict[str, Number] = Field(
+        description="Share of the mismatch of each channel that is left; channels that show none are left out."
+    )
     held_out: bool = Field(description="Whether the shares are of the held-out records, else of those to fit.")
 
 
 class FindingEntry(Cause):
     """One cause that the device file leaves out."""
 
+    role: Annotated[Role, WithJsonSchema({"enum": list(Role), "type": "string"})] = Field(
+        description="cause; minor: above the noise and below a hundredth of the mismatch; part: it takes away nothing itself, and the "
+        "cause that it serves needs it; unseen: only the records to fit can show it."
+    )
+    serves: Cause | None = Field(description="The cause that needs it, where its role is part.")
     share: ShareEntry | None = Field(
-        description="Share of the mismatch that it takes away: its Shapley value; null where it was read from the data."
+        description="Share of the mismatch that it takes away, from its Shapley value; null where it was read from the data, or may "
+        "be zero."
     )
     worth: dict[str, WorthEntry] = Field(description="What it is worth, by channel.")
     parameters: dict[str, EstimateEntry] = Field(description="Parameters of the effect, by name.")
+    terms: list[dict[str, EstimateEntry]] = Field(
+        description="Parameters of further terms of the same law at the same place, such as harmonics."
+    )
     alternatives: list[Cause] = Field(description="Other causes that explain the recording equally well in its place.")
     source: str = Field(description="Publication of the effect's law.")
 
@@ -124,7 +136,12 @@ def diagnosis_record(diagnosis: Diagnosis, provenance: Provenance) -> DiagnosisR
         verdict=d.verdict,
         sentence=sentence(d),
         findings=[FindingEntry.model_validate(f, from_attributes=True) for f in d.findings],
-        attribution=AttributionEntry.model_validate(d.attribution, from_attributes=True),
+        attribution=AttributionEntry(
+            explained=d.attribution.explained,
+            rest=d.attribution.rest,
+            left={channel: shares[-1] for channel, shares in d.attribution.channels.items()},
+            held_out=d.attribution.held_out,
+        ),
         shares=shares_record(d),
         empirical_terms=[
             EmpiricalTermEntry(

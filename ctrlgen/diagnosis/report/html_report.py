@@ -10,10 +10,11 @@ import numpy as np
 from ctrlgen.core.units import show
 from ctrlgen.devices.changed_numbers import written
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
+from ctrlgen.diagnosis.report.answer import answer
 from ctrlgen.diagnosis.report.diagnosis_record import Provenance, location_record, shares_record
 from ctrlgen.diagnosis.report.figures import draw_all
-from ctrlgen.diagnosis.report.narrative import gathered, hard, interval, next_steps, plain_name, sentence, share_text
-from ctrlgen.diagnosis.report.shares_sentences import family_shares, per_cent, shares_sentences
+from ctrlgen.diagnosis.report.narrative import gathered, hard, interval, next_steps, per_cent, plain_name, share_text
+from ctrlgen.diagnosis.report.shares_sentences import family_shares, shares_sentences
 from ctrlgen.diagnosis.selection.findings import Finding
 from ctrlgen.diagnosis.selection.search_history import search_history
 from ctrlgen.diagnosis.settings import SHARES
@@ -60,7 +61,7 @@ def page(diagnosis: Diagnosis, provenance: Provenance) -> str:
         device_title=diagnosis.device.title,
         counts=counts(diagnosis),
         held_out={channel: entry.as_json() for channel, entry in diagnosis.held_out.items()},
-        sentence=sentence(diagnosis),
+        answer=answer(diagnosis),
         findings=[_row(f) for f in diagnosis.findings],
         steps=next_steps(diagnosis),
         tested=_tested(diagnosis),
@@ -118,9 +119,9 @@ def _row(f: Finding) -> dict[str, Any]:
         "effect": f.effect,
         "location": f.location,
         "of": f.cause.of,
-        "numbers": [(name, interval(e)) for name, e in f.parameters.items()],
+        "numbers": [(name, interval(e)) for numbers in (f.parameters, *f.terms) for name, e in numbers.items()],
         "alternatives": [{"effect": h.effect, "location": h.location} for h in f.alternatives],
-        "share": share_text(f.share),
+        "share": share_text(f),
         "source": f.source,
     }
 

@@ -1,34 +1,28 @@
-"""The sentences of a diagnosis, for report.html, the console and the header of device.next.toml."""
+"""Names, numbers and next steps of a diagnosis in words, for report.html, the console and the header of device.next.toml."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
 
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.experiment_sentences import experiment_sentence
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
-from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding
-from ctrlgen.diagnosis.selection.verdict import Verdict, contradicts_datasheet, within_tolerance
+from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding, Role
+from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 from ctrlgen.reporting.numbers import number
 
-# findings that the first sentence names
+# refusals that are told
 NAMED = 3
+# per cent that are shown, next to none and to all
+SMALLEST = 0.1
 # a dimensionless number whose interval lies within this is shown in per cent
 WIDE = 1.0
 HARD_SPACE = "\u00a0"
 # share of its interval within which an estimate counts as on the interval's end
 EDGE = 1e-6
-HEADLINE = {
-    Verdict.EXPLAINED: "Explained",
-    Verdict.PARTLY: "Partly explained",
-    Verdict.AMBIGUOUS: "Ambiguous",
-    Verdict.UNEXPLAINED: "Unexplained",
-    Verdict.CONSISTENT: "Consistent",
-}
 
 
 def plain_name(effect: str) -> str:
@@ -92,107 +86,37 @@ def short(channel: str) -> str:
     return channel.removeprefix("reading.")
 
 
-def worst_channel(diagnosis: Diagnosis) -> str:
-    """The channel with the largest held-out error before the correction, relative to its noise; where the noise is not known,
-    relative to the error after the correction."""
-
-    def size(item: tuple[str, ChannelErrorEntry]) -> float:
-        e = item[1]
-        ratio = e.rms_before / (e.noise_floor or e.rms_after or 1.0)
-        return ratio if math.isfinite(ratio) else -1.0
-
-    return max(diagnosis.held_out.items(), key=size)[0]
-
-
-def numbers_of(finding: Finding) -> str:
-    """'gain = 4.12 % (3.93 ... 4.31 %), tau = ...'."""
-    return ", ".join(f"{name} = {interval(e)}" for name, e in finding.parameters.items())
-
-
-def named(findings: Sequence[Finding]) -> str:
-    """The first findings with parameters and shares; each effect is described where it is named first."""
-    parts, described = [], set()
-    for f in findings[:NAMED]:
-        cause = hypothesis_name(f.cause) if f.effect in described else cause_text(f)
-        described.add(f.effect)
-        share = f", {share_text(f.share)} of the mismatch" if f.share else ""
-        parts.append(f"{cause}, {numbers_of(f)}{share}")
-    more = [f"{len(findings) - NAMED} more"] if len(findings) > NAMED else []
-    return "; ".join(parts + more)
-
-
 def _within_a_sentence(text: str) -> str:
     first = text.split(" ")[0]
     return text if first[1:] != first[1:].lower() or "-" in first else text[0].lower() + text[1:]
 
 
-def sentence(diagnosis: Diagnosis) -> str:
-    """The answer: the main cause, its size and share, the others, what is left, and the held-out error of the worst channel."""
-    findings, verdict = diagnosis.findings, diagnosis.verdict
-    head, chosen = HEADLINE[verdict], diagnosis.search.chosen
-    far = contradicts_datasheet(chosen.fit)
-    if verdict == Verdict.CONSISTENT:
-        text = f"{head}: the device file ({diagnosis.device.title}) lacks nothing that this recording can show"
-        text += f"{_blind(diagnosis) or _within(diagnosis)}."
-    elif far and (diagnosis.residual_tests.passed or not findings):
-        text = f"{head}: {_beyond(diagnosis, far)}{f'; the model also needs {named(findings)}' if findings else ''}."
-    elif not findings:
-        text = f"{head}: the recording differs from {diagnosis.device.title}, and no known effect explains it."
-    elif verdict == Verdict.UNEXPLAINED:
-        text = f"{head}: no confirmed cause takes away most of the mismatch; the best are {named(findings)}{_rest(diagnosis)}."
-    else:
-        text = f"{head}: {named(findings)}{_rivals(diagnosis)}{_rest(diagnosis)}."
-    channel = worst_channel(diagnosis)
-    return f"{text} {channel_sentence(channel, diagnosis.held_out[channel])}"
+def share_text(finding: Finding) -> str:
+    """'82 % (75 ... 88 %)', or why there is none."""
+    if finding.role is Role.PART and finding.serves is not None:
+        return f"part of {hypothesis_name(finding.serves)}"
+    if finding.role is Role.UNSEEN:
+        return "not seen in the held-out records"
+    if finding.share is None:
+        return "< 1 %" if finding.role is Role.MINOR else "-"
+    return with_ends(finding.share)
 
 
-def share_text(share: ShareEntry | None) -> str:
-    """'82 % (75 ... 88 %)'; a dash for a cause that was read from the data."""
-    if share is None:
-        return "-"
-    value, low, high = (round(100 * v) for v in (share.value, *share.ci95))
-    return f"{value} %" if low == high else f"{value} % ({low} ... {high} %)"
+def with_ends(share: ShareEntry) -> str:
+    """'82 % (75 ... 88 %)'; without the interval where its ends show as the share itself."""
+    value, low, high = (per_cent(v) for v in (share.value, *share.ci95))
+    return value if value == low == high else f"{value} ({low.removesuffix(' %')} ... {high})"
 
 
-def _rest(diagnosis: Diagnosis) -> str:
-    """'; 12 % (9 ... 15 %) of the mismatch is left', where more than noise is left."""
-    rest = diagnosis.attribution.rest
-    if rest is None or diagnosis.residual_tests.passed:
-        return ""
-    return f"; {share_text(rest)} of the mismatch is left{_within(diagnosis)}"
-
-
-def _within(diagnosis: Diagnosis) -> str:
-    """', within the stated tolerance', where that and not the noise is why nothing more is asked."""
-    tolerated = within_tolerance(diagnosis.search) and not diagnosis.residual_tests.passed
-    return ", within the stated tolerance" if tolerated else ""
-
-
-def _blind(diagnosis: Diagnosis) -> str:
-    """'; errors below 3.6 um cannot be judged', for the channels whose noise is not known."""
-    sizes = [f"{number(e.rms_after, 3)} {e.unit}" for e in diagnosis.held_out.values() if e.noise_floor is None]
-    return f"; the noise is not known, so errors below {', '.join(sizes)} cannot be judged" if sizes else ""
-
-
-def _beyond(diagnosis: Diagnosis, far: dict[str, float]) -> str:
-    """The parameters that contradict the device file, with their deviation in stated standard deviations."""
-    numbers = ", ".join(
-        f"{path} = {number(e.value)} {e.unit} ({z:+.0f} stated standard deviations)"
-        for path, z in far.items()
-        for e in [diagnosis.values[path]]
-    )
-    return (
-        f"the recording agrees with {diagnosis.device.title} only with parameters that contradict its file: {numbers}; "
-        "check the units, sign and gain of the recorded columns"
-    )
-
-
-def _rivals(diagnosis: Diagnosis) -> str:
-    """'; this recording cannot tell it from thermal_lag at actuator:axis', for an ambiguous verdict."""
-    others = dict.fromkeys(hypothesis_name(h) for f in diagnosis.findings for h in f.alternatives)
-    if diagnosis.verdict != Verdict.AMBIGUOUS or not others:
-        return ""
-    return f"; this recording cannot tell it from {' or '.join(others)}"
+def per_cent(share: float) -> str:
+    """'85 %'; '99.4 %' near the whole, '0.4 %' near nothing."""
+    value = 100 * share
+    if 0 < value < SMALLEST:
+        return f"< {SMALLEST} %"
+    if 100 - SMALLEST < value < 100:
+        return f"> {100 - SMALLEST} %"
+    coarse = value == 0 or 1 <= abs(value) <= 99 or abs(value) >= 100
+    return f"{value:.0f} %" if coarse else f"{value:.1f} %"
 
 
 def next_steps(diagnosis: Diagnosis) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import Enum
 
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
-from ctrlgen.diagnosis.report.narrative import empirical_sentences, short
+from ctrlgen.diagnosis.report.narrative import empirical_sentences, per_cent, short
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.diagnosis.settings import SHARES
 from ctrlgen.diagnosis.shares.design import Kind
@@ -111,6 +111,19 @@ def rest_sentence(c: ChannelShares) -> str:
     )
 
 
+def rest_kind(diagnosis: Diagnosis, channel: str) -> str:
+    """', mostly a function of the history of travel (64 %)' of what is left in a channel; nothing where no table tells it."""
+    shares = diagnosis.shares
+    c = next((c for c in shares.after.channels if c.channel == channel), None) if shares is not None else None
+    if c is None:
+        return ""
+    part, share = next(iter(named_parts(c)), (None, 0.0))
+    if part is None or share <= c.rest_own_past:
+        return ", mostly a function of none of the signals looked at"
+    function = "" if part in NO_FUNCTION else "a function of "
+    return f", {_mostly(share)} {function}{part_name(c, part)} ({per_cent(share)})"
+
+
 def named_parts(c: ChannelShares) -> list[tuple[Kind | Beside, float]]:
     """What a residual is a function of with the share that each adds, the largest first; those below `SHARES.told` left out."""
     parts: list[tuple[Kind | Beside, float]] = [(Beside.CONSTANT, c.constant), (Beside.NUMBERS, c.numbers)]
@@ -123,12 +136,6 @@ def part_name(c: ChannelShares, part: Kind | Beside) -> str:
     if part is Kind.LINE:
         return f"a line of {number(1 / c.periods[part], 3)} Hz"
     return NAMES.get(part, part.value)
-
-
-def per_cent(share: float) -> str:
-    """'85 %'; '99.4 %' near the whole."""
-    value = 100 * share
-    return f"{value:.0f} %" if abs(value) < 99 or round(value, 1) == 100 else f"{value:.1f} %"
 
 
 def with_interval(share: Share) -> str:

@@ -21,6 +21,7 @@ from ctrlgen.core.files import read_text, write_text
 from ctrlgen.core.units import from_si, to_si
 from ctrlgen.devices.python_file import as_toml
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
+from ctrlgen.diagnosis.report.answer import sentence
 from ctrlgen.diagnosis.report.narrative import (
     BETTER,
     HARD_SPACE,
@@ -29,7 +30,6 @@ from ctrlgen.diagnosis.report.narrative import (
     empirical_sentences,
     hard,
     predicts_better,
-    sentence,
 )
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.estimation.free_parameters import FreeParameter

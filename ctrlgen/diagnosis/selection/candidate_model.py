@@ -1,4 +1,4 @@
-"""Records of the search: candidate models with what they leave, rounds, and the result."""
+"""Records of the search: candidate models with what they leave, and rounds."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.estimation.error_model import ErrorModel
-from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.misfit import Misfit
 
@@ -60,25 +60,6 @@ class Round:
     criterion_before: float
     refused: tuple[Refusal, ...] = ()
     failed: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class SearchResult:
-    """The result of a search.
-
-    fitter: with the noise and the discrepancy learnt. nominal: the device as described, refitted within its stated
-    uncertainty. chosen: the selected model. without_cause: the chosen model without each of its causes. rivals: for each
-    cause, models with another cause in its place that explain the recording equally well. rounds: in order. final_screen: the
-    screen of the chosen model.
-    """
-
-    fitter: Fitter
-    nominal: CandidateModel
-    chosen: CandidateModel
-    without_cause: tuple[CandidateModel, ...]
-    rivals: tuple[tuple[CandidateModel, ...], ...]
-    rounds: tuple[Round, ...]
-    final_screen: Screened
 
 
 def linearised_optimum(fit: Fit) -> float:

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ctrlgen.core.units import from_si
-from ctrlgen.diagnosis.selection.candidate_model import SearchResult
 from ctrlgen.diagnosis.selection.findings import Estimate, Finding
+from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.settings import DIRECT_DETECTION
 from ctrlgen.effects import Channel, Effect, Place
 from ctrlgen.estimation.hypothesis import DOMAIN, Hypothesis, nominal_physics, selected_laws

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 from pydantic import Field
 
 from ctrlgen.core.units import difference, from_si
-from ctrlgen.diagnosis.selection.attribution import Attribution, ShareEntry
-from ctrlgen.diagnosis.selection.candidate_model import SearchResult
+from ctrlgen.diagnosis.selection.attribution import Attribution, ShareEntry, one_finding
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
+from ctrlgen.diagnosis.selection.search_result import SearchResult
+from ctrlgen.diagnosis.selection.verdict import unconfirmed
+from ctrlgen.diagnosis.settings import ATTRIBUTION
 from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 from ctrlgen.estimation.prediction_uncertainty import prediction_uncertainty
@@ -28,12 +32,24 @@ class Estimate:
     unit: str
 
 
+class Role(StrEnum):
+    """What a law of the accepted model is to the reader."""
+
+    CAUSE = "cause"
+    MINOR = "minor"
+    PART = "part"
+    UNSEEN = "unseen"
+
+
 class WorthEntry(Keys):
     """What a cause is worth in one channel, root mean square on the held-out records."""
 
     without: FiniteOrNull = Field(description="Error without the cause, the others refitted [unit].")
     with_it: FiniteOrNull = Field(description="Error with it [unit].")
     unit: str = Field(description="Unit of both.")
+    share: Number = Field(
+        description="Share of the channel's mismatch that it takes away; null where the channel shows none, or the share may be zero."
+    )
 
 
 @dataclass(frozen=True)
@@ -41,8 +57,10 @@ class Finding:
     """One cause that the device file leaves out.
 
     alternatives: other causes that explain the recording equally well in its place. share: of the mismatch, of energy, None
-    where it was read from the data. worth: by channel the held-out error without the cause and with it. source: publication
-    of the effect's law. cause: the hypothesis.
+    where it was read from the data or may be zero. worth: by channel the held-out error without the cause and with it. source:
+    publication of the effect's law. cause: the hypothesis. terms: numbers of further terms of the same law at the same place, such
+    as harmonics. role: a `cause`; `minor`: above the noise and below a hundredth of the mismatch; `part`: it takes away nothing
+    itself, and the finding `serves` needs it; `unseen`: only the records to fit can show it.
     """
 
     effect: str
@@ -53,6 +71,9 @@ class Finding:
     worth: dict[str, WorthEntry]
     source: str
     cause: Hypothesis
+    terms: tuple[dict[str, Estimate], ...] = ()
+    role: Role = Role.CAUSE
+    serves: Hypothesis | None = None
 
     @property
     def of(self) -> str | None:
@@ -113,34 +134,80 @@ def estimated_values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, 
 
 
 def findings(search: SearchResult, shares: Attribution, profiles: tuple[Profile, ...] = ()) -> tuple[Finding, ...]:
-    """The causes of the chosen model with intervals, shares and alternatives, that with the largest share first."""
-    fit, rows = search.chosen.fit, []
-    estimates = estimated_values(fit, profiles)
-    for k, cause in enumerate(fit.structure.causes):
-        number = cause.path.rpartition(".")[2]
-        parameters = {
-            number if cause.effect == PARAMETER else unknown.name: estimates[unknown.path]
-            for unknown in fit.structure.free_parameters
-            if unknown.cause == k
-        }
-        for p in () if cause.effect == PARAMETER else cause.law.params:
-            if fixed := cause.prior.of(p).fixed_range:
-                middle = sum(fixed) / 2
-                parameters[p.name] = Estimate(middle, (middle, middle), p.unit)
-        rivals = tuple(t.cause for t in search.rivals[k] if t.cause)
-        source = "parameter of the device file" if cause.effect == PARAMETER else cause.law.source
-        worth = _worth(search, k)
-        rows.append(Finding(cause.effect, cause.location, parameters, rivals, shares.shares[k], worth, source, cause))
-    return tuple(sorted(rows, key=lambda f: -(f.share.value if f.share else 0.0)))
+    """The causes of the chosen model with intervals, shares and alternatives, that with the largest share first.
+
+    Causes of one law at one place, such as harmonics, are one finding, with the numbers of the largest first.
+    """
+    causes = search.chosen.causes
+    estimates = estimated_values(search.chosen.fit, profiles)
+    unseen = set(unconfirmed(search))
+    groups: dict[tuple[str | None, ...], list[int]] = {}
+    for k, cause in enumerate(causes):
+        groups.setdefault(one_finding(cause), []).append(k)
+    rows = []
+    for members in groups.values():
+        first, *others = sorted(members, key=lambda k: -_held_out_energy(search.without_cause[k]))
+        cause, share = causes[first], shares.shares[first]
+        served = shares.serves[first] if shares.serves else None
+        role = _role(share, cause in unseen, shares.rest is None, served is not None)
+        rivals = dict.fromkeys(t.cause for k in members for t in search.rivals[k] if t.cause)
+        rows.append(
+            Finding(
+                cause.effect,
+                cause.location,
+                _numbers_of(search, first, estimates),
+                tuple(rivals),
+                share,
+                _worth(search, first, shares),
+                "parameter of the device file" if cause.effect == PARAMETER else cause.law.source,
+                cause,
+                tuple(_numbers_of(search, k, estimates) for k in others),
+                role,
+                causes[served] if role is Role.PART and served is not None else None,
+            )
+        )
+    return tuple(sorted(rows, key=lambda f: (f.role is not Role.CAUSE, -(f.share.value if f.share else 0.0))))
 
 
-def _worth(search: SearchResult, k: int) -> dict[str, WorthEntry]:
-    """The held-out error without cause k, the others refitted, and with it, of each channel."""
+def _role(share: ShareEntry | None, unseen: bool, nothing_to_share: bool, is_served: bool) -> Role:
+    if unseen:
+        return Role.UNSEEN
+    if share is None:
+        return Role.CAUSE if nothing_to_share else Role.PART if is_served else Role.MINOR
+    return Role.CAUSE if share.value >= ATTRIBUTION.least_share else Role.MINOR
+
+
+def _held_out_energy(candidate: CandidateModel) -> float:
+    return float(candidate.held_out.plain.sum())
+
+
+def _numbers_of(search: SearchResult, k: int, estimates: dict[str, Estimate]) -> dict[str, Estimate]:
+    """The numbers of cause k by name."""
+    fit = search.chosen.fit
+    cause = fit.structure.causes[k]
+    number = cause.path.rpartition(".")[2]
+    parameters = {
+        number if cause.effect == PARAMETER else unknown.name: estimates[unknown.path]
+        for unknown in fit.structure.free_parameters
+        if unknown.cause == k
+    }
+    for p in () if cause.effect == PARAMETER else cause.law.params:
+        if fixed := cause.prior.of(p).fixed_range:
+            middle = sum(fixed) / 2
+            parameters[p.name] = Estimate(middle, (middle, middle), p.unit)
+    return parameters
+
+
+def _worth(search: SearchResult, k: int, shares: Attribution) -> dict[str, WorthEntry]:
+    """The held-out error without cause k, the others refitted, and with it, of each channel, and its share there."""
     recording, floor = search.fitter.recording, search.fitter.noise.floor
     without, with_it = (np.sqrt(t.held_out.plain_mean) * floor for t in (search.without_cause[k], search.chosen))
     return {
         channel: WorthEntry(
-            without=float(a) * difference(1.0, unit), with_it=float(b) * difference(1.0, unit), unit=unit
+            without=float(a) * difference(1.0, unit),
+            with_it=float(b) * difference(1.0, unit),
+            unit=unit,
+            share=shares.channels[channel][k] if channel in shares.channels and shares.shares[k] else None,
         )
         for channel, unit, a, b in zip(recording.channels, recording.units, without, with_it, strict=True)
     }

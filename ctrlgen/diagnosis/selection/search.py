@@ -14,13 +14,15 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, SearchResult
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round
 from ctrlgen.diagnosis.selection.candidates import fit_candidates, restart_elsewhere
 from ctrlgen.diagnosis.selection.confusable import explains_alike
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.pruning import all_pruned, without_needless
 from ctrlgen.diagnosis.selection.rivals import rivals, simplified, swapped
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
+from ctrlgen.diagnosis.selection.search_result import SearchResult
+from ctrlgen.diagnosis.selection.supported import supported
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import SEARCH
 from ctrlgen.estimation.fit import Fitter
@@ -55,10 +57,12 @@ class Searcher:
         current = simplified(trials, self._settled(current))
         # its numbers are not bent by the errors of a better model
         nominal = scored(trials.fitter, trials.fitter.described(device)[1])
+        current, account = supported(trials, nominal, current, trials.screen.seed)
         each = range(len(current.causes))
         bare = tuple(trials.each(lambda branch, k: _without(branch, current, k, nominal), each))
         alike = tuple(trials.each(lambda branch, k: rivals(branch, current, k, rounds), each))
-        return SearchResult(trials.fitter, nominal, current, bare, alike, tuple(rounds), trials.screened(current))
+        screened = trials.screened(current)
+        return SearchResult(trials.fitter, nominal, current, account, bare, alike, tuple(rounds), screened)
 
     def _settled(self, current: CandidateModel) -> CandidateModel:
         """The same model fitted to its end under its own errors, without the causes that it then does not need."""

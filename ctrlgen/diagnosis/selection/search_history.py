@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
-from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, SearchResult
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round
 from ctrlgen.diagnosis.selection.cause_entry import EffectAt
+from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.reporting.result_file import FiniteOrNull, Keys, Number
 
 

@@ -8,8 +8,8 @@ import numpy as np
 from scipy import stats
 
 from ctrlgen.diagnosis.selection.attribution import Attribution
-from ctrlgen.diagnosis.selection.candidate_model import SearchResult
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection
+from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, VERDICT
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
@@ -101,7 +101,7 @@ def main_rivals(search: SearchResult, shares: Attribution) -> bool:
     exact = search.chosen.errors.is_noise
     return any(
         any(exact or not _one_family(cause, r.cause) for r in rivals)
-        and (share is None or share.value >= VERDICT.main_share * largest)
+        and (shares.rest is None or (share is not None and share.value >= VERDICT.main_share * largest))
         for cause, rivals, share in zip(search.chosen.causes, search.rivals, shares.shares, strict=True)
     )
 
@@ -120,15 +120,25 @@ def contradicts_datasheet(fit: Fit) -> dict[str, float]:
     Empty where a chi-square test does not reject the stated uncertainty; else the parameters that deviate by more than
     `VERDICT.named_deviation`, or the one that deviates most.
     """
-    off = {
-        u.path: float((value - u.nominal) / u.sd)
-        for u, value in zip(fit.structure.free_parameters, fit.theta, strict=True)
-        if u.sd
-    }
+    off = _deviations(fit)
     if not off or stats.chi2.sf(sum(z * z for z in off.values()), len(off)) > VERDICT.impossible_p:
         return {}
     least = min(VERDICT.named_deviation, max(map(abs, off.values())))
     return {path: z for path, z in off.items() if abs(z) >= least}
+
+
+def moved_numbers(fit: Fit) -> dict[str, float]:
+    """Deviations of the device's numbers that lie at least `VERDICT.far` stated standard deviations from the file, by path."""
+    return {path: z for path, z in _deviations(fit).items() if abs(z) >= VERDICT.far}
+
+
+def _deviations(fit: Fit) -> dict[str, float]:
+    """Deviations of the device's uncertain numbers from the file, in stated standard deviations, by path."""
+    return {
+        u.path: float((value - u.nominal) / u.sd)
+        for u, value in zip(fit.structure.free_parameters, fit.theta, strict=True)
+        if u.sd
+    }
 
 
 def unconfirmed(search: SearchResult) -> tuple[Hypothesis, ...]:

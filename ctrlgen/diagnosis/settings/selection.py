@@ -228,14 +228,15 @@ class AttributionSettings:
     diverge."""
     steps: int = 4
     """Levenberg-Marquardt steps of an incomplete model from the numbers of the complete one. Judgement."""
-    hidden: float = 0.5
-    """Energy that the model leaves, over that of the device as described, from which on the numbers of that device hide the mismatch,
-    if it leaves less than this share of what it leaves with the model's numbers: then the mismatch is that. Judgement."""
     hardly_known: float = 0.25
     """Stated standard deviation of a number of the device, over the number, from which on it is adapted to incomplete models, as
     it was to the chosen one. Judgement."""
     fixed: float = 1e-9
     """Range, over its typical size, of a number that stays as it is: rounding."""
+    least_share: float = 0.01
+    """Share of the mismatch below which nothing is called a cause: a tenth of the error. Judgement."""
+    vague_share: float = 0.1
+    """The same of a cause whose amplitude may be zero. Judgement."""
 
 
 @dataclass(frozen=True)
@@ -255,6 +256,9 @@ class VerdictSettings:
     """p of the device's stated numbers so far off by chance, below which they contradict the data sheet."""
     named_deviation: float = 2.0
     """Stated standard deviations from which on such a number is named."""
+    far: float = 4.0
+    """Stated standard deviations from which on a moved number of the device stands in the answer: chance moves one so far once in
+    16,000."""
 
 
 SCREEN = ScreenSettings()

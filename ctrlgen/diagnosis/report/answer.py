@@ -1,0 +1,177 @@
+"""The answer of a diagnosis in three sentences at most: the main cause, the held-out error, what is left and of what kind it is.
+
+Every number is one of a table: shares are of the error that the table calls before, in the channel or in all, and the largest
+error that is left stands beside its noise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
+from ctrlgen.diagnosis.report.narrative import (
+    cause_text,
+    channel_sentence,
+    hypothesis_name,
+    interval,
+    per_cent,
+    short,
+    with_ends,
+)
+from ctrlgen.diagnosis.report.shares_sentences import rest_kind
+from ctrlgen.diagnosis.selection.attribution import ShareEntry
+from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding, Role
+from ctrlgen.diagnosis.selection.verdict import (
+    Verdict,
+    contradicts_datasheet,
+    moved_numbers,
+    poorly_determined,
+    within_tolerance,
+)
+from ctrlgen.estimation.hypothesis import PARAMETER
+from ctrlgen.reporting.numbers import number
+
+HEADLINE = {
+    Verdict.EXPLAINED: "Explained",
+    Verdict.PARTLY: "Partly explained",
+    Verdict.AMBIGUOUS: "Ambiguous",
+    Verdict.UNEXPLAINED: "Unexplained",
+    Verdict.CONSISTENT: "Consistent",
+}
+# further findings, and numbers of the main one, that the first sentence holds
+BESIDE, NUMBERS = 2, 2
+
+
+def sentence(diagnosis: Diagnosis) -> str:
+    """The whole answer."""
+    return " ".join(answer(diagnosis))
+
+
+def answer(diagnosis: Diagnosis) -> list[str]:
+    """The answer sentence by sentence: cause, size, share; held-out error of the channel that was worst; what is left."""
+    channel = worst_channel(diagnosis)
+    return [_cause(diagnosis), channel_sentence(channel, diagnosis.held_out[channel]), *_left(diagnosis)]
+
+
+def worst_channel(diagnosis: Diagnosis) -> str:
+    """The channel with the largest held-out error before the correction, relative to its noise; where the noise is not known,
+    relative to the error after the correction."""
+
+    def size(item: tuple[str, ChannelErrorEntry]) -> float:
+        e = item[1]
+        ratio = e.rms_before / (e.noise_floor or e.rms_after or 1.0)
+        return ratio if math.isfinite(ratio) else -1.0
+
+    return max(diagnosis.held_out.items(), key=size)[0]
+
+
+def _cause(diagnosis: Diagnosis) -> str:
+    """What is left out: the main cause with its size and share, and what stands beside it."""
+    findings, verdict = diagnosis.findings, diagnosis.verdict
+    head, title = HEADLINE[verdict], diagnosis.device.title
+    far = contradicts_datasheet(diagnosis.search.chosen.fit)
+    if verdict == Verdict.CONSISTENT:
+        lacks = f"{head}: the device file ({title}) lacks nothing that this recording can show"
+        return f"{lacks}{_blind(diagnosis) or _within(diagnosis)}."
+    if far and (diagnosis.residual_tests.passed or not findings):
+        also = f"; the model also needs {_main(findings)}" if findings else ""
+        return f"{head}: {_beyond(diagnosis, far)}{also}."
+    if not findings:
+        return f"{head}: the recording differs from {title}, and no known effect explains it."
+    best = "no confirmed cause takes away most of the error; the best is " if verdict == Verdict.UNEXPLAINED else ""
+    return f"{head}: {best}{_main(findings)}{_rivals(diagnosis)}."
+
+
+def _main(findings: Sequence[Finding]) -> str:
+    """The main cause with its first numbers and its share; the names of the others with theirs."""
+    main, *others = findings
+    numbers = ", ".join(f"{name} = {interval(e)}" for name, e in _first_numbers(main).items())
+    share = f"; it takes away {_share(main.share)}" if main.share else ""
+    causes = [f for f in others if f.role is Role.CAUSE]
+    names = [f"{hypothesis_name(f.cause)}{f' ({per_cent(f.share.value)})' if f.share else ''}" for f in causes[:BESIDE]]
+    more = len(others) - len(names)
+    names += [f"{more} more in the table"] if more else []
+    return f"{cause_text(main)}, {numbers}{share}{', beside ' + ' and '.join(names) if names else ''}"
+
+
+def _share(share: ShareEntry) -> str:
+    """'82 % (75 ... 88 %) of the error'."""
+    return "all of the error beyond the noise" if share.value >= 1 else f"{with_ends(share)} of the error"
+
+
+def _first_numbers(finding: Finding) -> dict[str, Estimate]:
+    """The amplitude of a finding and the numbers after it, as many as the sentence holds."""
+    if finding.effect == PARAMETER:
+        return finding.parameters
+    amplitude = finding.cause.law.amplitude().name
+    first = sorted(finding.parameters, key=lambda name: name != amplitude)[:NUMBERS]
+    return {name: finding.parameters[name] for name in first}
+
+
+def _rivals(diagnosis: Diagnosis) -> str:
+    """'; this recording cannot tell it from thermal_lag at actuator:axis', for an ambiguous verdict."""
+    others = dict.fromkeys(hypothesis_name(h) for f in diagnosis.findings for h in f.alternatives)
+    if diagnosis.verdict != Verdict.AMBIGUOUS or not others:
+        return ""
+    return f"; this recording cannot tell it from {' or '.join(others)}"
+
+
+def _left(diagnosis: Diagnosis) -> list[str]:
+    """What is left where it is more than noise, why the answer is partial where it is not, and numbers that moved far."""
+    if diagnosis.verdict == Verdict.CONSISTENT:
+        return []
+    fit = diagnosis.search.chosen.fit
+    moved = "" if contradicts_datasheet(fit) and diagnosis.residual_tests.passed else _moved(diagnosis)
+    text = _rest(diagnosis) if diagnosis.findings else ""
+    return [" ".join(part for part in (text, moved) if part)] if text or moved else []
+
+
+def _rest(diagnosis: Diagnosis) -> str:
+    """'Left: 4.9 urad in theta_z, 1.4 times the noise, mostly a function of position.'"""
+    if any(e.noise_floor is None for e in diagnosis.held_out.values()):
+        return "Whether more is left cannot be said: the noise is not known."
+    if diagnosis.residual_tests.passed:
+        if diagnosis.unconfirmed:
+            return f"No held-out record shows {' or '.join(map(hypothesis_name, diagnosis.unconfirmed))}."
+        loose = diagnosis.verdict == Verdict.PARTLY and poorly_determined(diagnosis.search)
+        return "The numbers are too uncertain to predict the held-out records better." if loose else ""
+    channel, e = max(diagnosis.held_out.items(), key=lambda item: item[1].rms_after / (item[1].noise_floor or 1.0))
+    size = f"{number(e.rms_after, 3)} {e.unit} in {short(channel)}, {number(e.rms_after / (e.noise_floor or 1.0), 2)} times the noise"
+    return f"Left: {size}{rest_kind(diagnosis, channel)}{_within(diagnosis)}."
+
+
+def _moved(diagnosis: Diagnosis) -> str:
+    """The numbers of the device that the fit moved far, in stated standard deviations."""
+    moved = moved_numbers(diagnosis.search.chosen.fit)
+    if not moved:
+        return ""
+    return f"The fit moves {_numbers(diagnosis, moved)}."
+
+
+def _numbers(diagnosis: Diagnosis, deviations: dict[str, float]) -> str:
+    return ", ".join(
+        f"{path} to {number(e.value)} {e.unit} ({z:+.0f} stated standard deviations)"
+        for path, z in deviations.items()
+        for e in [diagnosis.values[path]]
+    )
+
+
+def _within(diagnosis: Diagnosis) -> str:
+    """', within the stated tolerance', where that and not the noise is why nothing more is asked."""
+    tolerated = within_tolerance(diagnosis.search) and not diagnosis.residual_tests.passed
+    return ", within the stated tolerance" if tolerated else ""
+
+
+def _blind(diagnosis: Diagnosis) -> str:
+    """'; errors below 3.6 um cannot be judged', for the channels whose noise is not known."""
+    sizes = [f"{number(e.rms_after, 3)} {e.unit}" for e in diagnosis.held_out.values() if e.noise_floor is None]
+    return f"; the noise is not known, so errors below {', '.join(sizes)} cannot be judged" if sizes else ""
+
+
+def _beyond(diagnosis: Diagnosis, far: dict[str, float]) -> str:
+    """The parameters that contradict the device file, with their deviation in stated standard deviations."""
+    return (
+        f"the recording agrees with {diagnosis.device.title} only with parameters that contradict its file, which moves "
+        f"{_numbers(diagnosis, far)}; check the units, sign and gain of the recorded columns"
+    )

@@ -1,0 +1,30 @@
+"""The result of a search."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ctrlgen.diagnosis.selection.attribution import Attribution
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round
+from ctrlgen.diagnosis.selection.screen import Screened
+from ctrlgen.estimation.fit import Fitter
+
+
+@dataclass(frozen=True, eq=False)
+class SearchResult:
+    """The result of a search.
+
+    fitter: with the noise and the discrepancy learnt. nominal: the device as described, refitted within its stated uncertainty.
+    chosen: the selected model. account: what each of its causes takes away of what `nominal` leaves. without_cause: the chosen
+    model without each of its causes. rivals: for each cause, models with another cause in its place that explain the recording
+    equally well. rounds: in order. final_screen: the screen of the chosen model.
+    """
+
+    fitter: Fitter
+    nominal: CandidateModel
+    chosen: CandidateModel
+    account: Attribution
+    without_cause: tuple[CandidateModel, ...]
+    rivals: tuple[tuple[CandidateModel, ...], ...]
+    rounds: tuple[Round, ...]
+    final_screen: Screened
