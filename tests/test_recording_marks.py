@@ -20,13 +20,13 @@ def test_missing_samples_are_marked_and_not_filled(tmp_path, model):
 
 def test_a_gap_cuts_a_record_where_the_drive_is_not_known(tmp_path, model):
     kept = np.r_[0:150, 200:N]
-    recording = load_recordings([two(tmp_path, {k: v[kept] for k, v in samples().items()})], model)
+    recording = load_recordings([two(tmp_path, {k: v[kept] for k, v in samples().items()}, gap="split")], model)
     first, second = recording.records[:2]
     assert len(first.time) == 150 and len(second.time) == 200 and second.time[0] == pytest.approx(0.2)
     assert first.valid.all() and second.valid.all() and "cut before 0.2 s" in recording.notes[0]
     lost = samples()
     lost["u2X"][150:200] = np.nan
-    again = load_recordings([two(tmp_path, lost)], model).records[:2]
+    again = load_recordings([two(tmp_path, lost, gap="split")], model).records[:2]
     assert [len(r.time) for r in again] == [150, 200] and np.array_equal(again[1].drive, second.drive)
 
 

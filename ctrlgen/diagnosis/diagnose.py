@@ -1,7 +1,8 @@
 """The steps of a diagnosis in their order, from a validated recording to the answer.
 
 1. Channels that read one constant value are taken out (`selection.dead_channels`).
-2. The noise of every channel is estimated (`estimation.noise`), and isolated outliers are marked (`isolated_outliers`).
+2. The noise of every channel is estimated (`estimation.noise`), and isolated outliers are marked (`isolated_outliers`); the search
+   marks them again against each model that it accepts.
 3. The device as described is refitted within its stated uncertainty (`estimation.fit`).
 4. Hypotheses are listed: every effect at every location, every parameter of the device (`estimation.hypothesis`).
 5. The search screens them, fits candidate models and selects among them on held-out data (`selection.screen`, `search`).
@@ -45,7 +46,7 @@ from ctrlgen.estimation.profile_likelihood import profiles
 from ctrlgen.estimation.residual_tests import run_residual_tests
 from ctrlgen.estimation.settings import NOISE_UPDATE, SIMULATION
 from ctrlgen.estimation.simulator import compiled_simulator
-from ctrlgen.estimation.spikes import Spikes, find_spikes
+from ctrlgen.estimation.spikes import find_spikes, marking_notes
 from ctrlgen.model.assembly import build_model, movable
 from ctrlgen.model.discretisation import settling_time
 from ctrlgen.recordings.recording import Recording
@@ -111,7 +112,8 @@ def _diagnose(
     enough = unit_is_wrong or answer in (Verdict.CONSISTENT, Verdict.EXPLAINED)
     left, failed = ((), ()) if enough else _empirical_terms(search, shares)
     spikes = find_spikes(search.fitter, search.chosen.fit, known)
-    notes = (*_notes(search, live.notes, spikes, tests.restless, laws, effects), *analyses.failed, *failed)
+    told = (*marking_notes(live.recording, search.fitter.recording), *(s.sentence for s in spikes))
+    notes = (*_notes(search, live.notes, told, tests.restless, laws, effects), *analyses.failed, *failed)
     return Diagnosis(
         verdict=answer,
         findings=(*findings(search, attribution, likelihoods), *detected),
@@ -177,7 +179,7 @@ def _without_outliers(device: Device, fitter: Fitter) -> Fitter:
 def _notes(
     search: SearchResult,
     live: Sequence[str],
-    spikes: Sequence[Spikes],
+    marks: Sequence[str],
     restless: Sequence[str],
     laws: Sequence[str] | None,
     effects: Sequence[type[Effect]],
@@ -188,7 +190,7 @@ def _notes(
         *search.fitter.recording.notes,
         *live,
         *search.fitter.noise.notes,
-        *(s.sentence for s in spikes),
+        *marks,
         *map(RESTLESS.format, restless),
         *([] if laws is None else [RESTRICTED.format(", ".join(law.kind for law in effects) or "none")]),
         *(f"could not be tried: {text}" for text in failed),

@@ -202,9 +202,9 @@ class Fitter:
         if self.checkpoint is None:
             return _fit_at(problem, levenberg_marquardt(problem, problem.to_scaled(start), steps))
         s, noise, corner = problem.structure, self.error.weighted, self.error.corner
-        valid = [int(r.valid.sum()) for r in self.recording.records]
+        valid = [r.valid for r in self.recording.records]
         begun = (s.starts, s.expanded_at, sorted(s.nominal_starts.items()), s.free)
-        key = key_of(s.causes, *begun, start, steps, noise.sd, corner, *noise.ar, valid)
+        key = key_of(s.causes, *begun, start, steps, noise.sd, corner, *noise.ar, *valid)
         optimum = self.checkpoint.recall(key)
         if optimum is None:
             optimum = levenberg_marquardt(problem, problem.to_scaled(start), steps)

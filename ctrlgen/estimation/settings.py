@@ -125,15 +125,58 @@ class OutlierSettings:
     """Samples over which the local deviation is taken: its median is known to 17 %."""
     largest_share: float = 0.01
     """Share of a channel's samples; where more stand out, they are no isolated faults and all are kept. Judgement."""
+    largest_share_again: float = 0.03
+    """The same against a model that was accepted, which leaves less that could be taken for one. Beyond, every third median of the
+    samples around would hold another one. Judgement."""
+    explained: float = 4.0
+    """Standard deviations of the noise up to which a reading that was marked before is explained by another model: normal noise
+    has one in 16 000 beyond."""
     widest: int = 2
     """Samples of one outlier. A mechanism cannot leave and return within two samples."""
     neighbour_share: float = 0.3
     """Share of an outlier that the samples beside it may have: a mass that is pushed moves before and after. Judgement."""
+    fewest_by_motion: int = 5
+    """Outliers of a channel that tell whether they come with the motion: of fewer, the test below rejects nothing."""
+    by_motion_p: float = 1e-5
+    """p below which outliers do: three tests of each channel and record."""
     beyond_noise: float = 4.0
     """Standard deviations of the whitened residual from which an isolated sample is counted as a small spike: normal noise has
     one in 16 000."""
     beyond_noise_p: float = 1e-4
     """Probability that normal noise has so many of them, below which they are told: a few dozen channels are looked at."""
+
+
+@dataclass(frozen=True)
+class PoseOutlierSettings:
+    """Outliers of settled poses, which have no neighbours in time."""
+
+    threshold: float = 7.0
+    """Robust standard deviations of the channel's residual, as of a series."""
+    fewest: int = 20
+    """Poses that a channel must have: their median absolute value is known to 25 %."""
+    largest_share: float = 0.03
+    """Share of a channel's poses; where more stand out, all are kept, as of a series."""
+    nearest: int = 2
+    """Nearest poses by drive, each over its range, that must have little of it: what acts in a region acts there, too. Judgement."""
+
+
+@dataclass(frozen=True)
+class HeldSettings:
+    """Stretches in which a reading is held although the model moves."""
+
+    shortest: int = 5
+    """Equal readings in a row, as of a channel that is clipped."""
+    moves: float = 7.0
+    """Standard deviations of the noise by which the model moves meanwhile, and leaves the reading: as of an outlier."""
+    noise_ratio: float = 1.3
+    """Robust standard deviation of the residual elsewhere over the noise: everything else is explained, but for what the stretches
+    themselves bend the fit. Judgement."""
+    beyond: float = 1e-3
+    """Share of the residual elsewhere that may be beyond `moves`: small spikes. Judgement."""
+    most: int = 5
+    """Stretches of one record. Friction holds a stage at every reversal. Judgement."""
+    largest_share: float = 0.1
+    """Share of a record's readings in such stretches. Judgement."""
 
 
 @dataclass(frozen=True)
@@ -306,6 +349,8 @@ NOISE = NoiseSettings()
 RESIDUAL_NOISE = ResidualNoiseSettings()
 NOISE_UPDATE = NoiseUpdateSettings()
 OUTLIERS = OutlierSettings()
+POSE_OUTLIERS = PoseOutlierSettings()
+HELD = HeldSettings()
 SIMULATION = SimulationSettings()
 FIT = FitSettings()
 HELD_OUT_REFIT = HeldOutRefitSettings()

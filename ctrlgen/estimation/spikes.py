@@ -13,6 +13,7 @@ from scipy import stats
 from ctrlgen.core.units import difference
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.settings import OUTLIERS, RESIDUAL_TESTS, STATISTICS
+from ctrlgen.recordings.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class Spikes:
 
 def find_spikes(fitter: Fitter, fit: Fit, known: np.ndarray) -> tuple[Spikes, ...]:
     """The spikes of each channel that has some: outliers that were marked, and smaller ones in what `fit` leaves where that is
-    noise. `known` (n_y,) says whose noise is known. None of settled poses, which have no neighbours in time."""
+    noise. `known` (n_y,) says whose noise is known."""
     recording, rows = fitter.recording, []
     for i, (channel, unit) in enumerate(zip(recording.channels, recording.units, strict=True)):
         sizes = [abs(size) for r in recording.records for _, k, size in r.spikes if k == i]
@@ -56,6 +57,26 @@ def find_spikes(fitter: Fitter, fit: Fit, known: np.ndarray) -> tuple[Spikes, ..
             in_noise = size / floor if known[i] and floor > 0 else None
             rows.append(Spikes(channel, len(sizes), samples, float(difference(size, unit)), unit, in_noise))
     return tuple(rows)
+
+
+def marking_notes(before: Recording, after: Recording) -> tuple[str, ...]:
+    """What marking again changed, as sentences: outliers of `before` that are none of the accepted model, and held stretches."""
+    notes = []
+    for old, new in zip(before.records, after.records, strict=True):
+        for i, channel in enumerate(after.channels):
+            back = int((new.valid & ~old.valid)[:, i].sum())
+            if back:
+                notes.append(
+                    f"{new.name}, {channel}: {back} of what was marked as outliers is used again; the accepted model explains it."
+                )
+            held = [(a, b) for a, b, k in new.held if k == i]
+            if held:
+                at = ", ".join(f"{new.time[a]:.6g} s" for a, _ in held)
+                count = sum(b - a for a, b in held)
+                notes.append(
+                    f"{new.name}, {channel}: {count} samples repeat one value while the device moves (from {at}); not used."
+                )
+    return tuple(notes)
 
 
 def _beyond_noise(fitter: Fitter, fit: Fit, i: int, marked: int) -> list[float]:

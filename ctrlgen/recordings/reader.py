@@ -164,7 +164,7 @@ class _File:
             if record is None:
                 continue
             record = replace(record, name=f"{self.path.resolve().parent.name}/{record.name}") if self.prefix else record
-            result = validation.validate_record(record, self.written.kind, self.model, names, where)
+            result = validation.validate_record(record, self.written.kind, self.model, names, where, table.gap)
             records += result.records
             places += [where] * len(result.records)
             notes += result.notes

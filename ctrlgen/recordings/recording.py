@@ -30,7 +30,8 @@ class Record:
     cut-off of the low-pass that every column passed, half of the amplitude there and less than a hundredth an octave above;
     None where nothing was filtered. Half of `1/sample_time` is the highest frequency that the rows can hold. `spikes`: row,
     channel and deviation [SI] from its
-    neighbours of each outlier that was marked.
+    neighbours of each outlier that was marked. `held`: first row, row behind the last and channel of each stretch in which a
+    reading was found to be held although the device moves.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Record:
     band: float | None = None
     spikes: tuple[tuple[int, int, float], ...] = ()
     poses: bool = False
+    held: tuple[tuple[int, int, int], ...] = ()
 
     def __post_init__(self) -> None:
         if np.isinf(self.sample_time):  # not where it is still to be found

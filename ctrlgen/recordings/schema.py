@@ -81,6 +81,11 @@ class RecordTable(Section):
     """Time of the first row on the clock common to all records. Left out: 0 s."""
     between_samples: Literal["held", "linear"] = "held"
     """Whether the drive is held at a sample's value until the next sample or is linear between them."""
+    gap: Literal["linear", "held", "split"] | None = None
+    """What the drive does across rows that are missing, or that hold no number for it: `linear` or `held` bridges every gap that is a
+    whole number of samples so, `split` ends a record there and begins another. Left out: gaps of at most 100 samples are bridged where
+    the drive itself tells what it did there, by its steps or its smoothness, and the others split.
+    """
     rows: tuple[Annotated[int, Field(ge=0)], Annotated[int, Field(ge=0)]] | None = None
     """The half-open range [first, one past the last] of the file's rows that is used, from 0. Left out: all."""
     lead_in: Annotated[int, Field(ge=0)] = 0
@@ -200,6 +205,8 @@ class _Check:
                 self._fault(f"{where}.time", what)
             if record.dwell is not None:
                 self._fault(f"{where}.dwell", 'is for poses only; leave it out, or write kind = "poses"')
+        elif record.gap is not None:
+            self._fault(f"{where}.gap", 'is for series only; leave it out, or write kind = "series"')
         elif record.time is not None or record.sample_rate is not None:
             self._fault(
                 f"{where}.time", 'poses have no clock; leave it out and give dwell = "2 s" if they did not settle'

@@ -4,14 +4,14 @@ Refused: time that does not increase or is unevenly sampled, drives that are mis
 with too few numbers, records in which nothing changes, held-out data that are fitted as well, too few samples to hold any
 out.
 Marked or noted: gaps, missing samples, outliers, stuck and clipped stretches, dead channels, jitter below 1 %.
-Nothing is filled in: where the drive is not known one record ends and another begins.
+No reading is filled in. A drive is across short gaps where it is held or smooth (`gaps`); where it is not known one record ends and
+another begins.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -19,22 +19,18 @@ from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import from_si, show
 from ctrlgen.devices.limit import spans
 from ctrlgen.model.model import Model
+from ctrlgen.recordings.gaps import BREAK, SHORTEST, Gap, rows_between, stretches
 from ctrlgen.recordings.outliers import outliers, stuck_samples
 from ctrlgen.recordings.recording import Record
 
 JITTER = 0.01  # of the sample time, rms
 NOTED_JITTER = 0.001  # of the sample time, rms: from here on it is noted
-BREAK = 1.5  # sample times without a sample: a gap
-SHORTEST = {"series": 20, "poses": 3}  # rows below which a record says nothing
 DIVISIBLE = {"series": 200, "poses": 12}  # rows from which a part can be held out
 HELD_OUT = 0.3  # of a series, at its end: random samples would leak through the device's memory
 EVERY = 3  # of poses, the third, sixth, ... are held out
 OVER_LIMIT = 1e-6  # of the drive's range: rounding of the file
 RESTLESS = 0.01  # of the drive's range: more is no rest
-REST_SAMPLES = 5  # on each side of a gap, over which the drive must be at rest
-WHOLE_SAMPLES = 0.1  # sample times: how far a gap may be off a whole number of them
 REPEAT_BLOCKS = 10  # into which a held-out record is cut to be looked for among the fitted ones
-LISTED_CUTS = 5  # places at which a record was cut that a note names
 
 
 @dataclass(frozen=True)
@@ -60,23 +56,26 @@ class Validated:
     faults: tuple[Fault, ...] = ()
 
 
-def validate_record(record: Record, kind: str, model: Model, names: ChannelNames, where: str) -> Validated:
+def validate_record(
+    record: Record, kind: str, model: Model, names: ChannelNames, where: str, gap: Gap | None = None
+) -> Validated:
     """One record as read -> its uninterrupted stretches with every doubtful sample marked.
 
     `record.valid` is False in channels that this record has no column for; `kind` is "series" or "poses"; `where` is the
-    record's place in recording.toml, such as "record[0]".
+    record's place in recording.toml, such as "record[0]". `gap`: what the drive does across rows that are missing, where the
+    file says it.
     """
     recorded = np.any(record.valid, axis=0)
     faults = _missing_numbers(record, kind, names, where, recorded) + _beyond_limits(record, kind, model, names, where)
     notes: list[str] = []
-    stretches = [record]
+    parts = [record]
     if kind == "series" and len(record.time) >= SHORTEST[kind]:
         sample_time, clock_notes, clock_faults = _sample_time(record, where)
         faults += clock_faults
         if not faults:
-            stretches, gap_notes = _stretches(replace(record, sample_time=sample_time))
+            parts, gap_notes = stretches(replace(record, sample_time=sample_time), gap)
             notes = clock_notes + gap_notes
-            if not stretches:
+            if not parts:
                 faults = [Fault(where, f"{record.name}: {notes[-1]} No usable stretch remains; record without gaps")]
     faults = faults or _nothing_changes(record, where)
     if faults:
@@ -86,7 +85,7 @@ def validate_record(record: Record, kind: str, model: Model, names: ChannelNames
             f"{record.name}: no drive moves; the readings show only drift, noise, or the effect of earlier motion."
         )
     marked = []
-    for stretch in stretches:
+    for stretch in parts:
         stretch, mark_notes = mark(stretch, kind, names, recorded)
         marked.append(stretch)
         notes += mark_notes
@@ -185,93 +184,6 @@ def _sample_time(record: Record, where: str) -> tuple[float, list[str], list[Fau
             f"{record.name}: time stamps jitter by {100 * jitter:.2g} % of the sample time (rms); samples are taken as evenly spaced."
         )
     return sample_time, notes, []
-
-
-def _stretches(record: Record) -> tuple[list[Record], list[str]]:
-    """The record cut at gaps in time and where a drive is missing, but joined across a gap in which the drive rests."""
-    known = np.isfinite(record.drive).all(1)
-    breaks = (np.flatnonzero(np.diff(record.time) > BREAK * record.sample_time) + 1).tolist()
-    edges = np.flatnonzero(np.diff(np.r_[False, known, False].astype(int)))
-    bounds = [(a, b) for a, b in edges.reshape(-1, 2).tolist()]
-    cuts = [(a, b) for low, high in bounds for a, b in _split(low, high, breaks)]
-    if len(cuts) == 1 and cuts[0] == (0, len(known)):
-        return [record], []
-    notes: list[str] = []
-    stretches: list[Record] = []
-    for a, b in cuts:
-        stretch = rows_between(record, a, b)
-        joined = _joined(stretches[-1], stretch) if stretches else None
-        if joined:
-            missing = len(joined.time) - len(stretches[-1].time) - len(stretch.time)
-            after = f"{stretches[-1].time[-1]:.6g} s"
-            notes.append(
-                f"{record.name}: {missing} samples are missing after {after} while the drive rests; marked, not used."
-            )
-            stretches[-1] = joined
-        else:
-            stretches.append(stretch)
-    kept = [stretch for stretch in stretches if len(stretch.time) >= SHORTEST["series"]]
-    dropped = sum(len(stretch.time) for stretch in stretches) - sum(len(stretch.time) for stretch in kept)
-    if not notes and len(stretches) == 1:
-        count = len(known) - len(stretches[0].time)
-        notes.append(
-            f"{record.name}: a drive is missing in {count} samples at its beginning or end; they are left out."
-        )
-    if len(stretches) > 1:
-        more = ", ..." if len(stretches) > LISTED_CUTS + 1 else ""
-        at = ", ".join(f"{stretch.time[0]:.6g} s" for stretch in stretches[1 : LISTED_CUTS + 1]) + more
-        notes.append(
-            f"{record.name}: the drive is not known across gaps, so the record is used as {len(kept)} records, cut before {at}"
-            + (f"; {dropped} samples in stretches shorter than {SHORTEST['series']} are left out." if dropped else ".")
-        )
-        kept = [replace(stretch, name=f"{stretch.name} from {stretch.time[0]:.6g} s") for stretch in kept]
-    return kept, notes
-
-
-def _split(a: int, b: int, breaks: list[int]) -> list[tuple[int, int]]:
-    """The half-open range a to b cut at the `breaks` inside it."""
-    edges = [a, *(k for k in breaks if a < k < b), b]
-    return list(pairwise(edges))
-
-
-def rows_between(record: Record, a: int, b: int) -> Record:
-    """Rows a to b, half open, of a record."""
-    ambient = None if record.ambient is None else record.ambient[a:b]
-    return replace(
-        record,
-        time=record.time[a:b],
-        drive=record.drive[a:b],
-        observed=record.observed[a:b],
-        valid=record.valid[a:b],
-        ambient=ambient,
-        spikes=tuple((k - a, i, size) for k, i, size in record.spikes if a <= k < b),
-    )
-
-
-def _joined(before: Record, after: Record) -> Record | None:
-    """Both records with rows marked not valid between; None unless the drive rests on both sides at the same values and the
-    gap is a whole number of samples, no more than the shorter of the two records has."""
-    around = np.vstack([before.drive[-REST_SAMPLES:], after.drive[:REST_SAMPLES]])
-    steps = (after.time[0] - before.time[-1]) / before.sample_time
-    missing = round(steps) - 1
-    shortest = min(len(before.time), len(after.time))
-    moves = len(around) < 2 * REST_SAMPLES or (around != around[0]).any()
-    if moves or abs(steps - round(steps)) > WHOLE_SAMPLES or missing > shortest:
-        return None
-    time = before.time[-1] + before.sample_time * np.arange(1, missing + 1)
-    blank = np.full((missing, before.observed.shape[1]), np.nan)
-    ambient = None
-    if before.ambient is not None and after.ambient is not None:
-        between = np.interp(time, [before.time[-1], after.time[0]], [before.ambient[-1], after.ambient[0]])
-        ambient = np.r_[before.ambient, between, after.ambient]
-    return replace(
-        before,
-        time=np.r_[before.time, time, after.time],
-        drive=np.vstack([before.drive, np.tile(around[0], (missing, 1)), after.drive]),
-        observed=np.vstack([before.observed, blank, after.observed]),
-        valid=np.vstack([before.valid, np.zeros(blank.shape, dtype=bool), after.valid]),
-        ambient=ambient,
-    )
 
 
 def mark(record: Record, kind: str, names: ChannelNames, recorded: np.ndarray) -> tuple[Record, list[str]]:

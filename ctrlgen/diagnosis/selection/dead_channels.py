@@ -87,6 +87,7 @@ def _only(recording: Recording, kept: list[int]) -> Recording:
             observed=r.observed[:, kept],
             valid=r.valid[:, kept],
             spikes=tuple((row, place[i], size) for row, i, size in r.spikes if i in place),
+            held=tuple((a, b, place[i]) for a, b, i in r.held if i in place),
         )
         for r in recording.records
     )

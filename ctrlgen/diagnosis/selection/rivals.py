@@ -29,10 +29,10 @@ def swapped(trials: Trials, current: CandidateModel, before: int) -> CandidateMo
 
 
 def simplified(trials: Trials, current: CandidateModel) -> CandidateModel:
-    """The model with the special case of each law in its place that the fit does not exclude, where more than noise is left: how
-    the friction falls with speed, say, is then within what the discrepancy feigns."""
+    """The model with the special case of each law in its place that the fit does not exclude, where it explains alike: how
+    the friction falls with speed, say, is then within what noise or discrepancy feigns."""
     for k in range(len(current.causes)):
-        special = None if current.errors.is_noise else current.fit.nested_case(k)
+        special = current.fit.nested_case(k)
         candidates = replacements(trials, current, k) if special else []
         for t in (t for t in candidates if t.cause and t.cause.effect == special):
             if explains_alike(trials.selection, t, current) and not trials.objections(t, current.causes):
@@ -49,7 +49,7 @@ def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Rou
     alike = {
         t.cause: t
         for t in reversed(candidates)
-        if not _same_name(t.cause, there[k])
+        if not (_same_name(t.cause, there[k]) or _contains(t, there[k]))
         and (explains_alike(trials.selection, t, current) or (special and t.cause and t.cause.effect == special))
     }
     return tuple(t for t in trials.selection.ranked(list(alike.values())) if not trials.objections(t, there))
@@ -104,6 +104,12 @@ def replace_cause(trials: Trials, fit: Fit, k: int, others: Structure, suspect: 
     common = {name: value for name, value in fit.values(k).items() if name in suspect.start}
     kin = (structure.restarted(len(others.causes), s | common) for s in (suspect.start, *suspect.other_starts))
     return min((structure, *kin), key=trials.fitter.initial_objective)
+
+
+def _contains(rival: CandidateModel, cause: Hypothesis) -> bool:
+    """Whether a rival's law is the cause's but for numbers that it does not tell from those of the cause: it is no other physics."""
+    places = [k for k, c in enumerate(rival.causes) if c == rival.cause and c.location == cause.location]
+    return any(rival.fit.nested_case(k) == cause.effect for k in places)
 
 
 def _same_name(a: Hypothesis | None, b: Hypothesis) -> bool:

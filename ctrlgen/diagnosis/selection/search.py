@@ -10,6 +10,7 @@ although it scores better is kept with its reason.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from ctrlgen.diagnosis.selection.supported import supported
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import SEARCH
 from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.isolated_outliers import mark_again
 from ctrlgen.estimation.noise_update import update_noise
 from ctrlgen.estimation.settings import FIT
 
@@ -35,6 +37,7 @@ class Searcher:
 
     def __init__(self, fitter: Fitter, screen: Screen, step: Callable[[str], None], jobs: int = 1) -> None:
         self.trials = Trials(fitter, screen, step, jobs)
+        self.markings = 0
 
     def run(self, device: Device) -> SearchResult:
         """Rounds until nothing more is justified, again where they have taught the noise; then the rivals of each cause."""
@@ -43,7 +46,7 @@ class Searcher:
         trials.use(fitter)
         rounds: list[Round] = []
         current = trials.with_noise_update(trials.fit(described.restarted, steps=FIT.max_steps))
-        trials.mismatch = current.held_out.plain_mean * trials.fitter.noise.floor**2
+        self._learn_mismatch(current)
         for _ in range(SEARCH.most_noise_updates):
             current = self._forward_rounds(current, rounds)
             before = trials.fitter.noise
@@ -68,6 +71,24 @@ class Searcher:
         """The same model fitted to its end under its own errors, without the causes that it then does not need."""
         return without_needless(self.trials, self.trials.with_errors(self.trials.converged(current)))
 
+    def _learn_mismatch(self, described: CandidateModel) -> None:
+        """What the device as described leaves on the held-out records is what causes are measured by."""
+        self.trials.mismatch = described.held_out.plain_mean * self.trials.fitter.noise.floor**2
+
+    def _marked_again(self, current: CandidateModel) -> CandidateModel:
+        """The same model fitted to the readings without the spikes that it uncovers, and with those that it explains."""
+        trials = self.trials
+        fitter = trials.fitter
+        if self.markings >= SEARCH.most_markings:
+            return current
+        recording = mark_again(fitter.recording, lambda record: fitter.predict(current.fit, record), fitter.noise)
+        if recording is fitter.recording:
+            return current
+        self.markings += 1
+        trials.use(replace(fitter, recording=recording))
+        self._learn_mismatch(scored(trials.fitter, trials.fitter.described(current.fit.structure.device)[1]))
+        return trials.with_noise_update(trials.with_errors(trials.converged(current)))
+
     def _forward_rounds(self, current: CandidateModel, rounds: list[Round]) -> CandidateModel:
         """Forward rounds from `current`, with swaps in between, until nothing more is justified; appends each to `rounds`."""
         trials, visited = self.trials, [current]
@@ -75,6 +96,7 @@ class Searcher:
         while True:
             trials.step(f"screening, {len(current.causes)} causes so far")
             trials.new_round()
+            current = self._marked_again(current)
             screened = trials.screened(current)
             if len(current.causes) >= most or trials.selection.residual_within_model_form_error(current):
                 return current

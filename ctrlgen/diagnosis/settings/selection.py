@@ -85,6 +85,8 @@ class SearchSettings:
     """Causes of a model at most, by kind of recording. Poses have many independent offsets. Judgement."""
     most_noise_updates: int = 8
     """Updates of the noise from the residual at most."""
+    most_markings: int = 4
+    """Times that spikes are marked again against what was accepted: each teaches the next less. Judgement."""
     same_noise: float = 0.05
     """Relative change of the noise below which it counts as unchanged."""
     same_noise_size: float = 0.02

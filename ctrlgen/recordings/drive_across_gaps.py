@@ -1,0 +1,85 @@
+"""A drive across rows that are missing: held, linear, or as smooth as it is elsewhere; and how well each of them tells it.
+
+Smooth means autoregressive: of the missing samples those that leave the least squares of the prediction errors of an autoregressive
+model of the samples around (A. J. E. M. Janssen, R. N. J. Veldhuis, L. B. Vries, IEEE Trans. ASSP 34 (1986) 317). Sums of sines and
+whatever is sampled fast beside its own changes are exact but for rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+
+Way = Literal["held", "linear", "smooth"]
+
+ORDER = 24  # of the autoregressive model: a dozen sines
+WINDOW = 150  # rows on either side that the model is taken from
+PLACES = 24  # rows that are there and are told from those around, as a trial
+QUANTILE = 0.9  # of the errors of the trials: a drive may have a few corners
+
+
+def across(drive: np.ndarray, a: int, b: int, way: Way) -> np.ndarray:
+    """One drive (b - a,) in the rows a to b, half open, of `drive` (n,), which is NaN there and may be elsewhere."""
+    return _WAYS[way](drive, a, b)
+
+
+def error(drive: np.ndarray, length: int, way: Way) -> float:
+    """How far `way` is off in gaps of `length` rows [range of the drive], by trials where `drive` (n,) is known; infinite where it
+    cannot be tried."""
+    span, n, side = np.nanmax(drive) - np.nanmin(drive), len(drive), max(length, 3)
+    if 2 * side + length > n:
+        return np.inf
+    clear = np.convolve(np.isnan(drive), np.ones(2 * side + length, int), "valid") < 0.5
+    begins = np.flatnonzero(clear) + side
+    if not len(begins):
+        return np.inf
+    worst = []
+    for a in begins[np.linspace(0, len(begins) - 1, min(PLACES, len(begins))).astype(int)].tolist():
+        low, b = max(a - WINDOW, 0), a + length
+        tried = drive[low : b + WINDOW].copy()
+        tried[a - low : b - low] = np.nan
+        worst.append(np.abs(across(tried, a - low, b - low, way) - drive[a:b]).max())
+    return float(np.quantile(worst, QUANTILE) / span) if span > 0 else 0.0
+
+
+def _held(u: np.ndarray, a: int, b: int) -> np.ndarray:
+    return np.full(b - a, u[a - 1])
+
+
+def _linear(u: np.ndarray, a: int, b: int) -> np.ndarray:
+    return np.interp(np.arange(a, b), [a - 1, b], [u[a - 1], u[b]])
+
+
+def _smooth(u: np.ndarray, a: int, b: int) -> np.ndarray:
+    low, high = max(a - WINDOW, 0), min(b + WINDOW, len(u))
+    x = u[low:high]
+    gap = np.zeros(len(x), bool)
+    gap[a - low : b - low] = True
+    centre = np.nanmean(x)
+    x = x - centre
+    order = min(ORDER, len(x) // 6)
+    if order < 2:
+        return _linear(u, a, b)
+    rows = np.lib.stride_tricks.sliding_window_view(x, order + 1)
+    whole = np.isfinite(rows).all(axis=1)
+    if whole.sum() < 2 * order:
+        return _linear(u, a, b)
+    scale = np.nanmax(np.abs(x)) or 1.0
+    # singular for few sines: the smallest coefficients of all
+    coefficients = np.linalg.lstsq(rows[whole, :-1] / scale, rows[whole, -1] / scale, rcond=1e-10)[0]
+    weights = np.concatenate([-coefficients, [1.0]])
+    # prediction errors that a sample of the gap takes part in, with what else is missing there
+    near = np.flatnonzero(np.lib.stride_tricks.sliding_window_view(gap, order + 1).any(axis=1))
+    touched = np.zeros((len(near), len(x)))
+    touched[np.arange(len(near))[:, None], near[:, None] + np.arange(order + 1)] = weights
+    missing = ~np.isfinite(x) & touched.any(axis=0)
+    known = np.where(np.isfinite(x), x, 0.0)
+    solved = np.linalg.lstsq(touched[:, missing], -touched @ known, rcond=1e-12)[0]
+    filled = known
+    filled[missing] = solved
+    return filled[gap] + centre
+
+
+_WAYS: dict[Way, Callable[[np.ndarray, int, int], np.ndarray]] = {"held": _held, "linear": _linear, "smooth": _smooth}

@@ -1,0 +1,159 @@
+"""Short gaps of a drive that tells what it did there are bridged; the others end a record."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from axis_records import AXIS, NOISE, H, drive, record
+from conftest import AXIS_FILE
+from recorded import refused, samples, two
+
+import ctrlgen
+from ctrlgen.core.units import from_si
+from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.noise import estimate_noise
+from ctrlgen.estimation.structure import Structure
+from ctrlgen.recordings import gaps
+from ctrlgen.recordings.reader import load_recordings
+from ctrlgen.recordings.recording import Record, Recording
+
+N = 4000
+t = H * np.arange(N)
+KNOWN = {
+    "sines": (drive(N), 1e-9),
+    "chirp": (np.sin(2 * np.pi * (t + 10 * t**2)), 1e-6),
+    "triangle": (np.abs((2 * t) % 2 - 1), 1e-3),  # two rows next to a corner
+    "at rest": (np.zeros(N), 0.0),
+    "clocked steps": (np.repeat(np.random.default_rng(5).choice([-1.0, 0.0, 1.0], N // 10), 10), 0.0),
+    "twelve bits": (np.round(drive(N) * 512) / 512, 2e-3),
+}
+WHITE = np.random.default_rng(6).standard_normal(N)
+
+
+def lacking(u: np.ndarray, rate: float = 0.01, seed: int = 1, role: str = "fit") -> tuple[Record, np.ndarray]:
+    """A record of the drive whose rows are missing at a rate, and which are there."""
+    there = np.random.default_rng(seed).random(len(u)) >= rate
+    there[[0, -1]] = True
+    whole = record(u, np.arange(len(u)), role)
+    return gaps._rows(whole, there), there
+
+
+@pytest.mark.parametrize("kind", KNOWN)
+def test_a_drive_that_tells_what_it_did_is_bridged_and_told_in_one_note(kind):
+    u, within = KNOWN[kind]
+    given, there = lacking(u)
+    (bridged,), notes = gaps.stretches(given)
+    assert np.abs(bridged.drive[:, 0] - u).max() <= within * max(np.ptp(u), 1.0)
+    assert np.array_equal(bridged.valid[:, 0], there) and np.isnan(bridged.observed[~there, 0]).all()
+    np.testing.assert_allclose(bridged.time, t, atol=1e-12)
+    runs = np.diff(np.flatnonzero(there)) - 1
+    (note,) = notes
+    assert f"{(runs > 0).sum()} gaps, the longest of {runs.max()} samples" in note
+
+
+@pytest.mark.parametrize("rate", [0.003, 0.02])
+def test_a_drive_that_nobody_knows_between_its_rows_is_not_made_up(rate):
+    given, there = lacking(WHITE, rate)
+    parts, notes = gaps.stretches(given)
+    assert sum(len(p.time) for p in parts) <= there.sum() and len(parts) > 5
+    assert all(np.isin(p.drive[:, 0], WHITE).all() for p in parts) and "not known across gaps" in notes[-1]
+
+
+def test_a_jump_inside_of_a_gap_of_a_smooth_drive_is_not_bridged():
+    u = np.sin(2 * np.pi * t) + (t >= 2.0)
+    whole = record(u, u, "fit")
+    parts, _ = gaps.stretches(gaps._rows(whole, ~np.isin(np.arange(N), [700, 1999, 2000, 3000])))
+    assert [len(p.time) for p in parts] == [1999, 1999]
+
+
+def test_a_long_gap_splits_and_short_ones_beside_it_are_bridged():
+    there = np.ones(N, bool)
+    there[[500, 900, 901, 3000]] = False
+    there[1500:1700] = False
+    parts, notes = gaps.stretches(gaps._rows(record(drive(N), drive(N), "fit"), there))
+    assert [len(p.time) for p in parts] == [1500, 2300] and len(notes) == 2
+    assert "3 gaps, the longest of 2 samples" in notes[0] and "cut before 1.7 s" in notes[1]
+
+
+def test_a_gap_that_is_no_whole_number_of_samples_splits():
+    u = drive(N)
+    given = gaps._rows(record(u, u, "fit"), np.arange(N) != 2000)
+    time = given.time.copy()
+    time[2000:] += 0.4 * H
+    parts, _ = gaps.stretches(gaps.replace(given, time=time))
+    assert [len(p.time) for p in parts] == [2000, 1999]
+
+
+@pytest.mark.parametrize("gap, value", [("linear", 1.5), ("held", 1.0)])
+def test_what_the_file_says_of_a_gap_holds(gap, value):
+    u = WHITE.copy()
+    u[[99, 101]] = 1.0, 2.0
+    given = gaps._rows(record(u, u, "fit"), np.arange(N) != 100)
+    (bridged,), (note,) = gaps.stretches(given, gap)
+    assert bridged.drive[100, 0] == value and f"taken as {gap} there" in note
+    assert len(gaps.stretches(given, "split")[0]) == 2
+
+
+def test_the_file_may_say_it_for_a_series_alone(tmp_path, model):
+    kept = np.arange(400) != 200
+    fit = {k: v[kept] for k, v in samples().items()}
+    assert [len(r.time) for r in load_recordings([two(tmp_path, fit)], model).records] == [400, 400]
+    parts = load_recordings([two(tmp_path, fit, gap="split")], model).records
+    assert [len(r.time) for r in parts] == [200, 199, 400]
+    faults = refused([two(tmp_path, fit, gap="spline")], model)
+    assert "linear" in str(faults)
+
+
+def test_a_row_without_a_number_for_one_drive_keeps_those_of_the_others(tmp_path, model):
+    fit = samples()
+    u = fit["u2X"].copy()
+    fit["u2X"][[100, 101, 300]] = np.nan
+    recording = load_recordings([two(tmp_path, fit)], model)
+    first = recording.records[0]
+    k = list(model.signals["drive"].channels).index("2X")
+    np.testing.assert_allclose(first.drive[:, k], u, atol=1e-9)
+    assert np.flatnonzero(~first.valid[:, 0]).tolist() == [100, 101, 300]
+
+
+MEMORY = {
+    "displacement_hysteresis": {"share": "0.03", "reach": "50 um", "taper": "0", "reversible": "0"},
+    "backlash": {"gap": "0.2 um"},
+    "creep": {"gain": "0.03", "tau": "0.2 s", "slow": "0.1"},
+    "resonance": {"stiffness": "0.02 N/um", "frequency": "180 Hz", "damping": "0.02"},
+}
+
+
+def with_law(law: str):
+    lines = "".join(f'{k} = "{v}"\n' for k, v in MEMORY[law].items())
+    return f'[[effect]]\nkind = "{law}"\nat = "axis"\n{lines}'
+
+
+@pytest.mark.parametrize("law", MEMORY)
+def test_a_law_with_memory_is_fitted_across_gaps_as_without_them(law, tmp_path):
+    (tmp_path / "true.toml").write_text(AXIS_FILE.read_text() + with_law(law))
+    true = ctrlgen.load_device(tmp_path / "true.toml")
+    model, rng = ctrlgen.build_model(true), np.random.default_rng(3)
+    records = []
+    for role, u in (
+        ("fit", drive(N)),
+        ("hold_out", 1.2 * np.sin(2 * np.pi * 1.7 * t) + 0.2 * np.sin(2 * np.pi * 29 * t)),
+    ):
+        y = ctrlgen.simulate(model, u[:, None], H).signals["reading"][:-1, 0] + NOISE * rng.standard_normal(N)
+        records.append(record(u, y, role, first=0.0 if role == "fit" else N * H))
+    (effect,) = true.effect
+    start = {name: 1.2 * value.si for name, value in effect.values.items()}
+    errors, pieces = [], []
+    for whole in (True, False):
+        parts = []
+        for k, r in enumerate(records):
+            there = np.random.default_rng(7 + k).random(N) >= (0.0 if whole else 0.01)
+            parts += gaps.stretches(gaps._rows(r, there))[0]
+        recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("nm",), (NOISE,), tuple(parts), ())
+        fitter = Fitter(recording, estimate_noise(recording, 0.5))
+        fit = fitter.fit(Structure(AXIS).with_cause(Hypothesis(law, "stage:axis", "axis"), start))
+        left = [(r.observed - fitter.predict(fit, r))[r.valid] for r in fitter.held_out_records]
+        errors.append(np.sqrt(np.mean(np.concatenate(left) ** 2)))
+        pieces.append(len(parts))
+    assert pieces == [2, 2]
+    assert from_si(errors[1], "nm") == pytest.approx(from_si(errors[0], "nm"), rel=0.1)
