@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from axis_records import AXIS, NOISE, H, drive, record
@@ -36,7 +38,7 @@ def lacking(u: np.ndarray, rate: float = 0.01, seed: int = 1, role: str = "fit")
     there = np.random.default_rng(seed).random(len(u)) >= rate
     there[[0, -1]] = True
     whole = record(u, np.arange(len(u)), role)
-    return gaps._rows(whole, there), there
+    return gaps.rows_of(whole, there), there
 
 
 @pytest.mark.parametrize("kind", KNOWN)
@@ -63,7 +65,7 @@ def test_a_drive_that_nobody_knows_between_its_rows_is_not_made_up(rate):
 def test_a_jump_inside_of_a_gap_of_a_smooth_drive_is_not_bridged():
     u = np.sin(2 * np.pi * t) + (t >= 2.0)
     whole = record(u, u, "fit")
-    parts, _ = gaps.stretches(gaps._rows(whole, ~np.isin(np.arange(N), [700, 1999, 2000, 3000])))
+    parts, _ = gaps.stretches(gaps.rows_of(whole, ~np.isin(np.arange(N), [700, 1999, 2000, 3000])))
     assert [len(p.time) for p in parts] == [1999, 1999]
 
 
@@ -71,17 +73,17 @@ def test_a_long_gap_splits_and_short_ones_beside_it_are_bridged():
     there = np.ones(N, bool)
     there[[500, 900, 901, 3000]] = False
     there[1500:1700] = False
-    parts, notes = gaps.stretches(gaps._rows(record(drive(N), drive(N), "fit"), there))
+    parts, notes = gaps.stretches(gaps.rows_of(record(drive(N), drive(N), "fit"), there))
     assert [len(p.time) for p in parts] == [1500, 2300] and len(notes) == 2
     assert "3 gaps, the longest of 2 samples" in notes[0] and "cut before 1.7 s" in notes[1]
 
 
 def test_a_gap_that_is_no_whole_number_of_samples_splits():
     u = drive(N)
-    given = gaps._rows(record(u, u, "fit"), np.arange(N) != 2000)
+    given = gaps.rows_of(record(u, u, "fit"), np.arange(N) != 2000)
     time = given.time.copy()
     time[2000:] += 0.4 * H
-    parts, _ = gaps.stretches(gaps.replace(given, time=time))
+    parts, _ = gaps.stretches(replace(given, time=time))
     assert [len(p.time) for p in parts] == [2000, 1999]
 
 
@@ -89,7 +91,7 @@ def test_a_gap_that_is_no_whole_number_of_samples_splits():
 def test_what_the_file_says_of_a_gap_holds(gap, value):
     u = WHITE.copy()
     u[[99, 101]] = 1.0, 2.0
-    given = gaps._rows(record(u, u, "fit"), np.arange(N) != 100)
+    given = gaps.rows_of(record(u, u, "fit"), np.arange(N) != 100)
     (bridged,), (note,) = gaps.stretches(given, gap)
     assert bridged.drive[100, 0] == value and f"taken as {gap} there" in note
     assert len(gaps.stretches(given, "split")[0]) == 2
@@ -148,7 +150,7 @@ def test_a_law_with_memory_is_fitted_across_gaps_as_without_them(law, tmp_path):
         parts = []
         for k, r in enumerate(records):
             there = np.random.default_rng(7 + k).random(N) >= (0.0 if whole else 0.01)
-            parts += gaps.stretches(gaps._rows(r, there))[0]
+            parts += gaps.stretches(gaps.rows_of(r, there))[0]
         recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("nm",), (NOISE,), tuple(parts), ())
         fitter = Fitter(recording, estimate_noise(recording, 0.5))
         fit = fitter.fit(Structure(AXIS).with_cause(Hypothesis(law, "stage:axis", "axis"), start))

@@ -71,10 +71,12 @@ def test_a_law_says_what_its_record_says(kind, rng):
 
 
 def test_contacts_count_from_where_they_touch():
-    """Far beyond its corner e a spring is k (d - gap) but for e; Hertz's is e^-(1/2) k x^(3/2)."""
+    """Beyond its corner, a thousandth of e, a spring is k (d - gap); far beyond e Hertz's is e^-(1/2) k x^(3/2)."""
     law, s = Effect.library["end_stop"]("all", {}), law_inputs(displacement=1.4, travel=1.0)
     spring = law.term(s, SimpleNamespace(stiffness=2.0, gap=0.4, power=1.0))
-    assert float(spring) == pytest.approx(-2.0, rel=2e-3)  # e is a thousandth
+    assert float(spring) == pytest.approx(-2.0, rel=2e-6)  # the corner is a thousandth of a thousandth
+    touched = law.term(law_inputs(displacement=0.4004, travel=1.0), SimpleNamespace(stiffness=2.0, gap=0.4, power=1.0))
+    assert float(touched) == pytest.approx(-8e-4, rel=3e-3)  # and at less than e it is that spring already
     hertz = law.term(s, SimpleNamespace(stiffness=2.0, gap=0.4, power=1.5))
     assert float(hertz) == pytest.approx(-2.0 / sqrt(1e-3), rel=2e-3)
     assert float(law.term(s, SimpleNamespace(stiffness=2.0, gap=1.5, power=1.5))) == 0.0

@@ -69,7 +69,7 @@ def remembered(s, p):
 def stop(s, p):
     side, e = sign(p.gap), 1e-3 * s.travel
     x = max(side * (s.displacement - p.gap), 0.0)
-    return -side * p.stiffness * x**2 / (x + e) * (1 + x / e) ** (p.power - 1)
+    return -side * p.stiffness * x**2 / (x + 1e-3 * e) * (1 + x / e) ** (p.power - 1)
 
 
 def logarithmic(s, p):

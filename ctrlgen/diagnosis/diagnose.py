@@ -40,7 +40,7 @@ from ctrlgen.estimation.checkpoint import Checkpoint
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, hypotheses, nominal_physics, selected_laws
 from ctrlgen.estimation.isolated_outliers import mark_outliers
-from ctrlgen.estimation.noise import Noise, NoiseSource, estimate_noise
+from ctrlgen.estimation.noise import Noise, estimate_noise
 from ctrlgen.estimation.noise_update import correct_stated_noise, update_guessed_noise
 from ctrlgen.estimation.profile_likelihood import profiles
 from ctrlgen.estimation.residual_tests import run_residual_tests
@@ -164,7 +164,7 @@ def _with_noise(device: Device, fitter: Fitter) -> Fitter:
     for _ in range(NOISE_UPDATE.guessed_refits if fitter.noise.guessed.any() else 0):
         fitter, described = fitter.described(device)
         fitter = fitter.with_noise(update_guessed_noise(fitter, described))
-    if fitter.recording.kind == "series" and fitter.noise.from_source(NoiseSource.STATED_WHITE).any():
+    if fitter.noise.stated.any():
         weighed, described = fitter.described(device)
         fitter = fitter.with_noise(correct_stated_noise(weighed, described))
     return fitter

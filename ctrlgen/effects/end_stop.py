@@ -4,12 +4,15 @@ import casadi as ca
 
 from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 
+CORNER = 1e-3  # of e
+
 
 class EndStop(Effect):
-    """Delta F = -k x^2/(x + e) (1 + x/e)^(n - 1), x = d - gap where positive; on the negative side for gap < 0.
+    """Delta F = -k x^2/(x + e/1000) (1 + x/e)^(n - 1), x = d - gap where positive; on the negative side for gap < 0.
 
-    n = 1 is a spring of stiffness k, n = 1.5 Hertz's contact of a ball. e, a thousandth of the typical travel, rounds the corner;
-    k is the stiffness at that depth. Exactly zero before contact. Holds for elastic contact.
+    n = 1 is a spring of stiffness k, n = 1.5 Hertz's contact of a ball. e is a thousandth of the typical travel, k about the
+    stiffness at first contact; a thousandth of e rounds the corner, less than what is touched. Exactly zero before contact. Holds for
+    elastic contact.
     """
 
     place = Place.FORCE
@@ -30,4 +33,4 @@ class EndStop(Effect):
         side = ca.sign(p.gap)
         x = ca.fmax(side * (s.displacement - p.gap), 0)
         e = 1e-3 * s.travel
-        return -p.stiffness * side * x**2 / (x + e) * (1 + x / e) ** (p.power - 1)
+        return -p.stiffness * side * x**2 / (x + CORNER * e) * (1 + x / e) ** (p.power - 1)

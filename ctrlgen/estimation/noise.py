@@ -69,6 +69,11 @@ class Noise:
         return ~self.from_source(NoiseSource.MISFIT)
 
     @property
+    def stated(self) -> np.ndarray:
+        """(n_y,), True where the noise is as the recording's author stated it."""
+        return np.array([s.stated for s in self.sources], bool)
+
+    @property
     def guessed(self) -> np.ndarray:
         """(n_y,), True where only the fastest part of the readings tells the noise, until a residual does."""
         return self.from_source(NoiseSource.FASTEST_PART)
@@ -150,7 +155,7 @@ def _of_poses(recording: Recording, i: int, settling: float) -> _ChannelNoise:
     """The noise of channel `i` of a recording of settled poses."""
     if stated := recording.noise[i]:
         return _ChannelNoise(stated, NoiseSource.STATED, np.inf)
-    sd, count = _repeatability(recording.records, i)
+    sd, count = repeatability(recording.records, i)
     if count >= NOISE.fewest_repeats and sd > 0:
         return _ChannelNoise(sd, NoiseSource.POSES, float(count), f", {count} beyond the first of each")
     few = f"only {count} poses repeat an earlier one" if count else "no pose repeats"
@@ -204,7 +209,7 @@ def _from_stretches(stretches: list[np.ndarray], source: NoiseSource, rounding: 
     return _ChannelNoise(sd, source, float(n), details, a)
 
 
-def _repeatability(records: tuple[Record, ...], i: int) -> tuple[float, int]:
+def repeatability(records: tuple[Record, ...], i: int) -> tuple[float, int]:
     """Standard deviation [SI] of channel i within groups of poses with one drive, and its degrees of freedom."""
     drive = np.concatenate([r.drive[r.valid[:, i]] for r in records])
     y = np.concatenate([r.observed[r.valid[:, i], i] for r in records])

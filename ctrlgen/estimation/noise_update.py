@@ -8,7 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from ctrlgen.estimation.fit import Fit, Fitter
-from ctrlgen.estimation.noise import Noise, NoiseSource, autoregression, cross_correlation, ljung_box, without_lines
+from ctrlgen.estimation.noise import (
+    Noise,
+    NoiseSource,
+    autoregression,
+    cross_correlation,
+    ljung_box,
+    without_lines,
+)
+from ctrlgen.estimation.pose_noise import stated_pose_noise
 from ctrlgen.estimation.residual_noise import noise_from_residual
 from ctrlgen.estimation.settings import DISCREPANCY, NOISE_UPDATE, STATISTICS
 from ctrlgen.recordings.recording import Record
@@ -21,6 +29,8 @@ def update_noise(fitter: Fitter, fit: Fit) -> Noise:
     Of other noise the colour may change, see `update_noise_colour`, and of stated noise the size, see `correct_stated_noise`.
     """
     noise = fitter.noise
+    if fitter.recording.kind == "poses":
+        return stated_pose_noise(fitter, fit)
     if not noise.guessed.any():
         return correct_stated_noise(fitter.with_noise(update_noise_colour(fitter, fit)), fit)
     update = update_guessed_noise(fitter, fit)
@@ -61,24 +71,40 @@ def update_guessed_noise(fitter: Fitter, fit: Fit) -> Noise:
 
 
 def _of_longest_stretch(fitter: Fitter, fit: Fit, record: Record, i: int) -> tuple[float, np.ndarray, float] | None:
-    """`noise_from_residual` on the longest stretch of valid samples of channel i."""
+    """`noise_from_residual` on the longest stretch of channel i whose gaps are short, with straight lines across them."""
     y = fitter.predict(fit, record)[:, i]
     good = record.valid[:, i] & np.isfinite(y)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]])))
-    if not len(edges):
+    stretch = _longest_stretch(good)
+    if stretch is None:
         return None
-    a, b = max(edges.reshape(-1, 2), key=lambda stretch: stretch[1] - stretch[0])
+    a, b = stretch
+    at, rows = a + np.flatnonzero(good[a:b]), np.arange(a, b)
+    residual = np.interp(rows, at, record.observed[at, i] - y[at])
     highest = 2 * record.band * record.sample_time if record.band else 1.0
-    return noise_from_residual((record.observed[:, i] - y)[a:b], y[a:b], highest)
+    return noise_from_residual(residual, np.interp(rows, at, y[at]), highest)
+
+
+def _longest_stretch(good: np.ndarray) -> tuple[int, int] | None:
+    """The longest half-open range of `good` samples (n,) with no more than `NOISE_UPDATE.bridged` others in a row between; None where
+    none is good."""
+    at = np.flatnonzero(good)
+    if not len(at):
+        return None
+    parts = np.split(at, np.flatnonzero(np.diff(at) > NOISE_UPDATE.bridged + 1) + 1)
+    longest = max(parts, key=lambda part: part[-1] - part[0])
+    return int(longest[0]), int(longest[-1]) + 1
 
 
 def correct_stated_noise(fitter: Fitter, fit: Fit) -> Noise:
     """The noise with the size of the residual of `fit` for channels whose stated noise is wrong; the same object where none is.
 
     What is left is noise of another size, and no physics, where it is white on every record, its variance does not change, and
-    it has nothing to do with the drive. Physics of a stage that moves smoothly is never white.
+    it has nothing to do with drive, prediction, their squares and how fast they change. Physics of a stage that moves smoothly is
+    never white. Of settled poses see `stated_pose_noise`.
     """
     noise = fitter.noise
+    if fitter.recording.kind == "poses":
+        return stated_pose_noise(fitter, fit)
     sd, notes, count, sources = noise.sd.copy(), list(noise.notes), noise.count.copy(), list(noise.sources)
     for i in np.flatnonzero(noise.from_source(NoiseSource.STATED_WHITE)).tolist():
         records = [r for r in fitter.recording.records if r.role != "rest"]
@@ -88,7 +114,7 @@ def correct_stated_noise(fitter: Fitter, fit: Fit) -> Noise:
         if not (1 / NOISE_UPDATE.stated_factor < ratio < NOISE_UPDATE.stated_factor) or len(noise.ar[i]):
             continue
         if abs(ratio - 1) < NOISE_UPDATE.stated_margin or not all(
-            _is_noise_alone(e, r.drive[r.valid[:, i]]) for e, r in zip(residuals, records, strict=True)
+            _is_noise_alone(e, _motion(fitter, fit, r, i)) for e, r in zip(residuals, records, strict=True)
         ):
             continue
         sd[i], count[i], sources[i] = size, sum(map(len, residuals)), NoiseSource.RESIDUAL
@@ -101,12 +127,22 @@ def correct_stated_noise(fitter: Fitter, fit: Fit) -> Noise:
     return replace(noise, sd=sd, sources=tuple(sources), notes=tuple(notes), count=count)
 
 
-def _is_noise_alone(e: np.ndarray, drive: np.ndarray) -> bool:
-    """Whether `e` (n,) is white, of steady variance, and uncorrelated with the `drive` (n, n_u)."""
+def _motion(fitter: Fitter, fit: Fit, record: Record, i: int) -> np.ndarray:
+    """Drives and prediction of channel i, their squares and the size of their changes (n, m) at its valid samples: what a law that is
+    missing goes with."""
+    good = record.valid[:, i]
+    signals = np.column_stack([record.drive, fitter.predict(fit, record)[:, i]])
+    signals = signals - signals.mean(axis=0)
+    changes = np.abs(np.gradient(signals, axis=0))
+    return np.hstack([signals, signals**2, changes])[good]
+
+
+def _is_noise_alone(e: np.ndarray, motion: np.ndarray) -> bool:
+    """Whether `e` (n,) is white, of steady variance, and uncorrelated with the `motion` (n, m)."""
     if len(e) < STATISTICS.fewest_per_lag * STATISTICS.whiteness_lags or np.ptp(e) == 0:
         return False
     e = np.clip(e, *(DISCREPANCY.huber_corner * np.std(e) * np.array([-1, 1])))
-    p = (ljung_box(e), ljung_box(e**2 - np.mean(e**2)), cross_correlation(e, drive))
+    p = (ljung_box(e), ljung_box(e**2 - np.mean(e**2)), cross_correlation(e, motion))
     return min(p) > NOISE_UPDATE.noise_alone_p
 
 

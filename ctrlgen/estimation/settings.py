@@ -101,13 +101,26 @@ class NoiseUpdateSettings:
     largest_residual: float = 1.3
     """Root mean square of the residual over the noise, below which the residual's colour is taken as the noise's. A
     larger residual holds physics that was left out. Judgement."""
-    stated_factor: float = 2.0
-    """Factor by which a stated noise may be wrong. Judgement."""
+    stated_factor: float = 3.0
+    """Factor by which a stated noise may be wrong: half of the true one is a common mistake, and is known with its scatter.
+    Judgement."""
     stated_margin: float = 0.05
     """Relative difference of the residual from the stated noise up to which the statement stands: data sheets round."""
     noise_alone_p: float = 1e-4
     """p of whiteness, steady variance and no correlation with the drive, above which a residual is noise alone: three tests a
     record."""
+    fewest_poses: int = 30
+    """Readings of settled poses that tell a standard deviation: to 1/sqrt(60) = 13 %."""
+    poses_per_feature: int = 4
+    """Readings for each function of the drive by which the residual of poses is tested: Judgement."""
+    pose_alone_p: float = 1e-2
+    """p of each test of settled poses, above which their residual is noise alone: a few dozen poses tell little, and to leave a noise
+    as it was stated hides nothing."""
+    pose_lags: int = 5
+    """Poses over which their residual is tested for memory. Judgement."""
+    bridged: int = 3
+    """Samples in a row without a reading that a straight line bridges where guessed noise is taken from a residual: one in a hundred
+    changes a variance by half a hundredth. Judgement."""
     other_colour_p: float = 1e-4
     """p of whiteness at rest below which the colour found in the residual is not that of the noise."""
 

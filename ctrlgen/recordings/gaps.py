@@ -30,6 +30,7 @@ FEWEST_STEPS = 3  # steps that tell the clock of a drive that steps
 DWELLS = 4.0  # times a gap in the mean time between steps, from which on two equal sides have no step between
 AROUND = 50  # rows on each side that tell how much a drive changes in as many rows as a gap has
 USUAL = 3.0  # times that change, beyond which a drive jumped inside of the gap
+TOLD = 1e-6  # of the drive's range: how far off a bridge must be for a note to say so
 LISTED_CUTS = 5  # places at which a record was cut that a note names
 
 
@@ -57,7 +58,7 @@ def bridged(record: Record, gap: Gap | None) -> tuple[Record, list[str]]:
         return record, []
     ways = [gap] if gap else sorted({way for d in drives for way in d.ways})
     off = max((d.errors[key] for d in drives for key in d.used), default=0.0)
-    right = f" (within {100 * off:.1g} % of its range, by trials)" if off > 0 else ""
+    right = f" (within {100 * off:.1g} % of its range, by trials)" if off > TOLD else ""
     count = (
         f"{len(sizes)} gaps, the longest of {max(sizes)} samples, are"
         if len(sizes) > 1
@@ -68,7 +69,7 @@ def bridged(record: Record, gap: Gap | None) -> tuple[Record, list[str]]:
         "readings of theirs are not used."
     )
     observed = np.where(valid, whole.observed, np.nan)
-    return _rows(replace(whole, drive=drive, valid=valid, observed=observed), kept), [note]
+    return rows_of(replace(whole, drive=drive, valid=valid, observed=observed), kept), [note]
 
 
 class _Drive:
@@ -143,7 +144,7 @@ def _on_its_grid(record: Record) -> tuple[Record, np.ndarray]:
     return replace(record, time=time, drive=drive, observed=observed, valid=valid, ambient=ambient), there
 
 
-def _rows(record: Record, kept: np.ndarray) -> Record:
+def rows_of(record: Record, kept: np.ndarray) -> Record:
     """The rows `kept` (n,) bool of a record."""
     ambient = None if record.ambient is None else record.ambient[kept]
     time, drive, observed, valid = (v[kept] for v in (record.time, record.drive, record.observed, record.valid))

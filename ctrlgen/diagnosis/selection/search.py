@@ -50,7 +50,7 @@ class Searcher:
         for _ in range(SEARCH.most_noise_updates):
             current = self._forward_rounds(current, rounds)
             before = trials.fitter.noise
-            noise = update_noise(trials.fitter, current.fit) if trials.fitter.recording.kind == "series" else before
+            noise = update_noise(trials.fitter, current.fit)
             if noise is before:
                 break
             trials.use(trials.fitter.with_noise(noise))
