@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import casadi as ca
-from pydantic import Field, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
 from ctrlgen.core.units import Quantity
 from ctrlgen.devices.device_physics import DevicePhysics
 from ctrlgen.devices.quantities import member_at, si_namespace, walk
+from ctrlgen.devices.reported_units import in_units_of
 from ctrlgen.devices.run_time import RunTime, RunTimeConstant, run_time_constants
 from ctrlgen.devices.section import Section
 from ctrlgen.devices.sensor import AnySensor
@@ -43,6 +44,9 @@ class Device(Section):
     drift. Without it every number is compiled in.
     """
 
+    # by signal, such as ("reading.axis", "mm"); empty: the units of the kind of device
+    _told_in: tuple[tuple[str, str], ...] = PrivateAttr(())
+
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
         kinds = getattr(cls.model_fields["kind"].annotation, "__args__", ())
@@ -62,6 +66,17 @@ class Device(Section):
     def physics(self, p: SimpleNamespace) -> DevicePhysics:
         """The device's physics with the values `p` (SI numbers, or symbols where they are free)."""
         raise NotImplementedError
+
+    def told_physics(self, p: SimpleNamespace) -> DevicePhysics:
+        """The physics as `physics` gives it, told in the units that `told_in` was given."""
+        physics = self.physics(p)
+        return in_units_of(physics, dict(self._told_in)) if self._told_in else physics
+
+    def told_in(self, units: Mapping[str, str]) -> Device:
+        """The same device, whose reports state numbers in the `units` of signals, such as {'reading.axis': 'mm'}."""
+        told = self.model_copy()
+        told._told_in = tuple(units.items())
+        return told
 
     def remarks(self) -> list[str]:
         """Remarks on the description for the reader, such as an equation that is used outside its range."""

@@ -90,6 +90,7 @@ def _diagnose(
     jobs: int,
 ) -> Diagnosis:
     effects = selected_laws(laws)
+    device = _in_units_of_the_reader(device, recording)
     recording = _relative_ambient(_with_both_roles(recording))
     step("noise")
     live = without_dead_channels(device, recording, effects)
@@ -144,6 +145,16 @@ def _empirical_terms(
         return empirical_terms(search.fitter, search.chosen.fit, shares), ()
     except FAILURES as error:
         return (), (f"empirical terms are left out: {error}",)
+
+
+def _in_units_of_the_reader(device: Device, recording: Recording) -> Device:
+    """The device, whose numbers are told in the units of the recording's columns."""
+    drives = [f"drive.{c}" for c in nominal_physics(device).drive.channels]
+    units = {
+        **dict(zip(recording.channels, recording.units, strict=True)),
+        **(dict(zip(drives, recording.drive_units, strict=True)) if recording.drive_units else {}),
+    }
+    return device.told_in(units)
 
 
 def _with_both_roles(recording: Recording) -> Recording:

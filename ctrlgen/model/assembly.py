@@ -157,7 +157,7 @@ def _assemble(
 def _physics(without_effects: Device, free: tuple[str, ...]) -> tuple[dict[str, ca.SX], DevicePhysics]:
     """The symbols of the numbers `free` and the physics with them; models of one device share both."""
     symbols = {path: ca.SX.sym(path) for path in free}
-    return symbols, without_effects.physics(without_effects.values(symbols))
+    return symbols, without_effects.told_physics(without_effects.values(symbols))
 
 
 def _limited(physics: DevicePhysics, signals: dict[str, Signal], z: ca.SX) -> SimpleNamespace:

@@ -22,6 +22,7 @@ from ctrlgen.recordings import preprocessing, validation
 from ctrlgen.recordings.formats import READERS, MeasurementTable, read_table
 from ctrlgen.recordings.recording import Record, Recording
 from ctrlgen.recordings.schema import FILE, Column, RecordingFile, RecordTable, check, deviation, fits
+from ctrlgen.recordings.units_of_columns import channel_names
 
 
 def load_recordings(paths: Sequence[Path | str], model: Model, *, hold_out: bool = True) -> Recording:
@@ -54,8 +55,7 @@ def load_recordings(paths: Sequence[Path | str], model: Model, *, hold_out: bool
         for name, column in written.columns_of(r).items()
     ]
     channels = tuple(dict.fromkeys(name for name, _ in columns if not name.startswith("drive.")))
-    first_unit = {name: column.unit for name, column in reversed(columns)}
-    names = _channel_names(model, channels, tuple(first_unit[name] for name in channels))
+    names = channel_names(model, [written for _, written in readable], columns, channels)
     contents = [file.read(names) for file in files]
     faults += [fault for content in contents for fault in content.faults]
     if faults:
@@ -84,12 +84,8 @@ def load_recordings(paths: Sequence[Path | str], model: Model, *, hold_out: bool
             *divided.notes,
         ),
         tolerance=tolerance,
+        drive_units=names.drive_units,
     )
-
-
-def _channel_names(model: Model, channels: tuple[str, ...], units: tuple[str, ...]) -> validation.ChannelNames:
-    drive = model.signals["drive"]
-    return validation.ChannelNames(tuple(f"drive.{c}" for c in drive.channels), drive.units, channels, units)
 
 
 def _stated(

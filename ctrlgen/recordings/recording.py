@@ -65,7 +65,8 @@ class Recording:
 
     `kind`: "series" or "poses". `channels` observed, such as 'reading.delta_x', with the reader's `units` and the stated
     standard deviation of their `noise` in SI, None where none is stated. `notes`: what validation marked or could not do.
-    `tolerance`: error of each channel in SI that does not matter to the reader, None where none is stated.
+    `tolerance`: error of each channel in SI that does not matter to the reader, None where none is stated. `drive_units`: the reader's
+    unit of each drive of the model, empty where they are the model's.
     """
 
     title: str
@@ -77,6 +78,7 @@ class Recording:
     records: tuple[Record, ...]
     notes: tuple[str, ...]
     tolerance: tuple[float | None, ...] = ()
+    drive_units: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.tolerance:  # none stated

@@ -62,13 +62,13 @@ class UserDevice(Device):
 
     def _value(self) -> tuple[Any, ...]:
         plain = (getattr(self, key) for key in Device.model_fields)
-        return self.description.identity, *plain, *self.quantities()
+        return self.description.identity, self._told_in, *plain, *self.quantities()
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickles the user's functions, which must be picklable, and the values; the class is made again from them."""
         sections = {s: dict(getattr(self, s)) for s in SECTIONS.values() if s in type(self).model_fields}
         plain = {key: getattr(self, key) for key in Device.model_fields}
-        return _unpickled, (self.description, plain, sections)
+        return _unpickled, (self.description, plain, sections, dict(self._told_in))
 
 
 def _numbers(description: UserDescription, p: SimpleNamespace) -> Ports:
@@ -95,9 +95,12 @@ def _device_class(description: UserDescription) -> type[UserDevice]:
 
 
 def _unpickled(
-    description: UserDescription, plain: dict[str, Any], sections: dict[str, dict[str, Quantity]]
-) -> UserDevice:
-    return _device_class(description).model_validate({**plain, **sections})
+    description: UserDescription,
+    plain: dict[str, Any],
+    sections: dict[str, dict[str, Quantity]],
+    told_in: dict[str, str],
+) -> Device:
+    return _device_class(description).model_validate({**plain, **sections}).told_in(told_in)
 
 
 Size = str | tuple[str, str]  # the largest size, "24 V", or a range, ("0 V", "150 V")
