@@ -27,6 +27,7 @@ KNOWN = {
     "chirp": (np.sin(2 * np.pi * (t + 10 * t**2)), 1e-6),
     "triangle": (np.abs((2 * t) % 2 - 1), 1e-3),  # two rows next to a corner
     "at rest": (np.zeros(N), 0.0),
+    "levels, then a sweep": (np.where(t < 2, np.floor(t), np.sin(2 * np.pi * 8 * (t - 2) ** 2)), 1e-4),
     "clocked steps": (np.repeat(np.random.default_rng(5).choice([-1.0, 0.0, 1.0], N // 10), 10), 0.0),
     "twelve bits": (np.round(drive(N) * 512) / 512, 2e-3),
 }

@@ -12,8 +12,9 @@ from scipy.signal import lfilter, lsim
 from ctrlgen.diagnosis.diagnose import diagnose_recording
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.estimation.noise import estimate_noise
-from ctrlgen.estimation.noise_update import correct_stated_noise, update_guessed_noise
+from ctrlgen.estimation.noise_update import correct_stated_noise, update_guessed_noise, update_noise_colour
 from ctrlgen.recordings.recording import Recording
+from ctrlgen.recordings.validation import rows_between
 
 N = 1500
 LAWS = ("backlash", "coulomb", "creep", "drift", "force_step", "sensor_step", "stiffening", "thermal_lag", "vibration")
@@ -114,6 +115,16 @@ def test_what_is_not_white_or_follows_the_drive_is_no_noise():
     assert after is before  # its variance changes
     before, after = corrected(recorded(coloured, 0.7 * NOISE))
     assert after is before
+
+
+@pytest.mark.parametrize("rows", [500, 1500])
+def test_a_noise_that_is_stated_takes_its_colour_from_what_is_left_however_short_the_record(rows):
+    given = recorded(coloured)
+    recording = replace(given, records=tuple(rows_between(r, 0, rows) for r in given.records))
+    fitter = replace(fitter_of(), recording=recording, noise=estimate_noise(recording, SETTLING))
+    weighed, described = fitter.described(AXIS)
+    after = update_noise_colour(weighed, described)
+    assert after.ar[0][0] == pytest.approx(0.6, abs=0.15) and after.floor[0] == pytest.approx(NOISE, rel=0.1)
 
 
 @pytest.mark.parametrize("missing", [0.0, 0.02])

@@ -18,7 +18,7 @@ from ctrlgen.estimation.noise import (
 )
 from ctrlgen.estimation.pose_noise import stated_pose_noise
 from ctrlgen.estimation.residual_noise import noise_from_residual
-from ctrlgen.estimation.settings import DISCREPANCY, NOISE_UPDATE, STATISTICS
+from ctrlgen.estimation.settings import DISCREPANCY, NOISE, NOISE_UPDATE, STATISTICS
 from ctrlgen.recordings.recording import Record
 
 
@@ -149,15 +149,17 @@ def _is_noise_alone(e: np.ndarray, motion: np.ndarray) -> bool:
 def update_noise_colour(fitter: Fitter, fit: Fit) -> Noise:
     """The noise with the colour of the residual of `fit`, per channel; the same object where no channel changes.
 
-    A channel changes where its noise was estimated from fewer samples than there are to fit, the residual is not much
-    larger than the noise, and rest, whitened by the residual's coefficients, is white. The standard deviation follows the
+    A channel changes where its noise was estimated from fewer samples than there are to fit, or stated without a colour, the residual
+    is not much larger than the noise, and rest, whitened by the residual's coefficients, is white. The standard deviation follows the
     residual too, but not beyond the uncertainty of its first estimate.
     """
     noise = fitter.noise
     sd, ar, floor = noise.sd.copy(), list(noise.ar), noise.floor
     changed = False
     rests = [r for r in fitter.recording.records if r.role == "rest"]
-    for i in np.flatnonzero(noise.count < sum(len(r.time) for r in fitter.fit_records)).tolist():
+    there = sum(len(r.time) for r in fitter.fit_records)
+    no_colour = noise.from_source(NoiseSource.STATED_WHITE) & (there >= NOISE.shortest_stretch)
+    for i in np.flatnonzero((noise.count < there) | no_colour).tolist():
         residuals = [_residual(fitter, fit, r, i) for r in fitter.fit_records]
         rms = np.sqrt(np.mean(np.concatenate(residuals) ** 2))
         if rms >= NOISE_UPDATE.largest_residual * floor[i]:

@@ -16,7 +16,8 @@ Way = Literal["held", "linear", "smooth"]
 
 ORDER = 24  # of the autoregressive model: a dozen sines
 WINDOW = 150  # rows on either side that the model is taken from
-PLACES = 24  # rows that are there and are told from those around, as a trial
+REACH = 400  # rows on either side of a gap in which trials are made
+TRIALS = 8  # gaps of the same length that are made there in rows that are known
 QUANTILE = 0.9  # of the errors of the trials: a drive may have a few corners
 
 
@@ -25,23 +26,26 @@ def across(drive: np.ndarray, a: int, b: int, way: Way) -> np.ndarray:
     return _WAYS[way](drive, a, b)
 
 
-def error(drive: np.ndarray, length: int, way: Way) -> float:
-    """How far `way` is off in gaps of `length` rows [range of the drive], by trials where `drive` (n,) is known; infinite where it
-    cannot be tried."""
-    span, n, side = np.nanmax(drive) - np.nanmin(drive), len(drive), max(length, 3)
-    if 2 * side + length > n:
-        return np.inf
-    clear = np.convolve(np.isnan(drive), np.ones(2 * side + length, int), "valid") < 0.5
-    begins = np.flatnonzero(clear) + side
+def error(drive: np.ndarray, a: int, b: int, way: Way) -> float:
+    """How far `way` is off in gaps as long as rows a to b [range of the drive], by trials around them where `drive` (n,) is known;
+    infinite where it cannot be tried."""
+    span, length = float(np.nanmax(drive) - np.nanmin(drive)), b - a
+    low, side = max(a - REACH, 0), max(length, 3)
+    x = drive[low : b + REACH]
+    if 2 * side + length > len(x) or span == 0:
+        return np.inf if span else 0.0
+    clear = np.convolve(np.isnan(x), np.ones(2 * side + length, int), "valid") < 0.5
+    begins = low + np.flatnonzero(clear) + side
     if not len(begins):
         return np.inf
-    worst = []
-    for a in begins[np.linspace(0, len(begins) - 1, min(PLACES, len(begins))).astype(int)].tolist():
-        low, b = max(a - WINDOW, 0), a + length
-        tried = drive[low : b + WINDOW].copy()
-        tried[a - low : b - low] = np.nan
-        worst.append(np.abs(across(tried, a - low, b - low, way) - drive[a:b]).max())
-    return float(np.quantile(worst, QUANTILE) / span) if span > 0 else 0.0
+    off = []
+    for first in begins[np.linspace(0, len(begins) - 1, min(TRIALS, len(begins))).astype(int)].tolist():
+        start, last = max(first - WINDOW, 0), first + length
+        tried = drive[start : last + WINDOW].copy()
+        tried[first - start : last - start] = np.nan
+        values = across(tried, first - start, last - start, way)
+        off.append(np.abs(values - drive[first:last]).max())
+    return float(np.quantile(off, QUANTILE) / span)
 
 
 def _held(u: np.ndarray, a: int, b: int) -> np.ndarray:
@@ -62,18 +66,21 @@ def _smooth(u: np.ndarray, a: int, b: int) -> np.ndarray:
     order = min(ORDER, len(x) // 6)
     if order < 2:
         return _linear(u, a, b)
-    rows = np.lib.stride_tricks.sliding_window_view(x, order + 1)
-    whole = np.isfinite(rows).all(axis=1)
-    if whole.sum() < 2 * order:
+    windows = np.lib.stride_tricks.sliding_window_view(x, order + 1)
+    whole = np.isfinite(windows).all(axis=1)
+    if whole.sum() < order:
         return _linear(u, a, b)
     scale = np.nanmax(np.abs(x)) or 1.0
-    # singular for few sines: the smallest coefficients of all
-    coefficients = np.linalg.lstsq(rows[whole, :-1] / scale, rows[whole, -1] / scale, rcond=1e-10)[0]
+    # what is predicted forward is predicted backward, too; singular for few sines: the smallest coefficients of all
+    ways = np.vstack([windows[whole], windows[whole, ::-1]]) / scale
+    coefficients = np.linalg.lstsq(ways[:, :-1], ways[:, -1], rcond=1e-10)[0]
     weights = np.concatenate([-coefficients, [1.0]])
     # prediction errors that a sample of the gap takes part in, with what else is missing there
     near = np.flatnonzero(np.lib.stride_tricks.sliding_window_view(gap, order + 1).any(axis=1))
-    touched = np.zeros((len(near), len(x)))
-    touched[np.arange(len(near))[:, None], near[:, None] + np.arange(order + 1)] = weights
+    both = np.zeros((2, len(near), len(x)))
+    for k, w in enumerate((weights, weights[::-1])):
+        both[k, np.arange(len(near))[:, None], near[:, None] + np.arange(order + 1)] = w
+    touched = both.reshape(-1, len(x))
     missing = ~np.isfinite(x) & touched.any(axis=0)
     known = np.where(np.isfinite(x), x, 0.0)
     solved = np.linalg.lstsq(touched[:, missing], -touched @ known, rcond=1e-12)[0]

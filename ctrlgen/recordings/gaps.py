@@ -12,6 +12,7 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from ctrlgen.recordings import drive_across_gaps
 from ctrlgen.recordings.drive_across_gaps import Way
@@ -25,9 +26,11 @@ WHOLE_SAMPLES = 0.1  # sample times: how far a gap may be off a whole number of 
 LONGEST = 100  # rows of a gap that is bridged unasked
 RIGHT = 2e-3  # of the drive's range: how far off a bridge may be that nobody asked for
 REST_SAMPLES = 5  # on each side of a gap, over which the drive must be at rest
-STEPPED = 0.5  # of the samples of a drive that steps differ from the one before, at most
-FEWEST_STEPS = 3  # steps that tell the clock of a drive that steps
-DWELLS = 4.0  # times a gap in the mean time between steps, from which on two equal sides have no step between
+STEPPED = 0.5  # of the samples around differ from the one before, at most, where a drive steps
+FEWEST_STEPS = (
+    6  # steps that tell the clock of a drive that steps: a chance divisor of so many distances is one in thirty
+)
+DWELLS = 4.0  # times a gap in the usual time between steps, from which on two equal sides have no step between
 AROUND = 50  # rows on each side that tell how much a drive changes in as many rows as a gap has
 USUAL = 3.0  # times that change, beyond which a drive jumped inside of the gap
 TOLD = 1e-6  # of the drive's range: how far off a bridge must be for a note to say so
@@ -57,7 +60,7 @@ def bridged(record: Record, gap: Gap | None) -> tuple[Record, list[str]]:
     if not sizes:
         return record, []
     ways = [gap] if gap else sorted({way for d in drives for way in d.ways})
-    off = max((d.errors[key] for d in drives for key in d.used), default=0.0)
+    off = max(d.off for d in drives)
     right = f" (within {100 * off:.1g} % of its range, by trials)" if off > TOLD else ""
     count = (
         f"{len(sizes)} gaps, the longest of {max(sizes)} samples, are"
@@ -73,48 +76,56 @@ def bridged(record: Record, gap: Gap | None) -> tuple[Record, list[str]]:
 
 
 class _Drive:
-    """One drive (n,), NaN where it is not known, and what it tells of its gaps: `used` the trials that were relied on, by length and
-    way, with their `errors`; `ways` of all gaps that it told."""
+    """One drive (n,), NaN where it is not known, and what it tells of its gaps: `ways` that it was taken across them, and `off`, the
+    largest error in trials of those [range of the drive]."""
 
     def __init__(self, u: np.ndarray) -> None:
         self.u = u
-        self.errors: dict[tuple[int, Way], float] = {}
-        self.used: set[tuple[int, Way]] = set()
         self.ways: set[Way] = set()
+        self.off = 0.0
+        self.span = float(np.nanmax(u) - np.nanmin(u))
+        change = np.diff(u) != 0
         pairs = np.isfinite(u[1:]) & np.isfinite(u[:-1])
-        self.changes = np.flatnonzero(pairs & (np.diff(u) != 0)) + 1
-        self.stepped = len(self.changes) <= STEPPED * pairs.sum()
-        self.clock = int(np.gcd.reduce(np.diff(self.changes))) if len(self.changes) > FEWEST_STEPS else 1
-        self.dwell = len(u) / (len(self.changes) + 1)
+        self.moves = np.where(pairs, change, np.nan)
+        alone = pairs[1:-1] & change[1:-1] & ~change[:-2] & ~change[2:]
+        steps = np.flatnonzero(alone) + 2
+        self.step = int(steps[0]) if len(steps) else 0
+        self.clock = int(np.gcd.reduce(np.diff(steps))) if len(steps) > FEWEST_STEPS else 1
+        self.dwell = float(np.median(np.diff(steps))) if len(steps) > 1 else len(u)
 
     def across(self, a: int, b: int) -> np.ndarray | None:
         """The drive (b - a,) in rows a to b, half open; None where it does not tell."""
-        return self._held(a, b) if self.stepped else self._as_elsewhere(a, b)
+        around = self.moves[max(a - AROUND, 0) : b + AROUND]
+        stepped = np.nanmean(around) <= STEPPED if np.isfinite(around).any() else False
+        return self._held(a, b) if stepped else self._as_elsewhere(a, b)
 
     def _held(self, a: int, b: int) -> np.ndarray | None:
         """A drive that mostly stands still: at the one value of both sides, or from one to the other where its clock strikes once."""
         before, after, length = self.u[a - 1], self.u[b], b - a
-        self.ways.add("held")
-        strikes = [k for k in range(a, b + 1) if (k - self.changes[0]) % self.clock == 0] if self.clock > 1 else []
-        if before == after and (length <= self.dwell / DWELLS or len(strikes) <= 1):
+        strikes = [k for k in range(a, b + 1) if (k - self.step) % self.clock == 0] if self.clock > 1 else []
+        if before == after and (length <= self.dwell / DWELLS or (self.clock > 1 and len(strikes) <= 1)):
+            self.ways.add("held")
             return np.full(length, before)
         if len(strikes) == 1 and before != after:
+            self.ways.add("held")
             return np.where(np.arange(a, b) < strikes[0], before, after)
         return None
 
     def _as_elsewhere(self, a: int, b: int) -> np.ndarray | None:
-        """A drive that moves: linear or smooth, whichever is right in trials where it is known."""
-        length = b - a
+        """A drive that moves: linear or smooth, whichever is right in trials around."""
         ways: tuple[Way, ...] = ("linear", "smooth")
-        for way in ways:
-            if (length, way) not in self.errors:
-                self.errors[length, way] = drive_across_gaps.error(self.u, length, way)
-        best = min(ways, key=lambda way: self.errors[length, way])
-        if self.errors[length, best] > RIGHT or self._jumps(a, b):
+        errors = {way: drive_across_gaps.error(self.u, a, b, way) for way in ways}
+        values = {way: drive_across_gaps.across(self.u, a, b, way) for way in ways}
+        best = min(ways, key=lambda way: errors[way])
+        # beside a step, what is smooth elsewhere goes astray
+        apart = float(np.abs(values["smooth"] - values["linear"]).max())
+        if apart > (USUAL * errors["linear"] + RIGHT) * self.span:
+            best = "linear"
+        if errors[best] > RIGHT or self._jumps(a, b):
             return None
         self.ways.add(best)
-        self.used.add((length, best))
-        return drive_across_gaps.across(self.u, a, b, best)
+        self.off = max(self.off, errors[best])
+        return values[best]
 
     def _jumps(self, a: int, b: int) -> bool:
         """Whether it changes more across rows a to b than around in as many rows."""
@@ -154,7 +165,9 @@ def rows_of(record: Record, kept: np.ndarray) -> Record:
 def stretches(record: Record, gap: Gap | None = None) -> tuple[list[Record], list[str]]:
     """The record with short gaps bridged, cut at the others in time and where a drive is missing, and joined across one in which the
     drive rests; and a note on what was done. `gap` says what the drive does in all of them."""
-    record, bridged_notes = (record, []) if gap == "split" else bridged(record, gap)
+    # one thread: the matrices are small
+    with threadpool_limits(1):
+        record, bridged_notes = (record, []) if gap == "split" else bridged(record, gap)
     known = np.isfinite(record.drive).all(1)
     breaks = (np.flatnonzero(np.diff(record.time) > BREAK * record.sample_time) + 1).tolist()
     edges = np.flatnonzero(np.diff(np.r_[False, known, False].astype(int)))
