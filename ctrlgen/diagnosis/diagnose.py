@@ -53,6 +53,9 @@ from ctrlgen.recordings.recording import Recording
 
 Progress = Callable[[str], None]
 RESTLESS = "{}: at rest the residual jumps or has memory, so it is not noise; something acts there that the device file does not describe"
+WITHDRAWN = (
+    "{} at {} is not confirmed: with it the held-out records are predicted worse than by the device as described"
+)
 RESTRICTED = "only these effects were considered, beside the device's own parameters: {}"
 
 
@@ -204,6 +207,7 @@ def _notes(
         *marks,
         *map(RESTLESS.format, restless),
         *([] if laws is None else [RESTRICTED.format(", ".join(law.kind for law in effects) or "none")]),
+        *(WITHDRAWN.format(c.effect, c.location) for c in search.withdrawn),
         *(f"could not be tried: {text}" for text in failed),
     )
 

@@ -58,6 +58,8 @@ class LawPrior:
     suspected: False for what a device file may state, and no recording shows beside what else it shows.
     repeatable: the law may act more than once at one place, as harmonics do.
     acts_on_all: the law is suspected at all channels at once only.
+    of_time: what it does is a function of time alone (an event, a drift, a line), whatever the machine does. A law that acts with
+        the motion comes first where it explains nearly as much.
     domain: where a finding is reported to be; by default what the law's place says.
     parameters: by name; one that is not listed gets `default_starts`.
     """
@@ -71,8 +73,14 @@ class LawPrior:
     suspected: bool = True
     repeatable: bool = False
     acts_on_all: bool = False
+    of_time: bool = False
     domain: str | None = None
     parameters: Mapping[str, ParameterPrior] = field(default_factory=dict)
+
+    @property
+    def is_pitch(self) -> bool:
+        """Whether the law repeats along a path."""
+        return any(p.start_from_data == "spatial_periods" for p in self.parameters.values())
 
     def of(self, parameter: Param) -> ParameterPrior:
         """The row of one parameter of the law, or its default."""

@@ -66,7 +66,12 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             domain="recording",
         ),
         "delay": LawPrior("Error of the interpolation between samples; 0.1 %: judgement.", model_form_error=0.001),
-        "drift": LawPrior("What drifts also wanders; 10 %: judgement.", model_form_error=0.1),
+        "drift": LawPrior(
+            "What drifts also wanders; 10 %: judgement. As rare as an event: it follows any residual that has a slow part.",
+            log_prior_odds=ONE_IN_A_HUNDRED,
+            model_form_error=0.1,
+            of_time=True,
+        ),
         "home_offset": LawPrior(
             "Readings are zeroed before a run, and an offset fits the mean of any residual of one sign, as of friction in one "
             "direction: judgement.",
@@ -87,7 +92,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             parameters={"quantum": _starts((1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1))},
         ),
         "sensor_step": LawPrior(
-            _EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, domain="disturbance", parameters=_EVENT
+            _EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, of_time=True, domain="disturbance", parameters=_EVENT
         ),
         "stitching_error": LawPrior(
             "Rarer than errors that act along the whole path: judgement. A scale may have several joints.",
@@ -108,7 +113,10 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             parameters={"reference": _starts((0.0,))},
         ),
         "vibration": LawPrior(
-            "From outside. Frequencies of mains and rotating machines, and the lines of the residual's spectrum.",
+            "From outside. Frequencies of mains and rotating machines, and the lines of the residual's spectrum. Rarer than a pitch, "
+            "which is the same at one speed: judgement.",
+            log_prior_odds=ONE_IN_TEN,
+            of_time=True,
             domain="disturbance",
             parameters={
                 "frequency": _starts((10.0, 16.7, 25.0, 33.0, 50.0, 60.0, 100.0, 120.0)),
@@ -219,7 +227,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             parameters={"gap": _peaks(-0.97, -0.9, -0.7, -0.4, 0.4, 0.7, 0.9, 0.97), "power": _starts((1.0, 1.5))},
         ),
         "force_step": LawPrior(
-            _EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, domain="disturbance", parameters=_EVENT
+            _EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, of_time=True, domain="disturbance", parameters=_EVENT
         ),
         "hysteresis": LawPrior(
             _HYSTERESIS + _IN_BALANCE,
@@ -228,7 +236,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             family="hysteresis",
             parameters={"reach": _starts((0.03, 0.1, 0.3, 1.0, 2.0)), "taper": _starts((0.5,))},
         ),
-        "lost_beams": LawPrior(_EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, parameters=_EVENT),
+        "lost_beams": LawPrior(_EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, of_time=True, parameters=_EVENT),
         "one_sided_stiffening": LawPrior(
             "A flexure that is straight at home stiffens alike to both sides: rarer than that. Judgement.",
             log_prior_odds=-1.0,

@@ -170,11 +170,23 @@ class ModelSelection:
         return errors.is_noise or (self.matters(before, after) and wins_by_block(before.held_out, after.held_out))
 
     def matters(self, before: CandidateModel, after: CandidateModel) -> bool:
-        """Whether `after` takes away a share of the whole mismatch of any channel on the held-out records that is worth a name."""
+        """Whether `after` takes away a share of the whole mismatch of any channel on the held-out records that is worth a name, or
+        much of what `before` leaves there."""
         if self.mismatch is None:
             return True
         gain = (before.held_out.plain_mean - after.held_out.plain_mean) * self.fitter.noise.floor**2
-        return bool(np.any(gain > MODEL_SELECTION.least_share * self.mismatch))
+        return bool(np.any(gain > MODEL_SELECTION.least_share * self.mismatch)) or self.takes_much(before, after)
+
+    def takes_much(self, before: CandidateModel, after: CandidateModel) -> bool:
+        """Whether `after` takes away much of what `before` leaves in any channel on the held-out records, however little that is
+        of the whole mismatch; less is asked of one more term of a law that is there already, as a harmonic is."""
+        laws = {(c.effect, c.location) for c in before.causes if c.prior.repeatable}
+        added = [c for c in after.causes if c not in before.causes]
+        further = bool(laws) and all((c.effect, c.location) in laws for c in added)
+        most = 1 - (MODEL_SELECTION.least_further_share if further else MODEL_SELECTION.much)
+        left, was = after.held_out.plain_mean, before.held_out.plain_mean
+        shown = was > RESIDUAL_TESTS.error_ratio**2
+        return bool(np.any(shown & (left < most * was)) and self.contradicted(after, before))
 
     def contradicted(self, before: CandidateModel, after: CandidateModel) -> bool:
         """Whether `after` predicts the held-out records worse than `before`, beyond chance."""

@@ -38,11 +38,7 @@ def objections(
         reason = (
             _outside_its_range(fit, k)
             or _on_the_lattice(recording, fit, k)
-            or (
-                None
-                if exact
-                else _no_pitch(recording, fit, k) or _no_line(recording, fit, k) or _no_event(recording, fit, k)
-            )
+            or (None if exact else _of_another_kind(recording, fit, k))
         )
         if reason:
             reasons[k] = reason
@@ -51,6 +47,12 @@ def objections(
         if causes[new] not in accepted and new not in reasons and _same_line(recording, fit, j, k):
             reasons[new] = "the records are too short to tell it from another line of its kind"
     return reasons
+
+
+def _of_another_kind(recording: Recording, fit: Fit, k: int) -> str | None:
+    """Why cause k, beside which more than noise is left, only looks like its law; None where nothing says so."""
+    tests = (_no_pitch, _no_line, _no_event, _no_drift)
+    return next((reason for test in tests if (reason := test(recording, fit, k))), None)
 
 
 def _outside_its_range(fit: Fit, k: int) -> str | None:
@@ -155,6 +157,25 @@ def _no_event(recording: Recording, fit: Fit, k: int) -> str | None:
         if any(abs(values[name] - t) <= near for name in moments for t in _onsets(record)):
             return "it happens where the motion begins or ends, as friction, slack and delays do"
     return None
+
+
+def _no_drift(recording: Recording, fit: Fit, k: int) -> str | None:
+    """Why a drift is none: it would be a large part of the motion; None where it may be one."""
+    cause = fit.structure.causes[k]
+    channel = f"reading.{cause.at}"
+    if cause.effect == PARAMETER or recording.kind != "series" or channel not in recording.channels:
+        return None
+    rate = cause.law.amplitude()
+    if not (cause.prior.of_time and rate.unit == "channel/s"):
+        return None
+    i = recording.channels.index(channel)
+    records = [r for r in recording.records if r.role == "fit"]
+    read = np.concatenate([r.observed[r.valid[:, i], i] for r in records])
+    time = max((float(r.time[-1] - r.time[0]) for r in records), default=0.0)
+    share = abs(fit.values(k)[rate.name]) * time / max(float(np.ptp(read)) if len(read) else 0.0, 1e-300)
+    if share <= OBJECTIONS.largest_drift:
+        return None
+    return f"it would drift by {100 * share:.0f} % of the motion within a record"
 
 
 def _onsets(record: Record) -> np.ndarray:

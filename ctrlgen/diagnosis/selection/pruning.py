@@ -1,36 +1,58 @@
 """Causes taken out of a model: those that meet an objection, and those that it does not need.
 
-A candidate is pruned, not discarded: without the causes that meet an objection it is fitted again and compared again, and
-what is refused is kept with its reason.
+A candidate is pruned, not discarded: a cause that meets an objection is begun again from its next start, and where each meets
+one, the candidate is fitted again without it and compared again. What is refused is kept with its reason.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
+from ctrlgen.diagnosis.selection.attribution import as_fitted
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal
-from ctrlgen.diagnosis.selection.trials import Trials
-from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.diagnosis.selection.model_selection import scored
+from ctrlgen.diagnosis.selection.screen import Screened
+from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
+from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 
 
-def all_pruned(trials: Trials, current: CandidateModel, candidates: Sequence[CandidateModel]) -> list[CandidateModel]:
-    """The candidates that meet no objection, and of the others what is left without the causes that do."""
+def all_pruned(
+    trials: Trials, current: CandidateModel, candidates: Sequence[CandidateModel], screened: Screened | None = None
+) -> list[CandidateModel]:
+    """The candidates that meet no objection, and of the others what is left without the causes that do, each begun again from
+    where else the screen saw it."""
     by_causes: dict[frozenset[Any], CandidateModel] = {}
-    for kept in trials.each(lambda branch, t: pruned(branch, t, current.causes), candidates):
+    starts = {} if screened is None else {s.hypothesis: (s.start, *s.other_starts) for s in screened.suspects}
+    for kept in trials.each(lambda branch, t: pruned(branch, t, current.causes, starts, current), candidates):
         if kept is not None:
             by_causes.setdefault(frozenset(kept.causes), kept)
     return list(by_causes.values())
 
 
-def pruned(trials: Trials, candidate: CandidateModel, accepted: Sequence[Hypothesis]) -> CandidateModel | None:
-    """The candidate without the causes that meet an objection, fitted again; None where none of its new ones is left."""
+def pruned(
+    trials: Trials,
+    candidate: CandidateModel,
+    accepted: Sequence[Hypothesis],
+    starts: Mapping[Hypothesis, Sequence[dict[str, float]]] = MappingProxyType({}),
+    before: CandidateModel | None = None,
+) -> CandidateModel | None:
+    """The candidate without the causes that meet an objection, fitted again; None where none of its new ones is left. Where it
+    scores better than the model `before`, each is begun again first in its other `starts`."""
     for _ in range(len(candidate.causes) + 1):
         against = trials.objections(candidate, accepted)
         if not against:
             return candidate
         causes = tuple(candidate.causes[k] for k in against)
         trials.refused.append(Refusal(candidate, causes, tuple(against.values())))
+        if before is not None and trials.selection.advantage(candidate, before) > 0:
+            again = _begun_elsewhere(trials, candidate, against, accepted, starts, before)
+            if again is not None:
+                return again
         structure = candidate.fit.restarted
         for k in sorted(against, reverse=True):
             structure = structure.without(k)
@@ -43,11 +65,46 @@ def pruned(trials: Trials, candidate: CandidateModel, accepted: Sequence[Hypothe
     return None
 
 
+def _begun_elsewhere(
+    trials: Trials,
+    candidate: CandidateModel,
+    against: Collection[int],
+    accepted: Sequence[Hypothesis],
+    starts: Mapping[Hypothesis, Sequence[dict[str, float]]],
+    before: CandidateModel,
+) -> CandidateModel | None:
+    """The candidate that meets no objection and is better than `before`, one of its causes `against` which there is something
+    begun in its next starts, in their order; None where there is none."""
+    for k in against:
+        cause, structure = candidate.causes[k], candidate.fit.restarted
+        for start in _other_valleys(cause, starts.get(cause, ())):
+            try:
+                fit = trials.fitter.fit(structure.restarted(k, start), steps=SEARCH.candidate_steps)
+                again = scored(trials.fitter, fit, candidate.cause)
+                if trials.selection.advantage(again, before) > 0 and not trials.objections(again, accepted):
+                    return again
+            except FAILURES as error:
+                trials.note_failure(cause, error)
+    return None
+
+
+def _other_valleys(cause: Hypothesis, starts: Sequence[dict[str, float]]) -> list[dict[str, float]]:
+    """The starts beside the first, one of each shape: a phase or the amplitude is found from any, another period is not."""
+    if cause.effect == PARAMETER:
+        return []
+    shape = [p.name for p in cause.law.params if p.off is None and p.unit != "deg"]
+    valleys: dict[tuple[float, ...], dict[str, float]] = {}
+    for start in starts:
+        valleys.setdefault(tuple(start[name] for name in shape), start)
+    return list(valleys.values())[1 : 1 + SEARCH.restarts]
+
+
 def without_needless(trials: Trials, current: CandidateModel) -> CandidateModel:
     """The model without the causes that it does not need."""
     for k in reversed(range(len(current.causes))):
         for bare in trials.tried(current.fit.restarted.without(k), None):
-            if not _needed(trials, bare, current) or trials.selection.within_model_form_error(bare, current, k):
+            feigned = trials.selection.within_model_form_error(bare, current, k) and not _far_worse(bare, current)
+            if not _needed(trials, bare, current) or feigned:
                 current = bare
     return current
 
@@ -63,3 +120,32 @@ def _needed(trials: Trials, bare: CandidateModel, current: CandidateModel) -> bo
         and compare.matters(bare, current)
         and not compare.contradicted(bare, current)
     )
+
+
+def _far_worse(bare: CandidateModel, current: CandidateModel) -> bool:
+    """Whether `bare` leaves so much more than `current` in a channel of the held-out records that no model-form error is that."""
+    left, was = bare.held_out.plain_mean, current.held_out.plain_mean
+    return bool(np.any(left > MODEL_SELECTION.beyond_form_error * np.maximum(was, 1.0)))
+
+
+def no_worse(trials: Trials, nominal: CandidateModel, current: CandidateModel) -> CandidateModel:
+    """The model without the causes with which its numbers, as fitted, predict the held-out records worse than the device as
+    described does; that device where nothing else is left."""
+    allowed = MODEL_SELECTION.worse * _held_out_energy(trials, nominal)
+    # two squares a number: what its uncertainty adds
+    while current.causes and _held_out_energy(trials, current) > allowed + 2 * _numbers(current):
+        fits = [trials.tried(current.fit.restarted.without(k), None) for k in range(len(current.causes))]
+        fewer = [trials.converged(t) for fitted in fits for t in fitted if t.causes]
+        current = min(fewer, key=lambda t: _held_out_energy(trials, t)) if fewer else nominal
+    return current
+
+
+def _held_out_energy(trials: Trials, candidate: CandidateModel) -> float:
+    """Sum of the squares, over the noise's, that a model with its numbers as fitted leaves on the held-out records."""
+    return float(
+        np.nan_to_num(as_fitted(trials.fitter, candidate.fit, trials.fitter.held_out_records).plain.sum(), nan=np.inf)
+    )
+
+
+def _numbers(candidate: CandidateModel) -> int:
+    return sum(u.cause is not None for u in candidate.fit.structure.free_parameters)

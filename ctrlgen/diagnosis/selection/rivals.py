@@ -8,6 +8,7 @@ from dataclasses import replace
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, linearised_optimum
 from ctrlgen.diagnosis.selection.candidates import significant, trying
 from ctrlgen.diagnosis.selection.confusable import explains_alike, explains_better
+from ctrlgen.diagnosis.selection.precedence import counterparts, explains_alike_but_for_odds
 from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
 from ctrlgen.diagnosis.settings import SEARCH
@@ -52,6 +53,10 @@ def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Rou
         if not (_same_name(t.cause, there[k]) or _contains(t, there[k]))
         and (explains_alike(trials.selection, t, current) or (special and t.cause and t.cause.effect == special))
     }
+    # a line and a pitch at one speed: how rare a line is does not tell them apart
+    for t in counterparts(trials, current, k):
+        if explains_alike_but_for_odds(trials.selection, t, current):
+            alike.setdefault(t.cause, t)
     return tuple(t for t in trials.selection.ranked(list(alike.values())) if not trials.objections(t, there))
 
 

@@ -15,11 +15,13 @@ from dataclasses import replace
 import numpy as np
 
 from ctrlgen.devices import Device
+from ctrlgen.diagnosis.selection.attribution import attribute
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round
 from ctrlgen.diagnosis.selection.candidates import fit_candidates, restart_elsewhere
 from ctrlgen.diagnosis.selection.confusable import explains_alike
 from ctrlgen.diagnosis.selection.model_selection import scored
-from ctrlgen.diagnosis.selection.pruning import all_pruned, without_needless
+from ctrlgen.diagnosis.selection.precedence import acting_first
+from ctrlgen.diagnosis.selection.pruning import all_pruned, no_worse, without_needless
 from ctrlgen.diagnosis.selection.rivals import rivals, simplified, swapped
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
 from ctrlgen.diagnosis.selection.search_result import SearchResult
@@ -61,11 +63,16 @@ class Searcher:
         # its numbers are not bent by the errors of a better model
         nominal = scored(trials.fitter, trials.fitter.described(device)[1])
         current, account = supported(trials, nominal, current, trials.screen.seed)
+        found = current
+        current = no_worse(trials, nominal, current)
+        if current is not found:
+            account = attribute(trials.fitter, nominal, current, trials.screen.seed, trials.jobs)
         each = range(len(current.causes))
         bare = tuple(trials.each(lambda branch, k: _without(branch, current, k, nominal), each))
         alike = tuple(trials.each(lambda branch, k: rivals(branch, current, k, rounds), each))
         screened = trials.screened(current)
-        return SearchResult(trials.fitter, nominal, current, account, bare, alike, tuple(rounds), screened)
+        withdrawn = tuple(c for c in found.causes if c not in current.causes)
+        return SearchResult(trials.fitter, nominal, current, account, bare, alike, tuple(rounds), screened, withdrawn)
 
     def _settled(self, current: CandidateModel) -> CandidateModel:
         """The same model fitted to its end under its own errors, without the causes that it then does not need."""
@@ -100,10 +107,11 @@ class Searcher:
             screened = trials.screened(current)
             if len(current.causes) >= most or trials.selection.residual_within_model_form_error(current):
                 return current
-            candidates = all_pruned(trials, current, fit_candidates(trials, current, screened))
+            candidates = all_pruned(trials, current, fit_candidates(trials, current, screened), screened)
             candidates = trials.selection.ranked(candidates)
             better = [t for t in candidates if trials.selection.improves_enough(current, t)]
             best = self._most_parsimonious(current, better, screened) if better else current
+            best = acting_first(trials, current, best, candidates)
             rounds.append(self._round(screened, candidates, current, best))
             if not better:
                 return current

@@ -8,6 +8,7 @@ from ctrlgen.diagnosis.selection.attribution import Attribution
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round
 from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.hypothesis import Hypothesis
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,7 +18,8 @@ class SearchResult:
     fitter: with the noise and the discrepancy learnt. nominal: the device as described, refitted within its stated uncertainty.
     chosen: the selected model. account: what each of its causes takes away of what `nominal` leaves. without_cause: the chosen
     model without each of its causes. rivals: for each cause, models with another cause in its place that explain the recording
-    equally well. rounds: in order. final_screen: the screen of the chosen model.
+    equally well. rounds: in order. final_screen: the screen of the chosen model. withdrawn: causes that were taken out at the
+    end, because with them the held-out records are predicted worse than by the device as described.
     """
 
     fitter: Fitter
@@ -28,3 +30,4 @@ class SearchResult:
     rivals: tuple[tuple[CandidateModel, ...], ...]
     rounds: tuple[Round, ...]
     final_screen: Screened
+    withdrawn: tuple[Hypothesis, ...] = ()

@@ -33,22 +33,30 @@ def spatial_periods(path: np.ndarray, left: np.ndarray, shortest: float = 0.0) -
     if not np.any(rest):
         return ()
     shortest = max(shortest, resolved_way(path), SPATIAL_PERIODS.finest_cells * span / n)
-    first, last = padding * SPATIAL_PERIODS.fewest_cycles, int(padding * span / shortest)
-    if last <= first:
-        return ()
-    least = np.log((last - first) / SPATIAL_PERIODS.false_alarm_p)
+    fast, slow, last = SPATIAL_PERIODS.fewest_cycles, SPATIAL_PERIODS.fewest_slow_cycles, int(span / shortest)
     found: list[float] = []
-    for _ in range(SPATIAL_PERIODS.most):
-        along = np.bincount(cell, weights=weight * rest, minlength=n)
-        power = (periodogram(along, padding=padding) / np.sum((weight * rest) ** 2))[first:last]
-        for cycles in found:
-            power[max(int(padding * (cycles - 2)) - first, 0) : max(int(padding * (cycles + 2)) + 1 - first, 0)] = 0.0
-        best = highest_peaks(power, 1, distance=2 * padding, height=least)
-        if not len(best):
-            break
-        found.append((first + int(best[0]) + vertex(power, int(best[0]))) / padding)
-        rest = _without_wave((path - np.mean(path)) / span, found[-1], rest, weight)
+    for first, beyond, most in ((fast, last, SPATIAL_PERIODS.most), (slow, min(fast, last), SPATIAL_PERIODS.most_slow)):
+        for _ in range(most if beyond > first else 0):
+            along = np.bincount(cell, weights=weight * rest, minlength=n)
+            power = periodogram(along, padding=padding) / np.sum((weight * rest) ** 2)
+            cycles = _strongest(power, first, beyond, found)
+            if cycles is None:
+                break
+            found.append(cycles)
+            rest = _without_wave((path - np.mean(path)) / span, cycles, rest, weight)
     return tuple(span / cycles for cycles in found)
+
+
+def _strongest(power: np.ndarray, first: int, beyond: int, found: list[float]) -> float | None:
+    """Cycles within the path of the highest peak of `power` between two numbers of them, apart from those `found`; None where
+    chance would show one as high."""
+    padding = SPATIAL_PERIODS.padding
+    power = power[padding * first : padding * beyond].copy()
+    for cycles in found:
+        power[max(int(padding * (cycles - 2 - first)), 0) : max(int(padding * (cycles + 2 - first)) + 1, 0)] = 0.0
+    least = float(np.log(len(power) / SPATIAL_PERIODS.false_alarm_p))
+    best = highest_peaks(power, 1, distance=2 * padding, height=least)
+    return first + (int(best[0]) + vertex(power, int(best[0]))) / padding if len(best) else None
 
 
 def resolved_way(path: np.ndarray) -> float:

@@ -2,7 +2,8 @@
 
 A search adds what improves a criterion. The account is stricter: a cause that takes away less than a hundredth of the mismatch, or
 whose share or amplitude may be zero, is taken out and the rest fitted again. It stays where noise alone is left with it and more
-without it, where only the records to fit could show it, and where the others need it: then it is part of them, not a cause.
+without it, where it takes away much of what is left, where only the records to fit could show it, and where the others need it: then
+it is part of them, not a cause.
 """
 
 from __future__ import annotations
@@ -60,6 +61,8 @@ def _without(trials: Trials, nominal: CandidateModel, current: CandidateModel, k
         return None
     bare, compare = trials.converged(fitted[0]), trials.selection
     if compare.improves_enough(bare, current) and (current.errors.is_noise or compare.unseen_in_held_out(bare)):
+        return None
+    if not current.errors.is_noise and compare.takes_much(bare, current):
         return None
     records = trials.fitter.held_out_records
     energy = [float(np.sum(as_fitted(trials.fitter, t.fit, records).plain)) for t in (bare, current, nominal)]

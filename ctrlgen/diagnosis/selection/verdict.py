@@ -47,7 +47,8 @@ def verdict(
     enough = (known and tests.passed) or within_tolerance(search)
     contradicted = bool(contradicts_datasheet(search.chosen.fit))
     if not named:
-        return Verdict.UNEXPLAINED if contradicted or (known and not enough) else Verdict.CONSISTENT
+        left_out = search.withdrawn or (known and not enough)
+        return Verdict.UNEXPLAINED if contradicted or left_out else Verdict.CONSISTENT
     if main_rivals(search, shares):
         return Verdict.AMBIGUOUS
     if enough and not contradicted and not unconfirmed(search) and not poorly_determined(search):

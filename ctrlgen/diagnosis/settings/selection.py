@@ -40,7 +40,11 @@ class SpatialPeriodSettings:
     padding: int = 4
     """Zero padding of the spectrum along the path: a period is then right to 1/16 of a cycle over the whole path."""
     fewest_cycles: int = 20
-    """Cycles within the path of the longest period; longer ones are among the start values of the laws."""
+    """Cycles within the path from which on a wave is sought apart from the slower ones, which trends feign."""
+    fewest_slow_cycles: int = 3
+    """Cycles within the path of the longest period: fewer are seen by the start values of the laws, if the path is the travel."""
+    most_slow: int = 2
+    """Periods between both that are tried. Judgement."""
     same_period: float = 1e-4
     """Relative difference below which two periods are one."""
     false_alarm_p: float = 1e-4
@@ -166,12 +170,40 @@ class ModelSelectionSettings:
     """p of the bootstrap above which a gain is not that of the recording as a whole."""
     tie: float = 2.0
     """Difference of the criterion below which the commoner law is taken: a factor e of likelihood."""
+    much: float = 0.75
+    """Share of what is left in a channel, of energy on the held-out records, that a cause takes away to count although it is a
+    small part of the whole mismatch: without it the error is twice as large. Judgement."""
+    least_further_share: float = 0.25
+    """The same of one more term of a law that is there already, such as a harmonic. Judgement."""
+    beyond_form_error: float = 9.0
+    """Energy on the held-out records without a cause, over that with it, from which on it is no model-form error of another law,
+    although the sizes would allow that: a law in place of another's error rarely takes away more than eight ninths of it.
+    Judgement."""
+    worse: float = 1.02
+    """Energy on the held-out records with the causes, over that of the device as described, from which on the answer is no better
+    than that device: a hundredth of the error."""
     most_of_mismatch: float = 0.9
     """Share of the mismatch: a cause that explains so much of the records to fit need not be confirmed by held-out
     records that do not show it; and where accepted causes explain so much, only singles and pairs are searched (time
     series). Judgement."""
     vague_factor: float = 5.0
     """Factor on the model-form error of the other laws, for a cause whose amplitude may be zero. Judgement."""
+
+
+@dataclass(frozen=True)
+class PrecedenceSettings:
+    """Laws that act with the motion before those that are functions of time alone."""
+
+    nearly_as_much: float = 0.5
+    """Share of the squares that an event, a drift or a line takes away which a law that acts with the motion must take away to
+    come first where both leave more than noise: the search adds the other where it is still needed. Judgement."""
+    speed_parts: int = 12
+    """Equal parts of a record in each of which the mean speed is taken: long beside a pitch, which bends the reading. Judgement."""
+    moving: float = 0.1
+    """Speed, over the largest, from which a part counts as in motion. Judgement."""
+    even_speed: float = 0.3
+    """Range of the middle 60 % of the speeds, over their median, up to which a motion has one speed. A pitch of several hundred
+    periods is then no line; it is tried as one all the same. Judgement."""
 
 
 @dataclass(frozen=True)
@@ -201,6 +233,9 @@ class ObjectionsSettings:
     """Samples that a drive must stand before or after an onset: less is a reversal."""
     standing: float = 1e-4
     """Change of a drive from sample to sample, over its range, up to which it stands still. Judgement."""
+    largest_drift: float = 0.2
+    """Drift within the longest record to fit, over the range of the reading, above which it is none: a sensor that moves by a
+    fifth of the motion would have been noticed. Judgement."""
     shortest_period: float = 3.0
     """Shortest period along a reading, in its quantisation steps: a shorter one is that of the rounding."""
 
@@ -269,6 +304,7 @@ SUBSETS = SubsetSettings()
 SEARCH = SearchSettings()
 CONFUSABLE = ConfusableSettings()
 MODEL_SELECTION = ModelSelectionSettings()
+PRECEDENCE = PrecedenceSettings()
 OBJECTIONS = ObjectionsSettings()
 DIRECT_DETECTION = DirectDetectionSettings()
 ATTRIBUTION = AttributionSettings()

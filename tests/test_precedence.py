@@ -1,0 +1,158 @@
+"""A pitch before a line, laws that act with the motion before those that happen, a refused start replaced by the next."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from axis_records import AXIS, BACKLASH, fitter_of, played
+from fitted_causes import DRIFT
+from misfits import left
+from strokes import MM, servo, strokes
+from test_lines_and_events import timed
+
+from ctrlgen.diagnosis.diagnose import diagnose_recording
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
+from ctrlgen.diagnosis.selection.precedence import acting_first, even_speed, why_alike
+from ctrlgen.diagnosis.selection.pruning import no_worse, pruned
+from ctrlgen.diagnosis.selection.screen import Screen
+from ctrlgen.diagnosis.selection.trials import Trials
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.structure import Structure
+
+LAWS = ["cyclic", "vibration", "sensor_gain", "drift"]
+PITCH, LINE = Hypothesis("cyclic", "sensor:axis", "axis"), Hypothesis("vibration", "disturbance:axis", "axis")
+SPEED, WAY = 0.25 * MM, 0.25 * MM  # m/s, m: a line of 1 Hz
+
+
+def pitched(place, time):
+    return 8e-6 * np.sin(2 * np.pi * place / WAY + 0.7)
+
+
+def hummed(place, time):
+    return 8e-6 * np.sin(2 * np.pi * time + 0.7)
+
+
+def diagnosed(folder, error, *speeds):
+    recording = strokes(error, speeds, 4e-7, seconds=12.0)
+    found = diagnose_recording(servo(folder), recording, laws=LAWS, jobs=0)
+    (finding,) = found.findings
+    return finding
+
+
+@pytest.mark.parametrize("error", [pitched, hummed])
+def test_at_one_speed_a_pitch_comes_first_and_a_line_stands_beside_it(tmp_path, error):
+    """Each is as good as the other there, whichever acts: the corrected device must hold at other speeds."""
+    finding = diagnosed(tmp_path, error, SPEED, SPEED)
+    assert finding.effect == "cyclic" and finding.parameters["period"].value == pytest.approx(0.25, rel=1e-3)
+    assert [a.effect for a in finding.alternatives] == ["vibration"]
+    assert "another speed tells them apart" in why_alike(finding.cause, finding.alternatives[0])
+
+
+@pytest.mark.parametrize("error, effect", [(pitched, "cyclic"), (hummed, "vibration")])
+def test_where_speeds_differ_the_data_decide(tmp_path, error, effect):
+    finding = diagnosed(tmp_path, error, SPEED, 0.6 * SPEED, 0.8 * SPEED)
+    assert (finding.effect, finding.alternatives) == (effect, ())
+
+
+@pytest.mark.parametrize("speeds, even", [((1.0,), True), ((1.0, -1.0), True), ((1.0, 0.6), False), ((1.0, 0.0), True)])
+def test_a_motion_has_one_speed_whichever_way_it_goes_and_wherever_it_rests(speeds, even):
+    y = np.cumsum(np.repeat(np.array(speeds) * 1e-6, 400))
+    recording = timed(0.01 * np.arange(len(y)))
+    recording.channels = ("reading.axis",)
+    (record,) = recording.records
+    record.observed, record.valid = y[:, None], np.ones((len(y), 1), bool)
+    found = even_speed(recording, "axis")
+    assert found == (pytest.approx(1e-4, rel=1e-6) if even else None)
+
+
+def test_why_a_cause_has_an_alternative_is_told():
+    assert "another course" in why_alike(BACKLASH, LINE) and "another course" in why_alike(DRIFT, BACKLASH)
+    coulomb, stribeck = (Hypothesis(e, "stage:axis", "axis") for e in ("coulomb", "stribeck"))
+    assert why_alike(coulomb, stribeck) == "another form of dry friction"
+    assert why_alike(BACKLASH, coulomb) == "their effects on these readings are alike"
+
+
+@pytest.fixture
+def trials() -> Trials:
+    fitter = fitter_of(played)
+    found = Trials(fitter, Screen(fitter, [BACKLASH]), lambda _: None)
+    found.objections = lambda *_: {}
+    found.converged = lambda t: t
+    found.each = lambda function, items, sentence=None: [function(found, item) for item in items]
+    return found
+
+
+@pytest.mark.parametrize("share, first", [(0.49, "drift"), (0.51, "backlash")])
+def test_a_law_that_acts_comes_before_a_drift_that_takes_away_twice_as_much(trials, share, first):
+    """Where both leave more than noise."""
+    before = trials.fit(Structure(AXIS), steps=0)
+    noisy = trials.fitter.with_errors_of(before.fit).error
+
+    def taking(cause: Hypothesis, start: dict[str, float], share: float) -> CandidateModel:
+        fit = trials.fitter.fit(Structure(AXIS).with_cause(cause, start), steps=0)
+        return replace(
+            before, fit=fit, errors=noisy, cause=cause, fitted=left(1e6 * (1 - share)), held_out=left(1e6 * (1 - share))
+        )
+
+    bare = replace(before, fitted=left(1e6), held_out=left(1e6), errors=noisy)
+    drift = taking(DRIFT, {"rate": 1e-6}, 0.8)
+    play = taking(BACKLASH, {"gap": 6e-8}, 0.8 * share)
+    best = acting_first(trials, bare, drift, [drift, play])
+    assert best.cause is not None and best.cause.effect == first
+    assert acting_first(trials, bare, play, [drift, play]) is play
+
+
+@pytest.mark.parametrize("rate, told", [(0.19, True), (0.21, False)])
+def test_a_drift_of_a_fifth_of_the_motion_is_none(rate, told):
+    from types import SimpleNamespace
+
+    from ctrlgen.diagnosis.selection.objections import objections
+
+    recording = timed(np.arange(11.0))
+    recording.channels = ("reading.axis",)
+    (record,) = recording.records
+    record.observed, record.valid = np.linspace(-5e-6, 5e-6, 11)[:, None], np.ones((11, 1), bool)
+    structure = SimpleNamespace(causes=(DRIFT,), free_parameters=())
+    fit = SimpleNamespace(structure=structure, theta=(), values=lambda k: {"rate": -rate * 1e-6})
+    reason = "it would drift by 21 % of the motion within a record"
+    assert objections(recording, fit) == ({} if told else {0: reason})
+    assert objections(recording, fit, exact=True) == {}
+
+
+def test_a_refused_start_is_replaced_by_the_next():
+    """Of two ways the first leads to fringes that are as short as the steps of the reading."""
+    pitch = 4e-7
+
+    def fringed(u):
+        y = played(u, 0.0)
+        return y + 2e-8 * np.sin(2 * np.pi * y / pitch)
+
+    fitter = fitter_of(fringed)
+    found = Trials(fitter, Screen(fitter, [PITCH]), lambda _: None)
+    before = found.fit(Structure(AXIS))
+    starts = [{"amplitude": 2e-8, "period": way, "phase": 0.0} for way in (1.3e-7, 1.7e-7, pitch)]
+    real = found.objections
+    found.objections = lambda t, accepted=(): (
+        {0: "too short"} if t.causes and t.fit.values(0)["period"] < 2e-7 else real(t, accepted)
+    )
+    found.selection.__class__.advantage, kept = (lambda self, a, b: 1.0), found.selection.__class__.advantage
+    try:
+        refused = found.fit(Structure(AXIS).with_cause(PITCH, starts[0]))
+        best = pruned(found, refused, (), {PITCH: starts}, before)
+    finally:
+        found.selection.__class__.advantage = kept
+    assert best is not None and best.fit.values(0)["period"] == pytest.approx(pitch, rel=1e-3)
+    assert [r.reasons for r in found.refused] == [("too short",)]
+    assert pruned(found, refused, ()) is None
+
+
+@pytest.mark.parametrize("energy, stays", [(1.01, True), (1.04, False)])
+def test_an_answer_that_predicts_worse_than_the_device_as_described_is_that_device(monkeypatch, trials, energy, stays):
+    nominal = trials.fit(Structure(AXIS), steps=0)
+    found = trials.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 6e-8}), steps=0)
+    monkeypatch.setattr(
+        "ctrlgen.diagnosis.selection.pruning._held_out_energy", lambda _, t: 1e4 * (energy if t.causes else 1.0)
+    )
+    assert no_worse(trials, nominal, found) is (found if stays else nominal)
