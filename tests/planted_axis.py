@@ -55,6 +55,16 @@ def drive_hysteresis(u, t):
     return move(np.array(out))
 
 
+def asymmetric_drive_hysteresis(u, t):
+    """The same two hundred plays, of which the lower edge goes away from the upper one by 0.3 |u| for the widest."""
+    radii = 0.4 * (np.arange(200) + 0.5) / 200
+    play, out = np.zeros(200), []
+    for volts in u:
+        play = np.clip(play, volts - radii * (1 + 0.3 * abs(volts) / 0.4), volts + radii)
+        out.append(volts + 0.1 * (play.mean() - volts))
+    return move(np.array(out))
+
+
 def asymmetric_hysteresis(u, t):
     """Dahl's friction of 2e4 N/m and 10 um, in the displacement warped by 0.5, in steps of a tenth of a sample."""
     L, r, a, k = AXIS.mechanics.stroke.si, 1e-5, 0.5, 2e4
@@ -67,6 +77,11 @@ def asymmetric_hysteresis(u, t):
         return -k * z * slope, (z, q)
 
     return move(u, force)
+
+
+def cogging(u, t):
+    """0.1 N every 25 um, half a tenth of a sample on: in the middle of a step."""
+    return move(u, lambda time, q, v, memory: (-0.1 * np.sin(2 * np.pi * (q + v * H / 20) / 2.5e-5 + 0.7), memory))
 
 
 def one_sided_stiffening(u, t):
@@ -143,6 +158,12 @@ ON_AXIS = {
         "stage:axis", {"force": 0.8, "slack": 2e-5, "reach": 8e-6}, within={"force": 0.02, "slack": 0.02, "reach": 0.05}
     ),
     drive_hysteresis: Planted("actuator:axis", {"share": 0.1, "reach": 0.4}, within={"share": 0.1, "reach": 0.1}),
+    asymmetric_drive_hysteresis: Planted(
+        "actuator:axis",
+        {"share": 0.1, "reach": 0.4, "lower": 0.3},
+        within={"share": 0.15, "reach": 0.15, "lower": 0.15},
+    ),
+    cogging: Planted("stage:axis", {"force": 0.1, "period": 2.5e-5}, within={"force": 0.02}),
     bouc_wen: Planted(
         "stage:axis",
         {"stiffness": 2e4, "reach": 1e-5, "loop": 0.8},

@@ -126,6 +126,16 @@ def played(u, radius=2e-5):
     return np.array(out)
 
 
+def widened(u, radius=2e-5):
+    """A fifth of the way through two hundred plays, whose upper edge goes away from the lower one by 0.4 |d| for the widest."""
+    radii = radius * (np.arange(200) + 0.5) / 200
+    play, out = np.zeros(200), []
+    for d in u:
+        play = np.maximum(np.minimum(play, d + radii + 0.4 * abs(d) * radii / radius), d - radii)
+        out.append(0.8 * d + 0.2 * play.mean())
+    return np.array(out)
+
+
 def yielding(u):
     """d - z/5, dz = dd (1 - (4e4 sgn(dd z) + 1e4)|z|/m), in two hundred steps from pose to pose."""
     z, before, out = 0.0, 0.0, []
@@ -143,6 +153,14 @@ IN_ORDER = {
     "displacement_hysteresis": (
         played,
         Planted("stage:axis", {"share": 0.2, "reach": 2e-5}, within={"share": 0.1, "reach": 0.1}),
+    ),
+    "asymmetric_displacement_hysteresis": (
+        widened,
+        Planted(
+            "stage:axis",
+            {"share": 0.2, "reach": 2e-5, "upper": 0.4},
+            within={"share": 0.1, "reach": 0.15, "upper": 0.1},
+        ),
     ),
     "displacement_bouc_wen": (
         yielding,

@@ -237,7 +237,8 @@ def test_what_bends_a_reading_is_delayed_afterwards():
     )[:, 0]
     assert np.array_equal(*ends.values())
     bent = late + 2e3 * late**2
-    assert np.abs(ends[delay, bow] - bent).max() < 0.02 * np.abs(bent - late).max()
+    # but for the two samples that show what was before the record
+    assert np.abs(ends[delay, bow] - bent)[2:].max() < 0.02 * np.abs(bent - late).max()
 
 
 def test_fringes_count_in_what_a_bowed_scale_says():

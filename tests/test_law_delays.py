@@ -13,6 +13,7 @@ from written_laws import H
 
 import ctrlgen.effects  # noqa: F401  fills the library
 from ctrlgen import load_device
+from ctrlgen.core.units import Quantity
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.simulator import Simulator
@@ -24,8 +25,8 @@ SHARES = np.array([0.2, 0.5, 0.9, 1.0, 1.7, 2.5, 4.3, 5.0])
 
 def read_late(y, samples: np.ndarray, h: float, slopes: bool) -> np.ndarray:
     """What `delay` makes of the polynomial y at 9 h, for delays of `samples` h."""
-    law = Effect.library["delay"]("all", {})
-    memory = {state.name: 0.0 for state in law.states}
+    law = Effect.library["delay"]("all", {"delay": Quantity(float(samples.max()) * h, "the longest")})
+    memory = {state.name: 0.0 for state in law.kept(h, free=False)}
     for k in range(10):
         rates = {"rate": y.deriv()(k * h), "second_rate": y.deriv(2)(k * h)} if slopes else {}
         s = law_inputs(value=y(k * h), sample_time=h, **rates, **memory)
@@ -74,6 +75,9 @@ def test_clocks_that_do_not_agree_shift_the_drive(tau, rng):
     assert beyond == pytest.approx(np.full(len(beyond), line(0.3 + 49 * H)))
 
 
-def test_a_delay_of_more_than_five_samples_counts_as_five(rng):
-    y = np.polynomial.Polynomial(rng.uniform(-1, 1, 5))
-    assert read_late(y, np.array([7.0]), 0.3, True) == pytest.approx(y(4 * 0.3), rel=1e-12)
+@pytest.mark.parametrize("samples, states", [(0.3, 6), (1.0, 6), (5.2, 21), (60.0, 183)])
+def test_a_delay_keeps_as_many_samples_as_it_takes(samples, states):
+    late = Effect.library["delay"]("all", {"delay": Quantity(samples * H, "")})
+    assert len(late.kept(H, free=False)) == states
+    assert len(late.kept(H, free=True)) >= 2 * states  # a fit may double it
+    assert len(late.kept(None, free=True)) == len(late.kept(float("inf"), free=True)) == 15

@@ -60,6 +60,9 @@ def test_times_frequencies_and_ways_are_not_negative_and_moments_places_and_lean
             "taper",
             "reversible",
             "skew",
+            "upper",
+            "lower",
+            "side",
             "low",
             *(f"c{j}" for j in range(1, 18)),
         )

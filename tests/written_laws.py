@@ -115,6 +115,13 @@ def second_mass_rates(s, p):
 # kind: shape parameters, term, rates where it has some
 LAWS = {
     "abbe_arm": ({}, lambda s, p: p.arm * s.all[s.partner]),
+    **dict.fromkeys(
+        ("asymmetric_displacement_hysteresis", "asymmetric_drive_hysteresis"),
+        (
+            {"reach": 0.3, "taper": 0.5, "reversible": 0.7, "upper": 0.4, "lower": -0.2, "side": 0.1},
+            lambda s, p: -p.share * (weighted(s, p, s.value) - 0.7 * s.value),
+        ),
+    ),
     "asymmetric_gain": ({}, lambda s, p: p.gain * abs(s.value)),
     "asymmetric_hysteresis": (
         {"reach": 0.3, "skew": 0.6},
@@ -125,6 +132,10 @@ LAWS = {
     "bouc_wen": ({"reach": 0.3, "loop": 0.8}, lambda s, p: -p.stiffness * s.z),
     "bow": ({}, lambda s, p: p.curvature * s.value**2),
     "clock_offset": None,  # below: it shifts the recorded drive
+    "cogging": (
+        {"period": 0.4, "phase": 0.9},
+        lambda s, p: -p.force * sin(TWO_PI * s.displacement / 0.4 + 0.9),
+    ),
     "coulomb": ({"reach": 0.02, "smoothing": 0.3}, lambda s, p: -p.force * s.z, lambda s, p: {"z": dahl_rate(s, p)}),
     "butterfly": (
         {"linear": 0.6, "reach": 0.3, "taper": 0.5},

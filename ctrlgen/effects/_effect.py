@@ -37,6 +37,9 @@ class Effect:
     source: ClassVar[str]
     params: ClassVar[tuple[Param, ...]]
     states: ClassVar[tuple[State, ...]] = ()
+    # Remembers so much that a simulation of a recording applies it to the simulated readings as a whole, where nothing follows it,
+    # and leaves it out of the model: `estimation.late_readings`.
+    apart: ClassVar[bool] = False
     # What the device must have, of: acceleration, actuator, ambient, balanced, bipolar, displacement_command, force, heat,
     # sample_time, second_order_kinematics, spatial, state, tangent_compliance, unheated, velocity, voltage.
     requires: ClassVar[frozenset[str]] = frozenset()
@@ -121,6 +124,11 @@ class Effect:
     def update(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         """Each stepped state after the present sample, from its value before; `term` sees the new one."""
         return {}
+
+    def kept(self, sample_time: float | None, free: bool) -> tuple[State, ...]:
+        """The states at this sample time [s], of which a law that looks back by samples needs more the shorter it is; `free`: its
+        amplitude may be moved from the file's."""
+        return self.states
 
     def after_sample(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         """`update`, with the states that keep their value through a record."""

@@ -3,7 +3,7 @@
 `hysteresis` of a stage, `drive_hysteresis` of a piezo stack and `displacement_hysteresis` of a joint behind the stage
 share these expressions and stay three laws: the first is a restoring force that slips with the displacement and places
 reversals between samples, the others are lags of a signal itself, so that their terms, units and parameters differ.
-`asymmetric_hysteresis` and `bouc_wen` are differential laws without plays.
+`asymmetric_lag` are the latter two with edges of their own; `asymmetric_hysteresis` and `bouc_wen` are differential laws without plays.
 """
 
 from __future__ import annotations
@@ -61,6 +61,15 @@ def updated_plays(s: LawInputs, path: list[ca.SX], widths: list[ca.SX]) -> dict[
         for value in path:
             play = ca.fmax(ca.fmin(play, value + radius), value - radius)
         new[name] = play - first
+    return new
+
+
+def kept_between(s: LawInputs, low: list[ca.SX], high: list[ca.SX], widths: list[ca.SX]) -> dict[str, ca.SX]:
+    """The plays after a step at whose end P_j is within `low` ... `high`; they begin within their half `widths` at home."""
+    new = {}
+    for name, below, above, radius in zip(_play_names(), low, high, widths, strict=True):
+        first = beginning(s, radius)
+        new[name] = ca.fmax(ca.fmin(getattr(s.states, name) + first, above), below) - first
     return new
 
 

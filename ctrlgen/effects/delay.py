@@ -1,18 +1,25 @@
 """A reading that is late by a fixed time."""
 
+from math import ceil
+
 import casadi as ca
 
 from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
 
-SAMPLES = 5
-EVERY = range(SAMPLES + 1)
+FREE_SAMPLES = 4  # kept beyond twice the file's delay where the delay is free
+SIZES = {"y": ("channel", 1.0), "r": ("channel/s", 10.0), "c": ("channel/s^2", 100.0)}
+
+
+def _kept(samples: int) -> tuple[State, ...]:
+    """The readings of so many samples and the present one, with slopes and second derivatives."""
+    return tuple(State(f"{name}{k}", *SIZES[name], stepped=True) for name in SIZES for k in range(samples + 1))
 
 
 class Delay(Effect):
     """Delta y(t) = y(t - tau) - y(t), by the quartic polynomial through value and slope at both neighbouring samples
     and the second derivative just after the older one; where the motion gives no derivatives, by a cubic with slopes from samples.
 
-    Holds up to five samples (a longer delay counts as five) and for frequencies below a fifth of the sampling rate.
+    Keeps the samples that the file's delay takes, over twice as many where it is free. Holds for frequencies below rate/5.
     """
 
     place = Place.SENSOR
@@ -21,30 +28,31 @@ class Delay(Effect):
     source = "T. I. Laakso et al., IEEE Signal Processing Magazine 13 (1996) 30: splitting the unit delay"
     params = (Param("delay", "ms", (0.0, 500.0), "age of the reading", off=0.0),)
     moves_in_time = True
-    states = (
-        *(State(f"y{k}", "channel", 1.0, stepped=True) for k in EVERY),
-        *(State(f"r{k}", "channel/s", 10.0, stepped=True) for k in EVERY),
-        *(State(f"c{k}", "channel/s^2", 100.0, stepped=True) for k in EVERY),
-    )
+    states = _kept(1)  # of a delay that is off
+    apart = True
+
+    def kept(self, sample_time: float | None, free: bool) -> tuple[State, ...]:
+        age = ceil(self.values["delay"].si / (sample_time or float("inf")))
+        return _kept(max(2 * age + FREE_SAMPLES if free else age, 1))
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
-        h, total = s.sample_time, 0.0
-        D = ca.fmin(p.delay / h, SAMPLES)
-        for k in EVERY[:-1]:  # w from 0 at sample k, counted backwards, to 1 at sample k + 1
+        h, total, samples = s.sample_time, 0.0, len(vars(s.states)) // 3 - 1
+        D = ca.fmin(p.delay / h, samples)
+        for k in range(samples):  # w from 0 at sample k, counted backwards, to 1 at sample k + 1
             near, old = ([getattr(s.states, f"{name}{j}") for name in "yrc"] for j in (k, k + 1))
             w, slope = D - k, h * near[1]
             gap, turn = old[0] - near[0] + slope, slope - h * old[1]
-            fourth = (h**2 * old[2] + 6 * gap - 4 * turn) / 2 if s.second_rate is not None else 0.0
+            fourth = 0.0 if s.second_rate is None else (h**2 * old[2] + 6 * gap - 4 * turn) / 2
             third = turn - 2 * gap - 2 * fourth
             between = w * (w * (gap - third - fourth + w * (third + w * fourth)) - slope)
-            inside = (w >= 0) * (w < 1) if k + 1 < SAMPLES else w >= 0
+            inside = (w >= 0) * (w < 1) if k + 1 < samples else w >= 0
             total += ca.if_else(inside, near[0] - s.value + between, 0.0)
         return total
 
     def update(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         slope = (s.value - s.states.y0) / s.sample_time if s.rate is None else s.rate
         new = {"y0": s.value, "r0": slope, "c0": 0.0 if s.second_rate is None else s.second_rate}
-        for k in EVERY[1:]:
+        for k in range(1, len(vars(s.states)) // 3):
             new |= {f"{name}{k}": getattr(s.states, f"{name}{k - 1}") for name in "yrc"}
         if s.rate is None:
             new["r1"] = (s.value - s.states.y1) / (2 * s.sample_time)

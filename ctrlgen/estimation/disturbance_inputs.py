@@ -28,7 +28,7 @@ def with_disturbance_inputs(device: Device, physics: DevicePhysics) -> tuple[Dev
     """The device with a disturbance input on every channel of every place, and the path of each by place and channel index."""
     inputs: list[_DisturbanceInput] = []
     paths: dict[tuple[Place, int], str] = {}
-    unread = _unread_axes(device, physics)
+    unread = unread_axes(device, physics)
     for place in Place:
         if place is Place.HEAT and "heat" not in available(physics):
             continue
@@ -40,7 +40,7 @@ def with_disturbance_inputs(device: Device, physics: DevicePhysics) -> tuple[Dev
     return device.model_copy(update={"effect": (*device.effect, *inputs)}), paths
 
 
-def _unread_axes(device: Device, physics: DevicePhysics) -> frozenset[int]:
+def unread_axes(device: Device, physics: DevicePhysics) -> frozenset[int]:
     """The axes of an imposed motion on whose displacement no force depends, whatever the device's numbers."""
     if not isinstance(physics, ImposedPhysics):
         return frozenset()

@@ -11,10 +11,11 @@ from itertools import product
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import Quantity
-from ctrlgen.devices import Device, DevicePhysics
+from ctrlgen.devices import Device, DevicePhysics, InertialPhysics
 from ctrlgen.devices.quantities import walk
 from ctrlgen.devices.section import Section
 from ctrlgen.effects import Channel, Effect, Param, Place
+from ctrlgen.estimation.disturbance_inputs import unread_axes
 from ctrlgen.estimation.law_prior import LawPrior
 from ctrlgen.estimation.priors import DEFAULT, prior_of
 from ctrlgen.estimation.settings import CANDIDATE_TERMS
@@ -54,6 +55,7 @@ class Hypothesis:
     at, of: the channel on which the effect acts, or "all"; for effects of pairs, the other channel.
     count: how many of the same effect a structure has there already, where the effect is repeatable.
     highest: frequency [Hz] up to which samples are told from their aliases; infinite for settled poses, which have no clock.
+    longest: delay [s] that is looked for; finite in the reading of a loop, where each sample of it is a state of the simulation.
     """
 
     effect: str
@@ -63,6 +65,7 @@ class Hypothesis:
     path: str = ""
     count: int = 0
     highest: float = float("inf")
+    longest: float = float("inf")
 
     def beside(self, causes: Sequence[Hypothesis]) -> Hypothesis | None:
         """The hypothesis to add to `causes`: itself, one more where it is there and repeatable, None where it cannot be added.
@@ -137,6 +140,8 @@ class Hypothesis:
         low, high = (channel.si(b, p) for b in p.bounds)
         if p.unit == "Hz":
             return low, max(low, min(high, self.highest))
+        if self.law.moves_in_time and p is self.law.amplitude():
+            return low, max(low, min(high, self.longest))
         if p.unit == "s" and self.prior.of(p).scales_with_peak and self.law.place is not Place.SENSOR:
             # An actuated change within one sample shows its middle in the motion, not its duration.
             low = min(high, max(low, CANDIDATE_TERMS.highest_frequency / self.highest))
@@ -166,13 +171,20 @@ def hypotheses(
     `sample_time` [s] is None for settled poses; `ambient` says whether the recording has the temperature of the surroundings.
     """
     laws = selected_laws() if laws is None else laws
-    effects = [h for law in laws for h in _of_law(law, physics, observed, sample_time, ambient)]
+    unread = unread_axes(device, physics)
+    effects = [h for law in laws for h in _of_law(law, physics, observed, sample_time, ambient, unread)]
     return effects + [Hypothesis(PARAMETER, location, path=path) for path, location in _numbers(device)]
 
 
 def _of_law(
-    law: type[Effect], physics: DevicePhysics, observed: tuple[str, ...], sample_time: float | None, ambient: bool
+    law: type[Effect],
+    physics: DevicePhysics,
+    observed: tuple[str, ...],
+    sample_time: float | None,
+    ambient: bool,
+    unread: frozenset[int],
 ) -> Iterator[Hypothesis]:
+    """The hypotheses of one law; none of a displacement on which, as on that of the axes `unread`, nothing that is read depends."""
     there = available(physics, sample_time) - (frozenset() if ambient else {"ambient"})
     prior = prior_of(law)
     if not prior.suspected or prior.unless & there:
@@ -181,10 +193,16 @@ def _of_law(
         return
     domain = prior.domain or DOMAIN[law.place]
     highest = CANDIDATE_TERMS.highest_frequency / sample_time if sample_time else float("inf")
+    longest = float("inf")
+    if law.apart and sample_time and in_loop(physics):
+        longest = CANDIDATE_TERMS.samples_in_loop * sample_time
     places = channels(physics, law.place)
     seen = {channel.removeprefix("reading.") for channel in observed}
     if law.place is Place.SENSOR:
         places = [channel for channel in places if channel.name in seen]
+    every = len(places)
+    if law.place is Place.DISPLACEMENT:
+        places = [channel for i, channel in enumerate(places) if i not in unread]
     if law.pairs:
         for k, channel in enumerate(places):
             for j, other in enumerate(partner_channels(physics, law)):
@@ -193,9 +211,17 @@ def _of_law(
         return
     fitting = [channel for channel in places if law.applies_to(channel)]
     for channel in () if prior.acts_on_all else fitting:
-        yield Hypothesis(law.kind, f"{domain}:{channel.name}", channel.name, highest=highest)
+        yield Hypothesis(law.kind, f"{domain}:{channel.name}", channel.name, highest=highest, longest=longest)
+    if len(places) < every:
+        return
     if prior.acts_on_all or (len(fitting) > 1 and law.place is not Place.SENSOR):
         yield Hypothesis(law.kind, f"{domain}:all", "all", highest=highest)
+
+
+def in_loop(physics: DevicePhysics) -> bool:
+    """Whether a feedback loop acts on the readings."""
+    loop = physics.feedback if isinstance(physics, InertialPhysics) else None
+    return loop is not None and loop.measures == "reading"
 
 
 def _numbers(device: Device) -> Iterator[tuple[str, str]]:

@@ -9,6 +9,7 @@ by judgement and has no measurement or source behind it; such numbers were check
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
 
 from ctrlgen.effects import Effect
@@ -41,6 +42,21 @@ _HYSTERESIS = (
 _IN_BALANCE = (
     " In a stage in balance a force that lags and a displacement that lags show the same to first order; there the latter is "
     "suspected, whose memory stays out of the balance."
+)
+_ASYMMETRIC_LAG = LawPrior(
+    "Rarer than a symmetric loop: judgement. Heaters have none. Begun symmetric, and with one branch or the other wider. "
+    + _HYSTERESIS,
+    log_prior_odds=ONE_IN_TEN,
+    model_form_error=0.02,
+    family="hysteresis",
+    parameters={
+        "reach": _peaks(0.1, 0.4),
+        "taper": _starts((0.5,)),
+        "reversible": _starts((0.0,)),
+        "upper": _starts((0.0, 0.4)),
+        "lower": _starts((0.0, 0.4)),
+        "side": _starts((0.0,)),
+    },
 )
 _CREEP = "Forms of one relaxation spectrum; 1 %: judgement."
 
@@ -200,12 +216,22 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             family="hysteresis",
             parameters={"reach": _starts((0.01, 0.03, 0.1, 0.3, 1.0)), "skew": _starts((-0.6, 0.6))},
         ),
+        "asymmetric_displacement_hysteresis": _ASYMMETRIC_LAG,
+        "asymmetric_drive_hysteresis": replace(_ASYMMETRIC_LAG, unless=frozenset({"heat"})),
         "bouc_wen": LawPrior(
             _HYSTERESIS + _IN_BALANCE,
             unless=frozenset({"balanced"}),
             model_form_error=0.02,
             family="hysteresis",
             parameters={"reach": _starts((0.01, 0.03, 0.1, 0.3, 1.0)), "loop": _starts((0.55, 0.9))},
+        ),
+        "cogging": LawPrior(
+            "Motors of a stage that is no flexure have it; harmonics: several at one place. Periods seen in the residual.",
+            repeatable=True,
+            parameters={
+                "period": ParameterPrior((1.0, 0.5, 0.25), start_from_data="spatial_periods"),
+                "phase": _starts((0.0, 90.0)),
+            },
         ),
         "coulomb": LawPrior(
             _DRY_FRICTION,

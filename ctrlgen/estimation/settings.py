@@ -355,6 +355,9 @@ class CandidateTermsSettings:
     """Samples that are propagated at a time: their sensitivities stay in the processor's cache."""
     diverged: float = 1e100
     """Magnitude of a state above which a candidate has diverged and is left out."""
+    samples_in_loop: float = 8.0
+    """Samples up to which a delay in the reading of a feedback loop is looked for: there each is a state of the simulation, and a loop
+    that is later than that does not stand. Judgement."""
 
 
 STATISTICS = StatisticsSettings()

@@ -19,6 +19,8 @@ from scipy.interpolate import CubicSpline
 
 from ctrlgen.devices import Device
 from ctrlgen.estimation.forward_sensitivities import forward_sensitivities
+from ctrlgen.estimation.hypothesis import nominal_physics
+from ctrlgen.estimation.late_readings import LateReading, effects_apart, late_readings, read_late, unknown_samples
 from ctrlgen.estimation.sample_equations import SampleEquations, build_sample_equations
 from ctrlgen.estimation.settings import SIMULATION
 from ctrlgen.model.assembly import build_model
@@ -49,7 +51,9 @@ class Simulator:
         self.sample_time, self.linear = sample_time, linear
         self.ambient = ca.SX.sym("ambient")
         look_back = sample_time if np.isfinite(sample_time) else None
-        self.model: Model = build_model(device, free, self.ambient, look_back, per_record=True)
+        apart = () if poses or look_back is None else effects_apart(device, nominal_physics(device))
+        self.model: Model = build_model(device, free, self.ambient, look_back, per_record=True, apart=apart)
+        self.late, self._rates = late_readings(self.model, apart, self.free, self.channels)
         self.poses = not self.model.inertial and (poses or np.isinf(sample_time))
         self._with_sensitivities: dict[bool, Recursion] = {}
         self._by_pattern: dict[tuple[Any, ...], ca.Function] = {}
@@ -105,8 +109,16 @@ class Simulator:
 
     @cached_property
     def equations(self) -> SampleEquations:
-        """F and H of one sample, symbolically."""
+        """F and H of one sample, symbolically; the readings as they are before they are late."""
         return build_sample_equations(self.model, self._observed, self.sample_time, self.linear, self.poses)
+
+    @cached_property
+    def _with_rates(self) -> SampleEquations:
+        """The same with the rates of the readings that are late as further readings."""
+        if not self._rates.numel():
+            return self.equations
+        y = ca.vertcat(self._observed, self._rates)
+        return build_sample_equations(self.model, y, self.sample_time, self.linear, self.poses)
 
     def linearise(self, p: np.ndarray, chosen: Sequence[int]) -> Linearised:
         """F_S, F_f, H_S and H_f at `p` (k,) along any motion, f the m `chosen` parameters by their places in `free`."""
@@ -166,8 +178,13 @@ class Simulator:
     ) -> tuple[np.ndarray, np.ndarray]:
         """S after each sample (n, n_s) and the readings (n, n_y) [SI]; arguments as of `simulate`."""
         record = self.aligned(record, p)
-        c = np.tile(self.equations.constants(p)[0].full().T, (len(record.time), 1))
-        return self._recursion.run(self.starting_state(record, p, start), *self.inputs(record), c)
+        c = np.tile(self._with_rates.constants(p)[0].full().T, (len(record.time), 1))
+        after, values = self._recursion.run(self.starting_state(record, p, start), *self.inputs(record), c)
+        y = values[:, : len(self.channels)]
+        for late in self.late:
+            read = read_late(late.signals(values), late.age(p), self.sample_time)[0]
+            y[:, late.row] = _with_unknown(read, record, late, late.age(p))
+        return after, y
 
     def sensitivities(
         self, record: Record, p: np.ndarray, start: np.ndarray | None = None, by_free: bool = True
@@ -179,17 +196,28 @@ class Simulator:
         clock = self._clock[1] if by_free else None
         by_clock = None if clock is None else self._by_clock(record, p, start, clock)
         record = self.aligned(record, p)
-        c, c_p = self.equations.constants(p)
+        c, c_p = self._with_rates.constants(p)
         k, n_i, n_y, n = len(self.free) * by_free, len(self.free_initial_states), len(self.channels), len(record.time)
         T_0 = np.zeros((k + n_i, self.n_s))
         T_0[k + np.arange(n_i), list(self.free_initial_states)] = 1.0
         first = np.concatenate([self.starting_state(record, p, start), T_0.ravel(order="F")])
         constant = (np.tile(np.reshape(v, (1, -1)), (n, 1)) for v in (c.full(), np.array(c_p.nonzeros())))
         values = self._recursion_with_sensitivities(by_free).run(first, *self.inputs(record), *constant)[1]
-        Y = values[:, n_y:].reshape(n, n_y, k + n_i)
+        rows = n_y + self._rates.numel()
+        values, Y = values[:, :rows], values[:, rows:].reshape(n, rows, k + n_i)
+        y, slopes = values[:, :n_y], Y[:, :n_y]
+        for late in self.late:
+            age = late.age(p)
+            read, by_age = read_late(late.signals(values), age, self.sample_time)
+            of_read = read_late(late.signals(Y), age, self.sample_time)[0]
+            if late.free is not None and by_free:
+                of_read[:, late.free] += by_age
+            unknown, behind = unknown_samples(age, self.sample_time, n)
+            of_read[unknown] = of_read[behind]
+            y[:, late.row], slopes[:, late.row] = _with_unknown(read, record, late, age), of_read
         if by_clock is not None:
-            Y[:, :, clock] = by_clock
-        return values[:, :n_y], Y
+            slopes[:, :, clock] = by_clock
+        return y, slopes
 
     def _by_clock(self, record: Record, p: np.ndarray, start: np.ndarray | None, clock: int) -> np.ndarray:
         """Derivative (n, n_y) of the readings by the offset of the clocks: a central difference over one sample."""
@@ -203,20 +231,21 @@ class Simulator:
     @cached_property
     def _recursion(self) -> Recursion:
         """The map (S, u, ...) -> (S+, y) of one sample."""
-        q = self.equations
+        q = self._with_rates
         return Recursion(ca.Function("one", q.given, [ca.densify(q.following), ca.densify(q.y)]))
 
     def _recursion_with_sensitivities(self, by_free: bool) -> Recursion:
         """(S, T) -> (S+, T+), (y, Y), with the nonzeros of dc/dp as a further input."""
         if by_free not in self._with_sensitivities:
-            n_i, pattern = len(self.free_initial_states), self.equations.constants.sparsity_out(1)
+            n_i, pattern = len(self.free_initial_states), self._with_rates.constants.sparsity_out(1)
             c_p = ca.MX.sym("c_p", pattern.nnz())
             seed = ca.MX(n_i, pattern.size1())
             if by_free:
                 seed = ca.vertcat(ca.MX(pattern, c_p).T, seed)
-            state, others = ca.MX.sym("state", self.n_s * (1 + seed.shape[0])), self._symbols[1:]
+            state = ca.MX.sym("state", self.n_s * (1 + seed.shape[0]))
+            others = self._symbols_of(self._with_rates)[1:]
             S, T = state[: self.n_s], ca.reshape(state[self.n_s :], seed.shape[0], self.n_s)
-            following, T, y, Y = forward_sensitivities(self.equations, T, seed, [S, *others])
+            following, T, y, Y = forward_sensitivities(self._with_rates, T, seed, [S, *others])
             values = [ca.densify(ca.vertcat(a, ca.vec(b))) for a, b in ((following, T), (y, Y))]
             self._with_sensitivities[by_free] = Recursion(ca.Function("one", [state, *others, c_p], values))
         return self._with_sensitivities[by_free]
@@ -224,7 +253,10 @@ class Simulator:
     @cached_property
     def _symbols(self) -> list[ca.MX]:
         """The arguments of one sample: S, u, u+, ambient, c."""
-        n_u, n_c = self.model.u.numel(), self.equations.constants.size1_out(0)
+        return self._symbols_of(self.equations)
+
+    def _symbols_of(self, equations: SampleEquations) -> list[ca.MX]:
+        n_u, n_c = self.model.u.numel(), equations.constants.size1_out(0)
         return [ca.MX.sym(name, n) for name, n in (("S", self.n_s), ("u", n_u), ("u1", n_u), ("e", 1), ("c", n_c))]
 
     def starting_state(self, record: Record, p: np.ndarray, start: np.ndarray | None) -> np.ndarray:
@@ -240,6 +272,15 @@ class Simulator:
         if not self.poses:
             return u, np.vstack([u[1:], u[-1:]]), ambient
         return np.vstack([u[:1], u[:-1]]), u, ambient
+
+
+def _with_unknown(read: np.ndarray, record: Record, late: LateReading, age: float) -> np.ndarray:
+    """A late reading (n,), as wrong where it shows what was before the record as it is just afterwards."""
+    unknown, behind = unknown_samples(age, record.sample_time, len(read))
+    observed, valid = record.observed[:, late.row], record.valid[:, late.row]
+    wrong = np.where(valid[behind], observed[behind] - read[behind], 0.0)
+    read[unknown] = np.where(valid[unknown], observed[unknown] - wrong, read[behind])
+    return read
 
 
 @lru_cache(maxsize=SIMULATION.kept)

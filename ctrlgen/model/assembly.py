@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from types import SimpleNamespace
@@ -30,12 +30,14 @@ def build_model(
     ambient: ca.SX | None = None,
     sample_time: float | None = None,
     per_record: bool = False,
+    apart: Collection[int] = (),
 ) -> Model:
     """The symbolic model of `device`; the parameters named in `free` stay symbols, the others are numbers.
 
     `free` are dotted paths as in `device.quantities()`; `ambient` is a symbol for the rise of the surroundings [K],
     where that is not zero; `sample_time` [s] is needed by effects that look back by samples. With `per_record` the
-    constants of a record (where a play begins, a zero that is set anew) are states; without, they are zero. Raises InputError for a
+    constants of a record (where a play begins, a zero that is set anew) are states; without, they are zero. The effects `apart`, by
+    their places in the file, add no term; see `Effect.apart`. Raises InputError for a
     path that is no parameter or acts on nothing, an effect that does not fit the device, and a restoring force that
     does not rise over the stroke.
     """
@@ -46,8 +48,8 @@ def build_model(
     counts = [path for path in free if nominal[path].whole]
     if counts:
         raise InputError(device.name, [Fault(path, "is a count and cannot be free") for path in counts])
-    model = _assemble(device, free, NO_RISE if ambient is None else ambient, sample_time, per_record)
-    outside = {f"effect[{k}].{e.amplitude().name}" for k, e in enumerate(device.effect) if e.shifts_drive}
+    model = _assemble(device, free, NO_RISE if ambient is None else ambient, sample_time, per_record, apart)
+    outside = {f"effect[{k}].{e.amplitude().name}" for k, e in enumerate(device.effect) if e.shifts_drive or k in apart}
     idle = [path for path in free if path not in model.moved_by and path not in outside]
     if idle:
         what = "appears in no equation of motion (a limit, a material of the wires' stress): it cannot be free"
@@ -74,7 +76,12 @@ def symbolic_model(device: Device, only: Sequence[str] | None = None) -> Model:
 
 
 def _assemble(
-    device: Device, free: Sequence[str], ambient: ca.SX, sample_time: float | None, per_record: bool
+    device: Device,
+    free: Sequence[str],
+    ambient: ca.SX,
+    sample_time: float | None,
+    per_record: bool,
+    apart: Collection[int] = (),
 ) -> Model:
     """The model of `device` with the parameters `free` as symbols: the one place where a Model is made."""
     nominal = dict(device.quantities())
@@ -87,7 +94,8 @@ def _assemble(
     n_v = n if isinstance(physics, InertialPhysics) else 0
     z, v, a = ca.SX.sym("d", n), ca.SX.sym("v", n_v), ca.SX.sym("a", n_v)
     velocity = physics.drive.expr[n : 2 * n] if isinstance(physics, ImposedPhysics) else v
-    terms = EffectTerms(device, physics, device.values(symbols), z, velocity, a, ambient, sample_time, per_record)
+    values = device.values(symbols)
+    terms = EffectTerms(device, physics, values, z, velocity, a, ambient, sample_time, per_record, apart)
     faults = mounting_faults(device.sensor, *physics.readings[:2]) + terms.faults
     if faults:
         raise InputError(device.name, faults)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import SimpleNamespace
@@ -42,7 +42,7 @@ REQUIREMENTS = {
 
 @dataclass
 class Member:
-    """One effect on one channel, with the symbols of its states; `rates` and `stepped` are its law's answers."""
+    """One effect on one channel, with the symbols of the states that are `kept`; `rates` and `stepped` are its law's answers."""
 
     effect: Effect
     values: SimpleNamespace
@@ -50,14 +50,15 @@ class Member:
     index: int
     partner: int | None
     states: dict[str, ca.SX]
+    kept: tuple[State, ...]
     rates: dict[str, ca.SX] = field(default_factory=dict)
     stepped: dict[str, ca.SX] = field(default_factory=dict)
 
     def apply(self, s: LawInputs) -> ca.SX:
         """The term for the inputs `s`; keeps the states' rates and the new values of those that change once a sample."""
+        by_default = {state.name: ca.SX(float(state.clock)) for state in self.kept}
         self.stepped = {name: ca.SX(value) for name, value in self.effect.after_sample(s, self.values).items()}
         s = s.with_states(self.stepped)
-        by_default = {state.name: ca.SX(float(state.clock)) for state in self.effect.states}
         self.rates = {**by_default, **self.effect.rates(s, self.values)}
         return self.effect.term(s, self.values)
 
@@ -67,7 +68,8 @@ class EffectTerms:
 
     `displacement` (n_axes,), `velocity` (n_axes, or none where it is not known) and `acceleration` are the model's
     symbols, `ambient` the rise of the surroundings [K]. `faults` lists the effects that do not fit the device. What the
-    laws keep through a record is a state with `per_record`, zero without.
+    laws keep through a record is a state with `per_record`, zero without. The effects `apart`, by their places in the file, add no
+    term.
     """
 
     def __init__(
@@ -81,8 +83,10 @@ class EffectTerms:
         ambient: ca.SX,
         sample_time: float | None,
         per_record: bool,
+        apart: Collection[int] = (),
     ) -> None:
         self.physics, self.ambient, self.sample_time, self.per_record = physics, ambient, sample_time, per_record
+        self.apart = apart
         self.displacement, self.velocity, self.acceleration = displacement, velocity, acceleration
         reach = REACH * physics.displacement_scale
         self.within_reach = ca.fmin(ca.fmax(displacement, -reach), reach)
@@ -120,11 +124,14 @@ class EffectTerms:
                     self.faults.append(Fault(f"effect[{k}].at", f"{effect.kind} cannot act on {names[i]}: wrong unit"))
                 continue
             self.faults += [Fault(f"effect[{k}].{name}", text) for name, text in faults_at(effect, channel)]
+            if k in self.apart:
+                continue
+            kept = effect.kept(self.sample_time, isinstance(getattr(values, effect.amplitude().name), ca.SX))
             states = {
                 s.name: ca.SX.sym(f"{effect.kind}_{k}_{s.name}_{names[i]}") if self._unknown(s) else ca.SX(0)
-                for s in effect.states
+                for s in kept
             }
-            self.members.append(Member(effect, values, channel, i, partner, states))
+            self.members.append(Member(effect, values, channel, i, partner, states, kept))
 
     def added(self, place: Place, before: ca.SX) -> ca.SX:
         """`before` (channels,) plus every term of the effects at `place`."""
@@ -208,7 +215,7 @@ class EffectTerms:
         return [
             (m, state, symbol)
             for m in self.members
-            for state, symbol in zip(m.effect.states, m.states.values(), strict=True)
+            for state, symbol in zip(m.kept, m.states.values(), strict=True)
             if self._unknown(state)
         ]
 

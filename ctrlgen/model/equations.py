@@ -116,7 +116,7 @@ def _imposed(physics: ImposedPhysics, terms: EffectTerms, z: ca.SX) -> Equations
     v, a = drive[n : 2 * n], drive[2 * n :]
     displacement = terms.added(Place.DISPLACEMENT, z)
     carried = [m for m in terms.members if m.effect.place is Place.DISPLACEMENT]
-    memories = [(m.states[s.name], m.rates[s.name]) for m in carried for s in m.effect.states if not s.stepped]
+    memories = [(m.states[s.name], m.rates[s.name]) for m in carried for s in m.kept if not s.stepped]
     memory, rate = (ca.vertcat(NONE, *part) for part in (zip(*memories, strict=True) if memories else ((), ())))
     velocity = ca.jtimes(displacement, z, v) + ca.jtimes(displacement, memory, rate)
     acceleration = ca.jtimes(displacement, z, a) + ca.jtimes(velocity, z, v) + ca.jtimes(velocity, memory, rate)

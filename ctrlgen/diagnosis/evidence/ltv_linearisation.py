@@ -33,6 +33,7 @@ class LtvModel:
     displacement, velocity: of the axes (n, n_axes).
     F_S, F_f, H_S, H_f: matrices of the LTV model (n, ., .), with one column of f per axis.
     start_sd: standard deviation of the initial state (n_s,). state_scale: typical size of the state (n_s,).
+    ages: by how many whole samples each reading is late beyond what H_S and H_f say.
     """
 
     record: Record
@@ -51,14 +52,26 @@ class LtvModel:
     H_f: np.ndarray
     start_sd: np.ndarray
     state_scale: np.ndarray
+    ages: tuple[int, ...]
 
     @property
     def poses(self) -> bool:
         """Whether the samples are poses."""
         return self.record.poses
 
+    @property
+    def advanced(self) -> tuple[np.ndarray, np.ndarray]:
+        """The residual (n, n_y) with readings that are late taken back to when they were caused, and whether they are valid; zero
+        where the record ends before they come."""
+        residual, valid = np.zeros_like(self.residual), np.zeros_like(self.record.valid)
+        for i, age in enumerate(self.ages):
+            residual[: len(residual) - age, i] = self.residual[age:, i]
+            valid[: len(valid) - age, i] = self.record.valid[age:, i]
+        return residual, valid
+
     def readings(self, f: np.ndarray, axis: np.ndarray) -> np.ndarray:
-        """Change of the readings (n, n_y, m) by disturbances f (n, m), of which column j acts on axis `axis`[j], SI."""
+        """Change of the readings (n, n_y, m), before they are late, by disturbances f (n, m), of which column j acts on axis
+        `axis`[j], SI."""
         following = f if self.poses else np.vstack([f[1:], f[-1:]])
         into = self.F_f[:, :, axis] * ((f + following) / 2)[:, None, :]
         direct = self.H_f[:, :, axis] * f[:, None, :]
@@ -122,6 +135,7 @@ def linearise_along(fitter: Fitter, fit: Fit, record: Record) -> LtvModel:
         H_f=H_f,
         start_sd=sd,
         state_scale=np.concatenate([m.x_scale, m.z_scale]),
+        ages=_ages(simulator, record, p),
     )
 
 
@@ -160,6 +174,13 @@ def _linearised(
         for a in range(0, len(before), LTV_MODEL.block)
     ]
     return tuple(np.concatenate(column) for column in zip(*parts, strict=True))
+
+
+def _ages(simulator: Simulator, record: Record, p: np.ndarray) -> tuple[int, ...]:
+    ages = [0] * len(simulator.channels)
+    for late in simulator.late:
+        ages[late.row] = min(round(late.age(p) / record.sample_time), len(record.time))
+    return tuple(ages)
 
 
 def _velocity(r: Simulator, record: Record, at: np.ndarray, z: np.ndarray) -> np.ndarray:

@@ -53,7 +53,8 @@ class _Problem:
         # coloured noise is taken as white noise of its density at zero frequency, so that slow noise does not appear as a force
         density = noise.sd / np.array([1 - min(np.sum(a), 0.99) for a in noise.ar])
         self.sd = np.maximum(density, noise.floor)
-        self.residual = model.residual / self.sd
+        residual, self.valid = model.advanced
+        self.residual = residual / self.sd
         scale = np.concatenate([np.where(model.start_sd > 0, model.start_sd, model.state_scale), size])
         self.up, self.down = scale, 1 / scale
         self.P_0 = np.diag(np.concatenate([model.start_sd > 0, np.ones(self.k)]).astype(float))
@@ -69,7 +70,7 @@ class _Problem:
         return self.down[:, None] * A * self.up, H * self.up / self.sd[:, None]
 
     def _noise(self, k: int) -> np.ndarray:
-        return np.where(self.model.record.valid[k], 1.0, UNKNOWN_INPUT.missing_variance)
+        return np.where(self.valid[k], 1.0, UNKNOWN_INPUT.missing_variance)
 
     def _change(self, speed: float | np.ndarray) -> np.ndarray:
         Q = np.zeros((*np.shape(speed), self.m + self.k, self.m + self.k))

@@ -10,6 +10,7 @@ import numpy as np
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.screen import Screened
+from ctrlgen.diagnosis.selection.shifts import best_shift
 from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
@@ -98,25 +99,25 @@ def restart_elsewhere(
 def fit_other_clocks(
     trials: Trials, current: CandidateModel, singles: Sequence[CandidateModel]
 ) -> tuple[CandidateModel, ...]:
-    """What a signal that is early or late explains, alone and beside the best of the `singles`, begun at the best of a few
+    """What a signal that is early or late explains, alone and beside the best of the `singles`, begun at the best of many
     shifts. The screen hardly sees it: a shift of several samples is no multiple of a slope."""
     h = min(r.sample_time for r in trials.fitter.recording.records)
     open_ = (o for o in (h.beside(current.causes) for h in trials.screen.hypotheses) if o is not None)
     shifts = [o for o in open_ if o.effect != PARAMETER and o.law.moves_in_time]
     if current.errors.is_noise or trials.fitter.recording.kind == "poses" or not shifts:
         return ()
+    alone = len(trials.fitter.recording.channels) == 1
 
     def one(branch: Trials, beside: CandidateModel) -> list[CandidateModel]:
         begun: list[tuple[float, Hypothesis, Structure]] = []
-        for cause in shifts:
-            p = cause.law.amplitude()
-            low, high = cause.bounds(p, cause.channel_on(current.fit.structure.device))
+        # a drive that is early and a single reading that is late are one shift
+        shifted = alone and any(c.effect != PARAMETER and c.law.moves_in_time for c in beside.causes)
+        for cause in () if shifted else shifts:
             try:
-                starts = [2**k * h for k in range(SEARCH.clock_doublings) if low <= 2**k * h <= high]
-                for start in starts:
-                    suspected = beside.fit.restarted.with_cause(cause, {p.name: starts[0]})
-                    structure = suspected.restarted(len(beside.causes), {p.name: start})
-                    begun.append((branch.fitter.initial_objective(structure), cause, structure))
+                p = cause.law.amplitude()
+                shift = best_shift(branch.fitter, beside.fit, cause, h)
+                structure = beside.fit.restarted.with_cause(cause, {p.name: shift})
+                begun.append((branch.fitter.initial_objective(structure), cause, structure))
             except FAILURES as error:
                 branch.note_failure(cause, error)
         if not begun:

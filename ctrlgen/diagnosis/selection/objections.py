@@ -12,10 +12,11 @@ from itertools import combinations
 import numpy as np
 
 from ctrlgen.core.units import from_si
+from ctrlgen.devices import ImposedPhysics
 from ctrlgen.diagnosis.settings import OBJECTIONS
-from ctrlgen.effects import Param
+from ctrlgen.effects import Param, Place
 from ctrlgen.estimation.fit import Fit
-from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, nominal_physics
 from ctrlgen.estimation.noise import period_of
 from ctrlgen.estimation.raw_readings import detect_directly
 from ctrlgen.estimation.settings import STATISTICS
@@ -81,7 +82,7 @@ def _same_line(recording: Recording, fit: Fit, j: int, k: int) -> bool:
     a, b = fit.structure.causes[j], fit.structure.causes[k]
     if a.effect == PARAMETER or not a.prior.repeatable or (a.effect, a.location) != (b.effect, b.location):
         return False
-    return abs(_line(fit, j) - _line(fit, k)) * _covered(recording, a) < OBJECTIONS.apart
+    return abs(_line(fit, j) - _line(fit, k)) * _covered(recording, a, fit) < OBJECTIONS.apart
 
 
 def _no_pitch(recording: Recording, fit: Fit, k: int) -> str | None:
@@ -89,7 +90,7 @@ def _no_pitch(recording: Recording, fit: Fit, k: int) -> str | None:
     cause = fit.structure.causes[k]
     if cause.effect == PARAMETER or not any(_is_spatial_period(cause, p) for p in cause.law.params):
         return None
-    periods = _line(fit, k) * _covered(recording, cause)
+    periods = _line(fit, k) * _covered(recording, cause, fit)
     if periods >= OBJECTIONS.fewest_pitches:
         return None
     return (
@@ -105,7 +106,7 @@ def _no_line(recording: Recording, fit: Fit, k: int) -> str | None:
         return None
     if not any(p.unit == "Hz" for p in cause.law.params):
         return None
-    line, covered = _line(fit, k), _covered(recording, cause)
+    line, covered = _line(fit, k), _covered(recording, cause, fit)
     if line * covered < OBJECTIONS.fewest_periods:
         fewest = f"{OBJECTIONS.fewest_periods:.0f} are needed to tell a line"
         return f"the records hold {line * covered:.1f} periods of it, and {fewest}"
@@ -222,14 +223,21 @@ def _line(fit: Fit, k: int) -> float:
     return 0.0
 
 
-def _covered(recording: Recording, cause: Hypothesis) -> float:
-    """The longest of the records to fit [s], or how far its reading goes in them [SI]; no end where neither is meant."""
+def _covered(recording: Recording, cause: Hypothesis, fit: Fit) -> float:
+    """The longest of the records to fit [s], or how far its reading, or its axis, goes in them [SI]; no end where neither is
+    meant."""
     records = [r for r in recording.records if r.role == "fit"]
     params = cause.law.params
     if any(p.unit == "Hz" for p in params):
         return max(float(r.time[-1] - r.time[0]) for r in records)
     channel = f"reading.{cause.at}"
-    if not any(_is_spatial_period(cause, p) for p in params) or channel not in recording.channels:
+    if not any(_is_spatial_period(cause, p) for p in params):
+        return np.inf
+    physics = nominal_physics(fit.structure.device)
+    if cause.law.place is Place.FORCE and isinstance(physics, ImposedPhysics):
+        place = 0 if cause.at == "all" else physics.axes.index(cause.at)
+        return float(max(np.ptp(r.drive[:, place]) for r in records))
+    if channel not in recording.channels:
         return np.inf
     i = recording.channels.index(channel)
     read = np.concatenate([r.observed[r.valid[:, i], i] for r in records])

@@ -19,6 +19,7 @@ from ctrlgen.effects import Place
 from ctrlgen.estimation.disturbance_inputs import with_disturbance_inputs
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis, nominal_physics
+from ctrlgen.estimation.late_readings import LateSlopes
 from ctrlgen.estimation.settings import CANDIDATE_TERMS
 from ctrlgen.estimation.simulator import Simulator, compiled_simulator
 from ctrlgen.estimation.structure import Structure
@@ -102,8 +103,12 @@ class ScoreGradient:
         tails = [np.zeros((len(ar), len(s))) for ar, s in zip(noise.ar, seen, strict=True)]
         total = Sums.none(U.shape[2], len(self.columns))
         lost = np.zeros(len(self.laws.terms) + len(self.sizes), bool)
+        h = self.record.sample_time
+        late = {r.row: LateSlopes(r.age(self.p), h) for r in self.simulator.late}
         for a, b, readings in self.blocks(start, lost):
             for i, Y in enumerate(readings):
+                if i in late:
+                    Y = late[i].late(Y)
                 if len(noise.ar[i]):
                     Y = np.vstack([tails[i], Y])
                     tails[i] = Y[len(Y) - len(tails[i]) :]

@@ -27,7 +27,7 @@ from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis, nominal_physics
 from ctrlgen.model.effect_terms import channels
 from ctrlgen.numerics.spectral_peaks import highest_peaks, periodogram
-from ctrlgen.recordings.recording import Timing
+from ctrlgen.recordings.recording import Record, Timing
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +146,7 @@ class Screen:
             shortest = max(resolved_way(y[good, i]) for y in paths)
             return merged_periods(spatial_periods(y[good, i], residual[good, i], shortest) for y in paths)
 
-        return {
+        by_sensor = {
             (Place.SENSOR, names.index(name)): {
                 "spatial_periods": periods(i, good),
                 "jump_positions": jump_positions(record.observed[good, i], residual[good, i]),
@@ -154,6 +154,25 @@ class Screen:
             for i, name in read
             if name in names and np.any(good := record.valid[:, i] & np.isfinite(residual[:, i]))
         }
+        return by_sensor | self._along_axes(fit, record, residual)
+
+    def _along_axes(
+        self, fit: Fit, record: Record, residual: np.ndarray
+    ) -> dict[tuple[Place, int], dict[str, tuple[float, ...]]]:
+        """Of the force on each axis, the ways of the axis after which the residual of its own reading repeats, or of any where none
+        has its name."""
+        simulator = self.fitter.simulator(fit.structure, record)
+        ways = simulator.simulate_states(record, fit.theta)[0][:, simulator.n_x :]
+        names = [c.removeprefix("reading.") for c in self.fitter.recording.channels]
+        found = {}
+        for j, axis in enumerate(nominal_physics(fit.structure.device).axes):
+            own = [i for i, name in enumerate(names) if name == axis] or range(len(names))
+            shortest, good = resolved_way(ways[:, j]), record.valid & np.isfinite(residual)
+            repeats = merged_periods(
+                spatial_periods(ways[good[:, i], j], residual[good[:, i], i], shortest) for i in own if good[:, i].any()
+            )
+            found[Place.FORCE, j] = {"spatial_periods": repeats}
+        return found
 
     def _screened(
         self, columns: list[CandidateTerm], sums: Sums, gradient: np.ndarray, likeness: np.ndarray

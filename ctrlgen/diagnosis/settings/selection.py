@@ -111,8 +111,12 @@ class SearchSettings:
     """Rivals fitted for a cause."""
     nearly_best: float = 0.9
     """Share of what the best candidate explains from which on another is fitted to the end before both are compared."""
-    clock_doublings: int = 6
-    """Shifts in time from which a fit may begin: one sample, doubled so many times less one, early and late."""
+    longest_shift: int = 64
+    """Samples by which a signal may be early or late where a fit of it begins: what a camera or a bus is late by at usual rates. A fit
+    goes on from there. Judgement."""
+    shift_share: int = 8
+    """The shifts tried are a sample apart, or this part of themselves: within half a period of a signal of a few periods, where
+    neighbouring optima are told apart. Judgement."""
     halvings: int = 3
     """How often an amplitude from which no fit can begin is halved: the screen that promises it is linear. Judgement."""
     restarts: int = 4

@@ -78,7 +78,7 @@ SPEAKS_FOR: dict[Kind, tuple[tuple[Family, ...], str]] = {
     ),
     Kind.TEMPERATURE: ((Family.THERMAL,), "expansion, and sensors that see the surroundings"),
     Kind.RECORD: ((Family.GAIN, Family.EVENTS), "the zero point of each record, or what happened between them"),
-    Kind.PITCH: ((Family.PERIODIC,), "fringes, teeth, resolvers and screws repeat along the way"),
+    Kind.PITCH: ((Family.PERIODIC,), "fringes, teeth, slots, resolvers and screws repeat along the way"),
     Kind.TIME: ((Family.EVENTS, Family.THERMAL, Family.CREEP), "drift and ageing on the clock, whatever was done"),
     Kind.LINE: ((Family.EVENTS,), "vibration and mains repeat in time"),
     Kind.PAST: ((), "says that something is left that lasts longer than a sample, not what"),
@@ -89,6 +89,8 @@ FAMILY_OF = {
     **dict.fromkeys(
         (
             "hysteresis",
+            "asymmetric_displacement_hysteresis",
+            "asymmetric_drive_hysteresis",
             "asymmetric_hysteresis",
             "bouc_wen",
             "butterfly",
@@ -115,7 +117,7 @@ FAMILY_OF = {
     **dict.fromkeys(("abbe_arm", "bow", "cubic_sensor", "finite_rotation", "frame_rotation_x"), Family.GEOMETRY),
     **dict.fromkeys(("frame_rotation_y", "frame_rotation_z", "raised_point", "screw_motion"), Family.GEOMETRY),
     **dict.fromkeys(("stitching_error",), Family.GEOMETRY),
-    **dict.fromkeys(("cyclic", "quantisation"), Family.PERIODIC),
+    **dict.fromkeys(("cogging", "cyclic", "quantisation"), Family.PERIODIC),
     **dict.fromkeys(("expansion", "second_pole", "temperature_sensitivity", "thermal_lag"), Family.THERMAL),
     **dict.fromkeys(("degradation", "drift", "force_step", "lost_beams", "sensor_step", "vibration"), Family.EVENTS),
 }

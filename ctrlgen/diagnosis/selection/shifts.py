@@ -1,0 +1,63 @@
+"""By how much a reading comes late, or a drive early, to begin with: shifts of what a fit predicts, without simulating it again."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ctrlgen.diagnosis.settings import SEARCH
+from ctrlgen.estimation.error_model import huber
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.least_squares import limited
+from ctrlgen.recordings.recording import Record
+
+
+def shifts_tried(h: float, low: float, high: float) -> np.ndarray:
+    """Every sample of h [s], farther apart the longer they are, up to `SEARCH.longest_shift`; one at least."""
+    shifts = [1]
+    while (further := shifts[-1] + max(1, shifts[-1] // SEARCH.shift_share)) <= SEARCH.longest_shift:
+        shifts.append(further)
+    tried = h * np.array(shifts, float)
+    within = tried[(tried >= low) & (tried <= high)]
+    return within if len(within) else np.array([min(max(h, low), high)])
+
+
+def best_shift(fitter: Fitter, fit: Fit, cause: Hypothesis, h: float) -> float:
+    """The shift [s] of `shifts_tried` that leaves least of the residual of `fit` on the records to fit.
+
+    Exact for what `fit` predicts where nothing but the signal's own time is shifted; a start, not an estimate.
+    """
+    device = fit.structure.device
+    shifts = shifts_tried(h, *cause.bounds(cause.law.amplitude(), cause.channel_on(device)))
+    channels = fitter.recording.channels
+    rows = range(len(channels)) if cause.at == "all" else [channels.index(f"reading.{cause.at}")]
+    left = np.zeros(len(shifts))
+    for k, record in enumerate(fitter.fit_records):
+        start = fit.initial_states[k] if fit.initial_states else None
+        y = fitter.simulator(fit.structure, record).simulate(record, fit.theta, start)
+        left += _left(fitter, record, y, list(rows), -shifts if cause.law.shifts_drive else shifts)
+    return float(shifts[np.argmin(left)])
+
+
+def _left(fitter: Fitter, record: Record, y: np.ndarray, rows: list[int], late: np.ndarray) -> np.ndarray:
+    """The loss (m,) on one record with the readings `rows` of y (n, n_y) `late` (m,) [s]; what was before the record, or after it,
+    counts like the mean of the rest."""
+    n, t = len(y), record.time
+    residual = np.zeros((n, len(rows), len(late)))
+    known = np.zeros((n, len(late)), bool)
+    for j, tau in enumerate(late):
+        at = t - tau
+        known[:, j] = (at >= t[0]) & (at <= t[-1])
+        for place, row in enumerate(rows):
+            residual[:, place, j] = record.observed[:, row] - np.interp(at, t, y[:, row])
+    errors, valid = fitter.error, record.valid[:, rows]
+    residual = np.where(valid[:, :, None], residual, 0.0)
+    white = np.zeros_like(residual)
+    for place, row in enumerate(rows):
+        filtered = errors.whiten_channel(residual[:, place], row)
+        white[n - len(filtered) :, place] = limited(filtered)
+    white[~errors.usable(record.valid)[:, rows]] = 0.0
+    loss = np.array([huber(white[:, :, j], errors.corner[rows])[0] ** 2 for j in range(len(late))])
+    inside = known.T[:, :, None]
+    share = np.maximum(known.mean(axis=0), 1 / n)
+    return np.sum(np.where(inside, loss, 0.0), axis=(1, 2)) / share

@@ -1,0 +1,60 @@
+"""Asymmetric hysteresis of a joint or a stack: the loop is wider on one of its branches or sides."""
+
+import casadi as ca
+
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects._play_operators import kept_between, play_states, radii, weighted_lag
+
+
+class AsymmetricLag(Effect, listed=False):
+    """Delta s = g (sum_j w_j P_j - s + k s), P_j within s - a_j ... s + b_j, r_j = r j/8, w_j ~ j^-q, sum w_j = 1, j = 1..8.
+
+    a_j = r_j + (l |s| + t s) r_j/r and b_j = r_j + (u |s| + t s) r_j/r, no less than 0: generalised plays, of which each edge widens
+    in its own way. u = l = t = 0 is `displacement_hysteresis`. Rate-independent. Holds for |u| + |t| and |l| + |t| below 1, where the
+    edges rise with s, so that nothing between two samples matters.
+    """
+
+    order = 1
+    source = (
+        "M. Al Janaideh, S. Rakheja, C.-Y. Su, IEEE/ASME Trans. Mechatron. 16 (2011) 734: generalised play operators"
+    )
+
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return -p.share * (weighted_lag(s, s.value, p.reach, p.taper) - p.reversible * s.value)
+
+    def update(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
+        widening, widths = p.side * s.value, radii(p.reach)
+        shares = (1 + (rise * ca.fabs(s.value) + widening) / p.reach for rise in (p.lower, p.upper))
+        low, high = ([ca.fmax(share, 0.0) * r for r in widths] for share in shares)
+        return kept_between(s, [s.value - a for a in low], [s.value + b for b in high], widths)
+
+
+def _shape(unit: str) -> tuple[Param, ...]:
+    return (
+        Param("reach", unit, (1e-4, 10.0), "r: way after which all plays follow, at home"),
+        Param("taper", "1", (-1.0, 2.0), "q: weight of the narrow plays over the wide ones"),
+        Param("reversible", "1", (-0.5, 1.5), "k: reversible part over the share that lags"),
+        Param("upper", "1", (-0.6, 0.6), "u: widening of the branch that comes down, per way from home"),
+        Param("lower", "1", (-0.6, 0.6), "l: widening of the branch that goes up, per way from home"),
+        Param("side", "1", (-0.35, 0.35), "t: widening of both toward the positive side"),
+    )
+
+
+class AsymmetricDisplacementHysteresis(AsymmetricLag):
+    """s = d, the displacement: Delta d as of `AsymmetricLag`. In a set of poses the memory goes from pose to pose. Holds as above."""
+
+    title = "Asymmetric hysteresis of a joint behind the stage"
+    place = Place.DISPLACEMENT
+    requires = frozenset({"actuator"})
+    params = (Param("share", "1", (-0.95, 0.95), "share of the displacement that lags", off=0.0), *_shape("travel"))
+    states = play_states("travel")
+
+
+class AsymmetricDriveHysteresis(AsymmetricLag):
+    """s = u, the drive: Delta u as of `AsymmetricLag`. Holds as above, on actuators that push."""
+
+    title = "Asymmetric hysteresis of a piezo stack"
+    place = Place.DRIVE
+    requires = frozenset({"actuator", "force"})
+    params = (Param("share", "1", (-0.95, 0.95), "share of the drive that lags", off=0.0), *_shape("channel"))
+    states = play_states("channel")

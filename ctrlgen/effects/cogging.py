@@ -1,0 +1,28 @@
+"""A force that repeats along the way: cogging of a motor, its slots, ripple of a screw."""
+
+import math
+
+import casadi as ca
+
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+
+
+class Cogging(Effect):
+    """F = -A sin(2 pi d/Lambda + phi), of a potential, so that it takes and gives back. One harmonic; several take several effects.
+
+    Holds where a period fits into the travel: part of a longer one is a stiffness and an offset.
+    """
+
+    place = Place.FORCE
+    requires = frozenset({"force", "velocity"})  # what stands in balance has a flexure, and no motor with slots
+    source = (
+        "T. Sebastian, V. Gangla, IEEE Trans. Ind. Appl. 32 (1996) 730: cogging torque, periodic in the slots and poles"
+    )
+    params = (
+        Param("force", "channel", (-2.0, 2.0), "A: largest force", off=0.0),
+        Param("period", "travel", (1e-4, 2.0), "Lambda: way of one period"),
+        Param("phase", "deg", (-360.0, 360.0), "phi: phase at home"),
+    )
+
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return -p.force * ca.sin(2 * math.pi * s.displacement / p.period + p.phase)

@@ -1,0 +1,72 @@
+"""Where a law is suspected, and where it is another law."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from axis_records import record
+
+import ctrlgen
+from ctrlgen.core.files import validate
+from ctrlgen.devices import Device
+from ctrlgen.diagnosis.diagnose import diagnose_recording
+from ctrlgen.diagnosis.selection.verdict import Verdict
+from ctrlgen.effects import Place
+from ctrlgen.estimation.hypothesis import PARAMETER, hypotheses, nominal_physics
+from ctrlgen.recordings.recording import Recording
+
+
+def gantry():
+    """Two axes moved as told, whose forces are read; no force depends on where the second one is."""
+    return ctrlgen.user_device(
+        "gantry",
+        parameters={"m": "8 kg", "c": "20 N*s/m", "k": "300 N/m"},
+        axes={"x": "200 mm", "y": "150 mm"},
+        speed={"x": "1 m/s", "y": "1 m/s"},
+        needed_force=lambda d, v, a, p: [p.m * a.x + p.c * v.x + p.k * d.x, p.m * a.y + p.c * v.y],
+    )
+
+
+def test_a_displacement_that_no_force_depends_on_has_no_law():
+    """The disturbance that would tell it from others has no place to enter."""
+    device = gantry()
+    found = hypotheses(device, nominal_physics(device), ("reading.x", "reading.y"), 1e-3, ambient=False)
+    behind = [h for h in found if h.effect != PARAMETER and h.law.place is Place.DISPLACEMENT]
+    assert {h.at for h in behind} == {"x"} and "backlash" in {h.effect for h in behind}
+    assert {h.at for h in found if h.effect == "coulomb"} == {"x", "y", "all"}
+
+
+def motor_record(t: np.ndarray, w: float, way: float, force, rng) -> tuple[np.ndarray, np.ndarray]:
+    """A slide of 4 kg with 20 N*s/m on two sines: its motion, and the force that it takes beside force(d)."""
+    d, v, a = (
+        way * (w**k * np.sin(w * t + k * np.pi / 2) + 0.15 * (2.7 * w) ** k * np.sin(2.7 * w * t + k * np.pi / 2))
+        for k in range(3)
+    )
+    return np.column_stack([d, v, a]), 4 * a + 20 * v + force(d) + 0.05 * rng.standard_normal(len(t))
+
+
+def linear_motor() -> Device:
+    own = {"mass": {"value": "4 kg", "sd": "0.2 kg"}, "damping": {"value": "20 N*s/m", "sd": "2 N*s/m"}}
+    own |= {"stiffness": "0 N/m", "stroke": "200 mm", "speed": "1 m/s", "force": "50 N"}
+    table = {"kind": "tested_axis", "name": "motor", "title": "a motor", "source": "round numbers", "mechanics": own}
+    return validate(Device.library["tested_axis"], table, "device")
+
+
+@pytest.mark.long
+def test_the_cogging_of_a_motor_is_found_with_its_pitch():
+    """14 slots within the way, two harmonics, which no start value of the law knows."""
+    rng, device, t, parts = np.random.default_rng(2), linear_motor(), 2e-3 * np.arange(3000), []
+
+    def cogging(d: np.ndarray) -> np.ndarray:
+        angle = 2 * np.pi * d / 0.024
+        return 1.5 * np.sin(angle + 0.4) + 0.3 * np.sin(2 * angle + 1)
+
+    for role, hertz, way in (("fit", 0.31, 0.15), ("hold_out", 0.47, 0.11)):
+        moved, force = motor_record(t, 2 * np.pi * hertz, way, cogging, rng)
+        parts.append(record(moved, force, role, h=2e-3))
+    recording = Recording("t", device.name, "series", ("reading.force",), ("N",), (0.05,), tuple(parts), ())
+    found = diagnose_recording(device, recording, jobs=0)
+    first = found.findings[0]
+    assert found.verdict is Verdict.EXPLAINED and {f.effect for f in found.findings} == {"cogging"}
+    assert first.parameters["period"].value == pytest.approx(24e3, rel=1e-3)  # um
+    assert first.parameters["force"].value == pytest.approx(1.5, rel=0.01)
