@@ -13,8 +13,11 @@ from ctrlgen.devices import load_device
 from ctrlgen.devices.mechanism.mechanism import Mechanism
 from ctrlgen.devices.mechanism.modes import summary
 from ctrlgen.devices.sensor import describe
+from ctrlgen.effects import Effect
+from ctrlgen.estimation.law_needs import not_offered, refusals, usual
 from ctrlgen.firmware.package import MANIFEST, verify_package
 from ctrlgen.model.assembly import build_model
+from ctrlgen.model.effect_terms import available
 from ctrlgen.recordings.schema import FILE as RECORDING
 from ctrlgen.trajectory.infeasibility import check_feasible
 from ctrlgen.trajectory.scenario import load_scenario, model_of
@@ -100,5 +103,12 @@ def _check_device(file: Path, figure: Path | None) -> None:
     units = dict(zip(model.signals["reading"].channels, model.signals["reading"].units, strict=True))
     for sensor in device.sensor:
         out.print(f"  sensor: {describe(sensor, units[sensor.at])}", markup=False, soft_wrap=True)
+    physics = device.physics(device.values())
+    parts, there = device.parts(physics), available(physics)
+    out.print(f"  machine: {parts.text}", markup=False, soft_wrap=True)
+    if refused := not_offered([name for name, law in sorted(Effect.library.items()) if law.requires <= there], parts):
+        out.print(f"  not offered in a diagnosis: {refusals(refused)}", markup=False, soft_wrap=True)
+    for row in usual(parts):
+        out.print(f"  usual: {row.text}", markup=False, soft_wrap=True)
     for remark in device.remarks():
         out.print(f"  note: {remark}", markup=False, soft_wrap=True)

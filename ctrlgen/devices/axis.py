@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Annotated, ClassVar, Literal
 
@@ -9,8 +10,9 @@ import casadi as ca
 
 from ctrlgen.core.units import In, Quantity, written_unit
 from ctrlgen.devices.base import Device
-from ctrlgen.devices.device_physics import FeedbackLoop, InertialPhysics
+from ctrlgen.devices.device_physics import DevicePhysics, FeedbackLoop, InertialPhysics
 from ctrlgen.devices.limit import Limit
+from ctrlgen.devices.machine import MachineParts
 from ctrlgen.devices.section import Section
 from ctrlgen.devices.signal import AxisSignal, Signal
 
@@ -75,6 +77,15 @@ class Axis(Device):
     """The motor."""
     loop: Loop | None = None
     """The position controller; the drive of the device is then the reference position. Left out: open loop."""
+
+    def excluded_actuators(self) -> dict[str, str]:
+        """A ceramic does not move a stage that nothing holds."""
+        return {} if self.mechanics.stiffness.si > 0 else {"piezo": "nothing holds its stage"}
+
+    def parts(self, physics: DevicePhysics) -> MachineParts:
+        """As of any device; a stiffness is one of flexures where no transmission is stated."""
+        parts = super().parts(physics)
+        return replace(parts, flexible=self.mechanics.stiffness.si > 0) if parts.transmission is None else parts
 
     def physics(self, p: SimpleNamespace) -> InertialPhysics:
         """Newton's second law with the device's numbers."""

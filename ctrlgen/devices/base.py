@@ -12,6 +12,7 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from ctrlgen.core.units import Quantity
 from ctrlgen.devices.device_physics import DevicePhysics
+from ctrlgen.devices.machine import Machine, MachineParts, machine_parts
 from ctrlgen.devices.quantities import member_at, si_namespace, walk
 from ctrlgen.devices.reported_units import in_units_of
 from ctrlgen.devices.run_time import RunTime, RunTimeConstant, run_time_constants
@@ -24,6 +25,10 @@ class Device(Section):
     """Base of every device: one subclass in one file, chosen by `kind` in the device file."""
 
     library: ClassVar[dict[str, type[Device]]] = {}
+    works_by: ClassVar[str | None] = None
+    """By what the actuators of this kind work (`machine.FAMILIES`), None where the kind does not say."""
+    on_flexures: ClassVar[bool | None] = None
+    """Whether the stages of this kind stand on flexures, None where the kind does not say."""
 
     kind: str
     """Chooses the equations of the device."""
@@ -39,6 +44,8 @@ class Device(Section):
     """`[[sensor]]` tables: what reads the channels of the pose. They do not enter the model; `ctrlgen check` gives
     their resolution and range, `ctrlgen.simulate_sensors` their recordings.
     """
+    machine: Machine | None = None
+    """`[machine]`: what it is made of, for a diagnosis."""
     run_time: RunTime | None = None
     """`[run_time]`: which of these numbers the generated controller is given when it starts, because they differ between specimens or
     drift. Without it every number is compiled in.
@@ -77,6 +84,14 @@ class Device(Section):
         told = self.model_copy()
         told._told_in = tuple(units.items())
         return told
+
+    def excluded_actuators(self) -> dict[str, str]:
+        """Families of actuators (`machine.FAMILIES`) that a device of this kind and these numbers cannot have, with the reason."""
+        return {}
+
+    def parts(self, physics: DevicePhysics) -> MachineParts:
+        """What it is made of: as stated, else as its `physics` and its kind tell."""
+        return machine_parts(self.machine, physics, self.works_by, self.on_flexures, self.excluded_actuators())
 
     def remarks(self) -> list[str]:
         """Remarks on the description for the reader, such as an equation that is used outside its range."""

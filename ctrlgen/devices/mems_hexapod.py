@@ -187,6 +187,9 @@ class MemsHexapod(Device):
     Displacements and forces count positive in the direction in which the actuators push.
     """
 
+    works_by: ClassVar[str | None] = "thermal"
+    on_flexures: ClassVar[bool | None] = True
+
     kind: Literal["mems_hexapod"]
     """NIST's MEMS hexapod with thermal actuators (S1)."""
     axes: tuple[Axis, Axis, Axis, Axis, Axis, Axis]

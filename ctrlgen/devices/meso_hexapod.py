@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
@@ -76,6 +76,8 @@ class RatedTravel(Section):
 
 class MesoHexapod(Device):
     """Actuator displacement -> stage -> platform pose: kinematics alone, without force, temperature or time."""
+
+    on_flexures: ClassVar[bool | None] = True
 
     kind: Literal["meso_hexapod"]
     """The kinematics of NIST's meso-scale hexapod (S0)."""

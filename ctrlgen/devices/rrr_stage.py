@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
@@ -69,6 +69,9 @@ class Piezo(Section):
 
 class RrrStage(Device):
     """Stack voltage -> force on the input = restoring force of the input -> output displacement."""
+
+    works_by: ClassVar[str | None] = "piezo"
+    on_flexures: ClassVar[bool | None] = True
 
     kind: Literal["rrr_stage"]
     """A planar stage of three links with three circular hinges each (S3)."""

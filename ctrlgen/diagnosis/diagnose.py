@@ -40,6 +40,7 @@ from ctrlgen.estimation.checkpoint import Checkpoint
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, hypotheses, nominal_physics, selected_laws
 from ctrlgen.estimation.isolated_outliers import mark_outliers
+from ctrlgen.estimation.law_needs import not_offered, refusals, usual, with_odds
 from ctrlgen.estimation.noise import Noise, estimate_noise
 from ctrlgen.estimation.noise_update import correct_stated_noise, update_guessed_noise
 from ctrlgen.estimation.profile_likelihood import profiles
@@ -53,6 +54,7 @@ from ctrlgen.recordings.recording import Recording
 
 Progress = Callable[[str], None]
 RESTLESS = "{}: at rest the residual jumps or has memory, so it is not noise; something acts there that the device file does not describe"
+NOT_OFFERED = "not offered: {}"
 WITHDRAWN = (
     "{} at {} is not confirmed: with it the held-out records are predicted worse than by the device as described"
 )
@@ -101,6 +103,9 @@ def _diagnose(
     fitter = _with_noise(device, fitter)
     known = fitter.noise.known
     suspected = _hypotheses(device, live.recording, effects)
+    parts = device.parts(nominal_physics(device))
+    refused = not_offered(list(dict.fromkeys(h.effect for h in suspected)), parts) if laws is None else {}
+    suspected = [with_odds(h, parts) for h in suspected if h.effect not in refused]
     step(f"refit of the device as described, {len(suspected)} hypotheses")
     search = Searcher(fitter, Screen(fitter, suspected, seed), step, jobs).run(device)
     step("residual tests")
@@ -117,7 +122,13 @@ def _diagnose(
     left, failed = ((), ()) if enough else _empirical_terms(search, shares)
     spikes = find_spikes(search.fitter, search.chosen.fit, known)
     told = (*marking_notes(live.recording, search.fitter.recording), *(s.sentence for s in spikes))
-    notes = (*_notes(search, live.notes, told, tests.restless, laws, effects), *analyses.failed, *failed)
+    told_of_machine = [NOT_OFFERED.format(refusals(refused))] if refused else []
+    told_of_machine += [f"usual: {row.text}" for row in usual(parts)]
+    notes = (
+        *_notes(search, live.notes, told, tests.restless, laws, effects, told_of_machine),
+        *analyses.failed,
+        *failed,
+    )
     return Diagnosis(
         verdict=answer,
         findings=(*findings(search, attribution, likelihoods), *detected),
@@ -197,6 +208,7 @@ def _notes(
     restless: Sequence[str],
     laws: Sequence[str] | None,
     effects: Sequence[type[Effect]],
+    told_of_machine: Sequence[str],
 ) -> tuple[str, ...]:
     """What was done to the recording, what is known of its noise, and what could not be tried."""
     failed = dict.fromkeys(text for round_ in search.rounds for text in round_.failed)
@@ -206,6 +218,7 @@ def _notes(
         *search.fitter.noise.notes,
         *marks,
         *map(RESTLESS.format, restless),
+        *told_of_machine,
         *([] if laws is None else [RESTRICTED.format(", ".join(law.kind for law in effects) or "none")]),
         *(WITHDRAWN.format(c.effect, c.location) for c in search.withdrawn),
         *(f"could not be tried: {text}" for text in failed),

@@ -55,6 +55,7 @@ class Hypothesis:
     at, of: the channel on which the effect acts, or "all"; for effects of pairs, the other channel.
     count: how many of the same effect a structure has there already, where the effect is repeatable.
     highest: frequency [Hz] up to which samples are told from their aliases; infinite for settled poses, which have no clock.
+    machine_odds: ln of how many times commoner the law is in a machine of these parts than in any.
     longest: delay [s] that is looked for; finite in the reading of a loop, where each sample of it is a state of the simulation.
     """
 
@@ -65,6 +66,7 @@ class Hypothesis:
     path: str = ""
     count: int = 0
     highest: float = float("inf")
+    machine_odds: float = field(default=0.0, compare=False)
     longest: float = float("inf")
 
     def beside(self, causes: Sequence[Hypothesis]) -> Hypothesis | None:

@@ -82,7 +82,7 @@ class Structure:
     @property
     def log_prior_odds(self) -> float:
         """The sum of the log prior odds of its causes."""
-        return sum(c.prior.log_prior_odds for c in self.causes)
+        return sum(c.prior.log_prior_odds + c.machine_odds for c in self.causes)
 
     def cause_of(self, parameter: FreeParameter) -> Hypothesis:
         """The cause that a parameter belongs to. Raises ValueError for one of the device's own."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property, wraps
 from types import SimpleNamespace
-from typing import Annotated, Any, Literal, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -53,6 +53,8 @@ def _as_described(method: Callable[[Mechanism], T]) -> cached_property[T]:
 
 class Mechanism(Device):
     """Drive -> force or displacement -> motion of all bodies -> pose of the output point."""
+
+    on_flexures: ClassVar[bool | None] = True
 
     kind: Literal["mechanism"]
     """Rigid bodies and flexures."""

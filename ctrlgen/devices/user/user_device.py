@@ -156,6 +156,8 @@ class UserArguments(TypedDict, total=False):
     """The device in words; by default its name."""
     source: str
     """Where the model comes from."""
+    machine: Mapping[str, Any]
+    """What it is made of, as the `[machine]` table states it."""
     effect: Sequence[Mapping[str, Any]]
     """Effects as `[[effect]]` tables state them."""
 
@@ -218,7 +220,11 @@ def user_device(name: str, **given: Unpack[UserArguments]) -> Device:
         drive_rates=rates_of_drives,
         weights=weights,
     )
-    plain = {"title": given.get("title") or name, "source": given.get("source", "a user's model")}
+    plain = {
+        "title": given.get("title") or name,
+        "source": given.get("source", "a user's model"),
+        "machine": given.get("machine"),
+    }
     return _validated(description, tables, {"name": name, **plain, "effect": tuple(given.get("effect", ()))}, read)
 
 

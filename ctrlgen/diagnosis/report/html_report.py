@@ -115,7 +115,7 @@ def _families(diagnosis: Diagnosis) -> list[dict[str, str]]:
 
 def _row(f: Finding) -> dict[str, Any]:
     return {
-        "plain": plain_name(f.effect),
+        "plain": f.title or plain_name(f.effect),
         "effect": f.effect,
         "location": f.location,
         "of": f.cause.of,

@@ -43,7 +43,11 @@ def hypothesis_name(cause: Hypothesis) -> str:
 def cause_text(finding: Finding) -> str:
     """The cause with its meaning: 'a clamped flexure stretches as it bends (stiffening at stage:axis)'."""
     name = hypothesis_name(finding.cause)
-    return name if finding.effect == PARAMETER else f"{_within_a_sentence(plain_name(finding.effect))} ({name})"
+    return (
+        name
+        if finding.effect == PARAMETER
+        else f"{_within_a_sentence(finding.title or plain_name(finding.effect))} ({name})"
+    )
 
 
 def interval(e: Estimate) -> str:

@@ -11,11 +11,12 @@ from pydantic import Field
 from ctrlgen.core.units import difference, from_si
 from ctrlgen.diagnosis.selection.attribution import Attribution, ShareEntry, one_finding
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
+from ctrlgen.diagnosis.selection.law_titles import title
 from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.selection.verdict import unconfirmed
 from ctrlgen.diagnosis.settings import ATTRIBUTION
 from ctrlgen.estimation.fit import Fit
-from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, nominal_physics
 from ctrlgen.estimation.prediction_uncertainty import prediction_uncertainty
 from ctrlgen.estimation.profile_likelihood import Profile
 from ctrlgen.estimation.robust_covariance import robust_deviations
@@ -60,7 +61,8 @@ class Finding:
     where it was read from the data or may be zero. worth: by channel the held-out error without the cause and with it. source:
     publication of the effect's law. cause: the hypothesis. terms: numbers of further terms of the same law at the same place, such
     as harmonics. role: a `cause`; `minor`: above the noise and below a hundredth of the mismatch; `part`: it takes away nothing
-    itself, and the finding `serves` needs it; `unseen`: only the records to fit can show it.
+    itself, and the finding `serves` needs it; `unseen`: only the records to fit can show it. title: what the law is called on this
+    machine, empty where its own title serves.
     """
 
     effect: str
@@ -74,6 +76,7 @@ class Finding:
     terms: tuple[dict[str, Estimate], ...] = ()
     role: Role = Role.CAUSE
     serves: Hypothesis | None = None
+    title: str = ""
 
     @property
     def of(self) -> str | None:
@@ -164,9 +167,18 @@ def findings(search: SearchResult, shares: Attribution, profiles: tuple[Profile,
                 tuple(_numbers_of(search, k, estimates) for k in others),
                 role,
                 causes[served] if role is Role.PART and served is not None else None,
+                _title(search, cause),
             )
         )
     return tuple(sorted(rows, key=lambda f: (f.role is not Role.CAUSE, -(f.share.value if f.share else 0.0))))
+
+
+def _title(search: SearchResult, cause: Hypothesis) -> str:
+    """What the law of a cause is called on this machine; empty for a number of the device."""
+    if cause.effect == PARAMETER:
+        return ""
+    device = search.chosen.fit.structure.device
+    return title(cause.law, device.parts(nominal_physics(device)))
 
 
 def _role(share: ShareEntry | None, unseen: bool, nothing_to_share: bool, is_served: bool) -> Role:

@@ -1,0 +1,176 @@
+"""What a machine is made of: its actuator, what stands between it and the reading, and the sensor; stated, or inferred from the file.
+
+Nothing of this enters the model. A diagnosis offers no law that such a machine cannot have, and names laws in its words.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator
+
+from ctrlgen.core.units import same_dimension
+from ctrlgen.devices.device_physics import BalancedPhysics, DevicePhysics, ImposedPhysics
+from ctrlgen.devices.section import Section
+
+ActuatorName = Literal[
+    "voice coil",
+    "linear motor",
+    "servo motor",
+    "stepper",
+    "galvanometer",
+    "solenoid",
+    "piezo stack",
+    "piezo ceramic",
+    "piezo motor",
+    "thermal",
+    "electrostatic",
+    "hydraulic",
+    "pneumatic",
+    "pump",
+]
+TransmissionName = Literal[
+    "none", "flexure", "lever", "linkage", "screw", "gear", "harmonic drive", "belt", "rack", "cable"
+]
+SensorName = Literal[
+    "capacitive",
+    "eddy current",
+    "LVDT",
+    "interferometer",
+    "encoder",
+    "resolver",
+    "potentiometer",
+    "strain gauge",
+    "load cell",
+    "tachometer",
+    "camera",
+    "autocollimator",
+    "accelerometer",
+]
+# By what an actuator works. "position": a controller of its own brings it where it is told.
+FAMILIES: Mapping[str, str] = {
+    **dict.fromkeys(
+        ("voice coil", "linear motor", "servo motor", "stepper", "galvanometer", "solenoid"), "electromagnetic"
+    ),
+    **dict.fromkeys(("piezo stack", "piezo ceramic"), "piezo"),
+    "piezo motor": "stepping piezo",
+    "thermal": "thermal",
+    "electrostatic": "electrostatic",
+    **dict.fromkeys(("hydraulic", "pneumatic", "pump"), "fluid"),
+}
+# A ceramic strains by 0.1 to 0.15 % (Physik Instrumente, piezo tutorial), so that 2 mm take a stack of 1.4 m, or one of 0.1 m behind a
+# lever of 14; a tilting stage of twice 50 um over 5 mm does 0.02 rad. Twice as much is no piezo.
+LONGEST_PIEZO, WIDEST_PIEZO = 2e-3, 0.04
+
+
+class Machine(Section):
+    """`[machine]`: the parts of the machine. Each key may be left out; `ctrlgen check` says what is then inferred."""
+
+    actuator: ActuatorName | None = None
+    """What moves it."""
+    transmission: Annotated[
+        tuple[TransmissionName, ...] | None,
+        BeforeValidator(lambda given: (given,) if isinstance(given, str) else given),
+    ] = None
+    """What stands between actuator and reading, one name or several; "none" for a direct drive."""
+    sensor: SensorName | None = None
+    """What the readings come from."""
+
+
+@dataclass(frozen=True)
+class MachineParts:
+    """The parts of a machine as far as they are known.
+
+    actuator, transmission, sensor: as stated, None where not. family: by what the actuator works, a value of `FAMILIES`, "none"
+    where the motion is imposed, None where it is not known. excluded: families that it cannot be, with the reason. flexible:
+    whether its stage stands on flexures, None where not known. position: whether its drive is the position that it shall have.
+    """
+
+    actuator: str | None = None
+    transmission: tuple[str, ...] | None = None
+    sensor: str | None = None
+    family: str | None = None
+    excluded: tuple[tuple[str, str], ...] = ()
+    flexible: bool | None = None
+    position: bool = False
+
+    def cannot_be(self, families: frozenset[str]) -> str:
+        """Why its actuator is none of the `families`; empty where it may be one."""
+        if self.family is not None:
+            kind = f"a {self.actuator}" if self.actuator else f"{self.family}"
+            return (
+                ""
+                if self.family in families
+                else f"its actuator is {kind}"
+                if self.family != "none"
+                else "its motion is imposed"
+            )
+        reasons = dict(self.excluded)
+        return reasons[next(iter(sorted(families)))] if families <= reasons.keys() else ""
+
+    @property
+    def words(self) -> frozenset[str]:
+        """Every word that is known of it: names of parts, the family of its actuator, "position" for a drive that is one, "flexible"
+        for a stage on flexures."""
+        known = (self.family, self.actuator, self.sensor, *(self.transmission or ()))
+        marks = ("position" if self.position else None, "flexible" if self.flexible else None)
+        return frozenset(word for word in (*known, *marks) if word)
+
+    @property
+    def text(self) -> str:
+        """What is known in words, such as 'piezo stack (stated), flexure (stated), no sensor stated'."""
+        if self.actuator:
+            moved = f"{self.actuator} (stated)"
+        elif self.family == "none":
+            moved = "motion imposed"
+        elif self.family:
+            moved = f"{self.family} actuator (inferred)"
+        else:
+            nots = "; ".join(f"no {family} one: {why}" for family, why in self.excluded)
+            moved = f"actuator not stated{f' ({nots})' if nots else ''}"
+        if self.transmission:
+            between = f"{' and '.join(self.transmission)} (stated)"
+        else:
+            between = "on flexures (inferred)" if self.flexible else "transmission not stated"
+        return f"{moved}, {between}, {f'{self.sensor} (stated)' if self.sensor else 'sensor not stated'}"
+
+
+def machine_parts(
+    stated: Machine | None,
+    physics: DevicePhysics,
+    works_by: str | None,
+    on_flexures: bool | None,
+    excluded: Mapping[str, str],
+) -> MachineParts:
+    """The parts of a device of this `physics`, as stated, else as its kind says (`works_by`, `on_flexures`), else as its units do.
+
+    `excluded` are families that its kind rules out, with the reason.
+    """
+    given = stated or Machine()
+    family, reasons, flexible = works_by, dict(excluded), on_flexures
+    units = physics.drive.units
+    if isinstance(physics, ImposedPhysics):
+        family = "none"
+    elif isinstance(physics, BalancedPhysics) and physics.power is not None:
+        family = "thermal"
+    elif all(same_dimension(unit, "A") for unit in units):
+        family = "electromagnetic"
+    elif any(same_dimension(unit, told) for unit in units for told in ("N", "N*m")):
+        reasons |= dict.fromkeys(("piezo", "thermal"), "its drive is a force")
+    longest = LONGEST_PIEZO if same_dimension(physics.travel_unit, "m") else WIDEST_PIEZO
+    if physics.displacement_scale > longest:
+        reasons.setdefault("piezo", f"its travel is beyond {'2 mm' if longest == LONGEST_PIEZO else '40 mrad'}")
+    if given.transmission is not None:
+        flexible = "flexure" in given.transmission
+    position = all(same_dimension(unit, physics.travel_unit) for unit in units)
+    return MachineParts(
+        actuator=given.actuator,
+        transmission=given.transmission,
+        sensor=given.sensor,
+        family=FAMILIES[given.actuator] if given.actuator else family,
+        excluded=tuple(reasons.items()),
+        flexible=flexible,
+        position=position and not isinstance(physics, ImposedPhysics),
+    )

@@ -1,0 +1,104 @@
+"""What a law is called in sentences about a machine: in the words of its parts, or in neutral ones where they are not known.
+
+The title of a law's own file says what it is published for; a sentence about a pump must not speak of ferroelectrics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from ctrlgen.devices.machine import MachineParts
+from ctrlgen.effects import Effect
+
+# By law: (word of the machine, title) in the order in which they are looked for; "" is for any other machine. A word is a family of
+# actuators, the name of a part, "position" for a drive that is a position, or "flexible" for a stage on flexures.
+TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
+    {
+        "asymmetric_gain": (
+            ("position", "An axis that goes farther to one side than to the other"),
+            ("electromagnetic", "An amplifier, or motor, that is stronger in one direction"),
+            ("", "A drive that is stronger in one direction"),
+        ),
+        "asymmetric_displacement_hysteresis": (
+            ("piezo", "Asymmetric hysteresis of the piezo, or of a joint behind it"),
+        ),
+        "asymmetric_drive_hysteresis": (
+            ("piezo", "Asymmetric hysteresis of the piezo: the displacement lags behind the voltage"),
+            ("electromagnetic", "Asymmetric hysteresis of the motor's iron: the force lags behind the current"),
+            ("", "Asymmetric hysteresis of the actuator: its force lags behind the drive"),
+        ),
+        "butterfly": (
+            ("piezo", "Strain of a ferroelectric: it grows with the square of a polarisation that remembers"),
+            ("", "A drive that acts by the square of a state that remembers"),
+        ),
+        "creep": (
+            ("flexible", "A flexure or its glue keeps moving after the load has settled"),
+            ("piezo", "A piezo, or its mount, keeps moving after the voltage has settled"),
+            ("", "A displacement that goes on after the drive has settled"),
+        ),
+        "cyclic": (
+            (
+                "interferometer",
+                "An error that repeats along the path: the interferometer's fringe, or a pitch behind it",
+            ),
+            ("resolver", "An error that repeats along the path: the resolver's period, or a pitch behind it"),
+            ("encoder", "An error that repeats along the path: the encoder's pitch, or one behind it"),
+            ("screw", "An error that repeats along the path: the screw's pitch"),
+            (
+                "harmonic drive",
+                "An error that repeats along the path: the harmonic drive's, two a turn of its wave generator",
+            ),
+            ("gear", "An error that repeats along the path: the pitch of the gear"),
+        ),
+        "dead_zone": (("position", "An axis that ignores small commands"),),
+        "displacement_hysteresis": (
+            ("piezo", "Hysteresis of the piezo, or of a joint behind it: the displacement lags"),
+        ),
+        "drive_gain": (
+            ("position", "An axis that goes farther, or less far, than it is told"),
+            ("", "A drive that does more, or less, than it is told"),
+        ),
+        "drive_hysteresis": (
+            ("piezo", "Hysteresis of the piezo: the displacement lags behind the voltage"),
+            ("electromagnetic", "Hysteresis of the motor's iron: the force lags behind the current"),
+            ("", "Hysteresis of the actuator: its force lags behind the drive"),
+        ),
+        "drive_offset": (
+            ("position", "A command that is off by a constant"),
+            ("thermal", "A heater that is heated when it is told nothing"),
+            ("pump", "A pump that delivers something when it is told nothing"),
+            ("piezo", "An amplifier that gives a voltage when it is told none"),
+            ("electromagnetic", "An amplifier that drives the motor when it is told nothing"),
+            ("", "A drive that is off by a constant"),
+        ),
+        "lost_beams": (
+            ("thermal", "Beams that break at one moment"),
+            ("electromagnetic", "A winding that breaks at one moment"),
+            ("", "A part of the actuator that fails at one moment"),
+        ),
+        "one_sided_stiffening": (
+            ("flexible", "A flexure that is bent or loaded already at home: stiffer to one side than to the other"),
+            ("", "A stiffness that is larger to one side than to the other"),
+        ),
+        "reversed": (("position", "An axis that counts the other way round"),),
+        "saturation": (
+            ("position", "An axis that stops short of its stated travel"),
+            ("", "A drive that saturates below its stated limit"),
+        ),
+        "stiffening": (
+            ("flexible", "A clamped flexure stretches as it bends"),
+            ("", "A stiffness that grows with the square of the displacement"),
+        ),
+        "thermal_lag": (
+            ("thermal", "A share of the actuator's action that builds up slowly, as heat spreads through a body"),
+            ("", "A share of the drive's action that builds up slowly"),
+        ),
+    }
+)
+
+
+def title(law: type[Effect], parts: MachineParts) -> str:
+    """The title of a law on a machine of these parts."""
+    words = parts.words | {""}
+    return next((text for word, text in TITLES.get(law.kind, ()) if word in words), law.title)
