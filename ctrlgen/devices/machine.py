@@ -7,9 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Literal
-
-from pydantic import BeforeValidator
+from typing import Literal
 
 from ctrlgen.core.units import same_dimension
 from ctrlgen.devices.device_physics import BalancedPhysics, DevicePhysics, ImposedPhysics
@@ -70,10 +68,7 @@ class Machine(Section):
 
     actuator: ActuatorName | None = None
     """What moves it."""
-    transmission: Annotated[
-        tuple[TransmissionName, ...] | None,
-        BeforeValidator(lambda given: (given,) if isinstance(given, str) else given),
-    ] = None
+    transmission: TransmissionName | tuple[TransmissionName, ...] | None = None
     """What stands between actuator and reading, one name or several; "none" for a direct drive."""
     sensor: SensorName | None = None
     """What the readings come from."""
@@ -149,6 +144,7 @@ def machine_parts(
     `excluded` are families that its kind rules out, with the reason.
     """
     given = stated or Machine()
+    between = (given.transmission,) if isinstance(given.transmission, str) else given.transmission
     family, reasons, flexible = works_by, dict(excluded), on_flexures
     units = physics.drive.units
     if isinstance(physics, ImposedPhysics):
@@ -162,12 +158,12 @@ def machine_parts(
     longest = LONGEST_PIEZO if same_dimension(physics.travel_unit, "m") else WIDEST_PIEZO
     if physics.displacement_scale > longest:
         reasons.setdefault("piezo", f"its travel is beyond {'2 mm' if longest == LONGEST_PIEZO else '40 mrad'}")
-    if given.transmission is not None:
-        flexible = "flexure" in given.transmission
+    if between is not None:
+        flexible = "flexure" in between
     position = all(same_dimension(unit, physics.travel_unit) for unit in units)
     return MachineParts(
         actuator=given.actuator,
-        transmission=given.transmission,
+        transmission=between,
         sensor=given.sensor,
         family=FAMILIES[given.actuator] if given.actuator else family,
         excluded=tuple(reasons.items()),

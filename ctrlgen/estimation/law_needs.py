@@ -130,6 +130,11 @@ USUAL: Sequence[Usual] = (
         "a resolver errs once and twice an electrical turn (D. C. Hanselman, IEEE Trans. Ind. Electron. 37 (1990) 556)",
     ),
     Usual(
+        "capacitive",
+        frozenset({"low_pass", "delay"}),
+        "a capacitive sensor is read through the low-pass of its demodulator (A. J. Fleming, Sens. Actuators A 190 (2013) 106)",
+    ),
+    Usual(
         "interferometer",
         frozenset({"cyclic"}),
         "an interferometer errs once and twice a fringe (P. L. M. Heydemann, Appl. Opt. 20 (1981) 3382)",
