@@ -17,7 +17,7 @@ SQUARES = 0.02  # by which a share may differ from that of the squares, which le
 LEAST = 0.01  # of the mismatch: below, nothing is a cause
 MOST = 0.75  # of the mismatch, which a partial answer takes away
 NOISE = 1.5  # times the noise: more is not explained
-HELD_OUT = re.compile(r"Held-out error of (\S+): (\S+) (\S+?)(?: -> (\S+) \S+?)?, noise (?:(\S+) \S+|not known)[.;]")
+HELD_OUT = re.compile(r"Held-out error of (\S+): (\S+) (\S+?)(?: -> (\S+) \S+?)?, noise (?:not known|(\S+) \S+?)[.;]")
 TAKES = re.compile(r"it takes away ((?:[<>] )?[\d.]+ %)")
 LEFT = re.compile(r"Left: (\S+) (\S+) in (\S+), (\S+) times the noise")
 HEADS = {
@@ -108,7 +108,8 @@ def _verdict(d: dict[str, Any]) -> Iterator[str]:
     tolerated = "within the stated tolerance" in d["sentence"]
     known = all(e["noise_floor"] for e in errors)
     quiet = known and all(e["rms_after"] is not None and e["rms_after"] <= NOISE * e["noise_floor"] for e in errors)
-    if verdict == "explained" and not (quiet or tolerated):
+    chance = "which chance allows so few samples" in d["sentence"]
+    if verdict == "explained" and not (quiet or tolerated or chance):
         yield "explained, and more than noise is left"
     if verdict == "explained" and any(f["role"] == "unseen" for f in d["findings"]):
         yield "explained by what no held-out record shows"
@@ -132,7 +133,7 @@ def _sentence(d: dict[str, Any]) -> Iterator[str]:
     said = d["sentence"].replace("\u00a0", " ")
     if not said.startswith(HEADS[d["verdict"]] + ":"):
         yield f"the sentence does not begin as {d['verdict']}: {said[:40]}"
-    if re.search(r"(?<![\d.])(?:-[\d.]+|0|100) % \(|(?:takes away|\() ?(?:-[\d.]+|0|100) %", said):
+    if re.search(r"takes away (?:-[\d.]+|0|100) %|:\w+ \((?:-[\d.]+|0|100) %\)", said):
         yield f"a share that is none, all or negative: {said}"
     found = HELD_OUT.search(said)
     if found is None:

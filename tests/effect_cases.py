@@ -71,7 +71,13 @@ def place_of(effect: type[Effect]) -> tuple[dict, list[Channel]]:
     raise AssertionError(f"{effect.kind} acts on no device that is known here")
 
 
-SUGGESTED = {"moments": (0.3, 1.0, 3.0), "jump_positions": (-0.3, 0.1, 0.6)}
+SUGGESTED = {
+    "moments": (0.3, 1.0, 3.0),
+    "jump_positions": (-0.3, 0.1, 0.6),
+    "edges_above": (-0.3, 0.2),
+    "edges_below": (-0.2, 0.3),
+    "speeds": (0.1, 3.0),
+}
 
 
 def shapes(effect: type[Effect], where: Channel) -> list[dict[str, float]]:

@@ -48,7 +48,10 @@ def test_a_cause_without_a_number_is_reported_like_any(tmp_path):
         tmp_path / "table.toml", [servo_poses(tmp_path / "run", -2.0, 0)], tmp_path / "out", laws=LAWS
     )
     assert found.verdict == Verdict.EXPLAINED and [f.effect for f in found.findings] == ["reversed"]
-    assert "share = 1, 100 % of the mismatch." in sentence(found) and (tmp_path / "out" / "report.html").exists()
+    assert (
+        "share = 1; it takes away all of the error beyond the noise." in sentence(found)
+        and (tmp_path / "out" / "report.html").exists()
+    )
     again = ctrlgen.diagnose(tmp_path / "out" / "device.next.toml", tmp_path / "run", laws=LAWS)
     assert again.verdict == Verdict.CONSISTENT
 

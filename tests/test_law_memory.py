@@ -169,6 +169,9 @@ def test_a_bristle_stands_where_it_is_at_standstill():
 def test_the_force_of_dry_friction_at_standstill_is_whatever_holds_the_stage():
     assert {kind for kind, law in Effect.library.items() if law.set_valued} == {
         "coulomb",
+        "coulomb_above",
+        "coulomb_after",
+        "coulomb_below",
         "directional_friction",
         "stribeck",
     }

@@ -55,6 +55,7 @@ def test_times_frequencies_and_ways_are_not_negative_and_moments_places_and_lean
             "phase",
             "lean",
             "gap",
+            "edge",
             "level",
             "linear",
             "taper",
@@ -89,5 +90,5 @@ def test_the_laws_of_two_channels_and_those_with_a_clock_are_these():
     two = {"abbe_arm", "coupling", "link_compliance", "swapped"} | couplings | empirical
     assert {k for k, law in library if law.pairs} == two
     assert {k for k, law in library if not prior_of(law).suspected} == empirical | {"zero_per_record"}
-    clocked = {"degradation", "drift", "force_step", "lost_beams", "sensor_step", "vibration"}
+    clocked = {"coulomb_after", "degradation", "drift", "force_step", "lost_beams", "sensor_step", "vibration"}
     assert {k for k, law in library if any(s.clock for s in law.states)} == clocked

@@ -11,6 +11,7 @@ from axis_records import AXIS, NOISE, H, move, record
 from conftest import DEVICE, SCENARIOS
 from planted_axis import ON_AXIS, asymmetric_hysteresis, bouc_wen, drive_hysteresis, given
 from planted_poses import FAR_OFF, IN_ORDER, ON_HEXAPOD, payload, warmed
+from planted_regions import IN_A_REGION
 from recovery import N, Planted, fitter_of, recover
 
 import ctrlgen.effects  # noqa: F401
@@ -45,7 +46,7 @@ def poses_of(parts, kind) -> Fitter:
     return fitter_of(hexapod(), channels, units, sds, kind, parts)
 
 
-@pytest.mark.parametrize("law", ON_AXIS, ids=lambda law: law.__name__)
+@pytest.mark.parametrize("law", ON_AXIS | IN_A_REGION, ids=lambda law: law.__name__)
 def test_of_an_axis(law):
     rng, t = np.random.default_rng(3), H * np.arange(N)
     parts = [
@@ -53,7 +54,7 @@ def test_of_an_axis(law):
         for u, role in zip(given(N), ("fit", "hold_out"), strict=True)
     ]
     fitter = fitter_of(AXIS, ("reading.axis",), ("um",), (NOISE,), "series", parts)
-    recover(fitter, AXIS, law.__name__, ON_AXIS[law])
+    recover(fitter, AXIS, law.__name__, (ON_AXIS | IN_A_REGION)[law])
 
 
 @pytest.mark.long
@@ -209,7 +210,7 @@ def test_a_zero_that_is_stated_to_be_free_is_fitted_in_every_record():
 def test_no_law_is_left_out():
     battery = {ALSO.get(name, name) for name in (*laws.DRAW, *FAULTS)}
     here = {
-        *(law.__name__ for law in ON_AXIS),
+        *(law.__name__ for law in ON_AXIS | IN_A_REGION),
         *ON_HEXAPOD,
         *SHARED,
         *IN_ORDER,

@@ -36,7 +36,7 @@ RECORD = {
     "findings": [],
     "shares": None,
     "empirical_terms": [],
-    "attribution": {"explained": 0.0, "rest": None, "held_out": True},
+    "attribution": {"explained": 0.0, "rest": None, "left": {}, "held_out": True},
     "residual_location": {"before": EMPTY, "after": EMPTY},
     "held_out": {},
     "spikes": {},

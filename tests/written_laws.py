@@ -22,6 +22,19 @@ def event(s, p):
     return 1 / (1 + exp(-(s.t - p.moment) * TWO_PI / p.rise))
 
 
+SIDES = {"above": 1, "below": -1}
+
+
+def beyond(x, width):
+    """From 0 to 1, half at the edge; a logistic curve of scale w/4."""
+    return 1 / (1 + exp(-4 * x / width))
+
+
+def too_fast(s, p):
+    x = np.maximum(abs(s.velocity) - p.speed, 0)
+    return -p.damping * sign(s.velocity) * x * x / (x + p.speed / 100)
+
+
 def turned(a: int, b: int):
     """What a rotation by p.angle from axis a toward b adds to component s.index."""
 
@@ -137,6 +150,27 @@ LAWS = {
         lambda s, p: -p.force * sin(TWO_PI * s.displacement / 0.4 + 0.9),
     ),
     "coulomb": ({"reach": 0.02, "smoothing": 0.3}, lambda s, p: -p.force * s.z, lambda s, p: {"z": dahl_rate(s, p)}),
+    **{
+        f"coulomb_{side}": (
+            {"reach": 0.02, "smoothing": 0.3, "edge": 0.2, "width": 0.3},
+            lambda s, p, sign=sign: -p.force * s.z * beyond(sign * (s.displacement - p.edge), p.width),
+            lambda s, p: {"z": dahl_rate(s, p)},
+        )
+        for side, sign in SIDES.items()
+    },
+    "coulomb_after": (
+        {"reach": 0.02, "smoothing": 0.3, **EVENT},
+        lambda s, p: -p.force * s.z * event(s, p),
+        lambda s, p: {"z": dahl_rate(s, p)},
+    ),
+    **{
+        f"viscous_{side}": (
+            {"edge": 0.2, "width": 0.3},
+            lambda s, p, sign=sign: -p.damping * s.velocity * beyond(sign * (s.displacement - p.edge), p.width),
+        )
+        for side, sign in SIDES.items()
+    },
+    "viscous_at_speed": ({"speed": 0.1}, too_fast),
     "butterfly": (
         {"linear": 0.6, "reach": 0.3, "taper": 0.5},
         lambda s, p: p.share * (((s.value - weighted(s, p, s.value)) / risen(s.scale)) ** 2 * s.scale - 0.6 * s.value),

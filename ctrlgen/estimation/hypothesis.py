@@ -133,6 +133,8 @@ class Hypothesis:
             *hints.suggested.get(prior.start_from_data, ()),
             *(hints.suggested.get("lines", ()) if p.unit == "Hz" else ()),
         ]
+        if prior.only_from_data:
+            return [value for value in suggested if low <= value <= high]
         starts = prior.start_values or (() if suggested else (sum(p.bounds) / 2,))
         tried = [*(channel.si(value, p) for value in starts), *(value for value in suggested if value >= low)]
         return [value for value in tried if value <= high] or [(low + high) / 2]

@@ -25,7 +25,9 @@ class ParameterPrior:
         channel's, the travel's, the travel's rate, or, for a time, one twelfth of the recording's duration.
     start_from_data: starts that the recording suggests are tried too: "spatial_periods" (periods along the path that stand
         out of the residual), "jump_positions" (places along the path at which it jumps), "moments" (times spread over the
-        recording). Frequencies in Hz always take the lines of the residual's spectrum as well.
+        recording), "edges_above", "edges_below" and "speeds" (beyond which most of the residual is). Frequencies in Hz always take
+        the lines of the residual's spectrum as well.
+    only_from_data: the law is not suspected where the recording suggests no start.
     plausible_range: of an amplitude: a fit that ends outside is another cause under this law's name, and is rejected.
     fixed_range: of an amplitude: the law is present or absent. Its amplitude is set to the middle of the range, not fitted.
     """
@@ -33,6 +35,7 @@ class ParameterPrior:
     start_values: tuple[float, ...] = ()
     scales_with_peak: bool = False
     start_from_data: str = ""
+    only_from_data: bool = False
     plausible_range: tuple[float, float] | None = None
     fixed_range: tuple[float, float] | None = None
 

@@ -14,6 +14,7 @@ from types import MappingProxyType
 
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.law_prior import ONE_IN_A_HUNDRED, ONE_IN_TEN, LawPrior, NestedCase, ParameterPrior
+from ctrlgen.estimation.priors_in_a_region import IN_A_REGION
 
 
 def prior_of(law: type[Effect]) -> LawPrior:
@@ -239,6 +240,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             family="dry friction",
             parameters={"reach": _peaks(3e-4, 3e-3, 0.03), "smoothing": _peaks(1e-4, 0.1)},
         ),
+        **IN_A_REGION,
         "directional_friction": LawPrior(
             "Dry friction alike in both directions is commoner: judgement. " + _DRY_FRICTION,
             log_prior_odds=-1.0,

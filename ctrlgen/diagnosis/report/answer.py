@@ -41,6 +41,8 @@ HEADLINE = {
 }
 # further findings, and numbers of the main one, that the first sentence holds
 BESIDE, NUMBERS = 2, 2
+# times the noise from which on it is said that chance allows as much
+CHANCE = 1.2
 
 
 def sentence(diagnosis: Diagnosis) -> str:
@@ -104,8 +106,11 @@ def _first_numbers(finding: Finding) -> dict[str, Estimate]:
     """The amplitude of a finding and the numbers after it, as many as the sentence holds."""
     if finding.effect == PARAMETER:
         return finding.parameters
-    amplitude = finding.cause.law.amplitude().name
-    first = sorted(finding.parameters, key=lambda name: name != amplitude)[:NUMBERS]
+    law = finding.cause.law
+    amplitude = law.amplitude().name
+    # where it is comes before how it is
+    places = [p.name for p in law.params if finding.cause.prior.of(p).start_from_data]
+    first = sorted(finding.parameters, key=lambda name: (name != amplitude, name not in places))[:NUMBERS]
     return {name: finding.parameters[name] for name in first}
 
 
@@ -131,14 +136,16 @@ def _rest(diagnosis: Diagnosis) -> str:
     """'Left: 4.9 urad in theta_z, 1.4 times the noise, mostly a function of position.'"""
     if any(e.noise_floor is None for e in diagnosis.held_out.values()):
         return "Whether more is left cannot be said: the noise is not known."
-    if diagnosis.residual_tests.passed:
-        if diagnosis.unconfirmed:
-            return f"No held-out record shows {' or '.join(map(hypothesis_name, diagnosis.unconfirmed))}."
-        loose = diagnosis.verdict == Verdict.PARTLY and poorly_determined(diagnosis.search)
-        return "The numbers are too uncertain to predict the held-out records better." if loose else ""
     channel, e = max(diagnosis.held_out.items(), key=lambda item: item[1].rms_after / (item[1].noise_floor or 1.0))
-    size = f"{number(e.rms_after, 3)} {e.unit} in {short(channel)}, {number(e.rms_after / (e.noise_floor or 1.0), 2)} times the noise"
-    return f"Left: {size}{rest_kind(diagnosis, channel)}{_within(diagnosis)}."
+    ratio = e.rms_after / (e.noise_floor or 1.0)
+    size = f"{number(e.rms_after, 3)} {e.unit} in {short(channel)}, {number(ratio, 2)} times the noise"
+    if not diagnosis.residual_tests.passed:
+        return f"Left: {size}{rest_kind(diagnosis, channel)}{_within(diagnosis)}."
+    if diagnosis.unconfirmed:
+        return f"No held-out record shows {' or '.join(map(hypothesis_name, diagnosis.unconfirmed))}."
+    if diagnosis.verdict == Verdict.PARTLY and poorly_determined(diagnosis.search):
+        return "The numbers are too uncertain to predict the held-out records better."
+    return f"Left: {size}, which chance allows so few samples." if ratio > CHANCE else ""
 
 
 def _moved(diagnosis: Diagnosis) -> str:

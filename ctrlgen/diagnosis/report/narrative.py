@@ -109,7 +109,8 @@ def share_text(finding: Finding) -> str:
 def with_ends(share: ShareEntry) -> str:
     """'82 % (75 ... 88 %)'; without the interval where its ends show as the share itself."""
     value, low, high = (per_cent(v) for v in (share.value, *share.ci95))
-    return value if value == low == high else f"{value} ({low.removesuffix(' %')} ... {high})"
+    exact = value[0] in "<>" or value == low == high
+    return value if exact else f"{value} ({low.removesuffix(' %')} ... {high})"
 
 
 def per_cent(share: float) -> str:

@@ -44,12 +44,12 @@ class CandidateTerm:
     range: tuple[float, float] = (-np.inf, np.inf)
 
 
-def signal_peaks(fitter: Fitter, fit: Fit) -> Peaks:
-    """How far the signals at every place go in the records to fit."""
-    peaks: Peaks = {}
+def signals_along(fitter: Fitter, fit: Fit) -> list[dict[tuple[Place, int], np.ndarray]]:
+    """Of every record to fit the signals (3, n) at every place [SI]: the channel's, the displacement, and its rate."""
     physics = nominal_physics(fit.structure.device)
     reached = (Place.DRIVE, Place.FORCE, Place.DISPLACEMENT)
     places = [(place, i) for place in reached for i in range(len(channels(physics, place)))]
+    along = []
     for record, start in zip(fitter.fit_records, fit.initial_states, strict=True):
         simulator = fitter.simulator(fit.structure, record)
         m, n = simulator.model, len(record.time)
@@ -62,10 +62,19 @@ def signal_peaks(fitter: Fitter, fit: Fit) -> Peaks:
         values = f.map(n)(
             S.T, record.drive.T, simulator.ambient_of(record)[None, :], np.tile(fit.theta[:, None], (1, n))
         )
-        most = np.nan_to_num(np.abs(values.full())).max(axis=1).reshape(-1, len(REACHED))
-        for where, row in zip(places, most, strict=True):
+        signals = np.nan_to_num(values.full()).reshape(len(places), len(REACHED), n)
+        along.append(dict(zip(places, signals, strict=True)))
+    return along
+
+
+def signal_peaks(along: list[dict[tuple[Place, int], np.ndarray]]) -> Peaks:
+    """How far the signals at every place go in the records to fit."""
+    peaks: Peaks = {}
+    for record in along:
+        for where, signals in record.items():
             old = peaks.get(where, {})
-            peaks[where] = {unit: max(old.get(unit, 0.0), value) for unit, value in zip(REACHED, row, strict=True)}
+            most = np.abs(signals).max(axis=1)
+            peaks[where] = {unit: max(old.get(unit, 0.0), value) for unit, value in zip(REACHED, most, strict=True)}
     return peaks
 
 

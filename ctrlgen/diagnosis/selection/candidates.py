@@ -73,15 +73,17 @@ def trying(*causes: Hypothesis) -> str:
 def restart_elsewhere(
     trials: Trials, candidate: CandidateModel, before: CandidateModel, screened: Screened
 ) -> CandidateModel:
-    """The candidate, its causes that are new begun again in the most promising of the other shapes screened, where more than
-    noise is left: the shapes of one law may lie in several valleys."""
+    """The candidate, its causes that are new begun again in the most promising of the other shapes screened, and with each number
+    of its own shape replaced by that of another, where more than noise is left: a law may have several valleys."""
     others = {s.hypothesis: s.other_starts for s in screened.suspects}
     for k, cause in enumerate(candidate.causes):
         if cause in before.causes or candidate.errors.is_noise:
             continue
         structure, shapes = candidate.fit.restarted, others.get(cause, ())
         size = cause.law.amplitude().name if shapes else ""
-        begins = [*shapes, *({**shape, size: structure.starts[k][size]} for shape in shapes)]
+        here = structure.starts[k]
+        begins = [*shapes, *({**shape, size: here[size]} for shape in shapes)]
+        begins += [here | {name: value} for name, value in dict.fromkeys(pair for s in shapes for pair in s.items())]
         if not begins:
             continue
         try:

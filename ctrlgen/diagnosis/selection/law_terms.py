@@ -92,7 +92,7 @@ class LawTerm:
         A = ca.jacobian(rates, memory)
         if not ca.symvar(A):
             step = h * ca.DM(phi_matrices(h * ca.DM(A).full(), 1)[1]) @ rates
-        elif A.sparsity().is_diag():
+        elif all(row == column for row, column in zip(*A.sparsity().get_triplet(), strict=True)):
             step = lag_increment(ca.diag(A), [rates], h)
         else:
             step = h * rates

@@ -16,8 +16,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ctrlgen.diagnosis.selection.candidate_terms import CandidateTerm, Peaks, signal_peaks
+from ctrlgen.diagnosis.selection.candidate_terms import CandidateTerm, Peaks, signal_peaks, signals_along
 from ctrlgen.diagnosis.selection.law_terms import LawTerms
+from ctrlgen.diagnosis.selection.regions import region_edges
 from ctrlgen.diagnosis.selection.score_gradient import ScoreGradient, Sums, law_terms
 from ctrlgen.diagnosis.selection.spatial_periods import jump_positions, merged_periods, resolved_way, spatial_periods
 from ctrlgen.diagnosis.selection.subset_search import SubsetSearch, Suspect
@@ -54,6 +55,7 @@ class Screen:
     def __init__(self, fitter: Fitter, hypotheses: list[Hypothesis], seed: int = 0) -> None:
         self.fitter, self.hypotheses, self.seed = fitter, hypotheses, seed
         self.peaks: Peaks | None = None
+        self.motions: dict[int, np.ndarray] = {}
         self.laws: dict[Timing, LawTerms] = {}
 
     def run(self, fit: Fit, dropped: dict[Hypothesis, str] | None = None) -> Screened:
@@ -96,8 +98,11 @@ class Screen:
     def data_hints(self, fit: Fit) -> Callable[[Place, int], DataHints]:
         """What the records show at each place, after what `fit` explains."""
         if self.peaks is None:
-            self.peaks = signal_peaks(self.fitter, fit)
-        most, along = self.peaks, self._along_path(fit)
+            signals = signals_along(self.fitter, fit)
+            self.peaks = signal_peaks(signals)
+            axes = sorted(i for place, i in signals[0] if place is Place.FORCE) if signals else []
+            self.motions = {i: np.hstack([record[Place.FORCE, i][1:] for record in signals]) for i in axes}
+        most, along = self.peaks, self._along_path(fit) | self._regions(fit)
         moments, part = self._moments()
         common = {"lines": self._spectral_peaks(fit), "moments": moments}
 
@@ -173,6 +178,21 @@ class Screen:
             )
             found[Place.FORCE, j] = {"spatial_periods": repeats}
         return found
+
+    def _regions(self, fit: Fit) -> dict[tuple[Place, int], dict[str, tuple[float, ...]]]:
+        """Of each axis the displacements and the speed beyond which most of what is left is."""
+        if self.fitter.recording.kind == "poses":
+            return {}
+        readings = fit.residual[: sum(r.valid.size for r in self.fitter.fit_records)]
+        squares = np.sum(readings.reshape(-1, len(self.fitter.recording.channels)) ** 2, axis=1)
+        return {
+            (Place.FORCE, i): {
+                "edges_above": region_edges(displacement, squares, 1),
+                "edges_below": region_edges(displacement, squares, -1),
+                "speeds": region_edges(np.abs(velocity), squares, 1),
+            }
+            for i, (displacement, velocity) in self.motions.items()
+        }
 
     def _screened(
         self, columns: list[CandidateTerm], sums: Sums, gradient: np.ndarray, likeness: np.ndarray

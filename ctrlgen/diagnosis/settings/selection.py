@@ -64,6 +64,24 @@ class SpatialPeriodSettings:
 
 
 @dataclass(frozen=True)
+class RegionSettings:
+    """Regions of the motion in which most of what is left over is."""
+
+    cells: int = 64
+    """Cells of as many samples along a coordinate, between which an edge may lie."""
+    fewest_in_cell: int = 4
+    """Samples of a cell, below which nothing is said."""
+    outlying: float = 0.99
+    """Quantile of the squares beyond which they count no more."""
+    least_ratio: float = 1.5
+    """Mean square on the far side of an edge over that on the near side, from which it counts. Judgement."""
+    most: int = 2
+    """Edges on either side that are tried. Judgement."""
+    apart: int = 6
+    """Cells between two of them. Judgement."""
+
+
+@dataclass(frozen=True)
 class SubsetSettings:
     """Sets of candidates that are tried together."""
 
@@ -304,6 +322,7 @@ class VerdictSettings:
 
 SCREEN = ScreenSettings()
 SPATIAL_PERIODS = SpatialPeriodSettings()
+REGIONS = RegionSettings()
 SUBSETS = SubsetSettings()
 SEARCH = SearchSettings()
 CONFUSABLE = ConfusableSettings()

@@ -1,0 +1,49 @@
+"""Damping in one part of the travel, or above one speed: a gap that narrows, grease at one end, an air film that starts."""
+
+import casadi as ca
+
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects._region import EDGE, beyond_edge
+
+
+class RegionalDamping(Effect, listed=False):
+    """Delta F = -c v in a region: one law, named once per region."""
+
+    place = Place.FORCE
+    requires = frozenset({"velocity"})
+    source = "definition: a linear damper, in a region"
+
+
+class ViscousAbove(RegionalDamping):
+    """Delta F = -c v (1 + tanh(2 (d - d_0)/w))/2: damping above the displacement d_0. Holds for slow flow."""
+
+    title = "Damping in the upper part of the travel"
+    params = (Param("damping", "channel*s/travel", (0.0, 10.0), "c: damping beyond the edge", off=0.0), *EDGE)
+
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return -p.damping * s.velocity * beyond_edge(s, p, 1)
+
+
+class ViscousBelow(RegionalDamping):
+    """Delta F = -c v (1 - tanh(2 (d - d_0)/w))/2: damping below the displacement d_0. Holds for slow flow."""
+
+    title = "Damping in the lower part of the travel"
+    params = ViscousAbove.params
+
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return -p.damping * s.velocity * beyond_edge(s, p, -1)
+
+
+class ViscousAtSpeed(RegionalDamping):
+    """Delta F = -c sgn(v) x^2/(x + e), x = |v| - v_0 where positive: damping above the speed v_0 alone. e, a hundredth of v_0, rounds
+    the corner. Holds for slow flow."""
+
+    title = "Damping above one speed alone"
+    params = (
+        Param("damping", "channel*s/travel", (0.0, 10.0), "c: damping above the speed", off=0.0),
+        Param("speed", "travel/s", (1e-3, 1e3), "v_0: speed at which it sets in"),
+    )
+
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        x = ca.fmax(ca.fabs(s.velocity) - p.speed, 0)
+        return -p.damping * ca.sign(s.velocity) * x**2 / (x + 0.01 * p.speed)

@@ -1,0 +1,54 @@
+"""Dry friction in one part of the travel, or from one moment on: a cable that drags, a seal that touches, dirt on a guide."""
+
+from typing import ClassVar
+
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Place, State
+from ctrlgen.effects._bristles import BRISTLES, CONTACT, bristle_rate
+from ctrlgen.effects._region import EDGE, beyond_edge
+from ctrlgen.effects._smooth_step import CLOCK, WHEN, smooth_step
+
+
+class RegionalFriction(Effect, listed=False):
+    """Delta F = -f z in a region, z Dahl's bristles of `coulomb`: one law, named once per region."""
+
+    place = Place.FORCE
+    set_valued = True
+    requires = frozenset({"velocity"})
+    source = "P. R. Dahl, AIAA Journal 14 (1976) 1675: solid friction damping; in a region"
+    states: ClassVar[tuple[State, ...]] = BRISTLES
+
+    def rates(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
+        return {"z": bristle_rate(s, p)}
+
+
+class CoulombAbove(RegionalFriction):
+    """Delta F = -f z (1 + tanh(2 (d - d_0)/w))/2, z Dahl's bristles of `coulomb`: friction above the displacement d_0. Holds for
+    contacts that do not wear."""
+
+    title = "Dry friction in the upper part of the travel"
+    params = (*CONTACT, *EDGE)
+
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return -p.force * s.states.z * beyond_edge(s, p, 1)
+
+
+class CoulombBelow(RegionalFriction):
+    """Delta F = -f z (1 - tanh(2 (d - d_0)/w))/2, z Dahl's bristles of `coulomb`: friction below the displacement d_0. Holds for
+    contacts that do not wear."""
+
+    title = "Dry friction in the lower part of the travel"
+    params = (*CONTACT, *EDGE)
+
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return -p.force * s.states.z * beyond_edge(s, p, -1)
+
+
+class CoulombAfter(RegionalFriction):
+    """Delta F = -f z e(t), z Dahl's bristles of `coulomb`, e from 0 to 1 within the time T about the moment t_0. Holds for one event."""
+
+    title = "Dry friction that sets in at a moment"
+    params = (*CONTACT, *WHEN)
+    states = (*BRISTLES, *CLOCK)
+
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return -p.force * s.states.z * smooth_step(s, p)
