@@ -35,6 +35,11 @@ def cubic_sensor(u, t):
     return y + 2e6 * y**3
 
 
+def rectified(u, t):
+    """What is negative is cut off."""
+    return np.maximum(move(u), 0)
+
+
 def stitching_error(u, t):
     """With the slope of 0.4 um on 2 um in its middle."""
     y = move(u)
@@ -163,6 +168,7 @@ ON_AXIS = {
         {"share": 0.1, "reach": 0.4, "lower": 0.3},
         within={"share": 0.15, "reach": 0.15, "lower": 0.15},
     ),
+    rectified: Planted("sensor:axis", {"share": 0.5}),
     cogging: Planted("stage:axis", {"force": 0.1, "period": 2.5e-5}, within={"force": 0.02}),
     bouc_wen: Planted(
         "stage:axis",

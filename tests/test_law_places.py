@@ -5,14 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from axis_records import record
+from planted_poses import played
+from recovery import fitter_of
 
 import ctrlgen
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.diagnose import diagnose_recording
+from ctrlgen.diagnosis.selection.objections import objections
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.effects import Place
-from ctrlgen.estimation.hypothesis import PARAMETER, hypotheses, nominal_physics
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, hypotheses, nominal_physics
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Recording
 
 
@@ -70,3 +75,30 @@ def test_the_cogging_of_a_motor_is_found_with_its_pitch():
     assert found.verdict is Verdict.EXPLAINED and {f.effect for f in found.findings} == {"cogging"}
     assert first.parameters["period"].value == pytest.approx(24e3, rel=1e-3)  # um
     assert first.parameters["force"].value == pytest.approx(1.5, rel=0.01)
+
+
+def servo_fit(readings, effect: str, start: dict[str, float]) -> tuple[Fitter, Fit]:
+    """A law fitted to poses of an axis that is told where to go."""
+    rng, parts = np.random.default_rng(9), []
+    table = {"kind": "servo", "name": "servo", "title": "an axis", "source": "round numbers", "travel": "100 um"}
+    device = validate(Device.library["servo"], table, "device")
+    for n, role in ((120, "fit"), (60, "hold_out")):
+        u = rng.uniform(-1e-4, 1e-4, n)
+        parts.append(record(u, readings(u) + 5e-9 * rng.standard_normal(n), role, h=np.inf))
+    fitter = fitter_of(device, ("reading.axis",), ("um",), (5e-9,), "poses", parts)
+    cause = Hypothesis(effect, "stage:axis", "axis")
+    return fitter, fitter.fit(Structure(device).with_cause(cause, start))
+
+
+PLAYS = {"share": 0.1, "taper": 0.5, "reversible": 0.0}
+
+
+@pytest.mark.parametrize("reach", [5e-4, 9e-4])
+def test_a_hysteresis_of_which_no_play_follows_or_all_do_is_a_gain(reach):
+    """What lags in proportion is no loop, wherever the fit of its reach ends; a loop is one."""
+    fitter, fit = servo_fit(lambda u: 0.93 * u, "displacement_hysteresis", PLAYS | {"reach": reach})
+    assert fit.chi2 < 1.5 * fit.n
+    (reason,) = objections(fitter.recording, fit).values()
+    assert reason.endswith("it is a gain") or reason.endswith("it is a gain beside a smaller loop")
+    fitter, fit = servo_fit(played, "displacement_hysteresis", PLAYS | {"reach": 3e-5})
+    assert objections(fitter.recording, fit) == {}

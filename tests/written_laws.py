@@ -246,6 +246,7 @@ LAWS = {
         {},
         lambda s, p: cross(s.all[:3], cross(s.all[:3], [0, 0, p.height]))[s.index - 3] / 2,
     ),
+    "rectified": ({}, lambda s, p: -2 * p.share * min(s.value, 0.0)),
     "resonance": ({"frequency": 8.0, "damping": 0.2}, second_mass, second_mass_rates),
     "reversed": ({}, lambda s, p: -2 * p.share * s.value),
     "saturation": ({"level": 0.4}, clipped),

@@ -9,9 +9,8 @@ from ctrlgen.effects._play_operators import kept_between, play_states, radii, we
 class AsymmetricLag(Effect, listed=False):
     """Delta s = g (sum_j w_j P_j - s + k s), P_j within s - a_j ... s + b_j, r_j = r j/8, w_j ~ j^-q, sum w_j = 1, j = 1..8.
 
-    a_j = r_j + (l |s| + t s) r_j/r and b_j = r_j + (u |s| + t s) r_j/r, no less than 0: generalised plays, of which each edge widens
-    in its own way. u = l = t = 0 is `displacement_hysteresis`. Rate-independent. Holds for |u| + |t| and |l| + |t| below 1, where the
-    edges rise with s, so that nothing between two samples matters.
+    a_j = r_j + (l |s| + t s) r_j/r and b_j = r_j + (u |s| + t s) r_j/r, no less than 0: generalised plays, whose edges widen each in
+    its own way. Holds for |u| + |t| and |l| + |t| below 1: the edges then rise with s, and no way between two samples matters.
     """
 
     order = 1
@@ -41,12 +40,12 @@ def _shape(unit: str) -> tuple[Param, ...]:
 
 
 class AsymmetricDisplacementHysteresis(AsymmetricLag):
-    """s = d, the displacement: Delta d as of `AsymmetricLag`. In a set of poses the memory goes from pose to pose. Holds as above."""
+    """s = d, the displacement, Delta d as of `AsymmetricLag`; in a set of poses the memory goes from pose to pose. Holds as above."""
 
     title = "Asymmetric hysteresis of a joint behind the stage"
     place = Place.DISPLACEMENT
     requires = frozenset({"actuator"})
-    params = (Param("share", "1", (-0.95, 0.95), "share of the displacement that lags", off=0.0), *_shape("travel"))
+    params = (Param("share", "1", (-0.999, 0.999), "share of the displacement that lags", off=0.0), *_shape("travel"))
     states = play_states("travel")
 
 
@@ -56,5 +55,5 @@ class AsymmetricDriveHysteresis(AsymmetricLag):
     title = "Asymmetric hysteresis of a piezo stack"
     place = Place.DRIVE
     requires = frozenset({"actuator", "force"})
-    params = (Param("share", "1", (-0.95, 0.95), "share of the drive that lags", off=0.0), *_shape("channel"))
+    params = (Param("share", "1", (-0.999, 0.999), "share of the drive that lags", off=0.0), *_shape("channel"))
     states = play_states("channel")

@@ -53,7 +53,7 @@ class DisplacementBoucWen(Yielding):
     place = Place.DISPLACEMENT
     order = 1
     requires = frozenset({"actuator"})
-    params = (Param("share", "1", (-0.95, 0.95), "share of the displacement that lags", off=0.0), *_SHAPE)
+    params = (Param("share", "1", (-0.999, 0.999), "share of the displacement that lags", off=0.0), *_SHAPE)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.share * s.states.z

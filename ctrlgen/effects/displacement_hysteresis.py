@@ -18,7 +18,7 @@ class DisplacementHysteresis(Effect):
     requires = frozenset({"actuator"})
     source = "K. Kuhnen, Eur. J. Control 9 (2003) 407: modified Prandtl-Ishlinskii operators"
     params = (
-        Param("share", "1", (-0.95, 0.95), "share of the displacement that lags", off=0.0),
+        Param("share", "1", (-0.999, 0.999), "share of the displacement that lags", off=0.0),
         Param("reach", "travel", (1e-4, 10.0), "r: travel after which all plays follow"),
         Param("taper", "1", (-1.0, 2.0), "q: weight of the narrow plays over the wide ones"),
         Param("reversible", "1", (-0.5, 1.5), "k: reversible displacement over the share that lags"),

@@ -16,7 +16,7 @@ class DriveHysteresis(Effect):
     requires = frozenset({"actuator", "force"})
     source = "K. Kuhnen, Eur. J. Control 9 (2003) 407: modified Prandtl-Ishlinskii operators"
     params = (
-        Param("share", "1", (0.0, 0.95), "share of the drive that lags", off=0.0),
+        Param("share", "1", (0.0, 0.999), "share of the drive that lags", off=0.0),
         Param("reach", "channel", (1e-3, 2.0), "r: change of drive after which all plays follow"),
         Param("taper", "1", (-1.0, 2.0), "q: weight of the narrow plays over the wide ones"),
     )

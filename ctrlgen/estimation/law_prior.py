@@ -30,6 +30,8 @@ class ParameterPrior:
     only_from_data: the law is not suspected where the recording suggests no start.
     plausible_range: of an amplitude: a fit that ends outside is another cause under this law's name, and is rejected.
     fixed_range: of an amplitude: the law is present or absent. Its amplitude is set to the middle of the range, not fitted.
+    at_bound: of a shape: what the law is where this ends at a bound. A fit that ends there is rejected, as one is of which the records
+        do not tell the shape.
     """
 
     start_values: tuple[float, ...] = ()
@@ -38,6 +40,7 @@ class ParameterPrior:
     only_from_data: bool = False
     plausible_range: tuple[float, float] | None = None
     fixed_range: tuple[float, float] | None = None
+    at_bound: str = ""
 
 
 @dataclass(frozen=True)

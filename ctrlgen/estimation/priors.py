@@ -31,6 +31,16 @@ def _peaks(*multiples: float) -> ParameterPrior:
     return ParameterPrior(multiples, scales_with_peak=True)
 
 
+def _reach(*multiples: float, peaks: bool = False) -> ParameterPrior:
+    """Start values of the way after which plays follow: where none does, or all do at once, what is left is proportional."""
+    return ParameterPrior(multiples, scales_with_peak=peaks, at_bound="a gain")
+
+
+def _reversible(*values: float) -> ParameterPrior:
+    """Start values of the part of a loop that is none."""
+    return ParameterPrior(values, at_bound="a gain beside a smaller loop")
+
+
 _EVENT = {"moment": ParameterPrior(start_from_data="moments"), "rise": _peaks(1.0)}  # it may happen at any time
 _EVENTS_ARE_RARE = (
     "An event at any time. Laws that act always come first among equals: most of a hundred records have no event, and a step fits "
@@ -51,9 +61,9 @@ _ASYMMETRIC_LAG = LawPrior(
     model_form_error=0.02,
     family="hysteresis",
     parameters={
-        "reach": _peaks(0.1, 0.4),
+        "reach": _reach(0.1, 0.4, peaks=True),
         "taper": _starts((0.5,)),
-        "reversible": _starts((0.0,)),
+        "reversible": _reversible(0.0),
         "upper": _starts((0.0, 0.4)),
         "lower": _starts((0.0, 0.4)),
         "side": _starts((0.0,)),
@@ -107,6 +117,11 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
         "quantisation": LawPrior(
             "Steps of half a decade each, from 1e-4 to 0.1 of the typical size.",
             parameters={"quantum": _starts((1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1))},
+        ),
+        "rectified": LawPrior(
+            "A fault of wiring or software; a small one is a curve of the sensor or a gain that differs by direction: judgement.",
+            log_prior_odds=ONE_IN_TEN,
+            parameters={"share": ParameterPrior(plausible_range=(0.4, 1.6))},
         ),
         "sensor_step": LawPrior(
             _EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, of_time=True, domain="disturbance", parameters=_EVENT
@@ -176,7 +191,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             unless=frozenset({"heat"}),
             model_form_error=0.02,
             family="hysteresis",
-            parameters={"reach": _starts((0.03, 0.1, 0.3, 1.0)), "taper": _starts((0.0,))},
+            parameters={"reach": _reach(0.03, 0.1, 0.3, 1.0), "taper": _starts((0.0,))},
         ),
         "reversed": LawPrior(
             "A wiring fault is rarer than a wrong gain: judgement. A lead is swapped or it is not.",
@@ -306,16 +321,16 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             _HYSTERESIS,
             model_form_error=0.02,
             family="hysteresis",
-            parameters={"reach": _peaks(0.01, 0.03, 0.1, 0.3, 1.0), "loop": _starts((0.55, 0.9))},
+            parameters={"reach": _reach(0.01, 0.03, 0.1, 0.3, 1.0, peaks=True), "loop": _starts((0.55, 0.9))},
         ),
         "displacement_hysteresis": LawPrior(
             _HYSTERESIS,
             model_form_error=0.02,
             family="hysteresis",
             parameters={
-                "reach": _peaks(0.03, 0.1, 0.3, 1.0),
+                "reach": _reach(0.03, 0.1, 0.3, 1.0, peaks=True),
                 "taper": _starts((0.5,)),
-                "reversible": _starts((0.0, 1.0)),
+                "reversible": _reversible(0.0, 1.0),
             },
         ),
         "finite_rotation": LawPrior("One geometry for all components.", acts_on_all=True),
@@ -330,7 +345,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             _CREEP,
             model_form_error=0.01,
             family="creep",
-            parameters={"tau": _starts((0.01, 0.1, 1.0)), "decades": _starts((3.25,))},
+            parameters={"tau": _starts((0.01, 0.1, 1.0)), "decades": _starts((3.25, 6.0))},
         ),
         "lost_motion": LawPrior(
             "On a stage of constant stiffness the same as a gain of the drive, which is named first: judgement.",

@@ -38,6 +38,7 @@ def objections(
             continue
         reason = (
             _outside_its_range(fit, k)
+            or _at_a_bound(fit, k)
             or _on_the_lattice(recording, fit, k)
             or (None if exact else _of_another_kind(recording, fit, k))
         )
@@ -74,6 +75,24 @@ def _outside_its_range(fit: Fit, k: int) -> str | None:
         span = OBJECTIONS.at_bound * (u.high - u.low)
         if value >= u.high - span or (value <= u.low + span and u.low != u.nominal):
             return f"{u.name} is at its bound of {shown(float(value))}"
+    return None
+
+
+def _at_a_bound(fit: Fit, k: int) -> str | None:
+    """Why cause k is another law: a shape that is at its bound, or of which the records say nothing; None where it is not."""
+    structure, cause = fit.structure, fit.structure.causes[k]
+    if cause.effect == PARAMETER:
+        return None
+    meant = {p.name: cause.prior.of(p).at_bound for p in cause.law.params}
+    for i, (u, value) in enumerate(zip(structure.free_parameters, fit.theta, strict=True)):
+        if u.cause != k or not (other := meant.get(u.name)):
+            continue
+        ways = u.low > 0
+        span = OBJECTIONS.shape_at_bound * (value if ways else u.high - u.low)
+        if value >= u.high - span or value <= u.low + span:
+            return f"its {u.name} is at a bound of {from_si(float(value), u.unit):.3g} {u.unit}, where it is {other}"
+        if ways and np.linalg.norm(fit.J[:, i]) * value < OBJECTIONS.told_shape:
+            return f"the records say nothing of its {u.name}; without one it is {other}"
     return None
 
 
@@ -233,10 +252,11 @@ def _covered(recording: Recording, cause: Hypothesis, fit: Fit) -> float:
     channel = f"reading.{cause.at}"
     if not any(_is_spatial_period(cause, p) for p in params):
         return np.inf
-    physics = nominal_physics(fit.structure.device)
-    if cause.law.place is Place.FORCE and isinstance(physics, ImposedPhysics):
-        place = 0 if cause.at == "all" else physics.axes.index(cause.at)
-        return float(max(np.ptp(r.drive[:, place]) for r in records))
+    if cause.law.place is Place.FORCE:
+        physics = nominal_physics(fit.structure.device)
+        if isinstance(physics, ImposedPhysics):
+            place = 0 if cause.at == "all" else physics.axes.index(cause.at)
+            return float(max(np.ptp(r.drive[:, place]) for r in records))
     if channel not in recording.channels:
         return np.inf
     i = recording.channels.index(channel)

@@ -236,6 +236,10 @@ class ObjectionsSettings:
     """Cycles by which two lines must part within the records to fit: nearer, they beat as one."""
     at_bound: float = 1e-6
     """Share of a parameter's range within which it is at its bound."""
+    shape_at_bound: float = 1e-3
+    """The same of a shape, of which a fit stops sooner: what it changes fades toward the bound."""
+    told_shape: float = 1.0
+    """Standard deviations by which all readings together must depend on a shape, per factor of e, to tell it."""
     fewest_periods: float = 10.0
     """Periods of a line that the longest record to fit must hold: of fewer, any slow change looks like one.
     Judgement."""

@@ -118,7 +118,7 @@ FAMILY_OF = {
     **dict.fromkeys(("clock_offset", "delay", "low_pass"), Family.TIMING),
     **dict.fromkeys(("abbe_arm", "bow", "cubic_sensor", "finite_rotation", "frame_rotation_x"), Family.GEOMETRY),
     **dict.fromkeys(("frame_rotation_y", "frame_rotation_z", "raised_point", "screw_motion"), Family.GEOMETRY),
-    **dict.fromkeys(("stitching_error",), Family.GEOMETRY),
+    **dict.fromkeys(("rectified", "stitching_error"), Family.GEOMETRY),
     **dict.fromkeys(("cogging", "cyclic", "quantisation"), Family.PERIODIC),
     **dict.fromkeys(("expansion", "second_pole", "temperature_sensitivity", "thermal_lag"), Family.THERMAL),
     **dict.fromkeys(("degradation", "drift", "force_step", "lost_beams", "sensor_step", "vibration"), Family.EVENTS),
