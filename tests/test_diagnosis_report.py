@@ -36,6 +36,7 @@ from ctrlgen.estimation.profile_likelihood import BOUNDED, Profile
 from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.reporting.result_file import json_text
 
+REASON = "their effects on these readings are alike"
 MADE_FROM = Provenance({"flexure_axis.toml": "0" * 64}, 3)
 
 
@@ -114,8 +115,8 @@ def test_the_json_lists_alternatives_by_name(found):
     rival = replace(found.findings[0], alternatives=others)
     result = diagnosis_record(replace(found, findings=(rival,)), MADE_FROM).as_json()
     assert faults(result, "diagnosis") == [] and result["findings"][0]["alternatives"] == [
-        {"effect": "thermal_lag", "location": "actuator:axis", "of": None},
-        {"effect": "swapped", "location": "actuator:a", "of": "b"},
+        {"effect": "thermal_lag", "location": "actuator:axis", "of": None, "reason": REASON},
+        {"effect": "swapped", "location": "actuator:a", "of": "b", "reason": REASON},
     ]
 
 

@@ -68,6 +68,14 @@ def print_diagnosis(diagnosis: Diagnosis) -> None:
         out.print(f"next: {step}", markup=False, soft_wrap=True)
 
 
+def print_explanation(diagnosis: Diagnosis, law: str) -> None:
+    """Where one law was tried, what it reached and why it was not taken."""
+    from ctrlgen.diagnosis.report.explain import explain
+
+    for line in explain(diagnosis, law):
+        out.print(line, markup=False, soft_wrap=True)
+
+
 def print_bootstrap(bootstrap: Bootstrap) -> None:
     """The percentile interval of each number, and how often a finding vanished."""
     from ctrlgen.diagnosis.report.narrative import interval

@@ -222,6 +222,30 @@ def _of_law(
         yield Hypothesis(law.kind, f"{domain}:all", "all", highest=highest)
 
 
+def why_not_offered(
+    law: type[Effect],
+    device: Device,
+    physics: DevicePhysics,
+    observed: tuple[str, ...],
+    sample_time: float | None,
+    ambient: bool,
+) -> str:
+    """Why `hypotheses` has none of this law; empty where it has some. Arguments as there."""
+    if next(_of_law(law, physics, observed, sample_time, ambient, unread_axes(device, physics)), None) is not None:
+        return ""
+    there = available(physics, sample_time) - (frozenset() if ambient else {"ambient"})
+    prior = prior_of(law)
+    if not prior.suspected:
+        return f"it is never suspected: {prior.reason}"
+    if there_already := prior.unless & there:
+        return f"the device has {' and '.join(sorted(there_already))}: {prior.reason}"
+    if missing := law.requires - there:
+        return f"it needs {' and '.join(sorted(missing))}, which the device or the recording does not have"
+    if law.place is Place.HEAT and "heat" not in there:
+        return "no actuator of the device is heated"
+    return "no channel that was recorded is one on which it can act"
+
+
 def in_loop(physics: DevicePhysics) -> bool:
     """Whether a feedback loop acts on the readings."""
     loop = physics.feedback if isinstance(physics, InertialPhysics) else None

@@ -18,7 +18,7 @@ from ctrlgen.app.commands.app import (
     app,
 )
 from ctrlgen.app.console import complain, counted, err, out, progress
-from ctrlgen.app.diagnosis_console import print_batch, print_bootstrap, print_diagnosis
+from ctrlgen.app.diagnosis_console import print_batch, print_bootstrap, print_diagnosis, print_explanation
 from ctrlgen.core.errors import InputError
 
 
@@ -36,6 +36,14 @@ def diagnose(
         typer.Option(
             help="Effects to consider, separated by commas; by default all. The device's own parameters always are.",
             metavar="NAME,...",
+            show_default=False,
+        ),
+    ] = None,
+    explain: Annotated[
+        str | None,
+        typer.Option(
+            help="An effect of which to say where it was tried, what it reached and why it was not taken.",
+            metavar="NAME",
             show_default=False,
         ),
     ] = None,
@@ -61,9 +69,13 @@ def diagnose(
     and 2 for input that cannot be used. The same command continues an
     interrupted diagnosis from the fits already made.
 
+    --explain backlash answers for one effect: where it was tried, from what
+    starts, what it reached and why it was not taken.
+
     Example:  ctrlgen diagnose scenarios/devices/meso_hexapod.toml scenarios/nist_hexapod --out out/nist
     """
     from ctrlgen.diagnosis.diagnosis_folder import Replicates, diagnose_into, unfinished
+    from ctrlgen.estimation.hypothesis import selected_laws
 
     if scheduler is not None and not bootstrap:
         raise typer.BadParameter(
@@ -72,6 +84,8 @@ def diagnose(
     try:
         replicates = Replicates(bootstrap, scheduler, jobs) if bootstrap else None
         chosen = None if laws is None else [name.strip() for name in laws.split(",") if name.strip()]
+        if explain is not None:
+            selected_laws([explain])
         with progress() as advance:
             result = diagnose_into(device, recording, out_folder, seed, advance, replicates, chosen, jobs)
     except KeyboardInterrupt:
@@ -85,6 +99,8 @@ def diagnose(
         complain(error)
         raise typer.Exit(2) from None
     print_diagnosis(result)
+    if explain is not None:
+        print_explanation(result, explain)
     if result.bootstrap is not None:
         print_bootstrap(result.bootstrap)
     out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'report.html'))}", soft_wrap=True)

@@ -18,7 +18,8 @@ from ctrlgen.diagnosis.report.answer import sentence
 from ctrlgen.diagnosis.report.shares_sentences import noise_of, shares_sentences
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.cause_entry import Cause
-from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Role, WorthEntry
+from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Finding, Role, WorthEntry
+from ctrlgen.diagnosis.selection.precedence import why_alike
 from ctrlgen.diagnosis.selection.search_history import RoundEntry, search_history
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.diagnosis.shares.shares_record import FractionEntry, SharesEntry, table_record
@@ -49,6 +50,12 @@ class AttributionEntry(Keys):
     held_out: bool = Field(description="Whether the shares are of the held-out records, else of those to fit.")
 
 
+class AlternativeEntry(Cause):
+    """Another cause that explains the recording equally well."""
+
+    reason: str = Field(description="Why both explain it alike, and what would tell them apart.")
+
+
 class FindingEntry(Cause):
     """One cause that the device file leaves out."""
 
@@ -66,7 +73,9 @@ class FindingEntry(Cause):
     terms: list[dict[str, EstimateEntry]] = Field(
         description="Parameters of further terms of the same law at the same place, such as harmonics."
     )
-    alternatives: list[Cause] = Field(description="Other causes that explain the recording equally well in its place.")
+    alternatives: list[AlternativeEntry] = Field(
+        description="Other causes that explain the recording equally well in its place."
+    )
     source: str = Field(description="Publication of the effect's law.")
 
 
@@ -135,7 +144,7 @@ def diagnosis_record(diagnosis: Diagnosis, provenance: Provenance) -> DiagnosisR
         **origin(provenance.inputs, provenance.seed, d.notes),
         verdict=d.verdict,
         sentence=sentence(d),
-        findings=[FindingEntry.model_validate(f, from_attributes=True) for f in d.findings],
+        findings=[_finding_entry(f) for f in d.findings],
         attribution=AttributionEntry(
             explained=d.attribution.explained,
             rest=d.attribution.rest,
@@ -164,6 +173,18 @@ def diagnosis_record(diagnosis: Diagnosis, provenance: Provenance) -> DiagnosisR
         next_experiment=None if d.next_experiment is None else d.next_experiment.record(),
         search_history=search_history(d.search),
     )
+
+
+def _finding_entry(finding: Finding) -> FindingEntry:
+    """A finding with the reason of each alternative."""
+    given = {name: getattr(finding, name) for name in FindingEntry.model_fields}
+    given["alternatives"] = [
+        AlternativeEntry(
+            effect=other.effect, location=other.location, of=other.of, reason=why_alike(finding.cause, other)
+        )
+        for other in finding.alternatives
+    ]
+    return FindingEntry.model_validate(given, from_attributes=True)
 
 
 def location_record(diagnosis: Diagnosis) -> ResidualLocations:

@@ -13,10 +13,11 @@ from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.answer import answer
 from ctrlgen.diagnosis.report.diagnosis_record import Provenance, location_record, shares_record
 from ctrlgen.diagnosis.report.figures import draw_all
+from ctrlgen.diagnosis.report.history_table import history_rows, not_taken_rows
 from ctrlgen.diagnosis.report.narrative import gathered, hard, interval, next_steps, per_cent, plain_name, share_text
 from ctrlgen.diagnosis.report.shares_sentences import family_shares, shares_sentences
 from ctrlgen.diagnosis.selection.findings import Finding
-from ctrlgen.diagnosis.selection.search_history import search_history
+from ctrlgen.diagnosis.selection.precedence import why_alike
 from ctrlgen.diagnosis.settings import SHARES
 from ctrlgen.estimation.hypothesis import PARAMETER, numbers
 from ctrlgen.estimation.robust_covariance import robust_deviations
@@ -56,7 +57,8 @@ def page(diagnosis: Diagnosis, provenance: Provenance) -> str:
         d=diagnosis,
         origin=origin(provenance.inputs, provenance.seed),
         trees={name: entry.as_json() for name, entry in _entries(diagnosis).items() if entry is not None},
-        history=[entry.as_json() for entry in search_history(diagnosis.search)],
+        history=history_rows(diagnosis.search),
+        not_taken=not_taken_rows(diagnosis.search),
         title=diagnosis.recording.title,
         device_title=diagnosis.device.title,
         counts=counts(diagnosis),
@@ -120,7 +122,9 @@ def _row(f: Finding) -> dict[str, Any]:
         "location": f.location,
         "of": f.cause.of,
         "numbers": [(name, interval(e)) for numbers in (f.parameters, *f.terms) for name, e in numbers.items()],
-        "alternatives": [{"effect": h.effect, "location": h.location} for h in f.alternatives],
+        "alternatives": [
+            {"effect": h.effect, "location": h.location, "reason": why_alike(f.cause, h)} for h in f.alternatives
+        ],
         "share": share_text(f),
         "source": f.source,
     }

@@ -7,8 +7,11 @@ import re
 
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.experiment_sentences import experiment_sentence
+from ctrlgen.diagnosis.report.history_table import quantity, worst_error
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding, Role
+from ctrlgen.diagnosis.selection.not_taken import that_matter
+from ctrlgen.diagnosis.selection.search_history import held_out_error
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
@@ -174,15 +177,17 @@ def predicts_better(diagnosis: Diagnosis) -> bool:
 
 
 def refusals(diagnosis: Diagnosis) -> list[str]:
-    """Causes that would score better than what was taken in the last rounds, with what speaks against them."""
-    taken = {(c.effect, c.location) for c in diagnosis.search.chosen.causes}
-    reasons: dict[str, None] = {}
-    for round_ in diagnosis.search.rounds:
-        for refusal in round_.refused:
-            for cause, reason in zip(refusal.causes, refusal.reasons, strict=True):
-                if (cause.effect, cause.location) not in taken:
-                    reasons[f"{hypothesis_name(cause)}, although it would score better: {reason}"] = None
-    return list(reasons)[:NAMED]
+    """Causes that scored better than what was taken, with what each would leave and what speaks against it, first what would gain
+    most."""
+    search, said = diagnosis.search, []
+    for gain, refusal in that_matter(search)[:NAMED]:
+        channel, error = worst_error(search, refusal.candidate)
+        now = held_out_error(search, search.chosen)[channel]
+        would = f"the held-out error of {short(channel)} would be {quantity(error)} instead of {quantity(now)}"
+        better = would if gain > 0 else "it scored better than what its round took"
+        names = " and ".join(map(hypothesis_name, refusal.causes))
+        said.append(f"{names}, although {better}: {'; '.join(dict.fromkeys(refusal.reasons))}")
+    return said
 
 
 def empirical_sentences(diagnosis: Diagnosis) -> list[str]:

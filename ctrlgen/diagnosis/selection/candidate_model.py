@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,11 +37,30 @@ class CandidateModel:
 
 @dataclass(frozen=True, eq=False)
 class Refusal:
-    """A candidate model that was not taken as it was, because of the `reasons` against some of its `causes`, one each."""
+    """A candidate model that was not taken as it was, because of the `reasons` against some of its `causes`, one each. `gain`: by how
+    much its criterion T is better than that of what its round took; negative where it is worse."""
 
     candidate: CandidateModel
     causes: tuple[Hypothesis, ...]
     reasons: tuple[str, ...]
+    gain: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """One fit of the search: in which `round` (from 1), from what numbers [SI] each cause of it was `started`, and the `candidate`
+    that it reached, without the slopes and the residual of its fit."""
+
+    round: int
+    started: tuple[dict[str, float], ...]
+    candidate: CandidateModel
+
+    @classmethod
+    def of(cls, round_: int, started: tuple[dict[str, float], ...], candidate: CandidateModel) -> Attempt:
+        """The attempt that reached a candidate; slopes and residuals of all fits would fill the memory."""
+        fit = candidate.fit
+        light = replace(fit, residual=np.zeros(0), J=np.zeros((0, fit.J.shape[1])), initial_states=(), shapes=())
+        return cls(round_, started, replace(candidate, fit=light))
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +68,7 @@ class Round:
     """One round of the search.
 
     screened: its screen. candidates: its candidate models, the best first, with the `criteria` T of each. before: the model
-    before, with the criterion `criterion_before`. refused: candidates that score better than what was taken. failed: trials
+    before, with the criterion `criterion_before`. refused: what was not taken, with the reasons, first what would gain most. failed: trials
     that could not be simulated, with the reason.
     """
 

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
-from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.diagnosis.selection.shifts import best_shift
 from ctrlgen.diagnosis.selection.subset_search import Suspect
@@ -92,7 +91,7 @@ def restart_elsewhere(
             again = (trials.fitter.fit(s, steps=SEARCH.candidate_steps) for s in promising)
             best = min(again, key=lambda fit: fit.objective)
             if best.objective < candidate.fit.objective:
-                candidate = trials.converged(scored(trials.fitter, best, candidate.cause))
+                candidate = trials.converged(trials.scored(best.structure, best, candidate.cause))
         except FAILURES as error:
             trials.note_failure(cause, error)
     return candidate

@@ -14,6 +14,7 @@ alone: there the parameters are refitted under their posterior (`estimation.held
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from enum import StrEnum
 
 import numpy as np
 
@@ -27,6 +28,16 @@ from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.misfit import Misfit, misfit
 from ctrlgen.estimation.settings import FIT, HELD_OUT_REFIT, RESIDUAL_TESTS, STATISTICS
 from ctrlgen.estimation.structure import Structure
+
+
+class Shortfall(StrEnum):
+    """What a model lacks to be taken in place of one with fewer causes."""
+
+    GAIN = "it improves less than its numbers cost"
+    IMMATERIAL = "what it changes is less than a tenth of the noise"
+    UNCONFIRMED = "the held-out records do not confirm it"
+    SMALL = "it takes away less than a hundredth of the mismatch"
+    ONE_BLOCK = "it gains in one stretch of the held-out records only"
 
 
 def scored(fitter: Fitter, fit: Fit, cause: Hypothesis | None = None) -> CandidateModel:
@@ -135,7 +146,12 @@ class ModelSelection:
         return max(screened.threshold**2, MODEL_SELECTION.material_share**2 * n)
 
     def improves_enough(self, before: CandidateModel, after: CandidateModel) -> bool:
-        """Whether `after` leaves enough less than `before`, for its additional parameters, on both kinds of records.
+        """Whether `after` leaves enough less than `before`, for its additional parameters, on both kinds of records."""
+        return self.shortfall(before, after) is None
+
+    def shortfall(self, before: CandidateModel, after: CandidateModel) -> Shortfall | None:
+        """What `after` lacks to be taken in place of `before`; None where it leaves enough less, for its additional parameters, on
+        both kinds of records.
 
         The held-out gain counts as much as the gain on the records to fit, up to the same amount: chance gives z^2 = 10 on
         both no more often than 17 on the first and 2 on the second. Less is required of the held-out records where the
@@ -149,25 +165,30 @@ class ModelSelection:
         added = len(after.fit.structure.free_parameters) - len(before.fit.structure.free_parameters)
         needed = MODEL_SELECTION.least_gain + added * np.log(max(n, 2))
         # parameters of the device masked it, so the readings hardly show it
-        if before.fit.penalty - after.fit.penalty > MODEL_SELECTION.hidden_share * gain:
-            return gain > needed and confirmed > -MODEL_SELECTION.largest_contradiction
-        if (
+        masked = before.fit.penalty - after.fit.penalty > MODEL_SELECTION.hidden_share * gain
+        unseen = (
             self.unseen_in_held_out(before)
             and before.fitted.excess - after.fitted.excess > MODEL_SELECTION.most_of_mismatch * before.fitted.excess
             and confirmed > -MODEL_SELECTION.largest_contradiction
-        ):
-            return gain > needed
-        if (
-            gain + min(confirmed, gain) <= needed + MODEL_SELECTION.least_confirmed
-            or gain <= MODEL_SELECTION.material_share**2 * n
-        ):
-            return False
+        )
+        if masked or unseen:
+            if gain <= needed:
+                return Shortfall.GAIN
+            return None if confirmed > -MODEL_SELECTION.largest_contradiction else Shortfall.UNCONFIRMED
+        if gain + min(confirmed, gain) <= needed + MODEL_SELECTION.least_confirmed:
+            return Shortfall.UNCONFIRMED if gain > needed else Shortfall.GAIN
+        if gain <= MODEL_SELECTION.material_share**2 * n:
+            return Shortfall.IMMATERIAL
         q = np.maximum(before.held_out.plain_mean, 1.0)
         share = MODEL_SELECTION.worthwhile_share if errors.is_noise else MODEL_SELECTION.above_discrepancy
         worthwhile = share * n_held * float(np.max(1 - 1 / q, initial=0.0))
         if confirmed <= max(MODEL_SELECTION.least_confirmed, worthwhile):
-            return False
-        return errors.is_noise or (self.matters(before, after) and wins_by_block(before.held_out, after.held_out))
+            return Shortfall.UNCONFIRMED
+        if errors.is_noise:
+            return None
+        if not self.matters(before, after):
+            return Shortfall.SMALL
+        return None if wins_by_block(before.held_out, after.held_out) else Shortfall.ONE_BLOCK
 
     def matters(self, before: CandidateModel, after: CandidateModel) -> bool:
         """Whether `after` takes away a share of the whole mismatch of any channel on the held-out records that is worth a name, or

@@ -14,7 +14,6 @@ import numpy as np
 
 from ctrlgen.diagnosis.selection.attribution import as_fitted
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal
-from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
@@ -79,8 +78,9 @@ def _begun_elsewhere(
         cause, structure = candidate.causes[k], candidate.fit.restarted
         for start in _other_valleys(cause, starts.get(cause, ())):
             try:
-                fit = trials.fitter.fit(structure.restarted(k, start), steps=SEARCH.candidate_steps)
-                again = scored(trials.fitter, fit, candidate.cause)
+                begun = structure.restarted(k, start)
+                fit = trials.fitter.fit(begun, steps=SEARCH.candidate_steps)
+                again = trials.scored(begun, fit, candidate.cause)
                 if trials.selection.advantage(again, before) > 0 and not trials.objections(again, accepted):
                     return again
             except FAILURES as error:

@@ -41,6 +41,19 @@ def simplified(trials: Trials, current: CandidateModel) -> CandidateModel:
     return current
 
 
+def acting_instead(trials: Trials, current: CandidateModel) -> CandidateModel:
+    """The model with a law that acts with the motion in place of each function of time alone, where one explains alike."""
+    for k, cause in enumerate(current.causes):
+        if not cause.prior.of_time:
+            continue
+        for t in trials.selection.ranked([*counterparts(trials, current, k), *replacements(trials, current, k)]):
+            acts = t.cause is not None and not t.cause.prior.of_time
+            alike = acts and explains_alike_but_for_odds(trials.selection, t, current)
+            if alike and not trials.objections(t, current.causes):
+                return acting_instead(trials, trials.converged(t))
+    return current
+
+
 def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Round] = ()) -> tuple[CandidateModel, ...]:
     """What explains alike in place of cause k, or is the special case of its law that the fit does not exclude; with what the
     `rounds` tried in its place."""

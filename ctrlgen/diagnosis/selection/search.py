@@ -20,9 +20,10 @@ from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round
 from ctrlgen.diagnosis.selection.candidates import fit_candidates, restart_elsewhere
 from ctrlgen.diagnosis.selection.confusable import explains_alike
 from ctrlgen.diagnosis.selection.model_selection import scored
+from ctrlgen.diagnosis.selection.not_taken import not_taken
 from ctrlgen.diagnosis.selection.precedence import acting_first
 from ctrlgen.diagnosis.selection.pruning import all_pruned, no_worse, without_needless
-from ctrlgen.diagnosis.selection.rivals import rivals, simplified, swapped
+from ctrlgen.diagnosis.selection.rivals import acting_instead, rivals, simplified, swapped
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
 from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.selection.supported import supported
@@ -59,7 +60,7 @@ class Searcher:
             current = self._settled(current)
             if np.allclose(noise.floor, before.floor, rtol=SEARCH.same_noise):
                 break
-        current = simplified(trials, self._settled(current))
+        current = acting_instead(trials, simplified(trials, self._settled(current)))
         # its numbers are not bent by the errors of a better model
         nominal = scored(trials.fitter, trials.fitter.described(device)[1])
         current, account = supported(trials, nominal, current, trials.screen.seed)
@@ -71,8 +72,11 @@ class Searcher:
         bare = tuple(trials.each(lambda branch, k: _without(branch, current, k, nominal), each))
         alike = tuple(trials.each(lambda branch, k: rivals(branch, current, k, rounds), each))
         screened = trials.screened(current)
+        log = (tuple(trials.log), tuple(trials.screen.hypotheses))
         withdrawn = tuple(c for c in found.causes if c not in current.causes)
-        return SearchResult(trials.fitter, nominal, current, account, bare, alike, tuple(rounds), screened, withdrawn)
+        return SearchResult(
+            trials.fitter, nominal, current, account, bare, alike, tuple(rounds), screened, withdrawn, *log
+        )
 
     def _settled(self, current: CandidateModel) -> CandidateModel:
         """The same model fitted to its end under its own errors, without the causes that it then does not need."""
@@ -102,7 +106,7 @@ class Searcher:
         most = SEARCH.most_causes[trials.fitter.recording.kind]
         while True:
             trials.step(f"screening, {len(current.causes)} causes so far")
-            trials.new_round()
+            trials.new_round(len(rounds) + 1)
             current = self._marked_again(current)
             screened = trials.screened(current)
             if len(current.causes) >= most or trials.selection.residual_within_model_form_error(current):
@@ -139,7 +143,7 @@ class Searcher:
     def _round(
         self, screened: Screened, candidates: Sequence[CandidateModel], before: CandidateModel, best: CandidateModel
     ) -> Round:
-        """The record of a round, with the refused candidates that score better than what was taken."""
+        """The record of a round, with what was not taken and why."""
         compare = self.trials.selection
         errors = compare.reference((before, *candidates, best))
         return Round(
@@ -148,7 +152,7 @@ class Searcher:
             criteria=tuple(compare.criterion(t, errors) for t in candidates),
             before=before,
             criterion_before=compare.criterion(before, errors),
-            refused=tuple(r for r in self.trials.refused if compare.advantage(r.candidate, best) > 0),
+            refused=not_taken(compare, self.trials.refused, candidates, before, best),
             failed=tuple(dict.fromkeys(self.trials.failed)),
         )
 

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from pydantic import Field
 
-from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round
-from ctrlgen.diagnosis.selection.cause_entry import EffectAt
+from ctrlgen.core.units import difference, from_si
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal, Round
+from ctrlgen.diagnosis.selection.cause_entry import Cause, EffectAt
+from ctrlgen.diagnosis.selection.not_taken import held_out_rms
 from ctrlgen.diagnosis.selection.search_result import SearchResult
+from ctrlgen.estimation.fit import Fit
 from ctrlgen.reporting.result_file import FiniteOrNull, Keys, Number
 
 
@@ -18,20 +23,41 @@ class TriedCause(EffectAt):
     accepted: bool = Field(description="Whether it is in the model after the round.")
 
 
-class RefusedEntry(Keys):
-    """A model that scores better than what was taken, and was not taken."""
+class NumberEntry(Keys):
+    """A number with its unit."""
 
-    causes: list[EffectAt] = Field(description="The causes that speak against it.")
-    reasons: list[str] = Field(description="What speaks against each.")
+    value: FiniteOrNull = Field(description="Value [unit].")
+    unit: str = Field(description="Unit; 1 without one.")
 
 
-class CandidateModelEntry(Keys):
-    """One model that was fitted in a round."""
+class ModelEntry(Keys):
+    """A model that was fitted, by what it leaves."""
 
-    causes: list[TriedCause] = Field(description="Causes that it adds to the model before the round.")
     criterion: FiniteOrNull = Field(description="Selection criterion T: smaller is better.")
     fitted: FiniteOrNull = Field(description="Mean square of the residual on the records to fit, over the noise's.")
     held_out: FiniteOrNull = Field(description="Mean square of the residual on the held-out records, over the noise's.")
+    held_out_error: dict[str, NumberEntry] = Field(
+        description="Root mean square error on the held-out records by channel."
+    )
+
+
+class NotTakenEntry(Keys):
+    """A model that scores better than what its round took, and was not taken."""
+
+    causes: list[Cause] = Field(description="The causes that speak against it.")
+    reasons: list[str] = Field(description="What speaks against each.")
+    numbers: dict[str, NumberEntry] = Field(description="Their numbers as fitted, '<effect>.<name>'.")
+    gain: FiniteOrNull = Field(description="By how much its criterion T is better than that of what was taken.")
+    held_out_error: dict[str, NumberEntry] = Field(
+        description="Root mean square error on the held-out records by channel."
+    )
+
+
+class CandidateModelEntry(ModelEntry):
+    """One model that was fitted in a round."""
+
+    causes: list[TriedCause] = Field(description="Causes that it adds to the model before the round.")
+    outcome: str = Field(description="'taken', or why it was not.")
 
 
 class RoundEntry(Keys):
@@ -42,9 +68,11 @@ class RoundEntry(Keys):
         description="|z| that a recording without mismatch exceeds anywhere with 1 % chance."
     )
     suspects: int = Field(description="Hypotheses screened.")
-    criterion_before: FiniteOrNull = Field(description="Selection criterion T of the model before the round.")
+    before: ModelEntry = Field(description="The model before the round.")
     candidates: list[CandidateModelEntry] = Field(description="Models fitted, the best first.")
-    refused: list[RefusedEntry] = Field(description="Models that score better than what was taken, with the reason.")
+    not_taken: list[NotTakenEntry] = Field(
+        description="Models that score better than what was taken, with the reason, first what would gain most."
+    )
     failed: list[str] = Field(description="Trials that could not be built or simulated, with the reason.")
     causes_after: list[tuple[str, str]] = Field(description="[effect, location] of the causes after the round.")
     decision: str = Field(description="What was decided, and why.")
@@ -58,14 +86,11 @@ def search_history(search: SearchResult) -> list[RoundEntry]:
             round=k,
             threshold=round_.screened.threshold,
             suspects=len(round_.screened.suspects),
-            criterion_before=round_.criterion_before,
-            candidates=[_tried(t, T, round_, then) for t, T in zip(round_.candidates, round_.criteria, strict=True)],
-            refused=[
-                RefusedEntry(
-                    causes=[EffectAt.model_validate(c, from_attributes=True) for c in r.causes], reasons=list(r.reasons)
-                )
-                for r in round_.refused
+            before=ModelEntry(**_left(search, round_.before, round_.criterion_before)),
+            candidates=[
+                _tried(search, t, T, round_, then) for t, T in zip(round_.candidates, round_.criteria, strict=True)
             ],
+            not_taken=[not_taken_entry(search, r) for r in round_.refused if r.gain > 0],
             failed=list(round_.failed),
             causes_after=[(c.effect, c.location) for c in then.causes],
             decision=_decision(round_.before, then, bool(round_.candidates)),
@@ -74,18 +99,67 @@ def search_history(search: SearchResult) -> list[RoundEntry]:
     ]
 
 
-def _tried(trial: CandidateModel, criterion: float, round_: Round, then: CandidateModel) -> CandidateModelEntry:
-    """The causes that one candidate model adds, and its criterion."""
+def not_taken_entry(search: SearchResult, refusal: Refusal) -> NotTakenEntry:
+    """What the result file says of a refusal."""
+    return NotTakenEntry(
+        causes=[Cause.model_validate(c, from_attributes=True) for c in refusal.causes],
+        reasons=list(refusal.reasons),
+        numbers=_numbers(refusal),
+        gain=refusal.gain,
+        held_out_error=held_out_error(search, refusal.candidate),
+    )
+
+
+def _numbers(refusal: Refusal) -> dict[str, NumberEntry]:
+    """The numbers as fitted of the causes that are refused."""
+    fit = refusal.candidate.fit
+    return {
+        f"{cause.effect}.{name}": NumberEntry(value=value, unit=unit)
+        for cause in refusal.causes
+        if cause in fit.structure.causes
+        for name, (value, unit) in numbers_of_cause(fit, fit.structure.causes.index(cause)).items()
+    }
+
+
+def numbers_of_cause(fit: Fit, k: int) -> dict[str, tuple[float, str]]:
+    """The numbers of cause k as fitted, with their units, by name."""
+    return {
+        u.name: (float(from_si(value, u.unit)), u.unit)
+        for u, value in zip(fit.structure.free_parameters, fit.theta, strict=True)
+        if u.cause == k
+    }
+
+
+def held_out_error(search: SearchResult, candidate: CandidateModel) -> dict[str, NumberEntry]:
+    """The held-out errors of a model by channel, in the reader's units."""
+    recording = search.fitter.recording
+    return {
+        channel: NumberEntry(value=float(rms) * difference(1.0, unit), unit=unit)
+        for channel, unit, rms in zip(recording.channels, recording.units, held_out_rms(candidate), strict=True)
+    }
+
+
+def _left(search: SearchResult, candidate: CandidateModel, criterion: float) -> dict[str, Any]:
+    """The keys of a `ModelEntry`."""
+    return {
+        "criterion": criterion,
+        "fitted": float(np.mean(candidate.fitted.plain_mean)),
+        "held_out": float(np.mean(candidate.held_out.plain_mean)),
+        "held_out_error": held_out_error(search, candidate),
+    }
+
+
+def _tried(
+    search: SearchResult, trial: CandidateModel, criterion: float, round_: Round, then: CandidateModel
+) -> CandidateModelEntry:
+    """The causes that one candidate model adds, its criterion and what came of it."""
     z = {s.hypothesis: s.z for s in round_.screened.suspects}
+    added = [c for c in trial.causes if c not in round_.before.causes]
+    why = {frozenset(r.candidate.causes): r.reasons[0] for r in reversed(round_.refused)}
     return CandidateModelEntry(
-        causes=[
-            TriedCause(effect=c.effect, location=c.location, z=z.get(c), accepted=c in then.causes)
-            for c in trial.causes
-            if c not in round_.before.causes
-        ],
-        criterion=criterion,
-        fitted=float(np.mean(trial.fitted.plain_mean)),
-        held_out=float(np.mean(trial.held_out.plain_mean)),
+        causes=[TriedCause(effect=c.effect, location=c.location, z=z.get(c), accepted=c in then.causes) for c in added],
+        outcome=why.get(frozenset(trial.causes), "taken" if all(c in then.causes for c in added) else "replaced"),
+        **_left(search, trial, criterion),
     )
 
 

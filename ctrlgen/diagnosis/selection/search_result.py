@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ctrlgen.diagnosis.selection.attribution import Attribution
-from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round
+from ctrlgen.diagnosis.selection.candidate_model import Attempt, CandidateModel, Round
 from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
@@ -19,7 +19,8 @@ class SearchResult:
     chosen: the selected model. account: what each of its causes takes away of what `nominal` leaves. without_cause: the chosen
     model without each of its causes. rivals: for each cause, models with another cause in its place that explain the recording
     equally well. rounds: in order. final_screen: the screen of the chosen model. withdrawn: causes that were taken out at the
-    end, because with them the held-out records are predicted worse than by the device as described.
+    end, because with them the held-out records are predicted worse than by the device as described. attempts: every fit of a
+    model with causes, in order. offered: the hypotheses among which was searched.
     """
 
     fitter: Fitter
@@ -31,3 +32,5 @@ class SearchResult:
     rounds: tuple[Round, ...]
     final_screen: Screened
     withdrawn: tuple[Hypothesis, ...] = ()
+    attempts: tuple[Attempt, ...] = ()
+    offered: tuple[Hypothesis, ...] = ()

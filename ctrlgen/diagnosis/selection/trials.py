@@ -14,7 +14,7 @@ import numpy as np
 
 from ctrlgen.core.errors import CtrlgenError, InputError
 from ctrlgen.core.forks import in_forks
-from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal
+from ctrlgen.diagnosis.selection.candidate_model import Attempt, CandidateModel, Refusal
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection, scored
 from ctrlgen.diagnosis.selection.objections import objections
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
@@ -29,11 +29,11 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 FAILURES = (CtrlgenError, ValueError, ArithmeticError, RuntimeError, np.linalg.LinAlgError)
 """What a trial may end with: a stage that cannot be built, a balance or integrator that does not converge."""
-_Learnt = tuple[dict[frozenset[Any], tuple[CandidateModel, int]], list[Refusal], list[str]]
+_Learnt = tuple[dict[frozenset[Any], tuple[CandidateModel, int]], list[Refusal], list[str], list[Attempt]]
 
 
 class Trials:
-    """Fits structures for a search, and keeps what was fitted, screened, `refused` and `failed`.
+    """Fits structures for a search, and keeps what was fitted, screened, `refused` and `failed`, and every attempt in the `log`.
 
     It replaces its own fitter as it learns the errors. `mismatch` is that of `ModelSelection`. `step` is called with a sentence
     before each trial. Trials that do not depend on one another are made in `jobs` processes.
@@ -46,6 +46,8 @@ class Trials:
         self.mismatch: np.ndarray | None = None
         self.refused: list[Refusal] = []
         self.failed: list[str] = []
+        self.log: list[Attempt] = []
+        self.round = 1
         self.per_round = SEARCH.candidates_per_round * (SEARCH.cheap_factor if fitter.recording.kind == "poses" else 1)
 
     @property
@@ -78,25 +80,34 @@ class Trials:
         def work(item: Item) -> tuple[Result, _Learnt]:
             branch = copy.copy(self)
             branch.jobs, branch.step = 1, (lambda _: None)
-            branch.fitted, branch.screens, branch.refused, branch.failed = dict(self.fitted), dict(self.screens), [], []
+            branch.fitted, branch.screens = dict(self.fitted), dict(self.screens)
+            branch.refused, branch.failed, branch.log = [], [], []
             result = function(branch, item)
             new = {key: value for key, value in branch.fitted.items() if self.fitted.get(key) is not value}
-            return result, (new, branch.refused, branch.failed)
+            return result, (new, branch.refused, branch.failed, branch.log)
 
         devices = {c.fit.structure.device for c, _ in self.fitted.values()}
         shared = (self.fitter.recording, self.fitter.noise, self.fitter.errors, *devices)
         begun = (lambda item: self.step(sentence(item))) if sentence else (lambda item: None)
         results = []
-        for result, (new, refused, failed) in in_forks(work, items, self.jobs, begun, shared):
+        for result, (new, refused, failed, log) in in_forks(work, items, self.jobs, begun, shared):
             self.fitted.update(new)
             self.refused += refused
             self.failed += failed
+            self.log += log
             results.append(result)
         return results
 
-    def new_round(self) -> None:
-        """Forgets what was refused and what failed."""
-        self.refused, self.failed = [], []
+    def new_round(self, number: int = 1) -> None:
+        """Forgets what was refused and what failed; what is fitted from now on belongs to the round of this number."""
+        self.refused, self.failed, self.round = [], [], number
+
+    def scored(self, structure: Structure, fit: Fit, cause: Hypothesis | None = None) -> CandidateModel:
+        """The candidate model of a fit begun at `structure`, kept in the log."""
+        candidate = scored(self.fitter, fit, cause)
+        if structure.causes:
+            self.log.append(Attempt.of(self.round, structure.starts, candidate))
+        return candidate
 
     def fit(
         self,
@@ -115,7 +126,7 @@ class Trials:
         if known is not None and known.fit.objective <= fit.objective:
             self.fitted[key] = (known, steps)
             return replace(known, cause=cause)
-        candidate = scored(self.fitter, fit, cause)
+        candidate = self.scored(structure, fit, cause)
         self.fitted[key] = (candidate, steps)
         return candidate
 

@@ -1,0 +1,81 @@
+"""The search round by round as a table, and what was not taken although it scored better, for the page and the console."""
+
+from __future__ import annotations
+
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal
+from ctrlgen.diagnosis.selection.not_taken import cause_text, that_matter
+from ctrlgen.diagnosis.selection.search_history import (
+    NumberEntry,
+    held_out_error,
+    not_taken_entry,
+    search_history,
+)
+from ctrlgen.diagnosis.selection.search_result import SearchResult
+from ctrlgen.reporting.numbers import number
+
+
+def history_rows(search: SearchResult) -> list[dict[str, str]]:
+    """A row for the model before each round, for each model that it fitted, and for what was decided."""
+    rows = []
+    for entry, round_ in zip(search_history(search), search.rounds, strict=True):
+        beside = " and ".join(map(cause_text, round_.before.causes)) or "the device as described"
+        rows.append(_row(str(entry.round), beside, "", 0.0, entry.before.held_out_error, "before the round"))
+        for tried, model in zip(entry.candidates, round_.candidates, strict=True):
+            added = "+ " + " and ".join(cause_text(c) for c in model.causes if c not in round_.before.causes)
+            scores = ", ".join(number(abs(c.z), 3) for c in tried.causes if c.z is not None)
+            better = (entry.before.criterion or 0.0) - (tried.criterion or 0.0)
+            rows.append(_row("", added, scores, better, tried.held_out_error, tried.outcome))
+        rows.append(_row("", "", "", None, {}, entry.decision))
+    return rows
+
+
+def _row(
+    round_: str, model: str, scores: str, better: float | None, errors: dict[str, NumberEntry], outcome: str
+) -> dict[str, str]:
+    return {
+        "round": round_,
+        "model": model,
+        "z": scores,
+        "better": "" if better is None else number(better, 4),
+        "held_out": errors_text(errors),
+        "outcome": outcome,
+    }
+
+
+def errors_text(errors: dict[str, NumberEntry]) -> str:
+    """'x 12.4 nm, y 3.1 nm'; without the name where there is one channel."""
+    names = {c: "" if len(errors) == 1 else f"{c.removeprefix('reading.')} " for c in errors}
+    return ", ".join(
+        f"{names[c]}{number(e.value, 3) if e.value is not None else '-'} {e.unit}" for c, e in errors.items()
+    )
+
+
+def not_taken_rows(search: SearchResult) -> list[dict[str, str]]:
+    """What scored better than what its round took, that which would gain most beside the answer first."""
+    return [
+        {
+            "cause": " and ".join(map(cause_text, refusal.causes)),
+            "numbers": _numbers(search, refusal),
+            "better": number(refusal.gain, 4),
+            "held_out": errors_text(held_out_error(search, refusal.candidate)),
+            "reason": "; ".join(dict.fromkeys(refusal.reasons)),
+        }
+        for _, refusal in that_matter(search)
+    ]
+
+
+def _numbers(search: SearchResult, refusal: Refusal) -> str:
+    shown = not_taken_entry(search, refusal).numbers
+    return ", ".join(f"{name.partition('.')[2]} = {quantity(e)}" for name, e in shown.items())
+
+
+def quantity(e: NumberEntry) -> str:
+    """'4.1 um'."""
+    value = "-" if e.value is None else number(e.value, 4)
+    return value if e.unit == "1" else f"{value} {e.unit}"
+
+
+def worst_error(search: SearchResult, candidate: CandidateModel) -> tuple[str, NumberEntry]:
+    """The channel in which a model leaves most on the held-out records beside the noise, and that error."""
+    channel = search.fitter.recording.channels[int(candidate.held_out.plain_mean.argmax())]
+    return channel, held_out_error(search, candidate)[channel]

@@ -1,0 +1,166 @@
+"""Why a search did not take what it tried: in the report, in diagnosis.json, and for one law on request."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from axis_records import AXIS, BACKLASH, fitter_of, played
+from conftest import AXIS_FILE
+from creeping_axis import LAWS, creeping_recording
+from misfits import left
+from strokes import MM, servo, strokes
+
+import ctrlgen
+from ctrlgen.core.errors import InputError
+from ctrlgen.diagnosis.diagnose import diagnose_recording
+from ctrlgen.diagnosis.report.diagnosis_record import Provenance, diagnosis_record
+from ctrlgen.diagnosis.report.explain import explain
+from ctrlgen.diagnosis.report.history_table import history_rows, not_taken_rows
+from ctrlgen.diagnosis.report.html_report import page
+from ctrlgen.diagnosis.report.narrative import refusals
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal
+from ctrlgen.diagnosis.selection.model_selection import ModelSelection, Shortfall
+from ctrlgen.diagnosis.selection.not_taken import not_taken, that_matter
+from ctrlgen.diagnosis.selection.screen import Screen
+from ctrlgen.diagnosis.selection.trials import Trials
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.structure import Structure
+
+MADE_FROM = Provenance({}, 0)
+OFFSET = Hypothesis("drive_offset", "actuator:axis", "axis")
+DRIFT = Hypothesis("drift", "sensor:axis", "axis")
+
+
+@pytest.fixture(scope="module")
+def creeping(tmp_path_factory):
+    """The answer for an axis that creeps, among a few laws."""
+    return ctrlgen.diagnose(AXIS_FILE, creeping_recording(tmp_path_factory.mktemp("creeping")), laws=LAWS)
+
+
+@pytest.fixture(scope="module")
+def turned(tmp_path_factory):
+    """The answer for an error of so short a way that, as a pitch, the reading would turn back: as a force would it be."""
+    way = 0.05 * MM
+
+    def error(place, time):
+        return 0.012 * MM * np.sin(2 * np.pi * place / way)
+
+    recording = strokes(error, (0.3 * MM, 0.21 * MM, 0.26 * MM), 2e-7, seconds=10.0)
+    return diagnose_recording(
+        servo(tmp_path_factory.mktemp("turned")), recording, laws=["cyclic", "sensor_gain"], jobs=0
+    )
+
+
+def test_the_law_that_was_found_tells_from_where_to_where_its_numbers_went(creeping):
+    first, score, attempt, *_ = explain(creeping, "creep")
+    assert first == "creep at stage:axis is in the answer." and "where chance reaches" in score
+    assert "round 1: gain 0.0" in attempt and "tau" in attempt and "-> " in attempt
+    for said in ("criterion better than the device as described by", "residual over noise", "held-out error", " nm"):
+        assert said in attempt, said
+
+
+def test_a_law_that_no_reading_asks_for_never_exceeded_the_threshold(creeping):
+    quiet = [law for law in LAWS if law != "creep"]
+    said = [line for law in quiet for line in explain(creeping, law)]
+    assert any("never exceeded the threshold of the screen: score" in line for line in said) or any(
+        "was not taken:" in line for line in said
+    )
+
+
+def test_a_law_that_cannot_act_there_is_not_offered_and_an_unknown_one_is_a_fault(creeping):
+    assert explain(creeping, "thermal_lag") == [
+        "thermal_lag: not offered, because it was not among the effects to consider."
+    ]
+    (heat,) = explain(creeping, "heat_crosstalk")
+    assert heat.startswith("heat_crosstalk: not offered, because it needs heat")
+    assert "never suspected" in explain(creeping, "zero_per_record")[0]
+    with pytest.raises(InputError, match="known are: "):
+        explain(creeping, "no_such_law")
+
+
+def test_a_refusal_that_mattered_is_told_with_what_it_would_leave(turned):
+    """In the next steps, on the page and in diagnosis.json, with its numbers and its held-out error."""
+    assert turned.findings == () and turned.verdict == "unexplained"
+    (said, *_) = refusals(turned)
+    assert said.startswith("cyclic at sensor:axis, although the held-out error of axis would be ")
+    assert " instead of " in said and said.endswith("the reading would turn back")
+    (row, *_) = not_taken_rows(turned.search)
+    assert "period = 0.05" in row["numbers"] and row["held_out"].endswith(" mm") and "turn back" in row["reason"]
+    record = diagnosis_record(turned, MADE_FROM)
+    entry = record.search_history[0].not_taken[0]
+    assert entry.numbers["cyclic.period"].unit == "mm"
+    assert entry.numbers["cyclic.period"].value == pytest.approx(0.05, rel=0.01)
+    assert entry.held_out_error["reading.axis"].value < 0.25 * record.held_out["reading.axis"].rms_after
+    shown = page(turned, MADE_FROM)
+    assert "What was not taken" in shown and "the reading would turn back" in shown
+    first, *_ = explain(turned, "cyclic")
+    assert (
+        first.startswith("cyclic at sensor:axis was not taken: ")
+        and "turn back" in first
+        and "(round 1, better" in first
+    )
+
+
+def test_the_history_is_a_table_with_one_outcome_a_model(creeping):
+    rows = history_rows(creeping.search)
+    assert rows[0]["model"] == "the device as described" and rows[0]["held_out"].endswith(" nm")
+    taken = [row for row in rows if row["outcome"] == "taken"]
+    assert taken and all(row["model"].startswith("+ creep at stage:axis") for row in taken)
+    assert all(row["outcome"] for row in rows)
+    assert "<th>outcome</th>" in page(creeping, MADE_FROM)
+
+
+@pytest.fixture(scope="module")
+def few() -> tuple[Trials, CandidateModel]:
+    fitter = fitter_of(played)
+    trials = Trials(fitter, Screen(fitter, [BACKLASH]), lambda _: None)
+    return trials, trials.fit(Structure(AXIS), steps=0)
+
+
+def test_every_fit_is_logged_with_its_start_and_without_its_slopes(few):
+    trials, _ = few
+    known = len(trials.log)
+    trials.new_round(3)
+    play = trials.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 3e-8}))
+    trials.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 3e-8}))
+    (attempt,) = trials.log[known:]
+    assert attempt.round == 3 and attempt.started == ({"gap": 3e-8},) and attempt.candidate.causes == (BACKLASH,)
+    assert attempt.candidate.fit.values(0) == play.fit.values(0)
+    assert attempt.candidate.fit.J.size == 0 and attempt.candidate.fit.residual.size == 0
+    compare = trials.selection
+    assert compare.advantage(attempt.candidate, play) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_what_is_not_taken_stands_by_its_gain_with_one_reason_each(few):
+    trials, before = few
+    noisy = trials.fitter.with_errors_of(before.fit).error
+
+    def model(causes: dict[Hypothesis, dict[str, float]], gone: float, held: float) -> CandidateModel:
+        structure = Structure(AXIS)
+        for cause, start in causes.items():
+            structure = structure.with_cause(cause, start)
+        fit = replace(trials.fitter.fit(structure, steps=0), penalty=0.0)
+        return replace(before, fit=fit, errors=noisy, fitted=left(gone), held_out=left(held))
+
+    bare = model({}, 1e6, 1e6)
+    best = model({BACKLASH: {"gap": 6e-8}}, 2e5, 2e5)
+    drift = model({DRIFT: {"rate": 1e-7}}, 1e5, 1e5)
+    offset = model({OFFSET: {"offset": 0.1}}, 1e5, 2e6)
+    refused = Refusal(model({OFFSET: {"offset": 0.2}}, 1e4, 1e4), (OFFSET,), ("offset is at its bound",))
+    rows = not_taken(
+        ModelSelection(trials.fitter, lambda *_: []), [refused, refused], [best, drift, offset], bare, best
+    )
+    assert [r.reasons[0] for r in rows] == [
+        "offset is at its bound",
+        "a function of time alone; backlash at stage:axis acts with the motion and explains nearly as much",
+        Shortfall.UNCONFIRMED.value,
+    ]
+    assert [r.gain > 0 for r in rows] == [True, True, False] and rows[0].gain > rows[1].gain
+
+
+def test_a_refusal_that_the_answer_has_does_not_matter_any_more(turned):
+    (row, *_) = that_matter(turned.search)
+    with_it = replace(turned.search, chosen=row[1].candidate)
+    assert not [r for r in that_matter(with_it) if r[1].causes == row[1].causes]
