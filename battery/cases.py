@@ -66,11 +66,11 @@ GROUPS = (
 LOOP = ("coulomb", "stribeck", "viscous", "quadratic_damping", "cyclic", "lost_beams", "step", "backlash")
 # By class, in the order of CLASSES
 COUNTS = {
-    "ci": (2, 4, 1, 1, 1, 1, 1, 1, 1, 1, 2),
-    "small": (10, 30, 8, 8, 7, 4, 2, 11, 10, 10, 12),
-    "full": (110, 90, 40, 48, 42, 16, 10, 33, 200, 72, 204),
+    "ci": (2, 4, 1, 1, 1, 1, 1, 1, 1, 1, 2, 0),
+    "small": (10, 30, 8, 8, 7, 4, 2, 11, 10, 10, 12, 8),
+    "full": (110, 90, 40, 48, 42, 16, 10, 33, 200, 72, 204, 64),
 }
-ROUGH = ("messy", "memory", "null")
+ROUGH = ("messy", "memory", "null", "forms")
 CLASSES = ("clean", "single", "weak", "multiple", "outside", "confusable", "hexapod_clean", "hexapod_single", *ROUGH)
 Rng = np.random.Generator
 

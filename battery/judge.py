@@ -9,7 +9,7 @@ from typing import Any
 from battery.accepted import ROUGH_TRUTHS, SAME_LAW, TRUTHS, in_si, is_right, place_is_right
 from battery.judge_rough import Rough, judge_rough
 
-ROUGH = ("messy", "memory")
+ROUGH = ("messy", "memory", "forms")
 
 
 @dataclass

@@ -30,14 +30,15 @@ EQUAL = 0.1  # dominant causes whose shares differ by less may come in either or
 class Rough:
     """One case. `first`: the finding with the largest share is a dominant cause; `in_set`: it or an alternative of it is; `place`:
     it stands where a dominant cause is; `share`: the largest cause is named, its share within five points; `artefact`: one that
-    nobody planted stands above a dominant cause; `answered`: the verdict is partly or explained; `over_best`: held-out error over
-    the least possible."""
+    nobody planted stands above a dominant cause; `nothing_beside`: every finding was planted; `answered`: the verdict is partly or
+    explained; `over_best`: held-out error over the least possible."""
 
     first: bool = False
     in_set: bool = False
     place: bool = False
     share: bool = False
     artefact: bool = False
+    nothing_beside: bool = False
     answered: bool = False
     over_best: float | None = None
 
@@ -57,6 +58,7 @@ def judge_rough(answer: dict[str, Any], diagnosis: dict[str, Any]) -> Rough:
         place=first is not None and any(all(place_is_right(first.get("location", ""), t)) for t in leading),
         share=largest is not None and any(abs(_share(largest) - truths[0][key]) <= NEAR for key in SHARES),
         artefact=_artefact_above(findings, truths, small),
+        nothing_beside=all(any(_right(f, t) for t in [*truths, *small]) for f in findings),
         answered=diagnosis["verdict"] in {"partly", "explained"},
         over_best=_over_best(answer, diagnosis),
     )

@@ -26,6 +26,8 @@ FAMILY = {
     "power_creep": "creep",
     "sinh_creep": "creep",
 }
+FORMS = ("narrow_stack", "leaning_stack")  # of hysteresis: further ones, in a class of their own
+FAMILIES = FAMILY | dict.fromkeys(FORMS, "hysteresis")
 
 
 def bouc_wen_motion(t: Array, x: Array, a: float, reach: float, loop: float, power: float) -> Array:
@@ -60,6 +62,27 @@ def _play(x: Array, half: float, w: float) -> Array:
 def play_stack(t: Array, x: Array, a: float, radii: list[float], weights: list[float]) -> Array:
     """a sum_j w_j (play of half width r_j - x), Prandtl-Ishlinskii; sum w_j = 1."""
     return a * sum(w * (_play(x, r, 0.0) - x) for r, w in zip(radii, weights, strict=True))
+
+
+def narrow_stack(t: Array, x: Array, a: float, radii: list[float], weights: list[float]) -> Array:
+    """As `play_stack`, of radii in even ratios and any weights, most of them on the narrowest."""
+    return play_stack(t, x, a, radii, weights)
+
+
+def leaning_stack(
+    t: Array, x: Array, a: float, radii: list[float], weights: list[float], scale: float, up: float, down: float
+) -> Array:
+    """a sum_j w_j (w_j - x), w_j dragged between x - r_j (1 + down f) and x + r_j (1 + up f), f = tanh(|x|/scale): each edge of the
+    play leans out in its own way."""
+    lean, out = np.tanh(np.abs(x) / scale), np.zeros_like(x)
+    for r, weight in zip(radii, weights, strict=True):
+        w, path = 0.0, []
+        edges = zip(x.tolist(), (x - r * (1 + down * lean)).tolist(), (x + r * (1 + up * lean)).tolist(), strict=True)
+        for place, low, high in edges:
+            w = max(min(w, high), low)
+            path.append(w - place)
+        out += weight * np.array(path)
+    return a * out
 
 
 def preisach(t: Array, x: Array, a: float, scale: float, skew: float) -> Array:
@@ -138,6 +161,8 @@ OPERATORS: dict[str, Callable[..., Array]] = {
     for f in (
         bouc_wen_motion,
         play_stack,
+        narrow_stack,
+        leaning_stack,
         preisach,
         free_play,
         worn_play,
@@ -167,6 +192,15 @@ def draw_shape(name: str, rng: np.random.Generator, travel: float, clock: float)
         weights = np.exp(-between(0.0, 2.0) * np.linspace(0, 1, n)) * rng.uniform(0.7, 1.3, n)
         radii = travel * np.linspace(0.04, between(0.6, 1.2), n) ** between(0.9, 1.3)
         return {"radii": radii.tolist(), "weights": (weights / weights.sum()).tolist()}
+    if name == "narrow_stack":
+        radii = travel * np.geomspace(0.01, between(0.5, 1.5), int(rng.integers(10, 14)))
+        weights = rng.exponential(1.0, len(radii)) * radii ** -between(0.1, 0.5)
+        return {"radii": radii.tolist(), "weights": (weights / weights.sum()).tolist()}
+    if name == "leaning_stack":
+        radii, weights = travel * rng.uniform(0.1, 0.7, 3), rng.uniform(0.5, 1.5, 3)
+        leans = rng.permutation([between(0.6, 1.6), between(-0.3, 0.3)]).tolist()
+        shape = {"radii": radii.tolist(), "weights": (weights / weights.sum()).tolist()}
+        return shape | {"scale": travel * between(0.8, 2.0), "up": leans[0], "down": leans[1]}
     if name == "preisach":
         return {"scale": travel * between(1.5, 3.0), "skew": between(-0.4, 0.4)}
     start = {"start": between(-1, 1)}

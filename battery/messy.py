@@ -120,7 +120,7 @@ def dominant(
     for k, name in enumerate(names):
         wanted = target if k == 0 else max(1.2 * low, target * float(rng.uniform(0.5, 1.0)))
         law, size = gauge.scaled(draw(name), wanted, low, high)
-        if memory.FAMILY.get(name, "backlash") != "backlash" and law.amplitude > LARGEST_SHARE:
+        if memory.FAMILIES.get(name, "backlash") != "backlash" and law.amplitude > LARGEST_SHARE:
             raise ValueError(f"{name}: a share of {law.amplitude:.2g}")
         found.append((law, size))
     return found
@@ -134,10 +134,10 @@ def background(
     `largest`: the size of the dominant cause; no law is of the kind or family of those `taken`.
     """
     count = int(rng.integers(5, 11))
-    families = {memory.FAMILY.get(name, name) for name in taken}
+    families = {memory.FAMILIES.get(name, name) for name in taken}
     names: list[str] = []
     for pool, n in zip(pools, (count // 2, count - count // 2), strict=True):
-        free = [p for p in pool if memory.FAMILY.get(p, p) not in families]
+        free = [p for p in pool if memory.FAMILIES.get(p, p) not in families]
         names += rng.permutation(free)[:n].tolist()
     found = []
     for name in names:

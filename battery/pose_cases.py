@@ -171,7 +171,7 @@ def draw_act(name: str, rng: Rng, bench: Bench, gauge: PoseGauge) -> Act:
     n = changed(read(machine.file), bench.poses.shares)
     d = machine.to_stage(n, bench.poses.drives["fit"])
     s, width = float(np.abs(d[:, k]).max()), float(np.abs(gauge.plain[:, c]).max())
-    if name in memory.FAMILY:
+    if name in memory.FAMILIES:
         return _memory(name, rng, bench, k, s)
 
     def only(i: int, f: Callable[[Array], Array]) -> Callable[[Array, float, int], Array]:
@@ -216,7 +216,7 @@ def _wander(shape: tuple[int, ...], c: int, seed: int) -> Array:
 
 def _memory(name: str, rng: Rng, bench: Bench, k: int, s: float) -> Act:
     """A memory of the displacement of stage axis `k`, the motion straight from pose to pose and held for the dwell."""
-    family = memory.FAMILY[name]
+    family = memory.FAMILIES[name]
     shape = memory.draw_shape(name, rng, s / 2, 2 * bench.dwell)
     parts = FINE if family == "creep" else 1
 

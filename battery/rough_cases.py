@@ -35,6 +35,10 @@ def plan(kind: str, rng: Rng, count: int) -> list[tuple[str, ...]]:
         return [(next(cycle),) for _ in range(count)]
     if kind == "messy":
         return [(DEVICES[k % 5], *_dominant(rng, DEVICES[k % 5], 1 + k % 2)) for k in range(count)]
+    if kind == "forms":
+        rooms = [*itertools.product(("servo", "meso", "axis", "mems"), ("single",), memory.FORMS)]
+        cycle = itertools.cycle(rng.permutation(rooms).tolist())
+        return [tuple(map(str, next(cycle))) for _ in range(count)]
     forms = rng.permutation(list(memory.FAMILY)).tolist()
     rooms = rng.permutation(list(itertools.product(("series", "poses"), ("single", "messy"), (0, 1)))).tolist()
     pairs = [(*rooms[k % 8], forms[(k + k // 72) % 9]) for k in range(count)]  # 8 and 9 have no common factor: all meet
@@ -122,7 +126,7 @@ def _poses(device: str, names: tuple[str, ...], rough: bool, seconds: float, rng
     truths = [_truth(a.name, a.location, a.amplitude * a.unit, a.shape, size) | {"also": a.also} for a, size in found]
     rest = [_truth(a.name, a.location, a.amplitude * a.unit, a.shape, size) | {"also": a.also} for a, size in small]
     known = pose_cases.shares(bench, _laws(found), _laws(small), gauge)
-    creeps = any(memory.FAMILY.get(name) == "creep" for name in names)
+    creeps = any(memory.FAMILIES.get(name) == "creep" for name in names)
     dwell = creeps or bool(rng.uniform() < 0.3)
     answer = hexapod_cases.describe(bench.poses) | told(truths, rest, known, device, rough)
     return (lambda d: pose_cases.write(d, bench, [*_laws(found), *_laws(small)], dwell)), answer
@@ -139,7 +143,7 @@ def told(
     if not all(max(pair) >= LEAST_SHARE for pair in zip(*both, strict=True)) or min(map(sum, both)) < LEAST_TOGETHER:
         raise ValueError("a cause that is not dominant on the held-out record")
     for truth, share, varying in zip(truths, known["shares"], known["shares_varying"], strict=True):
-        truth |= {"share": share, "share_varying": varying, "family": memory.FAMILY.get(truth["name"])}
+        truth |= {"share": share, "share_varying": varying, "family": memory.FAMILIES.get(truth["name"])}
     return {
         "planted": sorted(truths, key=lambda t: -t["share"]),
         "background": rest,

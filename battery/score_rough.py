@@ -15,6 +15,7 @@ def rough_rows(judged: Sequence[Judgement]) -> list[Row]:
     messy = [j for j in judged if j.kind == "messy"]
     memory = [j for j in judged if j.kind == "memory"]
     null = [j for j in judged if j.kind == "null"]
+    forms = [j for j in judged if j.kind == "forms"]
     best = [j.rough.over_best for j in messy if j.rough.over_best is not None]
     parts = [
         (f"{room}, {how}", [j for j in memory if (j.series, j.alone) == (room == "series", how == "single")])
@@ -34,6 +35,8 @@ def rough_rows(judged: Sequence[Judgement]) -> list[Row]:
         share("memory, family first", [j.rough.first for j in memory], ">= 90 %", 0.90),
         share("memory, place", [j.rough.place for j in memory], ">= 95 %", 0.95),
         *(share(f"memory, family first, {what}", [j.rough.first for j in part], UNSET) for what, part in parts),
+        share("other forms of hysteresis, family first", [j.rough.first for j in forms], ">= 95 %", 0.95),
+        share("other forms of hysteresis, nothing beside it", [j.rough.nothing_beside for j in forms], ">= 90 %", 0.90),
         share("nulls, anything but 'consistent'", [j.verdict != "consistent" for j in null], "<= 2 %", most=0.02),
         share("nulls, false names", [j.wrong or j.verdict == "failed" for j in null], "0 %", most=0.0),
     ]

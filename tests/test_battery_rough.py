@@ -16,7 +16,7 @@ from battery.plant_hexapod import Hexapod
 from battery.seal import unseal
 from ctrlgen.devices.meso_hexapod import matrices
 
-RATE_INDEPENDENT = [name for name, family in memory.FAMILY.items() if family != "creep"]
+RATE_INDEPENDENT = [name for name, family in memory.FAMILIES.items() if family != "creep"]
 
 
 def shape_of(name):
@@ -37,7 +37,7 @@ def test_hysteresis_and_play_do_not_depend_on_how_fast_or_in_how_many_steps_the_
     assert often == pytest.approx(once, abs=2e-3 * np.ptp(once))  # Bouc and Wen's law by the midpoint rule
 
 
-@pytest.mark.parametrize("name", [n for n in RATE_INDEPENDENT if memory.FAMILY[n] == "hysteresis"])
+@pytest.mark.parametrize("name", [n for n in RATE_INDEPENDENT if memory.FAMILIES[n] == "hysteresis"])
 def test_hysteresis_lags_and_a_closed_loop_dissipates(name):
     x = np.sin(np.linspace(0, 4 * np.pi, 801))
     y = x + memory.added(name, 0.3, shape_of(name), np.arange(801.0), x)
@@ -45,7 +45,7 @@ def test_hysteresis_lags_and_a_closed_loop_dissipates(name):
     assert np.trapezoid(x[loop], y[loop]) > 0.01  # the reading comes after the place
 
 
-@pytest.mark.parametrize("name", ["play_stack", "preisach", "free_play"])
+@pytest.mark.parametrize("name", ["play_stack", "narrow_stack", "preisach", "free_play"])
 def test_a_small_loop_that_closes_leaves_no_trace(name):
     """Return-point memory."""
     shape = shape_of(name) | ({"start": 0.0} if name == "free_play" else {})
@@ -177,6 +177,25 @@ def test_every_form_of_memory_meets_every_device_alone_and_over_a_background():
     assert {row[2] for row in rows[:9]} == set(memory.FAMILY)
 
 
+def test_further_forms_of_hysteresis_meet_every_device_alone():
+    rows = rough_cases.plan("forms", np.random.default_rng(5), 8)
+    assert {(row[0], row[2]) for row in rows} == {
+        (device, form) for device in ("axis", "servo", "mems", "meso") for form in memory.FORMS
+    }
+    assert {row[1] for row in rows} == {"single"}
+    narrow = memory.draw_shape("narrow_stack", np.random.default_rng(3), 1.0, 1.0)
+    at, weights = np.array(narrow["radii"]), np.array(narrow["weights"])
+    assert at[0] == pytest.approx(0.01) and weights[at < 0.1].sum() > weights[at >= 0.1].sum()
+
+
+def test_a_stack_that_leans_is_a_stack_where_neither_edge_does():
+    x, shape = walk(), {"radii": [0.2, 0.5], "weights": [0.6, 0.4]}
+    straight = memory.leaning_stack(x, x, 0.3, **shape, scale=1.0, up=0.0, down=0.0)
+    assert straight == pytest.approx(memory.play_stack(x, x, 0.3, **shape))
+    up = memory.leaning_stack(x, np.array([0.0, 2.0, -2.0]), 1.0, [0.2], [1.0], 1e-6, 1.0, 0.0)
+    assert up == pytest.approx([0.0, -0.2, 0.4])  # it comes down along the edge that leans
+
+
 def test_chosen_classes_hold_the_same_cases_as_beside_others():
     all_of = {order.seed: (order.kind, order.wanted) for order in cases.plan(3, "small")}
     chosen = cases.plan(3, "small", ("messy", "null"))
@@ -198,7 +217,7 @@ def test_a_rough_case_tells_nothing_and_its_seed_reproduces_it(tmp_path):
             cases.make_case(order, tmp_path / folder)
         for path in sorted((tmp_path / "a").rglob("*.*")):
             assert path.read_bytes() == (tmp_path / "b" / path.relative_to(tmp_path / "a")).read_bytes()
-            words = {*memory.FAMILY, *pose_cases.FOREIGN, "messy", "memory", "planted"} - {"ripple"}
+            words = {*memory.FAMILIES, *pose_cases.FOREIGN, "messy", "memory", "planted"} - {"ripple"}
             assert path.name == "device.toml" or not any(word in path.read_text() for word in words)
     answer = unseal(next((tmp_path / "a" / "answers").iterdir()))
     assert answer["class"] == orders[1].kind

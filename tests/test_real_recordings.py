@@ -229,10 +229,10 @@ def test_the_slit_axis_repeats_an_error_four_times_a_millimetre(name):
 @pytest.mark.parametrize("name", ["recording"])
 def test_the_piezo_stack_has_hysteresis_and_comes_late(name):
     found = diagnosed("piezo_stack", f"{name}.toml")
-    assert found.findings[0].effect in {"displacement_hysteresis", "drive_hysteresis", "asymmetric_hysteresis"}
+    assert found.findings[0].effect in {"displacement_hysteresis", "asymmetric_displacement_hysteresis"}
     assert {"delay", "low_pass", "clock_offset"} & {f.effect for f in found.findings}
     assert not {"vibration", "drift", "sensor_step", "cyclic"} & {f.effect for f in found.findings}
-    assert left(found, "reading.axis") < 0.2
+    assert left(found, "reading.axis") < 0.1  # plays of free weights leave 0.22 um of 2.5
 
 
 @pytest.mark.long
