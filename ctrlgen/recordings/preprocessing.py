@@ -5,13 +5,18 @@ A position and what is derived from it pass the same filter, so that a linear la
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy  # its parts take a while to import, and come when they are used
 
+from ctrlgen.recordings import drive_across_gaps
 from ctrlgen.recordings.schema import RecordingFile
 
 ORDER = 4  # of the Butterworth filter, run forward and backward
 ENOUGH = 4.0  # rate of the kept rows over the cut-off: at twice that the filter has 1/250 of an amplitude
+WHOLE_SAMPLES = 0.1  # sample times: how far a gap may be off a whole number of them
+QUARTER = 0.25  # of the cut-off's period
 HIGHEST = 0.9  # of half the rate of the kept rows: room for the filter's edge
 
 
@@ -38,6 +43,66 @@ def derivative(values: np.ndarray, sample_time: float, order: int) -> np.ndarray
     for _ in range(order):
         values = np.gradient(values, sample_time)
     return values
+
+
+def rows_on_grid(time: np.ndarray) -> np.ndarray | None:
+    """The row of each of `time` (n,) [s] on an even grid, where rows are missing there and every gap is a whole number of samples; None
+    where nothing is missing or the rows have no such grid."""
+    steps = np.diff(time)
+    if not np.isfinite(steps).all() or not len(steps) or np.median(steps) <= 0:
+        return None
+    apart = steps / np.median(steps)
+    whole = np.round(apart)
+    if (
+        (whole < 1).any()
+        or (np.abs(apart - whole) > WHOLE_SAMPLES).any()
+        or whole.max() < 2
+        or whole.sum() > 2 * len(time)
+    ):
+        return None
+    return np.concatenate([[0], np.cumsum(whole.astype(int))])
+
+
+def spread(values: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """A column (n,) at the rows `places` (n,) of an even grid, NaN between."""
+    whole = np.full(int(places[-1]) + 1, np.nan)
+    whole[places] = values
+    return whole
+
+
+def grid_note(name: str, places: np.ndarray) -> str:
+    """That rows are missing at the rows between `places` (n,), and what the filter was given there."""
+    sizes = np.diff(places) - 1
+    return (
+        f"{name}: {int((sizes > 0).sum())} gaps, the longest of {int(sizes.max())} samples, are bridged before the low-pass, "
+        f"{int(sizes.sum())} samples in all: every column as smooth as around; their readings are not used."
+    )
+
+
+def inner_rows(moved: Sequence[np.ndarray], first: int, last: int) -> tuple[int, int]:
+    """The rows from `first` to one before `last` without those at either end at which one of the columns that were `moved` in
+    time has no number: where each (n,) is False."""
+    for known in moved:
+        rows = first + np.flatnonzero(known[first:last])
+        first, last = (int(rows[0]), int(rows[-1]) + 1) if len(rows) else (first, last)
+    return first, last
+
+
+def bridged(values: np.ndarray, longest: int) -> np.ndarray:
+    """A column (n,) with its gaps of at most `longest` rows bridged as smoothly as it is around, for a filter that would smear them."""
+    known = np.isfinite(values)
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], known, [True]]).astype(int))).reshape(-1, 2)
+    filled = values.copy()
+    for a, b in edges.tolist():
+        if a > 0 and b < len(values) and b - a <= longest:
+            filled[a:b] = drive_across_gaps.across(values, a, b, "smooth")
+    return filled
+
+
+def longest_gap(sample_time: float, cutoff: float) -> int:
+    """Rows `sample_time` [s] apart that may be missing before a low-pass at `cutoff` [Hz]: a quarter of its period, within which a
+    column does what the filter takes away."""
+    return int(QUARTER / (cutoff * sample_time))
 
 
 def enough_rows(sample_time: float, cutoff: float) -> int:

@@ -163,7 +163,7 @@ class _File:
             result = validation.validate_record(record, self.written.kind, self.model, names, where, table.gap)
             records += result.records
             places += [where] * len(result.records)
-            notes += result.notes
+            notes += [*reader.notes, *result.notes]
             faults += result.faults
             if result.records:
                 spans.append((k, table, result.records[0].time[0], result.records[-1].time[-1]))
@@ -193,7 +193,8 @@ class _RecordReader:
         self.folder, self.written, self.table, self.columns, self.where = folder, written, table, columns, where
         self.faults: list[Fault] = []
         self.files: dict[str, MeasurementTable | None] = {}
-        self.rows = table.rows
+        self.rows, self.notes = table.rows, list[str]()
+        self.name = table.file + (f"[{table.rows[0]}:{table.rows[1]}]" if table.rows else "")
 
     def read(self, names: validation.ChannelNames) -> Record | None:
         """The record before validation; None where drives or clock cannot be read. `valid`: the channel has a column."""
@@ -216,6 +217,14 @@ class _RecordReader:
         if kind == "series" and clock is None and (table.time is not None or table.sample_rate is None):
             return None
         time, period = self._clock(kind, clock, n)
+        if self.written.low_pass and clock is not None and (places := preprocessing.rows_on_grid(time)) is not None:
+            self.table, values = (
+                self.table.at_rows(places),
+                {k: preprocessing.spread(v, places) for k, v in values.items()},
+            )
+            ambient = preprocessing.spread(ambient, places) if isinstance(ambient, np.ndarray) else ambient
+            time = np.interp(np.arange(places[-1] + 1), places, time)
+            self.notes.append(preprocessing.grid_note(self.name, places))
         if kind == "series" and n > 1:
             values |= {name: self._resampled(name, column, time) for name, column in foreign.items()}
             values = self._preprocessed(values, time)
@@ -232,7 +241,7 @@ class _RecordReader:
         late = {name: c.later.si for name, c in self.columns.items() if c.later and name in values}
         values = values | {name: preprocessing.delayed(values[name], time, lag) for name, lag in late.items()}
         moved = [np.isfinite(values[name]) for name in values if name in late or self.columns[name].sample_rate]
-        self.rows = _inner_rows(moved, *(self.table.rows or (0, n)))
+        self.rows = preprocessing.inner_rows(moved, *(self.table.rows or (0, n)))
         rows = slice(*self.rows)
         inside = self._filtered({k: v[rows] for k, v in values.items()}, float(np.median(np.diff(time))))
         whole = {name: np.full(n, np.nan) for name in inside}
@@ -248,8 +257,11 @@ class _RecordReader:
 
     def _filtered(self, values: dict[str, np.ndarray], sample_time: float) -> dict[str, np.ndarray]:
         """The columns after the file's low-pass, with its derivatives; empty, with a fault, where that cannot be done."""
-        w = self.written
+        w, missing = self.written, dict[str, np.ndarray]()
         if w.low_pass is not None:
+            longest = preprocessing.longest_gap(sample_time, w.low_pass.si)
+            missing = {name: ~np.isfinite(column) for name, column in values.items() if not name.startswith("drive.")}
+            values = {name: preprocessing.bridged(column, longest) for name, column in values.items()}
             incomplete = [name for name, column in values.items() if not np.isfinite(column).all()]
             highest = preprocessing.highest_cutoff(sample_time, self._kept(sample_time))
             too_high = not 0 < w.low_pass.si <= highest
@@ -267,7 +279,11 @@ class _RecordReader:
             for name, d in w.derivatives.items()
             if d.of in values
         }
-        return values | derivatives
+        whole = values | derivatives
+        for name, lost in missing.items():
+            readings = (k for k in whole if k == name or (k in derivatives and w.derivatives[k].of == name))
+            whole |= {k: np.where(lost, np.nan, whole[k]) for k in readings if not k.startswith("drive.")}
+        return whole
 
     def _kept(self, sample_time: float) -> int:
         """The number n of which every n-th row is kept, where rows are `sample_time` [s] apart."""
@@ -303,7 +319,7 @@ class _RecordReader:
         after_lead_in = (np.arange(n) >= table.used_rows[0])[:, None]
         recorded = np.array([name in values for name in names.observed])
         return Record(
-            name=table.file + (f"[{table.rows[0]}:{table.rows[1]}]" if table.rows else ""),
+            name=self.name,
             role=table.role,
             time=time[kept],
             sample_time=period * every,
@@ -370,15 +386,6 @@ class _RecordReader:
             what = f"{file} says {table.units[name]}, recording.toml says {column.unit}; correct the one that is wrong"
             self.faults.append(Fault(where, what))
         return column.scale * values * (scale[0] - scale[1]) + scale[1]
-
-
-def _inner_rows(moved: Sequence[np.ndarray], first: int, last: int) -> tuple[int, int]:
-    """The rows from `first` to one before `last` without those at either end at which one of the columns that were `moved` in
-    time has no number: where each (n,) is False."""
-    for known in moved:
-        rows = first + np.flatnonzero(known[first:last])
-        first, last = (int(rows[0]), int(rows[-1]) + 1) if len(rows) else (first, last)
-    return first, last
 
 
 def _contradicts(stated: str | None, scale: tuple[float, float], unit: str) -> bool:

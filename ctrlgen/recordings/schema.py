@@ -6,6 +6,7 @@ import difflib
 from pathlib import Path
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field
 
 from ctrlgen.core.errors import Fault
@@ -102,6 +103,13 @@ class RecordTable(Section):
         """The half-open range of rows whose readings are used; ends at `LAST_ROW` where `rows` is not given."""
         a, b = self.rows or (0, LAST_ROW)
         return a + self.lead_in, b
+
+    def at_rows(self, places: np.ndarray) -> RecordTable:
+        """The same record of a table whose rows stand at `places` (n,) of another one."""
+        a, b = self.rows or (0, len(places))
+        first = min(a + self.lead_in, len(places) - 1)
+        rows = (int(places[a]), int(places[b - 1]) + 1)
+        return self.model_copy(update={"rows": rows, "lead_in": int(places[first]) - rows[0]})
 
     def shares_rows(self, other: RecordTable) -> bool:
         """Whether both have rows of one file in common: they were taken at the same time."""
