@@ -11,6 +11,7 @@ import pytest
 from axis_records import AXIS, H, axis_fitter, record
 from conftest import DEVICES, SCENARIOS
 
+import ctrlgen
 from ctrlgen import diagnose, load_device
 from ctrlgen.core.errors import InputError
 from ctrlgen.devices.machine import FAMILIES, ActuatorName, Machine, MachineParts, SensorName, TransmissionName
@@ -69,7 +70,16 @@ def test_no_machine_is_told_of_parts_of_another(actuator):
 
 
 def test_a_machine_of_unknown_parts_is_told_in_neutral_words():
-    for name in ("drive_offset", "butterfly", "drive_hysteresis", "drive_gain", "saturation", "stiffening", "creep"):
+    for name in (
+        "drive_offset",
+        "butterfly",
+        "drive_hysteresis",
+        "drive_gain",
+        "saturation",
+        "stiffening",
+        "creep",
+        "cogging",
+    ):
         said = title(Effect.library[name], MachineParts())
         assert not re.search("amplifier|flexure|" + "|".join(OWN_WORDS.values()), said), said
     assert "fringe" in title(Effect.library["cyclic"], parts(sensor="interferometer"))
@@ -170,3 +180,19 @@ def test_the_report_says_in_one_line_what_was_not_offered():
     assert {"butterfly", "backlash"} <= offered
     (note,) = [n for n in diagnose(device, recording, jobs=0).notes if n.startswith("not offered")]
     assert "butterfly: it needs a ferroelectric, and its actuator is a pump" in note and "backlash" in note
+
+
+def test_a_device_in_python_states_its_parts_too():
+    def device(**more):
+        laws = {"force": lambda u, p: [2 * u[0]], "restoring_force": lambda d, p: [p.k * d[0]]}
+        return ctrlgen.user_device("m", parameters={"k": "1 N/um"}, axes={"x": "50 um"}, **laws, **more)
+
+    def known(stated):
+        return stated.parts(nominal_physics(stated))
+
+    assert known(device(drive={"u": "2 A"})).family == "electromagnetic"
+    assert known(device(drive={"u": "2 V"})).family is None
+    stack = device(drive={"u": "2 V"}, machine={"actuator": "piezo stack", "sensor": "capacitive"})
+    assert known(stack).family == "piezo" and "lost_beams" in not_offered(["lost_beams"], known(stack))
+    told = stack.told_in({"reading.x": "mm"})  # which tells nothing of what it is
+    assert known(told) == known(stack) and nominal_physics(told).pose_units == ("mm",)

@@ -32,6 +32,11 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
             ("piezo", "Strain of a ferroelectric: it grows with the square of a polarisation that remembers"),
             ("", "A drive that acts by the square of a state that remembers"),
         ),
+        "cogging": (
+            ("screw", "A force that repeats along the way: cogging of the motor, or ripple of the screw"),
+            ("electromagnetic", "A force that repeats along the way: cogging of the motor"),
+            ("", "A force that repeats along the way"),
+        ),
         "creep": (
             ("flexible", "A flexure or its glue keeps moving after the load has settled"),
             ("piezo", "A piezo, or its mount, keeps moving after the voltage has settled"),
