@@ -10,9 +10,11 @@ from recovery import fitter_of
 
 import ctrlgen
 from ctrlgen.core.files import validate
+from ctrlgen.core.units import to_si
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.diagnose import diagnose_recording
+from ctrlgen.diagnosis.diagnose import diagnose_recording, noise_before_fits
 from ctrlgen.diagnosis.selection.objections import objections
+from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.effects import Place
 from ctrlgen.estimation.fit import Fit, Fitter
@@ -57,8 +59,7 @@ def linear_motor() -> Device:
     return validate(Device.library["tested_axis"], table, "device")
 
 
-@pytest.mark.long
-def test_the_cogging_of_a_motor_is_found_with_its_pitch():
+def cogging_motor() -> tuple[Device, Recording]:
     """14 slots within the way, two harmonics, which no start value of the law knows."""
     rng, device, t, parts = np.random.default_rng(2), linear_motor(), 2e-3 * np.arange(3000), []
 
@@ -69,11 +70,25 @@ def test_the_cogging_of_a_motor_is_found_with_its_pitch():
     for role, hertz, way in (("fit", 0.31, 0.15), ("hold_out", 0.47, 0.11)):
         moved, force = motor_record(t, 2 * np.pi * hertz, way, cogging, rng)
         parts.append(record(moved, force, role, h=2e-3))
-    recording = Recording("t", device.name, "series", ("reading.force",), ("N",), (0.05,), tuple(parts), ())
+    return device, Recording("t", device.name, "series", ("reading.force",), ("N",), (0.05,), tuple(parts), ())
+
+
+def test_a_force_is_looked_for_where_the_motion_repeats_beside_where_most_is_left():
+    device, recording = cogging_motor()
+    fitter, described = Fitter(recording, noise_before_fits(device, recording)).described(device)
+    hints = Screen(fitter, []).data_hints(described)(Place.FORCE, 0).suggested
+    assert min(abs(way / 0.024 - 1) for way in hints["spatial_periods"]) < 0.01
+    assert "edges_above" in hints
+
+
+@pytest.mark.long
+def test_the_cogging_of_a_motor_is_found_with_its_pitch():
+    device, recording = cogging_motor()
     found = diagnose_recording(device, recording, jobs=0)
     first = found.findings[0]
     assert found.verdict is Verdict.EXPLAINED and {f.effect for f in found.findings} == {"cogging"}
-    assert first.parameters["period"].value == pytest.approx(24e3, rel=1e-3)  # um
+    period = first.parameters["period"]
+    assert to_si(period.value, period.unit) == pytest.approx(0.024, rel=1e-3)
     assert first.parameters["force"].value == pytest.approx(1.5, rel=0.01)
 
 

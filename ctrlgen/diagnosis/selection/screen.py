@@ -102,12 +102,13 @@ class Screen:
             self.peaks = signal_peaks(signals)
             axes = sorted(i for place, i in signals[0] if place is Place.FORCE) if signals else []
             self.motions = {i: np.hstack([record[Place.FORCE, i][1:] for record in signals]) for i in axes}
-        most, along = self.peaks, self._along_path(fit) | self._regions(fit)
+        most, along, regions = self.peaks, self._along_path(fit), self._regions(fit)
         moments, part = self._moments()
         common = {"lines": self._spectral_peaks(fit), "moments": moments}
 
         def at(place: Place, i: int) -> DataHints:
-            return DataHints(most.get((place, i), {}) | {"s": part}, common | along.get((place, i), {}))
+            here = along.get((place, i), {}) | regions.get((place, i), {})
+            return DataHints(most.get((place, i), {}) | {"s": part}, common | here)
 
         return at
 
