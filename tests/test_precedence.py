@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,16 +11,25 @@ from axis_records import AXIS, BACKLASH, fitter_of, played
 from fitted_causes import DRIFT
 from misfits import left
 from strokes import MM, servo, strokes
-from test_lines_and_events import timed
 
 from ctrlgen.diagnosis.diagnose import diagnose_recording
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
+from ctrlgen.diagnosis.selection.objections import objections
 from ctrlgen.diagnosis.selection.precedence import acting_first, even_speed, why_alike
 from ctrlgen.diagnosis.selection.pruning import no_worse, pruned
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.structure import Structure
+
+
+def read_along(y: np.ndarray, step: float) -> SimpleNamespace:
+    """A recording of one record to fit, which reads `y` [m] every `step` [s]."""
+    time = step * np.arange(len(y))
+    record = SimpleNamespace(role="fit", time=time, sample_time=step, period=None, drive=np.zeros((len(y), 1)))
+    record.observed, record.valid = y[:, None], np.ones((len(y), 1), bool)
+    return SimpleNamespace(records=[record], channels=("reading.axis",), kind="series")
+
 
 LAWS = ["cyclic", "vibration", "sensor_gain", "drift"]
 PITCH, LINE = Hypothesis("cyclic", "sensor:axis", "axis"), Hypothesis("vibration", "disturbance:axis", "axis")
@@ -59,10 +69,7 @@ def test_where_speeds_differ_the_data_decide(tmp_path, error, effect):
 @pytest.mark.parametrize("speeds, even", [((1.0,), True), ((1.0, -1.0), True), ((1.0, 0.6), False), ((1.0, 0.0), True)])
 def test_a_motion_has_one_speed_whichever_way_it_goes_and_wherever_it_rests(speeds, even):
     y = np.cumsum(np.repeat(np.array(speeds) * 1e-6, 400))
-    recording = timed(0.01 * np.arange(len(y)))
-    recording.channels = ("reading.axis",)
-    (record,) = recording.records
-    record.observed, record.valid = y[:, None], np.ones((len(y), 1), bool)
+    recording = read_along(y, 0.01)
     found = even_speed(recording, "axis")
     assert found == (pytest.approx(1e-4, rel=1e-6) if even else None)
 
@@ -106,14 +113,8 @@ def test_a_law_that_acts_comes_before_a_drift_that_takes_away_twice_as_much(tria
 
 @pytest.mark.parametrize("rate, told", [(0.19, True), (0.21, False)])
 def test_a_drift_of_a_fifth_of_the_motion_is_none(rate, told):
-    from types import SimpleNamespace
 
-    from ctrlgen.diagnosis.selection.objections import objections
-
-    recording = timed(np.arange(11.0))
-    recording.channels = ("reading.axis",)
-    (record,) = recording.records
-    record.observed, record.valid = np.linspace(-5e-6, 5e-6, 11)[:, None], np.ones((11, 1), bool)
+    recording = read_along(np.linspace(-5e-6, 5e-6, 11), 1.0)
     structure = SimpleNamespace(causes=(DRIFT,), free_parameters=())
     fit = SimpleNamespace(structure=structure, theta=(), values=lambda k: {"rate": -rate * 1e-6})
     reason = "it would drift by 21 % of the motion within a record"
@@ -153,6 +154,6 @@ def test_an_answer_that_predicts_worse_than_the_device_as_described_is_that_devi
     nominal = trials.fit(Structure(AXIS), steps=0)
     found = trials.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 6e-8}), steps=0)
     monkeypatch.setattr(
-        "ctrlgen.diagnosis.selection.pruning._held_out_energy", lambda _, t: 1e4 * (energy if t.causes else 1.0)
+        "ctrlgen.diagnosis.selection.pruning.held_out_energy", lambda _, t: 1e4 * (energy if t.causes else 1.0)
     )
     assert no_worse(trials, nominal, found) is (found if stays else nominal)

@@ -104,12 +104,12 @@ def without_needless(trials: Trials, current: CandidateModel) -> CandidateModel:
     for k in reversed(range(len(current.causes))):
         for bare in trials.tried(current.fit.restarted.without(k), None):
             feigned = trials.selection.within_model_form_error(bare, current, k) and not _far_worse(bare, current)
-            if not _needed(trials, bare, current) or feigned:
+            if not is_needed(trials, bare, current) or feigned:
                 current = bare
     return current
 
 
-def _needed(trials: Trials, bare: CandidateModel, current: CandidateModel) -> bool:
+def is_needed(trials: Trials, bare: CandidateModel, current: CandidateModel) -> bool:
     """Whether `current` is worth its further cause. Where more than noise is left, what was chosen among many before need only
     keep its advantage, and matter beside the others that came later."""
     compare = trials.selection
@@ -131,16 +131,16 @@ def _far_worse(bare: CandidateModel, current: CandidateModel) -> bool:
 def no_worse(trials: Trials, nominal: CandidateModel, current: CandidateModel) -> CandidateModel:
     """The model without the causes with which its numbers, as fitted, predict the held-out records worse than the device as
     described does; that device where nothing else is left."""
-    allowed = MODEL_SELECTION.worse * _held_out_energy(trials, nominal)
+    allowed = MODEL_SELECTION.worse * held_out_energy(trials, nominal)
     # two squares a number: what its uncertainty adds
-    while current.causes and _held_out_energy(trials, current) > allowed + 2 * _numbers(current):
+    while current.causes and held_out_energy(trials, current) > allowed + 2 * _numbers(current):
         fits = [trials.tried(current.fit.restarted.without(k), None) for k in range(len(current.causes))]
         fewer = [trials.converged(t) for fitted in fits for t in fitted if t.causes]
-        current = min(fewer, key=lambda t: _held_out_energy(trials, t)) if fewer else nominal
+        current = min(fewer, key=lambda t: held_out_energy(trials, t)) if fewer else nominal
     return current
 
 
-def _held_out_energy(trials: Trials, candidate: CandidateModel) -> float:
+def held_out_energy(trials: Trials, candidate: CandidateModel) -> float:
     """Sum of the squares, over the noise's, that a model with its numbers as fitted leaves on the held-out records."""
     return float(
         np.nan_to_num(as_fitted(trials.fitter, candidate.fit, trials.fitter.held_out_records).plain.sum(), nan=np.inf)
