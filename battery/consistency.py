@@ -59,7 +59,8 @@ def _shares(d: dict[str, Any]) -> Iterator[str]:
     whole = sum(s["value"] for s in shares)
     if shares and abs(whole - explained) > SUM:
         yield f"the shares make up {whole}, not {explained}"
-    causes = [f["share"]["value"] for f in d["findings"] if f["role"] == "cause" and f["share"] is not None]
+    standing = [f for f in d["findings"] if f["role"] == "cause" and f["share"] is not None]
+    causes = [f["share"]["value"] for f in standing if not (f["support"] and f["support"]["contradicted"])]
     if causes != sorted(causes, reverse=True):
         yield f"the largest share is not first: {causes}"
 

@@ -91,6 +91,7 @@ def test_the_json_is_the_contract(found):
             "worth",
             "alternatives",
             "source",
+            "support",
         )
     }
     assert (finding["effect"], finding["location"]) == ("creep", "stage:axis")

@@ -7,7 +7,7 @@
 4. Hypotheses are listed: every effect at every location, every parameter of the device (`estimation.hypothesis`).
 5. The search screens them, fits candidate models and selects among them on held-out data (`selection.screen`, `search`).
 6. Every accepted cause gets its share of the mismatch (`selection.attribution`), and beside it stands of what the residual is a
-   function before and after, whatever the law (`shares`).
+   function before and after, whatever the law (`shares`), which may speak against it (`selection.standing`).
 7. Residual tests and the held-out data give the verdict (`estimation.residual_tests`, `selection.verdict`).
 8. Supporting analyses: where the residual is, what was detectable, what to record next (`evidence`).
 """
@@ -31,9 +31,11 @@ from ctrlgen.diagnosis.selection.findings import findings, held_out_errors
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.search_result import SearchResult
+from ctrlgen.diagnosis.selection.standing import answer_of, in_standing
 from ctrlgen.diagnosis.selection.trials import FAILURES
 from ctrlgen.diagnosis.selection.verdict import Verdict, in_another_unit, verdict
 from ctrlgen.diagnosis.shares.empirical_terms import EmpiricalTerm, empirical_terms
+from ctrlgen.diagnosis.shares.families import ranking
 from ctrlgen.diagnosis.shares.gather import ResidualShares, residual_shares
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.checkpoint import Checkpoint
@@ -118,6 +120,11 @@ def _diagnose(
     likelihoods = profiles(search.fitter, search.chosen.fit)
     analyses = run_supporting_analyses(search, tests.passed, seed)
     shares = residual_shares(search.fitter, search.nominal.fit, search.chosen.fit, seed)
+    found = (*findings(search, attribution, likelihoods), *detected)
+    if shares is not None:
+        noise = dict(zip(search.fitter.recording.channels, search.fitter.noise.floor.tolist(), strict=True))
+        found = in_standing(found, ranking(shares.before, noise))
+        answer = answer_of(answer, found, search.chosen.errors.is_noise)
     enough = unit_is_wrong or answer in (Verdict.CONSISTENT, Verdict.EXPLAINED)
     left, failed = ((), ()) if enough else _empirical_terms(search, shares)
     spikes = find_spikes(search.fitter, search.chosen.fit, known)
@@ -131,7 +138,7 @@ def _diagnose(
     )
     return Diagnosis(
         verdict=answer,
-        findings=(*findings(search, attribution, likelihoods), *detected),
+        findings=found,
         attribution=attribution,
         shares=shares,
         empirical_terms=left,

@@ -116,10 +116,17 @@ def _first_numbers(finding: Finding) -> dict[str, Estimate]:
 
 def _rivals(diagnosis: Diagnosis) -> str:
     """'; this recording cannot tell it from thermal_lag at actuator:axis', for an ambiguous verdict."""
-    others = dict.fromkeys(hypothesis_name(h) for f in diagnosis.findings for h in f.alternatives)
-    if diagnosis.verdict != Verdict.AMBIGUOUS or not others:
+    if diagnosis.verdict != Verdict.AMBIGUOUS:
         return ""
-    return f"; this recording cannot tell it from {' or '.join(others)}"
+    others = dict.fromkeys(hypothesis_name(h) for f in diagnosis.findings for h in f.alternatives)
+    rivals = f"; this recording cannot tell it from {' or '.join(others)}" if others else ""
+    support = diagnosis.findings[0].support
+    if support is None or not support.contradicted:
+        return rivals
+    told = (
+        f"{support.leading} ({per_cent(support.leading_share)}), not for {support.family} ({per_cent(support.share)})"
+    )
+    return f"{rivals}; the model-free shares speak for {told}"
 
 
 def _left(diagnosis: Diagnosis) -> list[str]:

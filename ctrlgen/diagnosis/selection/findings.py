@@ -53,6 +53,16 @@ class WorthEntry(Keys):
     )
 
 
+class SupportEntry(Keys):
+    """What the model-free shares of the residual before say of a cause."""
+
+    family: str = Field(description="Family of the law.")
+    share: FiniteOrNull = Field(description="Share of the residual that this family could account for.")
+    leading: str = Field(description="The family with the largest share.")
+    leading_share: FiniteOrNull = Field(description="Its share.")
+    contradicted: bool = Field(description="Whether the shares speak against the cause.")
+
+
 @dataclass(frozen=True)
 class Finding:
     """One cause that the device file leaves out.
@@ -62,7 +72,7 @@ class Finding:
     publication of the effect's law. cause: the hypothesis. terms: numbers of further terms of the same law at the same place, such
     as harmonics. role: a `cause`; `minor`: above the noise and below a hundredth of the mismatch; `part`: it takes away nothing
     itself, and the finding `serves` needs it; `unseen`: only the records to fit can show it. title: what the law is called on this
-    machine, empty where its own title serves.
+    machine, empty where its own title serves. support: what the model-free shares say of it.
     """
 
     effect: str
@@ -77,6 +87,12 @@ class Finding:
     role: Role = Role.CAUSE
     serves: Hypothesis | None = None
     title: str = ""
+    support: SupportEntry | None = None
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether the model-free shares speak against it."""
+        return self.support is not None and self.support.contradicted
 
     @property
     def of(self) -> str | None:

@@ -26,6 +26,7 @@ from ctrlgen.diagnosis.settings.selection import (
     SCREEN,
     SEARCH,
     SPATIAL_PERIODS,
+    STANDING,
     SUBSETS,
     VERDICT,
 )
@@ -50,6 +51,7 @@ __all__ = [
     "SHARES",
     "SPATIAL_PERIODS",
     "SPECTRAL_LINES",
+    "STANDING",
     "SUBSETS",
     "UNKNOWN_INPUT",
     "VERDICT",

@@ -324,6 +324,18 @@ class VerdictSettings:
     16,000."""
 
 
+@dataclass(frozen=True)
+class StandingSettings:
+    """What the model-free shares must say against a cause, so that it does not stand first."""
+
+    near_zero: float = 0.05
+    """Share of a family below which it has none: the half width of a usual interval."""
+    far_below: float = 0.2
+    """Share of a family over the largest one, below which it is far behind. Judgement."""
+    clear: float = 0.3
+    """Share of the largest family, below which the shares tell no family. Judgement."""
+
+
 SCREEN = ScreenSettings()
 SPATIAL_PERIODS = SpatialPeriodSettings()
 REGIONS = RegionSettings()
@@ -335,4 +347,5 @@ PRECEDENCE = PrecedenceSettings()
 OBJECTIONS = ObjectionsSettings()
 DIRECT_DETECTION = DirectDetectionSettings()
 ATTRIBUTION = AttributionSettings()
+STANDING = StandingSettings()
 VERDICT = VerdictSettings()

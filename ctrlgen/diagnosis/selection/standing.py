@@ -1,0 +1,44 @@
+"""Evidence before names: how far the model-free shares bear a cause out.
+
+A share says of what the residual of the device as described is a function, whatever the law. Where more than noise is left, a law
+whose family the shares put near zero, or far below another family, may be what fits best and still not be what acts: it does not
+stand first, and alone it makes the answer ambiguous. Where a model leaves noise alone, it has the better evidence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ctrlgen.diagnosis.selection.findings import Finding, Role, SupportEntry
+from ctrlgen.diagnosis.selection.verdict import Verdict
+from ctrlgen.diagnosis.settings import STANDING
+from ctrlgen.diagnosis.shares.families import FAMILY_OF, Family
+
+
+def in_standing(findings: Sequence[Finding], shares: Sequence[tuple[Family, float]]) -> tuple[Finding, ...]:
+    """The findings with what the `shares` by family (the largest first) say of each; those that they contradict after the others."""
+    told = [replace(f, support=_support(f, shares)) for f in findings]
+    return tuple(sorted(told, key=lambda f: (f.role is not Role.CAUSE, f.contradicted)))
+
+
+def answer_of(verdict: Verdict, findings: Sequence[Finding], exact: bool) -> Verdict:
+    """The verdict: ambiguous where the first cause is contradicted by the shares, unless the model leaves noise alone (`exact`)."""
+    doubted = bool(findings) and findings[0].contradicted and not exact
+    return Verdict.AMBIGUOUS if doubted and verdict in (Verdict.PARTLY, Verdict.EXPLAINED) else verdict
+
+
+def _support(finding: Finding, shares: Sequence[tuple[Family, float]]) -> SupportEntry | None:
+    family = FAMILY_OF.get(finding.effect)
+    if family is None or not shares or finding.role is not Role.CAUSE:
+        return None
+    leading, most = shares[0]
+    own = dict(shares).get(family, 0.0)
+    weak = own < STANDING.near_zero or own < STANDING.far_below * most
+    return SupportEntry(
+        family=family.value,
+        share=own,
+        leading=leading.value,
+        leading_share=most,
+        contradicted=most >= STANDING.clear and weak,
+    )

@@ -1,0 +1,55 @@
+"""What the model-free shares do to causes: none that they contradict stands first, and alone it makes the answer ambiguous."""
+
+from __future__ import annotations
+
+import pytest
+
+from ctrlgen.diagnosis.selection.attribution import ShareEntry
+from ctrlgen.diagnosis.selection.findings import Finding, Role
+from ctrlgen.diagnosis.selection.standing import answer_of, in_standing
+from ctrlgen.diagnosis.selection.verdict import Verdict
+from ctrlgen.diagnosis.shares.families import Family
+from ctrlgen.estimation.hypothesis import Hypothesis
+
+
+def finding(effect: str, share: float = 0.5, role: Role = Role.CAUSE) -> Finding:
+    cause = Hypothesis(effect, "stage:axis", "axis")
+    return Finding(
+        effect, cause.location, {}, (), ShareEntry(value=share, ci95=(share, share)), {}, "", cause, role=role
+    )
+
+
+def shares(friction: float, creep: float) -> list[tuple[Family, float]]:
+    return sorted([(Family.FRICTION, friction), (Family.CREEP, creep)], key=lambda pair: -pair[1])
+
+
+@pytest.mark.parametrize(
+    ("friction", "creep", "stands"),
+    [
+        (0.7, 0.6, True),
+        (0.7, 0.149, True),
+        (0.7, 0.139, False),
+        (0.29, 0.0, True),
+        (0.31, 0.04, False),
+        (0.04, 0.7, True),
+    ],
+)
+def test_a_cause_whose_family_is_far_behind_a_clear_one_does_not_stand_first(friction, creep, stands):
+    """A fifth of the largest share, or a twentieth of the residual; three tenths make a family clear."""
+    first, second = in_standing([finding("creep"), finding("coulomb", 0.3)], shares(friction, creep))
+    assert (first.effect == "creep") == stands
+    assert {f.effect: f.contradicted for f in (first, second)}["creep"] == (not stands)
+
+
+def test_what_is_no_cause_stays_behind_the_causes_and_is_not_judged():
+    found = in_standing([finding("creep"), finding("drift", role=Role.MINOR)], shares(0.9, 0.0))
+    assert [f.effect for f in found] == ["creep", "drift"] and found[1].support is None
+
+
+@pytest.mark.parametrize("verdict", Verdict)
+def test_alone_it_makes_the_answer_ambiguous_unless_noise_alone_is_left(verdict):
+    found = in_standing([finding("creep")], shares(0.9, 0.0))
+    doubted = verdict in (Verdict.PARTLY, Verdict.EXPLAINED)
+    assert answer_of(verdict, found, exact=False) == (Verdict.AMBIGUOUS if doubted else verdict)
+    assert answer_of(verdict, found, exact=True) == verdict
+    assert answer_of(verdict, in_standing([finding("coulomb")], shares(0.9, 0.0)), exact=False) == verdict
