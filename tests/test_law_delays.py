@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from types import SimpleNamespace
 
 import casadi as ca
@@ -12,8 +13,10 @@ from law_inputs import law_inputs
 from written_laws import H
 
 import ctrlgen.effects  # noqa: F401  fills the library
-from ctrlgen import load_device
+from ctrlgen import build_model, load_device, simulate
+from ctrlgen.core.files import validate
 from ctrlgen.core.units import Quantity
+from ctrlgen.devices import Device
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.simulator import Simulator
@@ -81,3 +84,17 @@ def test_a_delay_keeps_as_many_samples_as_it_takes(samples, states):
     assert len(late.kept(H, free=False)) == states
     assert len(late.kept(H, free=True)) >= 2 * states  # a fit may double it
     assert len(late.kept(None, free=True)) == len(late.kept(float("inf"), free=True)) == 15
+
+
+def test_a_plant_whose_reading_is_late_by_forty_samples_is_what_it_was_forty_samples_ago():
+    """Sample by sample, as the C has it."""
+    table = tomllib.loads(AXIS_FILE.read_text())
+    late = table | {"effect": [{"kind": "delay", "at": "axis", "delay": "400 ms"}]}
+    time = H * np.arange(150)
+    drive = np.sin(2 * np.pi * 3 * time)[:, None]
+    plain, delayed = (
+        build_model(validate(Device.library["axis"], each, "axis.toml"), sample_time=H) for each in (table, late)
+    )
+    assert delayed.x.numel() == plain.x.numel() + 3 * 41
+    at, seen = (simulate(model, drive, H).signals["reading"][:, 0] for model in (plain, delayed))
+    assert seen[40:] == pytest.approx(at[: len(at) - 40], rel=1e-9, abs=1e-12)

@@ -55,7 +55,7 @@ _IN_BALANCE = (
     "suspected, whose memory stays out of the balance."
 )
 _ASYMMETRIC_LAG = LawPrior(
-    "Rarer than a symmetric loop: judgement. Heaters have none. Begun symmetric, and with one branch or the other wider. "
+    "Rarer than a symmetric loop: judgement. Heaters have none. Begun with one branch wider, or the other. "
     + _HYSTERESIS,
     log_prior_odds=ONE_IN_TEN,
     model_form_error=0.02,
@@ -64,8 +64,8 @@ _ASYMMETRIC_LAG = LawPrior(
         "reach": _reach(0.1, 0.4, peaks=True),
         "taper": _starts((0.5,)),
         "reversible": _reversible(0.0),
-        "upper": _starts((0.0, 0.4)),
-        "lower": _starts((0.0, 0.4)),
+        "upper": _starts((-0.3, 0.3)),
+        "lower": _starts((0.0,)),
         "side": _starts((0.0,)),
     },
 )
