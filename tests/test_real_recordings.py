@@ -212,7 +212,7 @@ def test_the_rotary_axis_comes_late_and_its_resolver_has_harmonics(run, limit, p
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["recording"])
+@pytest.mark.parametrize("name", ["recording", *more("recording_split2")])
 def test_the_slit_axis_repeats_an_error_four_times_a_millimetre(name):
     """At its one speed a pitch and a line in time are one signal: the answer names both."""
     found = diagnosed("slit_axis", f"{name}.toml")
