@@ -29,6 +29,8 @@ class ParameterPrior:
         the lines of the residual's spectrum as well.
     only_from_data: the law is not suspected where the recording suggests no start.
     plausible_range: of an amplitude: a fit that ends outside is another cause under this law's name, and is rejected.
+    usual: of a shape: the value of the plain form of the law, which is taken where the fit does not exclude it: what the records to fit
+        leave open, records that go farther show.
     fixed_range: of an amplitude: the law is present or absent. Its amplitude is set to the middle of the range, not fitted.
     at_bound: of a shape: what the law is where this ends at a bound. A fit that ends there is rejected, as one is of which the records
         do not tell the shape.
@@ -41,6 +43,7 @@ class ParameterPrior:
     plausible_range: tuple[float, float] | None = None
     fixed_range: tuple[float, float] | None = None
     at_bound: str = ""
+    usual: float | None = None
 
 
 @dataclass(frozen=True)

@@ -265,9 +265,12 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             parameters={"skew": _starts((-0.3, 0.3)), "reach": _peaks(3e-4, 3e-3, 0.03)},
         ),
         "end_stop": LawPrior(
-            "A contact is neither a spring nor Hertz's ball; 5 %: judgement. A stop beyond the peak is never touched.",
+            "A contact is neither a spring nor Hertz's ball; 5 %: judgement. A spring is plainest. A stop beyond the peak is untouched.",
             model_form_error=0.05,
-            parameters={"gap": _peaks(-0.97, -0.9, -0.7, -0.4, 0.4, 0.7, 0.9, 0.97), "power": _starts((1.0, 1.5))},
+            parameters={
+                "gap": _peaks(-0.97, -0.9, -0.7, -0.4, 0.4, 0.7, 0.9, 0.97),
+                "power": ParameterPrior((1.0, 1.5), usual=1.0),
+            },
         ),
         "force_step": LawPrior(
             _EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, of_time=True, domain="disturbance", parameters=_EVENT

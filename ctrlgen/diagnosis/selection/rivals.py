@@ -5,15 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, linearised_optimum
 from ctrlgen.diagnosis.selection.candidates import significant, trying
 from ctrlgen.diagnosis.selection.confusable import explains_alike, explains_better
+from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.precedence import counterparts, explains_alike_but_for_odds
 from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
-from ctrlgen.diagnosis.settings import SEARCH
+from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
 from ctrlgen.estimation.fit import Fit
-from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.estimation.settings import FIT
 from ctrlgen.estimation.structure import Structure
 
 
@@ -33,6 +37,7 @@ def simplified(trials: Trials, current: CandidateModel) -> CandidateModel:
     """The model with the special case of each law in its place that the fit does not exclude, where it explains alike: how
     the friction falls with speed, say, is then within what noise or discrepancy feigns."""
     for k in range(len(current.causes)):
+        current = _in_usual_shape(trials, current, k)
         special = current.fit.nested_case(k)
         candidates = replacements(trials, current, k) if special else []
         for t in (t for t in candidates if t.cause and t.cause.effect == special):
@@ -52,6 +57,53 @@ def acting_instead(trials: Trials, current: CandidateModel) -> CandidateModel:
             if alike and not trials.objections(t, current.causes):
                 return acting_instead(trials, trials.converged(t))
     return current
+
+
+def _in_usual_shape(trials: Trials, current: CandidateModel, k: int) -> CandidateModel:
+    """The model with the shapes of cause k at their usual values, or as near as a fit from there stays, where it fits alike and
+    foretells the held-out records no worse. A stop that is only touched may be a spring or a ball, and they part once it is run into."""
+    cause, fit = current.causes[k], current.fit
+    if cause.effect == PARAMETER:
+        return current
+    channel, free = cause.channel_on(fit.structure.device), fit.structure.free_parameters
+    for p in cause.law.params:
+        wanted = cause.prior.of(p).usual
+        i = next((i for i, u in enumerate(free) if (u.cause, u.name) == (k, p.name)), None)
+        if wanted is None or i is None:
+            continue
+        usual = channel.si(wanted, p)
+        off = abs(float(fit.theta[i]) - usual)
+        if off == 0:
+            continue
+        try:
+            begun, theta = _begun_usual(trials, fit, k, i, usual)
+            again = scored(trials.fitter, trials.fitter.fit(begun, theta, steps=FIT.max_steps), current.cause)
+        except FAILURES as error:
+            trials.note_failure(cause, error)
+            continue
+        fitter = trials.fitter
+        alike = again.fit.objective <= fit.objective + MODEL_SELECTION.tie
+        # as fitted: where the shape is open, held-out records bend it to themselves
+        foretells = fitter.held_out_squares(again.fit) <= fitter.held_out_squares(fit)
+        if abs(float(again.fit.theta[i]) - usual) < off and alike and foretells:
+            trials.fitted[frozenset(again.causes)] = (again, FIT.max_steps)
+            current, fit = again, again.fit
+    return current
+
+
+def _begun_usual(trials: Trials, fit: Fit, k: int, i: int, usual: float) -> tuple[Structure, np.ndarray]:
+    """The structure with its number i, a shape of cause k, at its `usual` value, and the other numbers (k,) fitted to that: the best
+    of several starts."""
+    free, values, fits = fit.structure.free_parameters, fit.values(k), []
+    size = fit.structure.causes[k].law.amplitude().name
+    for times in SEARCH.usual_amplitudes:
+        start = values | {free[i].name: usual, size: times * values[size]}
+        begun = fit.restarted.restarted(k, start)
+        # what is not free is as the simulator was expanded
+        begun = replace(begun, expansion=begun.starts)
+        fits.append((trials.fitter.fit(replace(begun, free=(*free[:i], *free[i + 1 :])), steps=FIT.max_steps), begun))
+    best, begun = min(fits, key=lambda f: f[0].objective)
+    return begun, np.insert(best.theta, i, usual)
 
 
 def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Round] = ()) -> tuple[CandidateModel, ...]:

@@ -109,6 +109,9 @@ class SearchSettings:
     """Updates of the noise from the residual at most."""
     most_markings: int = 4
     """Times that spikes are marked again against what was accepted: each teaches the next less. Judgement."""
+    usual_amplitudes: tuple[float, ...] = (1.0, 1.5, 2.0, 3.0)
+    """Amplitudes, over that of the fit, at which a law in its usual shape is begun: amplitude and shape stand for one another, and
+    samples that just touch a threshold make several optima. Judgement."""
     same_noise: float = 0.05
     """Relative change of the noise below which it counts as unchanged."""
     same_noise_size: float = 0.02

@@ -1,0 +1,76 @@
+"""A stop that the record to fit only touches is told as what it is, since the held-out record runs into it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from axis_records import AXIS, KF, C, K, M, drive, record
+
+from ctrlgen.diagnosis.selection.model_selection import scored
+from ctrlgen.diagnosis.selection.rivals import simplified
+from ctrlgen.diagnosis.selection.trials import Trials
+from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.noise import estimate_noise
+from ctrlgen.estimation.structure import Structure
+from ctrlgen.recordings.recording import Recording
+
+H, N, NOISE, STIFFNESS = 5e-4, 3000, 1e-9, 4e6
+STOP = Hypothesis("end_stop", "stage:axis", "axis")
+
+
+def stopped(u: np.ndarray, gap: float, fine: int = 40) -> np.ndarray:
+    """Position [m] of the axis under `u` [V], held, with a spring twenty times as stiff beyond `gap`: Runge and Kutta's steps."""
+    h, q, v, out = H / fine, 0.0, 0.0, []
+
+    def pull(q: float, v: float, force: float) -> float:
+        return (force - C * v - K * q - STIFFNESS * max(q - gap, 0.0)) / M
+
+    for volts in u.tolist():
+        out.append(q)
+        force = KF * volts
+        for _ in range(fine):
+            a = pull(q, v, force)
+            b = pull(q + h / 2 * v, v + h / 2 * a, force)
+            c = pull(q + h / 2 * (v + h / 2 * a), v + h / 2 * b, force)
+            d = pull(q + h * (v + h / 2 * b), v + h * c, force)
+            q, v = q + h * v + h * h / 6 * (a + b + c), v + h / 6 * (a + 2 * b + 2 * c + d)
+    return np.array(out)
+
+
+@pytest.fixture(scope="module")
+def touched() -> tuple[Fitter, float]:
+    rng, t = np.random.default_rng(0), H * np.arange(N)
+    fit, held = 0.55 * drive(N), 0.68 * (1.6 * np.sin(2 * np.pi * 1.7 * t) + 0.4 * np.sin(2 * np.pi * 7.3 * t))
+    gap = float(stopped(fit, np.inf).max()) - 4e-7
+    parts = []
+    for k, (u, role) in enumerate(((fit, "fit"), (held, "hold_out"))):
+        y = stopped(u, gap) + NOISE * rng.standard_normal(N)
+        parts.append(record(u, y, role, first=k * N * H, h=H))
+    recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("nm",), (NOISE,), tuple(parts), ())
+    return Fitter(recording, estimate_noise(recording, 0.5)), gap
+
+
+def test_the_law_is_that_of_the_stop_at_the_depth_at_which_it_is_touched(touched):
+    """A corner of 0.1 um, a thousandth of the travel, would leave a multiple of the noise."""
+    fitter, gap = touched
+    true = Structure(AXIS).with_cause(STOP, {"stiffness": STIFFNESS, "gap": gap, "power": 1.0})
+    fit = fitter.fit(true, steps=0)
+    for r in fitter.recording.records:
+        assert np.std(r.observed - fitter.predict(fit, r)) < 1.1 * NOISE
+
+
+@pytest.mark.long
+def test_a_shape_that_the_fit_leaves_open_is_the_usual_one(touched):
+    fitter, gap = touched
+    start = {"stiffness": 1.9e6, "gap": gap - 3e-8, "power": 1.64}
+    open_ = scored(fitter, fitter.fit(Structure(AXIS).with_cause(STOP, start)), STOP)
+    plain = simplified(Trials(fitter, None, lambda _: None), open_)
+
+    def missed(t):
+        return [np.std(r.observed - fitter.predict(t.fit, r)) for r in fitter.recording.records]
+
+    stiffness, _, power = plain.fit.theta[-3:]
+    assert power == pytest.approx(1.0, abs=0.1) and stiffness == pytest.approx(STIFFNESS, rel=0.1)
+    (fitted, held), (fitted_before, held_before) = missed(plain), missed(open_)
+    assert fitted == pytest.approx(fitted_before, rel=0.02) and held < 0.5 * held_before
