@@ -212,7 +212,7 @@ def test_the_rotary_axis_comes_late_and_its_resolver_has_harmonics(run, limit, p
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["recording", *more("recording_split2")])
+@pytest.mark.parametrize("name", ["recording", *more("recording_split2", "recording_half_rate")])
 def test_the_slit_axis_repeats_an_error_four_times_a_millimetre(name):
     """At its one speed a pitch and a line in time are one signal: the answer names both."""
     found = diagnosed("slit_axis", f"{name}.toml")
@@ -221,7 +221,7 @@ def test_the_slit_axis_repeats_an_error_four_times_a_millimetre(name):
     assert first.effect == "cyclic" and first.share.value > 0.9
     assert period.value == pytest.approx(0.25, rel=0.002) and period.unit == "mm"
     assert abs(amplitude.value) == pytest.approx(0.02057, rel=0.02) and amplitude.unit == "mm"  # by least squares
-    assert left(found, "reading.axis") < 0.12
+    assert left(found, "reading.axis") < 0.067  # 0.97 um, which two harmonics by least squares leave
     assert found.verdict == "ambiguous" and "vibration" in {a.effect for a in first.alternatives}
 
 
