@@ -31,7 +31,7 @@ class AsymmetricLag(Effect, listed=False):
 def _shape(unit: str) -> tuple[Param, ...]:
     return (
         Param("reach", unit, (1e-4, 10.0), "r: way after which all plays follow, at home"),
-        Param("taper", "1", (-1.0, 2.0), "q: weight of the narrow plays over the wide ones"),
+        Param("taper", "1", (-3.0, 3.0), "q: weight of the narrow plays over the wide ones"),
         Param("reversible", "1", (-0.5, 1.5), "k: reversible part over the share that lags"),
         Param("upper", "1", (-0.6, 0.6), "u: widening of the branch that comes down, per way from home"),
         Param("lower", "1", (-0.6, 0.6), "l: widening of the branch that goes up, per way from home"),

@@ -20,7 +20,7 @@ class DisplacementHysteresis(Effect):
     params = (
         Param("share", "1", (-0.999, 0.999), "share of the displacement that lags", off=0.0),
         Param("reach", "travel", (1e-4, 10.0), "r: travel after which all plays follow"),
-        Param("taper", "1", (-1.0, 2.0), "q: weight of the narrow plays over the wide ones"),
+        Param("taper", "1", (-3.0, 3.0), "q: weight of the narrow plays over the wide ones"),
         Param("reversible", "1", (-0.5, 1.5), "k: reversible displacement over the share that lags"),
     )
     states = play_states("travel")

@@ -18,7 +18,7 @@ class DriveHysteresis(Effect):
     params = (
         Param("share", "1", (0.0, 0.999), "share of the drive that lags", off=0.0),
         Param("reach", "channel", (1e-3, 2.0), "r: change of drive after which all plays follow"),
-        Param("taper", "1", (-1.0, 2.0), "q: weight of the narrow plays over the wide ones"),
+        Param("taper", "1", (-3.0, 3.0), "q: weight of the narrow plays over the wide ones"),
     )
     states = play_states("channel")
 

@@ -18,7 +18,7 @@ class Hysteresis(Effect):
     params = (
         Param("stiffness", "channel/travel", (0.0, 1e2), "stiffness right after a reversal", off=0.0),
         Param("reach", "travel", (1e-3, 5.0), "r: travel after which all springs slip"),
-        Param("taper", "1", (-1.0, 2.0), "q: weight of the small radii over the large ones"),
+        Param("taper", "1", (-3.0, 3.0), "q: weight of the small radii over the large ones"),
     )
     states = (
         *play_states("travel"),
