@@ -16,7 +16,7 @@ ROUGH = ("messy", "memory", "forms")
 class Judgement:
     """One case. `named`: (truth, name given or 'none'); `covered`: (name, parameter, inside); `places`: (channel, place) right;
     `bands`: whether a line's frequency lies in the band with the largest excess; `rough`: of messy cases and memory, the latter as
-    `series` or poses, `alone` or over a background."""
+    `series` or poses, `alone` or over a background; `contradictions` within the file."""
 
     case: str
     kind: str
@@ -35,6 +35,7 @@ class Judgement:
     seconds: float | None = None
     autocorrelated: bool = False
     rough: Rough | None = None
+    contradictions: list[str] = field(default_factory=list)
     series: bool = True
     alone: bool = True
 

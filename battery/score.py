@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from battery.consistency import contradictions
 from battery.judge import Judgement, judge
 from battery.rows import Row, number, share
 from battery.score_rough import rough_rows
@@ -64,7 +65,9 @@ def load(folder: Path, name: str, state: dict[str, Any]) -> Judgement:
             diagnosis = json.loads(path.read_text())
         except json.JSONDecodeError:
             diagnosis = None
-    return judge(answer, diagnosis, state["seconds"])
+    judged = judge(answer, diagnosis, state["seconds"])
+    judged.contradictions = contradictions(diagnosis) if diagnosis else []
+    return judged
 
 
 def table(judged: Sequence[Judgement]) -> list[Row]:
@@ -111,6 +114,7 @@ def table(judged: Sequence[Judgement]) -> list[Row]:
         ),
         share("confusable, wrong name", [j.wrong for j in of("confusable")], "none set"),
         *rough_rows(judged),
+        share("contradicts itself", [bool(j.contradictions) for j in judged], "0 %", most=0.0),
         share("crashed, refused or out of time", [j.verdict == "failed" for j in judged], "0 %", most=0.0),
     ]
 
