@@ -154,7 +154,7 @@ def test_what_is_not_taken_stands_by_its_gain_with_one_reason_each(few):
     )
     assert [r.reasons[0] for r in rows] == [
         "offset is at its bound",
-        "a function of time alone; backlash at stage:axis acts with the motion and explains nearly as much",
+        "a function of time alone: backlash at stage:axis was taken, which explains nearly as much by the motion",
         Shortfall.UNCONFIRMED.value,
     ]
     assert [r.gain > 0 for r in rows] == [True, True, False] and rows[0].gain > rows[1].gain

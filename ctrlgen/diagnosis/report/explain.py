@@ -81,7 +81,8 @@ def _of(diagnosis: Diagnosis, h: Hypothesis, attempts: list[Attempt]) -> list[st
 
 
 def _beside(a: Attempt, h: Hypothesis) -> str:
-    others = " and ".join(cause_text(c) for c in a.candidate.causes if _key(c) != _key(h))
+    # harmonics have one name
+    others = " and ".join(dict.fromkeys(cause_text(c) for c in a.candidate.causes if _key(c) != _key(h)))
     return f", beside {others}" if others else ""
 
 

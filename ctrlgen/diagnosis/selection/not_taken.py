@@ -39,13 +39,13 @@ def not_taken(
 
 def _second(t: CandidateModel, best: CandidateModel, before: CandidateModel, gain: float) -> str:
     """Why a candidate that is good enough was not taken."""
-    taken = " and ".join(f"{c.effect} at {c.location}" for c in best.causes if c not in before.causes)
+    taken = " and ".join(dict.fromkeys(cause_text(c) for c in best.causes if c not in before.causes))
     of_time, instead = (any(c.prior.of_time for c in m.causes if c not in before.causes) for m in (t, best))
     if of_time and not instead:
-        return f"a function of time alone; {taken} acts with the motion and explains nearly as much"
+        return f"a function of time alone: {taken} was taken, which explains nearly as much by the motion"
     if gain > 0:
-        return f"{taken} explains as much and is commoner, or has fewer numbers"
-    return f"{taken} explains more"
+        return f"{taken} was taken, which explains as much and is commoner, or has fewer numbers"
+    return f"{taken} was taken, which explains more"
 
 
 def that_matter(search: SearchResult) -> list[tuple[float, Refusal]]:
