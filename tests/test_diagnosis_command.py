@@ -49,6 +49,18 @@ def test_the_command_leaves_three_files_and_prints_the_answer(creeping, tmp_path
     assert json.loads((tmp_path / "next" / "diagnosis.json").read_text())["verdict"] == Verdict.CONSISTENT
 
 
+@pytest.mark.long
+def test_the_command_explains_one_law(creeping, tmp_path, capsys):
+    words = ("--out", tmp_path / "out", "--laws", ",".join(LAWS), "--explain", "creep")
+    assert command("diagnose", AXIS_FILE, creeping, *words) == 0
+    assert "creep at stage:axis is in the answer.\n" in capsys.readouterr().out
+
+
+def test_an_unknown_law_to_explain_is_refused_before_the_diagnosis(creeping, tmp_path, capsys):
+    assert command("diagnose", AXIS_FILE, creeping, "--out", tmp_path / "out", "--explain", "crep") == 2
+    assert "known are: " in capsys.readouterr().err and not (tmp_path / "out").exists()
+
+
 def test_a_place_for_replicates_that_nobody_asked_for_is_refused(creeping, tmp_path, capsys):
     where = "--scheduler", "tcp://nowhere:1"
     assert command("diagnose", AXIS_FILE, creeping, "--out", tmp_path / "out", *where) == 2
