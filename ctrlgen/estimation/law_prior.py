@@ -65,6 +65,7 @@ class LawPrior:
     nested_case: the simpler law inside this one; where the fit does not exclude it, it is named as an alternative.
     unless: what a device must not have (words of `Effect.requires`) for the law to be suspected there: another law says the same.
     suspected: False for what a device file may state, and no recording shows beside what else it shows.
+    in_a_region: the law is another one in a part of the motion: it is tried beside the others and never takes their turn.
     repeatable: the law may act more than once at one place, as harmonics do.
     acts_on_all: the law is suspected at all channels at once only.
     of_time: what it does is a function of time alone (an event, a drift, a line), whatever the machine does. A law that acts with
@@ -80,6 +81,7 @@ class LawPrior:
     nested_case: NestedCase | None = None
     unless: frozenset[str] = frozenset()
     suspected: bool = True
+    in_a_region: bool = False
     repeatable: bool = False
     acts_on_all: bool = False
     of_time: bool = False

@@ -26,6 +26,10 @@ DEFAULT = LawPrior()
 _starts = ParameterPrior  # shorthand: _starts((0.1, 1.0)) is a parameter with these start values alone
 
 
+# a force that slips after no way is dry friction, and one that never slips a spring
+_LOOP = ParameterPrior((0.01, 0.03, 0.1, 0.3, 1.0), at_bound="dry friction, or a spring")
+
+
 def _peaks(*multiples: float) -> ParameterPrior:
     """Start values in multiples of the peak in the recording."""
     return ParameterPrior(multiples, scales_with_peak=True)
@@ -230,7 +234,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             unless=frozenset({"balanced"}),
             model_form_error=0.02,
             family="hysteresis",
-            parameters={"reach": _starts((0.01, 0.03, 0.1, 0.3, 1.0)), "skew": _starts((-0.6, 0.6))},
+            parameters={"reach": _LOOP, "skew": _starts((-0.6, 0.6))},
         ),
         "asymmetric_displacement_hysteresis": _ASYMMETRIC_LAG,
         "asymmetric_drive_hysteresis": replace(_ASYMMETRIC_LAG, unless=frozenset({"heat"})),
@@ -239,7 +243,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             unless=frozenset({"balanced"}),
             model_form_error=0.02,
             family="hysteresis",
-            parameters={"reach": _starts((0.01, 0.03, 0.1, 0.3, 1.0)), "loop": _starts((0.55, 0.9))},
+            parameters={"reach": _LOOP, "loop": _starts((0.55, 0.9))},
         ),
         "cogging": LawPrior(
             "Motors of a stage that is no flexure have it; harmonics: several at one place. Periods seen in the residual.",
@@ -280,7 +284,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             unless=frozenset({"balanced"}),
             model_form_error=0.02,
             family="hysteresis",
-            parameters={"reach": _starts((0.03, 0.1, 0.3, 1.0, 2.0)), "taper": _starts((0.5,))},
+            parameters={"reach": replace(_LOOP, start_values=(0.03, 0.1, 0.3, 1.0, 2.0)), "taper": _starts((0.5,))},
         ),
         "lost_beams": LawPrior(_EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, of_time=True, parameters=_EVENT),
         "one_sided_stiffening": LawPrior(

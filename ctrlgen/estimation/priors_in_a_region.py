@@ -31,12 +31,13 @@ def _friction(where: dict[str, ParameterPrior], log_prior_odds: float) -> LawPri
         log_prior_odds=log_prior_odds,
         model_form_error=_FORM,
         family="dry friction",
+        in_a_region=True,
         parameters=contact | where,
     )
 
 
 def _damping(where: dict[str, ParameterPrior]) -> LawPrior:
-    return LawPrior(_REASON, log_prior_odds=ONE_IN_TEN, model_form_error=_FORM, parameters=where)
+    return LawPrior(_REASON, log_prior_odds=ONE_IN_TEN, model_form_error=_FORM, in_a_region=True, parameters=where)
 
 
 # it may happen at any time, and is as rare as any event

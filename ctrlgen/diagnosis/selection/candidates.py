@@ -32,18 +32,23 @@ def fit_candidates(trials: Trials, current: CandidateModel, screened: Screened) 
     return _converge_promising(trials, current, candidates)
 
 
-def significant(trials: Trials, current: CandidateModel, screened: Screened) -> list[Suspect]:
-    """The suspects worth a fit: the best of those that score enough, no more than a third of them of one law."""
+def significant(trials: Trials, current: CandidateModel, screened: Screened, most: int | None = None) -> list[Suspect]:
+    """The suspects worth a fit: the best of those that score enough, `most` of them or those of a round, no more than a third of one
+    law; beside them the best of the laws in a region."""
     need = trials.selection.required_z2(current, screened)
     loud = [s for s in screened.suspects if s.z**2 > need]
+    everywhere = [s for s in loud if not s.hypothesis.prior.in_a_region]
+    regional = [s for s in loud if s.hypothesis.prior.in_a_region]
+    most, beside = most or trials.per_round, SEARCH.regional_per_round
+    return [*_loudest(everywhere, most, most // 3), *_loudest(regional, beside, beside)]
+
+
+def _loudest(suspects: Sequence[Suspect], most: int, of_one_law: int) -> list[Suspect]:
+    """The first `most` of them that score no less than a share of the first, no more than so many of one law."""
     chosen: list[Suspect] = []
-    for s in loud:
+    for s in suspects:
         same = sum(c.hypothesis.effect == s.hypothesis.effect for c in chosen)
-        if (
-            s.z**2 >= SEARCH.smallest_score * loud[0].z ** 2
-            and same < trials.per_round // 3
-            and len(chosen) < trials.per_round
-        ):
+        if s.z**2 >= SEARCH.smallest_score * suspects[0].z ** 2 and same < of_one_law and len(chosen) < most:
             chosen.append(s)
     return chosen
 

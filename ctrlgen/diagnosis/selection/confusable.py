@@ -35,9 +35,9 @@ def look_alike(screened: Screened, suspect: Suspect) -> list[Suspect]:
     return [s for s in ranked[: CONFUSABLE.most_listed] if likeness(screened, suspect, s) >= CONFUSABLE.cosine]
 
 
-def explains_alike(compare: ModelSelection, rival: CandidateModel, model: CandidateModel) -> bool:
-    """Whether a rival explains the recording as well as a model does, or better."""
-    return compare.advantage(model, rival) < CONFUSABLE.criterion
+def explains_alike(compare: ModelSelection, rival: CandidateModel, model: CandidateModel, slack: float = 0.0) -> bool:
+    """Whether a rival explains the recording as well as a model does, or better; worse by the `slack` too."""
+    return compare.advantage(model, rival) < CONFUSABLE.criterion + slack
 
 
 def explains_better(compare: ModelSelection, rival: CandidateModel, model: CandidateModel) -> bool:

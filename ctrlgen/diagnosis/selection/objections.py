@@ -37,7 +37,7 @@ def objections(
         if cause in accepted:
             continue
         reason = (
-            _outside_its_range(fit, k)
+            outside_its_range(fit, k)
             or _at_a_bound(fit, k)
             or _on_the_lattice(recording, fit, k)
             or (None if exact else _of_another_kind(recording, fit, k))
@@ -57,7 +57,7 @@ def _of_another_kind(recording: Recording, fit: Fit, k: int) -> str | None:
     return next((reason for test in tests if (reason := test(recording, fit, k))), None)
 
 
-def _outside_its_range(fit: Fit, k: int) -> str | None:
+def outside_its_range(fit: Fit, k: int) -> str | None:
     """Why the numbers of cause k are not those of its law; None where they are."""
     structure, cause = fit.structure, fit.structure.causes[k]
     if cause.effect != PARAMETER and (reason := cause.law.contradiction(fit.values(k))):

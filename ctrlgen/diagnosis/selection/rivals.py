@@ -11,6 +11,7 @@ from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, l
 from ctrlgen.diagnosis.selection.candidates import significant, trying
 from ctrlgen.diagnosis.selection.confusable import explains_alike, explains_better
 from ctrlgen.diagnosis.selection.model_selection import scored
+from ctrlgen.diagnosis.selection.objections import outside_its_range
 from ctrlgen.diagnosis.selection.precedence import counterparts, explains_alike_but_for_odds
 from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
@@ -112,11 +113,17 @@ def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Rou
     there, special = current.causes, current.fit.nested_case(k)
     tried = [t for r in rounds for t in r.candidates if not current.errors.is_noise]
     candidates = [*replacements(trials, current, k), *_in_place_of(k, there, tried)]
+    # at the end of its range the cause stands for something else, which need not do quite as well
+    slack = SEARCH.bound_slack if outside_its_range(current.fit, k) else 0.0
+
+    def is_alike(t: CandidateModel) -> bool:
+        named = special and t.cause and t.cause.effect == special
+        return bool(named) or explains_alike(trials.selection, t, current, slack)
+
     alike = {
         t.cause: t
         for t in reversed(candidates)
-        if not (_same_name(t.cause, there[k]) or _contains(t, there[k]))
-        and (explains_alike(trials.selection, t, current) or (special and t.cause and t.cause.effect == special))
+        if not (_same_name(t.cause, there[k]) or _contains(t, there[k])) and is_alike(t)
     }
     # a line and a pitch at one speed: how rare a line is does not tell them apart
     for t in counterparts(trials, current, k):
@@ -150,14 +157,14 @@ def replacements(trials: Trials, current: CandidateModel, k: int) -> list[Candid
     gained = without - current.fit.objective
     able = [
         s
-        for s in significant(trials, current, screened)
+        for s in significant(trials, current, screened, max(SEARCH.most_rivals, trials.per_round))
         if s.z**2 > SEARCH.rival_share * gained and s.hypothesis != structure.causes[k]
     ]
 
     def one(branch: Trials, s: Suspect) -> list[CandidateModel]:
         return branch.tried(replace_cause(branch, current.fit, k, others, s), s.hypothesis)
 
-    tried = trials.each(one, able[: SEARCH.most_rivals], lambda s: f"{trying(s.hypothesis)} instead")
+    tried = trials.each(one, able, lambda s: f"{trying(s.hypothesis)} instead")
     fits = [t for fitted in tried for t in fitted]
     near = trials.close_contenders(without, current, trials.selection.ranked(fits))
     ends = trials.each(lambda branch, t: branch.converged(t), near)

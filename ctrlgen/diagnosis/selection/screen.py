@@ -229,7 +229,9 @@ class Screen:
             )
             for j in order
         }
-        together = SubsetSearch(columns, seen, score, distinct, distinct_share, cosine, self._suspect)
+        # a law in a region is tried alone: there are many, and each looks like the law everywhere
+        everywhere = np.array([j for j in seen if not columns[j].hypothesis.prior.in_a_region], int)
+        together = SubsetSearch(columns, everywhere, score, distinct, distinct_share, cosine, self._suspect)
         resembles = np.argmax(likeness, axis=0) if len(likeness) else np.full(len(columns), -1)
         undetectable = {c.hypothesis: int(resembles[j]) if norm[j] > 0 else -1 for j, c in enumerate(columns)}
         undetectable = {h: k for h, k in undetectable.items() if h not in ranked}

@@ -120,6 +120,8 @@ class SearchSettings:
     """Single candidates fitted a round, and as many sets of each size."""
     cheap_factor: int = 3
     """Times as many for settled poses, whose fits are cheap."""
+    regional_per_round: int = 2
+    """Laws in a region fitted a round, beside them. Judgement."""
     candidate_steps: int = 8
     """Levenberg-Marquardt steps of a candidate at first; the promising ones are fitted until they converge."""
     converged_candidates: int = 2
@@ -128,8 +130,11 @@ class SearchSettings:
     rival_share: float = 0.5
     """Share of what a cause explains that a rival must promise by its score to be fitted: shape parameters between the
     start values lose so much."""
-    most_rivals: int = 6
-    """Rivals fitted for a cause."""
+    most_rivals: int = 8
+    """Rivals fitted for a cause, beside those in a region: some of them meet an objection."""
+    bound_slack: float = 9.0
+    """Difference of the criterion by which a rival may be worse than what explains alike, where the amplitude of the cause is at the
+    end of its range: three standard deviations more. Judgement."""
     nearly_best: float = 0.9
     """Share of what the best candidate explains from which on another is fitted to the end before both are compared."""
     longest_shift: int = 64
@@ -335,8 +340,8 @@ class StandingSettings:
     """Share of a family below which it has none: the half width of a usual interval."""
     far_below: float = 0.2
     """Share of a family over the largest one, below which it is far behind. Judgement."""
-    clear: float = 0.3
-    """Share of the largest family, below which the shares tell no family. Judgement."""
+    clear: float = 0.5
+    """Share of the largest family, below which the shares tell no family: the larger half."""
 
 
 SCREEN = ScreenSettings()
