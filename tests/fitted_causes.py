@@ -25,6 +25,7 @@ def fitted(causes=(), theta=(), free_parameters=(), penalty=0.0) -> SimpleNamesp
         free_parameters=free_parameters,
         cause_of=lambda parameter: causes[parameter.cause],
         plausible_range=lambda unknown: None,
+        device=SimpleNamespace(parts=lambda physics: None),
     )
     return SimpleNamespace(
         structure=structure,

@@ -49,6 +49,8 @@ def test_play_is_followed_through_reversals_between_samples():
 
 
 def test_time_constants_are_found_decades_away():
+    """The record is shorter than the slowest ones: over how many decades they lie is known to two of them."""
+
     def creeping(u):
         y = move(u)
         lags = (lfilter([0, 1 - np.exp(-H / tau)], [1, -np.exp(-H / tau)], y) for tau in np.logspace(-1.7, 1.3, 10))
@@ -58,7 +60,8 @@ def test_time_constants_are_found_decades_away():
     for tau in (0.01, 1.0):
         fit = fitter.fit(Structure(AXIS).with_cause(LATE, {"gain": 1e-3, "tau": tau, "decades": 3.25}))
         assert fit.chi2 < 1.15 * fit.n
-        assert fit.theta[-2:] == pytest.approx([0.02, 3.3], rel=0.2)  # two a decade stand for ten in three
+        tau, decades = fit.theta[-2:]
+        assert tau == pytest.approx(0.02, rel=0.2) and abs(decades - 3.0) < 2 * np.sqrt(fit.covariance[-1, -1]) < 5.0
 
 
 def test_a_push_on_a_mass_is_no_spike():

@@ -114,6 +114,6 @@ def test_a_hysteresis_of_which_no_play_follows_or_all_do_is_a_gain(reach):
     fitter, fit = servo_fit(lambda u: 0.93 * u, "displacement_hysteresis", PLAYS | {"reach": reach})
     assert fit.chi2 < 1.5 * fit.n
     (reason,) = objections(fitter.recording, fit).values()
-    assert reason.endswith("it is a gain") or reason.endswith("it is a gain beside a smaller loop")
+    assert reason.endswith(("it is a gain", "it is a gain beside a smaller loop", "it is a single play, or a gain"))
     fitter, fit = servo_fit(played, "displacement_hysteresis", PLAYS | {"reach": 3e-5})
     assert objections(fitter.recording, fit) == {}

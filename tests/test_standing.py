@@ -29,13 +29,13 @@ def shares(friction: float, creep: float) -> list[tuple[Family, float]]:
         (0.7, 0.6, True),
         (0.7, 0.149, True),
         (0.7, 0.139, False),
-        (0.29, 0.0, True),
-        (0.31, 0.04, False),
+        (0.49, 0.0, True),
+        (0.51, 0.04, False),
         (0.04, 0.7, True),
     ],
 )
 def test_a_cause_whose_family_is_far_behind_a_clear_one_does_not_stand_first(friction, creep, stands):
-    """A fifth of the largest share, or a twentieth of the residual; three tenths make a family clear."""
+    """A fifth of the largest share, or a twentieth of the residual; half of it makes a family clear."""
     first, second = in_standing([finding("creep"), finding("coulomb", 0.3)], shares(friction, creep))
     assert (first.effect == "creep") == stands
     assert {f.effect: f.contradicted for f in (first, second)}["creep"] == (not stands)

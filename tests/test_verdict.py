@@ -197,7 +197,8 @@ def test_a_whole_number_is_said_as_what_it_was_expected_to_be_and_the_weightier_
     monkeypatch.setattr(
         "ctrlgen.diagnosis.selection.findings.robust_deviations", lambda fit: np.full(len(fit.theta), 0.01)
     )
-    monkeypatch.setattr("ctrlgen.diagnosis.selection.findings._title", lambda search, cause: "")
+    monkeypatch.setattr("ctrlgen.diagnosis.selection.findings.nominal_physics", lambda device: None)
+    monkeypatch.setattr("ctrlgen.diagnosis.selection.findings.title", lambda law, parts: "")
     chosen = trial(causes=(GAIN, REVERSED), free_parameters=(number("effect[0].gain", cause=0),), theta=(1.1,))
     bare = (trial(held=3.0 * N), trial(held=8.0 * N))
     found = search(trial(held=15.0 * N), chosen, bare, ((trial(cause=CREEP), trial()), ()))

@@ -33,7 +33,8 @@ class ParameterPrior:
         leave open, records that go farther show.
     fixed_range: of an amplitude: the law is present or absent. Its amplitude is set to the middle of the range, not fitted.
     at_bound: of a shape: what the law is where this ends at a bound. A fit that ends there is rejected, as one is of which the records
-        do not tell the shape.
+        do not tell the shape. at_low_bound: the same of the lower bound alone.
+    proportional: of a shape: it adds a part in proportion to the signal, and what the law adds is nothing else where there is no loop.
     """
 
     start_values: tuple[float, ...] = ()
@@ -43,6 +44,8 @@ class ParameterPrior:
     plausible_range: tuple[float, float] | None = None
     fixed_range: tuple[float, float] | None = None
     at_bound: str = ""
+    at_low_bound: str = ""
+    proportional: bool = False
     usual: float | None = None
 
 

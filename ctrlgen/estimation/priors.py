@@ -27,6 +27,7 @@ _starts = ParameterPrior  # shorthand: _starts((0.1, 1.0)) is a parameter with t
 
 
 # a force that slips after no way is dry friction, and one that never slips a spring
+_TAPER = ParameterPrior((0.5,), at_low_bound="a single play, or a gain")
 _LOOP = ParameterPrior((0.01, 0.03, 0.1, 0.3, 1.0), at_bound="dry friction, or a spring")
 
 
@@ -42,7 +43,7 @@ def _reach(*multiples: float, peaks: bool = False) -> ParameterPrior:
 
 def _reversible(*values: float) -> ParameterPrior:
     """Start values of the part of a loop that is none."""
-    return ParameterPrior(values, at_bound="a gain beside a smaller loop")
+    return ParameterPrior(values, at_bound="a gain beside a smaller loop", proportional=True)
 
 
 _EVENT = {"moment": ParameterPrior(start_from_data="moments"), "rise": _peaks(1.0)}  # it may happen at any time
@@ -195,7 +196,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             unless=frozenset({"heat"}),
             model_form_error=0.02,
             family="hysteresis",
-            parameters={"reach": _reach(0.03, 0.1, 0.3, 1.0), "taper": _starts((0.0,))},
+            parameters={"reach": _reach(0.03, 0.1, 0.3, 1.0), "taper": replace(_TAPER, start_values=(0.0,))},
         ),
         "reversed": LawPrior(
             "A wiring fault is rarer than a wrong gain: judgement. A lead is swapped or it is not.",
@@ -336,7 +337,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             family="hysteresis",
             parameters={
                 "reach": _reach(0.03, 0.1, 0.3, 1.0, peaks=True),
-                "taper": _starts((0.5,)),
+                "taper": _TAPER,
                 "reversible": _reversible(0.0, 1.0),
             },
         ),

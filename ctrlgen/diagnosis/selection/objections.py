@@ -83,17 +83,37 @@ def _at_a_bound(fit: Fit, k: int) -> str | None:
     structure, cause = fit.structure, fit.structure.causes[k]
     if cause.effect == PARAMETER:
         return None
-    meant = {p.name: cause.prior.of(p).at_bound for p in cause.law.params}
+    priors = {p.name: cause.prior.of(p) for p in cause.law.params}
     for i, (u, value) in enumerate(zip(structure.free_parameters, fit.theta, strict=True)):
-        if u.cause != k or not (other := meant.get(u.name)):
+        if u.cause != k or u.name not in priors:
             continue
-        ways = u.low > 0
+        prior, ways = priors[u.name], u.low > 0
         span = OBJECTIONS.shape_at_bound * (value if ways else u.high - u.low)
-        if value >= u.high - span or value <= u.low + span:
+        low = prior.at_bound or prior.at_low_bound if value <= u.low + span else ""
+        if other := low or (prior.at_bound if value >= u.high - span else ""):
             return f"its {u.name} is at a bound of {from_si(float(value), u.unit):.3g} {u.unit}, where it is {other}"
-        if ways and np.linalg.norm(fit.J[:, i]) * value < OBJECTIONS.told_shape:
-            return f"the records say nothing of its {u.name}; without one it is {other}"
-    return None
+        if prior.at_bound and ways and np.linalg.norm(fit.J[:, i]) * value < OBJECTIONS.told_shape:
+            return f"the records say nothing of its {u.name}; without one it is {prior.at_bound}"
+    return "no loop is seen; without one it is a gain" if _has_no_loop(fit, k) else None
+
+
+def _has_no_loop(fit: Fit, k: int) -> bool:
+    """Whether what cause k adds is in proportion to its signal, but for less than the noise: its amplitude's slope is that of the shape
+    that adds such a part."""
+    numbers = {u.name: i for i, u in enumerate(fit.structure.free_parameters) if u.cause == k}
+    priors = fit.structure.causes[k].prior
+    amplitude = fit.structure.causes[k].law.amplitude()
+    along = [
+        i
+        for p in fit.structure.causes[k].law.params
+        if (i := numbers.get(p.name)) is not None and priors.of(p).proportional
+    ]
+    if not along or amplitude.name not in numbers:
+        return False
+    added = fit.J[:, numbers[amplitude.name]] * fit.theta[numbers[amplitude.name]]
+    proportional = fit.J[:, along[0]]
+    rest = added - proportional * (proportional @ added) / max(float(proportional @ proportional), 1e-300)
+    return float(np.linalg.norm(rest)) < OBJECTIONS.told_loop
 
 
 def _same_line(recording: Recording, fit: Fit, j: int, k: int) -> bool:

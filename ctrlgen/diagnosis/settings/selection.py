@@ -248,6 +248,9 @@ class ObjectionsSettings:
     """The same of a shape, of which a fit stops sooner: what it changes fades toward the bound."""
     told_shape: float = 1.0
     """Standard deviations by which all readings together must depend on a shape, per factor of e, to tell it."""
+    told_loop: float = 3.0
+    """Standard deviations by which all readings together must show a loop beside a part in proportion: three, which chance shows once
+    in 370."""
     fewest_periods: float = 10.0
     """Periods of a line that the longest record to fit must hold: of fewer, any slow change looks like one.
     Judgement."""
