@@ -77,8 +77,8 @@ def trying(*causes: Hypothesis) -> str:
 def restart_elsewhere(
     trials: Trials, candidate: CandidateModel, before: CandidateModel, screened: Screened
 ) -> CandidateModel:
-    """The candidate, its causes that are new begun again in the most promising of the other shapes screened, and with each number
-    of its own shape replaced by that of another, where more than noise is left: a law may have several valleys."""
+    """The candidate, its causes that are new begun again in the most promising of the other shapes screened, and with single numbers
+    of its own shape replaced by those of another, where more than noise is left: a law may have several valleys."""
     others = {s.hypothesis: s.other_starts for s in screened.suspects}
     for k, cause in enumerate(candidate.causes):
         if cause in before.causes or candidate.errors.is_noise:
@@ -87,12 +87,18 @@ def restart_elsewhere(
         size = cause.law.amplitude().name if shapes else ""
         here = structure.starts[k]
         begins = [*shapes, *({**shape, size: here[size]} for shape in shapes)]
-        begins += [here | {name: value} for name, value in dict.fromkeys(pair for s in shapes for pair in s.items())]
+        # nearest the optimum that is there
+        near = [here | {name: value} for name, value in dict.fromkeys(pair for s in shapes for pair in s.items())]
         if not begins:
             continue
         try:
-            starts = (structure.restarted(k, begin) for begin in begins)
-            promising = sorted(starts, key=trials.fitter.initial_objective)[: SEARCH.restarts]
+            promising = [
+                start
+                for group, most in ((begins, SEARCH.restarts), (near, SEARCH.near_restarts))
+                for start in sorted(
+                    (structure.restarted(k, begin) for begin in group), key=trials.fitter.initial_objective
+                )[:most]
+            ]
             again = (trials.fitter.fit(s, steps=SEARCH.candidate_steps) for s in promising)
             best = min(again, key=lambda fit: fit.objective)
             if best.objective < candidate.fit.objective:

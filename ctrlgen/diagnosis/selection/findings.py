@@ -148,6 +148,8 @@ def estimated_values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, 
         if unknown.path in profiled:
             below, above = profiled[unknown.path].ci95
             low, high = min(low, below), max(high, above)
+        # units round: a number at its bound is within its interval
+        low, high = min(low, value), max(high, value)
         estimates[unknown.path] = Estimate(value, (low, high), unknown.unit)
     return estimates
 

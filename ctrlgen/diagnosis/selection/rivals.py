@@ -14,6 +14,7 @@ from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.objections import outside_its_range
 from ctrlgen.diagnosis.selection.precedence import counterparts, explains_alike_but_for_odds
 from ctrlgen.diagnosis.selection.subset_search import Suspect
+from ctrlgen.diagnosis.selection.supported import amplitude_may_be_zero
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
 from ctrlgen.estimation.fit import Fit
@@ -113,8 +114,9 @@ def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Rou
     there, special = current.causes, current.fit.nested_case(k)
     tried = [t for r in rounds for t in r.candidates if not current.errors.is_noise]
     candidates = [*replacements(trials, current, k), *_in_place_of(k, there, tried)]
-    # at the end of its range the cause stands for something else, which need not do quite as well
-    slack = SEARCH.bound_slack if outside_its_range(current.fit, k) else 0.0
+    # at the end of its range, or of a size that may be zero, the cause stands for something else, which need not do quite as well
+    open_ = outside_its_range(current.fit, k) or amplitude_may_be_zero(current.fit, k)
+    slack = SEARCH.bound_slack if open_ else 0.0
 
     def is_alike(t: CandidateModel) -> bool:
         named = special and t.cause and t.cause.effect == special

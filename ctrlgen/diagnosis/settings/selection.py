@@ -134,7 +134,7 @@ class SearchSettings:
     """Rivals fitted for a cause, beside those in a region: some of them meet an objection."""
     bound_slack: float = 9.0
     """Difference of the criterion by which a rival may be worse than what explains alike, where the amplitude of the cause is at the
-    end of its range: three standard deviations more. Judgement."""
+    end of its range, or may be zero: three standard deviations more. Judgement."""
     nearly_best: float = 0.9
     """Share of what the best candidate explains from which on another is fitted to the end before both are compared."""
     longest_shift: int = 64
@@ -147,6 +147,8 @@ class SearchSettings:
     """How often an amplitude from which no fit can begin is halved: the screen that promises it is linear. Judgement."""
     restarts: int = 4
     """Other shapes of a law from which it is fitted again, those that begin best: the valleys of one law. Judgement."""
+    near_restarts: int = 2
+    """The same of shapes that differ in one number. Judgement."""
     beside_clocks: int = 4
     """Candidates, the best first, beside which an offset of the clocks is tried: each such trial is a fit. Judgement."""
     subset_share: float = 0.1
