@@ -90,6 +90,7 @@ def test_shares_are_of_the_error_that_the_table_calls_before(monkeypatch):
 def test_nothing_is_taken_away_where_more_is_left_than_there_was(monkeypatch):
     found = shared(monkeypatch, lambda S: 3e3 if S else 1e5, 1, described=1.5e3)
     assert found.rest.value == pytest.approx(2.0) and found.explained == 0.0
+    assert found.channels == {"reading.axis": pytest.approx((0.0, 2.0))}
 
 
 def test_where_the_noise_is_not_known_the_whole_error_counts(monkeypatch):
@@ -105,16 +106,16 @@ def test_terms_of_one_law_at_one_place_are_one(monkeypatch):
 
 
 def test_a_cause_that_takes_nothing_away_has_no_share_and_says_whom_it_serves(monkeypatch):
-    """Alone the first leaves as much again; the second takes away 50 beside it and 10 without; the third never cares."""
+    """The first adds 20; the second takes away 50 beside it and 10 without it; the third takes away 5 beside any."""
 
     def energy(S):
-        return 1e5 + 2e4 * (0 in S) - (5e4 if {0, 1} <= S else 1e4 * (1 in S)) - 2e4 * (2 in S)
+        return 1e5 + 2e4 * (0 in S) - (5e4 if {0, 1} <= S else 1e4 * (1 in S)) - 5e3 * (2 in S)
 
     found = shared(monkeypatch, energy, 3)
     first, second, third = found.shares
     assert first is None and found.serves[0] == 1
     assert second.value + third.value + found.rest.value == pytest.approx(1.0)
-    assert found.rest.value == pytest.approx(0.5)
+    assert found.rest.value == pytest.approx(0.65)
 
 
 @pytest.mark.parametrize("over, adapted", [(1.01, False), (0.99, True)])

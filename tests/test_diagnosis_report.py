@@ -22,14 +22,14 @@ from ctrlgen.diagnosis.evidence.detectability import DetectabilityEntry, Smalles
 from ctrlgen.diagnosis.evidence.experiment_design import CandidateExperimentEntry, Experiment
 from ctrlgen.diagnosis.evidence.residual_location import ResidualPartEntry
 from ctrlgen.diagnosis.evidence.unmodelled_dynamics import Coordinate, DependenceMap, UnmodelledForce
-from ctrlgen.diagnosis.report.answer import sentence
+from ctrlgen.diagnosis.report.answer import answer, sentence
 from ctrlgen.diagnosis.report.diagnosis_record import Provenance, diagnosis_record
 from ctrlgen.diagnosis.report.figures import POINTS, residual_density, thinned
 from ctrlgen.diagnosis.report.html_report import page
 from ctrlgen.diagnosis.report.narrative import gathered, interval, next_steps
 from ctrlgen.diagnosis.report.plot_uncertainty import draw_rivals
 from ctrlgen.diagnosis.report.writeback import next_text
-from ctrlgen.diagnosis.selection.findings import Estimate, Finding
+from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.profile_likelihood import BOUNDED, Profile
@@ -305,6 +305,24 @@ def test_the_page_shows_whatever_evidence_there_is(found):
     assert text.count("<figure>") == 10
     for words in ("more below 1 Hz", "slow multisine", "added creep", "nm/s", "position explains 80%"):
         assert words in text
+
+
+def errors(before: float, after: float, noise: float | None) -> ChannelErrorEntry:
+    return ChannelErrorEntry(rms_before=before, rms_after=after, noise_floor=noise, unit="um", uncertainty=None)
+
+
+def test_the_answer_tells_what_is_left_where_most_is_left(found):
+    """The channel that was worst, and the one that is; by chance up to 1.2 times the noise nothing is said."""
+    failed = replace(found.residual_tests, passed=False)
+    two = {"reading.a": errors(9.0, 1.1, 1.0), "reading.b": errors(2.0, 0.7, 0.5)}
+    _, second, third = answer(replace(found, held_out=two, residual_tests=failed, verdict=Verdict.PARTLY))
+    assert second.startswith("Held-out error of a: 9 um -> 1.1 um")
+    assert third.startswith("Left: 0.7 um in b, 1.4 times the noise")
+    for after, said in ((0.59, False), (0.61, True)):
+        told = answer(replace(found, held_out={"reading.a": errors(2.0, after, 0.5)}))
+        assert ("which chance allows" in told[-1]) == said and len(told) == 2 + said
+    (*_, last) = answer(replace(found, held_out={"reading.a": errors(2.0, 0.5, None)}))
+    assert last.startswith("Whether more is left cannot be said")
 
 
 def test_a_verdict_says_what_to_do(found):
