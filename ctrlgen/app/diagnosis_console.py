@@ -31,8 +31,9 @@ def print_recording(recording: Recording) -> None:
 def print_diagnosis(diagnosis: Diagnosis) -> None:
     """The verdict, the findings and the held-out errors of a diagnosis."""
     from ctrlgen.diagnosis.report.answer import answer
-    from ctrlgen.diagnosis.report.narrative import gathered, hypothesis_name, interval, next_steps, share_text
+    from ctrlgen.diagnosis.report.narrative import gathered, interval, next_steps, share_text
     from ctrlgen.diagnosis.report.shares_sentences import shares_sentences
+    from ctrlgen.diagnosis.selection.cause_entry import cause_name
     from ctrlgen.reporting.numbers import number
 
     for line in answer(diagnosis):
@@ -50,7 +51,7 @@ def print_diagnosis(diagnosis: Diagnosis) -> None:
         for finding in diagnosis.findings:
             sets = (finding.parameters, *finding.terms)
             rows = [(name, interval(e)) for numbers in sets for name, e in numbers.items()]
-            alike = ", ".join(map(hypothesis_name, finding.alternatives))
+            alike = ", ".join(map(cause_name, finding.alternatives))
             for k, (name, text) in enumerate(rows):
                 first = (finding.effect, finding.location, share_text(finding)) if k == 0 else ("",) * 3
                 table.add_row(*first, name, text, escape(f"or {alike}") if alike and k == 0 else "")

@@ -25,6 +25,7 @@ from ctrlgen.core.forks import usable_cores
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.evidence.supporting_analyses import run_supporting_analyses
+from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.dead_channels import without_dead_channels
 from ctrlgen.diagnosis.selection.direct_detection import directly_detected_findings
 from ctrlgen.diagnosis.selection.findings import findings, held_out_errors
@@ -57,9 +58,7 @@ from ctrlgen.recordings.recording import Recording
 Progress = Callable[[str], None]
 RESTLESS = "{}: at rest the residual jumps or has memory, so it is not noise; something acts there that the device file does not describe"
 NOT_OFFERED = "not offered: {}"
-WITHDRAWN = (
-    "{} at {} is not confirmed: with it the held-out records are predicted worse than by the device as described"
-)
+WITHDRAWN = "{} is not confirmed: with it the held-out records are predicted worse than by the device as described"
 RESTRICTED = "only these effects were considered, beside the device's own parameters: {}"
 
 
@@ -227,7 +226,7 @@ def _notes(
         *map(RESTLESS.format, restless),
         *told_of_machine,
         *([] if laws is None else [RESTRICTED.format(", ".join(law.kind for law in effects) or "none")]),
-        *(WITHDRAWN.format(c.effect, c.location) for c in search.withdrawn),
+        *(WITHDRAWN.format(cause_name(c)) for c in search.withdrawn),
         *(f"could not be tried: {text}" for text in failed),
     )
 

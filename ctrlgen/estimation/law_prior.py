@@ -49,6 +49,11 @@ class ParameterPrior:
     usual: float | None = None
 
 
+def peaks(*multiples: float) -> ParameterPrior:
+    """Start values in multiples of the peak in the recording."""
+    return ParameterPrior(multiples, scales_with_peak=True)
+
+
 @dataclass(frozen=True)
 class NestedCase:
     """The law `effect` that this law becomes where `parameter` is at `value` [SI]."""

@@ -13,7 +13,7 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from ctrlgen.effects import Effect
-from ctrlgen.estimation.law_prior import ONE_IN_A_HUNDRED, ONE_IN_TEN, LawPrior, NestedCase, ParameterPrior
+from ctrlgen.estimation.law_prior import ONE_IN_A_HUNDRED, ONE_IN_TEN, LawPrior, NestedCase, ParameterPrior, peaks
 from ctrlgen.estimation.priors_in_a_region import IN_A_REGION
 
 
@@ -31,11 +31,6 @@ _TAPER = ParameterPrior((0.5,), at_low_bound="a single play, or a gain")
 _LOOP = ParameterPrior((0.01, 0.03, 0.1, 0.3, 1.0), at_bound="dry friction, or a spring")
 
 
-def _peaks(*multiples: float) -> ParameterPrior:
-    """Start values in multiples of the peak in the recording."""
-    return ParameterPrior(multiples, scales_with_peak=True)
-
-
 def _reach(*multiples: float, peaks: bool = False) -> ParameterPrior:
     """Start values of the way after which plays follow: where none does, or all do at once, what is left is proportional."""
     return ParameterPrior(multiples, scales_with_peak=peaks, at_bound="a gain")
@@ -46,7 +41,7 @@ def _reversible(*values: float) -> ParameterPrior:
     return ParameterPrior(values, at_bound="a gain beside a smaller loop", proportional=True)
 
 
-_EVENT = {"moment": ParameterPrior(start_from_data="moments"), "rise": _peaks(1.0)}  # it may happen at any time
+_EVENT = {"moment": ParameterPrior(start_from_data="moments"), "rise": peaks(1.0)}  # it may happen at any time
 _EVENTS_ARE_RARE = (
     "An event at any time. Laws that act always come first among equals: most of a hundred records have no event, and a step fits "
     "something of any structured residual. Judgement."
@@ -208,7 +203,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             "A limit beyond the peak shows nowhere; one far below it would have been noticed. An amplifier clips or it does not.",
             parameters={
                 "share": ParameterPrior(fixed_range=(0.5, 1.5)),
-                "level": _peaks(0.2, 0.4, 0.6, 0.8, 0.9, 0.97),
+                "level": peaks(0.2, 0.4, 0.6, 0.8, 0.9, 0.97),
             },
         ),
         "second_pole": LawPrior(
@@ -258,7 +253,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             _DRY_FRICTION,
             model_form_error=0.02,
             family="dry friction",
-            parameters={"reach": _peaks(3e-4, 3e-3, 0.03), "smoothing": _peaks(1e-4, 0.1)},
+            parameters={"reach": peaks(3e-4, 3e-3, 0.03), "smoothing": peaks(1e-4, 0.1)},
         ),
         **IN_A_REGION,
         "directional_friction": LawPrior(
@@ -267,13 +262,13 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             model_form_error=0.02,
             family="dry friction",
             nested_case=NestedCase("coulomb", "skew", 0.0),
-            parameters={"skew": _starts((-0.3, 0.3)), "reach": _peaks(3e-4, 3e-3, 0.03)},
+            parameters={"skew": _starts((-0.3, 0.3)), "reach": peaks(3e-4, 3e-3, 0.03)},
         ),
         "end_stop": LawPrior(
             "A contact is neither a spring nor Hertz's ball; 5 %: judgement. A spring is plainest. A stop beyond the peak is untouched.",
             model_form_error=0.05,
             parameters={
-                "gap": _peaks(-0.97, -0.9, -0.7, -0.4, 0.4, 0.7, 0.9, 0.97),
+                "gap": peaks(-0.97, -0.9, -0.7, -0.4, 0.4, 0.7, 0.9, 0.97),
                 "power": ParameterPrior((1.0, 1.5), usual=1.0),
             },
         ),
@@ -303,7 +298,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             unless=frozenset({"balanced"}),
             model_form_error=0.02,
             family="hysteresis",
-            parameters={"slack": _peaks(0.1, 0.3, 0.6), "reach": _peaks(0.03, 0.1, 0.3)},
+            parameters={"slack": peaks(0.1, 0.3, 0.6), "reach": peaks(0.03, 0.1, 0.3)},
         ),
         "stribeck": LawPrior(
             "Dry friction that does not fall with speed is commoner: judgement. " + _DRY_FRICTION,
@@ -311,13 +306,13 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             model_form_error=0.02,
             family="dry friction",
             nested_case=NestedCase("coulomb", "breakaway", 1.0),
-            parameters={"breakaway": _starts((1.8,)), "speed": _peaks(0.01, 0.05, 0.2), "reach": _peaks(1e-3, 0.01)},
+            parameters={"breakaway": _starts((1.8,)), "speed": peaks(0.01, 0.05, 0.2), "reach": peaks(1e-3, 0.01)},
         ),
         # Displacement and pose ------------------------------------------------------------------------------------------------
         "backlash": LawPrior(
             "Reversals between two samples are placed to 1 %: measured on simulated play.",
             model_form_error=0.01,
-            parameters={"gap": _peaks(1e-4, 1e-3, 0.01, 0.1, 0.3)},
+            parameters={"gap": peaks(1e-4, 1e-3, 0.01, 0.1, 0.3)},
         ),
         "creep": LawPrior(
             _CREEP,

@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ctrlgen.estimation.law_prior import ONE_IN_A_HUNDRED, ONE_IN_TEN, LawPrior, ParameterPrior
+from ctrlgen.estimation.law_prior import ONE_IN_A_HUNDRED, ONE_IN_TEN, LawPrior, ParameterPrior, peaks
 
 _REASON = (
     "A law in one part of the motion is rarer than one everywhere, and is suspected where most of the residual is. Neither the law nor "
     "its edge is of one form; 5 %: judgement."
 )
 _FORM = 0.05
-
-
-def _peaks(*multiples: float) -> ParameterPrior:
-    """Start values in multiples of the peak in the recording."""
-    return ParameterPrior(multiples, scales_with_peak=True)
 
 
 def _edge(suggested: str) -> dict[str, ParameterPrior]:
@@ -25,7 +20,7 @@ def _edge(suggested: str) -> dict[str, ParameterPrior]:
 
 
 def _friction(where: dict[str, ParameterPrior], log_prior_odds: float) -> LawPrior:
-    contact = {"reach": _peaks(3e-4, 3e-3, 0.03), "smoothing": _peaks(1e-4, 0.1)}
+    contact = {"reach": peaks(3e-4, 3e-3, 0.03), "smoothing": peaks(1e-4, 0.1)}
     return LawPrior(
         _REASON,
         log_prior_odds=log_prior_odds,
@@ -41,7 +36,7 @@ def _damping(where: dict[str, ParameterPrior]) -> LawPrior:
 
 
 # it may happen at any time, and is as rare as any event
-_FROM_A_MOMENT = {"moment": ParameterPrior(start_from_data="moments"), "rise": _peaks(1.0)}
+_FROM_A_MOMENT = {"moment": ParameterPrior(start_from_data="moments"), "rise": peaks(1.0)}
 _ABOVE_A_SPEED = {"speed": ParameterPrior(start_from_data="speeds", only_from_data=True)}
 
 IN_A_REGION: Mapping[str, LawPrior] = {

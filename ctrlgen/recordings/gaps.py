@@ -16,20 +16,19 @@ from threadpoolctl import threadpool_limits
 
 from ctrlgen.recordings import drive_across_gaps
 from ctrlgen.recordings.drive_across_gaps import Way
+from ctrlgen.recordings.preprocessing import WHOLE_SAMPLES
 from ctrlgen.recordings.recording import Record
 
 Gap = Literal["linear", "held", "split"]
 
 SHORTEST = {"series": 20, "poses": 3}  # rows below which a record says nothing
 BREAK = 1.5  # sample times without a sample: a gap
-WHOLE_SAMPLES = 0.1  # sample times: how far a gap may be off a whole number of them
 LONGEST = 100  # rows of a gap that is bridged unasked
 RIGHT = 2e-3  # of the drive's range: how far off a bridge may be that nobody asked for
 REST_SAMPLES = 5  # on each side of a gap, over which the drive must be at rest
 STEPPED = 0.5  # of the samples around differ from the one before, at most, where a drive steps
-FEWEST_STEPS = (
-    6  # steps that tell the clock of a drive that steps: a chance divisor of so many distances is one in thirty
-)
+# steps that tell the clock of a drive that steps: a chance divisor of so many distances is one in thirty
+FEWEST_STEPS = 6
 DWELLS = 4.0  # times a gap in the usual time between steps, from which on two equal sides have no step between
 AROUND = 50  # rows on each side that tell how much a drive changes in as many rows as a gap has
 USUAL = 3.0  # times that change, beyond which a drive jumped inside of the gap

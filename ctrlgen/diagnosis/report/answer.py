@@ -13,7 +13,6 @@ from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.narrative import (
     cause_text,
     channel_sentence,
-    hypothesis_name,
     interval,
     per_cent,
     short,
@@ -21,6 +20,7 @@ from ctrlgen.diagnosis.report.narrative import (
 )
 from ctrlgen.diagnosis.report.shares_sentences import rest_kind
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
+from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding, Role
 from ctrlgen.diagnosis.selection.verdict import (
     Verdict,
@@ -91,7 +91,7 @@ def _main(findings: Sequence[Finding]) -> str:
     numbers = ", ".join(f"{name} = {interval(e)}" for name, e in _first_numbers(main).items())
     share = f"; it takes away {_share(main.share)}" if main.share else ""
     causes = [f for f in others if f.role is Role.CAUSE]
-    names = [f"{hypothesis_name(f.cause)}{f' ({per_cent(f.share.value)})' if f.share else ''}" for f in causes[:BESIDE]]
+    names = [f"{cause_name(f.cause)}{f' ({per_cent(f.share.value)})' if f.share else ''}" for f in causes[:BESIDE]]
     more = len(others) - len(names)
     names += [f"{more} more in the table"] if more else []
     return f"{cause_text(main)}, {numbers}{share}{', beside ' + ' and '.join(names) if names else ''}"
@@ -118,7 +118,7 @@ def _rivals(diagnosis: Diagnosis) -> str:
     """'; this recording cannot tell it from thermal_lag at actuator:axis', for an ambiguous verdict."""
     if diagnosis.verdict != Verdict.AMBIGUOUS:
         return ""
-    others = dict.fromkeys(hypothesis_name(h) for f in diagnosis.findings for h in f.alternatives)
+    others = dict.fromkeys(cause_name(h) for f in diagnosis.findings for h in f.alternatives)
     rivals = f"; this recording cannot tell it from {' or '.join(others)}" if others else ""
     support = diagnosis.findings[0].support
     if support is None or not support.contradicted:
@@ -149,7 +149,7 @@ def _rest(diagnosis: Diagnosis) -> str:
     if not diagnosis.residual_tests.passed:
         return f"Left: {size}{rest_kind(diagnosis, channel)}{_within(diagnosis)}."
     if diagnosis.unconfirmed:
-        return f"No held-out record shows {' or '.join(map(hypothesis_name, diagnosis.unconfirmed))}."
+        return f"No held-out record shows {' or '.join(map(cause_name, diagnosis.unconfirmed))}."
     if diagnosis.verdict == Verdict.PARTLY and poorly_determined(diagnosis.search):
         return "The numbers are too uncertain to predict the held-out records better."
     return f"Left: {size}, which chance allows so few samples." if ratio > CHANCE else ""

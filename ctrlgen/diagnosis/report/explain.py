@@ -8,8 +8,9 @@ from ctrlgen.core.units import from_si
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.history_table import errors_text
 from ctrlgen.diagnosis.selection.candidate_model import Attempt
+from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.confusable import likeness, look_alike
-from ctrlgen.diagnosis.selection.not_taken import cause_text, compared
+from ctrlgen.diagnosis.selection.not_taken import compared
 from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.diagnosis.selection.search_history import held_out_error, numbers_of_cause
 from ctrlgen.diagnosis.selection.subset_search import Suspect
@@ -31,7 +32,7 @@ def explain(diagnosis: Diagnosis, law: str) -> list[str]:
     tried = {_key(h): _attempts(diagnosis, h) for h in offered}
     silent = [h for h in offered if not tried[_key(h)]]
     lines = [line for h in offered if tried[_key(h)] for line in _of(diagnosis, h, tried[_key(h)])]
-    return [*lines, *(f"{cause_text(h)}: {_never_fitted(diagnosis, h)}." for h in silent)]
+    return [*lines, *(f"{cause_name(h)}: {_never_fitted(diagnosis, h)}." for h in silent)]
 
 
 def _key(h: Hypothesis) -> tuple[str, str, str | None]:
@@ -67,7 +68,7 @@ def _of(diagnosis: Diagnosis, h: Hypothesis, attempts: list[Attempt]) -> list[st
     taken = any(_key(c) == _key(h) for c in search.chosen.causes)
     head = "is in the answer" if taken else f"was not taken: {_why_not_taken(diagnosis, h, attempts)}"
     ranked = sorted(attempts, key=lambda a: -compare.advantage(a.candidate, search.chosen))
-    rows = [f"{cause_text(h)} {head}.", f"  {_score(diagnosis, h)}"]
+    rows = [f"{cause_name(h)} {head}.", f"  {_score(diagnosis, h)}"]
     for a in ranked[:LISTED]:
         gain = compare.advantage(a.candidate, search.nominal)
         errors = errors_text(held_out_error(search, a.candidate))
@@ -82,7 +83,7 @@ def _of(diagnosis: Diagnosis, h: Hypothesis, attempts: list[Attempt]) -> list[st
 
 def _beside(a: Attempt, h: Hypothesis) -> str:
     # harmonics have one name
-    others = " and ".join(dict.fromkeys(cause_text(c) for c in a.candidate.causes if _key(c) != _key(h)))
+    others = " and ".join(dict.fromkeys(cause_name(c) for c in a.candidate.causes if _key(c) != _key(h)))
     return f", beside {others}" if others else ""
 
 
@@ -137,7 +138,7 @@ def _score(diagnosis: Diagnosis, h: Hypothesis) -> str:
         return "the screen does not judge it: it is no term of the model, or does not reach the readings"
     screened, suspect = found
     alike = [
-        f"{cause_text(s.hypothesis)} (|cos| {likeness(screened, suspect, s):.3f})"
+        f"{cause_name(s.hypothesis)} (|cos| {likeness(screened, suspect, s):.3f})"
         for s in look_alike(screened, suspect)
     ]
     like = f"; confusable with {', '.join(alike)}" if alike else ""

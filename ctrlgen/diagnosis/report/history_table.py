@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal
-from ctrlgen.diagnosis.selection.not_taken import cause_text, that_matter
+from ctrlgen.diagnosis.selection.cause_entry import cause_name
+from ctrlgen.diagnosis.selection.not_taken import that_matter
 from ctrlgen.diagnosis.selection.search_history import (
     NumberEntry,
     held_out_error,
@@ -18,10 +19,10 @@ def history_rows(search: SearchResult) -> list[dict[str, str]]:
     """A row for the model before each round, for each model that it fitted, and for what was decided."""
     rows = []
     for entry, round_ in zip(search_history(search), search.rounds, strict=True):
-        beside = " and ".join(map(cause_text, round_.before.causes)) or "the device as described"
+        beside = " and ".join(map(cause_name, round_.before.causes)) or "the device as described"
         rows.append(_row(str(entry.round), beside, "", 0.0, entry.before.held_out_error, "before the round"))
         for tried, model in zip(entry.candidates, round_.candidates, strict=True):
-            added = "+ " + " and ".join(cause_text(c) for c in model.causes if c not in round_.before.causes)
+            added = "+ " + " and ".join(cause_name(c) for c in model.causes if c not in round_.before.causes)
             scores = ", ".join(number(abs(c.z), 3) for c in tried.causes if c.z is not None)
             better = (entry.before.criterion or 0.0) - (tried.criterion or 0.0)
             rows.append(_row("", added, scores, better, tried.held_out_error, tried.outcome))
@@ -54,7 +55,7 @@ def not_taken_rows(search: SearchResult) -> list[dict[str, str]]:
     """What scored better than what its round took, that which would gain most beside the answer first."""
     return [
         {
-            "cause": " and ".join(map(cause_text, refusal.causes)),
+            "cause": " and ".join(map(cause_name, refusal.causes)),
             "numbers": _numbers(search, refusal),
             "better": number(refusal.gain, 4),
             "held_out": errors_text(held_out_error(search, refusal.candidate)),

@@ -9,12 +9,13 @@ from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.experiment_sentences import experiment_sentence
 from ctrlgen.diagnosis.report.history_table import quantity, worst_error
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
+from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding, Role
 from ctrlgen.diagnosis.selection.not_taken import that_matter
 from ctrlgen.diagnosis.selection.search_history import held_out_error
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.effects import Effect
-from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.estimation.hypothesis import PARAMETER
 from ctrlgen.reporting.numbers import number
 
 # refusals that are told
@@ -36,16 +37,9 @@ def plain_name(effect: str) -> str:
     return law.title if law else effect
 
 
-def hypothesis_name(cause: Hypothesis) -> str:
-    """'stiffening at stage:axis', or 'mechanism:platform_radius differs from its nominal value'."""
-    if cause.effect == PARAMETER:
-        return f"{cause.location} differs from its nominal value"
-    return f"{cause.effect} at {cause.location}" + (f", of {cause.of}" if cause.of else "")
-
-
 def cause_text(finding: Finding) -> str:
     """The cause with its meaning: 'a clamped flexure stretches as it bends (stiffening at stage:axis)'."""
-    name = hypothesis_name(finding.cause)
+    name = cause_name(finding.cause)
     return (
         name
         if finding.effect == PARAMETER
@@ -101,7 +95,7 @@ def _within_a_sentence(text: str) -> str:
 def share_text(finding: Finding) -> str:
     """'82 % (75 ... 88 %)', or why there is none."""
     if finding.role is Role.PART and finding.serves is not None:
-        return f"part of {hypothesis_name(finding.serves)}"
+        return f"part of {cause_name(finding.serves)}"
     if finding.role is Role.UNSEEN:
         return "not seen in the held-out records"
     if finding.share is None:
@@ -151,7 +145,7 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
     elif not diagnosis.residual_tests.passed:
         steps.append("More than noise is left: the report shows where it is and of what it is a function.")
     if diagnosis.unconfirmed:
-        names = ", ".join(map(hypothesis_name, diagnosis.unconfirmed))
+        names = ", ".join(map(cause_name, diagnosis.unconfirmed))
         steps.append(
             f"No held-out record shows {names}: hold out a record that covers the same range as the records to fit."
         )
@@ -185,7 +179,7 @@ def refusals(diagnosis: Diagnosis) -> list[str]:
         now = held_out_error(search, search.chosen)[channel]
         would = f"the held-out error of {short(channel)} would be {quantity(error)} instead of {quantity(now)}"
         better = would if gain > 0 else "it scored better than what its round took"
-        names = " and ".join(map(hypothesis_name, refusal.causes))
+        names = " and ".join(map(cause_name, refusal.causes))
         said.append(f"{names}, although {better}: {'; '.join(dict.fromkeys(refusal.reasons))}")
     return said
 

@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
-from ctrlgen.diagnosis.report.narrative import hypothesis_name
 from ctrlgen.diagnosis.selection.candidate_model import Round
+from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.confusable import likeness
 from ctrlgen.diagnosis.settings import CONFUSABLE
 from ctrlgen.estimation.profile_likelihood import Profile
@@ -57,7 +57,7 @@ def _rival_bars(panel: Axes, round_: Round, kept: set[Any]) -> None:
         worse = criterion - best
         # several where a set is tried
         added = [c for c in candidate.causes if c not in round_.before.causes]
-        names = " + ".join(map(hypothesis_name, added)) or "fewer causes"
+        names = " + ".join(map(cause_name, added)) or "fewer causes"
         labels.append(textwrap.fill(names, WIDE_LABEL, break_long_words=False))
         colour = FOUND if added and kept.issuperset(added) else ALIKE if worse < CONFUSABLE.criterion else WORSE
         panel.barh(row, worse, color=colour, height=0.6)
@@ -84,7 +84,7 @@ def draw_confusability(diagnosis: Diagnosis) -> Figure | None:
     if len(top) < 2:
         return None
     values = np.array([[likeness(screened, a, b) for b in top] for a in top])
-    labels = [textwrap.fill(hypothesis_name(s.hypothesis), LABEL, break_long_words=False) for s in top]
+    labels = [textwrap.fill(cause_name(s.hypothesis), LABEL, break_long_words=False) for s in top]
     figure, panel = plt.subplots(figsize=(FIGURE_WIDTH, 1.9 + 0.42 * len(top)))
     panel.imshow(values, cmap="Blues", vmin=0, vmax=1, aspect="auto")
     for row, column in np.ndindex(values.shape):
@@ -118,7 +118,7 @@ def draw_intervals(diagnosis: Diagnosis) -> Figure | None:
         for name, e in finding.parameters.items():
             if e.value and np.all(np.isfinite([e.value, *e.ci95])):
                 ends = sorted(100 * np.array(e.ci95) / e.value)
-                rows.append((f"{hypothesis_name(finding.cause)}: {name}", ends))
+                rows.append((f"{cause_name(finding.cause)}: {name}", ends))
     if not rows:
         return None
     figure, panel = plt.subplots(figsize=(FIGURE_WIDTH, 0.8 + 0.32 * len(rows)))

@@ -1,10 +1,18 @@
-"""How the result file names a cause."""
+"""How a cause is named: in a sentence, and in the result file."""
 
 from __future__ import annotations
 
 from pydantic import Field
 
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 from ctrlgen.reporting.result_file import Keys
+
+
+def cause_name(cause: Hypothesis) -> str:
+    """'coupling at stage:x of y', or 'mechanism:radius differs from its nominal value'."""
+    if cause.effect == PARAMETER:
+        return f"{cause.location} differs from its nominal value"
+    return f"{cause.effect} at {cause.location}" + (f" of {cause.of}" if cause.of else "")
 
 
 class EffectAt(Keys):

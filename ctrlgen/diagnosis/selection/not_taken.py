@@ -8,9 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal
+from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection
 from ctrlgen.diagnosis.selection.search_result import SearchResult
-from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.estimation.hypothesis import Hypothesis
 
 
 def not_taken(
@@ -39,7 +40,7 @@ def not_taken(
 
 def _second(t: CandidateModel, best: CandidateModel, before: CandidateModel, gain: float) -> str:
     """Why a candidate that is good enough was not taken."""
-    taken = " and ".join(dict.fromkeys(cause_text(c) for c in best.causes if c not in before.causes))
+    taken = " and ".join(dict.fromkeys(cause_name(c) for c in best.causes if c not in before.causes))
     of_time, instead = (any(c.prior.of_time for c in m.causes if c not in before.causes) for m in (t, best))
     if of_time and not instead:
         return f"a function of time alone: {taken} was taken, which explains nearly as much by the motion"
@@ -73,10 +74,3 @@ def compared(search: SearchResult) -> ModelSelection:
 def held_out_rms(candidate: CandidateModel) -> np.ndarray:
     """Root mean square (n_y,) [SI] of what a candidate leaves on the held-out records."""
     return np.sqrt(candidate.held_out.plain_mean) * candidate.errors.noise.floor
-
-
-def cause_text(cause: Hypothesis) -> str:
-    """'coupling at stage:x of y', or 'mechanism:radius differs from its nominal value'."""
-    if cause.effect == PARAMETER:
-        return f"{cause.location} differs from its nominal value"
-    return f"{cause.effect} at {cause.location}" + (f" of {cause.of}" if cause.of else "")

@@ -8,10 +8,9 @@ it is part of them, not a cause.
 
 from __future__ import annotations
 
-import numpy as np
-
-from ctrlgen.diagnosis.selection.attribution import Attribution, as_fitted, attribute
+from ctrlgen.diagnosis.selection.attribution import Attribution, attribute
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
+from ctrlgen.diagnosis.selection.pruning import held_out_energy
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import ATTRIBUTION
 from ctrlgen.estimation.fit import Fit
@@ -64,8 +63,7 @@ def _without(trials: Trials, nominal: CandidateModel, current: CandidateModel, k
         return None
     if not current.errors.is_noise and compare.takes_much(bare, current):
         return None
-    records = trials.fitter.held_out_records
-    energy = [float(np.sum(as_fitted(trials.fitter, t.fit, records).plain)) for t in (bare, current, nominal)]
+    energy = [held_out_energy(trials, t) for t in (bare, current, nominal)]
     vague = amplitude_may_be_zero(current.fit, k)
     least = ATTRIBUTION.vague_share if vague else ATTRIBUTION.least_share
     return bare if energy[0] - energy[1] < least * energy[2] else None

@@ -15,6 +15,7 @@ import numpy as np
 from ctrlgen.core.errors import CtrlgenError, InputError
 from ctrlgen.core.forks import in_forks
 from ctrlgen.diagnosis.selection.candidate_model import Attempt, CandidateModel, Refusal
+from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection, scored
 from ctrlgen.diagnosis.selection.objections import objections
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
@@ -154,7 +155,7 @@ class Trials:
     def note_failure(self, cause: Hypothesis | None, error: Exception) -> None:
         """Keeps why a trial of a cause could not be made."""
         why = "; ".join(f.what for f in error.faults) if isinstance(error, InputError) else str(error)
-        self.failed.append(f"{_name(cause) if cause else 'a trial'}: {why}")
+        self.failed.append(f"{cause_name(cause) if cause else 'a trial'}: {why}")
 
     def converged(self, candidate: CandidateModel) -> CandidateModel:
         """The same candidate fitted until it converges, or as it was where that fails: candidates are first fitted for a few
@@ -168,7 +169,7 @@ class Trials:
         fit, screened = self.screens.get(key, (None, None))
         if screened is None or fit is not candidate.fit:
             screened = self.screen.run(candidate.fit)
-            self.failed += [f"{_name(h)}: {why}" for h, why in screened.dropped.items()]
+            self.failed += [f"{cause_name(h)}: {why}" for h, why in screened.dropped.items()]
             self.screens[key] = candidate.fit, screened
         return screened
 
@@ -212,7 +213,3 @@ class Trials:
         """The first of those that take away nearly as much of the objective `without` as the best one."""
         least = SEARCH.nearly_best * (without - best.fit.objective)
         return [t for t in others if without - t.fit.objective >= least][: SEARCH.converged_candidates]
-
-
-def _name(cause: Hypothesis) -> str:
-    return f"{cause.effect} at {cause.location}" + (f" of {cause.of}" if cause.of else "")
