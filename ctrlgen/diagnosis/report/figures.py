@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -11,16 +10,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.signal import freqz, welch
 
-from ctrlgen.core.units import from_si
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.narrative import short
+from ctrlgen.diagnosis.report.plot_readings import draw_readings
 from ctrlgen.diagnosis.report.plot_shares import draw_shares
 from ctrlgen.diagnosis.report.plot_uncertainty import draw_confusability, draw_intervals, draw_profiles, draw_rivals
-from ctrlgen.recordings.recording import Record
-from ctrlgen.reporting.plots import COLOURS, STYLE, svg
+from ctrlgen.diagnosis.report.residuals import AFTER, BEFORE, NOISE, WIDTH, Residuals
+from ctrlgen.reporting.plots import STYLE, svg
 
-BEFORE, AFTER, NOISE = COLOURS[2], COLOURS[0], "#d9d9d9"
-WIDTH = 8.6
 # columns of a long curve; of each the smallest and the largest sample are drawn
 POINTS = 700
 # samples of a window of the spectrum
@@ -35,6 +32,7 @@ def draw_all(diagnosis: Diagnosis) -> dict[str, str]:
     force = diagnosis.unmodelled_force
     with plt.rc_context(STYLE):
         figures: dict[str, Figure | None] = {
+            "readings": draw_readings(residuals),
             "residuals": draw_residuals(residuals),
             "spectrum": draw_spectrum(residuals),
             "shares_before": _shares(diagnosis, after=False),
@@ -55,34 +53,6 @@ def _shares(diagnosis: Diagnosis, after: bool) -> Figure | None:
         return None
     units = dict(zip(diagnosis.recording.channels, diagnosis.recording.units, strict=True))
     return draw_shares(diagnosis.shares.after if after else diagnosis.shares.before, units)
-
-
-class Residuals:
-    """Held-out residuals of the nominal and of the chosen model, in the recording's units."""
-
-    def __init__(self, diagnosis: Diagnosis) -> None:
-        self.diagnosis, self.recording, fitter = diagnosis, diagnosis.recording, diagnosis.fitter
-        self.records: list[Record] = fitter.held_out_records
-        self.settled = self.recording.kind == "poses"
-        search = diagnosis.search
-        self.scales = [from_si(1.0, unit) - from_si(0.0, unit) for unit in self.recording.units]
-        self.before, self.after = (
-            [np.where(r.valid, r.observed - fitter.predict(trial.fit, r), np.nan) * self.scales for r in self.records]
-            for trial in (search.nominal, search.chosen)
-        )
-        self.changed = bool(diagnosis.findings)
-
-    def spans(self) -> Iterator[tuple[int, np.ndarray]]:
-        """(record, its abscissa): seconds or poses, the records one after another."""
-        first = 0.0
-        for k, record in enumerate(self.records):
-            n, step = len(record.time), 1.0 if self.settled else record.sample_time
-            yield k, first + step * np.arange(n)
-            first += step * n
-
-    def floor(self, i: int) -> float | None:
-        """Noise standard deviation of channel i in its unit, None where it is not known."""
-        return self.diagnosis.held_out[self.recording.channels[i]].noise_floor
 
 
 def draw_residuals(residuals: Residuals) -> Figure:

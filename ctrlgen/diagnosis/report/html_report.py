@@ -26,6 +26,8 @@ from ctrlgen.reporting.numbers import number
 from ctrlgen.reporting.result_file import Keys, origin
 
 CAPTIONS = {
+    "readings": "Measured against simulated on the held-out records, zoomed where the error is largest, and the error below (grey: noise, "
+    "± 2 sd). Of more than three readings those with the largest error over their noise are drawn.",
     "residuals": "Residual on the held-out records. Gaps are samples that were marked as not usable.",
     "spectrum": "Amplitude spectral density of the same residual. Where a curve meets the noise, this recording holds no more information.",
     "shares_before": "What the device as described leaves: how much of its energy each kind of signal explains in blocks that were not "
