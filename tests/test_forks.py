@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from axis_records import AXIS, H, axis_fitter, record
 import ctrlgen
 from ctrlgen.core.forks import JOBS_VARIABLE, in_forks, usable_cores
 from ctrlgen.diagnosis.diagnose import diagnose_recording
+from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.estimation.checkpoint import Checkpoint
 from ctrlgen.recordings.recording import Recording
 
@@ -85,6 +87,23 @@ def test_work_whose_result_cannot_be_sent_is_done_here():
 def test_the_number_of_processes_may_be_given_in_the_environment(monkeypatch, given, cores):
     monkeypatch.setenv(JOBS_VARIABLE, given)
     assert usable_cores() == (cores or len(os.sched_getaffinity(0)))
+
+
+@forked
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_an_item_recalls_the_fits_of_those_before_all_items_and_of_no_other(tmp_path, jobs):
+    checkpoint = Checkpoint(tmp_path / "unfinished", {})
+    fitter = SimpleNamespace(checkpoint=checkpoint, recording=SimpleNamespace(kind="series"), noise=None, errors=None)
+    trials = Trials(fitter, None, lambda _: None, jobs)
+
+    def fit(_, key):
+        known = sorted(checkpoint.optima)
+        checkpoint.keep(key, np.ones(1))
+        return known
+
+    assert trials.each(fit, ["a", "b", "c"]) == [[], [], []]
+    assert trials.each(fit, ["d", "e"]) == [["a", "b", "c"]] * 2
+    assert set(Checkpoint(tmp_path / "unfinished", {}).optima) == set(checkpoint.optima) == set("abcde")
 
 
 def cubic_axis():

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +53,25 @@ class Checkpoint:
         if not self._has_header:
             write_text(self.path, _line(self.made_from) + "".join(map(_line, self.optima.items())))
             self._has_header = True
+
+    @contextmanager
+    def branch(self) -> Iterator[dict[str, list[float]]]:
+        """Gives a mapping that holds, at the end, the optima kept inside; they stay in the file, and here they are forgotten.
+
+        Work that may be done in a fork of this process so recalls the same fits as in one, and what it found is added by `learn`.
+        """
+        before = self.optima
+        new: dict[str, list[float]] = {}
+        self.optima = dict(before)
+        try:
+            yield new
+        finally:
+            new.update((key, optimum) for key, optimum in self.optima.items() if key not in before)
+            self.optima = before
+
+    def learn(self, optima: dict[str, list[float]]) -> None:
+        """Recalls from now on the `optima` of a branch, which are in the file."""
+        self.optima.update(optima)
 
     def done(self) -> None:
         """Deletes the file: the diagnosis is complete."""

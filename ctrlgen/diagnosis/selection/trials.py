@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -30,7 +31,8 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 FAILURES = (CtrlgenError, ValueError, ArithmeticError, RuntimeError, np.linalg.LinAlgError)
 """What a trial may end with: a stage that cannot be built, a balance or integrator that does not converge."""
-_Learnt = tuple[dict[frozenset[Any], tuple[CandidateModel, int]], list[Refusal], list[str], list[Attempt]]
+_Optima = dict[str, list[float]]
+_Learnt = tuple[dict[frozenset[Any], tuple[CandidateModel, int]], list[Refusal], list[str], list[Attempt], _Optima]
 
 
 class Trials:
@@ -71,31 +73,36 @@ class Trials:
     ) -> list[Result]:
         """function(trials, item) of every item, in as many processes as there may be.
 
-        Each item begins with what these trials know now, and what it learnt is kept here in the order of the items: the result
-        does not depend on the number of processes. `sentence` of an item is told as it begins.
+        Each item begins with what these trials and their checkpoint know now, and what it learnt is kept here in the order of the
+        items: neither the result nor which fits are made depends on the number of processes. `sentence` of an item is told as
+        it begins.
         """
-
-        if self.fitter.checkpoint is not None:
-            self.fitter.checkpoint.begin()
+        checkpoint = self.fitter.checkpoint
+        if checkpoint is not None:
+            checkpoint.begin()  # before there are forks, which append to the file
 
         def work(item: Item) -> tuple[Result, _Learnt]:
             branch = copy.copy(self)
             branch.jobs, branch.step = 1, (lambda _: None)
             branch.fitted, branch.screens = dict(self.fitted), dict(self.screens)
             branch.refused, branch.failed, branch.log = [], [], []
-            result = function(branch, item)
+            optima: _Optima = {}
+            with nullcontext(optima) if checkpoint is None else checkpoint.branch() as optima:
+                result = function(branch, item)
             new = {key: value for key, value in branch.fitted.items() if self.fitted.get(key) is not value}
-            return result, (new, branch.refused, branch.failed, branch.log)
+            return result, (new, branch.refused, branch.failed, branch.log, optima)
 
         devices = {c.fit.structure.device for c, _ in self.fitted.values()}
         shared = (self.fitter.recording, self.fitter.noise, self.fitter.errors, *devices)
         begun = (lambda item: self.step(sentence(item))) if sentence else (lambda item: None)
         results = []
-        for result, (new, refused, failed, log) in in_forks(work, items, self.jobs, begun, shared):
+        for result, (new, refused, failed, log, optima) in in_forks(work, items, self.jobs, begun, shared):
             self.fitted.update(new)
             self.refused += refused
             self.failed += failed
             self.log += log
+            if checkpoint is not None:
+                checkpoint.learn(optima)
             results.append(result)
         return results
 
