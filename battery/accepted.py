@@ -35,6 +35,35 @@ FAMILIES = {
     "backlash": ("backlash", "play"),
     "creep": ("creep", "thermal_lag", "second_pole"),
 }
+# Truth -> how the names begin that are right for a law in a region: which region is judged apart
+IN_A_REGION = {
+    **dict.fromkeys(("friction_there", "friction_from", "stick_from"), ("coulomb", "stribeck")),
+    "friction_one_way": ("directional_friction", "coulomb", "stribeck"),
+    **dict.fromkeys(("damping_there", "damping_fast"), ("viscous",)),
+    **dict.fromkeys(("knee", "stop_there"), ("end_stop", "stiffness_")),
+    "scratch": ("scratch", "local_error"),
+    "gain_beyond": ("saturation", "drive_gain"),
+    "play_there": ("backlash",),
+    "warm_reading": ("temperature_sensitivity",),
+}
+# Truth, or family of a memory -> families of the model-free shares that are right
+_CREEPS = ("creep", "thermal")
+EVIDENCE = {
+    **dict.fromkeys(("coulomb", "stribeck", "friction_there", "friction_from", "stick_from"), ("dry friction",)),
+    "friction_one_way": ("dry friction",),
+    **dict.fromkeys(("hysteresis", "backlash", "play_there"), ("hysteresis",)),
+    **dict.fromkeys(("stiffening", "softening", "end_stop", "knee", "stop_there"), ("elastic nonlinearity",)),
+    **dict.fromkeys(("saturation", "dead_zone", "gain_beyond"), ("drive nonlinearity",)),
+    **dict.fromkeys(("drive_gain", "sensor_gain", "stiffness", "home_offset"), ("gain and offset",)),
+    **dict.fromkeys(("coupling", "heat_crosstalk"), ("cross-talk",)),
+    **dict.fromkeys(("viscous", "quadratic_damping", "resonance", "damping_there", "damping_fast"), ("dynamics",)),
+    **dict.fromkeys(("creep", "log_creep", "thermal_lag"), _CREEPS),
+    **dict.fromkeys(("delay", "low_pass"), ("timing",)),
+    **dict.fromkeys(("bow", "frame_turn", "finite_rotation", "scratch"), ("sensor geometry",)),
+    **dict.fromkeys(("cyclic", "cogging"), ("periodic sensor error",)),
+    **dict.fromkeys(("temperature_sensitivity", "warm_reading"), ("thermal",)),
+    **dict.fromkeys(("drift", "degradation", "lost_beams", "step", "vibration"), ("events and disturbances",)),
+}
 # Truth -> another name of the very same law and numbers
 SAME_LAW = {
     "step": "force_step",
@@ -138,6 +167,8 @@ def is_right(effect: str, location: str, truth: dict[str, Any]) -> bool:
     """Whether the name of a finding is right for a planted law; for a memory, whether its family is."""
     if truth.get("family"):
         return any(word in effect for word in FAMILIES[truth["family"]])
+    if truth["name"] in IN_A_REGION:
+        return effect.startswith(IN_A_REGION[truth["name"]])
     if effect in truth.get("also", ()):
         return True
     for name in ACCEPTED.get(truth["name"], (truth["name"],)):

@@ -165,7 +165,7 @@ def draw_bench(rng: Rng, seconds: float = 6.0, loop: bool = False, ambient: bool
             Take(role, drive, draw_noise(rng, noise, phi, n), draw_ambient(rng, n, dt) if has_ambient else None, clock)
         )
         clock += n * dt + 0.5
-    scene = _scene(axis, fit, noise, clock - 0.5, dt)
+    scene = scene_of(axis, fit, noise, clock - 0.5, dt)
     return Bench(
         axis,
         stated,
@@ -177,7 +177,8 @@ def draw_bench(rng: Rng, seconds: float = 6.0, loop: bool = False, ambient: bool
     )
 
 
-def _scene(axis: Axis, fit: Array, noise: float, span: float, dt: float) -> Scene:
+def scene_of(axis: Axis, fit: Array, noise: float, span: float, dt: float) -> Scene:
+    """The sizes of the motion under the drive `fit`."""
     q = simulate(axis, fit, scene=Scene(axis, sample_time=dt))
     v = np.gradient(q, dt)
     drive_peak = float(np.abs(fit).max()) if axis.loop is None else 5.0

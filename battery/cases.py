@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from battery import axis_cases, hexapod_cases, laws, rough_cases
+from battery import axis_cases, gap_cases, hexapod_cases, laws, region_cases, rough_cases, spike_cases
 from battery.plant_axis import Planted
 from battery.seal import seal
 from battery.size import OWN, Ruler, left_over
@@ -66,12 +66,14 @@ GROUPS = (
 LOOP = ("coulomb", "stribeck", "viscous", "quadratic_damping", "cyclic", "lost_beams", "step", "backlash")
 # By class, in the order of CLASSES
 COUNTS = {
-    "ci": (2, 4, 1, 1, 1, 1, 1, 1, 1, 1, 2, 0),
-    "small": (10, 30, 8, 8, 7, 4, 2, 11, 10, 10, 12, 8),
-    "full": (110, 90, 40, 48, 42, 16, 10, 33, 200, 72, 204, 64),
+    "ci": (2, 4, 1, 1, 1, 1, 1, 1, 1, 1, 2, 0, 0, 0, 0),
+    "small": (10, 30, 8, 8, 7, 4, 2, 11, 10, 10, 12, 13, 12, 8, 9),
+    "full": (110, 90, 40, 48, 42, 16, 10, 33, 200, 72, 204, 78, 96, 104, 48),
 }
 ROUGH = ("messy", "memory", "null", "forms")
-CLASSES = ("clean", "single", "weak", "multiple", "outside", "confusable", "hexapod_clean", "hexapod_single", *ROUGH)
+FURTHER = {"regional": region_cases, "gaps": gap_cases, "spikes": spike_cases}
+TEXTBOOK = ("clean", "single", "weak", "multiple", "outside", "confusable", "hexapod_clean", "hexapod_single")
+CLASSES = (*TEXTBOOK, *ROUGH, *FURTHER)
 Rng = np.random.Generator
 
 
@@ -100,6 +102,8 @@ def plan(seed: int, size: str, classes: Sequence[str] = CLASSES) -> list[Order]:
         }.get(kind)
         if kind in ROUGH:
             names = rough_cases.plan(kind, rng, count)
+        elif kind in FURTHER:
+            names = FURTHER[kind].plan(rng, count)
         elif kind == "multiple":
             names = [_mixture(rng, 2 + k % 2) for k in range(count)]
         elif pool:
@@ -255,8 +259,12 @@ def _rough(order: Order, rng: Rng) -> tuple[Callable[[Path], None], dict[str, An
     return rough_cases.make(order.kind, order.wanted, order.seconds, rng)
 
 
+def _further(order: Order, rng: Rng) -> tuple[Callable[[Path], None], dict[str, Any]]:
+    return FURTHER[order.kind].make(order.wanted, rng)
+
+
 MAKERS = {"clean": _clean, "confusable": _confusable, "hexapod_clean": _hexapod, "hexapod_single": _hexapod}
-MAKERS |= dict.fromkeys(ROUGH, _rough)
+MAKERS |= dict.fromkeys(ROUGH, _rough) | dict.fromkeys(FURTHER, _further)
 
 
 def make_case(order: Order, folder: Path) -> str:

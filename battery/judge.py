@@ -7,16 +7,18 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from battery.accepted import ROUGH_TRUTHS, SAME_LAW, TRUTHS, in_si, is_right, place_is_right
+from battery.judge_further import Further, judge_further
 from battery.judge_rough import Rough, judge_rough
 
-ROUGH = ("messy", "memory", "forms")
+ROUGH = ("messy", "memory", "forms", "regional", "gaps", "spikes")
 
 
 @dataclass
 class Judgement:
     """One case. `named`: (truth, name given or 'none'); `covered`: (name, parameter, inside); `places`: (channel, place) right;
     `bands`: whether a line's frequency lies in the band with the largest excess; `rough`: of messy cases and memory, the latter as
-    `series` or poses, `alone` or over a background; `contradictions` within the file."""
+    `series` or poses, `alone` or over a background; `contradictions` within the file; `further`: None where it failed; `set_of` gaps and
+    the `way` in which rows are missing; `cpu` [s] and largest `memory` [GB] of the command."""
 
     case: str
     kind: str
@@ -38,6 +40,11 @@ class Judgement:
     contradictions: list[str] = field(default_factory=list)
     series: bool = True
     alone: bool = True
+    further: Further | None = None
+    set_of: str | None = None
+    way: str | None = None
+    cpu: float | None = None
+    memory: float | None = None
 
 
 def _covered(finding: dict[str, Any], truth: dict[str, Any]) -> list[tuple[str, str, bool]]:
@@ -62,6 +69,7 @@ def judge(answer: dict[str, Any], diagnosis: dict[str, Any] | None, seconds: flo
     j = Judgement(answer["case"], answer["class"], "failed", seconds=seconds)
     j.autocorrelated = answer.get("noise", {}).get("phi", 0) > 0
     j.series, j.alone = answer.get("device") in {"axis", "servo"}, not answer.get("rough")
+    j.set_of, j.way = answer.get("set"), answer.get("way")
     j.rough = Rough() if j.kind in ROUGH else None
     if diagnosis is None:
         j.alarmed, j.named = True, [(t["name"], "failed") for t in truths]
@@ -95,6 +103,7 @@ def judge(answer: dict[str, Any], diagnosis: dict[str, Any] | None, seconds: flo
     j.wrong = bool(spare)
     j.exact = exact == len(truths) and not left
     j.in_set = exact + near == len(truths) and not left
+    j.further = judge_further(answer, diagnosis, spare)
     if j.kind in ROUGH:
         j.rough = judge_rough(answer, diagnosis)
     names = {f["effect"] for f in findings} | {a["effect"] for f in findings for a in f.get("alternatives", [])}

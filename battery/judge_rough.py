@@ -46,28 +46,38 @@ class Rough:
 def judge_rough(answer: dict[str, Any], diagnosis: dict[str, Any]) -> Rough:
     """The judgement of a messy case, or of one with memory."""
     truths, small = answer["planted"], answer["background"]
-    findings = sorted(diagnosis.get("findings", []), key=_share, reverse=True)
-    leading = [t for t in truths if any(t[key] > max(u[key] for u in truths) - EQUAL for key in SHARES)]
+    findings, dominant = by_share(diagnosis), leading(truths)
     first = findings[0] if findings else None
-    named = first is not None and any(_right(first, t) for t in leading)
+    named = first is not None and any(_right(first, t) for t in dominant)
     rivals = [] if first is None else [first, *first.get("alternatives", [])]
     largest = next((f for f in findings if _right(f, truths[0])), None)
     return Rough(
         first=named,
-        in_set=any(_right(r, t) for r in rivals for t in leading),
-        place=first is not None and any(all(place_is_right(first.get("location", ""), t)) for t in leading),
-        share=largest is not None and any(abs(_share(largest) - truths[0][key]) <= NEAR for key in SHARES),
+        in_set=any(_right(r, t) for r in rivals for t in dominant),
+        place=first is not None and any(all(place_is_right(first.get("location", ""), t)) for t in dominant),
+        share=largest is not None and any(abs(share_of(largest) - truths[0][key]) <= NEAR for key in SHARES),
         artefact=_artefact_above(findings, truths, small),
         nothing_beside=all(any(_right(f, t) for t in [*truths, *small]) for f in findings),
         answered=diagnosis["verdict"] in {"partly", "explained"},
-        over_best=_over_best(answer, diagnosis),
+        over_best=over_best(answer, diagnosis),
     )
 
 
 SHARES = ("share", "share_varying")  # with each record's zero point counted as mismatch, and without: both are right
 
 
-def _share(finding: dict[str, Any]) -> float:
+def by_share(diagnosis: dict[str, Any]) -> list[dict[str, Any]]:
+    """The findings, that with the largest share first."""
+    return sorted(diagnosis.get("findings", []), key=share_of, reverse=True)
+
+
+def leading(truths: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The dominant causes that may stand first."""
+    return [t for t in truths if any(t[key] > max(u[key] for u in truths) - EQUAL for key in SHARES)]
+
+
+def share_of(finding: dict[str, Any]) -> float:
+    """Of a finding; none counts as least."""
     share = finding.get("share")
     return -np.inf if share is None or share["value"] is None else float(share["value"])
 
@@ -79,16 +89,18 @@ def _right(finding: dict[str, Any], truth: dict[str, Any]) -> bool:
 def _artefact_above(findings: list[dict[str, Any]], truths: list[dict[str, Any]], small: list[dict[str, Any]]) -> bool:
     """Whether an artefact that is not among the laws planted has a larger share than a dominant cause, or one is not named."""
     false = [f for f in findings if f["effect"] in ARTEFACTS and not any(_right(f, t) for t in [*truths, *small])]
-    real = [max((_share(f) for f in findings if _right(f, t)), default=-np.inf) for t in truths]
-    return any(_share(f) > min(real) for f in false)
+    real = [max((share_of(f) for f in findings if _right(f, t)), default=-np.inf) for t in truths]
+    return any(share_of(f) > min(real) for f in false)
 
 
-def _over_best(answer: dict[str, Any], diagnosis: dict[str, Any]) -> float | None:
+def over_best(answer: dict[str, Any], diagnosis: dict[str, Any], key: str = "rms_after") -> float | None:
     """Held-out error with the findings over that of a model with the dominant causes exact; all channels, over the noise."""
+    if "sd" not in answer.get("noise", {}):
+        return None
     sd = np.atleast_1d(answer["noise"]["sd"])
     squares = []
     for channel, error in diagnosis.get("held_out", {}).items():
         noise = sd[0] if len(sd) == 1 or ".theta" in channel else 1e-6 * sd[1]  # [m], or [rad, um]
-        if error["rms_after"] is not None:
-            squares.append((in_si(error["rms_after"], error["unit"]) / noise) ** 2)
-    return float(np.sqrt(np.mean(squares) / (answer["least_error"] ** 2 + 1))) if squares else None
+        if error[key] is not None:
+            squares.append((in_si(error[key], error["unit"]) / noise) ** 2)
+    return float(np.sqrt(np.mean(squares) / (answer.get("least_error", 0.0) ** 2 + 1))) if squares else None

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from battery import laws_drive, laws_memory, laws_sensor, laws_stage, laws_strange
+from battery import laws_drive, laws_memory, laws_region, laws_sensor, laws_stage, laws_strange
 from battery.plant_axis import Axis, Hooks, Planted, Scene, digitise, move, read
 
-MODULES = (laws_drive, laws_stage, laws_sensor, laws_strange, laws_memory)
+MODULES = (laws_drive, laws_stage, laws_sensor, laws_strange, laws_memory, laws_region)
 DRAW = {name: draw for module in MODULES for name, draw in module.DRAW.items()}
 GUESS = {name: guess for module in MODULES for name, guess in module.GUESS.items()}
 STRANGE = tuple(laws_strange.DRAW)
@@ -19,7 +19,9 @@ MAKE |= {"temperature_sensitivity": laws_sensor.make_temperature, "softening": l
 MAKE |= laws_memory.MAKE
 # Where a law acts, if not at the stage
 PLACE = {
-    **dict.fromkeys(("drive_gain", "saturation", "dead_zone", "lost_beams", "degradation", "thermal_lag"), "actuator"),
+    **dict.fromkeys(
+        ("drive_gain", "saturation", "dead_zone", "lost_beams", "degradation", "thermal_lag", "gain_beyond"), "actuator"
+    ),
     **dict.fromkeys(("vibration", "step"), "disturbance"),
     **dict.fromkeys(
         (
@@ -33,6 +35,8 @@ PLACE = {
             "stuck",
             "sensor_gain",
             "home_offset",
+            "scratch",
+            "warm_reading",
         ),
         "sensor",
     ),

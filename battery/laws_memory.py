@@ -19,5 +19,5 @@ def _maker(name: str) -> Callable[..., Hooks]:
 MAKE = {name: _maker(name) for name in OPERATORS}
 DRAW = {name: (lambda rng, s, name=name: draw_shape(name, rng, s.travel, 1000 * s.sample_time)) for name in OPERATORS}
 GUESS = {name: (lambda s: 0.01) for name in OPERATORS} | {
-    name: (lambda s: 0.005 * s.travel) for name in ("free_play", "worn_play", "loose_joints")
+    name: (lambda s: 0.005 * s.travel) for name in ("free_play", "worn_play", "loose_joints", "play_of_many")
 }

@@ -78,7 +78,7 @@ def make_backlash(scene: Scene, a: float) -> Hooks:
     return Hooks(carried=carried)
 
 
-def _lugre(scene: Scene, level: Callable[[float], float], stiffness: float) -> Callable[[float, float, float], float]:
+def lugre(scene: Scene, level: Callable[[float], float], stiffness: float) -> Callable[[float, float, float], float]:
     """LuGre: dz/dt = v - s_0 |v| z/g(v), F = -(s_0 z + s_1 dz/dt). C. Canudas de Wit et al., IEEE TAC 40 (1995) 419.
 
     The bristle's equation is solved exactly for v held over a step.
@@ -100,14 +100,14 @@ def _lugre(scene: Scene, level: Callable[[float], float], stiffness: float) -> C
 
 def make_coulomb(scene: Scene, a: float, presliding: float) -> Hooks:
     """LuGre with a constant level a [N]; bristles bend by `presliding` [m] before they slip."""
-    return Hooks(force=_lugre(scene, lambda v: a, a / presliding)) if a else Hooks()
+    return Hooks(force=lugre(scene, lambda v: a, a / presliding)) if a else Hooks()
 
 
 def make_stribeck(scene: Scene, a: float, presliding: float, ratio: float, speed: float) -> Hooks:
     """LuGre with g(v) = a (1 + (ratio - 1) exp(-(v/speed)^2)) [N]."""
     if not a:
         return Hooks()
-    return Hooks(force=_lugre(scene, lambda v: a * (1 + (ratio - 1) * math.exp(-((v / speed) ** 2))), a / presliding))
+    return Hooks(force=lugre(scene, lambda v: a * (1 + (ratio - 1) * math.exp(-((v / speed) ** 2))), a / presliding))
 
 
 def make_viscous(scene: Scene, a: float, width: float) -> Hooks:
@@ -150,6 +150,16 @@ def make_resonance(scene: Scene, a: float, frequency: float, ratio: float) -> Ho
         middle = (v2 + new) / 2
         state[0], state[1] = q2 + h * middle, new
         return m2 * (w * w * (q2 + h / 2 * middle - q) + d * (middle - v))
+
+    return Hooks(force=force)
+
+
+def make_cogging(scene: Scene, a: float, period: float, phase: float, second: float) -> Hooks:
+    """F = -a (sin p + second sin 2 p), p = 2 pi q/period + phase: slots of a motor, a little sharper than a sine."""
+
+    def force(t: float, q: float, v: float) -> float:
+        p = 2 * math.pi * q / period + phase
+        return -a * (math.sin(p) + second * math.sin(2 * p))
 
     return Hooks(force=force)
 
@@ -199,6 +209,11 @@ DRAW = {
         "side": float(rng.choice([-1, 1])),
     },
     "resonance": draw_resonance,
+    "cogging": lambda rng, s: {
+        "period": float(s.peak * rng.uniform(0.1, 0.4)),
+        "phase": float(rng.uniform(0, 2 * np.pi)),
+        "second": float(rng.uniform(0, 0.2)),
+    },
     "stiffness": lambda rng, s: {},
     "expansion": lambda rng, s: {"tau": float(10 ** rng.uniform(-0.7, 0.3))},
 }
@@ -216,6 +231,7 @@ GUESS = {
     "quadratic_damping": lambda s: 0.05 * s.axis.damping / s.speed,
     "end_stop": lambda s: 0.1,
     "resonance": lambda s: 0.005,
+    "cogging": lambda s: 0.002 * s.axis.force_constant * s.drive_peak,
     "stiffness": lambda s: 0.2,
     "expansion": lambda s: 0.01 * s.travel / s.drive_peak**2,
 }

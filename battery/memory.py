@@ -26,8 +26,14 @@ FAMILY = {
     "power_creep": "creep",
     "sinh_creep": "creep",
 }
-FORMS = ("narrow_stack", "leaning_stack")  # of hysteresis: further ones, in a class of their own
-FAMILIES = FAMILY | dict.fromkeys(FORMS, "hysteresis")
+# Further forms, in a class of their own
+FORMS = {
+    **dict.fromkeys(("narrow_stack", "wide_stack", "humped_stack", "leaning_stack"), "hysteresis"),
+    "play_of_many": "backlash",
+    "long_creep": "creep",
+}
+FAMILIES = FAMILY | FORMS
+DECADES = 6  # of `long_creep`
 
 
 def bouc_wen_motion(t: Array, x: Array, a: float, reach: float, loop: float, power: float) -> Array:
@@ -62,11 +68,6 @@ def _play(x: Array, half: float, w: float) -> Array:
 def play_stack(t: Array, x: Array, a: float, radii: list[float], weights: list[float]) -> Array:
     """a sum_j w_j (play of half width r_j - x), Prandtl-Ishlinskii; sum w_j = 1."""
     return a * sum(w * (_play(x, r, 0.0) - x) for r, w in zip(radii, weights, strict=True))
-
-
-def narrow_stack(t: Array, x: Array, a: float, radii: list[float], weights: list[float]) -> Array:
-    """As `play_stack`, of radii in even ratios and any weights, most of them on the narrowest."""
-    return play_stack(t, x, a, radii, weights)
 
 
 def leaning_stack(
@@ -131,6 +132,12 @@ def loose_joints(t: Array, x: Array, a: float, start: float, spread: float) -> A
     return sum(free_play(t, x, a * (1 + s), start) for s in (-spread, 0.0, spread)) / 3
 
 
+def play_of_many(t: Array, x: Array, a: float, start: float, spread: float, joints: int) -> Array:
+    """As `loose_joints`, of `joints` gaps evenly within a (1 +- spread): a chain whose links take up their slack one by one."""
+    shares = np.linspace(-spread, spread, joints)
+    return sum(free_play(t, x, a * (1 + s), start) for s in shares.tolist()) / joints
+
+
 def three_relaxations(t: Array, x: Array, a: float, tau: float) -> Array:
     """a (0.5 lag(x, tau) + 0.3 lag(x, 4 tau) + 0.2 lag(x, 15 tau))."""
     out = np.zeros_like(x)
@@ -138,6 +145,16 @@ def three_relaxations(t: Array, x: Array, a: float, tau: float) -> Array:
         d = math.exp(-(t[1] - t[0]) / times / tau)
         out += weight * lfilter([1 - d], [1, -d], x)
     return a * out
+
+
+def long_creep(t: Array, x: Array, a: float, first: float) -> Array:
+    """a sum_i lag(x, tau_i)/n, four tau_i a decade over `DECADES` decades from `first` [s]: a logarithm of time that no record ends."""
+    out, step = np.zeros_like(x), t[1] - t[0]
+    times = first * np.logspace(0, DECADES, 4 * DECADES + 1)
+    for tau in times.tolist():
+        d = math.exp(-step / tau)
+        out += lfilter([1 - d], [1, -d], x)
+    return a * out / len(times)
 
 
 def power_creep(t: Array, x: Array, a: float, tau: float, power: float) -> Array:
@@ -156,22 +173,25 @@ def sinh_creep(t: Array, x: Array, a: float, tau: float, scale: float) -> Array:
     return a * np.array(out)
 
 
+# As `play_stack`, radii in even ratios, with most of the weight on the narrowest, on the widest, or in two humps
+WEIGHTED = ("narrow_stack", "wide_stack", "humped_stack")
 OPERATORS: dict[str, Callable[..., Array]] = {
     f.__name__: f
     for f in (
         bouc_wen_motion,
         play_stack,
-        narrow_stack,
         leaning_stack,
         preisach,
         free_play,
         worn_play,
         loose_joints,
+        play_of_many,
         three_relaxations,
+        long_creep,
         power_creep,
         sinh_creep,
     )
-}
+} | dict.fromkeys(WEIGHTED, play_stack)
 
 
 def added(name: str, amplitude: float, shape: dict[str, Any], t: Array, x: Array) -> Array:
@@ -192,9 +212,14 @@ def draw_shape(name: str, rng: np.random.Generator, travel: float, clock: float)
         weights = np.exp(-between(0.0, 2.0) * np.linspace(0, 1, n)) * rng.uniform(0.7, 1.3, n)
         radii = travel * np.linspace(0.04, between(0.6, 1.2), n) ** between(0.9, 1.3)
         return {"radii": radii.tolist(), "weights": (weights / weights.sum()).tolist()}
-    if name == "narrow_stack":
+    if name in WEIGHTED:
         radii = travel * np.geomspace(0.01, between(0.5, 1.5), int(rng.integers(10, 14)))
         weights = rng.exponential(1.0, len(radii)) * radii ** -between(0.1, 0.5)
+        if name == "wide_stack":
+            weights = weights[::-1]
+        if name == "humped_stack":
+            at, places = np.linspace(0, 1, len(radii)), (between(0.0, 0.3), between(0.7, 1.0))
+            weights = sum(between(0.5, 1.0) * np.exp(-(((at - c) / 0.12) ** 2)) for c in places)
         return {"radii": radii.tolist(), "weights": (weights / weights.sum()).tolist()}
     if name == "leaning_stack":
         radii, weights = travel * rng.uniform(0.1, 0.7, 3), rng.uniform(0.5, 1.5, 3)
@@ -204,11 +229,14 @@ def draw_shape(name: str, rng: np.random.Generator, travel: float, clock: float)
     if name == "preisach":
         return {"scale": travel * between(1.5, 3.0), "skew": between(-0.4, 0.4)}
     start = {"start": between(-1, 1)}
+    if name == "long_creep":
+        return {"first": clock * 10 ** between(-3.5, -2.5)}
     if name in {"three_relaxations", "power_creep", "sinh_creep"}:
         start = {"tau": clock * between(0.2, 1.0)}
     more = {
         "worn_play": {"scale": travel, "wear": between(0.1, 0.3)},
         "loose_joints": {"spread": between(0.05, 0.2)},
+        "play_of_many": {"spread": between(0.2, 0.5), "joints": int(rng.integers(5, 9))},
         "power_creep": {"power": between(0.15, 0.4)},
         "sinh_creep": {"scale": travel * between(0.7, 1.5)},
     }

@@ -16,6 +16,7 @@ from battery.plant_hexapod import AXES, Hexapod, changed
 from battery.size import Ruler
 from plants.numbers import read
 
+Sizes = tuple[float, float]
 Made = tuple[Callable[[Path], None], dict[str, Any]]
 DEVICES = ("axis", "mems", "axis", "axis", "meso")  # of messy cases, in turn
 NULLS = ("spikes", "coloured", "understated", "overstated", "linear", "linear_hexapod")
@@ -37,6 +38,7 @@ def plan(kind: str, rng: Rng, count: int) -> list[tuple[str, ...]]:
         return [(DEVICES[k % 5], *_dominant(rng, DEVICES[k % 5], 1 + k % 2)) for k in range(count)]
     if kind == "forms":
         rooms = [*itertools.product(("servo", "meso", "axis", "mems"), ("single",), memory.FORMS)]
+        rooms += [("axis", "single", "cogging")] * 2
         cycle = itertools.cycle(rng.permutation(rooms).tolist())
         return [tuple(map(str, next(cycle))) for _ in range(count)]
     forms = rng.permutation(list(memory.FAMILY)).tolist()
@@ -61,25 +63,43 @@ def make(kind: str, wanted: tuple[str, ...], seconds: float, rng: Rng) -> Made:
     rough = kind == "messy" or wanted[1] == "messy"
     low, high = messy.DOMINANT if rough else MEMORY
     make_one = _poses if device in pose_cases.MACHINES else _axis
+    return until(lambda: make_one(device, names, rough, seconds, rng, (low, high)), wanted)
+
+
+def until(once: Callable[[], Made], wanted: tuple[str, ...]) -> Made:
+    """What `once` returns: tried until it raises no ValueError, which says that no amplitude has the wanted size on its bench."""
     for _ in range(TRIES):
         try:
             with np.errstate(over="ignore", invalid="ignore"):  # a spring that softens too far
-                return make_one(device, names, rough, seconds, rng, low, high)
-        except ValueError:  # no amplitude of the wanted size on this bench
+                return once()
+        except ValueError:
             continue
     raise RuntimeError(f"no draw gave {wanted} the wanted size; widen the laws' shape values")
 
 
-def _axis(device: str, names: tuple[str, ...], rough: bool, seconds: float, rng: Rng, low: float, high: float) -> Made:
+def _axis(device: str, names: tuple[str, ...], rough: bool, seconds: float, rng: Rng, sizes: Sizes) -> Made:
     servo = device == "servo"
     bench = servo_cases.draw_bench(rng, 5 * seconds) if servo else axis_cases.draw_bench(rng, seconds)
     bench = messy.unsettled(rng, bench) if rough else bench
+    bench, planted, answer = on_axis(bench, device, names, rng, sizes, rough)
+    return (lambda d: messy.write(d, bench, planted)), answer
+
+
+def on_axis(
+    bench: Bench,
+    device: str,
+    names: tuple[str, ...],
+    rng: Rng,
+    sizes: Sizes,
+    rough: bool = False,
+    draw: Callable[[str], Any] | None = None,
+) -> tuple[Bench, list[Any], dict[str, Any]]:
+    """Dominant causes `names`, and a background if `rough`: the bench, with a zero point of each record if `rough`, all laws, and the
+    answer. `draw`: a law by its name. Raises ValueError where a law has not its size."""
+    servo, (low, high) = device == "servo", sizes
     t = bench.fit
     ruler = Ruler(bench.axis, bench.scene, t.drive, t.start, t.ambient, t.noise, bench.linear)
-
-    def draw(name: str) -> Any:
-        return laws.draw(name, rng, bench.scene)
-
+    draw = draw or (lambda name: laws.draw(name, rng, bench.scene))
     top = min(high, messy.LARGEST_TRAVEL * bench.scene.travel / bench.scene.noise)
     found = messy.dominant(rng, draw, ruler, names, low, top)
     largest = max(size for _, size in found)
@@ -91,7 +111,7 @@ def _axis(device: str, names: tuple[str, ...], rough: bool, seconds: float, rng:
     rest = [_truth(p.name, _locations(p.name, servo), p.amplitude, p.shape, size) for p, size in small]
     known = messy.shares(bench, _laws(found), _laws(small), ruler)
     answer = axis_cases.describe(bench) | told(truths, rest, known, device, rough)
-    return (lambda d: messy.write(d, bench, _laws([*found, *small]))), answer
+    return bench, _laws([*found, *small]), answer
 
 
 def _laws(sized: list[tuple[Any, float]]) -> list[Any]:
@@ -108,9 +128,17 @@ def _truth(name: str, location: str, amplitude: float, shape: dict[str, Any], si
     return {"name": name, "location": location, "amplitude": amplitude, "shape": shape, "size": size}
 
 
-def _poses(device: str, names: tuple[str, ...], rough: bool, seconds: float, rng: Rng, low: float, high: float) -> Made:
+def _poses(device: str, names: tuple[str, ...], rough: bool, seconds: float, rng: Rng, sizes: Sizes) -> Made:
     bench = pose_cases.draw_bench(rng, device, rough)
-    gauge = pose_cases.PoseGauge(bench)
+    bench, acts, dwell, answer = on_poses(bench, device, names, rng, sizes, rough)
+    return (lambda d: pose_cases.write(d, bench, acts, dwell)), answer
+
+
+def on_poses(
+    bench: pose_cases.Bench, device: str, names: tuple[str, ...], rng: Rng, sizes: Sizes, rough: bool = False
+) -> tuple[pose_cases.Bench, list[Any], bool, dict[str, Any]]:
+    """As `on_axis`, of pose sets; and whether the recording says how long a pose was held."""
+    gauge, (low, high) = pose_cases.PoseGauge(bench), sizes
 
     def draw(name: str) -> Any:
         return pose_cases.draw_act(name, rng, bench, gauge)
@@ -129,7 +157,7 @@ def _poses(device: str, names: tuple[str, ...], rough: bool, seconds: float, rng
     creeps = any(memory.FAMILIES.get(name) == "creep" for name in names)
     dwell = creeps or bool(rng.uniform() < 0.3)
     answer = hexapod_cases.describe(bench.poses) | told(truths, rest, known, device, rough)
-    return (lambda d: pose_cases.write(d, bench, [*_laws(found), *_laws(small)], dwell)), answer
+    return bench, _laws([*found, *small]), dwell, answer
 
 
 def told(

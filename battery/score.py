@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import signal
 import subprocess
 import time
@@ -19,8 +20,11 @@ import numpy as np
 from battery.consistency import contradictions
 from battery.judge import Judgement, judge
 from battery.rows import Row, number, share
+from battery.score_further import evidence_table, further_rows
 from battery.score_rough import rough_rows
 from battery.seal import unseal
+
+POLL = 0.05  # s, between looks whether a process has ended
 
 
 @dataclass(frozen=True)
@@ -33,7 +37,8 @@ class Result:
 
 
 def run_case(folder: Path, name: str, command: Sequence[str], timeout: float, again: bool) -> dict[str, Any]:
-    """The command on one case; {'seconds', 'exit'}, kept in results/<case>/run.json so that an interrupted run goes on."""
+    """The command on one case; {'seconds', 'cpu' [s], 'memory' [GB], 'exit'}, kept in results/<case>/run.json so that an interrupted run
+    goes on."""
     case, out = folder / "cases" / name, folder / "results" / name
     kept = out / "run.json"
     if kept.exists() and not again:
@@ -44,15 +49,26 @@ def run_case(folder: Path, name: str, command: Sequence[str], timeout: float, ag
     with (out / "log.txt").open("w") as log:
         files = [str(case / "device.toml"), str(case / "recording.toml"), "--out", str(out / "report")]
         process = subprocess.Popen([*command, *files], stdout=log, stderr=subprocess.STDOUT, start_new_session=True)
-        try:
-            code: int | str = process.wait(timeout)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)  # the command's own children too: it leads its own session
-            process.wait()
-            code = "time-out"
-    state = {"seconds": time.perf_counter() - begin, "exit": code}
+        code, usage = _finished(process, begin + timeout)
+    state: dict[str, Any] = {"seconds": time.perf_counter() - begin, "exit": code}
+    state |= {"cpu": usage.ru_utime + usage.ru_stime, "memory": usage.ru_maxrss / 1e6}
     kept.write_text(json.dumps(state) + "\n")
     return state
+
+
+def _finished(process: subprocess.Popen[bytes], until: float) -> tuple[int | str, resource.struct_rusage]:
+    """How the process ended, 'time-out' at `until`, and what it and its children used: the largest memory of one of them."""
+    code: int | str | None = None
+    while True:
+        pid, status, usage = os.wait4(process.pid, 0 if code else os.WNOHANG)
+        if pid:
+            process.returncode = os.waitstatus_to_exitcode(status)
+            return process.returncode if code is None else code, usage
+        if time.perf_counter() > until:
+            os.killpg(process.pid, signal.SIGKILL)  # the command's own children too: it leads its own session
+            code = "time-out"
+        else:
+            time.sleep(POLL)
 
 
 def load(folder: Path, name: str, state: dict[str, Any]) -> Judgement:
@@ -66,6 +82,7 @@ def load(folder: Path, name: str, state: dict[str, Any]) -> Judgement:
         except json.JSONDecodeError:
             diagnosis = None
     judged = judge(answer, diagnosis, state["seconds"])
+    judged.cpu, judged.memory = state.get("cpu"), state.get("memory")
     judged.contradictions = contradictions(diagnosis) if diagnosis else []
     return judged
 
@@ -114,6 +131,7 @@ def table(judged: Sequence[Judgement]) -> list[Row]:
         ),
         share("confusable, wrong name", [j.wrong for j in of("confusable")], "none set"),
         *rough_rows(judged),
+        *further_rows(judged),
         share("contradicts itself", [bool(j.contradictions) for j in judged], "0 %", most=0.0),
         share("crashed, refused or out of time", [j.verdict == "failed" for j in judged], "0 %", most=0.0),
     ]
@@ -140,6 +158,7 @@ def markdown(rows: Sequence[Row], judged: Sequence[Judgement], opponents: list[d
     for truth in sorted({t for t, _ in pairs}):
         named = Counter({n: c for (t, n), c in pairs.items() if t == truth})
         lines.append(f"| {truth} | {', '.join(f'{n} {c}' for n, c in named.most_common())} |")
+    lines += ["", *evidence_table(judged)]
     if opponents:
         from battery.opponents import summary
 

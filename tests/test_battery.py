@@ -268,6 +268,8 @@ def test_all_wrong_misses_every_goal_that_a_name_can_miss():
         "time of a case with one effect, longest [s]",
         "time of a case with two or three, longest [s]",
         "contradicts itself",
+        "region stated where none is",
+        "held-out error worse than before",
         "crashed, refused or out of time",
     }
     assert rows["false alarms on clean records"].hits == 1

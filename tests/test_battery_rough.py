@@ -177,10 +177,11 @@ def test_every_form_of_memory_meets_every_device_alone_and_over_a_background():
     assert {row[2] for row in rows[:9]} == set(memory.FAMILY)
 
 
-def test_further_forms_of_hysteresis_meet_every_device_alone():
-    rows = rough_cases.plan("forms", np.random.default_rng(5), 8)
+def test_further_forms_of_memory_meet_every_device_alone():
+    rows = rough_cases.plan("forms", np.random.default_rng(5), 26)
     assert {(row[0], row[2]) for row in rows} == {
-        (device, form) for device in ("axis", "servo", "mems", "meso") for form in memory.FORMS
+        *((device, form) for device in ("axis", "servo", "mems", "meso") for form in memory.FORMS),
+        ("axis", "cogging"),
     }
     assert {row[1] for row in rows} == {"single"}
     narrow = memory.draw_shape("narrow_stack", np.random.default_rng(3), 1.0, 1.0)
