@@ -17,6 +17,7 @@ MOVING = 0.02  # of the rms speed: slower, a direction says nothing
 FALSE = 0.05  # share from which on a false name counts
 WORSE = 1.01  # held-out error after over that before, from which on an answer makes it worse
 NEAR_BEST = 1.5  # held-out error over the least possible
+ALIKE = 0.005  # by which shares of families may differ that one signal speaks for
 TOLD = 0.1  # by which the number of spikes told may differ from those planted
 
 
@@ -36,8 +37,10 @@ class Located:
 
 @dataclass(frozen=True)
 class Evidence:
-    """The model-free shares: the `family` with the largest `share`, whether it is a dominant cause's (`right`), whether the first
-    finding is a dominant cause (`named`), and whether they are said to speak against it (`against`)."""
+    """The model-free shares: the `family` with the largest `share`, whether it, or one alike, is a dominant cause's (`right`).
+
+    `named`: the first finding is a dominant cause; `against`: the shares are said to speak against it.
+    """
 
     family: str
     share: float
@@ -115,13 +118,14 @@ def _evidence(answer: dict[str, Any], diagnosis: dict[str, Any], first: dict[str
     families = ((diagnosis.get("shares") or {}).get("before") or {}).get("families") or []
     if not families:
         return None
+    first_of = {f["family"] for f in families if f["share"] >= families[0]["share"] - ALIKE}
     truths = leading(answer["planted"])
     kinds = {family for t in truths for family in EVIDENCE.get(t.get("family") or t["name"], ())}
     support = (first or {}).get("support") or {}
     return Evidence(
         family=families[0]["family"],
         share=float(families[0]["share"] or 0.0),
-        right=families[0]["family"] in kinds,
+        right=bool(first_of & kinds),
         named=first is not None and any(_right(first, t) for t in truths),
         against=bool(support.get("contradicted")),
     )

@@ -260,6 +260,8 @@ def test_what_the_shares_say_is_weighed_against_the_finding():
         judged(DRAG, finding("drift"), **shares("dry friction", 0.4)),
         judged(DRAG, drag, shares=None),
     ]
+    tied = [{"family": f, "share": 0.5} for f in ("hysteresis", "dry friction", "dynamics")]
+    assert judged(DRAG, drag, shares={"before": {"families": tied}}).further.evidence.right
     assert [j.further.evidence and j.further.evidence.right for j in all_of] == [True, False, True, None]
     table = evidence_table(all_of)
     assert table[4] == "| 0.5 to 0.75 | 1 | 1 | 0 | 1 | 1 |" and table[-1] == "| all | 3 | 1 | 1 | 1 | 1 |"
