@@ -30,15 +30,18 @@ COMMANDS = (
     "fastest",
     "learn",
     "example",
+    "new",
     "diagnose",
     "calibrate",
     "batch",
 )
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize(
+    "command", [*(command for command in COMMANDS if command != "new"), "new device", "new scenario"]
+)
 def test_every_command_has_a_help_with_an_example(command):
-    done = ctrlgen(command, "--help")
+    done = ctrlgen(*command.split(), "--help")
     assert done.returncode == 0 and f"ctrlgen {command} " in done.stdout and "Example" in done.stdout
 
 

@@ -55,7 +55,8 @@ MAY_IMPORT = {
     "app": f"{C} firmware.fmi devices.mechanism devices.user budget path_timing learning verification calibration recordings estimation "
     "diagnosis diagnosis.shares diagnosis.selection diagnosis.evidence diagnosis.report",
 }
-MAY_IMPORT["app.commands"] = f"app {MAY_IMPORT['app']}"
+MAY_IMPORT["app.new_files"] = f"{C} devices model trajectory"
+MAY_IMPORT["app.commands"] = f"app app.new_files {MAY_IMPORT['app']}"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
 

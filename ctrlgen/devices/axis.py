@@ -7,8 +7,9 @@ from types import SimpleNamespace
 from typing import Annotated, ClassVar, Literal
 
 import casadi as ca
+from pydantic import model_validator
 
-from ctrlgen.core.units import In, Quantity, written_unit
+from ctrlgen.core.units import In, Quantity, same_dimension, written_unit
 from ctrlgen.devices.base import Device
 from ctrlgen.devices.device_physics import DevicePhysics, FeedbackLoop, InertialPhysics
 from ctrlgen.devices.limit import Limit
@@ -45,6 +46,15 @@ class Actuator(Section):
     """Force per drive k_f; its unit decides whether the drive is a voltage or a current."""
     drive_limit: Annotated[Quantity, In("V", positive=True)] | Annotated[Quantity, In("A", positive=True)]
     """Largest drive of either sign, in volt or ampere as in `force_constant`."""
+
+    @model_validator(mode="after")
+    def _driven_by_one_quantity(self) -> Actuator:
+        constant, limit = written_unit(self.force_constant.text), written_unit(self.drive_limit.text)
+        if not same_dimension(f"({constant})*({limit})", "N"):
+            raise ValueError(
+                f"force_constant in {constant} gives no force of a drive_limit in {limit}; write both in volt or in ampere"
+            )
+        return self
 
 
 class Loop(Section):

@@ -324,6 +324,10 @@ def commands_page() -> str:
     for command in cli.app.registered_commands:
         name = command.name or command.callback.__name__.replace("_", "-")
         lines += [f"## ctrlgen {name}", "", *_help(runner, cli.app, [name], environment)]
+    for group in cli.app.registered_groups:
+        for command in group.typer_instance.registered_commands:
+            words = [str(group.name), str(command.name or command.callback.__name__)]
+            lines += [f"## ctrlgen {' '.join(words)}", "", *_help(runner, cli.app, words, environment)]
     return "\n".join(lines)
 
 

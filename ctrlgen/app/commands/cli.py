@@ -16,6 +16,7 @@ from ctrlgen.app.commands import (  # noqa: F401, they register their commands
     examples,
     fastest_paths,
     learning,
+    new,
     recordings,
 )
 from ctrlgen.app.commands.app import PANELS, app
@@ -24,7 +25,10 @@ from ctrlgen.core.errors import CtrlgenError, Unreachable
 from ctrlgen.core.files import explained
 
 app.registered_commands.sort(key=lambda command: PANELS.index(command.rich_help_panel))
-for command in app.registered_commands:  # typer keeps a docstring's line breaks: let the terminal break its paragraphs
+for command in (
+    *app.registered_commands,
+    *new.new.registered_commands,
+):  # typer keeps a docstring's line breaks: let the terminal break its paragraphs
     command.help = re.sub(r"(?<=[^\n\b])\n(?=\w)", " ", inspect.getdoc(command.callback) or "")
 
 

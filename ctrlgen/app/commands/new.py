@@ -1,0 +1,94 @@
+"""Files to begin with: new device, new scenario. The work is imported by the command that does it."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ctrlgen.app.commands.app import DEVICE_PANEL, app
+from ctrlgen.app.console import out
+from ctrlgen.core.errors import Fault, InputError
+
+new = typer.Typer(no_args_is_help=True, help="Begin a device or a scenario: a commented file that passes check.")
+app.add_typer(new, name="new", rich_help_panel=DEVICE_PANEL)
+
+
+@new.command()
+def device(
+    file: Annotated[Path, typer.Argument(help="The device file to write, such as stage.toml.", show_default=False)],
+    kind: Annotated[
+        str,
+        typer.Option(help="What it is: piezo, voice-coil, xy, tip-tilt, hexapod, mechanism.", show_default=False),
+    ],
+    name: Annotated[
+        str | None,
+        typer.Option(help="Name of the device and of its C functions.", show_default="as the file"),
+    ] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help="A number, such as mass=80g; repeat for more.", show_default=False
+        ),
+    ] = None,
+    ask: Annotated[
+        bool | None,
+        typer.Option(
+            "--ask/--no-ask", help="Ask for the numbers that --set does not give.", show_default="in a terminal"
+        ),
+    ] = None,
+) -> None:
+    """Begin a device file: its numbers are asked for in a terminal, or given by --set; those that nobody gave are marked as assumed.
+
+    Kinds: piezo (one axis, a stack and two blades), voice-coil (one axis with mass), xy (two stacks), tip-tilt (a mirror on
+    three stacks), hexapod (six struts on three planar stages), mechanism (your own, from its drawing).
+
+    Example:  ctrlgen new device stage.toml --kind piezo --set voltage=150V --set free_stroke=30um
+    """
+    from ctrlgen.app.new_files.questions import KINDS, read
+    from ctrlgen.app.new_files.write import write_device
+
+    given = dict(_pair(text) for text in set_ or [])
+    if sys.stdin.isatty() if ask is None else ask:
+        for question in KINDS[kind].questions if kind in KINDS else ():
+            while question.key not in given:
+                answer = typer.prompt(question.text, default=question.answer)
+                try:
+                    read(question, answer)
+                except ValueError as error:
+                    out.print(f"  {error}", markup=False, soft_wrap=True)
+                else:
+                    given |= {question.key: answer} if answer != question.answer else {}
+                    break
+    write_device(file, kind, name, given)
+    out.print(str(file), soft_wrap=True, markup=False)
+    out.print(f"next:  ctrlgen check {file}", soft_wrap=True, markup=False)
+    out.print(f"then:  ctrlgen new scenario circle --device {file}", soft_wrap=True, markup=False)
+
+
+@new.command()
+def scenario(
+    folder: Annotated[Path, typer.Argument(help="The folder of the scenario, such as circle.", show_default=False)],
+    device_path: Annotated[Path, typer.Option("--device", help="The device file.", show_default=False)],
+    path: Annotated[
+        str, typer.Option(help="The path: circle, line, raster, spiral.", show_default="circle, or line of one axis")
+    ] = "",
+) -> None:
+    """Begin a scenario: a path in the middle of what the device can reach, half as large as would fit.
+
+    Example:  ctrlgen new scenario scenarios/mine --device scenarios/devices/xy_lever_stage.toml
+    """
+    from ctrlgen.app.new_files.write import write_scenario
+
+    write_scenario(folder, device_path, path or None)
+    out.print(str(folder / "scenario.toml"), soft_wrap=True, markup=False)
+    out.print(f"next:  ctrlgen run {folder} --out out/{folder.name}", soft_wrap=True, markup=False)
+
+
+def _pair(text: str) -> tuple[str, str]:
+    key, equals, value = text.partition("=")
+    if not equals:
+        raise InputError("--set", [Fault(text, "must be KEY=VALUE, such as mass=80g")])
+    return key.strip(), value.strip()

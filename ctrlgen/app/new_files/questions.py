@@ -1,0 +1,134 @@
+"""What is asked of a device of each kind, with an answer to begin with; a template beside this file turns the answers into a file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.units import parse, to_si, written_unit
+
+
+@dataclass(frozen=True)
+class Question:
+    """One number of a device: its `key`, the question in words, and an `answer` to begin with, whose dimension any other must have."""
+
+    key: str
+    text: str
+    answer: str
+    positive: bool = True
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of device that can be begun: what it is, its questions."""
+
+    title: str
+    questions: tuple[Question, ...]
+
+
+STACK = (
+    Question("voltage", "largest voltage of the amplifier", "120 V"),
+    Question("free_stroke", "stroke of the stack at that voltage, free", "20 um"),
+    Question("stack_stiffness", "stiffness of the stack", "50 N/um"),
+)
+BLADES = (
+    Question("blade_length", "length of a blade (leaf spring)", "25 mm"),
+    Question("blade_thickness", "thickness of a blade, along which it bends", "0.5 mm"),
+    Question("blade_width", "width of a blade", "10 mm"),
+)
+KINDS: Mapping[str, Kind] = {
+    "piezo": Kind(
+        "one axis: a piezo stack pushes a stage on two blades",
+        (*STACK, Question("mass", "moving mass", "50 g"), *BLADES),
+    ),
+    "voice-coil": Kind(
+        "one axis with inertia: a voice coil moves a mass on flexures",
+        (
+            Question("mass", "moving mass", "0.5 kg"),
+            Question("stiffness", "stiffness of the flexures", "0.2 N/um"),
+            Question("damping", "viscous damping, from a ring-down", "30 N*s/m"),
+            Question("stroke", "largest displacement to either side", "100 um"),
+            Question("force_constant", "force of the coil per volt or ampere", "10 N/V"),
+            Question("drive_limit", "largest drive of either sign, in the same volt or ampere", "4 V"),
+        ),
+    ),
+    "xy": Kind(
+        "X-Y stage: two piezo stacks, each pushing a block, blades decouple the plate",
+        (*STACK, Question("mass", "mass of the plate", "0.25 kg"), *BLADES),
+    ),
+    "tip-tilt": Kind(
+        "mirror on three piezo stacks: tip, tilt and piston",
+        (*STACK, Question("radius", "radius of the circle on which the stacks stand", "12 mm")),
+    ),
+    "hexapod": Kind(
+        "six struts on three planar stages, moved by six linear actuators: kinematics alone",
+        (
+            Question("platform_radius", "radius of the strut ends on the platform", "60 mm"),
+            Question("base_radius", "radius of the strut ends on the stages", "140 mm"),
+            Question("platform_half_angle", "half the angle between neighbouring strut ends on the platform", "10 deg"),
+            Question("base_half_angle", "half the angle between neighbouring strut ends on the base", "5 deg"),
+            Question("height", "height of the platform's centre above the lower strut ends", "200 mm"),
+            Question("platform_thickness", "thickness of the platform", "12 mm"),
+            Question("travel", "largest displacement of an actuator to either side", "1 mm"),
+        ),
+    ),
+    "mechanism": Kind(
+        "a mechanism of your own, from its drawing: bodies, blades, actuators, readings",
+        (
+            Question("mass", "mass of the moving body", "35 g"),
+            *BLADES,
+            Question("force_constant", "force of the actuator per ampere", "3.8 N/A"),
+            Question("drive_limit", "largest current of either sign", "1.5 A"),
+        ),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Answer:
+    """An answer as it is written, in SI, and whether it was `given` or is the one to begin with."""
+
+    text: str
+    si: float
+    given: bool
+
+
+def answers(kind: str, given: Mapping[str, str]) -> dict[str, Answer]:
+    """The answer to every question of a kind, those `given` and the rest as assumed.
+
+    Raises InputError for a key that the kind does not ask for, and for a number of another dimension or not above zero.
+    """
+    questions = {question.key: question for question in KINDS[kind].questions}
+    faults = [
+        Fault(f"--set {key}", f"is not asked of {kind}; asked are {', '.join(questions)}")
+        for key in given
+        if key not in questions
+    ]
+    answered = {}
+    for key, question in questions.items():
+        text = given.get(key, question.answer).strip()
+        try:
+            answered[key] = Answer(text, read(question, text), key in given)
+        except ValueError as error:
+            faults.append(Fault(f"--set {key}", str(error)))
+    if faults:
+        raise InputError("new device", faults)
+    return answered
+
+
+def read(question: Question, text: str) -> float:
+    """The SI number of an answer. Raises ValueError that says what to write instead."""
+    unit = written_unit(question.answer)
+    units = {unit, unit.replace("V", "A")} if question.key in ("force_constant", "drive_limit") else {unit}
+    faults = []
+    for wanted in sorted(units, key=lambda u: u != unit):
+        try:
+            si = parse(text, wanted)
+        except ValueError as error:
+            faults.append(error)
+            continue
+        if question.positive and not si > to_si(0.0, wanted):
+            raise ValueError(f"{text!r} must be above zero")
+        return si
+    raise faults[0]
