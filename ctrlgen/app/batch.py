@@ -26,6 +26,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.escaping import csv_cell
 from ctrlgen.core.files import MARKER, read_toml, validate, whole_folder, write_text
 from ctrlgen.core.parallel import Failure, run_all
 from ctrlgen.devices.section import Section
@@ -260,7 +261,8 @@ def _write_table(tasks: Sequence[Task], rows: dict[str, BatchRow], out: Path) ->
         text, [f for f in BatchRow.__dataclass_fields__ if f != "state"], lineterminator="\n", extrasaction="ignore"
     )
     table.writeheader()
-    table.writerows(asdict(rows[task.name]) for task in tasks if task.name in rows)
+    for row in (rows[task.name] for task in tasks if task.name in rows):
+        table.writerow({key: csv_cell(v) if isinstance(v, str) else v for key, v in asdict(row).items()})
     try:
         write_text(out / TABLE, text.getvalue())
     except OSError as error:

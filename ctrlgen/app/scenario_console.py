@@ -72,7 +72,7 @@ def print_solution(outcome: Outcome) -> None:
     for e in outcome.expected:
         if not e.passed:
             measured, low, high = (f"{from_si(v, e.unit):.7g}" for v in (e.measured, e.low, e.high))
-            out.print(f"[red]  {e.value} = {measured} {e.unit}, expected {low} ... {high}[/red]")
+            out.print(f"[red]  {escape(e.value)} = {measured} {e.unit}, expected {low} ... {high}[/red]")
 
 
 def print_comparison(outcome: Outcome) -> None:

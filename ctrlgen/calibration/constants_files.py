@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from ctrlgen.calibration.calibrate import CalibratedConstant, Calibration
+from ctrlgen.core.escaping import c_comment
 from ctrlgen.core.files import write_text
 from ctrlgen.firmware.c.real import Real
-from ctrlgen.firmware.c.templates import comment
 from ctrlgen.firmware.online.constants_layout import MAGIC, VERSION
 from ctrlgen.version import program
 
@@ -35,7 +35,8 @@ def c_header(calibration: Calibration) -> str:
     name, number = calibration.device.name, device_hash(calibration)
     upper = name.upper()
     lines = [
-        f"/* Constants of one specimen of {comment(calibration.device.title)}, from the recording {comment(calibration.recording.title)}.",
+        f"/* Constants of one specimen of {c_comment(calibration.device.title)},",
+        f" * from the recording {c_comment(calibration.recording.title)}.",
         f" * Made by {program()}; do not edit. In the firmware, behind the controller's header:",
         f" *   static const {name}_online_f32_constants specimen = {upper}_CONSTANTS_F32;",
         f" *   status = {name}_online_f32_init_with(&state, &specimen); */",
@@ -56,7 +57,7 @@ def c_header(calibration: Calibration) -> str:
         for k, (row, literal) in enumerate(zip(calibration.constants, rows, strict=True)):
             c, end = row.constant, "" if k == len(rows) - 1 else ","
             told = f"{c.base_unit}, sd {row.sd:.3g}" if row.determined else f"{c.base_unit}, default: {row.remark}"
-            lines.append(f"    {literal}{end} /* {c.name}: {comment(told)} */ \\")
+            lines.append(f"    {literal}{end} /* {c.name}: {c_comment(told)} */ \\")
         lines.append("}")
     return "\n".join([*lines, "", "#endif", ""])
 

@@ -9,6 +9,7 @@ import numpy as np
 import tomlkit
 from tomlkit.items import Item, Table
 
+from ctrlgen.core.escaping import toml
 from ctrlgen.core.units import difference_unit, from_si
 
 DIGITS = 12  # nine would round by 5e-9, more than predictions may differ by
@@ -36,7 +37,7 @@ def toml_text(value: str | dict[str, Any]) -> str:
     """A text in quotes, or an inline table with the spaces that device files have."""
     if isinstance(value, dict):
         return f"{{ {', '.join(f'{key} = {toml_text(member)}' for key, member in value.items())} }}"
-    return tomlkit.string(value).as_string()
+    return toml(value)
 
 
 def value_text(si: float, unit: str, digits: int = DIGITS) -> str:

@@ -7,6 +7,7 @@ import errno
 import os
 import reprlib
 import shutil
+import stat
 import tempfile
 import tomllib
 from collections.abc import Iterator, Sequence
@@ -17,6 +18,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.file_limits import LARGEST_TEXT, TOO_DEEP, foreign_parts, unreadable_toml
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -24,6 +26,12 @@ Model = TypeVar("Model", bound=BaseModel)
 def read_text(path: Path | str) -> str:
     """The text of a file, UTF-8 with or without a byte order mark. Raises InputError when it cannot be read."""
     try:
+        about = os.stat(path)
+        if not stat.S_ISREG(about.st_mode) and not stat.S_ISDIR(about.st_mode):
+            raise InputError(path, [Fault("file", "is no regular file; save what it gives as a file, and name that")])
+        if about.st_size > LARGEST_TEXT:
+            what = f"has {about.st_size / 1e6:.0f} MB; a text file has at most {LARGEST_TEXT / 1e6:.0f}: is it the right one?"
+            raise InputError(path, [Fault("file", what)])
         return Path(path).read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise InputError(path, [Fault("file", "does not exist; check the path")]) from None
@@ -69,18 +77,27 @@ def unwritable(path: Path | str, error: OSError, where: str = "file") -> InputEr
 
 
 def read_toml(path: Path | str) -> dict[str, Any]:
-    """The tables of a TOML file. Raises InputError with the line of a syntax error."""
+    """The tables of a TOML file. Raises InputError with the line of a syntax error, and for what no file may hold (`file_limits`)."""
+    text = read_text(path)
+    if fault := unreadable_toml(text):
+        raise InputError(path, [fault])
     try:
-        return tomllib.loads(read_text(path))
+        table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(path, [Fault("syntax", f"{error}; see https://toml.io for the notation")]) from None
+    except ValueError:  # of Python: more than 4300 digits
+        raise InputError(path, [Fault("syntax", "has a whole number of thousands of digits; correct it")]) from None
     except RecursionError:
-        what = "lists or tables stand hundreds deep inside one another, which no file of ctrlgen needs; is it the right one?"
-        raise InputError(path, [Fault("syntax", what)]) from None
+        raise InputError(path, [Fault("syntax", TOO_DEEP)]) from None
+    if faults := foreign_parts(table):
+        raise InputError(path, faults)
+    return table
 
 
 def validate(model: type[Model], table: dict[str, Any], path: Path | str) -> Model:
     """`table` as a `model`. Raises InputError listing every fault with its dotted key and a remedy."""
+    if faults := foreign_parts(table):
+        raise InputError(path, faults)
     try:
         return model.model_validate(table)
     except ValidationError as error:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+import reprlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -39,9 +40,54 @@ def _registry() -> pint.UnitRegistry[Any]:
     return registry
 
 
+LONGEST_UNIT = 200
+"""Letters of a unit, products that are made of units of a file included."""
+MOST_FACTORS = 20
+"""Names and numbers in a unit."""
+LARGEST_POWER = 12.0
+"""Of a unit in a unit; second moments of area have 4."""
+LARGEST = {
+    "m": 1e4,
+    "s": 1e9,
+    "kg": 1e6,
+    "K": 1e5,
+    "rad": 1e4,
+    "Hz": 1e12,
+    "V": 1e7,
+    "A": 1e6,
+    "W": 1e9,
+    "N": 1e9,
+    "Pa": 1e15,
+}
+"""The largest magnitudes [SI] that a machine of the size of a nanopositioner can have, far above what any has: a stage of 10 km."""
+LARGEST_OTHER = 1e30
+"""Of other dimensions: its products stay finite, also in single precision."""
+SMALLEST = 1e-60
+"""Below it [SI], a number that is not zero: its inverse squared stays finite."""
+_WORD = r"[^\W\d]\w*|[%°]|\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+"
+_UNIT = re.compile(rf"(?:\s|{_WORD}|\*\*|[*/^()+-])*")
+_POWER = re.compile(r"(?:\^|\*\*)\s*[+-]?\s*(?:\(\s*[+-]?\d\s*/\s*\d\s*\)|(\d+\.?\d*))(?!\s*(?:\^|\*\*))")
+
+
+def _check_unit(text: str) -> None:
+    """Raises ValueError for a text that is no product of powers, and for one that would take long to reckon with, such as um^9^9^9."""
+    if len(text) > LONGEST_UNIT:
+        raise ValueError(f"a unit of {len(text)} letters is not one I know; write one such as um or N/um")
+    if not _UNIT.fullmatch(text):
+        raise ValueError(f"{reprlib.repr(text)} is not a unit I know")
+    powers = _POWER.findall(text)
+    if len(powers) < len(re.findall(r"\^|\*\*", text)) or any(float(power or 0) > LARGEST_POWER for power in powers):
+        raise ValueError(
+            f"{text!r} is not a unit I know: a power in it is one number up to {LARGEST_POWER:g}, as in um^2"
+        )
+    if len(re.findall(_WORD, text)) > MOST_FACTORS:
+        raise ValueError(f"{text!r} has more than {MOST_FACTORS} factors; write a simpler unit")
+
+
 @cache
 def _unit(text: str) -> pint.Unit:
     """The pint unit of `text`; '1' and '' are dimensionless. Raises ValueError if unknown."""
+    _check_unit(text.strip())
     try:
         return _registry().Unit("" if text == "1" else f"1{text}" if text.startswith("/") else text)
     except Exception as error:  # pint raises a dozen different types for bad unit text
@@ -52,7 +98,12 @@ def _unit(text: str) -> pint.Unit:
 def _affine(unit: str) -> tuple[float, float]:
     """(scale, offset) with SI = scale * value + offset, from pint's conversion of 0 and 1."""
     base = _unit(unit)
-    zero, one = (float(_registry().Quantity(value, base).to_base_units().magnitude) for value in (0.0, 1.0))
+    try:
+        zero, one = (float(_registry().Quantity(value, base).to_base_units().magnitude) for value in (0.0, 1.0))
+    except (OverflowError, ZeroDivisionError):
+        zero = one = math.nan
+    if not math.isfinite(one) or not SMALLEST < abs(one - zero) < 1 / SMALLEST:
+        raise ValueError(f"{unit!r} is too large or too small a unit to reckon with")
     return one - zero, zero
 
 
@@ -128,16 +179,16 @@ def parse(text: object, unit: str) -> float:
     Angles are a dimension of their own: a plain number is not an angle, and rpm is not Hz.
     """
     if isinstance(text, bool) or not isinstance(text, (str, int, float)):
-        raise ValueError(f'write a number with its unit, such as "1 {unit}", not {text!r}')
+        raise ValueError(f'write a number with its unit, such as "1 {unit}", not {reprlib.repr(text)}')
     if isinstance(text, str):
         match = _NUMBER.match(text)
         if not match:
-            raise ExampleGiven(f'{text!r} does not start with a number; write for example "1 {unit}"')
+            raise ExampleGiven(f'{reprlib.repr(text)} does not start with a number; write for example "1 {unit}"')
         value, written = float(match[1]), match[2]
     else:
-        value, written = float(text), ""
+        value, written = (float(text) if abs(text) < LARGEST_OTHER else math.inf), ""
     if not math.isfinite(value):
-        raise ValueError(f"{text!r} is not a finite number")
+        raise ValueError(f"{reprlib.repr(text)} is not a finite number")
     _unit(written)
     absolute = unit in ("degC", "degF", "K")
     if (written == "" and unit != "1") or (absolute and "delta" in written) or not same_dimension(written, unit):
@@ -147,7 +198,18 @@ def parse(text: object, unit: str) -> float:
         raise ExampleGiven(
             f"{text!r} has the wrong unit: {unit if unit != '1' else 'a plain number'} is needed, for example {hint}"
         )
-    return to_si(value, written)
+    si = to_si(value, written)
+    if not abs(si) <= largest(unit):
+        raise ValueError(f"{text!r} is far too large; {show(largest(unit), unit)} is the most that is read")
+    if 0 < abs(si) < SMALLEST:
+        raise ValueError(f"{text!r} is too small to reckon with; write 0 where nothing is meant")
+    return si
+
+
+@cache
+def largest(unit: str) -> float:
+    """The largest magnitude [SI] that is read of a quantity in `unit`."""
+    return LARGEST.get(base_unit(unit), LARGEST_OTHER)
 
 
 def parse_difference(text: str, unit: str) -> float:
@@ -225,7 +287,7 @@ def _reader(
         source = table.get("source")
         if source is not None and not isinstance(source, str):
             raise ValueError(f"source = {source!r} must be text")
-        return Quantity(si, str(table["value"]), source, sd, whole)
+        return Quantity(si, " ".join(str(table["value"]).split()), source, sd, whole)
 
     return read
 

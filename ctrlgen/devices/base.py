@@ -8,8 +8,9 @@ from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import casadi as ca
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import PrivateAttr, model_validator
 
+from ctrlgen.core.names import CName
 from ctrlgen.core.units import Quantity
 from ctrlgen.devices.device_physics import DevicePhysics
 from ctrlgen.devices.machine import Machine, MachineParts, machine_parts
@@ -32,7 +33,7 @@ class Device(Section):
 
     kind: str
     """Chooses the equations of the device."""
-    name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
+    name: CName
     """A C identifier in lower case; recordings and scenarios name the device by it, and generated functions bear it."""
     title: str
     """The device in words, for reports."""

@@ -10,8 +10,9 @@ from typing import Annotated, Any, ClassVar, Literal
 import casadi as ca
 import numpy as np
 import scipy
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
+from ctrlgen.core.names import ChannelName, distinct
 from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.base import Device
 from ctrlgen.devices.device_physics import BalancedPhysics, DevicePhysics, InertialPhysics
@@ -27,7 +28,6 @@ Length = Annotated[Quantity, In("um", positive=True)]
 Angle = Annotated[Quantity, In("deg")]
 Count = Annotated[Quantity, In("1", positive=True, whole=True)]
 Inertia = Annotated[Quantity, In("mg*mm^2", positive=True)]
-Axis = Annotated[str, Field(pattern=r"^[A-Za-z0-9_]+$")]
 
 
 class Actuator(Section):
@@ -192,7 +192,7 @@ class MemsHexapod(Device):
 
     kind: Literal["mems_hexapod"]
     """NIST's MEMS hexapod with thermal actuators (S1)."""
-    axes: tuple[Axis, Axis, Axis, Axis, Axis, Axis]
+    axes: Annotated[tuple[ChannelName, ...], Field(min_length=6, max_length=6), AfterValidator(distinct)]
     """Names of the six actuators, in the order 1X, 1Y, 2X, 2Y, 3X, 3Y of S1 eq. (19)."""
     push: tuple[Literal[-1, 1], ...] = Field(min_length=6, max_length=6)
     """Signs of S1 eq. (19): along which direction of the paper's axis each actuator pushes. Displacements and forces
@@ -210,8 +210,6 @@ class MemsHexapod(Device):
     @model_validator(mode="after")
     def _lengths_fit(self) -> MemsHexapod:
         h, s, a = self.hexapod, self.stage, self.actuator
-        if len(set(self.axes)) != 6:
-            raise ValueError("axes: two actuators have the same name; name each once")
         if s.lever_short.si >= s.lever_long.si:
             raise ValueError("stage.lever_short must be below stage.lever_long: the lever multiplies travel")
         if s.stroke.si >= s.lever_long.si:

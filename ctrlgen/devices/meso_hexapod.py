@@ -7,7 +7,9 @@ from typing import Annotated, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
+from pydantic import AfterValidator, Field
 
+from ctrlgen.core.names import ChannelName, distinct
 from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.base import Device
 from ctrlgen.devices.device_physics import BalancedPhysics
@@ -81,7 +83,7 @@ class MesoHexapod(Device):
 
     kind: Literal["meso_hexapod"]
     """The kinematics of NIST's meso-scale hexapod (S0)."""
-    axes: tuple[str, str, str, str, str, str]
+    axes: Annotated[tuple[ChannelName, ...], Field(min_length=6, max_length=6), AfterValidator(distinct)]
     """Names of the six actuators, in the order of S0 eq. (6): 1x, 2x, 2y, 3x, 3y, 1y."""
     hexapod: Hexapod
     """Strut ends and platform."""

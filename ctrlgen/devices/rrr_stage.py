@@ -7,8 +7,9 @@ from typing import Annotated, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
-from pydantic import model_validator
+from pydantic import AfterValidator, Field, model_validator
 
+from ctrlgen.core.names import ChannelName, distinct
 from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.base import Device
 from ctrlgen.devices.device_physics import BalancedPhysics
@@ -75,7 +76,7 @@ class RrrStage(Device):
 
     kind: Literal["rrr_stage"]
     """A planar stage of three links with three circular hinges each (S3)."""
-    axes: tuple[str, str, str]
+    axes: Annotated[tuple[ChannelName, ...], Field(min_length=3, max_length=3), AfterValidator(distinct)]
     """Names of the three inputs, in the order of Links 1 to 3."""
     frame_angle: Annotated[Quantity, In("deg")]
     """Angle by which the output frame is turned from the frame of Link 1."""

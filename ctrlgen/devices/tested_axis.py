@@ -9,6 +9,7 @@ from typing import Annotated, ClassVar, Literal
 import casadi as ca
 from pydantic import Field, model_validator
 
+from ctrlgen.core.names import Name
 from ctrlgen.core.units import In, Quantity, same_dimension, written_unit
 from ctrlgen.devices.base import Device
 from ctrlgen.devices.device_physics import ImposedPhysics, imposed_motion
@@ -84,7 +85,7 @@ class Mechanics(Section):
 class NamedAxis(Mechanics):
     """One `[[axis]]` of several: its name beside the numbers of a single one."""
 
-    name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
+    name: Name
     """Name of the axis; its columns are `drive.NAME_position`, `drive.NAME_velocity`, `drive.NAME_acceleration` and
     `reading.NAME`.
     """

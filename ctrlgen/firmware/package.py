@@ -14,7 +14,7 @@ from ctrlgen.core.files import read_text, write_text
 from ctrlgen.core.units import base_unit
 from ctrlgen.devices.signal import Signal
 from ctrlgen.firmware.c.real import Real
-from ctrlgen.firmware.c.templates import comment, write
+from ctrlgen.firmware.c.templates import write
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.version import __version__, commit
 
@@ -134,7 +134,7 @@ def _context(
     return {
         **c,
         "name": scenario.name,
-        "title": comment(scenario.file.title),
+        "title": scenario.file.title,
         "device": scenario.device.name,
         "owners": owners(scenario),
         "pieces": ["online", *(["player"] if c["player"] else []), "selftest", "vectors"],

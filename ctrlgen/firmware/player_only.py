@@ -11,7 +11,7 @@ import numpy as np
 from ctrlgen.controller.null_motion import why_no_null_motion
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import write_text
-from ctrlgen.firmware.c.templates import comment, write
+from ctrlgen.firmware.c.templates import write
 from ctrlgen.firmware.package import LICENCE, MANIFEST, input_files
 from ctrlgen.firmware.player.compression import compress
 from ctrlgen.firmware.player.player_context import player_context
@@ -71,7 +71,7 @@ def generate_player(solution: Solution, out: Path) -> list[Path]:
             "version": __version__,
             "digest": scenario.digest,
             "u_safe": np.clip(0.0, *model.u_bounds),
-            "source": comment(model.device.source),
+            "source": model.device.source,
         }
         written += [write(f"player.{kind}", context, out / f"{name}.{kind}") for kind in ("h", "c")]
     texts = {f"device/{path}": text for path, text in input_files(scenario).items()}

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ctrlgen.core.escaping import toml
 from ctrlgen.core.files import write_text
 from ctrlgen.core.units import Quantity, from_si
 from ctrlgen.model.model import Model
@@ -31,11 +32,11 @@ def retimed(
     device = scenario.inputs["device"]
     folder = device.path.parent
     lines = [
-        f'title = "{_escaped(title)}"',
-        f'device = "{device.path.name}"',
+        f"title = {toml(title)}",
+        f"device = {toml(device.path.name)}",
         f'follow = "{file.follow}"',
         *([f'controller = "{file.controller}"'] if file.controller else []),
-        f'sample_rate = "{rate.text}"',
+        f"sample_rate = {toml(rate.text)}",
         "",
         "[path]",
         'kind = "poses"',
@@ -61,7 +62,3 @@ def write_inputs(folder: Path, scenario: Scenario) -> None:
     """The files of a scenario, side by side in a folder."""
     for read in scenario.inputs.values():
         write_text(folder / read.path.name, read.text)
-
-
-def _escaped(text: str) -> str:
-    return text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", " ")

@@ -24,6 +24,7 @@ STYLE: dict[Any, Any] = {
     "axes.edgecolor": "#666666",
     "axes.axisbelow": True,
     "legend.frameon": False,
+    "text.parse_math": False,  # a $ in a name is a $
     "svg.fonttype": "none",
     "svg.hashsalt": "ctrlgen",
     "figure.constrained_layout.use": True,

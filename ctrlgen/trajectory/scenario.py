@@ -13,6 +13,7 @@ import casadi as ca
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, read_toml, validate
+from ctrlgen.core.names import C_NAME, checked
 from ctrlgen.devices import Device, files_of, load_device
 from ctrlgen.effects import Place
 from ctrlgen.model.assembly import build_model
@@ -161,10 +162,15 @@ def load_scenario(path: Path | str, device: Device | Path | str | None = None) -
         poses = file_path.parent / file.path.file
         inputs["poses"] = Input(poses, read_text(poses))
     name = file_path.resolve().parent.name if file_path.name == FILE else file_path.stem
-    return Scenario(_identifier(name), file_path, file, device, inputs)
+    try:
+        return Scenario(_identifier(name), file_path, file, device, inputs)
+    except ValueError as error:
+        what = f"gives the C its name, but {error}"
+        raise InputError(file_path, [Fault("the folder" if file_path.name == FILE else "the file", what)]) from None
 
 
 def _identifier(name: str) -> str:
-    """`name` as a C identifier, which becomes the prefix of the generated functions: 'my circle-1' -> 'my_circle_1'."""
+    """`name` as a C identifier, which becomes the prefix of the generated functions: 'my circle-1' -> 'my_circle_1'. Raises ValueError
+    where it is too long."""
     cleaned = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
-    return cleaned if cleaned[:1].isalpha() else f"s_{cleaned}"
+    return checked(cleaned if cleaned[:1].isalpha() else f"s_{cleaned}", C_NAME)

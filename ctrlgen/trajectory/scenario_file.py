@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
+from ctrlgen.core.names import CName
 from ctrlgen.core.units import In, Quantity, read_probability
 from ctrlgen.devices.section import Section
 from ctrlgen.trajectory.inverse.clock import Clock, Sampled, Settled
@@ -63,7 +63,7 @@ class ScenarioFile(Section):
     """The scenario in words, for reports."""
     device: str
     """The device file, relative to this one."""
-    controller: str | None = None
+    controller: CName | None = None
     """C name of the online controller and of the plant, a C identifier in lower case. Left out: the device's name. Controllers of one
     device at two rates need two names to be linked into one program.
     """
@@ -100,15 +100,6 @@ class ScenarioFile(Section):
     def closed(self) -> bool:
         """Whether the path is periodic: its first sample follows the last one."""
         return self.sample_rate is not None and self.path.closed
-
-    @field_validator("controller")
-    @classmethod
-    def _c_name(cls, name: str | None) -> str | None:
-        if name is not None and not re.fullmatch(r"[a-z][a-z0-9_]*", name, re.ASCII):
-            raise ValueError(
-                f"{name!r} is no C identifier in lower case: begin with a letter, then letters, digits and _, such as fast_hexapod"
-            )
-        return name
 
     @model_validator(mode="after")
     def _robust_feedforward(self) -> ScenarioFile:

@@ -7,9 +7,10 @@ from typing import Annotated, Literal
 
 from pydantic import model_validator
 
+from ctrlgen.core.names import Name
 from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.mechanism.flexures import Flexible, FlexureSection
-from ctrlgen.devices.mechanism.joining import Length, Name
+from ctrlgen.devices.mechanism.joining import Length
 from ctrlgen.devices.section import Section
 from ctrlgen.physics import thermal_actuator
 from ctrlgen.physics.screw import Matrix, inverse

@@ -25,7 +25,7 @@ SHORT = 0.04  # of the mechanism's extent: an element without a length, an actua
 def draw_mechanism(device: Mechanism, path: Path) -> None:
     """Writes the figure of a mechanism, .svg or .png."""
     figure, buffer = mechanism_figure(device), io.BytesIO()
-    with rc_context({"svg.hashsalt": "ctrlgen"}):
+    with rc_context({"svg.hashsalt": "ctrlgen", "text.parse_math": False}):
         metadata = {"Date": None, "Creator": "ctrlgen"} if path.suffix == ".svg" else None
         figure.savefig(buffer, format=path.suffix[1:], dpi=150, metadata=metadata, bbox_inches="tight")
     write_bytes(path, buffer.getvalue())

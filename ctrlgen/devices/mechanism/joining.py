@@ -9,13 +9,13 @@ import casadi as ca
 import numpy as np
 from pydantic import Field, model_validator
 
+from ctrlgen.core.names import Name
 from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.section import Section
 from ctrlgen.physics import rigid_bodies as mechanism
 from ctrlgen.physics.screw import Matrix, inverse
 from ctrlgen.physics.second_order_flexure import Segment
 
-Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 Length = Annotated[Quantity, In("mm", positive=True)]
 Coordinate = Annotated[Quantity, In("mm")]
 Place = tuple[Coordinate, Coordinate, Coordinate]

@@ -8,8 +8,9 @@ import casadi as ca
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
+from ctrlgen.core.names import Name
 from ctrlgen.core.units import In, Quantity, same_dimension, written_unit
-from ctrlgen.devices.mechanism.joining import Direction, Name, Place
+from ctrlgen.devices.mechanism.joining import Direction, Place
 from ctrlgen.devices.section import Section
 from ctrlgen.physics.screw import Matrix, rotation_z
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ctrlgen.core.errors import Fault
+from ctrlgen.core.names import LONGEST_NAME, is_name
 from ctrlgen.core.units import Quantity, read_quantity, same_dimension, to_si, written_unit
 from ctrlgen.devices.section import Section
 from ctrlgen.devices.user.ports import Law
@@ -30,8 +31,9 @@ class ArgumentReader:
         """Largest sizes by name; one that cannot be read is a fault and counts as 1. A pair of lowest and highest value also goes into
         `ranges`."""
         sizes: dict[str, Quantity] = {}
-        if not isinstance(given, Mapping) or not all(isinstance(n, str) and n.isidentifier() for n in given):
-            self.faults.append(Fault(where, 'must be names with their largest size, such as {"motor": "10 V"}'))
+        if not isinstance(given, Mapping) or not all(is_name(n) for n in given):
+            what = f'must be names with their largest size, such as {{"motor": "10 V"}}: letters, digits and _, {LONGEST_NAME} at most'
+            self.faults.append(Fault(where, what))
             return sizes
         for name, text in given.items():
             try:
@@ -77,7 +79,7 @@ class ArgumentReader:
             if domain not in SECTIONS:
                 self.faults.append(Fault(where, f"domain = {domain!r} must be one of {', '.join(SECTIONS)}"))
                 domain = "mechanism"
-            if not str(name).isidentifier() or name[0] == "_" or name.startswith("model_") or hasattr(Section, name):
+            if not is_name(name) or name.startswith("model_") or hasattr(Section, name):
                 self.faults.append(Fault(where, "is not a name that a parameter can have; choose another one"))
                 continue
             try:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
-
 import casadi as ca
 import numpy as np
 
+from ctrlgen.core.escaping import toml
 from ctrlgen.core.units import difference
 from ctrlgen.devices import BalancedPhysics
 from ctrlgen.diagnosis.evidence.experiment_design import Experiment
@@ -58,15 +57,15 @@ def _recording(fitter: Fitter, simulator: Simulator, chosen: Experiment) -> str:
     cut = int(EXPERIMENT.fitted_share * n)
     lines = [
         f"# {chosen.candidates[0].description}. Add the readings to {DRIVE} as columns with the names below.",
-        f"title  = {json.dumps(f'next experiment after: {recording.title}')}",
-        f"device = {json.dumps(recording.device)}",
-        f"kind   = {json.dumps(recording.kind)}",
+        f"title  = {toml(f'next experiment after: {recording.title}')}",
+        f"device = {toml(recording.device)}",
+        f"kind   = {toml(recording.kind)}",
     ]
     timed = not record.poses
     for role, rows in (("fit", [0, cut]), ("hold_out", [cut, n])):
         lines += ["", "[[record]]", f'file = "{DRIVE}"', f'role = "{role}"', f"rows = {rows}"]
         if timed:
-            start = json.dumps(f"{rows[0] * record.sample_time:.9g} s")
+            start = toml(f"{rows[0] * record.sample_time:.9g} s")
             lines += ['time = { column = "time [s]", unit = "s" }', f"start = {start}"]
         elif np.isfinite(record.sample_time):
             lines.append(f'dwell = "{record.sample_time:.9g} s"')
@@ -91,8 +90,8 @@ def _scenario(simulator: Simulator, fit: Fit, chosen: Experiment, device_file: s
     header = [f"{c} [{u}]" for c, u in zip(signal.channels, signal.units, strict=True)]
     rate = f'sample_rate = "{1 / record.sample_time:.9g} Hz"\n' if np.isfinite(record.sample_time) else ""
     text = (
-        f"title = {json.dumps(f'next experiment: {chosen.candidates[0].description}')}\n"
-        f"device = {json.dumps(device_file)}\n"
+        f"title = {toml(f'next experiment: {chosen.candidates[0].description}')}\n"
+        f"device = {toml(device_file)}\n"
         f'follow = "displacement"\n{rate}\n[path]\nkind = "poses"\nfile = "{COMMAND}"\n'
     )
     return {SCENARIO: text, COMMAND: _csv(header, columns)}

@@ -17,6 +17,7 @@ from itertools import product
 import casadi as ca
 import numpy as np
 
+from ctrlgen.core.escaping import c_comment
 from ctrlgen.firmware.c.c_constants import DERIVED, WIDTH, Constants, Derived
 from ctrlgen.firmware.c.c_expression import PLACE, Call, Linear, Text, text_of
 from ctrlgen.firmware.c.c_rows import Rows, bare
@@ -310,8 +311,7 @@ def _function(
 
 
 def _comment(about: str) -> str:
-    text = about.replace("*/", "* /").replace("/*", "/ *")
-    return "\n".join(textwrap.wrap(f"/* {text} */", WIDTH, subsequent_indent=" * ")) + "\n" if about else ""
+    return "\n".join(textwrap.wrap(f"/* {c_comment(about)} */", WIDTH, subsequent_indent=" * ")) + "\n" if about else ""
 
 
 def _indented(lines: Sequence[str]) -> str:

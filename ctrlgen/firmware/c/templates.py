@@ -9,6 +9,7 @@ from typing import Any
 
 import jinja2
 
+from ctrlgen.core.escaping import c_comment, c_format, kconfig, markdown, markdown_code, one_line
 from ctrlgen.core.files import write_text
 from ctrlgen.core.shipped_files import shipped
 from ctrlgen.firmware.c.preprocessor import COMMENT, WORD
@@ -43,6 +44,14 @@ def render(template: str, context: dict[str, Any]) -> str:
         keep_trailing_newline=True,
     )
     environment.globals |= {"abi": ABI, "hertz": hertz}
+    environment.filters |= {
+        "c_comment": c_comment,
+        "c_format": c_format,
+        "kconfig": kconfig,
+        "markdown": markdown,
+        "markdown_code": markdown_code,
+        "one_line": one_line,
+    }
     return environment.get_template(f"{template}.j2").render(context)
 
 
@@ -58,8 +67,3 @@ def write(template: str, context: dict[str, Any], path: Path) -> Path:
     """`render`, written to `path`, which is returned."""
     write_text(path, render(template, context))
     return path
-
-
-def comment(text: str) -> str:
-    """`text` as it may stand inside a C comment, on one line."""
-    return " ".join(text.split()).replace("*/", "* /").replace("/*", "/ *")

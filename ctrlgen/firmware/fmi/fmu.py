@@ -28,7 +28,7 @@ from ctrlgen.core.errors import CtrlgenError, Fault, InputError, ToolError
 from ctrlgen.core.files import whole_folder, write_bytes
 from ctrlgen.core.units import base_unit, exponents, from_si
 from ctrlgen.firmware.c.real import Real
-from ctrlgen.firmware.c.templates import comment, write
+from ctrlgen.firmware.c.templates import write
 from ctrlgen.firmware.c.toolchains import compile_c, find_compilers
 from ctrlgen.firmware.fmi.fmi_calls import FOREIGN_TYPES, REFUSED_2, REFUSED_3
 from ctrlgen.firmware.fmi.plant import Plant, plant_of, write_plant
@@ -263,7 +263,7 @@ def _write_unit(
         "identifier": identifier,
         "fmi": f"{fmi}.0",
         "core": unit.core,
-        "title": comment(unit.title),
+        "title": unit.title,
         "unit": unit.kind,
         "digest": scenario.digest,
         "version": __version__,

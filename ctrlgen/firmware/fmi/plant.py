@@ -23,7 +23,7 @@ from ctrlgen.devices import Signal
 from ctrlgen.firmware.c.cprint import Kernel, Printer
 from ctrlgen.firmware.c.elementary import elementary_text
 from ctrlgen.firmware.c.real import Real
-from ctrlgen.firmware.c.templates import comment, write
+from ctrlgen.firmware.c.templates import write
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.discretisation import balanced, held_step, one_step_map
 from ctrlgen.model.model import Model
@@ -121,8 +121,8 @@ def plant_context(scenario: Scenario, plant: Plant, real: Real, prefix: str) -> 
         "real": real,
         "version": __version__,
         "program": program(),
-        "title": comment(m.device.title),
-        "source": comment(m.device.source),
+        "title": m.device.title,
+        "source": m.device.source,
         "device_sha256": scenario.device_sha256,
         "si": si_text,
         "drive": m.signals["drive"],

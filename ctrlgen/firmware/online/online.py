@@ -15,7 +15,6 @@ from ctrlgen.core.units import show, show_difference
 from ctrlgen.devices import Limit
 from ctrlgen.firmware.c.elementary import elementary_text
 from ctrlgen.firmware.c.real import Real
-from ctrlgen.firmware.c.templates import comment
 from ctrlgen.firmware.online.limit_tables import limit_context
 from ctrlgen.firmware.online.limiter import bounds_once, limited_modes, limiter_macros, limiter_text
 from ctrlgen.firmware.online.printed_kernels import PrintedKernels, kernel_printer, printed_kernels, si_text
@@ -78,8 +77,8 @@ def _header(scenario: Scenario, controller: Controller) -> dict[str, Any]:
     return {
         "version": __version__,
         "program": program(),
-        "title": comment(model.device.title),
-        "source": comment(model.device.source),
+        "title": model.device.title,
+        "source": model.device.source,
         "device_sha256": scenario.device_sha256,
         "n": len(model.axes),
         "nu": len(drive.channels),

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from ctrlgen.firmware.c.templates import comment
 from ctrlgen.firmware.player.compression import INSTRUCTION_BUDGET, Compression, PlayerCandidate, SampleTable
 from ctrlgen.firmware.player.spline import Spline
 from ctrlgen.trajectory.inverse.clock import in_time
@@ -24,7 +23,7 @@ def player_context(solution: Solution, compression: Compression, prefix: str) ->
     }
     return {
         "prefix": prefix,
-        "title": comment(solution.scenario.file.title),
+        "title": solution.scenario.file.title,
         "version": __version__,
         "device_sha256": solution.scenario.device_sha256,
         "digest": solution.scenario.digest,
