@@ -314,7 +314,8 @@ def test_the_command_says_how_large_a_circle_a_frequency_allows(tmp_path):
         ("circle20", {"frequency": "20 ms"}, "wrong unit"),
         ("circle20", {"frequency": "400 Hz"}, "2.5 samples"),
         ("circle20", {"frequency": "1 mHz"}, "give a lower --sample-rate"),
-        ("circle20", {"sample_rate": "1e300 Hz"}, "give a lower one"),
+        ("circle20", {"sample_rate": "1e300 Hz"}, "is far too large"),
+        ("circle20", {"sample_rate": "1 GHz"}, "give a lower one"),
         ("circle20", {"sample_rate": "100 Hz"}, "is too low"),
     ],
 )
@@ -322,6 +323,27 @@ def test_what_cannot_be_answered_is_refused_with_what_to_do(scenario, options, s
     with pytest.raises((InputError, SolverError), match=said) as caught:
         ctrlgen.fastest(SCENARIOS / scenario, **options)
     assert str(caught.value).count("for example") <= 1
+
+
+@pytest.mark.parametrize(
+    ("device", "path", "said"),
+    [
+        ("flexure_axis", 'kind = "line"\nstart = { axis = "5 um" }\nend = { axis = "5 um" }', "nothing moves"),
+        ("xy_lever_stage", 'kind = "circle"\ndiameter = "1e-9 nm"', "nothing moves"),
+        (
+            "xy_lever_stage",
+            'kind = "raster"\nlength = "9 um"\nspacing = "1 um"\nlines = 3\nstep_share = 1e-17',
+            "step_share",
+        ),
+    ],
+)
+def test_a_path_on_which_nothing_moves_or_the_stage_would_jump_is_refused(device, path, said, tmp_path):
+    file = SCENARIOS / "devices" / f"{device}.toml"
+    (tmp_path / "s.toml").write_text(
+        f'title = "t"\ndevice = "{file}"\nsample_rate = "2 kHz"\nduration = "0.1 s"\n[path]\n{path}\n'
+    )
+    with pytest.raises(InputError, match=said):
+        ctrlgen.fastest(tmp_path / "s.toml")
 
 
 @pytest.fixture(params=["raster", "flexure_axis_line"])

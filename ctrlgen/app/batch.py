@@ -189,8 +189,8 @@ def run_batch(
         except (InputError, OSError) as error:
             rows[task.name] = BatchRow(task.name, "failed", error=_one_line(str(error)))
             continue
-        if _is_there(out / task.name, made_from):
-            rows[task.name] = _row(task.name, "done before", (out / task.name / "diagnosis.json").read_bytes())
+        if (row := _earlier(task.name, out / task.name, made_from)) is not None:
+            rows[task.name] = row
         else:
             to_do.append((task, made_from))
     before = len(tasks) - len(to_do)
@@ -228,11 +228,14 @@ def _kept(task: Task, made_from: dict[str, Any], result: dict[str, bytes] | Fail
     return _row(task.name, "done", result["diagnosis.json"])
 
 
-def _is_there(folder: Path, made_from: dict[str, Any]) -> bool:
+def _earlier(name: str, folder: Path, made_from: dict[str, Any]) -> BatchRow | None:
+    """The row of a result that was made before from the same files; None where there is none, or it is damaged."""
     try:
-        return json.loads((folder / MADE_FROM).read_text(encoding="utf-8")) == made_from
-    except (OSError, ValueError):
-        return False
+        if json.loads((folder / MADE_FROM).read_text(encoding="utf-8")) != made_from:
+            return None
+        return _row(name, "done before", (folder / "diagnosis.json").read_bytes())
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return None
 
 
 def _row(name: str, state: str, content: bytes) -> BatchRow:

@@ -17,6 +17,11 @@ if TYPE_CHECKING:
     import numpy as np
 
 
+def visible(text: str) -> str:
+    """`text` with every character that a terminal would obey instead of showing (controls, marks of direction) as its escape."""
+    return "".join(c if c.isprintable() or c in "\n\t" else ascii(c)[1:-1] for c in text)
+
+
 class CtrlgenError(Exception):
     """Base of every error that a user can cause; the command line prints it and exits with status 1."""
 
@@ -39,7 +44,7 @@ class InputError(CtrlgenError):
         self.source = str(source)
         self.faults = tuple(faults)
         count = "1 fault" if len(self.faults) == 1 else f"{len(self.faults)} faults"
-        super().__init__("\n".join([f"{self.source}: {count}", *(f"  - {fault}" for fault in self.faults)]))
+        super().__init__(visible("\n".join([f"{self.source}: {count}", *(f"  - {fault}" for fault in self.faults)])))
 
 
 @dataclass(frozen=True)

@@ -282,7 +282,7 @@ def _foreign(out: Path) -> list[str]:
     if not out.is_dir():
         return []
     marker = out / MARKER
-    made = {MARKER, *marker.read_text(encoding="utf-8").splitlines()} if marker.exists() else set()
+    made = {MARKER, *read_text(marker).splitlines()} if marker.exists() else set()
     return sorted(
         name for path in out.rglob("*") if path.is_file() and (name := str(path.relative_to(out))) not in made
     )

@@ -33,8 +33,8 @@ class Checkpoint:
             header, *lines = self.path.read_text(encoding="utf-8").splitlines(keepends=True)
             if json.loads(header) != self.made_from:
                 return {}
-            return dict(json.loads(line) for line in lines if line.endswith("\n"))
-        except (OSError, ValueError):
+            return dict(_optimum(line) for line in lines if line.endswith("\n"))
+        except (OSError, ValueError, RecursionError):  # of another program, or damaged
             return {}
 
     def recall(self, key: str) -> np.ndarray | None:
@@ -76,6 +76,16 @@ class Checkpoint:
     def done(self) -> None:
         """Deletes the file: the diagnosis is complete."""
         self.path.unlink(missing_ok=True)
+
+
+def _optimum(line: str) -> tuple[str, list[float]]:
+    """The key and the optimum of a line. Raises ValueError."""
+    pair = json.loads(line)
+    if not (isinstance(pair, list) and len(pair) == 2 and isinstance(pair[0], str) and isinstance(pair[1], list)):
+        raise ValueError("no line of a checkpoint")
+    if not all(isinstance(number, int | float) for number in pair[1]):
+        raise ValueError("no numbers")
+    return pair[0], pair[1]
 
 
 def _line(value: Any) -> str:

@@ -101,7 +101,7 @@ def verify_package(folder: Path | str) -> tuple[Fault, ...]:
     folder = Path(folder)
     try:
         expected = dict(json.loads(read_text(folder / MANIFEST))["files"])
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, RecursionError):
         raise InputError(
             folder / MANIFEST, [Fault("file", "is no manifest of ctrlgen; generate the folder anew")]
         ) from None

@@ -80,6 +80,11 @@ class Curve:
         step = np.diff(self.samples(share), axis=0) / sizes
         return share, np.concatenate([[0.0], np.cumsum(np.linalg.norm(step, axis=1))])
 
+    @property
+    def length(self) -> float:
+        """Its length in typical sizes of the channels."""
+        return float(self._length[1][-1])
+
     def evenly(self, intervals: int) -> np.ndarray:
         """Shares (at least intervals + 1,) at equal distances along the curve, every corner among them."""
         share, length = self._length

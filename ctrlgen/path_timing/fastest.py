@@ -34,6 +34,7 @@ FEWEST = 8  # samples of the fastest motion: of fewer, nothing says where betwee
 COARSE = 32  # samples of a path, below which its set-points are few
 EXAMPLES = {"--sample-rate": "10 kHz", "--frequency": "50 Hz"}
 HIGHEST_RATE = 1e8  # Hz, of set-points: no controller is faster
+STILL = 1e-9  # typical sizes, below which the length of a path is rounding
 HELD_POINTS = 400  # at which it is looked at whether a path can be held
 
 
@@ -103,6 +104,9 @@ def fastest(
     if wanted is not None:
         check_frequency(rate, wanted)
     curve = Curve(scenario, model)
+    if curve.length < STILL:
+        what = f"is {curve.length:.1g} of the typical size of the {scenario.file.follow} long: nothing moves, and nothing bounds the speed"
+        raise InputError(scenario.path, [Fault("path", f"{what}; make it longer")])
     if scenario.file.robust is not None:
         what = "asks for limits that hold at a probability, for which the fastest path is not computed; leave it out of a copy"
         raise InputError(scenario.path, [Fault("robust", what)])
@@ -181,6 +185,8 @@ def _sampled(optimum: Optimum, followed: Followed) -> np.ndarray:
         enough = f"{np.ceil(COARSE / optimum.duration / 1e3):g} kHz"
         lasts = show(optimum.duration, "s")
         what = f'is too low: the fastest motion lasts {lasts}, which is {begin} samples; give --sample-rate "{enough}"'
+        if COARSE / optimum.duration > HIGHEST_RATE:
+            what = f"is of no use: the path is so short that it takes {lasts}; make it longer"
         raise InputError(followed.curve.scenario.path, [Fault("sample_rate", what)])
     n = fewest(lambda n: followed.keeps(optimum.samples(followed.sample_time, n - begin)), begin)
     if n is None:

@@ -17,6 +17,7 @@ ORDER = 4  # of the Butterworth filter, run forward and backward
 ENOUGH = 4.0  # rate of the kept rows over the cut-off: at twice that the filter has 1/250 of an amplitude
 WHOLE_SAMPLES = 0.1  # sample times: how far a gap may be off a whole number of them
 QUARTER = 0.25  # of the cut-off's period
+FEWEST_FILTERED = 16  # rows, by one more than the filter is led in at either end
 HIGHEST = 0.9  # of half the rate of the kept rows: room for the filter's edge
 
 

@@ -214,6 +214,7 @@ class _RecordReader:
             return None
         if table.rows and n and table.rows[1] > n:
             self._fault(".rows", f"{list(table.rows)} ends after the last of {n} rows of {table.file}")
+            return None
         if kind == "series" and clock is None and (table.time is not None or table.sample_rate is None):
             return None
         time, period = self._clock(kind, clock, n)
@@ -242,8 +243,10 @@ class _RecordReader:
         values = values | {name: preprocessing.delayed(values[name], time, lag) for name, lag in late.items()}
         moved = [np.isfinite(values[name]) for name in values if name in late or self.columns[name].sample_rate]
         self.rows = preprocessing.inner_rows(moved, *(self.table.rows or (0, n)))
-        rows = slice(*self.rows)
-        inside = self._filtered({k: v[rows] for k, v in values.items()}, float(np.median(np.diff(time))))
+        rows, step = slice(*self.rows), float(np.median(np.diff(time)))
+        if not step > 0:  # the clock itself is at fault, which validation says
+            return values
+        inside = self._filtered({k: v[rows] for k, v in values.items()}, step)
         whole = {name: np.full(n, np.nan) for name in inside}
         for name, column in inside.items():
             whole[name][rows] = column
@@ -264,6 +267,10 @@ class _RecordReader:
             values = {name: preprocessing.bridged(column, longest) for name, column in values.items()}
             incomplete = [name for name, column in values.items() if not np.isfinite(column).all()]
             highest = preprocessing.highest_cutoff(sample_time, self._kept(sample_time))
+            if (count := min(map(len, values.values()), default=0)) < preprocessing.FEWEST_FILTERED:
+                what = f"takes {preprocessing.FEWEST_FILTERED} rows or more, and {count} are used; leave it out, or use more rows"
+                self._fault(": low_pass", what)
+                return {}
             too_high = not 0 < w.low_pass.si <= highest
             if too_high:
                 what = f"{w.low_pass.text} is too high for the rows that are kept; write {highest:.4g} Hz or less"

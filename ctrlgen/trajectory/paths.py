@@ -221,7 +221,7 @@ class Raster(Legs_):
     """Middle of the raster, as channels with units; channels left out are zero."""
     plane: tuple[str, str] = ("delta_x", "delta_y")
     """Two channels of one dimension that span the plane of the path, first and second."""
-    step_share: Annotated[float, Field(gt=0, le=1)] = 0.2
+    step_share: Annotated[float, Field(ge=1e-3, le=1)] = 0.2
     """Time of a step to the next line as a share of the time of a line."""
 
     def corners(self, frame: Frame) -> tuple[np.ndarray, np.ndarray]:

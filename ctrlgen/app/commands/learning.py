@@ -47,7 +47,7 @@ def learn(
 
     With --device device.next.toml it goes on from what a diagnosis has explained, and learns only what is left.
 
-    Example:  ctrlgen learn scenarios/circle20 run1 run2 --out out/learn
+    Example:  ctrlgen learn scenarios/lever_circle scenarios/lever_runs/run_a.toml scenarios/lever_runs/run_b.toml --out out/learn
     """
     from ctrlgen.core.files import check_folder, whole_folder
     from ctrlgen.learning.learn import learn as learn_next

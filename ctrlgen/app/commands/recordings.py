@@ -199,7 +199,10 @@ def batch(
     command continues with the rest. The exit status is 1 when a diagnosis
     failed, and 2 for a list that cannot be used.
 
-    Example:  ctrlgen batch jobs.toml --out out/jobs --scheduler tcp://cluster:8786
+    On a cluster add the address of its dask.distributed scheduler, --scheduler
+    tcp://HOST:8786.
+
+    Example:  ctrlgen batch scenarios/lever_runs/jobs.toml --out out/jobs
     """
     from ctrlgen.app.batch import load_batch, run_batch
 

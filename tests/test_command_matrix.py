@@ -1,0 +1,155 @@
+"""Every command on every shipped file of its kind, and on files of other kinds: it works, or refuses with the reason."""
+
+from __future__ import annotations
+
+import tomllib
+import warnings
+from pathlib import Path
+from typing import Any
+
+import click
+import pytest
+import tomlkit
+from conftest import DEVICES, SCENARIOS
+
+from ctrlgen.app.commands.cli import app
+from ctrlgen.app.shipped_examples import examples
+from ctrlgen.core.errors import CtrlgenError
+
+FEW = 24  # samples of a path, so that every scenario can be tried: rates are lowered to it
+TABLES = {path: tomllib.loads(path.read_text()) for path in sorted(SCENARIOS.rglob("*.toml"))}
+PATHS = [path for path, table in TABLES.items() if "path" in table]
+RECORDED = [path for path, table in TABLES.items() if "record" in table]
+DESCRIBED = [
+    *(path for path, table in TABLES.items() if "kind" in table and "record" not in table),
+    DEVICES / "tilt_platform.py",
+]
+COMMANDS = sorted(command.callback.__name__ for command in app.registered_commands)
+QUICK_PATHS = {
+    "flexure_axis_line",
+    "lever_circle",
+    "parallelogram_line",
+    "tripod_tilt",
+    "rrr_circle",
+    "unreachable",
+    "xy_stage_force",
+}
+QUICK = {path for path in PATHS if path.parent.name in QUICK_PATHS} | set(
+    {path.parent: path for path in RECORDED[::-1]}.values()
+)
+
+
+def slow(paths: list[Path], quick: set[Path]) -> list[Any]:
+    """The paths as parameters of a test, of which those that are not `quick` are long."""
+    return [path if path in quick else pytest.param(path, marks=pytest.mark.long) for path in paths]
+
+
+def tried(*words: object) -> str:
+    """The command line in this process: '' where it works, else the reason with which it refuses. Anything else is raised."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            status = app([str(word) for word in words], standalone_mode=False)
+    except (CtrlgenError, click.ClickException) as error:
+        return str(error) or "usage"
+    return "" if not status else f"status {status}"
+
+
+def of_device(path: Path) -> Path:
+    """The device file of a recording."""
+    return next(e.device for e in examples() if e.file.parent == path.parent.resolve())
+
+
+def named(path: Path) -> str:
+    return f"{path.parent.name}-{path.stem}"
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_refuses_files_of_other_kinds_in_words(command, tmp_path, capsys):
+    (tmp_path / "empty.toml").touch()
+    kinds = {
+        "device": DEVICES / "flexure_axis.toml",
+        "scenario": SCENARIOS / "parallelogram_line" / "scenario.toml",
+        "recording": SCENARIOS / "lever_runs" / "run_a.toml",
+        "jobs": SCENARIOS / "lever_runs" / "jobs.toml",
+        "uncertainty": SCENARIOS / "circle20" / "uncertainty.toml",
+        "log": SCENARIOS / "lever_runs" / "run_a.csv",
+        "empty": tmp_path / "empty.toml",
+        "folder": tmp_path,
+        "nothing": tmp_path / "nothing",
+    }
+    fitting = {"check": {"device", "scenario"}, "bode": {"device"}, "workspace": {"device"}, "batch": {"jobs"}}
+    takes_two = {"learn", "diagnose", "calibrate"}
+    out = [] if command in ("check", "compare", "example", "reproduce") else ["--out", tmp_path / "out.svg"]
+    for kind, file in kinds.items():
+        if kind in fitting.get(command, {"scenario"}):
+            continue
+        second = [kinds["device"]] if command in takes_two else []
+        reason = tried(command, file, *second, *out)
+        assert reason or capsys.readouterr().err, (kind, reason)
+    assert not list(tmp_path.glob("out*"))
+
+
+@pytest.mark.parametrize("path", slow(PATHS, QUICK), ids=named)
+def test_check_of_every_scenario(path):
+    assert tried("check", path.parent) == ""
+
+
+@pytest.mark.parametrize("path", DESCRIBED, ids=named)
+def test_check_of_every_device(path):
+    assert tried("check", path) == ""
+
+
+@pytest.mark.parametrize("path", slow(RECORDED, QUICK), ids=named)
+def test_check_of_every_recording(path):
+    """Those whose data may not be copied are refused where the data are not there."""
+    reason = tried("check", path, "--device", of_device(path))
+    there = all((path.parent / record["file"]).is_file() for record in TABLES[path]["record"])
+    assert not reason if there else "does not exist" in reason
+
+
+@pytest.mark.parametrize("path", slow(RECORDED, QUICK), ids=named)
+def test_calibration_of_every_device_without_constants_of_its_own_is_refused(path):
+    device = of_device(path)
+    if device.suffix == ".toml" and "run_time" not in TABLES[device]:
+        assert "run_time" in tried("calibrate", device, path)
+
+
+@pytest.fixture
+def small(tmp_path):
+    """A copy of a scenario with few samples, beside its device."""
+
+    def copied(path: Path, rated: bool = False) -> Path:
+        document = tomlkit.parse(path.read_text())
+        document["device"] = str((path.parent / document["device"]).resolve())
+        document.pop("expect", None)
+        if "duration" in document and not rated:
+            lasts = float(document["duration"].split()[0]) * (1e-3 if "ms" in document["duration"] else 1.0)
+            document["sample_rate"] = f"{FEW / lasts:.9g} Hz"
+        elif "points" in document:
+            document["points"] = 3
+        folder = tmp_path / path.parent.name
+        folder.mkdir(exist_ok=True)
+        for other in path.parent.glob("*"):
+            if other.is_file() and other.name != path.name:
+                (folder / other.name).write_bytes(other.read_bytes())
+        (folder / path.name).write_text(tomlkit.dumps(document))
+        return folder
+
+    return copied
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("path", PATHS, ids=named)
+@pytest.mark.parametrize("command", ["solve", "generate", "player", "fmu", "budget", "fastest"])
+def test_every_command_on_every_scenario(command, path, small, tmp_path):
+    folder, out = small(path, rated=command == "fastest"), tmp_path / "out"
+    words = {
+        "player": ("generate", folder, "--player", "--out", out),
+        "budget": ("budget", folder, "--draws", 0, "--out", out),
+        "fastest": ("fastest", folder),
+    }
+    reason = tried(*words.get(command, (command, folder, "--out", out)))
+    print(command, path.parent.name, reason[:300])
+    assert command == "fastest" or out.exists() == (not reason)
+    assert len(reason) == 0 or len(reason) > 20

@@ -1,0 +1,56 @@
+"""The examples that the commands' help prints work as they are printed, with files that `ctrlgen example` gives."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+import subprocess
+import tomllib
+
+import pytest
+from command_line import ctrlgen
+from conftest import SCENARIOS
+
+from ctrlgen.app.commands.cli import app
+from ctrlgen.app.shipped_examples import examples
+
+EXAMPLE = re.compile(r"Example:  (ctrlgen .*)")
+COMMANDS = {command.callback.__name__: command.help for command in app.registered_commands}
+QUICK = {"check", "example", "learn"}
+MATCHES = [
+    pytest.param(name, line, marks=() if name in QUICK else pytest.mark.long, id=name)
+    for name, told in sorted(COMMANDS.items())
+    for line in EXAMPLE.findall(told or "")
+]
+
+
+def test_every_command_prints_an_example():
+    assert {name for name, told in COMMANDS.items() if EXAMPLE.search(told or "")} == set(COMMANDS)
+
+
+def needed(line: str) -> set[str]:
+    """The shipped examples that hold the files of a line: folders of that name, and one that comes with a named device."""
+    folders = set(re.findall(r"scenarios/(\w+)", line)) - {"devices"}
+    stems = re.findall(r"scenarios/devices/(\w+)\.toml", line)
+    return folders | {next(e.name for e in examples() if e.device.stem == stem) for stem in stems}
+
+
+@pytest.mark.parametrize(("name", "line"), MATCHES)
+def test_the_example_of_a_command_works_as_its_help_prints_it(name, line, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    if name != "example":
+        for example in needed(line):
+            assert ctrlgen("example", example, "--to", "scenarios").returncode == 0
+    first, *then = line.split(" && ")
+    done = ctrlgen(*shlex.split(first)[1:])
+    assert done.returncode == 0 and "Traceback" not in done.stderr, done.stderr
+    if out := re.search(r"--out (\S+)|--to (\S+)", first):
+        assert (tmp_path / (out[1] or out[2])).exists()
+    for more in then if shutil.which("cmake") else ():
+        subprocess.run(shlex.split(more), check=True, capture_output=True)
+
+
+def test_the_runs_that_come_with_it_are_of_the_lever_stage():
+    for name in ("run_a", "run_b"):
+        assert tomllib.loads((SCENARIOS / "lever_runs" / f"{name}.toml").read_text())["device"] == "xy_lever_stage"
