@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy  # its parts take a while to import, and come when they are used
 
+from ctrlgen.core.units import Quantity
 from ctrlgen.recordings import drive_across_gaps
 from ctrlgen.recordings.schema import RecordingFile
 
@@ -24,6 +25,15 @@ HIGHEST = 0.9  # of half the rate of the kept rows: room for the filter's edge
 def low_passed(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarray:
     """`values` (n,) low-passed at `cutoff` [Hz] without phase shift: 6 dB at the cut-off, 48 dB an octave beyond."""
     return scipy.signal.sosfiltfilt(scipy.signal.butter(ORDER, cutoff, fs=1 / sample_time, output="sos"), values)
+
+
+def cannot_pass(cutoff: Quantity, highest: float, rows: int) -> str:
+    """Why so many `rows` cannot pass a low-pass at a `cutoff`, of which `highest` [Hz] is the most; empty where they can."""
+    if not 0 < cutoff.si <= highest:
+        return f"{cutoff.text} is too high for the rows that are kept; write {highest:.4g} Hz or less"
+    if rows < FEWEST_FILTERED:
+        return f"takes {FEWEST_FILTERED} rows or more, and {rows} are used; leave it out, or use more rows"
+    return ""
 
 
 def delayed(values: np.ndarray, time: np.ndarray, lag: float) -> np.ndarray:

@@ -267,18 +267,12 @@ class _RecordReader:
             values = {name: preprocessing.bridged(column, longest) for name, column in values.items()}
             incomplete = [name for name, column in values.items() if not np.isfinite(column).all()]
             highest = preprocessing.highest_cutoff(sample_time, self._kept(sample_time))
-            if (count := min(map(len, values.values()), default=0)) < preprocessing.FEWEST_FILTERED:
-                what = f"takes {preprocessing.FEWEST_FILTERED} rows or more, and {count} are used; leave it out, or use more rows"
-                self._fault(": low_pass", what)
-                return {}
-            too_high = not 0 < w.low_pass.si <= highest
-            if too_high:
-                what = f"{w.low_pass.text} is too high for the rows that are kept; write {highest:.4g} Hz or less"
-                self._fault(": low_pass", what)
+            if odd := preprocessing.cannot_pass(w.low_pass, highest, min(map(len, values.values()), default=0)):
+                self._fault(": low_pass", odd)
             if incomplete:
                 what = f"{', '.join(incomplete)} has rows without a number, which a filter would smear; leave them out with `rows`"
                 self._fault(": low_pass", what)
-            if incomplete or too_high:
+            if incomplete or odd:
                 return {}
             values = {k: preprocessing.low_passed(v, sample_time, w.low_pass.si) for k, v in values.items()}
         derivatives = {
