@@ -105,6 +105,8 @@ def agreement(true: Region, found: Region | None, samples: Mapping[str, Mapping[
     quantities = {true.of, found.of if found else true.of}
     roles = ("fit", "hold_out") if "time" in quantities else ("hold_out",)
     at = {of: np.concatenate([samples[role][of] for role in roles]) for of in samples["hold_out"]}
+    if "temperature" in at:
+        at["rise"] = at["temperature"] - np.mean(samples["fit"]["temperature"])
     if found is not None and not found.measured(at):
         return 0.0
     keep = np.ones(len(at["time"]), bool)

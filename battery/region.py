@@ -11,12 +11,13 @@ import numpy as np
 from battery.accepted import in_si
 
 Array = np.ndarray
+SIZE = " size"
 
 
 @dataclass(frozen=True)
 class Region:
-    """Samples whose quantity `of` lies between `low` and `high`, SI. Quantities: position, velocity, speed (its size), drive,
-    drive size, temperature, time on the common clock."""
+    """Samples whose quantity `of` lies between `low` and `high`, SI. Quantities: position, velocity, drive, temperature, its rise over the
+    mean of the record to fit, time on the common clock; `... size`: its size; speed, that of the velocity."""
 
     of: str
     low: float
@@ -29,13 +30,16 @@ class Region:
 
     def measured(self, samples: Mapping[str, Array]) -> bool:
         """Whether the samples hold its quantity."""
-        return {"speed": "velocity", "drive size": "drive"}.get(self.of, self.of) in samples
+        return _base(self.of) in samples
+
+
+def _base(of: str) -> str:
+    return "velocity" if of == "speed" else of.removesuffix(SIZE)
 
 
 def _quantity(of: str, samples: Mapping[str, Array]) -> Array:
-    if of == "speed":
-        return np.abs(samples["velocity"])
-    return np.abs(samples["drive"]) if of == "drive size" else samples[of]
+    x = samples[_base(of)]
+    return np.abs(x) if of == "speed" or of.endswith(SIZE) else x
 
 
 def overlap(a: Array, b: Array) -> float:
@@ -56,6 +60,8 @@ ONE_WAY = 0.5  # skew from which on friction acts in one direction
 
 def stated(finding: Mapping[str, Any]) -> Region | None:
     """The region that a finding states, or None where its law acts everywhere."""
+    if finding.get("region"):
+        return _told(finding["region"])
     effect = finding["effect"]
 
     def value(name: str) -> float | None:
@@ -76,3 +82,13 @@ def stated(finding: Mapping[str, Any]) -> Region | None:
     if effect == "directional_friction" and skew is not None and abs(skew) > ONE_WAY:
         return Region("velocity", 0.0, np.inf) if skew > 0 else Region("velocity", -np.inf, 0.0)
     return None
+
+
+def _told(entry: Mapping[str, Any]) -> Region:
+    """The region as a finding tells it: `quantity`, whether its `size` is meant, `lower` and `upper` end, `unit`."""
+    ends = [
+        None if entry[end] is None else in_si(float(entry[end]["value"]), entry["unit"]) for end in ("lower", "upper")
+    ]
+    low, high = (default if e is None else e for e, default in zip(ends, (-np.inf, np.inf), strict=True))
+    of = "rise" if entry["quantity"] == "temperature" else entry["quantity"]
+    return Region(of + (SIZE if entry["size"] and of != "speed" else ""), low, high)

@@ -157,6 +157,28 @@ def test_the_region_that_a_finding_states(effect, values, region):
         assert (found.low, found.high) == (pytest.approx(region.low), pytest.approx(region.high))
 
 
+@pytest.mark.parametrize(
+    "quantity, size, lower, upper, region",
+    [
+        ("position", False, -2.0, 3.0, Region("position", -2e-6, 3e-6)),
+        ("position", True, 2.0, None, Region("position size", 2e-6, np.inf)),
+        ("speed", True, 4.0, None, Region("speed", 4e-6, np.inf)),
+        ("temperature", False, None, 5.0, Region("rise", -np.inf, 5e-6)),
+    ],
+)
+def test_a_region_that_is_told_counts_before_what_a_name_says(quantity, size, lower, upper, region):
+    ends = {end: None if v is None else {"value": v, "ci95": [v, v]} for end, v in (("lower", lower), ("upper", upper))}
+    told = ends | {"quantity": quantity, "size": size, "unit": "um"}
+    found = stated(finding("coulomb_above", edge=(5.0, "um")) | {"region": told})
+    assert (found.of, found.low, found.high) == (region.of, pytest.approx(region.low), pytest.approx(region.high))
+
+
+def test_a_rise_of_temperature_is_over_the_mean_of_the_record_to_fit():
+    record = {"velocity": np.ones(10), "time": np.arange(10.0), "temperature": 295 + np.arange(10.0)}
+    samples = {"fit": record, "hold_out": record}
+    assert agreement(Region("temperature", 299.5, np.inf), Region("rise", 0.0, np.inf), samples) == 1
+
+
 GRID = {"position": np.linspace(-1e-5, 1e-5, 201).tolist(), "velocity": [1e-3] * 201, "drive": [0.0] * 201}
 DRAG = {
     "case": "case_1",
