@@ -10,7 +10,7 @@ from battery import axis_cases, messy, pose_cases, rough_cases
 from battery.axis_cases import Array, Rng
 
 SECONDS = 3.0
-SIZE = (30.0, 300.0)  # rms of the law over the noise's
+SIZE = (30.0, 120.0)  # rms of the law over the noise's: above, what the form of the law leaves counts more than spikes
 SERIES = ("coulomb", "stribeck", "stiffening", "quadratic_damping", "hysteresis", "backlash", "viscous", "log_creep")
 POSES = ("drive_gain", "bow", "coupling")
 SHARE = {"axis": 0.01, "mems": 0.02, "meso": 0.02}  # of the readings
