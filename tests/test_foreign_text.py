@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 import tomlkit
 from command_line import ctrlgen
-from conftest import SCENARIOS
+from conftest import ROOT, SCENARIOS
 from hostile_texts import FOREIGN, READ, SHOWN, UNSEEN, leaves, replaced, skeleton
 from package_programs import STRICT
 
@@ -20,13 +20,14 @@ import ctrlgen.firmware.fmi.fmu as fmu
 from ctrlgen import InputError, build_model, load_device, load_scenario, solve
 from ctrlgen.core.errors import ToolError
 from ctrlgen.core.escaping import c_comment, c_format, csv_cell, kconfig, markdown, markdown_code, toml
-from ctrlgen.core.file_limits import DEEPEST, LARGEST_TOML, LONGEST_TEXT
+from ctrlgen.core.file_limits import DEEPEST, LARGEST_TEXT, LARGEST_TOML, LONGEST_CHAIN, LONGEST_KEY, LONGEST_TEXT
 from ctrlgen.core.files import read_toml, validate
 from ctrlgen.core.names import LONGEST_NAME
+from ctrlgen.core.units import LARGEST_POWER, LONGEST_UNIT, MOST_FACTORS
 from ctrlgen.devices import Device
 from ctrlgen.firmware.folder import generate
 from ctrlgen.recordings.schema import RecordingFile
-from ctrlgen.trajectory.scenario_file import ScenarioFile
+from ctrlgen.trajectory.scenario_file import MOST_SAMPLES, ScenarioFile
 from ctrlgen.trajectory.solution_plots import draw_solution
 from ctrlgen.verification.scenario_report import write_report
 
@@ -124,6 +125,20 @@ def test_each_notation_has_its_escape():
     for text in (*SHOWN, ALL, "\N{GRINNING FACE}"):
         assert tomllib.loads(f"a = {toml(text)}")["a"] == text
     assert len(tomllib.loads(f"a = {toml('x' * 9999)}")["a"]) == LONGEST_TEXT
+
+
+def test_the_limits_that_are_stated_are_those_that_are_kept():
+    told = (ROOT / "SECURITY.md").read_text()
+    for number in (LARGEST_TOML, LONGEST_TEXT, MOST_SAMPLES):
+        assert f"{number:,}" in told
+    for words in (
+        f"tables {DEEPEST} deep, keys of {LONGEST_CHAIN} words",
+        f"and {LONGEST_KEY} characters",
+        f"{LARGEST_TEXT / 1e6:.0f} MB",
+        f"{LONGEST_UNIT} letters, {MOST_FACTORS} factors, powers up to {LARGEST_POWER:g}",
+        f"most {LONGEST_NAME} of them",
+    ):
+        assert words in told
 
 
 def with_texts(folder: Path, text: str, *files: Path) -> None:
