@@ -19,7 +19,7 @@ from conftest import AXIS_FILE
 from recording_folders import SERVO, axis_recording, servo_poses
 
 import ctrlgen
-from ctrlgen.app.batch import load_batch, run_batch
+from ctrlgen.app.batch import earlier, load_batch, run_batch
 from ctrlgen.app.commands.cli import execute
 from ctrlgen.core.errors import InputError
 from ctrlgen.diagnosis.evidence.bootstrap import block_length, bootstrap, redrawn
@@ -77,6 +77,23 @@ def test_what_is_there_is_kept_and_what_changed_is_made_again(jobs, tmp_path, mo
     assert run_batch(load_batch(jobs, seed=1)[:1], out, jobs=0)[0].state == "done before"
     monkeypatch.setattr("ctrlgen.app.batch.code_hash", lambda: "of other code")
     assert run_batch(load_batch(jobs, seed=1)[:1], out, jobs=0)[0].state == "done"
+
+
+def test_a_result_that_is_damaged_is_made_again(tmp_path):
+    (tmp_path / "made_from.json").write_text('{"seed": 0}')
+    for damaged in ("", "[]", "{}", '{"findings": 1}', "[" * 99_999):
+        (tmp_path / "diagnosis.json").write_text(damaged)
+        assert earlier("a", tmp_path, {"seed": 0}) is None
+    (tmp_path / "made_from.json").write_text("[" * 99_999)
+    assert earlier("a", tmp_path, {"seed": 0}) is None
+
+
+def test_a_pattern_does_not_walk_through_whole_disks(tmp_path):
+    (tmp_path / "table.toml").write_text(SERVO)
+    for pattern in ("/**/*", "**", "x" * 5000, "[", "/*/" * 300):
+        (tmp_path / "jobs.toml").write_text(f'[[job]]\ndevice = "table.toml"\nrecordings = ["{pattern[:1900]}"]\n')
+        with pytest.raises(InputError, match="nothing matches"):
+            load_batch(tmp_path / "jobs.toml")
 
 
 def test_a_list_says_all_its_faults(tmp_path):

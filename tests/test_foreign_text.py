@@ -18,7 +18,7 @@ from package_programs import STRICT
 
 import ctrlgen.firmware.fmi.fmu as fmu
 from ctrlgen import InputError, build_model, load_device, load_scenario, solve
-from ctrlgen.core.errors import ToolError
+from ctrlgen.core.errors import Fault, ToolError
 from ctrlgen.core.escaping import c_comment, c_format, csv_cell, kconfig, markdown, markdown_code, toml
 from ctrlgen.core.file_limits import DEEPEST, LARGEST_TEXT, LARGEST_TOML, LONGEST_CHAIN, LONGEST_KEY, LONGEST_TEXT
 from ctrlgen.core.files import read_toml, validate
@@ -266,3 +266,10 @@ def test_a_device_of_hostile_names_is_refused_with_each(tmp_path):
     (tmp_path / "device.toml").write_text(tomlkit.dumps(table))
     with pytest.raises(InputError, match=r"axes\[0\]: .* is no name of an axis: write letters, digits and _"):
         load_device(tmp_path / "device.toml")
+
+
+def test_a_message_obeys_no_file_and_can_be_read():
+    error = InputError("a\x1b[2Jb", [Fault(f"key[{k}]", "\u202e" if k else "x" * 9999) for k in range(1000)])
+    assert str(error).startswith("a\\x1b[2Jb: 1000 faults\n  - key[0]: xxx")
+    assert "\\u202e" in str(error) and str(error).endswith("\n  - and 960 more") and len(str(error)) < 4000
+    assert len(error.faults) == 1000

@@ -36,6 +36,7 @@ from ctrlgen.version import code_hash
 
 MADE_FROM = "made_from.json"  # in each result folder: what the result depends on
 TABLE = "results.csv"
+MOST_WILD = 4  # of * and ? in a pattern, and no **: more walk through whole disks
 
 Progress = Callable[[int, int], None]
 
@@ -150,7 +151,10 @@ def _groups(job: JobTable, folder: Path) -> Iterator[list[Path] | Fault]:
         matches = [_matches(folder, text) for text in ((given,) if isinstance(given, str) else given)]
         for text, paths in zip((given,) if isinstance(given, str) else given, matches, strict=True):
             if not paths:
-                yield Fault("", f"nothing matches {text!r}; name a folder with a recording.toml, or the file itself")
+                yield Fault(
+                    "",
+                    f"nothing matches {text!r}; name a folder with a recording.toml, or the file itself ({MOST_WILD} * or ? at most)",
+                )
         if isinstance(given, str):
             yield from ([path] for path in matches[0])
         elif all(matches):
@@ -159,9 +163,14 @@ def _groups(job: JobTable, folder: Path) -> Iterator[list[Path] | Fault]:
 
 def _matches(folder: Path, text: str) -> list[Path]:
     """The folders and .toml files that `text` names; of the folders that match a pattern, those with a recording."""
-    if not re.search(r"[*?\[]", text):
-        return [folder / text] if (folder / text).exists() else []
-    paths = sorted(Path("/").glob(text[1:]) if text.startswith("/") else folder.glob(text))
+    if len(re.findall(r"[*?\[]", text)) > MOST_WILD or "**" in text:
+        return []
+    try:
+        if not re.search(r"[*?\[]", text):
+            return [folder / text] if (folder / text).exists() else []
+        paths = sorted(Path("/").glob(text[1:]) if text.startswith("/") else folder.glob(text))
+    except (OSError, ValueError, RecursionError):  # a name too long, a pattern that is none
+        return []
     return [p for p in paths if (p.is_dir() and (p / "recording.toml").is_file()) or p.suffix == ".toml"]
 
 
@@ -189,7 +198,7 @@ def run_batch(
         except (InputError, OSError) as error:
             rows[task.name] = BatchRow(task.name, "failed", error=_one_line(str(error)))
             continue
-        if (row := _earlier(task.name, out / task.name, made_from)) is not None:
+        if (row := earlier(task.name, out / task.name, made_from)) is not None:
             rows[task.name] = row
         else:
             to_do.append((task, made_from))
@@ -228,7 +237,7 @@ def _kept(task: Task, made_from: dict[str, Any], result: dict[str, bytes] | Fail
     return _row(task.name, "done", result["diagnosis.json"])
 
 
-def _earlier(name: str, folder: Path, made_from: dict[str, Any]) -> BatchRow | None:
+def earlier(name: str, folder: Path, made_from: dict[str, Any]) -> BatchRow | None:
     """The row of a result that was made before from the same files; None where there is none, or it is damaged."""
     try:
         if json.loads((folder / MADE_FROM).read_text(encoding="utf-8")) != made_from:

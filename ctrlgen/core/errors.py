@@ -17,6 +17,14 @@ if TYPE_CHECKING:
     import numpy as np
 
 
+LISTED = 40  # faults of one input in a message: what a reader mends before he tries again
+LONGEST_FAULT = 2000  # characters of one
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= LONGEST_FAULT else f"{text[: LONGEST_FAULT // 2]} ... {text[-LONGEST_FAULT // 2 :]}"
+
+
 def visible(text: str) -> str:
     """`text` with every character that a terminal would obey instead of showing (controls, marks of direction) as its escape."""
     return "".join(c if c.isprintable() or c in "\n\t" else ascii(c)[1:-1] for c in text)
@@ -44,7 +52,10 @@ class InputError(CtrlgenError):
         self.source = str(source)
         self.faults = tuple(faults)
         count = "1 fault" if len(self.faults) == 1 else f"{len(self.faults)} faults"
-        super().__init__(visible("\n".join([f"{self.source}: {count}", *(f"  - {fault}" for fault in self.faults)])))
+        listed = [f"  - {_shortened(str(fault))}" for fault in self.faults[:LISTED]]
+        if len(self.faults) > LISTED:
+            listed.append(f"  - and {len(self.faults) - LISTED} more")
+        super().__init__(visible("\n".join([f"{self.source}: {count}", *listed])))
 
 
 @dataclass(frozen=True)
