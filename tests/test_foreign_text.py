@@ -17,7 +17,7 @@ from hostile_texts import FOREIGN, READ, SHOWN, UNSEEN, leaves, replaced, skelet
 from package_programs import STRICT
 
 import ctrlgen.firmware.fmi.fmu as fmu
-from ctrlgen import InputError, build_model, load_device, load_scenario, solve
+from ctrlgen import InputError, build_model, load_device, load_scenario, solve, user_device
 from ctrlgen.core.errors import Fault, ToolError
 from ctrlgen.core.escaping import c_comment, c_format, csv_cell, kconfig, markdown, markdown_code, toml
 from ctrlgen.core.file_limits import DEEPEST, LARGEST_TEXT, LARGEST_TOML, LONGEST_CHAIN, LONGEST_KEY, LONGEST_TEXT
@@ -156,8 +156,9 @@ def with_texts(folder: Path, text: str, *files: Path) -> None:
         copy.write_text(document.as_string())
 
 
-def same_but_for_texts(tmp_path: Path, make: Callable[[Path, Path], None], *files: Path) -> Path:
-    """What `make` writes from copies of `files` with plain texts and with hostile ones is the same, the texts apart; the second one."""
+def same_but_for_texts(tmp_path: Path, make: Callable[[Path, Path], None], *files: Path, shown: bool = True) -> Path:
+    """What `make` writes from copies of `files` with plain texts and with hostile ones is the same, the texts apart, which are `shown`
+    somewhere; the second one."""
     for name, text in (("plain", PLAIN), ("hostile", ALL)):
         with_texts(tmp_path / name, text, *files)
         make(tmp_path / name, tmp_path / f"{name}_out")
@@ -173,7 +174,7 @@ def same_but_for_texts(tmp_path: Path, make: Callable[[Path, Path], None], *file
         content = hostile[name].read_bytes()
         told += FOREIGN.encode() in content
         assert skeleton(name, content, ALL) == skeleton(name, plain[name].read_bytes(), PLAIN), name
-    assert told  # the texts did come out
+    assert bool(told) is shown
     return tmp_path / "hostile_out"
 
 
@@ -223,41 +224,52 @@ def test_nothing_foreign_is_in_the_player_and_the_units_for_co_simulation(tmp_pa
     )
 
 
+RUNS = "lever_runs/run_a.toml lever_runs/run_b.toml"
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("words", "files"),
+    "words",
     [
-        (("run", "mirror_spiral"), SPIRAL),
-        (("fastest", "mirror_spiral"), SPIRAL),
-        (("workspace", "devices/tip_tilt_mirror.toml"), SPIRAL),
-        (
-            ("budget", "circle20"),
-            [SCENARIOS / "circle20" / f"{name}.toml" for name in ("scenario", "uncertainty")]
-            + [SCENARIOS / "devices" / "mems_hexapod.toml"],
-        ),
-        (
-            ("calibrate", "devices/mems_hexapod_run_time.toml", "hexapod_specimen"),
-            [SCENARIOS / "devices" / "mems_hexapod_run_time.toml", SCENARIOS / "hexapod_specimen" / "recording.toml"],
-        ),
-        (
-            ("diagnose", "flexure_2dof/device.toml", "flexure_2dof"),
-            [SCENARIOS / "flexure_2dof" / f"{name}.toml" for name in ("device", "recording")],
-        ),
+        "run lever_circle",
+        "fastest lever_circle --sample-rate 20kHz",
+        "workspace devices/xy_lever_stage.toml",
+        "budget lever_circle --draws 0",
+        "calibrate devices/mems_hexapod_run_time.toml hexapod_specimen",
+        f"learn lever_circle {RUNS}",
+        f"diagnose devices/xy_lever_stage.toml {RUNS} --laws creep,backlash",
+        "batch lever_runs/jobs.toml",
     ],
-    ids=lambda value: value[0] if isinstance(value[0], str) else "",
 )
-def test_nothing_foreign_is_in_any_result_of_a_command(words, files, tmp_path):
-    command, *given = words
+def test_nothing_foreign_is_in_any_result_of_a_command(words, tmp_path):
+    command, *given = words.split()
+    folders = {SCENARIOS / word.split("/")[0] for word in given if (SCENARIOS / word).exists()} | {
+        SCENARIOS / "devices"
+    }
 
     def make(folder: Path, out: Path) -> None:
-        for data in {file.parent for file in files}:
-            for table in data.glob("*.csv"):
-                shutil.copy(table, folder / table.relative_to(SCENARIOS))
-        done = ctrlgen(command, *(folder / name for name in given), "--out", out)
-        assert done.returncode == 0, done.stderr
-        assert "Traceback" not in done.stderr
+        for table in (table for data in folders for table in data.glob("*.csv")):
+            shutil.copy(table, folder / table.relative_to(SCENARIOS))
+        done = ctrlgen(
+            command, *(folder / word if (SCENARIOS / word).exists() else word for word in given), "--out", out
+        )
+        assert done.returncode == 0 and "Traceback" not in done.stderr, done.stderr
 
-    same_but_for_texts(tmp_path, make, *files)
+    same_but_for_texts(
+        tmp_path,
+        make,
+        *(file for data in folders for file in sorted(data.glob("*.toml"))),
+        shown=command != "workspace",
+    )
+
+
+def test_a_device_in_python_has_no_hostile_names_either():
+    laws = {"force": lambda u, p: p.k * u[0], "restoring_force": lambda d, p: p.k * d[0], "parameters": {"k": "1 N/m"}}
+    for name in ("*/ int injected; /*", "ümlaut", "a b", "n" * 41, ""):
+        with pytest.raises(InputError, match="must be names with their largest size"):
+            user_device("stage", **laws, axes={name: "1 um"}, drive={"u": "1 m"})
+        with pytest.raises(InputError, match=r"name: .*(is no C identifier|has 41 letters)"):
+            user_device(name, **laws, axes={"x": "1 um"}, drive={"u": "1 m"})
 
 
 def test_a_device_of_hostile_names_is_refused_with_each(tmp_path):
