@@ -1,4 +1,4 @@
-"""Diagnosis: the screen of 60 s of six channels, and a whole diagnosis of 20 000 samples of an axis."""
+"""Diagnosis: the screen of 60 s of six channels, and whole diagnoses of 20 000 samples: of an axis beside its peers, and the goals."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 from battery.laws import simulate
 from battery.opponents import RUNNERS
 from battery.plant_axis import Axis, Planted
+from benchmarks.goals import goals
 from benchmarks.measure import Line, Note, interleave, timed
 from benchmarks.samples import SCENARIO, Disagreement
 from ctrlgen import build_model, diagnose, load_device
@@ -32,7 +33,7 @@ def run(repeat: int) -> list[Line | Note]:
     """Seconds of a screen and of a diagnosis, and the largest memory of both."""
     found = [*_screen(repeat), *_axis(repeat)]
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    return [*found, Note(f"diagnosis: peak memory {peak:.0f} MB (aim: < {MEMORY_AIM:.0f} MB)")]
+    return [*found, Note(f"diagnosis: peak memory {peak:.0f} MB (aim: < {MEMORY_AIM:.0f} MB)"), *goals()]
 
 
 def _screen(repeat: int) -> list[Line | Note]:

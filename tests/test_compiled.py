@@ -6,8 +6,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from ctrlgen.numerics import compiled
-from ctrlgen.numerics.batched_evaluation import Recursion
+from ctrlgen.numerics import batched_evaluation, compiled
+from ctrlgen.numerics.batched_evaluation import Recursion, evaluate
 from ctrlgen.numerics.compiled import Compilable
 
 LONG = 1e6  # seconds that would pay for any compilation
@@ -94,3 +94,38 @@ def test_a_long_function_is_compiled_in_parts_and_gives_the_same_bits(cache, mon
     assert long.spent(LONG)
     for point in np.random.default_rng(2).standard_normal((20, 3)):
         assert np.array_equal(long.function(point).full(), whole(point).full())
+
+
+def test_a_constant_input_is_given_once_and_one_of_another_length_is_refused(cache):
+    rng = np.random.default_rng(3)
+    v, p = rng.standard_normal((1200, 1)), np.array([[0.3, 0.7]])
+    plain, quick = Recursion(friction()), Recursion(friction())
+    expected = plain.run(np.zeros(1), v, np.repeat(p, 1200, axis=0))
+    for a, b in zip(expected, quick.run(np.zeros(1), v, p), strict=True):
+        assert np.array_equal(a, b)
+    if compiled.compiler() is None:
+        pytest.skip("no C compiler here")
+    assert quick.one.is_compiled or quick.one.spent(LONG)
+    for a, b in zip(expected, quick.run(np.zeros(1), v, p), strict=True):
+        assert np.array_equal(a, b)
+    for wrong in (p[:, :1], np.repeat(p, 3, axis=0)):
+        with pytest.raises(ValueError, match="has"):
+            quick.run(np.zeros(1), v, wrong)
+
+
+def test_a_long_record_is_compiled_for_after_its_first_block(cache, monkeypatch):
+    """Seconds are told by a clock that goes on a tenth at each look: the rest and a few more records would take longer than to compile."""
+    if compiled.compiler() is None:
+        pytest.skip("no C compiler here")
+    clock = iter(0.1 * np.arange(1000))
+    monkeypatch.setattr(batched_evaluation.time, "process_time", lambda: next(clock))
+    blocks = []
+    monkeypatch.setattr(batched_evaluation, "evaluate", lambda *given: blocks.append(1) or evaluate(*given))
+    v, p = np.random.default_rng(4).standard_normal((1700, 1)), np.array([[0.3, 0.7]])
+    quick = Recursion(friction())
+    got = quick.run(np.zeros(1), v, p)
+    assert quick.one.is_compiled and len(blocks) == 1
+    slow = Recursion(friction())
+    monkeypatch.setattr(slow.one, "spent", lambda *_: False)
+    for a, b in zip(got, slow.run(np.zeros(1), v, p), strict=True):
+        assert np.array_equal(a, b)

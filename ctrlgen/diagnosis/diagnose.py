@@ -40,7 +40,7 @@ from ctrlgen.diagnosis.shares.families import ranking
 from ctrlgen.diagnosis.shares.gather import ResidualShares, residual_shares
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.checkpoint import Checkpoint
-from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.fit import Fitter, forget_predictions
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, hypotheses, nominal_physics, selected_laws
 from ctrlgen.estimation.isolated_outliers import mark_outliers
 from ctrlgen.estimation.law_needs import not_offered, refusals, usual, with_odds
@@ -80,6 +80,7 @@ def diagnose_recording(
     """
     # Those of an earlier diagnosis only take memory
     compiled_simulator.cache_clear()
+    forget_predictions()
     # One thread: the matrices are small. No warnings: a candidate model may diverge, and is then rejected.
     with threadpool_limits(1), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         processes = usable_cores() if jobs is None else max(jobs, 1)

@@ -20,6 +20,9 @@ from ctrlgen.model.integrators import ExponentialRungeKutta, ImplicitRadau
 
 # at which a step of ETD-RK4 evaluates N
 POINTS = 4
+# Operations up to which a step is written out number by number: beyond, the compiler takes longer than the products of matrices.
+LONGEST_WRITTEN = 6_000
+LARGEST_WRITTEN = 6  # rows of a matrix whose inverse is written out: a few hundred operations
 
 Step = Callable[[ca.MX, ca.MX, list[ca.MX]], tuple[ca.MX, ca.MX]]
 """(T, seed, [Y, u, u at the end of the step, held values, ambient, c]) -> Y and T one step on. Y = (x, z) as in
@@ -75,9 +78,25 @@ def _all_steps(
         if isinstance(steps, ImplicitRadau)
         else _explicit_step(equations, steps, c_varies)
     )
+    written = _written_out(step, T, seed, [S, u, u_next, held, e, c])
     for u_start, u_end in pairwise(steps.drives(u, u_next, equations.linear)):
-        S, T = step(T, seed, [S, u_start, u_end, held, e, c])
+        S, T = written(T, seed, S, u_start, u_end, held, e, c)
     return S, T
+
+
+def _written_out(step: Step, T: ca.MX, seed: ca.MX, given: list[ca.MX]) -> ca.Function:
+    """(T, seed, *given) -> Y and T one step on."""
+    like = [ca.MX.sym("like", value.sparsity()) for value in (ca.densify(T), seed, *given)]
+    return written_out(ca.Function("step", like, list(step(like[0], like[1], like[2:]))))
+
+
+def written_out(one: ca.Function) -> ca.Function:
+    """The function number by number where that is short: as machine code it takes half the time of products of small matrices."""
+    try:
+        written = one.expand()
+    except RuntimeError:  # it solves a system that is too large for that
+        return one
+    return written if written.n_instructions() <= LONGEST_WRITTEN else one
 
 
 def _implicit_step(equations: SampleEquations, steps: ImplicitRadau, c_varies: bool) -> Step:
@@ -92,13 +111,21 @@ def _implicit_step(equations: SampleEquations, steps: ImplicitRadau, c_varies: b
         after, by_Y_1, by_Y_2, by_constant_1, by_constant_2 = evaluate(*given)
 
         def derivative_of_n(base: ca.MX, M: ca.DM, by_Y: ca.MX, by_constant: ca.MX) -> ca.MX:
-            return (base @ by_Y + seed @ by_constant) @ ca.inv(ca.DM.eye(M.size1()) - M @ by_Y)
+            return (base @ by_Y + seed @ by_constant) @ _inverse(ca.DM.eye(M.size1()) - M @ by_Y)
 
         first = derivative_of_n(T @ E_c, P, by_Y_1, by_constant_1)
         base = T @ E + first @ W
         return after, base + derivative_of_n(base, V, by_Y_2, by_constant_2) @ V
 
     return step
+
+
+def _inverse(A: ca.MX) -> ca.MX:
+    """The inverse of a small matrix, by its entries; of a larger one by a QR decomposition at run time."""
+    if A.size1() > LARGEST_WRITTEN:
+        return ca.inv(A)
+    entries = ca.SX.sym("A", A.sparsity())
+    return ca.Function("inverse", [entries], [ca.inv(entries)])(A)
 
 
 def _explicit_step(equations: SampleEquations, steps: ExponentialRungeKutta, c_varies: bool) -> Step:

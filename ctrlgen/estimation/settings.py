@@ -199,6 +199,10 @@ class SimulationSettings:
     kept: int = 64
     """Compiled simulators kept at a time. One of a hexapod takes 20 MB, and a search uses five hundred; with 64 it builds a tenth
     more of them than without a limit."""
+    kept_splines: int = 8
+    """Splines through the drives of records kept at a time: a search has as many records in turn. Judgement."""
+    kept_predictions: int = 16
+    """Predictions of records kept at a time: what one fit is judged by, on as many records. Judgement."""
     start_newton_steps: int = 12
     """Newton steps from home to the first displacement in balance, unrolled. Later samples start from the one before."""
     newton_steps: int = 4

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from ctrlgen.devices import Device
-from ctrlgen.estimation.forward_sensitivities import forward_sensitivities
+from ctrlgen.estimation.forward_sensitivities import forward_sensitivities, written_out
 from ctrlgen.estimation.hypothesis import nominal_physics
 from ctrlgen.estimation.late_readings import LateReading, effects_apart, late_readings, read_late, unknown_samples
 from ctrlgen.estimation.sample_equations import SampleEquations, build_sample_equations
@@ -82,11 +82,9 @@ class Simulator:
         if tau == 0 or self.poses or len(record.time) < SIMULATION.shortest_spline:
             return record
         at = np.clip(record.time + tau, record.time[0], record.time[-1])
-        if record.linear:
-            drive = CubicSpline(record.time, record.drive)(at)
-        else:
-            drive = np.column_stack([np.interp(at, record.time, u) for u in record.drive.T])
-        return replace(record, drive=drive)
+        if not record.linear:
+            return replace(record, drive=np.column_stack([np.interp(at, record.time, u) for u in record.drive.T]))
+        return replace(record, drive=_spline(record)(at))
 
     @cached_property
     def free_initial_states(self) -> tuple[int, ...]:
@@ -178,7 +176,7 @@ class Simulator:
     ) -> tuple[np.ndarray, np.ndarray]:
         """S after each sample (n, n_s) and the readings (n, n_y) [SI]; arguments as of `simulate`."""
         record = self.aligned(record, p)
-        c = np.tile(self._with_rates.constants(p)[0].full().T, (len(record.time), 1))
+        c = self._with_rates.constants(p)[0].full().T
         after, values = self._recursion.run(self.starting_state(record, p, start), *self.inputs(record), c)
         y = values[:, : len(self.channels)]
         for late in self.late:
@@ -201,7 +199,7 @@ class Simulator:
         T_0 = np.zeros((k + n_i, self.n_s))
         T_0[k + np.arange(n_i), list(self.free_initial_states)] = 1.0
         first = np.concatenate([self.starting_state(record, p, start), T_0.ravel(order="F")])
-        constant = (np.tile(np.reshape(v, (1, -1)), (n, 1)) for v in (c.full(), np.array(c_p.nonzeros())))
+        constant = (np.reshape(v, (1, -1)) for v in (c.full(), np.array(c_p.nonzeros())))
         values = self._recursion_with_sensitivities(by_free).run(first, *self.inputs(record), *constant)[1]
         rows = n_y + self._rates.numel()
         values, Y = values[:, :rows], values[:, rows:].reshape(n, rows, k + n_i)
@@ -247,7 +245,9 @@ class Simulator:
             S, T = state[: self.n_s], ca.reshape(state[self.n_s :], seed.shape[0], self.n_s)
             following, T, y, Y = forward_sensitivities(self._with_rates, T, seed, [S, *others])
             values = [ca.densify(ca.vertcat(a, ca.vec(b))) for a, b in ((following, T), (y, Y))]
-            self._with_sensitivities[by_free] = Recursion(ca.Function("one", [state, *others, c_p], values))
+            one = ca.Function("one", [state, *others, c_p], values)
+            whole = self._with_rates.steps is None
+            self._with_sensitivities[by_free] = Recursion(written_out(one) if whole else one)
         return self._with_sensitivities[by_free]
 
     @cached_property
@@ -281,6 +281,12 @@ def _with_unknown(read: np.ndarray, record: Record, late: LateReading, age: floa
     wrong = np.where(valid[behind], observed[behind] - read[behind], 0.0)
     read[unknown] = np.where(valid[unknown], observed[unknown] - wrong, read[behind])
     return read
+
+
+@lru_cache(maxsize=SIMULATION.kept_splines)
+def _spline(record: Record) -> CubicSpline:
+    """The drive of a record as a function of time."""
+    return CubicSpline(record.time, record.drive)
 
 
 @lru_cache(maxsize=SIMULATION.kept)

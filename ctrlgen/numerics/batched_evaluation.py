@@ -13,6 +13,8 @@ import numpy as np
 from ctrlgen.numerics.compiled import Compilable
 
 BLOCK = 500  # samples of an unrolled recursion: CasADi takes longer to unroll a long one than to run it
+# Times that a recursion will yet run over as many samples: a trial takes eight steps, some of them with further tries. Judgement.
+LIKELY_RUNS = 4
 
 
 def evaluate(batched: ca.Function, *given: np.ndarray) -> list[np.ndarray]:
@@ -39,26 +41,42 @@ def evaluate(batched: ca.Function, *given: np.ndarray) -> list[np.ndarray]:
 
 
 class Recursion:
-    """The recursion `one` (state, inputs ...) -> (next state, result), run sample after sample in unrolled blocks."""
+    """The recursion `one` (state, inputs ...) -> (next state, result), sample after sample: in unrolled blocks by CasADi's virtual
+    machine, in one loop where it has been compiled."""
 
     def __init__(self, one: ca.Function) -> None:
         self.one = Compilable(one)
         self.unrolled: dict[int, ca.Function] = {}
 
     def run(self, state: np.ndarray, *inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """States (n, n_s) after each of n samples and results (n, n_r), from `state` (n_s,) and inputs (n, .)."""
-        n, one = len(inputs[0]), self.one.function
-        size = min(n, BLOCK)
+        """States (n, n_s) after each of n samples and results (n, n_r), from `state` (n_s,) and inputs (n, .), or (1, .) where they are
+        constant."""
+        n = max(map(len, inputs))
+        if self.one.is_compiled:
+            return self.one.run(state, inputs, n)
+        one, size = self.one.function, min(n, BLOCK)
         if size not in self.unrolled:
             self.unrolled[size] = one.mapaccum(size)
         states, results = np.empty((n, one.size1_out(0))), np.empty((n, one.size1_out(1)))
-        begin = time.perf_counter()
         for a in range(0, n, size):
+            begin = time.process_time()
             b = min(a + size, n)
             # the last block is filled with its last sample
-            block = [np.concatenate([x[a:b], np.repeat(x[b - 1 : b], a + size - b, axis=0)]) for x in inputs]
+            block = [_block(x, a, b, size) for x in inputs]
             after, values = evaluate(self.unrolled[size], state, *block)
             states[a:b], results[a:b], state = after[: b - a], values[: b - a], after[-1]
-        if self.one.spent(time.perf_counter() - begin):
-            self.unrolled.clear()
+            seconds = time.process_time() - begin
+            if self.one.spent(seconds, seconds * ((n - b) + LIKELY_RUNS * n) / (b - a)):
+                self.unrolled.clear()
+                if b < n and self.one.is_compiled:
+                    rest = [x[b:] if len(x) == n else x for x in inputs]
+                    states[b:], results[b:] = self.one.run(state, rest, n - b)
+                    break
         return states, results
+
+
+def _block(x: np.ndarray, a: int, b: int, size: int) -> np.ndarray:
+    """Rows a to b of x, or the one row of what is constant, filled up to `size` rows with the last."""
+    if len(x) == 1:
+        return np.repeat(x, size, axis=0)
+    return np.concatenate([x[a:b], np.repeat(x[b - 1 : b], a + size - b, axis=0)])

@@ -7,6 +7,7 @@ virtual machine to the last bit.
 
 from __future__ import annotations
 
+import ctypes
 import functools
 import hashlib
 import os
@@ -14,9 +15,11 @@ import re
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import casadi as ca
+import numpy as np
 
 FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off", "-w")
 # Of generated C, for the compiler: measured with gcc 12 to 14 on steps of an axis and a hexapod.
@@ -31,6 +34,33 @@ IN_WORK_VECTOR = re.compile(r"  (w\[\d+\]=|if \(res\[\d+\]!=0\) )")
 PLACE = re.compile(r"w\[(\d+)\]")
 LONGEST = 6_000_000  # characters of generated C: beyond, the compiler takes longer than the diagnosis
 
+# A recursion as one call, sample after sample on the caller's memory: CasADi copies what goes in and out of every sample, which takes
+# as long as the equations of an axis. `by`: numbers from one sample of an argument to the next, 0 for one that is constant.
+LOOP = """
+#include <stdlib.h>
+CASADI_SYMBOL_EXPORT int {name}_run(casadi_int n, const casadi_real** given, const casadi_int* by, const casadi_real* state,
+                                    casadi_real* states, casadi_int n_s, casadi_real* results, casadi_int n_r) {{
+  casadi_int sz_arg, sz_res, sz_iw, sz_w, k, i;
+  if ({name}_work(&sz_arg, &sz_res, &sz_iw, &sz_w)) return 1;
+  const casadi_real** arg = malloc((sz_arg + 1)*sizeof(casadi_real*));
+  casadi_real** res = malloc((sz_res + 1)*sizeof(casadi_real*));
+  casadi_int* iw = malloc((sz_iw + 1)*sizeof(casadi_int));
+  casadi_real* w = malloc((sz_w + 1)*sizeof(casadi_real));
+  int mem = {name}_checkout(), failed = !arg || !res || !iw || !w;
+  for (k = 0; k < n && !failed; ++k) {{
+    arg[0] = state;
+    for (i = 1; i < {name}_n_in(); ++i) arg[i] = given[i - 1] + k*by[i - 1];
+    res[0] = states + k*n_s;
+    res[1] = results + k*n_r;
+    failed = {name}(arg, res, iw, w, mem);
+    state = states + k*n_s;
+  }}
+  {name}_release(mem);
+  free(arg), free(res), free(iw), free(w);
+  return failed;
+}}
+"""
+
 
 class Compilable:
     """`function`, and the library that takes its place once it has run so long that compiling pays."""
@@ -40,25 +70,51 @@ class Compilable:
         self.seconds = 0.0  # spent in the virtual machine so far
         self._code: str | None = None
         self._settled = compiler() is None
+        self._loop: Callable[..., int] | None = None
 
-    def spent(self, seconds: float) -> bool:
-        """Counts `seconds` of the virtual machine; whether `function` has been replaced by its library."""
+    def spent(self, seconds: float, expected: float = 0.0) -> bool:
+        """Counts `seconds` of the virtual machine, where it would take the `expected` ones beside; whether `function` has been replaced
+        by its library."""
         if self._settled:
             return False
         self.seconds += seconds
         if self._code is None:
-            if self.seconds < 0.2:  # what hardly runs need not be written as C
+            if self.seconds + expected < 0.2:  # what hardly runs need not be written as C
                 return False
             self._code = c_code(self.function)
         price = len(self._code) * SECONDS_PER_CHARACTER
         path = _library(self._code)
-        if not path.exists() and (self.seconds < price or len(self._code) > LONGEST):
+        if not path.exists() and (self.seconds + expected < price or len(self._code) > LONGEST):
             return False
         self._settled = True
         if not path.exists() and not _compile(self._code, path):
             return False
-        self.function, self._code = ca.external(self.function.name(), str(path)), ""
+        name, self._code = self.function.name(), ""
+        self.function = ca.external(name, str(path))
+        self._loop = getattr(ctypes.CDLL(str(path)), f"{name}_run", None)
         return True
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether a library with a loop over samples is there."""
+        return self._loop is not None
+
+    def run(self, state: np.ndarray, inputs: Sequence[np.ndarray], n: int) -> tuple[np.ndarray, np.ndarray]:
+        """States (n, n_s) and results (n, n_r) of a recursion from `state` (n_s,), all in the library; inputs (n, .), or (1, .) of what is
+        constant. Raises ValueError for an input of the wrong size, RuntimeError where there is no library or a sample fails."""
+        one, rows = self.function, [np.ascontiguousarray(x, float) for x in (state, *inputs)]
+        for i, x in enumerate(rows):
+            wanted = one.nnz_in(i) * (1 if i == 0 else len(x))
+            if x.size != wanted or (i and len(x) not in (1, n)):
+                raise ValueError(f"argument {one.name_in(i)} has {x.size} numbers instead of {wanted}")
+        states, results = np.empty((n, one.nnz_out(0))), np.empty((n, one.nnz_out(1)))
+        given = (ctypes.c_void_p * len(inputs))(*(x.ctypes.data for x in rows[1:]))
+        by = (ctypes.c_longlong * len(inputs))(*(x.shape[1] if len(x) == n else 0 for x in rows[1:]))
+        at = [ctypes.c_void_p(x.ctypes.data) for x in (rows[0], states, results)]
+        sizes = [ctypes.c_longlong(x.shape[1]) for x in (states, results)]
+        if self._loop is None or self._loop(ctypes.c_longlong(n), given, by, at[0], at[1], sizes[0], at[2], sizes[1]):
+            raise RuntimeError(f"{one.name()} could not be evaluated")
+        return states, results
 
 
 @functools.cache
@@ -72,7 +128,15 @@ def compiler() -> str | None:
 def c_code(function: ca.Function) -> str:
     """C of `function` with CasADi's interface, in parts where it is long."""
     code = _generated(function, avoid_stack=False)
-    return code if len(code) < LARGE else _in_parts(_generated(function, avoid_stack=True))
+    code = code if len(code) < LARGE else _in_parts(_generated(function, avoid_stack=True))
+    # a state and a result: a recursion
+    return _with_loop(code, function.name()) if function.n_out() == 2 and function.n_in() > 1 else code
+
+
+def _with_loop(code: str, name: str) -> str:
+    """The code with the loop over samples, in front of what closes the C linkage."""
+    head, end, tail = code.rpartition("#ifdef __cplusplus\n} /* extern")
+    return head + LOOP.format(name=name) + end + tail
 
 
 def _generated(function: ca.Function, avoid_stack: bool) -> str:

@@ -1,0 +1,42 @@
+"""What fits cost, counted in simulations of a record: none is made twice."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from axis_records import AXIS, axis_fitter
+
+from ctrlgen.estimation.error_model import ErrorModel
+from ctrlgen.estimation.simulator import Simulator
+from ctrlgen.estimation.structure import Structure
+
+
+@pytest.fixture
+def counted(monkeypatch):
+    """How often records are simulated, with slopes and without."""
+    counts: Counter[str] = Counter()
+
+    def counting(name):
+        method = getattr(Simulator, name)
+        monkeypatch.setattr(Simulator, name, lambda *a, **k: counts.update([name]) or method(*a, **k))
+
+    counting("simulate_states")
+    counting("sensitivities")
+    return counts
+
+
+def test_what_a_fit_predicts_is_simulated_once_under_the_same_errors(counted):
+    fitter = axis_fitter(n=400)
+    fit = fitter.fit(Structure(AXIS), steps=1)
+    record = fitter.held_out_records[0]
+    first = fitter.predict(fit, record)
+    counted.clear()
+    first[:] = 0.0  # belongs to who asked
+    again = fitter.predict(replace(fit), record)
+    assert not counted and np.any(again)
+    other = ErrorModel.of_noise(replace(fitter.noise, sd=2 * fitter.noise.sd))
+    replace(fitter, errors=other).predict(fit, record)
+    assert counted["sensitivities"] == 1
