@@ -10,7 +10,7 @@ import numpy as np
 
 from battery.accepted import EVIDENCE, is_right
 from battery.judge_rough import by_share, leading, over_best, share_of
-from battery.region import Region, overlap, stated
+from battery.region import Region, edges_covered, overlap, stated
 
 ENOUGH = 0.8  # overlap of a region that is found
 MOVING = 0.02  # of the rms speed: slower, a direction says nothing
@@ -23,11 +23,13 @@ TOLD = 0.1  # by which the number of spikes told may differ from those planted
 
 @dataclass(frozen=True)
 class Located:
-    """A law in a region: whether the first finding is of that `law`, the `overlap` of the region that it states, as text `stated`."""
+    """A law in a region: whether the first finding is of that `law`, the `overlap` of the region that it states, as text `stated`, and
+    whether the interval of each of its ends holds the true one, `edges`."""
 
     law: bool
     overlap: float
     stated: str
+    edges: tuple[bool, ...] = ()
 
     @property
     def found(self) -> bool:
@@ -97,7 +99,10 @@ def _located(answer: dict[str, Any], findings: Sequence[dict[str, Any]]) -> Loca
     if hit is None:
         return Located(law, 0.0, "")
     found = stated(hit)
-    return Located(law, agreement(region, found, answer["samples"]), "everywhere" if found is None else str(found))
+    edges = tuple(edges_covered(hit, region))
+    return Located(
+        law, agreement(region, found, answer["samples"]), "everywhere" if found is None else str(found), edges
+    )
 
 
 def agreement(true: Region, found: Region | None, samples: Mapping[str, Mapping[str, Any]]) -> float:

@@ -84,6 +84,20 @@ def stated(finding: Mapping[str, Any]) -> Region | None:
     return None
 
 
+def edges_covered(finding: Mapping[str, Any], true: Region) -> list[bool]:
+    """Of each end that the finding tells with an interval and that is true: whether the interval holds it; of the same quantity only."""
+    entry, found = finding.get("region"), stated(finding)
+    if not entry or found is None or found.of != true.of:
+        return []
+    out = []
+    for end, value in (("lower", true.low), ("upper", true.high)):
+        interval = entry[end] and entry[end]["ci95"]
+        if np.isfinite(value) and interval and None not in interval:
+            low, high = (in_si(float(e), entry["unit"]) for e in interval)
+            out.append(low <= value <= high)
+    return out
+
+
 def _told(entry: Mapping[str, Any]) -> Region:
     """The region as a finding tells it: `quantity`, whether its `size` is meant, `lower` and `upper` end, `unit`."""
     ends = [

@@ -26,10 +26,12 @@ def further_rows(judged: Sequence[Judgement]) -> list[Row]:
         return [what(j) for j in judged if j.kind == kind]
 
     best = [f.over_best for f in of(*KNOWN) if f.over_best is not None]
+    edges = [inside for f in of("regional") if f.located for inside in f.located.edges]
     memory = [j.memory for j in judged if j.memory is not None]
     return [
         share("regional, law first", rough("regional", _law), ">= 90 %", 0.90),
         share("regional, region overlaps by 0.8", rough("regional", _region), ">= 90 %", 0.90),
+        share("regional, coverage of the ends' 95 % intervals", edges, ">= 88 %", 0.88),
         share("regional, nothing beside it", rough("regional", lambda j: j.rough.nothing_beside), UNSET),
         share("region stated where none is", [f.false_region for f in of(*EVERYWHERE)], "<= 2 %", most=0.02),
         *_gap_rows(judged),

@@ -173,6 +173,18 @@ def test_a_region_that_is_told_counts_before_what_a_name_says(quantity, size, lo
     assert (found.of, found.low, found.high) == (region.of, pytest.approx(region.low), pytest.approx(region.high))
 
 
+def test_the_interval_of_an_end_holds_the_true_one_or_not():
+    def told(low, high):
+        end = {"value": (low + high) / 2, "ci95": [low, high]}
+        return {"region": {"quantity": "position", "size": False, "lower": end, "upper": None, "unit": "um"}}
+
+    drag = finding("coulomb_above", edge=(2.0, "um"))
+    ends = [judged(DRAG, drag | more).further.located.edges for more in (told(1.9, 2.2), told(2.1, 2.2), {})]
+    assert ends == [(True,), (False,), ()]
+    rows = {r.what: r for r in score.table([judged(DRAG, drag | told(1.9, 2.2))])}
+    assert rows["regional, coverage of the ends' 95 % intervals"].hits == 1
+
+
 def test_a_rise_of_temperature_is_over_the_mean_of_the_record_to_fit():
     record = {"velocity": np.ones(10), "time": np.arange(10.0), "temperature": 295 + np.arange(10.0)}
     samples = {"fit": record, "hold_out": record}
