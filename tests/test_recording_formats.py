@@ -1,4 +1,4 @@
-"""Six formats read alike; what is missing or damaged is named."""
+"""Formats read alike; what is missing or damaged is named."""
 
 from __future__ import annotations
 
@@ -15,8 +15,22 @@ from ctrlgen.recordings.reader import load_recordings
 
 
 def write_as(ending: str, path, columns: dict[str, np.ndarray]) -> None:
-    if ending in (".csv", ".dat", ".txt"):
+    if READERS[ending] == "text_file":
         path.write_text(csv_text(columns))
+    elif ending in (".xlsx", ".xlsm"):
+        openpyxl = pytest.importorskip("openpyxl", reason="openpyxl is not installed: Excel was not read")
+        book = openpyxl.Workbook()
+        for row in (list(columns), *zip(*(v.tolist() for v in columns.values()), strict=True)):
+            book.active.append(row)
+        book.save(path)
+    elif ending == ".parquet":
+        parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed: Parquet was not read")
+        parquet.write_table(__import__("pyarrow").table(columns), path)
+    elif ending == ".npz":
+        np.savez_compressed(path, **columns)
+    elif ending == ".npy":
+        table = np.array(list(zip(*columns.values(), strict=True)), dtype=[(name, float) for name in columns])
+        np.save(path, table)
     elif ending == ".json":
         path.write_text(json.dumps({k: [None if math.isnan(x) else x for x in v] for k, v in columns.items()}))
     elif ending == ".mat":
@@ -35,17 +49,17 @@ def write_as(ending: str, path, columns: dict[str, np.ndarray]) -> None:
             writer.write_segment([nptdms.ChannelObject("log", name, column) for name, column in columns.items()])
     else:
         asammdf = pytest.importorskip("asammdf", reason="asammdf is not installed: MDF4 was not read")
-        with asammdf.MDF(version="4.10") as file:
+        with asammdf.MDF(version="4.10" if ending == ".mf4" else "3.30") as file:
             rest = {name: column for name, column in columns.items() if name != "t"}
             file.append([asammdf.Signal(c, columns["t"], name=n, unit="um" * (n == "x")) for n, c in rest.items()])
-            file.save(path)
+            file.save(path, overwrite=True)
 
 
 @pytest.mark.parametrize("ending", list(READERS))
 def test_every_format_gives_the_same_record(ending, tmp_path, model):
     columns = samples()
     write_as(ending, tmp_path / f"run{ending}", columns)
-    clock = {"column": "time" if ending == ".mf4" else "t", "unit": "s"}
+    clock = {"column": "time" if ending in (".mf4", ".mdf") else "t", "unit": "s"}
     described(tmp_path, {"file": f"run{ending}", "role": "fit", "time": clock})
     fit, held = load_recordings([tmp_path], model).records
     assert np.allclose(np.vstack([fit.drive, held.drive])[:, 2], columns["u2X"], rtol=1e-15)
@@ -87,7 +101,10 @@ def test_bad_cells_are_listed_by_line(tmp_path):
         read_table(tmp_path / "a.csv").numbers("u")
 
 
-@pytest.mark.parametrize(("ending", "package"), [(".h5", "h5py"), (".tdms", "npTDMS"), (".mf4", "asammdf")])
+@pytest.mark.parametrize(
+    ("ending", "package"),
+    [(".h5", "h5py"), (".tdms", "npTDMS"), (".mf4", "asammdf"), (".xlsx", "openpyxl"), (".parquet", "pyarrow")],
+)
 def test_a_missing_package_is_named_with_its_command(ending, package, tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, package.lower(), None)
     (tmp_path / f"a{ending}").write_bytes(b"")

@@ -122,6 +122,11 @@ def enough_rows(sample_time: float, cutoff: float) -> int:
     return max(int(1 / (ENOUGH * cutoff * sample_time) * (1 + 1e-9)), 1)
 
 
+def lowest_cutoff(sample_time: float, keep_every: int) -> float:
+    """The lowest cut-off [Hz] after which no fewer than one row in `keep_every` is kept."""
+    return 1 / (ENOUGH * sample_time * keep_every)
+
+
 def highest_cutoff(sample_time: float, keep_every: int) -> float:
     """The highest cut-off [Hz] that half the rate of the kept rows can hold."""
     return HIGHEST / (2 * sample_time * keep_every)

@@ -6,7 +6,6 @@ What recording.toml may say is in `ctrlgen.recordings.schema`, what refuses a re
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,10 +15,14 @@ import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_toml, validate
-from ctrlgen.core.units import parse, same_dimension, to_si
+from ctrlgen.core.units import parse
 from ctrlgen.model.model import Model
 from ctrlgen.recordings import preprocessing, validation
-from ctrlgen.recordings.formats import READERS, MeasurementTable, read_table
+from ctrlgen.recordings.formats import READERS
+from ctrlgen.recordings.formats.measurement_table import Clock
+from ctrlgen.recordings.gaps import SHORTEST
+from ctrlgen.recordings.plausible_rate import rate_notes
+from ctrlgen.recordings.recorded_columns import RecordedColumns
 from ctrlgen.recordings.recording import Record, Recording
 from ctrlgen.recordings.schema import FILE, Column, RecordingFile, RecordTable, check, deviation, fits
 from ctrlgen.recordings.units_of_columns import channel_names
@@ -163,7 +166,8 @@ class _File:
             result = validation.validate_record(record, self.written.kind, self.model, names, where, table.gap)
             records += result.records
             places += [where] * len(result.records)
-            notes += [*reader.notes, *result.notes]
+            notes += [note for note in reader.notes if note not in notes] + list(result.notes)
+            notes += rate_notes(result.records, self.model, table) if self.written.kind == "series" else []
             faults += result.faults
             if result.records:
                 spans.append((k, table, result.records[0].time[0], result.records[-1].time[-1]))
@@ -190,19 +194,19 @@ class _RecordReader:
     def __init__(
         self, folder: Path, written: RecordingFile, table: RecordTable, columns: dict[str, Column], where: str
     ) -> None:
-        self.folder, self.written, self.table, self.columns, self.where = folder, written, table, columns, where
-        self.faults: list[Fault] = []
-        self.files: dict[str, MeasurementTable | None] = {}
-        self.rows, self.notes = table.rows, list[str]()
+        self.written, self.table, self.columns, self.where = written, table, columns, where
+        self.read_from = RecordedColumns(folder, written, table, where)
+        self.faults, self.rows, self.notes = self.read_from.faults, table.rows, self.read_from.notes
         self.name = table.file + (f"[{table.rows[0]}:{table.rows[1]}]" if table.rows else "")
 
     def read(self, names: validation.ChannelNames) -> Record | None:
         """The record before validation; None where drives or clock cannot be read. `valid`: the channel has a column."""
         table, kind = self.table, self.written.kind
-        read = {name: self._column(f"{self.where}.columns.{name!r}", column) for name, column in self.columns.items()}
-        values = {name: column for name, column in read.items() if column is not None}
+        values = self.read_from.signals(self.columns)
+        clock = None if table.time is None else self.read_from.column(f"{self.where}.time", table.time)
         foreign = {name: values.pop(name) for name in list(values) if self.columns[name].sample_rate}
-        clock = None if table.time is None else self._column(f"{self.where}.time", table.time)
+        clocks = self.read_from.own_clocks(list(values), clock)
+        foreign |= {name: values.pop(name) for name in clocks}
         ambient = self._ambient(table.conditions.ambient)
         sizes = {name: len(column) for name, column in values.items()}
         sizes |= {} if clock is None else {"time": len(clock)}
@@ -227,9 +231,10 @@ class _RecordReader:
             time = np.interp(np.arange(places[-1] + 1), places, time)
             self.notes.append(preprocessing.grid_note(self.name, places))
         if kind == "series" and n > 1:
-            values |= {name: self._resampled(name, column, time) for name, column in foreign.items()}
+            values |= {name: self._resampled(name, column, time, clocks) for name, column in foreign.items()}
             values = self._preprocessed(values, time)
-        if any(name not in values for name in names.drives):
+            self._check_thinned(float(np.median(np.diff(time))))
+        if any(name not in values for name in names.drives) or any(": " in fault.where for fault in self.faults):
             return None
         return self._record(names, values, time, period, ambient)
 
@@ -252,11 +257,11 @@ class _RecordReader:
             whole[name][rows] = column
         return whole
 
-    def _resampled(self, name: str, values: np.ndarray, time: np.ndarray) -> np.ndarray:
-        """A column (m,) of another recorder at the record's `time` (n,) [s]; both began at once."""
+    def _resampled(self, name: str, values: np.ndarray, time: np.ndarray, clocks: dict[str, Clock]) -> np.ndarray:
+        """A column (m,) of another recorder at the record's `time` (n,) [s]: both began at once, or it states its own clock."""
         rate = self.columns[name].sample_rate
-        clock = np.arange(len(values)) / (rate.si if rate else 1.0)
-        return preprocessing.resampled(values, clock, time - time[0])
+        start, step = clocks[name] if name in clocks else (0.0, 1 / rate.si if rate else 1.0)
+        return preprocessing.resampled(values, start + step * np.arange(len(values)), time - time[0])
 
     def _filtered(self, values: dict[str, np.ndarray], sample_time: float) -> dict[str, np.ndarray]:
         """The columns after the file's low-pass, with its derivatives; empty, with a fault, where that cannot be done."""
@@ -285,6 +290,21 @@ class _RecordReader:
             readings = (k for k in whole if k == name or (k in derivatives and w.derivatives[k].of == name))
             whole |= {k: np.where(lost, np.nan, whole[k]) for k in readings if not k.startswith("drive.")}
         return whole
+
+    def _check_thinned(self, sample_time: float) -> None:
+        """A fault where the filter leaves too few rows of a record that has enough of them."""
+        first, last = self.rows or (0, 0)
+        every, least = self._kept(sample_time), SHORTEST["series"]
+        if last - first < least or (last - first) // every >= least:
+            return
+        what = f"leaves {(last - first) // every} of {last - first} rows, one in {every}, and {least} are needed"
+        if self.written.keep_every is None and self.written.low_pass is not None:
+            lowest = preprocessing.lowest_cutoff(sample_time, (last - first) // least)
+            self._fault(
+                ": low_pass", f"{self.written.low_pass.text} {what}; write {lowest:.4g} Hz or more, or record longer"
+            )
+        else:
+            self._fault(": keep_every", f"{what}; write {(last - first) // least} or less, or record longer")
 
     def _kept(self, sample_time: float) -> int:
         """The number n of which every n-th row is kept, where rows are `sample_time` [s] apart."""
@@ -318,7 +338,7 @@ class _RecordReader:
         for i, name in enumerate(names.observed):
             observed[:, i] = values.get(name, np.nan)
         after_lead_in = (np.arange(n) >= table.used_rows[0])[:, None]
-        recorded = np.array([name in values for name in names.observed])
+        recorded = np.array([name in values for name in names.observed], dtype=bool)
         return Record(
             name=self.name,
             role=table.role,
@@ -337,64 +357,8 @@ class _RecordReader:
     def _ambient(self, given: str | Column | None) -> np.ndarray | float | None:
         """The ambient temperature [K]: recorded (n,), constant, or None."""
         if isinstance(given, Column):
-            return self._column(f"{self.where}.conditions.ambient", given)
+            return self.read_from.column(f"{self.where}.conditions.ambient", given)
         try:
             return None if given is None else parse(given, "degC")
         except ValueError:  # already among the faults of recording.toml
             return None
-
-    def _table(self, path: Path) -> MeasurementTable:
-        """A file's columns. Raises InputError; for a file that is not kept with the recording it says where to get it."""
-        stated = self.written.sha256.get(path.name)
-        which = self.table.table if path.name == Path(self.table.file).name else None
-        if stated is None:
-            return read_table(path, which)
-        source = f"{self.written.source or 'its source is not stated'}; file {path.name}, SHA-256 {stated}"
-        if not path.is_file():
-            what = f"is not here; the recording does not bring it along. Source: {source}. Put it at {path.resolve()}"
-            raise InputError(path, [Fault(path.name, what)])
-        actual = hashlib.sha256(path.read_bytes()).hexdigest()
-        # Rows, units and filters were chosen for that file and would mean something else in another
-        if actual != stated:
-            what = f"is another file, SHA-256 {actual}. Wanted: {source}. If you mean this one, state its SHA-256 in [sha256]"
-            raise InputError(path, [Fault(path.name, what)])
-        return read_table(path, which)
-
-    def _column(self, where: str, column: Column) -> np.ndarray | None:
-        """A column in SI (n,); None, with a fault, where it cannot be read."""
-        file = column.file or self.table.file
-        try:
-            if file not in self.files:
-                self.files[file] = None
-                self.files[file] = self._table(self.folder / file)
-        except InputError as error:
-            place = f"{self.where}.file" if column.file is None else f"{where}.file"
-            self.faults += [Fault(place, f"{file} {fault.what}") for fault in error.faults]
-        table = self.files[file]
-        if table is None:
-            return None
-        try:
-            name = table.find(column.column)
-            values = table.numbers(name)
-        except InputError as error:
-            self.faults += [Fault(where, f"{file} {fault.what}") for fault in error.faults]
-            return None
-        try:
-            scale = to_si(1.0, column.unit), to_si(0.0, column.unit)
-        except ValueError:  # already among the faults of recording.toml
-            return None
-        if column.scale == 1 and _contradicts(table.units.get(name), scale, column.unit):
-            what = f"{file} says {table.units[name]}, recording.toml says {column.unit}; correct the one that is wrong"
-            self.faults.append(Fault(where, what))
-        return column.scale * values * (scale[0] - scale[1]) + scale[1]
-
-
-def _contradicts(stated: str | None, scale: tuple[float, float], unit: str) -> bool:
-    """Whether a file's own unit differs from the one given; a text that is no unit contradicts nothing."""
-    if stated is None:
-        return False
-    try:
-        other = to_si(1.0, stated), to_si(0.0, stated)
-        return not same_dimension(stated, unit) or not np.allclose(other, scale, rtol=1e-9, atol=0)
-    except ValueError:
-        return False

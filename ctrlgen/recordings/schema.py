@@ -13,6 +13,7 @@ from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import In, Quantity, parse, parse_difference, same_dimension
 from ctrlgen.devices.section import Section
 from ctrlgen.model.model import Model
+from ctrlgen.recordings.formats.written_layout import Layout
 
 FILE = "recording.toml"
 LAST_ROW = 1 << 62  # stands for the end of a file whose length is not known yet
@@ -66,8 +67,10 @@ class RecordTable(Section):
 
     file: str
     """The measurement file, relative to recording.toml; its ending tells the format."""
-    table: Annotated[int, Field(ge=1)] | None = None
-    """Which table of a text file that holds several, from 1."""
+    table: Annotated[int, Field(strict=True, ge=1)] | str | None = None
+    """Which table of a file that holds several, from 1, or the name of a sheet of a workbook."""
+    layout: Layout | None = None
+    """How this record's files are written, where they leave it open. Left out: as `layout` of the whole file says."""
     role: Literal["fit", "hold_out", "rest"]
     """`fit`: parameters are estimated from it; `hold_out`: it only judges predictions; `rest`: nothing moves, it gives
     the noise. Without a `hold_out`, part of the longest record is held out.
@@ -130,6 +133,8 @@ class RecordingFile(Section):
     """SHA-256 of measurement files that are not kept beside this one, by name without folder; they are checked."""
     kind: Literal["series", "poses"]
     """`series`: motion in time; `poses`: a list of settled poses."""
+    layout: Layout = Layout()
+    """How the measurement files are written, where they leave it open: decimal mark, separator, what stands for none."""
     low_pass: Annotated[Quantity, In("Hz", positive=True)] | None = None
     """Cut-off of a zero-phase low-pass filter, which all columns and `derivatives` of a series pass."""
     keep_every: Annotated[int, Field(ge=1)] | None = None

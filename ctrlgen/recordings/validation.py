@@ -269,7 +269,8 @@ def with_hold_out(records: Sequence[Record], kind: str) -> Validated:
     n, least = len(longest.time), DIVISIBLE[kind]
     if n < least:
         what = f'none has role = "hold_out", and {longest.name} is too short to divide ({n} rows, {least} are needed)'
-        return Validated(faults=(Fault("record", f"{what}; record a second run"),))
+        thinned = ", or raise low_pass, after which fewer rows are kept" if longest.band is not None else ""
+        return Validated(faults=(Fault("record", f"{what}; record a second run{thinned}"),))
     if kind == "series":
         cut = round((1 - HELD_OUT) * n)
         parts = [rows_between(longest, 0, cut), replace(rows_between(longest, cut, n), role="hold_out")]

@@ -1,0 +1,173 @@
+"""The columns of one measurement file, as every reader gives them."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.recordings.formats import number_cells, over_range, time_stamps
+from ctrlgen.recordings.formats.number_cells import NumberStyle
+from ctrlgen.recordings.formats.unit_texts import bare_name
+
+MOST_LISTED = 20  # columns that a message lists
+
+
+class Clock(NamedTuple):
+    """The time axis of a channel that brings its own: its first instant and the time between its readings [s]."""
+
+    start: float
+    step: float
+
+
+class Numbers(NamedTuple):
+    """A column as float64 (n,), NaN where there is no reading, and what was interpreted on the way, one line each."""
+
+    values: np.ndarray
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class MeasurementTable:
+    """The columns of one file by name: numbers (n,), instants (datetime64), or the cells of a text file.
+
+    `units`: those that the file itself states. `lines`: the line number of each row in a text file. `notes`: what was interpreted to
+    read the file, one line each. `aliases`: further names of columns. `nameless`: columns that have no name of their own, by their
+    number from 0. `clocks`: of channels whose time axis the file states.
+    `style`: how numbers are written as text. `missing`: numbers and texts that the reader says are no reading,
+    None where nothing is said.
+    """
+
+    path: Path
+    columns: Mapping[str, Any]
+    units: Mapping[str, str] = field(default_factory=dict)
+    lines: Sequence[int] = ()
+    notes: tuple[str, ...] = ()
+    aliases: Mapping[str, str] = field(default_factory=dict)
+    nameless: frozenset[int] = frozenset()
+    clocks: Mapping[str, Clock] = field(default_factory=dict)
+    style: NumberStyle = field(default_factory=NumberStyle)
+    missing: tuple[str | int | float, ...] | None = None
+
+    def find(self, wanted: str | int) -> str:
+        """The full name of a column that is given by name, by number from 0, without its unit, or without its group.
+
+        Raises InputError that lists the columns, or the nearest name.
+        """
+        names = list(self.columns)
+        if isinstance(wanted, int):
+            if not 0 <= wanted < len(names):
+                raise self.fault(f"has columns 0 to {len(names) - 1}, not {wanted}")
+            named = str(wanted) in names and names.index(str(wanted)) != wanted
+            if named and len(self.nameless) < len(names):
+                what = f"has a column that is named {wanted}, and column number {wanted} from 0 is another, {names[wanted]!r}"
+                raise self.fault(f'{what}: write column = "{wanted}" for the first, or the name of the other')
+            return names[wanted]
+        shorter = (str, bare_name, _without_group, lambda name: bare_name(_without_group(name)))
+        for shorten in shorter:
+            matching = [name for name in names if shorten(name) == wanted]
+            matching += [
+                name for alias, name in self.aliases.items() if shorten(alias) == wanted and name not in matching
+            ]
+            if len(matching) == 1:
+                return matching[0]
+            if matching:
+                raise self.fault(f"has {len(matching)} columns {wanted!r}: write one of {', '.join(matching)}")
+        raise self.fault(f"has no column {wanted!r}; {self._instead(wanted, names)}")
+
+    def _instead(self, wanted: str, names: list[str]) -> str:
+        if wanted.isdecimal() and int(wanted) < len(names):
+            k = int(wanted)
+            return f"write column = {k}, without quotes, for the one with {k} before it: {names[k]!r}"
+        near = difflib.get_close_matches(wanted, [*names, *map(bare_name, names)], n=1)
+        listed = ", ".join(names[:MOST_LISTED]) + (", ..." if len(names) > MOST_LISTED else "")
+        return f"did you mean {near[0]!r}?" if near else f"its columns are: {listed or 'none'}"
+
+    def numbers(self, name: str) -> np.ndarray:
+        """Column `name` as float64 (n,), NaN where there is no reading. Raises InputError for text that is no number."""
+        return self.reading(name).values
+
+    def reading(self, name: str) -> Numbers:
+        """Column `name` with over-range marks and words for missing left out. Raises InputError for other text."""
+        column = np.asarray(self.columns[name])
+        if column.dtype.kind == "M":
+            raise self.fault(f"column {name!r} holds instants, which are no reading; name it as the time")
+        notes: list[str] = []
+        if column.dtype.kind == "O":
+            cells = number_cells.to_numbers(column, self.style, self.missing or ())
+            if cells.bad:
+                raise self.fault(self._bad_cells(name, cells.bad))
+            column = cells.values
+            notes += [
+                f"{name}: {self._count(len(k))} {word!r} ({self._first(k[0])}), taken as missing"
+                for word, k in cells.words.items()
+            ]
+            notes += [f"{name}: true is read as 1, false as 0"] if cells.truths else []
+        try:
+            values, marks = over_range.without_marks(np.asarray(column, dtype=float), self.missing)
+        except over_range.MayBeMark as error:
+            raise self.fault(f"column {name!r} {error}") from None
+        notes += [
+            f"{name}: {self._count(m.readings)} {m.text} ({self._first(m.row)}), {m.meaning}; left out" for m in marks
+        ]
+        return Numbers(values, tuple(notes))
+
+    def time(self, name: str, unit: str, scale: float = 1.0) -> Numbers:
+        """Column `name` as time since its first reading, in `scale` times `unit`: instants and time stamps as seconds.
+
+        Raises InputError for what is no time, for dates that can be read two ways, and for an epoch in another unit than stated.
+        """
+        column = np.asarray(self.columns[name])
+        try:
+            stamps = time_stamps.seconds(column, self.style.dates)
+        except ValueError as error:
+            raise self.fault(f"column {name!r} {error}") from None
+        if stamps is not None:
+            if unit != "s":
+                raise self.fault(
+                    f'column {name!r} holds time stamps, which are read as seconds: write unit = "s", not "{unit}"'
+                )
+            return Numbers(stamps.values, stamps.notes)
+        if column.dtype.kind == "O":
+            column = self._exact(name, column)
+        try:
+            values, notes = time_stamps.from_first(column, unit, scale)
+        except ValueError as error:
+            raise self.fault(f"column {name!r} {error}") from None
+        return Numbers(values, notes)
+
+    def _exact(self, name: str, column: np.ndarray) -> np.ndarray:
+        """Cells of text as numbers, those of a long epoch as the whole numbers that they are."""
+        return self.numbers(name) if not number_cells.are_whole(column) else np.array([int(c) for c in column])
+
+    def _bad_cells(self, name: str, bad: Sequence[tuple[int, str]]) -> str:
+        words = list(dict.fromkeys(text for _, text in bad))
+        listed = ", ".join(f"{self._place(k)} {text!r}" for k, text in bad[: number_cells.MOST_LISTED])
+        more = f" and {len(bad) - number_cells.MOST_LISTED} more" if len(bad) > number_cells.MOST_LISTED else ""
+        key = ", ".join(f'"{word}"' for word in words[: number_cells.MOST_LISTED]).replace("\\", "\\\\")
+        what = f"column {name!r} holds text that is no number in {len(bad)} of {len(self.columns[name])} rows ({listed}{more})"
+        if len(bad) == len(self.columns[name]):
+            return f"{what}; name another column"
+        return f"{what}; if that means a missing reading, write layout = {{ missing = [{key}] }}, else write numbers"
+
+    def _count(self, count: int) -> str:
+        return "1 reading is" if count == 1 else f"{count} readings are"
+
+    def _first(self, row: int) -> str:
+        return f"first in {self._place(row)}"
+
+    def _place(self, row: int) -> str:
+        return f"line {self.lines[row]}" if row < len(self.lines) else f"row {row}"
+
+    def fault(self, what: str) -> InputError:
+        """The error that says `what` is wrong with this file."""
+        return InputError(self.path, [Fault(self.path.name, what)])
+
+
+def _without_group(name: str) -> str:
+    return name.replace("/", ".").rpartition(".")[2]

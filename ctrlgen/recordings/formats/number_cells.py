@@ -1,0 +1,236 @@
+"""Numbers as text files write them: decimal mark, thousands, words for missing. What can be read two ways is asked."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from ctrlgen.recordings.formats.written_layout import Layout
+
+MOST_LISTED = 5  # bad cells of a column that a message lists; the others are counted
+MISSING = frozenset(
+    {"", "nan", "na", "n/a", "null", "none", "-nan", "nan(ind)", "-nan(ind)", "1.#qnan", "#n/a", "<na>", "nat"}
+)
+"""Words of programs for a number that is not there."""
+OVER = frozenset(
+    [
+        *(
+            "--",
+            "---",
+            "----",
+            "-----",
+            "------",
+            "***",
+            "****",
+            "*****",
+            "******",
+            "?",
+            "??",
+            "lost",
+            "uncertain",
+            "bad_quality",
+        ),
+        *(
+            "overload",
+            "ovld",
+            "ovrld",
+            "ovl",
+            "overrange",
+            "over-range",
+            "overflow",
+            "underrange",
+            "underflow",
+            "saturated",
+            "sat",
+        ),
+        *(
+            "ol",
+            "o.l.",
+            "0l",
+            "+ol",
+            "-ol",
+            "\u221e",
+            "+\u221e",
+            "-\u221e",
+            "inf",
+            "+inf",
+            "-inf",
+            "infinity",
+            "-infinity",
+            "1.#inf",
+            "-1.#inf",
+        ),
+        *("invalid", "bad", "err", "error", "#nv", "#num!", "#value!", "#div/0!", "#ref!", "#name?"),
+    ]
+)
+"""Words of instruments for a reading beyond their range, or lost."""
+WHOLE = re.compile(r"[+-]?\d{1,18}", re.ASCII)
+DATE = r"(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}|\d{1,2}[-./ ][A-Z][a-z]{2,8}[-./, ]+\d{4})"
+CLOCK = r"\d{1,3}:\d{2}(:\d{2})?([.,:]\d+)?(\s*[AaPp]\.?[Mm]\.?)?"
+TIME = re.compile(
+    rf"{DATE}|({DATE}[T ,;]\s*)?{CLOCK}\s*(Z|UTC|[+-]\d{{2}}:?\d{{2}})?|\d{{8}}T\d{{6}}([.,]\d+)?Z?", re.ASCII
+)
+EXPONENT = r"([eEdD][+-]?\d{1,3})?"
+GROUPS = "[.,'\u2019 \u00a0\u202f\u2009]"
+ANY = re.compile(rf"(?=[+\u2212-]?[.,]?\d)[+\u2212-]?(\d+|\d{{1,3}}({GROUPS}\d{{3}})+)?([.,]\d*)?{EXPONENT}", re.ASCII)
+"""A number in some style."""
+OPEN = re.compile("[,'\u2019\u00a0\u202f\u2009]|\\d \\d|[.]\\d*[.]")
+"""What in cells may be a decimal comma or stand between thousands."""
+BLANKS = ("\u00a0", "\u202f", "\u2009", " ")
+
+
+@dataclass(frozen=True)
+class NumberStyle:
+    """How a file writes its numbers: decimal mark, mark between thousands ('' for none), order of dates."""
+
+    decimal: Literal[".", ","] = "."
+    thousands: str = ""
+    dates: Literal["day first", "month first"] | None = None
+
+    @property
+    def pattern(self) -> re.Pattern[str]:
+        """A whole cell that is a number in this style, thousands only in groups of three."""
+        mark = {"": None, "blank": "[\u00a0\u202f\u2009 ]", "'": "['\u2019]"}.get(
+            self.thousands, re.escape(self.thousands)
+        )
+        digits = r"\d+" if mark is None else rf"(?:\d+|[1-9]\d{{0,2}}(?:{mark}\d{{3}})+)"
+        decimal = re.escape(self.decimal)
+        return re.compile(rf"[+\u2212-]?(?:{digits}(?:{decimal}\d*)?|{decimal}\d+){EXPONENT}", re.ASCII)
+
+    def plain(self, cell: str) -> str:
+        """A number of this style as Python writes it."""
+        for mark in BLANKS if self.thousands == "blank" else "'\u2019" if self.thousands == "'" else self.thousands:
+            cell = cell.replace(mark, "")
+        return cell.replace(self.decimal, ".").replace("\u2212", "-").replace("d", "e").replace("D", "e")
+
+
+class Ambiguous(ValueError):
+    """A file whose numbers can be read two ways; the message asks which."""
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Cells as numbers (n,), NaN where there is none; rows of each word of an instrument; `bad` cells that are neither; whether some are
+    truths."""
+
+    values: np.ndarray
+    words: dict[str, list[int]] = field(default_factory=dict)
+    bad: tuple[tuple[int, str], ...] = ()
+    truths: bool = False
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell is a number in some style."""
+    return ANY.fullmatch(cell) is not None
+
+
+def is_reading(cell: str) -> bool:
+    """Whether a cell stands in a column of numbers: a number, a time, or a word for a missing or lost one."""
+    return is_number(cell) or cell.lower() in MISSING or cell.lower() in OVER or bool(TIME.fullmatch(cell))
+
+
+def are_whole(cells: np.ndarray) -> bool:
+    """Whether every cell is a whole number without thousands, as those of an epoch in nanoseconds are."""
+    return len(cells) > 0 and all(isinstance(c, (str, int)) and WHOLE.fullmatch(str(c)) for c in cells)
+
+
+def to_numbers(cells: np.ndarray, style: NumberStyle, missing: Sequence[str | int | float] = ()) -> Cells:
+    """Cells of a text file (n,) as numbers; `missing` are the reader's own words for none."""
+    values, words, bad = np.full(len(cells), np.nan), dict[str, list[int]](), list[tuple[int, str]]()
+    pattern, truths, own = style.pattern, False, {str(word).strip() for word in missing}
+    for k, given in enumerate(cells):
+        if not isinstance(given, str):
+            values[k] = np.nan if given is None else float(given)
+            continue
+        cell = given.strip()
+        if cell in own or cell.lower() in MISSING:
+            continue
+        if pattern.fullmatch(cell):
+            values[k] = float(style.plain(cell))
+        elif cell.lower() in OVER:
+            words.setdefault(cell, []).append(k)
+        elif cell.lower() in ("true", "false"):
+            values[k], truths = cell.lower() == "true", True
+        else:
+            bad.append((k, cell))
+    return Cells(values, words, tuple(bad), truths)
+
+
+def style_of(columns: Iterable[Sequence[str]], layout: Layout, separator: str) -> tuple[NumberStyle, list[str]]:
+    """The style in which the cells of `columns` write numbers, and notes of what is not plain.
+
+    A mark decides itself where a cell cannot be read otherwise: 0,5 is no thousand, 1.234,5 has both. Raises `Ambiguous` where every
+    cell with a mark has it before exactly three digits, or where cells speak for different styles.
+    """
+    columns = list(columns)
+    plain = layout.decimal is None and layout.thousands is None and separator != ";"
+    if plain and not any(OPEN.search("\n".join(column)) for column in columns):
+        return NumberStyle(dates=layout.dates), []
+    votes = _Votes()
+    for column in columns:
+        votes.count([cell.strip() for cell in column])
+    decimal = layout.decimal or votes.decimal(separator)
+    other = "." if decimal == "," else ","
+    grouped = other if votes.seen[other] else ("'" if votes.seen["'"] else "blank" if votes.seen["blank"] else "")
+    thousands = layout.thousands if layout.thousands is not None else grouped
+    notes = ["decimal comma"] if decimal == "," else []
+    if thousands:
+        notes.append(f"{'blanks' if thousands == 'blank' else thousands} between thousands")
+    return NumberStyle(decimal, thousands, layout.dates), notes
+
+
+class _Votes:
+    """What the cells of a file say of its marks: an example of each, for the question."""
+
+    def __init__(self) -> None:
+        self.sure = {".": "", ",": ""}  # cells in which the mark can only be the decimal one
+        self.open = {".": "", ",": ""}  # cells in which it is that or stands between thousands
+        self.seen = {".": False, ",": False, "'": False, "blank": False}
+
+    def count(self, column: Sequence[str]) -> None:
+        numbers = [c for c in column if is_number(c)]
+        long = any(re.match(r"[+\u2212-]?\d{4}", c) for c in numbers)  # a column that writes 1234 has no mark in 1,234
+        for cell in numbers:
+            body = re.sub(r"[eEdD].*", "", cell.lstrip("+\u2212-"))
+            self.seen["'"] |= "'" in body or "\u2019" in body
+            self.seen["blank"] |= any(mark in body for mark in BLANKS)
+            marks = [c for c in body if c in ".,"]
+            for mark in set(marks):
+                self.seen[mark] = True
+            if not marks:
+                continue
+            last, several = marks[-1], len(set(marks)) > 1
+            grouped = re.fullmatch(rf"[1-9]\d{{0,2}}(?:{re.escape(last)}\d{{3}})+", body) and len(body) == len(
+                cell.lstrip("+\u2212-")
+            )
+            if marks.count(last) > 1:  # only thousands repeat
+                self.sure["." if last == "," else ","] = cell
+            elif several or not grouped or long:
+                self.sure[last] = cell
+            else:
+                self.open[last] = cell
+
+    def decimal(self, separator: str) -> Literal[".", ","]:
+        ask = 'write layout = { decimal = "," } or layout = { decimal = "." }'
+        if self.sure["."] and self.sure[","]:
+            raise Ambiguous(f"writes {self.sure['.']!r} and {self.sure[',']!r}: which mark is the decimal one? {ask}")
+        if self.sure["."]:
+            return "."
+        if self.sure[","]:
+            return ","
+        if self.open[","]:
+            what = f"writes {self.open[',']!r}, and no cell tells whether that is {_read_two_ways(self.open[','])}"
+            raise Ambiguous(f"{what}: {ask}")
+        if self.open["."] and separator == ";":  # as programs of countries with the decimal comma separate
+            what = f"separates cells by semicolons and writes {self.open['.']!r}; no cell tells whether that is"
+            raise Ambiguous(f"{what} {_read_two_ways(self.open['.'])}: {ask}")
+        return "."
+
+
+def _read_two_ways(cell: str) -> str:
+    plain = cell.replace(",", ".")
+    return f"{plain.replace('.', '', plain.count('.') - 1)} or {plain.replace('.', '')}"

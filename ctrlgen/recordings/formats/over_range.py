@@ -1,0 +1,85 @@
+"""Numbers by which an instrument says that it has no reading: beyond its range, or lost."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+HUGE = 9e29  # no reading in any unit: SCPI says 9.9e37 and 9.91e37, others 1e30, 1e31, 1e38, the largest float and infinity
+COUNTS = (-9999, 9999, -99999, 99999, -999, -9999.99, 99999.9, 999999, -999999, 9999999, -32768, 32767, 65535, -2147483648, 2147483647,
+          4294967295, 8388607, -8388608, 16777215, -999.25, -1e20, 1e20)  # fmt: skip
+"""Numbers that loggers and converters write for none; some are readings, so they count only where they are far from all else."""
+NEAR = 0.25  # spans: one of `COUNTS` that repeats and stands between this and `FAR` beyond all others may be either, and is asked
+FAR = 10.0  # spans of all other readings between them and one of `COUNTS`: no motion leaves its range so far and returns at once
+
+
+class Mark(NamedTuple):
+    """Readings of one number that is no reading: how many, the first row, the number as text, what it means."""
+
+    readings: int
+    row: int
+    text: str
+    meaning: str
+
+
+class MayBeMark(ValueError):
+    """A number that may be a reading or a mark for none; the message asks."""
+
+
+def without_marks(
+    values: np.ndarray, missing: Sequence[str | int | float] | None = None
+) -> tuple[np.ndarray, list[Mark]]:
+    """`values` (n,) with NaN where a number is over range, and what was left out.
+
+    `missing`: numbers that the reader says are none; where they are given, even as none at all, no other of `COUNTS` is taken for one.
+    Raises `MayBeMark`.
+    """
+    own = [float(m) for m in missing or () if not isinstance(m, str) or _is_float(m)]
+    marks: list[Mark] = []
+    kept = values
+    for number in own:
+        kept = _left_out(kept, kept == number, "which layout.missing says is none", marks)
+    with np.errstate(invalid="ignore"):
+        for number in np.unique(kept[np.abs(kept) >= HUGE])[:50]:
+            kept = _left_out(kept, kept == number, "over range", marks)
+        kept = _left_out(kept, np.abs(kept) >= HUGE, "over range", marks)
+    for number in COUNTS if missing is None else ():
+        chosen = kept == number
+        spans = _beyond(kept[~np.isin(kept, COUNTS)], number) if chosen.any() else 0.0
+        if spans > FAR:
+            kept = _left_out(kept, chosen, "far from all others: a mark for none", marks)
+        elif spans > NEAR and np.sum(chosen) > 1:
+            told = (
+                f"holds {number:g} {np.sum(chosen)} times, beyond all its other numbers: a reading, or a mark for none?"
+            )
+            raise MayBeMark(
+                f"{told} Write layout = {{ missing = [{number:g}] }}, or layout = {{ missing = [] }} if it is a reading"
+            )
+    return kept, marks
+
+
+def _is_float(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _beyond(others: np.ndarray, number: float) -> float:
+    """How many times the range of `others` a number lies beyond it; 0 where they have none."""
+    finite = others[np.isfinite(others)]
+    if len(finite) < 2:
+        return 0.0
+    low, high = float(finite.min()), float(finite.max())
+    return max(number - high, low - number) / (high - low) if high > low else 0.0
+
+
+def _left_out(values: np.ndarray, chosen: np.ndarray, meaning: str, marks: list[Mark]) -> np.ndarray:
+    if not chosen.any():
+        return values
+    row = int(chosen.argmax())
+    marks.append(Mark(int(chosen.sum()), row, f"{values[row]:.6g}", meaning))
+    return np.where(chosen, np.nan, values)

@@ -1,0 +1,55 @@
+"""TDMS of LabVIEW: channels by group, waveforms with their own time, instants."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ctrlgen.recordings.formats.checked_files import check_size, package
+from ctrlgen.recordings.formats.measurement_table import Clock, MeasurementTable
+from ctrlgen.recordings.formats.nested_columns import columns_of
+from ctrlgen.recordings.formats.written_layout import Layout
+
+
+def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
+    """Channels as `group/channel`; their unit is the property `unit_string`, their time `wf_start_offset` and `wf_increment`."""
+    nptdms = package("nptdms", path)
+    columns: dict[str, np.ndarray] = {}
+    units: dict[str, str] = {}
+    starts: dict[str, tuple[np.datetime64 | None, float, float]] = {}
+    with nptdms.TdmsFile.open(path) as file:
+        channels = [(group, channel) for group in file.groups() for channel in group.channels()]
+        check_size(path, sum(8.0 * len(channel) for _, channel in channels))
+        for group, channel in channels:
+            for column in columns_of(np.asarray(channel[:]), f"{group.name}/{channel.name}"):
+                columns[column.name] = column.values
+                given = channel.properties
+                if given.get("unit_string"):
+                    units[column.name] = str(given["unit_string"])
+                if given.get("wf_increment"):
+                    begin = given.get("wf_start_time")
+                    instant = None if begin is None else np.datetime64(begin)
+                    starts[column.name] = (
+                        instant,
+                        float(given.get("wf_start_offset", 0.0)),
+                        float(given["wf_increment"]),
+                    )
+    return {"data": MeasurementTable(path, columns, units, clocks=_clocks(starts), missing=layout.missing)}
+
+
+def _clocks(starts: dict[str, tuple[np.datetime64 | None, float, float]]) -> dict[str, Clock]:
+    """The time axis of each waveform on one clock, whose zero is the earliest start time."""
+    instants = [
+        instant for instant, *_ in starts.values() if instant is not None and instant > np.datetime64("1971-01-01")
+    ]
+    first = min(instants, default=None)
+    clocks = {}
+    for name, (instant, offset, step) in starts.items():
+        late = (
+            0.0
+            if instant is None or first is None or instant < first
+            else float((instant - first) / np.timedelta64(1, "ns")) * 1e-9
+        )
+        clocks[name] = Clock(late + offset, step)
+    return clocks

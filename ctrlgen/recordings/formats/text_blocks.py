@@ -1,0 +1,134 @@
+"""Where the tables of a text file stand among other text."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+from ctrlgen.recordings.formats.number_cells import Ambiguous, is_number, is_reading
+from ctrlgen.recordings.formats.text_cells import cells_of, is_comment, width_of
+
+FEWEST_ROWS = 2  # of a table among other text
+MOST_LISTED = 5  # bad lines that a message lists
+STRICT = re.compile(r"[\s\d.,;:|+\-\u2212/'\"eEdDTZ]*\d[\s\d.,;:|+\-\u2212/'\"eEdDTZ]*")
+"""A line that holds nothing but numbers, times and separators."""
+Kind = Literal["blank", "remark", "row", "mixed", "text"]
+
+
+@dataclass(frozen=True)
+class Block:
+    """A table of a text file by the numbers of its lines from 0: its rows of `width` cells, or `widest` with remarks behind them, the
+    lines above it, and its last line if that was not written to its end."""
+
+    rows: tuple[int, ...]
+    width: int
+    widest: int
+    above: tuple[int, ...]
+    cut: int | None = None
+
+
+def kind_of(line: str, separator: str) -> Kind:
+    """What a line is: a row of readings alone, one with other text in it, other text, a remark or nothing."""
+    if not line.strip():
+        return "blank"
+    if is_comment(line):
+        return "remark"
+    if STRICT.fullmatch(line) and re.search(r"\d", line):
+        return "row"
+    cells = cells_of(line, separator)
+    filled = [c for c in cells if c]
+    readings = [c for c in filled if is_reading(c)]
+    if filled and len(readings) == len(filled):
+        return "row"
+    return "mixed" if readings or not filled else "text"
+
+
+def blocks_of(lines: Sequence[str], separator: str) -> list[Block]:
+    """The tables of a file: runs of rows of readings, and rows of as many cells with a text that is none.
+
+    Raises `Ambiguous` where rows of one table differ in their number of cells.
+    """
+    kinds = [kind_of(line, separator) for line in lines]
+    filled = [k for k, kind in enumerate(kinds) if kind not in ("blank", "remark")]
+    if not any(kinds[a] == kinds[b] == "row" for a, b in pairwise(filled)):
+        return _beside_text(lines, kinds, separator)
+    blocks: list[Block] = []
+    run: list[int] = []
+    above: list[int] = []
+    for k, kind in enumerate(kinds):
+        if kind == "row" or (kind == "mixed" and run and _belongs(lines[k], lines[run[-1]], separator)):
+            run.append(k)
+        elif kind != "blank" and not (run and kind == "remark"):
+            if len(run) >= FEWEST_ROWS:
+                blocks.append(_block(lines, run, above, separator))
+                above = []
+            else:
+                above += run
+            run = []
+            above.append(k)
+    if len(run) >= FEWEST_ROWS:
+        blocks.append(_block(lines, run, above, separator))
+    return _of_several_columns(blocks)
+
+
+def _belongs(line: str, before: str, separator: str) -> bool:
+    """Whether a line with text in it is a row of the table of the line `before`."""
+    width = width_of(before, separator)
+    return width_of(line, separator) == width or _longer_by_a_remark(line, width, separator)
+
+
+def _of_several_columns(blocks: list[Block]) -> list[Block]:
+    """Without runs of single numbers where a table of several columns stands: those are counts in a header."""
+    wide = [block for block in blocks if block.width > 1]
+    return wide or blocks
+
+
+def _beside_text(lines: Sequence[str], kinds: Sequence[Kind], separator: str) -> list[Block]:
+    """The table of a file in which every row holds some text: its longest run of lines of the usual number of cells."""
+    mixed = [k for k, kind in enumerate(kinds) if kind in ("mixed", "row")]
+    if not mixed:
+        return []
+    width = Counter(width_of(lines[k], separator) for k in mixed).most_common(1)[0][0]
+    runs: list[list[int]] = [[]]
+    for k, kind in enumerate(kinds):
+        if kind in ("mixed", "row") and width_of(lines[k], separator) == width:
+            runs[-1].append(k)
+        elif kind not in ("blank", "remark"):
+            runs.append([])
+    run = max(runs, key=len)
+    above = [k for k in range(run[0] if run else 0) if kinds[k] != "blank"]
+    return [_block(lines, run, above, separator)] if run else []
+
+
+def _block(lines: Sequence[str], run: list[int], above: list[int], separator: str) -> Block:
+    """A run of rows as a table. Raises `Ambiguous` where they differ in their number of cells."""
+    while len(run) > 1 and not lines[run[-1]].strip().strip(separator):
+        run = run[:-1]  # a spreadsheet's empty rows
+    widths = [width_of(lines[k], separator) for k in run]
+    width = Counter(widths).most_common(1)[0][0]
+    cut = run[-1] if widths[-1] < width and run[-1] == len(lines) - 1 and len(run) > FEWEST_ROWS else None
+    if cut is not None:
+        run, widths = run[:-1], widths[:-1]
+    wrong = [
+        (k, w)
+        for k, w in zip(run, widths, strict=True)
+        if w != width and not _longer_by_a_remark(lines[k], width, separator)
+    ]
+    if wrong:
+        listed = ", ".join(f"line {k + 1} has {w}" for k, w in wrong[:MOST_LISTED]) + (
+            ", ..." if len(wrong) > MOST_LISTED else ""
+        )
+        usual = next(k for k, w in zip(run, widths, strict=True) if w == width)
+        what = f"line {usual + 1} has {width} cells, but {listed}; repair these, or write the line of the names, layout = {{ header = 5 }},"
+        raise Ambiguous(f"{what} if they stand above the table")
+    return Block(tuple(run), width, max(widths), tuple(above), cut)
+
+
+def _longer_by_a_remark(line: str, width: int, separator: str) -> bool:
+    """Whether the cells of a row beyond the table's are empty, or one remark in words."""
+    beyond = [c for c in cells_of(line, separator)[width:] if c]
+    return len(cells_of(line, separator)) > width and len(beyond) <= 1 and not any(map(is_number, beyond))

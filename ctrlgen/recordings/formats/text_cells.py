@@ -1,0 +1,107 @@
+"""Lines of a text file as cells: which separator it uses, and quotes."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Sequence
+
+from ctrlgen.recordings.formats.number_cells import DATE, Ambiguous, is_number, is_reading
+from ctrlgen.recordings.formats.written_layout import MARKS, Layout
+
+SEPARATORS = ("\t", ";", "|", ",", " ")  # where two fit alike the earlier is meant: nobody writes numbers with it
+COMMENTS = ("#", "%", "//", "!")  # at the beginning of a line
+SAMPLED = 200  # lines by which a separator is known
+ONE_CELL = re.compile(r"\s*[+-]?\d+,\d+\s*")
+DECLARED = (
+    re.compile(r'^"?sep=(.)"?\s*$'),  # Excel
+    re.compile(r"^Separator\s+(Tab|Comma|Semicolon)\s*$", re.IGNORECASE),  # LabVIEW
+    re.compile(r"^#\s*SEPARATOR\s*=\s*(\d+)\s*$"),  # GCS of Physik Instrumente: the code of the character
+)
+NAMED = {"tab": "\t", "comma": ",", "semicolon": ";"}
+
+
+def is_comment(line: str) -> bool:
+    """Whether a line is a remark: in a header it may hold names, in a table it is skipped."""
+    return line.lstrip().startswith(COMMENTS)
+
+
+def without_mark(line: str) -> str:
+    """A line without the mark of a comment."""
+    return re.sub(r"^\s*(#|%|//|!)+\s?", "", line)
+
+
+def cells_of(line: str, separator: str) -> list[str]:
+    """The cells of a line; a blank as `separator` is any run of blanks, and a date with its time of day is one cell."""
+    if '"' in line:
+        row = next(
+            csv.reader([line.strip() if separator == " " else line], delimiter=separator, skipinitialspace=True), []
+        )
+        return [cell.strip() for cell in row]
+    if separator == " ":
+        cells = line.split()
+        dated = len(cells) > 1 and ":" in cells[1] and re.fullmatch(DATE, cells[0], re.ASCII)
+        return [f"{cells[0]} {cells[1]}", *cells[2:]] if dated else cells
+    return [cell.strip() for cell in line.split(separator)]
+
+
+def width_of(line: str, separator: str) -> int:
+    """The number of cells of a line."""
+    return line.count(separator) + 1 if separator != " " and '"' not in line else len(cells_of(line, separator))
+
+
+def stray_quotes(lines: Sequence[str]) -> list[int]:
+    """Numbers from 1 of the lines with a quote that is opened and not closed: a reader would take the next lines for its cell."""
+    return [k for k, line in enumerate(lines, 1) if '"' in line and line.count('"') % 2]
+
+
+def separator_of(lines: Sequence[str], layout: Layout) -> str:
+    """The separator of a text file: as stated, as the file declares it, or that by which most cells are readings.
+
+    Raises `Ambiguous` where a comma may separate two numbers or be the decimal mark of one.
+    """
+    if layout.separator is not None:
+        return MARKS.get(layout.separator, layout.separator)
+    for line in lines[:SAMPLED]:
+        for pattern in DECLARED:
+            if match := pattern.match(line):
+                return NAMED.get(match[1].lower(), chr(int(match[1])) if match[1].isdigit() else match[1])
+    sample = _sample(lines)
+    scores = {mark: _fit(sample, mark) for mark in SEPARATORS}
+    best = max(scores.values(), default=0.0)
+    separator = next((mark for mark in SEPARATORS if best and scores[mark] > best - 1e-9), ",")
+    one = sample and all(ONE_CELL.fullmatch(line) for line in sample)
+    if separator == "," and one and layout.decimal != ".":
+        return _one_or_two(lines, layout)
+    return separator
+
+
+def _sample(lines: Sequence[str]) -> list[str]:
+    """Lines that stand for the rows of a table: the header is before the middle, and most lines are rows."""
+    rows = [line for line in lines[len(lines) // 2 :] if line.strip() and not is_comment(line)]
+    rows = rows or [line for line in lines if line.strip() and not is_comment(line)]
+    return rows[:: max(1, len(rows) // SAMPLED)]
+
+
+def _fit(sample: Sequence[str], separator: str) -> float:
+    """How well lines are rows of readings: the share of cells that are, times that of lines of the usual number of cells."""
+    rows = [cells_of(line, separator) for line in sample]
+    widths = Counter(map(len, rows))
+    if not rows or widths.most_common(1)[0][0] < 2:
+        return 0.0
+    cells = [cell for row in rows for cell in row]
+    sure = sum(is_number(c) or bool(c and is_reading(c)) for c in cells)
+    empty = sum(not c for c in cells)
+    return sure / max(len(cells) - empty, 1) * widths.most_common(1)[0][1] / len(rows)
+
+
+def _one_or_two(lines: Sequence[str], layout: Layout) -> str:
+    """The separator where every row is digits, a comma and digits. Names above tell whether they are one number or two."""
+    if layout.decimal == ",":
+        return ";"
+    names = [line for line in lines if line.strip() and not is_comment(line) and not ONE_CELL.fullmatch(line)]
+    if names:
+        return "," if "," in names[-1] else ";"
+    what = f"has rows such as {_sample(lines)[0].strip()!r}, which may be two numbers or one with a decimal comma"
+    raise Ambiguous(f'{what}: write layout = {{ separator = "," }} or layout = {{ decimal = "," }}')

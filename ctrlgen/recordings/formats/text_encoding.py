@@ -1,0 +1,78 @@
+"""The text of a measurement file, whatever encoding a logger wrote it in."""
+
+from __future__ import annotations
+
+import codecs
+from pathlib import Path
+
+from ctrlgen.recordings.formats.checked_files import fault, read_bytes
+
+BOMS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"),
+        (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))  # fmt: skip
+TRIED = [
+    "cp1252",
+    "cp437",
+    "cp850",
+    "mac_roman",
+    "cp1250",
+    "cp1251",
+    "shift_jis",
+    "euc_jp",
+    "gb18030",
+    "big5",
+    "euc_kr",
+]
+"""Encodings that programs of loggers write beside those of Unicode; digits are the same in all of them."""
+WESTERN = frozenset("µ°²³±äöüßéèà·ÄÖÜ".encode("cp1252"))
+"""Bytes of signs that units and German names are written with in cp1252, the encoding of Windows in Europe and America."""
+SAMPLE = 200_000  # bytes at the head of a file, by which an encoding is known
+
+
+def decoded(path: Path, encoding: str | None = None) -> tuple[str, list[str]]:
+    """The text of a file with lines ended by one mark, and notes of what was interpreted.
+
+    Raises InputError where it is no text, or not in the stated encoding.
+    """
+    content = read_bytes(path)
+    stated = encoding or next((name for mark, name in BOMS if content.startswith(mark)), None) or _wide(content)
+    notes = [f"encoding {stated}"] if stated not in (None, encoding, "utf-8-sig") else []
+    if stated is None:
+        try:
+            text = content.decode("utf-8")
+        except UnicodeDecodeError as error:
+            stated = _eight_bits(content, error.start)
+            text = content.decode(stated, errors="replace")
+            notes = [f"not UTF-8: read as {stated}"]
+    else:
+        try:
+            text = content.decode(stated)
+        except (UnicodeDecodeError, LookupError) as error:
+            raise fault(
+                path, f'cannot be read as {stated} ({error}): write its encoding, layout = {{ encoding = "..." }}'
+            ) from None
+    text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+    if "\0" in text:
+        raise fault(
+            path, "is no text, although its ending or its beginning says so; export it again, or give it its own ending"
+        )
+    return text, notes
+
+
+def _wide(content: bytes) -> str | None:
+    """UTF-16 without its mark: every second byte of plain text is zero."""
+    head = content[:SAMPLE]
+    even, odd = head[::2].count(0), head[1::2].count(0)
+    if len(head) < 8 or max(even, odd) < 0.4 * len(head) / 2 or min(even, odd) > 0.01 * len(head):
+        return None
+    return "utf-16-le" if odd > even else "utf-16-be"
+
+
+def _eight_bits(content: bytes, first: int) -> str:
+    """The encoding of text that is not UTF-8 from byte `first` on; only names and units depend on it."""
+    sample = content[max(0, first - SAMPLE // 2) : first + SAMPLE // 2]
+    if all(byte < 128 or byte in WESTERN for byte in set(sample)):
+        return "cp1252"
+    from charset_normalizer import from_bytes  # takes a moment to import
+
+    best = from_bytes(sample, cp_isolation=TRIED).best()
+    return best.encoding if best else "cp1252"

@@ -1,0 +1,169 @@
+"""Tables of text files: comma-separated and all that is called so."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ctrlgen.recordings.formats import number_cells
+from ctrlgen.recordings.formats.checked_files import fault
+from ctrlgen.recordings.formats.measurement_table import Clock, MeasurementTable
+from ctrlgen.recordings.formats.number_cells import Ambiguous, NumberStyle
+from ctrlgen.recordings.formats.text_blocks import MOST_LISTED, Block, blocks_of
+from ctrlgen.recordings.formats.text_cells import cells_of, separator_of, stray_quotes
+from ctrlgen.recordings.formats.text_encoding import decoded
+from ctrlgen.recordings.formats.text_header import header_of
+from ctrlgen.recordings.formats.written_layout import Layout
+
+STYLED = 1000  # rows, the first and others evenly over the table, by which the style of its numbers is known
+NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "blanks"}
+EMPTY = sorted(
+    {spelling for word in number_cells.MISSING for spelling in (word, word.upper(), word.capitalize(), "NaN", "NaT")}
+)
+
+
+def read_text_tables(path: Path, layout: Layout) -> list[MeasurementTable]:
+    """The tables of a text file.
+
+    A table is a run of rows of readings under a header; where other text stands around it, its names are the last line above of as many
+    cells, or that above a row of units. Raises InputError that says which line, or which key of recording.toml answers what is open.
+    """
+    text, notes = decoded(path, layout.encoding)
+    return tables_of_text(path, text, layout, notes)
+
+
+def tables_of_text(path: Path, text: str, layout: Layout, notes: Sequence[str] = ()) -> list[MeasurementTable]:
+    """The tables of a text whose lines end with a line feed; `notes` of what was interpreted before. Raises InputError."""
+    lines = text.split("\n")
+    if stray := stray_quotes(lines):
+        listed = ", ".join(f"line {k}" for k in stray[:MOST_LISTED]) + (", ..." if len(stray) > MOST_LISTED else "")
+        raise fault(
+            path,
+            f"has a quote that is opened and not closed in {listed}; repair it, or the rows after it would be lost",
+        )
+    if not any(line.strip() for line in lines):
+        raise fault(path, "has no rows; write a header and one row per sample")
+    try:
+        separator = separator_of(lines, layout)
+        blocks = _blocks(lines, separator, layout)
+        if not blocks:
+            what = f"holds no rows of numbers (cells separated by {NAMES.get(separator, repr(separator))})"
+            raise Ambiguous(
+                f'{what}; write the separator, such as layout = {{ separator = ";" }}, or export the numbers as text'
+            )
+        return [_table(path, lines, block, separator, layout, notes) for block in blocks]
+    except Ambiguous as error:
+        raise fault(path, str(error)) from None
+
+
+def _blocks(lines: list[str], separator: str, layout: Layout) -> list[Block]:
+    """The tables of a file, or that under the line that the reader names as its header."""
+    if not layout.header:
+        return blocks_of(lines, separator)
+    below = blocks_of([""] * layout.header + lines[layout.header :], separator)
+    return below[:1]
+
+
+def _table(
+    path: Path, lines: list[str], block: Block, separator: str, layout: Layout, said: Sequence[str]
+) -> MeasurementTable:
+    header = header_of(lines, block, separator, layout)
+    rows = [*header.more_rows, *block.rows][header.in_first_row :]
+    sample = [cells_of(lines[k], separator) for k in rows[: STYLED // 10] + rows[:: max(1, len(rows) // STYLED)]]
+    cells = [[row[i] for row in sample if i < len(row)] for i in range(block.width)]
+    style, notes = number_cells.style_of(cells, layout, separator)
+    dated = " " in cells[0][0] and not lines[rows[0]].lstrip().startswith('"')
+    columns = _columns("\n".join(lines[k] for k in rows), block, separator, style, dated)
+    names, units = list(header.names), dict(header.units)
+    unique = _unique(names)
+    cut = [f"line {block.cut + 1}, the last, ends before its last cell; left out"] if block.cut is not None else []
+    return MeasurementTable(
+        path,
+        dict(zip(unique, columns, strict=True)),
+        {unique[k]: unit for k, unit in units.items()},
+        _Lines(rows),
+        (*said, *header.notes, *notes, *cut),
+        nameless=frozenset(k for k, name in enumerate(names) if not name),
+        clocks={} if header.sample_time is None else dict.fromkeys(unique, Clock(0.0, header.sample_time)),
+        style=style,
+        missing=layout.missing,
+    )
+
+
+class _Lines(Sequence[int]):
+    """Numbers from 1 of the lines of rows."""
+
+    def __init__(self, rows: Sequence[int]) -> None:
+        self.rows = rows
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __getitem__(self, k: Any) -> Any:
+        return self.rows[k] + 1
+
+
+def _columns(body: str, block: Block, separator: str, style: NumberStyle, dated: bool) -> list[np.ndarray]:
+    """The cells of a table by column: numbers where all of a column are plain ones, else texts, None where one is empty.
+
+    `dated`: the first cell of rows that blanks separate is a date and a time of day.
+    """
+    import pandas  # takes half a second to import
+
+    two = separator == " " and dated
+    stated: dict[str, Any] = {"dtype": str} if style.decimal == separator else {"decimal": style.decimal}
+    frame = pandas.read_csv(
+        io.StringIO(body),
+        sep=r"\s+" if separator == " " else separator,
+        header=None,
+        names=list(range(block.widest + 1)),
+        index_col=False,
+        skipinitialspace=True,
+        keep_default_na=False,
+        na_values=EMPTY,
+        low_memory=False,
+        skip_blank_lines=False,
+        **stated,
+    )
+    columns = []
+    for k in range(block.width + two):
+        column = frame[k]
+        numeric = column.dtype.kind in "iuf"
+        columns.append(
+            column.to_numpy()
+            if numeric
+            else np.array([None if pandas.isna(c) else str(c) for c in column], dtype=object)
+        )
+    return _with_dates_joined(columns) if two else columns
+
+
+def _with_dates_joined(columns: list[np.ndarray]) -> list[np.ndarray]:
+    """The columns with the first two, a date and a time of day, as one."""
+    joined = np.array(
+        [f"{day} {time}" if day and time else None for day, time in zip(columns[0], columns[1], strict=True)],
+        dtype=object,
+    )
+    return [joined, *columns[2:]]
+
+
+def _unique(names: Sequence[str]) -> list[str]:
+    """Names under which columns are found: those that have none by their number from 0, those that repeat with it."""
+    filled = [name for name in names if name]
+    shown = [name if filled.count(name) < 2 else f"{name} (column {k})" for k, name in enumerate(names)]
+    taken = set(shown)
+    if not filled:
+        return [str(k) for k in range(len(names))]
+    return [
+        name or (f"column {k}" if f"column {k}" not in taken else f"column {k} without a name")
+        for k, name in enumerate(shown)
+    ]
+
+
+def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
+    """The tables of a text file, by the lines that they stand in."""
+    tables = read_text_tables(path, layout)
+    return {f"from line {table.lines[0]}, {len(table.lines)} rows": table for table in tables}

@@ -1,0 +1,193 @@
+"""Time as files write it: instants, ISO 8601 and other dates, seconds since an epoch. Read as seconds since the first."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+import numpy as np
+
+from ctrlgen.recordings.formats.number_cells import CLOCK, DATE, MISSING
+
+DAY = 86400.0
+HOUR = 3600.0
+EVEN = 0.25  # of a step: how exactly an hour's jump must be an hour and one step to be summer time
+SINCE_1970 = (9.46e8, 4.1e9)  # seconds: the years 2000 to 2100
+EPOCHS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+FILETIME = (1.2e17, 1.7e17)  # hundreds of nanoseconds since 1601: the years 1981 to 2139
+STAMP = re.compile(rf"({DATE})?[T ,;]*({CLOCK})?\s*(Z|UTC|[+-]\d{{2}}:?\d{{2}})?", re.ASCII)
+PARTS = re.compile(r"(\d{1,4})[-./](\d{1,2})[-./](\d{1,4})", re.ASCII)
+
+
+class Stamps(NamedTuple):
+    """Seconds since the first time stamp (n,), and how they were read."""
+
+    values: np.ndarray
+    notes: tuple[str, ...]
+
+
+def seconds(column: np.ndarray, dates: str | None) -> Stamps | None:
+    """A column of instants or of time stamps as seconds since the first; None for numbers.
+
+    Raises ValueError, whose message goes on from the column's name, where a stamp is none or a date can be read two ways.
+    """
+    if column.dtype.kind == "M":
+        return _instants(column, "time is instants", ())
+    if column.dtype.kind != "O":
+        return None
+    cells = [c.strip() if isinstance(c, str) else "" for c in column]
+    first = next((c for c in cells if c.lower() not in MISSING), "")
+    if not (re.match(DATE, first, re.ASCII) or re.match(CLOCK, first, re.ASCII)):
+        return None
+    if not re.match(DATE, first, re.ASCII):
+        return _times_of_day(cells)
+    return _dates(cells, first, dates)
+
+
+def _dates(cells: list[str], first: str, dates: str | None) -> Stamps:
+    """Dates with a time of day. A zone is subtracted; without one, summer time shows as a jump of an hour."""
+    iso = re.match(r"\d{4}[-/.]?\d{2}[-/.]?\d{2}", first)
+    said, zoned = ("time is ISO 8601" if iso else "time is dates"), bool(re.search(r"(Z|UTC|[+-]\d{2}:?\d{2})$", first))
+    texts = [re.sub(r"(\d),(\d+)", r"\1.\2", c.replace(" UTC", "Z")) for c in cells]
+    notes: tuple[str, ...] = ()
+    if iso:
+        texts = [re.sub(r"^(\d{4})[/.](\d{2})[/.](\d{2})[ T]?", r"\1-\2-\3T", c) for c in texts]
+        instants = _parsed(texts, "ISO8601")
+    elif match := PARTS.match(first):
+        style, notes = _order(texts, first, match, dates)
+        instants = _parsed([re.sub(r"[-./]", "-", c, count=2) for c in texts], style)
+    else:
+        instants = _parsed(texts, "mixed")
+    stamps = _instants(instants, said, notes)
+    return stamps if zoned else _without_summer_time(stamps)
+
+
+def _order(texts: list[str], first: str, match: re.Match[str], dates: str | None) -> tuple[str, tuple[str, ...]]:
+    """The format of dates that do not begin with the year. Raises ValueError where day and month cannot be told and it matters."""
+    found = [m for c in dict.fromkeys(c.split(" ")[0].split("T")[0] for c in texts) if (m := PARTS.match(c))]
+    if dates is None and "." in match[0]:
+        dates = "day first"
+    if dates is None and any(int(m[1]) > 12 for m in found):
+        dates = "day first"
+    if dates is None and any(int(m[2]) > 12 for m in found):
+        dates = "month first"
+    if dates is None and len(found) > 1:  # one day is the same whichever way round
+        what = f"writes dates such as {first!r}, and none tells the day from the month"
+        raise ValueError(f'{what}: write layout = {{ dates = "day first" }} or layout = {{ dates = "month first" }}')
+    day = "%m-%d" if dates == "month first" else "%d-%m"
+    year = "%Y" if len(match[3]) == 4 else "%y"
+    rest = first[match.end() :]
+    hour = "%I" if re.search(r"[AaPp]\.?[Mm]", rest) else "%H"
+    clock = f"{rest[0]}{hour}:%M" if rest.strip() else ""
+    clock += ":%S" if rest.count(":") > 1 else ""
+    clock += ".%f" if any(re.search(r":\d+\.\d", c) for c in texts) else ""
+    clock += " %p" if hour == "%I" else ""
+    return f"{day}-{year}{clock}", ((f"dates have the {dates.replace(' first', '')} first",) if dates else ())
+
+
+def _parsed(texts: list[str], style: str) -> np.ndarray:
+    """Instants (n,) of stamps of one style, in UTC where they state a zone, not a time where a cell is empty. Raises ValueError."""
+    import pandas  # takes half a second to import
+
+    blank = [None if c.lower() in MISSING else c for c in texts]
+    try:
+        if style.endswith("%f") or ".%f" in style:  # whole seconds lose their fraction in some programs
+            blank = [c if c is None or re.search(r":\d+\.\d", c) else re.sub(r"(:\d+:\d+)", r"\1.0", c) for c in blank]
+        parsed = pandas.to_datetime(pandas.Series(blank, dtype=object), format=style, utc=True, errors="coerce")
+    except (ValueError, OverflowError) as error:
+        raise ValueError(f"holds time stamps that cannot be read: {error}") from None
+    lost = (
+        [k for k, cell in enumerate(blank) if cell is not None and parsed.isna().iloc[k]] if parsed.isna().any() else []
+    )
+    if lost:
+        what = (
+            f"holds {len(lost)} of {len(texts)} time stamps that are none, such as {texts[lost[0]]!r} in row {lost[0]}"
+        )
+        raise ValueError(f"{what}; write them as ISO 8601 (2024-03-31T01:59:58.000)")
+    return parsed.dt.tz_localize(None).to_numpy()
+
+
+def _instants(instants: np.ndarray, said: str, notes: tuple[str, ...]) -> Stamps:
+    known = instants[~np.isnat(instants)]
+    if not len(known):
+        raise ValueError("holds no time at all")
+    since = instants - known[0]
+    unit = np.timedelta64(1, "ns")
+    values = np.where(np.isnat(instants), np.nan, since.astype("timedelta64[ns]") / unit * 1e-9)
+    whole, _, fraction = str(known[0]).partition(".")
+    begin = f"{whole}.{fraction.rstrip('0')}".rstrip(".")
+    return Stamps(values, (f"{said}; seconds since {begin}", *notes))
+
+
+def _without_summer_time(stamps: Stamps) -> Stamps:
+    """Stamps of a local clock that was put an hour forward or back: time goes on as evenly as before."""
+    step = np.diff(stamps.values)
+    short = step[np.abs(step) < HOUR / 2]
+    usual = float(np.median(short)) if len(short) else 0.0
+    if not 0 < usual < HOUR / 4:
+        return stamps
+    values, notes = stamps.values.copy(), list(stamps.notes)
+    for way, said in ((1, "forward"), (-1, "back")):
+        for k in np.flatnonzero(np.abs(step - way * HOUR - usual) < EVEN * usual).tolist():
+            values[k + 1 :] -= way * HOUR
+            notes.append(
+                f"the clock is put {said} by an hour before row {k + 1}, as summer time does: time goes on evenly"
+            )
+    return Stamps(values, tuple(notes))
+
+
+def _times_of_day(cells: list[str]) -> Stamps:
+    """Hours, minutes and seconds; midnight may pass. Raises ValueError for what is none, or two numbers that may be hours or minutes."""
+    values, carried, last, notes = np.full(len(cells), np.nan), 0.0, -np.inf, list[str]()
+    for k, cell in enumerate(cells):
+        if cell.lower() in MISSING:
+            continue
+        match = re.fullmatch(
+            r"(\d{1,3}):(\d{2})(?::(\d{2}))?(?:[.,:](\d+))?\s*([AaPp])?\.?[Mm]?\.?\s*Z?", cell, re.ASCII
+        )
+        if match is None:
+            raise ValueError(f"holds {cell!r} in row {k}, which is no time of day; write hours:minutes:seconds")
+        if match[3] is None and match[4] is None:
+            raise ValueError(
+                f"holds {cell!r}, which may be hours and minutes or minutes and seconds; write hours:minutes:seconds"
+            )
+        first, second, third = int(match[1]), int(match[2]), int(match[3] or 0)
+        if match[5] and match[3] is not None:
+            first = first % 12 + (12 if match[5] in "Pp" else 0)
+        whole = 3600 * first + 60 * second + third if match[3] is not None else 60 * first + second
+        time = whole + float(f"0.{match[4] or 0}")
+        if time + carried < last - DAY / 2:
+            carried += DAY
+            notes.append(f"midnight passes before row {k}")
+        values[k] = last = time + carried
+    known = values[np.isfinite(values)]
+    values = np.round(values - known[0], 12) if len(known) else values
+    return Stamps(values, ("time is a time of day; seconds since the first", *notes))
+
+
+def from_first(column: np.ndarray, unit: str, scale: float) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Numbers (n,) as time since the first, without the rounding of a long epoch, and how they were read.
+
+    Raises ValueError where they cannot be times in `scale` times `unit`: more than a century, but an epoch in another unit.
+    """
+    finite = column[np.isfinite(column.astype(float))]
+    if not len(finite):
+        return column.astype(float), ()
+    values, size = (column - finite[0]).astype(float), float(finite[0])
+    if unit not in EPOCHS:
+        return values, ()
+    if FILETIME[0] < size < FILETIME[1] and scale / EPOCHS[unit] > 2e-7:
+        raise ValueError('holds hundreds of nanoseconds since 1601: write scale = 100, unit = "ns"')
+    fitting = [name for name in EPOCHS if _in_epoch(size, name)]
+    if not fitting or scale != 1:
+        return values, ()
+    instant = np.datetime64(int(size / EPOCHS[fitting[0]]), "s")
+    if size / EPOCHS[unit] > SINCE_1970[1]:
+        what = f"begins at {size:.10g}, which in {unit} is more than a century, and in {fitting[0]} since 1970 is {instant}"
+        raise ValueError(f'{what}: write unit = "{fitting[0]}"')
+    return values, (f"time is {unit} since 1970; from {instant}",) if unit in fitting else ()
+
+
+def _in_epoch(size: float, unit: str) -> bool:
+    low, high = SINCE_1970
+    return low <= size / EPOCHS[unit] <= high

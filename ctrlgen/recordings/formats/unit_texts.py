@@ -1,0 +1,83 @@
+"""Units as measurement files write them: behind a name, in a row of their own, in words."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+
+from ctrlgen.core.units import base_unit, to_si
+
+BEHIND = re.compile(r"^(?P<name>.*?)[\s_,:;/-]*[\[({<]\s*(?P<unit>[^\[\](){}<>]*?)\s*[\])}>]\s*$")
+SLASH = re.compile(r"^(?P<name>.*?\S)\s*/\s*(?P<unit>[^\s/]{1,8})$")  # of DIN 1313: U / mV
+WORDS = {
+    "second": "s", "seconds": "s", "sec": "s", "secs": "s", "sekunde": "s", "sekunden": "s", "millisecond": "ms",
+    "milliseconds": "ms", "msec": "ms", "microseconds": "us", "usec": "us", "volt": "V", "volts": "V", "millivolt": "mV",
+    "amp": "A", "amps": "A", "ampere": "A", "amperes": "A", "metre": "m", "meter": "m", "metres": "m", "meters": "m",
+    "micron": "um", "microns": "um", "micrometer": "um", "micrometers": "um", "micrometre": "um", "nanometer": "nm",
+    "degrees": "deg", "degree": "deg", "°": "deg", "°c": "degC", "ºc": "degC", "celsius": "degC",
+    "newton": "N", "newtons": "N", "hertz": "Hz", "watt": "W", "watts": "W", "kelvin": "K", "arcsec": "arcsecond",
+    "radian": "rad", "radians": "rad", "hz": "Hz", "khz": "kHz", "%": "percent",
+}  # fmt: skip
+LETTERS = {"C": "degC", "g": "g_0"}  # of a log: neither coulombs nor grams
+SIGNS = {"µ": "u", "μ": "u", "²": "^2", "³": "^3", "·": "*", "°": "deg", "Ω": "ohm"}
+STRANGE = re.compile(r"[^\w/*^%().\s+-]|\^.*\^|\*\*|\d{2}")  # no unit of a log; a tower of powers has no end
+COUNTS = {"sequence", "sample", "samples", "point", "points", "index", "count", "counts", "row", "nr", "no."}
+NONE = {"", "-", "--", "1", "none", "n/a", "n.a.", "unitless", "a.u.", "arb", "arb.", "[]", "()", *COUNTS}
+BASES = {"m", "rad", "K", "N", "W", "V", "A", "s", "Hz", "Pa", "kg", "ohm", "1"}
+NAMES = {"t", "u", "x", "y", "z", "h", "a", "b", "d", "r", "c", "e", "f", "g", "i", "l", "p", "q", "v", "w"}
+LONGEST = 40  # characters of a unit in a file: more is a remark
+
+
+@cache
+def unit_of(text: str) -> str | None:
+    """The unit that a text of a file states, as ctrlgen writes it, '1' for a count; None for a text that is no unit."""
+    bare = text.strip().strip("[](){}<>").strip()
+    if len(bare) > LONGEST:
+        return None
+    since = re.fullmatch(r"(\w+) since .*", bare)  # CF conventions: "seconds since 2024-01-01"
+    if since:
+        return unit_of(since[1])
+    if bare.lower() in COUNTS:
+        return "1"
+    bare = LETTERS.get(bare) or WORDS.get(bare.lower(), bare)
+    for sign, plain in SIGNS.items():
+        bare = bare.replace(sign, plain)
+    if not bare or not re.search(r"[A-Za-z%]", bare) or STRANGE.search(bare):
+        return None
+    try:
+        to_si(1.0, bare)
+    except (ValueError, OverflowError):
+        return None
+    return bare
+
+
+def is_unit_cell(text: str) -> bool:
+    """Whether a cell of a row of units may be one: a unit, a word for none, or anything in brackets."""
+    bare = text.strip()
+    if bare.lower() in NONE or re.fullmatch(r"\[[^\]]*\]|\([^)]*\)", bare):
+        return True
+    unit = unit_of(bare)
+    return unit is not None and (unit == "1" or base_unit(unit) in BASES or "/" in unit)
+
+
+def is_unit_row(cells: list[str]) -> bool:
+    """Whether a row under the names states units: every cell may be one, and one is that is no usual name of a column."""
+    stated = [c for c in cells if c.strip().lower() not in NONE]
+    sure = [c for c in stated if c.strip().lower() not in NAMES or c.strip() in ("V", "A", "N", "W", "K", "C")]
+    return bool(stated) and all(map(is_unit_cell, cells)) and bool(sure)
+
+
+def split_name(name: str) -> tuple[str, str | None]:
+    """A name and the unit behind it: 'Channel 1 (mV)' is 'Channel 1' in mV; the unit as it stands there, None where there is none."""
+    if match := BEHIND.match(name):
+        square = name.rstrip().endswith("]")
+        if square or unit_of(match["unit"]) is not None:
+            return match["name"].strip(), match["unit"] or None
+    if (match := SLASH.match(name)) and unit_of(match["unit"]) is not None and is_unit_cell(match["unit"]):
+        return match["name"].strip(), match["unit"]
+    return name, None
+
+
+def bare_name(name: str) -> str:
+    """A column's name without the unit behind it."""
+    return split_name(name)[0]
