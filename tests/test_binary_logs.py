@@ -306,6 +306,8 @@ def test_json_with_stamps_and_a_key_that_stands_twice(tmp_path):
     (tmp_path / "b.json").write_text('{"log": {"x": [1, 2], "x": [3, 4]}}')
     with pytest.raises(InputError, match="holds the key 'x' twice"):
         read_table(tmp_path / "b.json")
+    (tmp_path / "d.json").write_text('{"x": 1, "y": 2}\n{"x": 3}\n')
+    assert read_table(tmp_path / "d.json").numbers("x").tolist() == [1, 3]
     (tmp_path / "c.json").write_text("[" * 100_000)
     with pytest.raises(InputError):
         read_table(tmp_path / "c.json")

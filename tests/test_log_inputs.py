@@ -97,3 +97,57 @@ def test_a_waveform_on_a_clock_of_its_own_is_taken_at_the_times_of_the_drive(sta
     own = load_recordings([LOGS / "s06_tdms_time_stamps_read_as_1000_s"], stage)  # the same numbers, 1 ms apart
     taken, given = (np.concatenate([r.observed[:, 0] for r in rec.records]) for rec in (recording, own))
     np.testing.assert_allclose(taken[20:119], given[0:198:2], rtol=1e-12)
+
+
+AXIS = """title = "t"
+device = "my_stage"
+kind = "series"
+{layout}
+[[record]]
+file = "{file}"
+role = "fit"
+{record}
+[columns]
+"drive.axis" = {{ column = "u", unit = "V" }}
+"reading.axis" = {{ column = "x", unit = "um" }}
+"""
+
+
+def recorded(folder, stage, file: str, content: bytes, record: str, layout: str = ""):
+    (folder / file).write_bytes(content)
+    (folder / "recording.toml").write_text(AXIS.format(file=file, record=record, layout=layout))
+    return load_recordings([folder], stage)
+
+
+def rows(step: int = 1) -> str:
+    return "".join(f"{k * step};{1 + k % 3},{100 + k % 13};{5 + k % 11},{100 + k % 17}\n" for k in range(240))
+
+
+@pytest.mark.parametrize("where", ["layout of all files", "layout of a record"])
+def test_the_answer_stands_in_recording_toml(where, tmp_path, stage):
+    content = ("t;u;x\n" + rows()).encode()
+    time = 'time = { column = "t", unit = "ms" }'
+    with pytest.raises(InputError, match=r"layout = \{ decimal = "):
+        recorded(tmp_path, stage, "run.csv", content, time)
+    if where == "layout of all files":
+        recording = recorded(tmp_path, stage, "run.csv", content, time.replace('t"', 't"'), '[layout]\ndecimal = ","')
+    else:
+        recording = recorded(tmp_path, stage, "run.csv", content, f'{time}\nlayout = {{ decimal = "," }}')
+    assert recording.records[0].drive[0, 0] == 1.1 and "run.csv: decimal comma." in recording.notes
+
+
+@pytest.mark.parametrize(("rate", "fits"), [("1 kHz", True), ("2 kHz", False)])
+def test_a_rate_that_the_file_contradicts_is_refused(rate, fits, tmp_path, stage):
+    head = "# SEPARATOR = 59\n# SAMPLE_TIME = 0.001\n# NAME0 = t\n# NAME1 = u\n# NAME2 = x\n# END_HEADER\n"
+    content = (head + rows().replace(",", ".")).encode()
+    layout = '[layout]\ndecimal = "."'
+    if fits:
+        assert (
+            recorded(tmp_path, stage, "run.dat", content, f'sample_rate = "{rate}"', layout).records[0].sample_time
+            == 1e-3
+        )
+    else:
+        with pytest.raises(
+            InputError, match=r'is read every 0.001 s, but sample_rate = 2 kHz; write sample_rate = "1000 Hz"'
+        ):
+            recorded(tmp_path, stage, "run.dat", content, f'sample_rate = "{rate}"', layout)

@@ -108,6 +108,42 @@ def test_unknown_words_are_one_fault_with_the_key_that_leaves_them_out(written):
     assert np.isnan(written(column("x", *cells), missing=("FAULT 7", "E12")).numbers("x")[1:]).sum() == 3
 
 
+def test_units_in_cells_are_told_as_such(written):
+    with pytest.raises(InputError, match="write the unit into the name"):
+        written("t,x\n0,1 mV\n1,2 mV\n").numbers("x")
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("Zeit (ms)", "ms"),
+        ("x [um]", "um"),
+        ("U / mV", "mV"),
+        ("time_ms", "ms"),
+        ("Weg in µm", "µm"),
+        ("pos nm", "nm"),
+        ("a (m/s^2)", "m/s^2"),
+    ]
+    + [
+        (name, None)
+        for name in (
+            "x_m",
+            "phase A",
+            "Channel (left)",
+            "u",
+            "Axis 1",
+            "a/b",
+            "x_V",
+            "rate (1^9^9^9)",
+            "(" + "m" * 10**5 + ")",
+        )
+    ],
+)
+def test_the_unit_behind_a_name(written, name, unit):
+    table = written(f"n;{name}\n0;1\n1;2\n")
+    assert table.unit(name) == unit and table.find(name) == name
+
+
 # rows
 
 
@@ -146,6 +182,26 @@ def test_a_header_of_numbers_is_asked_or_known_by_its_index(written):
     assert written("0,1,2\n0,5,6\n1,7,8\n", header=0).numbers("2").tolist() == [2, 6, 8]
 
 
+def test_lines_below_a_table_are_no_rows_of_it(written):
+    table = written("t,x\n0,1\n1,2\n2,3\nMean,2\n\nMax,3\n")
+    assert (
+        table.numbers("x").tolist() == [1, 2, 3]
+        and table.notes[-1] == "line 7, below the table, is no row of it; left out"
+    )
+
+
+def test_channels_with_times_of_their_own_are_on_their_own_clocks_or_refused(written):
+    head = "Name\tu\tName\tx\nSampleTime[ms]\t1\tSampleTime[ms]\t2\nData-Type\tREAL64\tData-Type\tREAL64\n\n"
+    rows = "".join(f"{k}\t{k}\t" + (f"{2 * k + 4}\t{k}\n" if k < 3 else "\t\n") for k in range(6))
+    clocks = written(head + rows).clocks
+    assert clocks == {"u": (0.0, 1e-3), "x": (pytest.approx(4e-3), 2e-3)}
+    multi = "X_Value\tu\tX_Value\tx\n0\t1\t{}\t2\n1\t2\t{}\t3\n2\t3\t{}\t4\n"
+    with pytest.raises(InputError, match="each have a time of their own, and these differ"):
+        written(multi.format(0, 2, 4))
+    same = written(multi.format(0, 1, 2))
+    assert same.numbers(same.find("X_Value")).tolist() == [0, 1, 2] and same.numbers("x").tolist() == [2, 3, 4]
+
+
 def test_names_that_repeat_are_found_by_their_number(written):
     table = written("t,x,x\n0,1,2\n1,3,4\n")
     with pytest.raises(InputError, match=r"x \(column 1\), x \(column 2\)"):
@@ -175,6 +231,9 @@ def test_names_of_fewer_or_more_columns_than_the_rows_have_are_refused(written):
         ("2024-03-31T01:59:59.999000000Z", "2024-03-31T02:00:00.000000000Z", "2024-03-31T02:00:00.001000000Z"),
         ("31.03.2024 23:59:59.999", "01.04.2024 00:00:00.000", "01.04.2024 00:00:00.001"),
         ("03/31/2024 11:59:59.999 PM", "04/01/2024 12:00:00.000 AM", "04/01/2024 12:00:00.001 AM"),
+        ("20240331T015959.999", "20240331T020000.000", "20240331T020000.001"),
+        ("2024-03-31 01:59:59.999 +0100", "2024-03-31 03:00:00.000 +0200", "2024-03-31 03:00:00.001 +0200"),
+        ("31-Mar-2024 23:59:59.999", "01-Apr-2024 00:00:00.000", "01-Apr-2024 00:00:00.001"),
         ("23:59:59.999", "00:00:00.000", "00:00:00.001"),
         ("59:59.999", "60:00.000", "60:00.001"),
         ("1711850399999", "1711850400000", "1711850400001"),

@@ -13,7 +13,7 @@ from ctrlgen.recordings.schema import RecordTable
 
 SLOWEST = 5.0  # periods of the lowest natural frequency between two samples: nothing of its motion is seen
 SHORTEST = 0.1  # of that period, of a whole record: nothing of it happens
-UNITS = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "hour": 3600.0}
+UNITS = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "hour": 3600.0, "day": 86400.0}
 USUAL = (1e-4, 0.25)  # of a period between two samples: as recorders of a device with inertia are set
 
 

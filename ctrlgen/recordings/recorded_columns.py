@@ -50,8 +50,8 @@ class RecordedColumns:
         except InputError as error:
             self.faults += [Fault(where, f"{file} {fault.what}") for fault in error.faults]
             return None
-        if column.scale == 1 and contradicts(table.units.get(name), scale, column.unit):
-            what = f"{file} says {table.units[name]}, recording.toml says {column.unit}; correct the one that is wrong"
+        if column.scale == 1 and contradicts(table.unit(name), scale, column.unit):
+            what = f"{file} says {table.unit(name)}, recording.toml says {column.unit}; correct the one that is wrong"
             self.faults.append(Fault(where, what))
         if signal and name in table.clocks and not column.sample_rate:
             self.clocks[signal] = table.clocks[name]

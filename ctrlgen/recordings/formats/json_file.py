@@ -1,4 +1,4 @@
-"""JSON: an object of lists, a list of row objects, or a matrix under a name."""
+"""JSON: an object of lists, a list of row objects or one in each line, or a matrix under a name."""
 
 from __future__ import annotations
 
@@ -30,7 +30,13 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
         return dict(pairs)
 
     try:
-        content = json.loads(text, object_pairs_hook=once)
+        rows = [line for line in text.split("\n") if line.strip()]
+        several = len(rows) > 1 and all(line.lstrip().startswith("{") and line.rstrip().endswith("}") for line in rows)
+        content = (
+            [json.loads(row, object_pairs_hook=once) for row in rows]
+            if several
+            else json.loads(text, object_pairs_hook=once)
+        )
     except json.JSONDecodeError as error:
         raise fault(path, f"is no JSON: line {error.lineno}: {error.msg}; export it again") from None
     if isinstance(content, list):

@@ -13,7 +13,7 @@ import numpy as np
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.recordings.formats import number_cells, over_range, time_stamps
 from ctrlgen.recordings.formats.number_cells import NumberStyle
-from ctrlgen.recordings.formats.unit_texts import bare_name
+from ctrlgen.recordings.formats.unit_texts import bare_name, split_name
 
 MOST_LISTED = 20  # columns that a message lists
 
@@ -88,6 +88,10 @@ class MeasurementTable:
         listed = ", ".join(names[:MOST_LISTED]) + (", ..." if len(names) > MOST_LISTED else "")
         return f"did you mean {near[0]!r}?" if near else f"its columns are: {listed or 'none'}"
 
+    def unit(self, name: str) -> str | None:
+        """The unit that the file states of a column, beside it or behind its name; None where it states none."""
+        return self.units.get(name) or split_name(_without_group(name))[1]
+
     def numbers(self, name: str) -> np.ndarray:
         """Column `name` as float64 (n,), NaN where there is no reading. Raises InputError for text that is no number."""
         return self.reading(name).values
@@ -151,6 +155,8 @@ class MeasurementTable:
         more = f" and {len(bad) - number_cells.MOST_LISTED} more" if len(bad) > number_cells.MOST_LISTED else ""
         key = ", ".join(f'"{word}"' for word in words[: number_cells.MOST_LISTED]).replace("\\", "\\\\")
         what = f"column {name!r} holds text that is no number in {len(bad)} of {len(self.columns[name])} rows ({listed}{more})"
+        if any(number_cells.has_unit(text) for _, text in bad):
+            return f"{what}; numbers stand alone: write the unit into the name, such as 'x (um)'"
         if len(bad) == len(self.columns[name]):
             return f"{what}; name another column"
         return f"{what}; if that means a missing reading, write layout = {{ missing = [{key}] }}, else write numbers"

@@ -128,6 +128,11 @@ def is_number(cell: str) -> bool:
     return ANY.fullmatch(cell) is not None
 
 
+def has_unit(cell: str) -> bool:
+    """Whether a cell is a number and a word of letters, as 0.5 mV."""
+    return bool(re.fullmatch(r"[+-]?[\d.,]+([eE][+-]?\d+)?\s*[^\W\d_]{1,4}", cell))
+
+
 def is_reading(cell: str) -> bool:
     """Whether a cell stands in a column of numbers: a number, a time, or a word for a missing or lost one."""
     return is_number(cell) or cell.lower() in MISSING or cell.lower() in OVER or bool(TIME.fullmatch(cell))

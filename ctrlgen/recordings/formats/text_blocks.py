@@ -13,6 +13,7 @@ from ctrlgen.recordings.formats.number_cells import Ambiguous, is_number, is_rea
 from ctrlgen.recordings.formats.text_cells import cells_of, is_comment, width_of
 
 FEWEST_ROWS = 2  # of a table among other text
+FOOTED = 20  # rows before a footer that must begin with a number
 MOST_LISTED = 5  # bad lines that a message lists
 STRICT = re.compile(r"[\s\d.,;:|+\-\u2212/'\"eEdDTZ]*\d[\s\d.,;:|+\-\u2212/'\"eEdDTZ]*")
 """A line that holds nothing but numbers, times and separators."""
@@ -22,13 +23,14 @@ Kind = Literal["blank", "remark", "row", "mixed", "text"]
 @dataclass(frozen=True)
 class Block:
     """A table of a text file by the numbers of its lines from 0: its rows of `width` cells, or `widest` with remarks behind them, the
-    lines above it, and its last line if that was not written to its end."""
+    lines above it, its last line if that was not written to its end, and lines below it that are of its width but no rows."""
 
     rows: tuple[int, ...]
     width: int
     widest: int
     above: tuple[int, ...]
     cut: int | None = None
+    below: tuple[int, ...] = ()
 
 
 def kind_of(line: str, separator: str) -> Kind:
@@ -108,6 +110,7 @@ def _block(lines: Sequence[str], run: list[int], above: list[int], separator: st
     """A run of rows as a table. Raises `Ambiguous` where they differ in their number of cells."""
     while len(run) > 1 and not lines[run[-1]].strip().strip(separator):
         run = run[:-1]  # a spreadsheet's empty rows
+    run, below = _without_footer(lines, run, separator)
     widths = [width_of(lines[k], separator) for k in run]
     width = Counter(widths).most_common(1)[0][0]
     cut = run[-1] if widths[-1] < width and run[-1] == len(lines) - 1 and len(run) > FEWEST_ROWS else None
@@ -125,7 +128,16 @@ def _block(lines: Sequence[str], run: list[int], above: list[int], separator: st
         usual = next(k for k, w in zip(run, widths, strict=True) if w == width)
         what = f"line {usual + 1} has {width} cells, but {listed}; repair these, or write the line of the names, layout = {{ header = 5 }},"
         raise Ambiguous(f"{what} if they stand above the table")
-    return Block(tuple(run), width, max(widths), tuple(above), cut)
+    return Block(tuple(run), width, max(widths), tuple(above), cut, below)
+
+
+def _without_footer(lines: Sequence[str], run: list[int], separator: str) -> tuple[list[int], tuple[int, ...]]:
+    """Rows without those at their end that begin with a text where all others begin with a number, such as means; and these."""
+    last = len(run)
+    while last > FEWEST_ROWS and not is_reading(cells_of(lines[run[last - 1]], separator)[0]):
+        last -= 1
+    begin_with_numbers = all(is_reading(cells_of(lines[k], separator)[0]) for k in run[max(0, last - FOOTED) : last])
+    return (run[:last], tuple(run[last:])) if begin_with_numbers else (run, ())
 
 
 def _longer_by_a_remark(line: str, width: int, separator: str) -> bool:

@@ -20,6 +20,16 @@ from ctrlgen.recordings.formats.text_header import header_of
 from ctrlgen.recordings.formats.written_layout import Layout
 
 STYLED = 1000  # rows, the first and others evenly over the table, by which the style of its numbers is known
+TIMES = {
+    "x_value",
+    "time",
+    "t",
+    "zeit",
+    "x",
+    "time [s]",
+    "time (s)",
+    "timestamp",
+}  # names of columns of time, in small letters
 NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "blanks"}
 EMPTY = sorted(
     {spelling for word in number_cells.MISSING for spelling in (word, word.upper(), word.capitalize(), "NaN", "NaT")}
@@ -81,6 +91,9 @@ def _table(
     names, units = list(header.names), dict(header.units)
     unique = _unique(names)
     cut = [f"line {block.cut + 1}, the last, ends before its last cell; left out"] if block.cut is not None else []
+    cut += [f"line {k + 1}, below the table, is no row of it; left out" for k in block.below]
+    times = header.times or _times_of(names)
+    clocks = _clocks(times, columns, header.sample_times)
     return MeasurementTable(
         path,
         dict(zip(unique, columns, strict=True)),
@@ -88,10 +101,37 @@ def _table(
         _Lines(rows),
         (*said, *header.notes, *notes, *cut),
         nameless=frozenset(k for k, name in enumerate(names) if not name),
-        clocks={} if header.sample_time is None else dict.fromkeys(unique, Clock(0.0, header.sample_time)),
+        aliases={names[0]: unique[0]} if times and not clocks else {},  # one time under several names
+        clocks={unique[k]: clock for k, clock in clocks.items()},
         style=style,
         missing=layout.missing,
     )
+
+
+def _times_of(names: Sequence[str]) -> dict[int, int]:
+    """The column of time of each column where every second one is time under one name; empty for other tables."""
+    every = {name.lower() for name in names[::2]}
+    paired = len(names) > 2 and len(names) % 2 == 0 and len(every) == 1 and every <= TIMES
+    return {k + 1: k for k in range(0, len(names), 2)} if paired else {}
+
+
+def _clocks(times: dict[int, int], columns: list[np.ndarray], sample_times: dict[int, float]) -> dict[int, Clock]:
+    """The clock of each column: of the sample time [s] that the header states, from where its own column of time begins.
+
+    Raises `Ambiguous` where columns have different times and the header does not state their sample time.
+    """
+    alike = all(np.array_equal(columns[k], columns[next(iter(times.values()))]) for k in times.values())
+    if times and alike:
+        return {}
+    if any(column not in sample_times for column in times):
+        what = "holds channels that each have a time of their own, and these differ"
+        raise Ambiguous(f"{what}; export them at one rate, or each to its own file, named by `file` of its column")
+    clocks = {}
+    for k, step in sample_times.items():
+        own = np.asarray(columns[times[k]], dtype=float) if k in times else np.arange(2.0)
+        own = own[np.isfinite(own)]
+        clocks[k] = Clock(float(step * own[0] / (own[1] - own[0])) if len(own) > 1 and own[1] > own[0] else 0.0, step)
+    return clocks
 
 
 class _Lines(Sequence[int]):

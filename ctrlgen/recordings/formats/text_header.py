@@ -24,30 +24,32 @@ PAIRED = 2  # header rows in which every second cell repeats a key, as TwinCAT S
 @dataclass(frozen=True)
 class Header:
     """Names of a table's columns, '' for one without; units by number of column; rows above the block that belong to it; the declared
-    sample time [s]; whether the block's first row holds the names."""
+    sample time [s] of each column, and its column of time where it has one of its own; whether the block's first row holds the names."""
 
     names: tuple[str, ...]
     units: dict[int, str] = field(default_factory=dict)
     more_rows: tuple[int, ...] = ()
     notes: tuple[str, ...] = ()
-    sample_time: float | None = None
+    sample_times: dict[int, float] = field(default_factory=dict)
+    times: dict[int, int] = field(default_factory=dict)
     in_first_row: bool = False
 
 
 def header_of(lines: Sequence[str], block: Block, separator: str, layout: Layout) -> Header:
     """The header of a table. Raises `Ambiguous` where its names are not as many as the columns."""
-    sample_time = next((float(m[1]) for k in block.above if (m := DECLARED_TIME.match(lines[k]))), None)
+    step = next((float(m[1]) for k in block.above if (m := DECLARED_TIME.match(lines[k]))), None)
+    sample_times = {} if step is None else dict.fromkeys(range(block.width), step)
     declared = {int(m[1]): m[2] for k in block.above if (m := DECLARED_NAME.match(lines[k]))}
     if len(declared) == block.width:
         names = tuple(declared[k] for k in sorted(declared))
         return Header(
-            names, _units_behind(names), notes=("names are those that the header declares",), sample_time=sample_time
+            names, _units_behind(names), notes=("names are those that the header declares",), sample_times=sample_times
         )
     if _ends_empty(lines, block, separator):
         shorter = header_of(lines, replace(block, width=block.width - 1), separator, layout)
         return replace(shorter, names=(*shorter.names, ""))
     if layout.header == 0:
-        return Header(("",) * block.width, sample_time=sample_time)
+        return Header(("",) * block.width, sample_times=sample_times)
     candidates = [
         (k, cells) for k in reversed(block.above) if (cells := _fitting(lines[k], block.width, separator)) is not None
     ]
@@ -56,14 +58,14 @@ def header_of(lines: Sequence[str], block: Block, separator: str, layout: Layout
     own = _rows_above(lines, block, separator, candidates)
     candidates = candidates[len(own) :]
     if pairs := _paired(candidates):
-        return replace(pairs, more_rows=own, sample_time=sample_time)
+        return replace(pairs, more_rows=own)
     plain = [(k, cells) for k, cells in candidates if not is_comment(lines[k])]
     header = _names_and_units(plain or candidates)
     if not header.names:
         header = _numbered(lines, block, separator) or _short(lines, block, separator)
     notes = header.notes
     names = header.names or ("",) * block.width
-    return Header(names, header.units, own, notes, sample_time, header.in_first_row)
+    return Header(names, header.units, own, notes, sample_times, {}, header.in_first_row)
 
 
 def _ends_empty(lines: Sequence[str], block: Block, separator: str) -> bool:
@@ -187,7 +189,15 @@ def _paired(candidates: Sequence[tuple[int, list[str]]]) -> Header | None:
     ]
     if scaled:
         notes.append(f"the header states a scale for {', '.join(scaled)}; the numbers are taken as they stand")
-    return Header(names, units, notes=tuple(notes))
+    steps = rows.get("SampleTime[ms]", ())
+    sample_times = {2 * k + 1: 1e-3 * float(step) for k, step in enumerate(steps) if re.fullmatch(r"\d+(\.\d+)?", step)}
+    return Header(
+        names,
+        units,
+        notes=tuple(notes),
+        sample_times=sample_times,
+        times={2 * k + 1: 2 * k for k in range(len(names) // 2)},
+    )
 
 
 def _stated(lines: Sequence[str], block: Block, separator: str, line: int) -> Header:

@@ -12,10 +12,12 @@ from ctrlgen.recordings.formats.number_cells import CLOCK, DATE, MISSING
 DAY = 86400.0
 HOUR = 3600.0
 EVEN = 0.25  # of a step: how exactly an hour's jump must be an hour and one step to be summer time
-SINCE_1970 = (9.46e8, 4.1e9)  # seconds: the years 2000 to 2100
+SINCE_1970 = (9.46e8, 2.5e9)  # seconds: the years 2000 to 2049; those since 1904, of LabVIEW, are more
+CENTURY = 4.1e9  # seconds: more is no time since a start, nor since 1904
 EPOCHS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 FILETIME = (1.2e17, 1.7e17)  # hundreds of nanoseconds since 1601: the years 1981 to 2139
 STAMP = re.compile(rf"({DATE})?[T ,;]*({CLOCK})?\s*(Z|UTC|[+-]\d{{2}}:?\d{{2}})?", re.ASCII)
+BASIC = re.compile(r"^(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)(\d\d)", re.ASCII)  # ISO 8601 without marks
 PARTS = re.compile(r"(\d{1,4})[-./](\d{1,2})[-./](\d{1,4})", re.ASCII)
 
 
@@ -35,7 +37,7 @@ def seconds(column: np.ndarray, dates: str | None) -> Stamps | None:
         return _instants(column, "time is instants", ())
     if column.dtype.kind != "O":
         return None
-    cells = [c.strip() if isinstance(c, str) else "" for c in column]
+    cells = [re.sub(BASIC, r"\1-\2-\3T\4:\5:\6", c.strip()) if isinstance(c, str) else "" for c in column]
     first = next((c for c in cells if c.lower() not in MISSING), "")
     if not (re.match(DATE, first, re.ASCII) or re.match(CLOCK, first, re.ASCII)):
         return None
@@ -48,7 +50,7 @@ def _dates(cells: list[str], first: str, dates: str | None) -> Stamps:
     """Dates with a time of day. A zone is subtracted; without one, summer time shows as a jump of an hour."""
     iso = re.match(r"\d{4}[-/.]?\d{2}[-/.]?\d{2}", first)
     said, zoned = ("time is ISO 8601" if iso else "time is dates"), bool(re.search(r"(Z|UTC|[+-]\d{2}:?\d{2})$", first))
-    texts = [re.sub(r"(\d),(\d+)", r"\1.\2", c.replace(" UTC", "Z")) for c in cells]
+    texts = [re.sub(r"(\d),(\d+)", r"\1.\2", re.sub(r"\s+(?=[+-]\d\d)", "", c.replace(" UTC", "Z"))) for c in cells]
     notes: tuple[str, ...] = ()
     if iso:
         texts = [re.sub(r"^(\d{4})[/.](\d{2})[/.](\d{2})[ T]?", r"\1-\2-\3T", c) for c in texts]
@@ -182,7 +184,7 @@ def from_first(column: np.ndarray, unit: str, scale: float) -> tuple[np.ndarray,
     if not fitting or scale != 1:
         return values, ()
     instant = np.datetime64(int(size / EPOCHS[fitting[0]]), "s")
-    if size / EPOCHS[unit] > SINCE_1970[1]:
+    if size / EPOCHS[unit] > CENTURY:
         what = f"begins at {size:.10g}, which in {unit} is more than a century, and in {fitting[0]} since 1970 is {instant}"
         raise ValueError(f'{what}: write unit = "{fitting[0]}"')
     return values, (f"time is {unit} since 1970; from {instant}",) if unit in fitting else ()

@@ -9,6 +9,10 @@ from ctrlgen.core.units import base_unit, to_si
 
 BEHIND = re.compile(r"^(?P<name>.*?)[\s_,:;/-]*[\[({<]\s*(?P<unit>[^\[\](){}<>]*?)\s*[\])}>]\s*$")
 SLASH = re.compile(r"^(?P<name>.*?\S)\s*/\s*(?P<unit>[^\s/]{1,8})$")  # of DIN 1313: U / mV
+PLAIN = re.compile(
+    r"^(?P<name>.*[^\W_])(?:[_\s]+|\s+in\s+)(?P<unit>[mun\u00b5\u03bc]s|[mun\u00b5\u03bcp]m|[mkun\u00b5\u03bc][VA]|[mun\u00b5\u03bc]rad|rad|deg[CF]?|[kM]?Hz)$"
+)
+"""A unit after a blank or an underscore, of those that are no usual end of a name: time_ms, but not x_m or phase A."""
 WORDS = {
     "second": "s", "seconds": "s", "sec": "s", "secs": "s", "sekunde": "s", "sekunden": "s", "millisecond": "ms",
     "milliseconds": "ms", "msec": "ms", "microseconds": "us", "usec": "us", "volt": "V", "volts": "V", "millivolt": "mV",
@@ -25,6 +29,7 @@ COUNTS = {"sequence", "sample", "samples", "point", "points", "index", "count", 
 NONE = {"", "-", "--", "1", "none", "n/a", "n.a.", "unitless", "a.u.", "arb", "arb.", "[]", "()", *COUNTS}
 BASES = {"m", "rad", "K", "N", "W", "V", "A", "s", "Hz", "Pa", "kg", "ohm", "1"}
 NAMES = {"t", "u", "x", "y", "z", "h", "a", "b", "d", "r", "c", "e", "f", "g", "i", "l", "p", "q", "v", "w"}
+LETTERS_OF_NAMES = NAMES - {"h", "d", "g"}  # behind a name they are rather another name than tonnes or atomic masses
 LONGEST = 40  # characters of a unit in a file: more is a remark
 
 
@@ -71,9 +76,11 @@ def split_name(name: str) -> tuple[str, str | None]:
     """A name and the unit behind it: 'Channel 1 (mV)' is 'Channel 1' in mV; the unit as it stands there, None where there is none."""
     if match := BEHIND.match(name):
         square = name.rstrip().endswith("]")
-        if square or unit_of(match["unit"]) is not None:
+        if square or (match["unit"] not in LETTERS_OF_NAMES and unit_of(match["unit"]) is not None):
             return match["name"].strip(), match["unit"] or None
-    if (match := SLASH.match(name)) and unit_of(match["unit"]) is not None and is_unit_cell(match["unit"]):
+    if match := PLAIN.match(name):
+        return match["name"].removesuffix(" in").strip(), match["unit"]
+    if (match := SLASH.match(name)) and match["unit"] not in LETTERS_OF_NAMES and is_unit_cell(match["unit"]):
         return match["name"].strip(), match["unit"]
     return name, None
 
