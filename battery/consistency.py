@@ -16,6 +16,7 @@ SUM = 1e-6  # by which shares that make up one may differ from it
 SQUARES = 0.02  # by which a share may differ from that of the squares, which leave out what the tables round
 LEAST = 0.01  # of the mismatch: below, nothing is a cause
 MOST = 0.75  # of the mismatch, which a partial answer takes away
+LUCK = 0.05  # chance up to which a cause is told without a word of doubt
 NOISE = 1.5  # times the noise: more is not explained
 HELD_OUT = re.compile(r"Held-out error of (\S+): (\S+) (\S+?)(?: -> (\S+) \S+?)?, noise (?:not known|(\S+) \S+?)[.;]")
 TAKES = re.compile(r"it takes away ((?:[<>] )?[\d.]+ %)")
@@ -31,7 +32,7 @@ HEADS = {
 
 def contradictions(diagnosis: dict[str, Any]) -> list[str]:
     """What contradicts itself in the content of a diagnosis.json; nothing where all of it agrees."""
-    parts = (_shares, _channels, _causes, _verdict, _sentence, _numbers)
+    parts = (_shares, _channels, _causes, _verdict, _sentence, _numbers, _luck)
     return [text for part in parts for text in part(diagnosis)]
 
 
@@ -195,6 +196,37 @@ def _numbers(d: dict[str, Any]) -> Iterator[str]:
             for channel, c in d["shares"][when]["channels"].items():
                 if abs(c["total"] + c["rest"] - 1) > SUM:
                     yield f"{channel} {when}: total {c['total']} and rest {c['rest']} are not one"
+
+
+def _luck(d: dict[str, Any]) -> Iterator[str]:
+    """The chance that luck found a cause: what it is made of, and what the verdict and the sentence say of it."""
+    for f in d["findings"]:
+        c, name = f["chance"], _name(f)
+        if c is None:
+            continue
+        if (c["by_luck"] is None) != (c["p"] is None) or (c["by_luck"] is None and not c["reason"]):
+            yield f"{name}: not tested for luck, without a reason, or with a p of {c['p']}"
+        if c["by_luck"] is None or c["p"] is None:
+            continue
+        if not 0.5 ** c["stretches"] * (1 - SUM) <= c["p"] <= 1:
+            yield f"{name}: {c['stretches']} stretches have no p of {c['p']}"
+        if not min(c["p"] * c["looks"], 1) * (1 - SUM) <= c["by_luck"] <= 1:
+            yield f"{name}: p {c['p']} times {c['looks']} answers is not {c['by_luck']}"
+        if c["reason"] and c["by_luck"] <= LUCK:
+            yield f"{name}: luck is excluded, and {c['reason']}"
+    main = d["findings"][0] if d["findings"] else None
+    if main is None or main["role"] == "unseen" or d["verdict"] == "consistent":
+        return
+    told = "luck" in d["sentence"].partition(", beside ")[0]
+    if told != _doubted(main):
+        yield f"{_name(main)} may be luck: {_doubted(main)}; the sentence says {told}"
+    if d["verdict"] == "explained" and _doubted(main) and not main["chance"]["reason"]:
+        yield f"explained by {_name(main)}, which may be luck"
+
+
+def _doubted(finding: dict[str, Any]) -> bool:
+    c = finding["chance"]
+    return c is not None and (c["by_luck"] is None or c["by_luck"] > LUCK)
 
 
 def _same(a: float, b: float | None, share: float = 0.006) -> bool:

@@ -17,8 +17,9 @@ ROUGH = ("messy", "memory", "forms", "regional", "gaps", "spikes")
 class Judgement:
     """One case. `named`: (truth, name given or 'none'); `covered`: (name, parameter, inside); `places`: (channel, place) right;
     `bands`: whether a line's frequency lies in the band with the largest excess; `rough`: of messy cases and memory, the latter as
-    `series` or poses, `alone` or over a background; `contradictions` within the file; `further`: None where it failed; `set_of` gaps and
-    the `way` in which rows are missing; `cpu` [s] and largest `memory` [GB] of the command."""
+    `series` or poses, `alone` or over a background; `luck`: of each finding whether it is there, and the chance that luck found it;
+    `contradictions` within the file; `further`: None where it failed; `set_of` gaps and the `way` in which rows are missing; `cpu` [s]
+    and largest `memory` [GB] of the command."""
 
     case: str
     kind: str
@@ -37,6 +38,7 @@ class Judgement:
     seconds: float | None = None
     autocorrelated: bool = False
     rough: Rough | None = None
+    luck: list[tuple[bool, float | None]] = field(default_factory=list)
     contradictions: list[str] = field(default_factory=list)
     series: bool = True
     alone: bool = True
@@ -101,6 +103,7 @@ def judge(answer: dict[str, Any], diagnosis: dict[str, Any] | None, seconds: flo
     spare = [f for f in left if not any(_among(f, t) for t in truths)]
     j.named += [("nothing", f["effect"]) for f in spare]
     j.wrong = bool(spare)
+    j.luck = [(f not in spare, f["chance"]["by_luck"]) for f in findings if f.get("chance")]
     j.exact = exact == len(truths) and not left
     j.in_set = exact + near == len(truths) and not left
     j.further = judge_further(answer, diagnosis, spare)

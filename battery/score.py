@@ -25,6 +25,7 @@ from battery.score_rough import rough_rows
 from battery.seal import unseal
 
 POLL = 0.05  # s, between looks whether a process has ended
+NULLS = {"clean", "hexapod_clean", "null"}
 
 
 @dataclass(frozen=True)
@@ -132,15 +133,41 @@ def table(judged: Sequence[Judgement]) -> list[Row]:
         share("confusable, wrong name", [j.wrong for j in of("confusable")], "none set"),
         *rough_rows(judged),
         *further_rows(judged),
+        *luck_rows(judged),
         share("contradicts itself", [bool(j.contradictions) for j in judged], "0 %", most=0.0),
         share("crashed, refused or out of time", [j.verdict == "failed" for j in judged], "0 %", most=0.0),
     ]
 
 
+LEVEL = 0.05  # chance by luck up to which a finding is told without a word of doubt
+
+
+def luck_rows(judged: Sequence[Judgement]) -> list[Row]:
+    """Whether the stated chance of a finding by luck holds where nothing is wrong, and whom it doubts elsewhere."""
+    nulls = [j for j in judged if j.kind in NULLS]
+    there, not_there = (
+        [_certain(p) for j in judged for right, p in j.luck if right is wanted] for wanted in (True, False)
+    )
+    return [
+        share(
+            "nulls, certified though not there",
+            [any(_certain(p) for right, p in j.luck if not right) for j in nulls],
+            "<= 5 %",
+            most=LEVEL,
+        ),
+        share("findings that are there, certified", there, "none set"),
+        share("findings that are not there, certified (not luck, but another law)", not_there, "none set"),
+    ]
+
+
+def _certain(by_luck: float | None) -> bool:
+    return by_luck is not None and by_luck <= LEVEL
+
+
 def confusion(judged: Sequence[Judgement]) -> Counter[tuple[str, str]]:
     """How often each planted law got each name; ('nothing', x) are names given for nothing planted."""
     pairs = Counter(pair for j in judged for pair in j.named)
-    quiet = sum(1 for j in judged if j.kind in {"clean", "hexapod_clean", "null"} and not j.named)
+    quiet = sum(1 for j in judged if j.kind in NULLS and not j.named)
     return pairs + Counter({("nothing", "none"): quiet})
 
 

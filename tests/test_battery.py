@@ -190,6 +190,7 @@ def finding(truth, **changes):
 def fabricated(kind):
     """One clean case, one outside, three singles and a mixture, all diagnosed the same way: right, wrong, or not at all."""
     wrong = {"effect": "vibration", "location": "disturbance:other", "alternatives": [], "parameters": {}}
+    wrong |= {"chance": {"by_luck": 1e-3}}
     good = {"reading.axis": {"rms_before": 9.0, "rms_after": 1.0, "noise_floor": 1.0, "unit": "nm"}}
     bad = {"reading.axis": {"rms_before": 9.0, "rms_after": 9.0, "noise_floor": 1.0, "unit": "nm"}}
     rows = [
@@ -263,7 +264,7 @@ def test_all_right_meets_every_goal():
 
 def test_all_wrong_misses_every_goal_that_a_name_can_miss():
     rows = measured(fabricated("wrong"))
-    held = {r.what for r in rows.values() if r.met}
+    held = {r.what for r in rows.values() if r.met and r.goal != "none set"}
     assert held == {
         "time of a case with one effect, longest [s]",
         "time of a case with two or three, longest [s]",
@@ -273,6 +274,26 @@ def test_all_wrong_misses_every_goal_that_a_name_can_miss():
         "crashed, refused or out of time",
     }
     assert rows["false alarms on clean records"].hits == 1
+
+
+def test_a_finding_on_nothing_counts_as_certified_by_its_chance():
+    """And a null without a finding is none."""
+    false = {"effect": "vibration", "location": "disturbance:x", "alternatives": [], "parameters": {}}
+    chances = ({"by_luck": 0.04}, {"by_luck": 0.06}, {"by_luck": None}, None)
+    nulls = [{"verdict": "explained", "findings": [false | {"chance": c}]} for c in chances]
+    nulls += [{"verdict": "consistent", "findings": []}]
+    judged = [judge.judge({"case": "n", "class": "clean", "planted": []}, d) for d in nulls]
+    rows = measured(judged)
+    assert (rows["nulls, certified though not there"].hits, rows["nulls, certified though not there"].n) == (1, 5)
+    there = finding(ANSWERS[0]) | {"chance": {"by_luck": 1e-9}}
+    rows = measured(
+        [
+            judge.judge(
+                {"case": "s", "class": "single", "planted": ANSWERS[:1]}, {"verdict": "explained", "findings": [there]}
+            )
+        ]
+    )
+    assert rows["findings that are there, certified"].hits == 1
 
 
 def test_abstaining_is_never_a_wrong_name_but_a_false_alarm():

@@ -43,6 +43,11 @@ WRONG = {
     "consistent with findings": ("verdict", "consistent"),
     "a number outside its interval": ("findings.0.parameters.gain.value", 7.0),
     "no unit": ("findings.0.parameters.tau.unit", ""),
+    "a chance that may be luck, without a word": ("findings.0.chance.by_luck", 0.3),
+    "a chance below its own p": ("findings.0.chance.by_luck", 0.0),
+    "a p of more signs than there are": ("findings.0.chance.stretches", 3),
+    "a reason for a doubt that there is not": ("findings.0.chance.reason", "few"),
+    "no test and no reason": ("findings.0.chance.p", None),
 }
 
 
@@ -67,6 +72,7 @@ def test_a_contradiction_is_found(sound, wrong):
         ("Held-out error of axis", "Held-out error of theta"),
         ("it takes away all", "it takes away 12 % of everything, not all"),
         ("creep at", "drift at"),
+        ("it takes away", "it may be luck (12 %); it takes away"),
     ],
 )
 def test_words_that_are_not_those_of_the_tables_are_found(sound, said, instead):

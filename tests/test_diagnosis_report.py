@@ -92,6 +92,7 @@ def test_the_json_is_the_contract(found):
             "alternatives",
             "source",
             "support",
+            "chance",
         )
     }
     assert (finding["effect"], finding["location"]) == ("creep", "stage:axis")

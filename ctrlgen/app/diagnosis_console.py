@@ -31,6 +31,7 @@ def print_recording(recording: Recording) -> None:
 def print_diagnosis(diagnosis: Diagnosis) -> None:
     """The verdict, the findings and the held-out errors of a diagnosis."""
     from ctrlgen.diagnosis.report.answer import answer
+    from ctrlgen.diagnosis.report.luck_sentences import chance_text
     from ctrlgen.diagnosis.report.narrative import gathered, interval, next_steps, share_text
     from ctrlgen.diagnosis.report.shares_sentences import shares_sentences
     from ctrlgen.diagnosis.selection.cause_entry import cause_name
@@ -45,6 +46,7 @@ def print_diagnosis(diagnosis: Diagnosis) -> None:
             ("found", "left"),
             ("at", "left"),
             ("share", "right"),
+            ("by luck", "right"),
             ("parameter", "left"),
             ("estimate, 95 % interval", "left"),
         )
@@ -52,8 +54,9 @@ def print_diagnosis(diagnosis: Diagnosis) -> None:
             sets = (finding.parameters, *finding.terms)
             rows = [(name, interval(e)) for numbers in sets for name, e in numbers.items()]
             alike = ", ".join(map(cause_name, finding.alternatives))
+            told = (finding.effect, finding.location, share_text(finding), chance_text(finding))
             for k, (name, text) in enumerate(rows):
-                first = (finding.effect, finding.location, share_text(finding)) if k == 0 else ("",) * 3
+                first = told if k == 0 else ("",) * len(told)
                 table.add_row(*first, name, text, escape(f"or {alike}") if alike and k == 0 else "")
         show_table(table)
     table = table_of(

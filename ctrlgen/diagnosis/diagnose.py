@@ -7,7 +7,8 @@
 4. Hypotheses are listed: every effect at every location, every parameter of the device (`estimation.hypothesis`).
 5. The search screens them, fits candidate models and selects among them on held-out data (`selection.screen`, `search`).
 6. Every accepted cause gets its share of the mismatch (`selection.attribution`), and beside it stands of what the residual is a
-   function before and after, whatever the law (`shares`), which may speak against it (`selection.standing`).
+   function before and after, whatever the law (`shares`), which may speak against it (`selection.standing`); and the chance that luck
+   found it, by an exact test on the held-out records (`evidence.chance_by_luck`).
 7. Residual tests and the held-out data give the verdict (`estimation.residual_tests`, `selection.verdict`).
 8. Supporting analyses: where the residual is, what was detectable, what to record next (`evidence`).
 """
@@ -23,6 +24,7 @@ from threadpoolctl import threadpool_limits
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.forks import usable_cores
 from ctrlgen.devices import Device
+from ctrlgen.diagnosis.evidence.chance_by_luck import doubted, with_chances
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.evidence.supporting_analyses import run_supporting_analyses
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
@@ -125,6 +127,8 @@ def _diagnose(
         noise = dict(zip(search.fitter.recording.channels, search.fitter.noise.floor.tolist(), strict=True))
         found = in_standing(found, ranking(shares.before, noise))
         answer = answer_of(answer, found, search.chosen.errors.is_noise)
+    found = with_chances(found, search)
+    answer = doubted(answer, found)
     enough = unit_is_wrong or answer in (Verdict.CONSISTENT, Verdict.EXPLAINED)
     left, failed = ((), ()) if enough else _empirical_terms(search, shares)
     spikes = find_spikes(search.fitter, search.chosen.fit, known)

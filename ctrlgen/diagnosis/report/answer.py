@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
+from ctrlgen.diagnosis.report.luck_sentences import MAY_BE_LUCK, doubt_of_luck
 from ctrlgen.diagnosis.report.narrative import (
     cause_text,
     channel_sentence,
@@ -91,10 +92,18 @@ def _main(findings: Sequence[Finding]) -> str:
     numbers = ", ".join(f"{name} = {interval(e)}" for name, e in _first_numbers(main).items())
     share = f"; it takes away {_share(main.share)}" if main.share else ""
     causes = [f for f in others if f.role is Role.CAUSE]
-    names = [f"{cause_name(f.cause)}{f' ({per_cent(f.share.value)})' if f.share else ''}" for f in causes[:BESIDE]]
+    names = [f"{cause_name(f.cause)}{_in_brackets(f)}" for f in causes[:BESIDE]]
     more = len(others) - len(names)
     names += [f"{more} more in the table"] if more else []
-    return f"{cause_text(main)}, {numbers}{share}{', beside ' + ' and '.join(names) if names else ''}"
+    doubt = f"; {words}" if (words := doubt_of_luck(main)) else ""
+    return f"{cause_text(main)}, {numbers}{share}{doubt}{', beside ' + ' and '.join(names) if names else ''}"
+
+
+def _in_brackets(finding: Finding) -> str:
+    """' (12 %)' after the name of a further cause, ' (12 %, may be luck)', or nothing."""
+    told = [per_cent(finding.share.value)] if finding.share else []
+    told += [MAY_BE_LUCK] if doubt_of_luck(finding) else []
+    return f" ({', '.join(told)})" if told else ""
 
 
 def _share(share: ShareEntry) -> str:

@@ -18,7 +18,7 @@ from ctrlgen.diagnosis.report.answer import sentence
 from ctrlgen.diagnosis.report.shares_sentences import noise_of, shares_sentences
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.cause_entry import Cause
-from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Finding, Role, SupportEntry, WorthEntry
+from ctrlgen.diagnosis.selection.findings import ChanceEntry, ChannelErrorEntry, Finding, Role, SupportEntry, WorthEntry
 from ctrlgen.diagnosis.selection.precedence import why_alike
 from ctrlgen.diagnosis.selection.search_history import RoundEntry, search_history
 from ctrlgen.diagnosis.selection.verdict import Verdict
@@ -71,6 +71,7 @@ class FindingEntry(Cause):
     support: SupportEntry | None = Field(
         description="What the model-free shares say of it; null where they say nothing of its family."
     )
+    chance: ChanceEntry | None = Field(description="Chance that luck found it; null where it was read from the data.")
     worth: dict[str, WorthEntry] = Field(description="What it is worth, by channel.")
     parameters: dict[str, EstimateEntry] = Field(description="Parameters of the effect, by name.")
     terms: list[dict[str, EstimateEntry]] = Field(

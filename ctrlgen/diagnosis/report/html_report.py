@@ -14,6 +14,7 @@ from ctrlgen.diagnosis.report.answer import answer
 from ctrlgen.diagnosis.report.diagnosis_record import Provenance, location_record, shares_record
 from ctrlgen.diagnosis.report.figures import draw_all
 from ctrlgen.diagnosis.report.history_table import history_rows, not_taken_rows
+from ctrlgen.diagnosis.report.luck_sentences import luck_text
 from ctrlgen.diagnosis.report.narrative import gathered, hard, interval, next_steps, per_cent, plain_name, share_text
 from ctrlgen.diagnosis.report.shares_sentences import family_shares, shares_sentences
 from ctrlgen.diagnosis.selection.findings import Finding
@@ -128,6 +129,7 @@ def _row(f: Finding) -> dict[str, Any]:
             {"effect": h.effect, "location": h.location, "reason": why_alike(f.cause, h)} for h in f.alternatives
         ],
         "share": share_text(f),
+        "luck": luck_text(f),
         "source": f.source,
     }
 

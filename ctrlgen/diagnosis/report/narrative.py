@@ -8,6 +8,7 @@ import re
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.experiment_sentences import experiment_sentence
 from ctrlgen.diagnosis.report.history_table import quantity, worst_error
+from ctrlgen.diagnosis.report.luck_sentences import luck_steps
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding, Role
@@ -123,6 +124,10 @@ def per_cent(share: float) -> str:
 
 def next_steps(diagnosis: Diagnosis) -> list[str]:
     """What to do next, in order."""
+    return [*_steps(diagnosis), *luck_steps(diagnosis.findings)]
+
+
+def _steps(diagnosis: Diagnosis) -> list[str]:
     verdict = diagnosis.verdict
     use = "Use device.next.toml in place of the device file: solve and generate the C with it, then record again to confirm."
     known = all(e.noise_floor is not None for e in diagnosis.held_out.values())

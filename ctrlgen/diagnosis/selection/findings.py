@@ -14,7 +14,7 @@ from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.law_titles import title
 from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.selection.verdict import unconfirmed
-from ctrlgen.diagnosis.settings import ATTRIBUTION
+from ctrlgen.diagnosis.settings import ATTRIBUTION, LUCK
 from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, nominal_physics
 from ctrlgen.estimation.prediction_uncertainty import prediction_uncertainty
@@ -63,6 +63,38 @@ class SupportEntry(Keys):
     contradicted: bool = Field(description="Whether the shares speak against the cause.")
 
 
+class ChanceEntry(Keys):
+    """The chance that luck found a cause, by an exact test of signs on the held-out records."""
+
+    by_luck: Number = Field(
+        description="Chance of such a finding by luck in the whole search, at most: p times looks, at most 1. Null where it cannot be "
+        "tested."
+    )
+    p: Number = Field(
+        description="Chance, over all signs, that noise agrees as well with what the cause changes beside all others; or, where sets of "
+        "causes were refuted one by one, that of what refutes the set without it which is refuted least."
+    )
+    looks: Number = Field(description="For how many answers that the search could have given p counts.")
+    stretches: int = Field(
+        description="Independent stretches of the held-out records, or poses, over whose signs p is."
+    )
+    against: str = Field(
+        description="noise: what is left were the set without the cause right. what no law reaches: more than noise is left, and the "
+        "test takes it, too, for independent from stretch to stretch and as likely of either sign."
+    )
+    reason: str | None = Field(description="Why the records cannot show a chance below 5 %; null where they can.")
+
+    @property
+    def certain(self) -> bool:
+        """Whether luck is as good as excluded."""
+        return self.by_luck is not None and self.by_luck <= LUCK.certain
+
+    @property
+    def weak(self) -> bool:
+        """Whether the records could have excluded luck, and do not."""
+        return not self.certain and self.reason is None
+
+
 @dataclass(frozen=True)
 class Finding:
     """One cause that the device file leaves out.
@@ -72,7 +104,8 @@ class Finding:
     publication of the effect's law. cause: the hypothesis. terms: numbers of further terms of the same law at the same place, such
     as harmonics. role: a `cause`; `minor`: above the noise and below a hundredth of the mismatch; `part`: it takes away nothing
     itself, and the finding `serves` needs it; `unseen`: only the records to fit can show it. title: what the law is called on this
-    machine, empty where its own title serves. support: what the model-free shares say of it.
+    machine, empty where its own title serves. support: what the model-free shares say of it. chance: that luck found it, None where it was
+    read from the data.
     """
 
     effect: str
@@ -88,6 +121,7 @@ class Finding:
     serves: Hypothesis | None = None
     title: str = ""
     support: SupportEntry | None = None
+    chance: ChanceEntry | None = None
 
     @property
     def contradicted(self) -> bool:

@@ -8,9 +8,11 @@ import numpy as np
 from scipy import stats
 
 from ctrlgen.diagnosis.selection.attribution import Attribution
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection
 from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, VERDICT
+from ctrlgen.estimation.error_model import ErrorModel
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.residual_tests import ResidualTests
@@ -149,11 +151,21 @@ def unconfirmed(search: SearchResult) -> tuple[Hypothesis, ...]:
     for cause, bare in zip(search.chosen.causes, search.without_cause, strict=True):
         errors = compare.reference((bare, search.chosen))
         confirmed = compare.held_out_loss(bare, errors) - compare.held_out_loss(search.chosen, errors)
-        gain = compare.fit_loss(bare, errors) - compare.fit_loss(search.chosen, errors)
-        hidden = bare.fit.penalty - search.chosen.fit.penalty >= 0.5 * gain
-        if confirmed < MODEL_SELECTION.least_confirmed and not hidden:
+        if confirmed < MODEL_SELECTION.least_confirmed and not _hides(bare, search.chosen, compare, errors):
             causes.append(cause)
     return tuple(causes)
+
+
+def hides_in_device(search: SearchResult, k: int) -> bool:
+    """Whether cause k shows by the stated numbers of the device that its absence would bend, more than by the readings."""
+    compare, bare = ModelSelection(search.fitter, lambda *_, **__: [search.chosen]), search.without_cause[k]
+    bent = bare.fit.penalty > search.chosen.fit.penalty
+    return bent and _hides(bare, search.chosen, compare, compare.reference((bare, search.chosen)))
+
+
+def _hides(bare: CandidateModel, chosen: CandidateModel, compare: ModelSelection, errors: ErrorModel) -> bool:
+    gain = compare.fit_loss(bare, errors) - compare.fit_loss(chosen, errors)
+    return bare.fit.penalty - chosen.fit.penalty >= MODEL_SELECTION.hidden_share * gain
 
 
 def poorly_determined(search: SearchResult) -> bool:

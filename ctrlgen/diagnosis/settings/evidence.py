@@ -141,6 +141,28 @@ class BootstrapSettings:
     """Standard deviations 1/sqrt(n) of a correlation above which it counts."""
 
 
+@dataclass(frozen=True)
+class LuckSettings:
+    """The chance that luck found a cause."""
+
+    certain: float = 0.05
+    """Chance up to which a cause is told without a word of doubt: the usual level."""
+    most_stretches: int = 100
+    """Stretches of a record at the most: 2^-100 is less than any number of answers makes up for, and longer ones are more surely
+    independent."""
+    memories: float = 5.0
+    """Length of a stretch in correlation times of the noise: with the gap, sums of neighbours correlate by half a per cent."""
+    gap: float = 3.0
+    """Gap before each, in the same: exp(-3) = 5 % of what was before it remains."""
+    white: float = 4.0
+    """Standard deviations 1/sqrt(n) of the correlation from sample to sample up to which they count as independent."""
+    most_causes: int = 4
+    """Causes up to which every set of them is fitted where it must be: ten models beside those that the search knows."""
+    doubt: float = 10.0
+    """Standard deviations to which numbers that were fitted beside the cause are taken to be known, so that the held-out records tell
+    them again: an error of two or three deviations does not count."""
+
+
 LTV_MODEL = LtvModelSettings()
 LOCALISATION = LocalisationSettings()
 SPECTRAL_LINES = SpectralLineSettings()
@@ -149,3 +171,4 @@ MAPS = MapSettings()
 EXCITATION = ExcitationSettings()
 EXPERIMENT = ExperimentSettings()
 BOOTSTRAP = BootstrapSettings()
+LUCK = LuckSettings()

@@ -1,0 +1,103 @@
+"""The parts of a matched filter: what the held-out records show beyond a model without a cause, along what the cause changes, stretch
+by stretch."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from ctrlgen.diagnosis.evidence.independent_stretches import GAP, Memory, matched_innovations, stretches
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.free_parameters import FreeParameter
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.least_squares import initial_state_sd
+from ctrlgen.estimation.structure import Structure
+from ctrlgen.recordings.recording import Record
+
+
+@dataclass(frozen=True, eq=False)
+class WithoutCauses:
+    """A fit without some of its causes, its other numbers `theta` (k,) [SI] as they are. `root` (k, k): R R' is their covariance."""
+
+    structure: Structure
+    theta: np.ndarray
+    root: np.ndarray
+
+
+def without_causes(full: Fit, causes: Collection[Hypothesis]) -> WithoutCauses:
+    """`full` without these of its causes, whose place is not taken by other numbers: what those could take is taken out later."""
+    structure = full.structure
+    places = {_key(structure, p): i for i, p in enumerate(structure.free_parameters)}
+    for k in reversed(range(len(structure.causes))):
+        if structure.causes[k] in causes:
+            structure = structure.without(k)
+    free = structure.free_parameters
+    at = [places.get(_key(structure, p)) for p in free]
+    theta = np.array([p.nominal if i is None else full.theta[i] for p, i in zip(free, at, strict=True)])
+    known = np.array([i is not None for i in at], bool)
+    C = np.zeros((len(free), len(free)))
+    chosen = [i for i in at if i is not None]
+    C[np.ix_(known, known)] = full.covariance[np.ix_(chosen, chosen)]
+    return WithoutCauses(structure, theta, _root(C))
+
+
+def matched_parts(fitter: Fitter, full: Fit, causes: Collection[Hypothesis], memory: Memory) -> np.ndarray:
+    """t_b (b,) of all held-out records: the whitened residual without the `causes` times what they change, each beyond what other numbers
+    can take, summed over each stretch.
+
+    Raises ArithmeticError where a prediction diverges.
+    """
+    bare = without_causes(full, causes)
+    left, changed, slopes, starts, labels = zip(
+        *(_of_record(fitter, bare, full, r, memory) for r in fitter.held_out_records), strict=True
+    )
+    first = np.cumsum([0, *(int(b.max(initial=GAP)) + 1 for b in labels)])
+    stretch = np.concatenate([b + begin for b, begin in zip(labels, first, strict=False)])
+    every = np.hstack([np.vstack(slopes), block_diag(*starts)])
+    return matched_innovations(np.concatenate(left), np.concatenate(changed), every, stretch)
+
+
+def _of_record(
+    fitter: Fitter, bare: WithoutCauses, full: Fit, record: Record, memory: Memory
+) -> tuple[np.ndarray, ...]:
+    """Of the m whitened readings of a held-out record that are in a stretch: what `bare` leaves from rest (m,), what `full` changes (m,),
+    the slopes by the parameters (m, k) and the initial states (m, n_s) in standard deviations, and the stretch (m,) of each."""
+    simulator = fitter.simulator(bare.structure, record)
+    changed = change_by(fitter, bare, full, record)
+    sd = initial_state_sd(simulator)
+    predicted, Y = simulator.sensitivities(record, bare.theta, np.zeros(len(sd)))
+    if not all(np.isfinite(v).all() for v in (predicted, changed, Y)):
+        raise ArithmeticError("the prediction diverges")
+    k = len(bare.theta)
+    left = np.where(record.valid, record.observed - predicted, 0.0)
+    values = [left[..., None], changed[..., None], Y[..., :k] @ bare.root, Y[..., k:] * sd]
+    white = fitter.error.whiten(np.concatenate(values, axis=2), record.valid)
+    labels = stretches(record, np.sum(white[..., 1] ** 2, axis=1), memory)
+    inside = labels != GAP
+    rows = white[inside].reshape(-1, white.shape[2])
+    return rows[:, 0], rows[:, 1], rows[:, 2 : 2 + k], rows[:, 2 + k :], np.repeat(labels[inside], white.shape[1])
+
+
+def change_by(fitter: Fitter, bare: WithoutCauses, full: Fit, record: Record) -> np.ndarray:
+    """What `full` changes of the prediction (n, n_y) [SI], both from rest: the held-out readings tell neither initial states, nor what a
+    reading that is late shows of the time before."""
+    unread = replace(record, valid=np.zeros_like(record.valid))
+    return np.subtract(*(fitter.simulator(f.structure, record).simulate(unread, f.theta) for f in (full, bare)))
+
+
+def _key(structure: Structure, p: FreeParameter) -> tuple[Hypothesis | None, str]:
+    """What a number is in any structure: a cause's, or the device's own."""
+    return (None, p.path) if p.cause is None else (structure.causes[p.cause], p.name)
+
+
+def _root(covariance: np.ndarray) -> np.ndarray:
+    """R (k, k) with R R' the covariance; without parameters that the records to fit leave open."""
+    sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    known = np.isfinite(sd) & (sd > 0)
+    unit = np.where(known, sd, 1.0)
+    correlation = np.nan_to_num(covariance / np.outer(unit, unit) * np.outer(known, known))
+    size, V = np.linalg.eigh((correlation + correlation.T) / 2)
+    return unit[:, None] * V * np.sqrt(np.maximum(size, 0.0))
