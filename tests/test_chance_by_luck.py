@@ -11,11 +11,19 @@ import numpy as np
 import pytest
 from axis_records import AXIS, BACKLASH, LATE, H, fitter_of, played, record
 from fitted_causes import CREEP, DRIFT, GAIN
+from scipy.linalg import block_diag
 from scipy.signal import lfilter
 
 from ctrlgen.diagnosis.evidence import chance_by_luck
 from ctrlgen.diagnosis.evidence.chance_by_luck import Looks, doubted, looks, with_chances
-from ctrlgen.diagnosis.evidence.independent_stretches import GAP, Memory, matched_innovations, memory_of, stretches
+from ctrlgen.diagnosis.evidence.independent_stretches import (
+    GAP,
+    Memory,
+    Whitened,
+    matched_innovations,
+    memory_of,
+    stretches,
+)
 from ctrlgen.diagnosis.evidence.matched_parts import change_by, matched_parts, without_causes
 from ctrlgen.diagnosis.report.luck_sentences import doubt_of_luck, luck_steps, luck_text
 from ctrlgen.diagnosis.selection.findings import ChanceEntry, Finding, Role
@@ -108,17 +116,32 @@ def test_where_more_than_noise_is_left_the_same_phase_of_a_periodic_drive_is_one
     assert stretches(held, np.ones(4000), Memory(10 * H, False)).max() > 8 * once.max()
 
 
+def innovations(left, effect, slopes, labels) -> np.ndarray:
+    """Those of one record without initial states."""
+    return matched_innovations([Whitened(left, effect, slopes, np.zeros((len(left), 0)), labels)])
+
+
+def by_cholesky(left, effect, slopes, labels) -> np.ndarray:
+    """Whitened by the factor of I + d^2 J J'."""
+    white = np.linalg.cholesky(np.eye(len(left)) + LUCK.doubt**2 * slopes @ slopes.T)
+    return np.bincount(labels, np.linalg.solve(white, left) * np.linalg.solve(white, effect))
+
+
 @pytest.mark.parametrize("stretch", [5, 30])
 def test_innovations_are_those_of_a_known_covariance(stretch):
-    """Whitened by the Cholesky factor of I + d^2 J J', stretch by stretch."""
     rng, n = np.random.default_rng(3), 150
-    left, effect, slopes = rng.standard_normal(n), rng.standard_normal(n), rng.standard_normal((n, 3))
-    white = np.linalg.cholesky(np.eye(n) + LUCK.doubt**2 * slopes @ slopes.T)
-    parts = np.linalg.solve(white, left) * np.linalg.solve(white, effect)
-    labels = np.arange(n) // stretch
-    assert matched_innovations(left, effect, slopes, labels) == pytest.approx(np.bincount(labels, parts))
-    labels[:40] = GAP
-    assert np.isfinite(matched_innovations(left, effect, slopes, labels)).all()
+    left, effect, slopes, labels = *rng.standard_normal((2, n)), rng.standard_normal((n, 3)), np.arange(n) // stretch
+    assert innovations(left, effect, slopes, labels) == pytest.approx(by_cholesky(left, effect, slopes, labels))
+
+
+def test_parameters_are_learnt_from_record_to_record_and_initial_states_are_not():
+    rng, n = np.random.default_rng(4), 60
+    left, effect, slopes, labels = *rng.standard_normal((2, 2 * n)), rng.standard_normal((2 * n, 2)), np.arange(n) // 10
+    starts = rng.standard_normal((2, n, 3))
+    parts = [slice(0, n), slice(n, 2 * n)]
+    records = [Whitened(left[p], effect[p], slopes[p], s, labels) for p, s in zip(parts, starts, strict=True)]
+    every, numbers = np.hstack([slopes, block_diag(*starts)]), np.concatenate([labels, labels + 6])
+    assert matched_innovations(records) == pytest.approx(by_cholesky(left, effect, every, numbers))
 
 
 @pytest.mark.parametrize(("off", "heavy"), [(0.0, False), (300.0, False), (3.0, True)])
@@ -130,10 +153,10 @@ def test_the_level_holds_beside_numbers_with_errors(off, heavy):
     effect = np.sin(t / 35.0) + np.sin(t / 15.0) ** 3
     noise = rng.standard_t(2.5, (draws, n)) if heavy else rng.standard_normal((draws, n))
     left = noise + (off * rng.standard_normal((draws, 4))) @ slopes.T
-    p = [sign_flip_p(matched_innovations(e, effect, slopes, labels)) for e in left]
+    p = [sign_flip_p(innovations(e, effect, slopes, labels)) for e in left]
     # where they are off by far more than is allowed for, their errors only hide the effect
     assert np.mean(np.array(p) <= 0.05) <= 0.05 + 2 * np.sqrt(0.05 * 0.95 / draws)
-    there = [sign_flip_p(matched_innovations(e + effect, effect, slopes, labels)) for e in left[:50]]
+    there = [sign_flip_p(innovations(e + effect, effect, slopes, labels)) for e in left[:50]]
     assert np.median(there) < 1e-2 or off > LUCK.doubt
 
 

@@ -7,9 +7,11 @@ stretch. Where they begin is told by the records to fit and by the drive, never 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from ctrlgen.diagnosis.settings import LUCK
 from ctrlgen.diagnosis.shares.blocks import correlation_time
@@ -89,25 +91,49 @@ def _labels(energy: np.ndarray, least: int, gap: int) -> np.ndarray:
     return labels
 
 
-def matched_innovations(left: np.ndarray, effect: np.ndarray, slopes: np.ndarray, labels: np.ndarray) -> np.ndarray:
-    """t_b (b,), the innovations of `left` (m,) times those of `effect` (m,), summed over each stretch of `labels` (m,).
+@dataclass(frozen=True, eq=False)
+class Whitened:
+    """Of the m whitened readings of a record that are in a stretch: what a model leaves (m,), an `effect` (m,), their slopes by its
+    parameters (m, k) and by the record's initial states (m, n_s) in standard deviations of these, and the number (m,) of the stretch."""
 
-    The innovation of a stretch is what the ones before do not foretell of it, over its deviation, where the numbers with the `slopes`
-    (m, k) are known to `LUCK.doubt` standard deviations at first, and better from stretch to stretch: with A_b = A_0 + the sum of J'J
-    up to b, c_b that of J'left and d_b that of J'effect,
+    left: np.ndarray
+    effect: np.ndarray
+    slopes: np.ndarray
+    starts: np.ndarray
+    labels: np.ndarray
+
+
+def matched_innovations(records: Sequence[Whitened]) -> np.ndarray:
+    """t_b (b,), the innovations of what is left times those of the effect, summed over each stretch of all records.
+
+    The innovation of a stretch is what the ones before do not foretell of it, over its deviation, where parameters and initial states
+    are known to `LUCK.doubt` standard deviations at first, and better from stretch to stretch: with A_b = A_0 + the sum of J'J up to
+    b, c_b that of J'left and d_b that of J'effect,
 
         t_b = left_b' effect_b - (c_b' A_b^-1 d_b - c_(b-1)' A_(b-1)^-1 d_(b-1)).
 
     Of normal noise they are independent whatever those numbers are; of other noise all but the first ones are nearly its own.
     """
-    count, k = int(labels.max(initial=GAP)) + 1, slopes.shape[1]
-    A, c = np.eye(k) / LUCK.doubt**2, np.zeros((k, 2))
-    both, parts, before = np.column_stack([left, effect]), np.zeros(count), 0.0
-    for b in range(count):
-        at = labels == b
-        J, Y = slopes[at], both[at]
-        A, c = A + J.T @ J, c + J.T @ Y
-        taken = float(c[:, 0] @ np.linalg.solve(A, c[:, 1])) if k else 0.0
-        parts[b] = Y[:, 0] @ Y[:, 1] - (taken - before)
-        before = taken
-    return parts
+    k = records[0].slopes.shape[1]
+    A, c, parts = np.eye(k) / LUCK.doubt**2, np.zeros((k, 2)), []
+    for record in records:
+        # the initial states are those of this record alone
+        n_s = record.starts.shape[1]
+        A, c = block_diag(A, np.eye(n_s) / LUCK.doubt**2), np.vstack([c, np.zeros((n_s, 2))])
+        both, all_slopes = np.column_stack([record.left, record.effect]), np.hstack([record.slopes, record.starts])
+        before = _taken(A, c)
+        for b in range(int(record.labels.max(initial=GAP)) + 1):
+            at = record.labels == b
+            J, Y = all_slopes[at], both[at]
+            A, c = A + J.T @ J, c + J.T @ Y
+            taken = _taken(A, c)
+            parts.append(Y[:, 0] @ Y[:, 1] - (taken - before))
+            before = taken
+        of_starts = np.linalg.solve(A[k:, k:], np.hstack([A[k:, :k], c[k:]])) if n_s else np.zeros((0, k + 2))
+        A, c = A[:k, :k] - A[:k, k:] @ of_starts[:, :k], c[:k] - A[:k, k:] @ of_starts[:, k:]
+    return np.array(parts)
+
+
+def _taken(A: np.ndarray, c: np.ndarray) -> float:
+    """c' A^-1 d of c and d, the columns of (k, 2)."""
+    return float(c[:, 0] @ np.linalg.solve(A, c[:, 1])) if len(A) else 0.0

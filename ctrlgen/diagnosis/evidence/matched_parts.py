@@ -7,9 +7,8 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import block_diag
 
-from ctrlgen.diagnosis.evidence.independent_stretches import GAP, Memory, matched_innovations, stretches
+from ctrlgen.diagnosis.evidence.independent_stretches import GAP, Memory, Whitened, matched_innovations, stretches
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.free_parameters import FreeParameter
 from ctrlgen.estimation.hypothesis import Hypothesis
@@ -51,20 +50,11 @@ def matched_parts(fitter: Fitter, full: Fit, causes: Collection[Hypothesis], mem
     Raises ArithmeticError where a prediction diverges.
     """
     bare = without_causes(full, causes)
-    left, changed, slopes, starts, labels = zip(
-        *(_of_record(fitter, bare, full, r, memory) for r in fitter.held_out_records), strict=True
-    )
-    first = np.cumsum([0, *(int(b.max(initial=GAP)) + 1 for b in labels)])
-    stretch = np.concatenate([b + begin for b, begin in zip(labels, first, strict=False)])
-    every = np.hstack([np.vstack(slopes), block_diag(*starts)])
-    return matched_innovations(np.concatenate(left), np.concatenate(changed), every, stretch)
+    return matched_innovations([_of_record(fitter, bare, full, r, memory) for r in fitter.held_out_records])
 
 
-def _of_record(
-    fitter: Fitter, bare: WithoutCauses, full: Fit, record: Record, memory: Memory
-) -> tuple[np.ndarray, ...]:
-    """Of the m whitened readings of a held-out record that are in a stretch: what `bare` leaves from rest (m,), what `full` changes (m,),
-    the slopes by the parameters (m, k) and the initial states (m, n_s) in standard deviations, and the stretch (m,) of each."""
+def _of_record(fitter: Fitter, bare: WithoutCauses, full: Fit, record: Record, memory: Memory) -> Whitened:
+    """What `bare` leaves of a held-out record, from rest, and what `full` changes."""
     simulator = fitter.simulator(bare.structure, record)
     changed = change_by(fitter, bare, full, record)
     sd = initial_state_sd(simulator)
@@ -78,7 +68,8 @@ def _of_record(
     labels = stretches(record, np.sum(white[..., 1] ** 2, axis=1), memory)
     inside = labels != GAP
     rows = white[inside].reshape(-1, white.shape[2])
-    return rows[:, 0], rows[:, 1], rows[:, 2 : 2 + k], rows[:, 2 + k :], np.repeat(labels[inside], white.shape[1])
+    stretch = np.repeat(labels[inside], white.shape[1])
+    return Whitened(rows[:, 0], rows[:, 1], rows[:, 2 : 2 + k], rows[:, 2 + k :], stretch)
 
 
 def change_by(fitter: Fitter, bare: WithoutCauses, full: Fit, record: Record) -> np.ndarray:
