@@ -286,13 +286,8 @@ def test_a_finding_on_nothing_counts_as_certified_by_its_chance():
     rows = measured(judged)
     assert (rows["nulls, certified though not there"].hits, rows["nulls, certified though not there"].n) == (1, 5)
     there = finding(ANSWERS[0]) | {"chance": {"by_luck": 1e-9}}
-    rows = measured(
-        [
-            judge.judge(
-                {"case": "s", "class": "single", "planted": ANSWERS[:1]}, {"verdict": "explained", "findings": [there]}
-            )
-        ]
-    )
+    answer = {"case": "s", "class": "single", "planted": ANSWERS[:1]}
+    rows = measured([judge.judge(answer, {"verdict": "explained", "findings": [there]})])
     assert rows["findings that are there, certified"].hits == 1
 
 
