@@ -80,7 +80,8 @@ def read_table(path: Path, which: int | str | None = None, layout: Layout | None
     except InputError:
         raise
     except RecursionError:
-        raise fault(path, "holds structures hundreds deep inside one another; export the columns alone") from None
+        what = f"cannot be read as {path.suffix or module}: structures stand hundreds deep inside one another; export the columns alone"
+        raise fault(path, what) from None
     except Exception as error:  # the libraries raise dozens of types for a damaged file
         what = f"cannot be read as {path.suffix or module}: {type(error).__name__}: {error}; export it again"
         raise fault(path, what) from None
