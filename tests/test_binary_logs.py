@@ -120,6 +120,28 @@ def test_a_file_of_nothing_but_objects_of_matlab_says_what_to_save(tmp_path):
         read_table(tmp_path / "a.mat")
 
 
+@pytest.mark.parametrize("version", ["5", "7.3"])
+def test_texts_that_are_times_are_a_column_and_objects_are_none(version, tmp_path):
+    path, stamps = tmp_path / "a.mat", [f"2024-03-05 10:00:00.{k:03d}" for k in range(40)]
+    if version == "5":
+        scipy.io.savemat(
+            path, {"t": np.array(stamps, dtype=object), "names": np.array(["a", "b"], dtype=object), "x": X}
+        )
+    else:
+
+        def fill(file):
+            cells = [text(file, f"#refs#/t{k}", stamp).ref for k, stamp in enumerate(stamps)]
+            file.create_dataset("t", data=np.array([cells], dtype=object), dtype=h5py_or_skip().ref_dtype)
+            file["x"] = X[None, :]
+            file["ts"] = np.array([[3707764736, 2, 1, 1, 1, 1]], dtype=np.uint32)
+            file["ts"].attrs["MATLAB_object_decode"] = 3
+
+        write_7_3(path, fill)
+    table = read_table(path)
+    assert set(table.columns) == {"t", "x"}
+    np.testing.assert_allclose(table.time("t", "s").values, T, atol=1e-9)
+
+
 # HDF5
 
 
@@ -173,10 +195,12 @@ def test_instants_and_waveforms_of_tdms(tmp_path):
         for name, (numbers, begin, offset) in waves.items():
             given = {"wf_start_time": begin, "wf_start_offset": offset, "wf_increment": 0.001, "unit_string": "V"}
             channels.append(nptdms.ChannelObject("g", name, numbers, properties=given))
+        channels.append(nptdms.ChannelObject("g", "unset", X, properties={"wf_increment": 1.0}))
         writer.write_segment(channels)
     table = read_table(tmp_path / "a.tdms")
     np.testing.assert_allclose(table.time(table.find("t"), "s").values, T, atol=1e-9)
     assert table.clocks["g/u"] == (0.0, 0.001) and table.clocks["g/x"] == (pytest.approx(0.007), 0.001)
+    assert "g/unset" not in table.clocks and "wf_increment of unset is 1 s" in table.notes[0]
     with pytest.raises(InputError, match="holds instants"):
         table.numbers("g/t")
 

@@ -168,6 +168,16 @@ def test_a_row_whose_cells_are_bad_stays_a_row(written):
         assert len(written("t,u,x\n" + rows).numbers("x")) == rows.count("\n")
 
 
+def test_a_spreadsheets_error_in_the_first_cell_is_a_row(written):
+    for remark in ("#N/A;2", "#NV;2"):
+        assert written(f"x;y\n0;1\n{remark}\n# a remark\n2;3\n").numbers("y").tolist() == [1, 2, 3]
+
+
+def test_null_characters_that_a_lost_power_left_are_left_out(written):
+    table = written("t;x\n0;1\n1;2\n2;3\n3;" + "\0" * 50)
+    assert table.numbers("x")[:3].tolist() == [1, 2, 3] and "50 null characters at the end are left out" in table.notes
+
+
 def test_several_tables_are_asked(written):
     text = "run 1\nt,u\n0,1\n1,2\nrun 2\nt,u\n0,3\n1,4\n2,5\n"
     with pytest.raises(InputError, match=r"holds 2 tables \(1: from line 3, 2 rows, 2: from line 7, 3 rows\)"):
@@ -244,6 +254,15 @@ def test_times_are_seconds_since_the_first(written, stamps):
     time = written(column("x", *stamps).replace("t;x", "n;t")).time("t", "ms" if scale < 1 else "s")
     np.testing.assert_allclose(scale * time.values, [0, 0.001, 0.002], rtol=0, atol=1e-9)
     assert time.notes and "time is" in time.notes[0]
+
+
+def test_a_time_of_day_in_doubt_is_refused(written):
+    for cells, said in (
+        (("10:00:00:5", "10:00:00:10"), "no thousandths"),
+        (("10:00", "10:01"), "hours and minutes or minutes"),
+    ):
+        with pytest.raises(InputError, match=said):
+            written(column("x", *cells).replace("t;x", "n;t")).time("t", "s")
 
 
 def test_dates_that_can_be_read_two_ways_are_asked_where_it_matters(written):

@@ -56,7 +56,7 @@ def _value(path: Path, file: Any, node: Any, depth: int) -> Any:
     kind = node.attrs.get("MATLAB_class", b"")
     if node.dtype.kind == "O":
         return [_value(path, file, file[reference], depth + 1) for reference in np.ravel(node[()], order="F")]
-    if node.attrs.get("MATLAB_empty", 0):
+    if node.attrs.get("MATLAB_empty", 0) or "MATLAB_object_decode" in node.attrs:
         return None
     value = node[()]
     if kind == b"char":

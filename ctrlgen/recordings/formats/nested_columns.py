@@ -66,6 +66,8 @@ def _is_numeric(value: Any) -> bool:
 
 def _vectors(value: Any, name: str, joint: str) -> Iterator[Nested]:
     """The columns of an array: its fields, its real and imaginary parts, its columns."""
+    if isinstance(value, np.ndarray) and value.dtype.kind in "OU":
+        value = value.ravel().tolist()
     array = value if isinstance(value, np.ndarray) else _as_array(value)
     if array is None:
         if stamps := _time_stamps(value):

@@ -11,12 +11,15 @@ from ctrlgen.recordings.formats.measurement_table import Clock, MeasurementTable
 from ctrlgen.recordings.formats.nested_columns import columns_of
 from ctrlgen.recordings.formats.written_layout import Layout
 
+UNSET = 1.0  # s: the time between readings of a waveform whose programmer did not set it
+
 
 def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
     """Channels as `group/channel`; their unit is the property `unit_string`, their time `wf_start_offset` and `wf_increment`."""
     nptdms = package("nptdms", path)
     columns: dict[str, np.ndarray] = {}
     units: dict[str, str] = {}
+    notes: list[str] = []
     starts: dict[str, tuple[np.datetime64 | None, float, float]] = {}
     with nptdms.TdmsFile.open(path) as file:
         channels = [(group, channel) for group in file.groups() for channel in group.channels()]
@@ -27,7 +30,11 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
                 given = channel.properties
                 if given.get("unit_string"):
                     units[column.name] = str(given["unit_string"])
-                if given.get("wf_increment"):
+                if given.get("wf_increment") == UNSET:
+                    notes.append(
+                        f"wf_increment of {channel.name} is 1 s, which LabVIEW writes where nobody set it: not compared"
+                    )
+                elif given.get("wf_increment"):
                     begin = given.get("wf_start_time")
                     instant = None if begin is None else np.datetime64(begin)
                     starts[column.name] = (
@@ -35,7 +42,11 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
                         float(given.get("wf_start_offset", 0.0)),
                         float(given["wf_increment"]),
                     )
-    return {"data": MeasurementTable(path, columns, units, clocks=_clocks(starts), missing=layout.missing)}
+    return {
+        "data": MeasurementTable(
+            path, columns, units, clocks=_clocks(starts), notes=tuple(notes), missing=layout.missing
+        )
+    }
 
 
 def _clocks(starts: dict[str, tuple[np.datetime64 | None, float, float]]) -> dict[str, Clock]:

@@ -12,6 +12,9 @@ from ctrlgen.recordings.formats.written_layout import MARKS, Layout
 
 SEPARATORS = ("\t", ";", "|", ",", " ")  # where two fit alike the earlier is meant: nobody writes numbers with it
 COMMENTS = ("#", "%", "//", "!")  # at the beginning of a line
+ERRORS = re.compile(
+    r"\s*#(N/?A|NV|NUM!|VALUE!|DIV/0!|REF!|NAME\?)\s*[^\w\s]", re.IGNORECASE
+)  # of a spreadsheet, and a separator
 SAMPLED = 200  # lines by which a separator is known
 ONE_CELL = re.compile(r"\s*[+-]?\d+,\d+\s*")
 DECLARED = (
@@ -23,8 +26,8 @@ NAMED = {"tab": "\t", "comma": ",", "semicolon": ";"}
 
 
 def is_comment(line: str) -> bool:
-    """Whether a line is a remark: in a header it may hold names, in a table it is skipped."""
-    return line.lstrip().startswith(COMMENTS)
+    """Whether a line is a remark: in a header it may hold names, in a table it is skipped. #N/A of a spreadsheet begins a row."""
+    return line.lstrip().startswith(COMMENTS) and not ERRORS.match(line)
 
 
 def without_mark(line: str) -> str:

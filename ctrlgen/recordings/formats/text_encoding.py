@@ -51,6 +51,10 @@ def decoded(path: Path, encoding: str | None = None) -> tuple[str, list[str]]:
                 path, f'cannot be read as {stated} ({error}): write its encoding, layout = {{ encoding = "..." }}'
             ) from None
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+    lost = len(text) - len(text.rstrip("\0"))
+    if lost and lost < len(text):  # a logger that lost its power
+        text = text.rstrip("\0")
+        notes = [*notes, f"{lost} null characters at the end are left out"]
     if "\0" in text:
         raise fault(
             path, "is no text, although its ending or its beginning says so; export it again, or give it its own ending"

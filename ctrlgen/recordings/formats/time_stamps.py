@@ -149,6 +149,10 @@ def _times_of_day(cells: list[str]) -> Stamps:
         )
         if match is None:
             raise ValueError(f"holds {cell!r} in row {k}, which is no time of day; write hours:minutes:seconds")
+        if re.search(r":\d+:\d+:(?!\d{3}\b)", cell):
+            raise ValueError(
+                f"holds {cell!r}, whose last part is no thousandths of a second; write hours:minutes:seconds.fraction"
+            )
         if match[3] is None and match[4] is None:
             raise ValueError(
                 f"holds {cell!r}, which may be hours and minutes or minutes and seconds; write hours:minutes:seconds"
