@@ -84,6 +84,7 @@ def test_of_a_device(old, new, says, tmp_path):
     [
         "rows = [0, 1000000000000000000]",
         "lead_in = 1000000000000000000",
+        'columns = { "reading.axis" = { column = "y", unit = "um", scale = inf } }',
         "rows = [7, 3]",
         'dwell = "1e300 s"',
         'start = "1e300 s"',

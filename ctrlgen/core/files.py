@@ -159,6 +159,7 @@ _REMEDY = {
     "int_parsing": "write a whole number",
     "float_type": "write a number without a unit",
     "float_parsing": "write a number without a unit",
+    "finite_number": "write a finite number",
     "bool_type": "write true or false",
     "bool_parsing": "write true or false",
     "model_attributes_type": "write a table, such as { ... } or [section]",

@@ -17,4 +17,4 @@ class Section(BaseModel):
     domain: ClassVar[str] = "mechanism"
     relative_sd: ClassVar[float | None] = None
 
-    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True, allow_inf_nan=False)
