@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import tomllib
@@ -211,6 +212,20 @@ def test_nothing_foreign_is_in_the_c_its_package_and_the_report(tmp_path, compil
         write_all(folder / "line", out)
 
     check_c(same_but_for_texts(tmp_path, make, DEVICE), compiler)
+
+
+def test_a_file_of_any_name_is_named_as_code_and_read_again(tmp_path):
+    odd = "d `|$(injected) <b>'.toml"
+    shutil.copy(DEVICE, tmp_path / odd)
+    (tmp_path / "a line").mkdir()
+    (tmp_path / "a line" / "scenario.toml").write_text(
+        f'title = "t"\ndevice = {toml("../" + odd)}\npoints = 2\n[path]\nkind = "line"\nend = {{ delta_x = "5 um" }}\n'
+    )
+    scenario = load_scenario(tmp_path / "a line")
+    c = generate(scenario, build_model(scenario.device), tmp_path / "out")
+    rows = [line for line in (c.path / "README.md").read_text().splitlines() if "injected" in line]
+    assert [re.fullmatch(r"\| `[^`]*` \| `[0-9a-f]{64}` \|", row) is not None for row in rows] == [True]
+    assert load_scenario(c.path / "device" / "a line").device == scenario.device
 
 
 @pytest.mark.long
