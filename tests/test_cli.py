@@ -31,6 +31,8 @@ COMMANDS = (
     "learn",
     "example",
     "new",
+    "simulate",
+    "look",
     "diagnose",
     "calibrate",
     "batch",

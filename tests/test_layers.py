@@ -34,6 +34,7 @@ MAY_IMPORT = {
     "controller": MODEL,
     "recordings.formats": DEVICES,
     "recordings": f"{MODEL} recordings.formats",
+    "recordings.look": f"{MODEL} recordings recordings.formats",
     "estimation": f"{MODEL} recordings",
     "trajectory.inverse": f"{MODEL} controller",
     "trajectory": f"{MODEL} controller trajectory.inverse",
@@ -56,6 +57,7 @@ MAY_IMPORT = {
     "app": f"{C} firmware.fmi devices.mechanism devices.user budget path_timing learning verification calibration recordings estimation "
     "diagnosis diagnosis.shares diagnosis.selection diagnosis.evidence diagnosis.report",
 }
+MAY_IMPORT["app"] += " recordings.look recordings.formats"
 MAY_IMPORT["app.new_files"] = f"{C} devices model trajectory"
 MAY_IMPORT["app.commands"] = f"app app.new_files {MAY_IMPORT['app']}"
 MODULES = sorted(PACKAGE.rglob("*.py"))

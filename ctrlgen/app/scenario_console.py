@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 from rich.markup import escape
 
 from ctrlgen.app.console import Column, out, show_table, table_of
-from ctrlgen.core.units import from_si, show, show_difference
+from ctrlgen.core.units import difference, from_si, show, show_difference
+from ctrlgen.reporting.numbers import number
 
 if TYPE_CHECKING:
     from ctrlgen.app.scenario_pipeline import Outcome, WorkspaceSummary
+    from ctrlgen.app.simulated import Simulated
     from ctrlgen.trajectory.problem import PathProblem
     from ctrlgen.verification.build_record import Build
 
@@ -154,3 +156,21 @@ def print_workspace(summary: WorkspaceSummary) -> None:
         )
     sizes = ", ".join(f"{show(v, u)}" for v, u in sorted(set(zip(signal_.scale, signal_.units, strict=True))))
     out.print(f"typical sizes: {sizes}")
+
+
+def print_simulated(result: Simulated) -> None:
+    """The range of every signal, its last value, and the rms of what was measured less what was simulated."""
+    shown = table_of(
+        ("signal", "left"), ("unit", "left"), ("smallest", "right"), ("largest", "right"), ("last", "right")
+    )
+    for role, signal in result.model.signals.items():
+        values = result.trace.signals[role]
+        for i, (channel, unit) in enumerate(zip(signal.channels, signal.units, strict=True)):
+            ends = (values[:, i].min(), values[:, i].max(), values[-1, i])
+            shown.add_row(f"{role}.{channel}", escape(unit), *(number(float(from_si(v, unit))) for v in ends))
+    show_table(shown)
+    for reading in result.measured:
+        role, _, channel = reading.partition(".")
+        unit = result.model.signals[role].units[result.model.signals[role].channels.index(channel)]
+        error = difference(result.error(reading), unit)
+        out.print(f"{reading}: measured less simulated {number(error)} {unit} rms", markup=False, soft_wrap=True)

@@ -38,3 +38,13 @@ def svg(figure: Figure) -> str:
     plt.close(figure)
     text = buffer.getvalue()
     return re.sub(r"<\?xml.*?<svg", "<svg", text, count=1, flags=re.DOTALL)
+
+
+def image(figure: Figure, suffix: str) -> bytes:
+    """The figure as a file of .svg or .png; the figure is closed."""
+    if suffix == ".svg":
+        return svg(figure).encode()
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=suffix[1:], dpi=150)
+    plt.close(figure)
+    return buffer.getvalue()

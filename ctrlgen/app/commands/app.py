@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.version import program
 
 # the parts of `ctrlgen --help`, in their order
@@ -84,3 +85,10 @@ SchedulerAddress = Annotated[
 JobCount = Annotated[
     int | None, typer.Option(min=0, help="Processes on this computer; 0: only this one.", show_default="one per core")
 ]
+
+
+def as_picture(option: str, path: Path) -> Path:
+    """`path`, if it is one of a picture. Raises InputError."""
+    if path.suffix not in (".svg", ".png"):
+        raise InputError(option, [Fault(str(path), "must end in .svg or .png")])
+    return path

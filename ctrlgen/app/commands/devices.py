@@ -9,9 +9,9 @@ from typing import Annotated
 
 import typer
 
-from ctrlgen.app.commands.app import DEVICE_PANEL, DevicePath, OutFolder, app
+from ctrlgen.app.commands.app import DEVICE_PANEL, DevicePath, OutFolder, app, as_picture
 from ctrlgen.app.console import err, out, progress
-from ctrlgen.app.scenario_console import print_workspace
+from ctrlgen.app.scenario_console import print_simulated, print_workspace
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.shipped_files import shipped_package
 
@@ -42,14 +42,7 @@ def check(
     """
     from ctrlgen.app.check_files import check as checked
 
-    checked(file, device_path, _picture("--figure", figure) if figure is not None else None)
-
-
-def _picture(option: str, path: Path) -> Path:
-    """`path`, if it is one of a picture."""
-    if path.suffix not in (".svg", ".png"):
-        raise InputError(option, [Fault(str(path), "must end in .svg or .png")])
-    return path
+    checked(file, device_path, as_picture("--figure", figure) if figure is not None else None)
 
 
 @app.command(rich_help_panel=DEVICE_PANEL)
@@ -77,7 +70,7 @@ def bode(
     model = build_model(load_device(device))
     signal_ = model.signals["pose"]
     pose = middle_pose(model) if at is None else Frame(signal_.channels, signal_.units).pose(at, "--at")
-    draw_bode(model, pose, _picture("--out", picture))
+    draw_bode(model, pose, as_picture("--out", picture))
     out.print(str(picture), soft_wrap=True, markup=False)
 
 
@@ -104,6 +97,38 @@ def workspace(
 
     print_workspace(map_workspace(load_device(device), at or [], out_folder))
     out.print(str(out_folder / "workspace.svg"), soft_wrap=True, markup=False)
+
+
+@app.command(rich_help_panel=DEVICE_PANEL)
+def simulate(
+    device: DevicePath,
+    drives: Annotated[
+        Path | None,
+        typer.Argument(help="A file with a column of time and one of each drive, with units.", show_default=False),
+    ] = None,
+    step: Annotated[
+        str | None,
+        typer.Option(help="A step instead of a file: 1V, or of several drives 1X=0.1W,2X=0.2W.", show_default=False),
+    ] = None,
+    duration: Annotated[float, typer.Option(help="Of a step, in seconds; the first tenth is at rest.")] = 1.0,
+    rate: Annotated[float, typer.Option(help="Of a step, in samples a second.", min=1e-3)] = 1000.0,
+    out_folder: Annotated[
+        Path | None, typer.Option("--out", help="Folder for signals.csv and signals.svg.", show_default=False)
+    ] = None,
+) -> None:
+    """Drive a device as a file says, or by a step, from rest: the range of every signal, and what was measured beside it.
+
+    Columns are found by name and unit, as ctrlgen look finds them. Readings in the file are compared with the simulated ones.
+
+    Example:  ctrlgen simulate scenarios/devices/flexure_axis.toml --step 1V --duration 0.5
+    """
+    from ctrlgen.app.simulated import simulate_device, write_simulated
+
+    result = simulate_device(device, drives, step, duration, rate)
+    print_simulated(result)
+    if out_folder is not None:
+        write_simulated(result, out_folder)
+        out.print(str(out_folder / "signals.svg"), soft_wrap=True, markup=False)
 
 
 @app.command(rich_help_panel=DEVICE_PANEL)

@@ -16,6 +16,7 @@ from ctrlgen.app.commands.app import (
     OutFolder,
     SchedulerAddress,
     app,
+    as_picture,
 )
 from ctrlgen.app.console import complain, counted, err, out, progress
 from ctrlgen.app.diagnosis_console import print_batch, print_bootstrap, print_diagnosis, print_explanation
@@ -23,11 +24,47 @@ from ctrlgen.core.errors import InputError
 
 
 @app.command(rich_help_panel=RECORDING_PANEL)
+def look(
+    files: Annotated[
+        list[Path], typer.Argument(help="Measurement files; the last of several is held out.", show_default=False)
+    ],
+    device: Annotated[
+        Path | None,
+        typer.Option(
+            "--device", help="The device they were made on: which column is which signal.", show_default=False
+        ),
+    ] = None,
+    to: Annotated[
+        Path | None,
+        typer.Option("--to", help="The recording.toml to write; without it it is printed.", show_default=False),
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Also draw the columns into this file, .svg or .png.", show_default=False)
+    ] = None,
+) -> None:
+    """Say what measurement files hold, what is odd, and with --device which column is which signal, as a recording.toml to begin with.
+
+    Columns are matched by unit, name and range. What the files do not say is asked: a line "to be answered", and a comment in
+    the recording.toml.
+
+    Example:  ctrlgen look scenarios/nist_hexapod/poses.csv
+    """
+    from ctrlgen.app.look_console import look as looked
+
+    if to is not None and device is None:
+        raise typer.BadParameter("--to writes a recording of a device; add --device stage.toml")
+    looked(files, device, to, None if figure is None else as_picture("--figure", figure))
+
+
+@app.command(rich_help_panel=RECORDING_PANEL)
 def diagnose(
     device: DevicePath,
     recording: Annotated[
         list[Path],
-        typer.Argument(help="A recording.toml, or the folder that holds one; several are joined.", show_default=False),
+        typer.Argument(
+            help="A recording.toml, or the folder that holds one, or measurement files; several are joined.",
+            show_default=False,
+        ),
     ],
     out_folder: OutFolder,
     seed: Annotated[int, typer.Option(help="Seed of all random numbers; the same seed gives the same answer.")] = 0,
@@ -59,6 +96,9 @@ def diagnose(
     scenarios/nist_hexapod/recording.toml is one, and ctrlgen check FILE
     --device DEVICE says what is wrong with yours.
 
+    A measurement file whose columns are named and have units needs no
+    recording.toml: one is written beside it (as ctrlgen look does).
+
     Leaves in --out: report.html (open this first), diagnosis.json,
     device.next.toml (the device file with the findings added), and
     next_experiment/ where another recording would decide between causes.
@@ -74,6 +114,7 @@ def diagnose(
 
     Example:  ctrlgen diagnose scenarios/devices/meso_hexapod.toml scenarios/nist_hexapod --out out/nist
     """
+    from ctrlgen.app.look_console import described
     from ctrlgen.diagnosis.diagnosis_folder import Replicates, diagnose_into, unfinished
     from ctrlgen.estimation.hypothesis import selected_laws
 
@@ -86,6 +127,7 @@ def diagnose(
         chosen = None if laws is None else [name.strip() for name in laws.split(",") if name.strip()]
         if explain is not None:
             selected_laws([explain])
+        recording = described(recording, device)
         with progress() as advance:
             result = diagnose_into(device, recording, out_folder, seed, advance, replicates, chosen, jobs)
     except KeyboardInterrupt:

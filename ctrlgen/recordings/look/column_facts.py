@@ -1,0 +1,178 @@
+"""What the columns of one measurement table hold: range, step, rests, gaps, repeated extremes; and which of them is the time."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from ctrlgen.core.errors import InputError
+from ctrlgen.core.units import same_dimension, to_si
+from ctrlgen.recordings.formats.measurement_table import MeasurementTable
+from ctrlgen.recordings.formats.unit_texts import BASES, NAMES, bare_name, unit_of
+
+TIME_NAME = re.compile(
+    r"^(t|time|zeit|tijd|temps|tempo|timestamp|time.?stamp|clock|datetime|date|elapsed.*|sekunden|seconds?|secs?)(?![a-z])",
+    re.IGNORECASE,
+)
+SUFFIX = re.compile(r"^(?P<name>.*[A-Za-z0-9)])[_.](?P<unit>[A-Za-z%]{1,4})$")  # of a name: drive_V, time.ms
+EVEN = 0.01  # of a step, rms: clocks jitter by less
+GAP = 1.5  # steps between two rows from which rows are missing
+END = 1e-9  # of the range: rounding of a file
+CLIPPED = 20  # rows at an end, in runs of three and more, from which it is told
+RUN = 3
+REST = 100  # rows: a shorter rest says nothing of the noise
+STILL = 1e-6  # of the range of a drive: held still
+SLOW_CLOCK = 0.6  # share of rows in which a drive stands still from which it steps by a slower clock
+SMOOTH = 0.1  # median of second differences over that of first ones, of a drive that is a curve and no steps
+
+
+@dataclass(frozen=True)
+class ColumnFacts:
+    """One column: `unit` as the file states it or its name ends, None where neither does; `values` (n,), NaN where there is no number,
+    None where the column is text; `why`: what is wrong with it; `notes`: what was interpreted."""
+
+    name: str
+    unit: str | None
+    values: np.ndarray | None
+    why: str = ""
+    notes: tuple[str, ...] = ()
+
+    @property
+    def bare(self) -> str:
+        """The name without its unit."""
+        return bare_name(self.name)
+
+    @property
+    def finite(self) -> np.ndarray:
+        """The numbers that are there."""
+        return np.empty(0) if self.values is None else self.values[np.isfinite(self.values)]
+
+    @property
+    def missing(self) -> int:
+        """Rows without a number."""
+        return 0 if self.values is None else int(np.sum(~np.isfinite(self.values)))
+
+    @property
+    def moves(self) -> bool:
+        """Whether the numbers differ."""
+        return len(self.finite) > 1 and bool(np.ptp(self.finite) > 0)
+
+    def clipped(self) -> list[float]:
+        """Ends of the range at which the numbers stand in runs, though they move elsewhere: a converter that was at its end."""
+        y, ends = self.finite, []
+        if not self.moves or len(np.unique(y)) < CLIPPED:
+            return []
+        for end in (y.min(), y.max()):
+            at = np.abs(y - end) <= END * np.ptp(y)
+            edges = np.flatnonzero(np.diff(np.concatenate([[0], at.astype(int), [0]])))
+            runs = np.diff(edges.reshape(-1, 2), axis=1)
+            runs = runs[(runs >= RUN) & (runs < REST)]  # what stands longer rests
+            if len(runs) > 1 and runs.sum() >= CLIPPED:
+                ends.append(float(end))
+        return ends
+
+
+@dataclass(frozen=True)
+class TimeFacts:
+    """The time of a table's rows: `column`, its `unit`, `stamps` whether they are dates, median `step` [s], rms `jitter` [s], `gaps`: (row
+    before, missing rows), `backward`: rows that are earlier than the one before."""
+
+    column: str
+    unit: str
+    stamps: bool
+    step: float
+    jitter: float
+    gaps: tuple[tuple[int, int], ...]
+    backward: int
+
+
+@dataclass(frozen=True)
+class TableFacts:
+    """The columns of one table, and its time where it has one."""
+
+    table: MeasurementTable
+    columns: tuple[ColumnFacts, ...]
+    time: TimeFacts | None
+
+    @property
+    def rows(self) -> int:
+        """Its length."""
+        return max((len(c.values) for c in self.columns if c.values is not None), default=0)
+
+    def column(self, name: str) -> ColumnFacts:
+        """The column of a name."""
+        return next(c for c in self.columns if c.name == name)
+
+
+def table_facts(table: MeasurementTable) -> TableFacts:
+    """What a table holds."""
+    columns = tuple(_facts(table, name) for name in table.columns)
+    return TableFacts(table, columns, _time(table, columns))
+
+
+def _facts(table: MeasurementTable, name: str) -> ColumnFacts:
+    stated = table.units.get(name)
+    unit = _suffix(name) if stated is None else unit_of(stated)
+    try:
+        read = table.reading(name)
+    except InputError as error:
+        return ColumnFacts(name, unit, None, "; ".join(fault.what for fault in error.faults))
+    return ColumnFacts(name, unit, read.values, "", read.notes)
+
+
+def _suffix(name: str) -> str | None:
+    """The unit that a name ends in, such as `V` of drive_V; of the letters that are also indices or axes none is taken."""
+    match = SUFFIX.match(name)
+    if match is None or (match["unit"].lower() in NAMES - {"s"} and match["unit"] not in ("V", "A", "N", "W", "s")):
+        return None
+    unit = unit_of(match["unit"])
+    return unit if unit is not None and any(same_dimension(unit, base) for base in BASES) else None
+
+
+def _time(table: MeasurementTable, columns: tuple[ColumnFacts, ...]) -> TimeFacts | None:
+    """The column that is named as the time, or else holds dates, or else has the unit of a time and rises."""
+    named = [c for c in columns if TIME_NAME.match(c.bare)]
+    dated = [c for c in columns if c.values is None]
+    of_unit = [c for c in columns if c.unit is not None and same_dimension(c.unit, "s")]
+    for column in dict.fromkeys(c.name for c in (*named, *dated, *of_unit)):
+        unit = next(c.unit for c in columns if c.name == column) or "s"
+        if not same_dimension(unit, "s"):
+            continue
+        stamps = next(c.values is None for c in columns if c.name == column)
+        try:
+            seconds = table.time(column, "s" if stamps else unit).values * (1.0 if stamps else to_si(1.0, unit))
+        except InputError:
+            continue
+        steps = np.diff(seconds[np.isfinite(seconds)])
+        if len(steps) < 2 or not np.median(steps) > 0:
+            continue
+        step = float(np.median(steps))
+        even = steps[np.abs(steps / step - 1) < GAP - 1]
+        gaps = tuple((int(k), round(float(steps[k] / step)) - 1) for k in np.flatnonzero(steps > GAP * step))
+        jitter = float(np.sqrt(np.mean((even - step) ** 2))) if len(even) else 0.0
+        return TimeFacts(column, "s" if stamps else unit, stamps, step, jitter, gaps, int(np.sum(steps <= 0)))
+    return None
+
+
+def rests(drives: np.ndarray) -> list[tuple[int, int]]:
+    """Stretches [first, one past the last] of at least `REST` rows in which no drive (n, drives) moves."""
+    spans = np.maximum(np.nanmax(drives, axis=0) - np.nanmin(drives, axis=0), 1e-300)
+    still = (np.abs(np.diff(drives, axis=0)) <= STILL * spans).all(axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
+    return [(int(a), int(b) + 1) for a, b in edges.reshape(-1, 2) if b + 1 - a >= REST]
+
+
+def between_samples(drive: np.ndarray) -> str:
+    """ "held" for a drive that steps, "linear" for one that is a curve as sampled: second differences far below the first ones."""
+    u = drive[np.isfinite(drive)]
+    first = np.diff(u)
+    moving = first[:-1] != 0
+    if moving.sum() < REST or np.mean(first == 0) > SLOW_CLOCK:
+        return "held"
+    bend, slope = (
+        np.median(np.abs(np.diff(first)[moving])),
+        np.median(np.abs(first[:-1][moving])),
+    )  # a few corners do not count
+    return "linear" if bend < SMOOTH * slope else "held"

@@ -1,0 +1,109 @@
+"""What is odd about readings beside the device they are said to come from: range, unit, order of cause and effect."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ctrlgen.core.units import from_si, same_dimension, to_si
+from ctrlgen.model.model import Model
+from ctrlgen.recordings.look.column_facts import TableFacts
+
+WIDE = 5.0  # times the device's own size: no reading of it is as large
+NARROW = 1e-4  # of it: nothing moved, or the unit is another
+FITTING = (0.02, 2.5)  # of the device's size: a reading of it usually spans so much
+MULTIPLES = {
+    "m": ("nm", "um", "mm", "m"),
+    "rad": ("urad", "mrad", "rad", "deg"),
+    "V": ("mV", "V"),
+    "A": ("mA", "A"),
+    "N": ("mN", "N"),
+}
+LAGS = 50  # rows within which a reading is sought before and after its drive
+EARLY = 0.3  # of the correlation at best: as much better an earlier reading must fit
+
+
+def table_oddities(facts: TableFacts) -> list[str]:
+    """What is odd of a table by itself."""
+    said = []
+    if (time := facts.time) is not None:
+        if time.backward:
+            said.append(f"{time.column}: {time.backward} rows are not later than the row before")
+        if time.jitter > 0.01 * time.step:
+            said.append(f"{time.column}: rows are uneven by {100 * time.jitter / time.step:.2g} % of their step")
+    for column in facts.columns:
+        if column.values is None:
+            continue
+        said += [f"{column.name}: stands at its end {end:g} again and again: clipped?" for end in column.clipped()]
+    constant = [c.name for c in facts.columns if c.values is not None and not c.moves]
+    said += [f"the same in every row: {', '.join(constant)}"] if constant else []
+    said += [f"{b}: is the same as {a}" for a, b in _alike(facts)]
+    return said
+
+
+def _alike(facts: TableFacts) -> list[tuple[str, str]]:
+    moving = [c for c in facts.columns if c.moves]
+    return [
+        (a.name, b.name)
+        for k, b in enumerate(moving)
+        for a in moving[:k]
+        if a.values is not None and b.values is not None and np.array_equal(a.values, b.values, equal_nan=True)
+    ]
+
+
+def implausible_range(name: str, values: np.ndarray, unit: str, model: Model) -> str | None:
+    """A sentence where numbers in `unit` cannot be of the signal `name`, "role.channel": their range beside the device's own size, and
+    the unit with which it would be plausible. None where it can be."""
+    role, _, channel = name.partition(".")
+    signal = model.signals[role]
+    i = signal.channels.index(channel)
+    own = signal.scale[i] if role != "drive" else _drive_size(model, i)
+    seen = values[np.isfinite(values)]
+    if not len(seen) or not np.isfinite(own) or own <= 0:
+        return None
+    span = float(np.ptp(seen)) * (to_si(1.0, unit) - to_si(0.0, unit))
+    if NARROW * own <= span <= WIDE * own or span == 0:
+        return None
+    size = f"{from_si(own, signal.units[i]) - from_si(0.0, signal.units[i]):.3g} {signal.units[i]}"
+    what = f"{name} spans {np.ptp(seen):.4g} {unit}, and the device's own size is {size}"
+    fitting = fitting_units(name, values, unit, model)
+    return (
+        f'{what}; if the numbers are in {fitting[0]}, write unit = "{fitting[0]}"'
+        if fitting
+        else f"{what}; is the unit right?"
+    )
+
+
+def fitting_units(name: str, values: np.ndarray, unit: str, model: Model) -> list[str]:
+    """Units of the dimension of `unit` with which the numbers of a signal are about as large as the device, where `unit` is not one."""
+    role, _, channel = name.partition(".")
+    signal = model.signals[role]
+    i = signal.channels.index(channel)
+    own = signal.scale[i] if role != "drive" else _drive_size(model, i)
+    span = float(np.ptp(values[np.isfinite(values)]))
+
+    def fits(other: str) -> bool:
+        return bool(FITTING[0] * own <= span * (to_si(1.0, other) - to_si(0.0, other)) <= FITTING[1] * own)
+
+    if fits(unit):
+        return []
+    return [
+        o for base, others in MULTIPLES.items() if same_dimension(unit, base) for o in others if o != unit and fits(o)
+    ]
+
+
+def _drive_size(model: Model, i: int) -> float:
+    low, high = model.u_bounds
+    return float(high[i] - low[i]) if np.isfinite(high[i] - low[i]) else float(model.signals["drive"].scale[i])
+
+
+def early(drive: np.ndarray, reading: np.ndarray) -> int | None:
+    """Rows by which a reading comes before its drive: None where it does not. By the correlation of their differences."""
+    u, y = np.diff(np.nan_to_num(drive)), np.diff(np.nan_to_num(reading))
+    n = len(u)
+    if n < 10 * LAGS or not u.any() or not y.any():
+        return None
+    size = np.sqrt(np.sum(u**2) * np.sum(y**2))
+    after = [abs(float(u[: n - k] @ y[k:])) / size for k in range(LAGS)]
+    before = [abs(float(u[k:] @ y[: n - k])) / size for k in range(LAGS)]
+    best = int(np.argmax(before))
+    return best if best > 0 and before[best] - max(after) > EARLY * before[best] else None

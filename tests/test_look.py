@@ -1,0 +1,178 @@
+"""ctrlgen look: what files hold and what is odd; logs in the style of many loggers become a recording.toml that is accepted."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import ctrlgen
+from conftest import AXIS_FILE, DEVICES
+
+from ctrlgen import build_model, load_device
+from ctrlgen.app.look_console import described, look
+from ctrlgen.core.errors import InputError
+from ctrlgen.recordings.formats import read_table
+from ctrlgen.recordings.look.column_facts import between_samples, rests, table_facts
+from ctrlgen.recordings.look.oddities import early, table_oddities
+from ctrlgen.recordings.look.proposal import propose
+from ctrlgen.recordings.reader import load_recordings
+
+RATE = 1000.0
+N = 1500
+GAIN = 50.0  # um/V of the flexure axis
+
+
+@pytest.fixture(scope="module")
+def axis():
+    return build_model(load_device(AXIS_FILE))
+
+
+def motion(seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Time [s], drive [V], reading [um] of something like the flexure axis."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(N) / RATE
+    u = np.repeat(rng.uniform(-1.0, 1.0, N // 50), 50)
+    y = GAIN * np.convolve(u, np.exp(-np.arange(40) / 8) / 8, "full")[:N] + rng.normal(0, 0.01, N)
+    return t, u, y
+
+
+def rows(*columns: np.ndarray, separator: str = ",", form: str = "%.9f") -> str:
+    return "\n".join(separator.join(form % v for v in row) for row in zip(*columns, strict=True)) + "\n"
+
+
+def comma(text: str) -> str:
+    return text.replace(".", ",")
+
+
+T, U, Y = motion()
+LOGS = {
+    "spreadsheet": "time (s),drive (V),position (um)\n" + rows(T, U, Y),
+    "german": "Zeit [s];Spannung [V];Weg [µm]\n" + comma(rows(T, U, Y, separator=";")),
+    "milliseconds": "t_ms\tcmd_V\tfeedback_um\n" + rows(1e3 * T, U, Y, separator="\t"),
+    "units below": "Time,Command,Actual\ns,V,mm\n" + rows(T, U, 1e-3 * Y),
+    "hash header": "# t[s] u[V] y[nm]\n" + rows(T, U, 1e3 * Y, separator=" "),
+    "block before": "Instrument: XY-7\nSerial: 42\nOperator: nobody\n\nTime [s],AO0 [V],LVDT [um],AI1 [degC]\n"
+    + rows(T, U, Y, 22 + 0 * T),
+    "readings first": "elapsed (s),sensor (um),set (V)\n" + rows(T, Y, U),
+    "channel names": "time [s],drive.axis [V],reading.axis [um]\n" + rows(T, U, Y),
+    "millivolts": "Time (ms),Ref (mV),Capacitive sensor (um)\n" + rows(1e3 * T, 1e3 * U, Y),
+    "dates": "timestamp,drive (V),position (um)\n"
+    + "\n".join(f"2026-03-01T10:00:{t:09.6f}Z,{u:.9f},{y:.9f}" for t, u, y in zip(T, U, Y, strict=True)),
+    "picoscope": "Time,Channel A,Position\n(ms),(V),(um)\n\n" + rows(1e3 * T, U, Y),
+    "many columns": "time [s],index,drive [V],force [N],position [um],velocity [um/s],temperature [degC]\n"
+    + rows(T, np.arange(N), U, 10 * U, Y, np.gradient(Y, T), 22 + 0 * T),
+}
+
+
+@pytest.mark.parametrize("logger", LOGS)
+def test_a_log_becomes_a_recording_without_an_edit(logger, axis, tmp_path):
+    (tmp_path / "log.csv").write_text(LOGS[logger], encoding="utf-8")
+    (written,) = described([tmp_path / "log.csv"], AXIS_FILE)
+    recording = load_recordings([written], axis)
+    u, y = (np.concatenate([getattr(r, name)[:, 0] for r in recording.records]) for name in ("drive", "observed"))
+    assert np.allclose(u[: N // 2], U[: N // 2], atol=1e-6)
+    seen = np.isfinite(y[: N // 2])
+    assert seen.mean() > 0.9 and np.allclose(y[: N // 2][seen], 1e-6 * Y[: N // 2][seen], atol=2e-12)
+    assert abs(recording.records[0].sample_time - 1 / RATE) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("text", "asks"),
+    [
+        ("t,u,y\n" + rows(T, U, Y), "drive.axis = column 'u': the file states no unit, V is assumed: -"),
+        ("u [V],y [um]\n" + rows(U, Y), "no column is a time"),
+        ("t [s],a [V],b [V],y [um]\n" + rows(T, U, U[::-1], Y), "could be column 'b [V]' as well"),
+        ("t [s],u [V]\n" + rows(T, U), "no column was recognised as a reading"),
+    ],
+)
+def test_what_a_log_does_not_say_is_asked_and_nothing_is_written(text, asks, tmp_path):
+    (tmp_path / "log.csv").write_text(text)
+    with pytest.raises(InputError, match=re.escape(asks)):
+        described([tmp_path / "log.csv"], AXIS_FILE)
+    assert [path.name for path in tmp_path.iterdir()] == ["log.csv"]
+
+
+def test_the_last_of_several_files_is_held_out_and_rests_give_the_noise(axis, tmp_path):
+    for k in (1, 2):
+        t, u, y = motion(k)
+        u[:200], y[:200] = 0.0, np.random.default_rng(k).normal(0, 0.01, 200)
+        (tmp_path / f"{k}.csv").write_text("time (s),drive (V),position (um)\n" + rows(t, u, y))
+    (written,) = described([tmp_path / "1.csv", tmp_path / "2.csv"], AXIS_FILE)
+    assert [r.role for r in load_recordings([written], axis).records] == ["fit", "rest", "hold_out", "rest"]
+    with pytest.raises(InputError, match="describes this file already"):
+        described([tmp_path / "1.csv"], AXIS_FILE)
+
+
+def test_a_unit_that_cannot_be_is_told_with_the_one_that_can(axis, tmp_path):
+    (tmp_path / "log.csv").write_text("time (s),drive (V),position (m)\n" + rows(T, U, Y))
+    proposal = propose([table_facts(read_table(tmp_path / "log.csv"))], axis)
+    assert 'if the numbers are in um, write unit = "um"' in " ".join(proposal.remarks)
+    (tmp_path / "good.csv").write_text("time (s),drive (V),position (um)\n" + rows(T, U, Y))
+    assert not propose([table_facts(read_table(tmp_path / "good.csv"))], axis).remarks
+
+
+def test_a_reading_before_its_drive_is_told():
+    _, u, y = motion(3)
+    assert early(u, y) is None
+    assert early(np.roll(u, 7), y) == 7
+
+
+def test_steps_are_held_and_curves_are_linear():
+    t = np.arange(3000) / RATE
+    assert between_samples(np.sin(2 * np.pi * 3 * t)) == "linear"
+    assert between_samples(np.abs((5 * t) % 2 - 1)) == "linear"  # a triangle has corners
+    assert between_samples(np.repeat(np.sin(2 * np.pi * 3 * t[:300]), 10)) == "held"
+    assert between_samples(np.random.default_rng(0).normal(size=3000)) == "held"
+
+
+def test_oddities_of_columns(tmp_path):
+    t, u, y = motion(4)
+    clipped = np.clip(20 * np.sin(2 * np.pi * 5 * t) + 0.01 * y, -15.0, 15.0)
+    t[700] = t[699]
+    (tmp_path / "log.csv").write_text("t [s],u [V],y [um],same [um],still [V]\n" + rows(t, u, clipped, clipped, 0 * t))
+    said = " ".join(table_oddities(table_facts(read_table(tmp_path / "log.csv"))))
+    for what in (
+        "1 rows are not later",
+        "y [um]: stands at its end 15",
+        "same [um]: is the same as y [um]",
+        "still [V]",
+    ):
+        assert what in said
+
+
+def test_rests_are_where_no_drive_moves():
+    drive = np.zeros((600, 2))
+    drive[150:300, 0] = np.linspace(0, 1, 150)
+    drive[300:, 0] = 1.0
+    drive[450:, 1] = np.linspace(0, 1, 150)
+    assert rests(drive) == [(0, 151), (299, 451)]
+
+
+def test_six_drives_are_told_apart_by_their_names(tmp_path):
+    model = build_model(load_device(DEVICES / "mems_hexapod.toml"))
+    names = ["1X", "1Y", "2X", "2Y", "3X", "3Y"]
+    channels = ["delta_x", "delta_y", "delta_z", "theta_x", "theta_y", "theta_z"]
+    readings = [f"{c} [{'um' if c.startswith('d') else 'urad'}]" for c in channels]
+    head = ",".join(["t [s]", *readings, *(f"heater {n} [W]" for n in reversed(names))])
+    rng = np.random.default_rng(1)
+    values = rows(T, *(rng.normal(size=N) for _ in channels), *(rng.uniform(0, 0.5, N) for _ in names))
+    (tmp_path / "log.csv").write_text(f"{head}\n{values}")
+    proposal = propose([table_facts(read_table(tmp_path / "log.csv"))], model)
+    assert proposal.certain, proposal.asked
+    assert {m.signal: m.column for m in proposal.matches} == {
+        **{f"drive.{n}": f"heater {n} [W]" for n in names},
+        **{f"reading.{c}": column for c, column in zip(channels, readings, strict=True)},
+    }
+
+
+def test_the_command_draws_prints_and_writes(tmp_path):
+    log, to, figure = tmp_path / "log.csv", tmp_path / "recording.toml", tmp_path / "log.png"
+    log.write_text(LOGS["spreadsheet"])
+    done = ctrlgen("look", log, "--device", AXIS_FILE, "--to", to, "--figure", figure)
+    assert done.returncode == 0, done.stderr
+    assert f"{N} rows, 1000 Hz" in done.stdout and figure.stat().st_size > 1000
+    assert ctrlgen("check", to, "--device", AXIS_FILE).returncode == 0
+    with pytest.raises(InputError, match="exists"):
+        look([Path(log)], AXIS_FILE, to, None)
