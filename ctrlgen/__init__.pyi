@@ -13,6 +13,7 @@ from .calibration.calibrate import calibrate as calibrate
 from .controller.controller_step import ControllerStatus as ControllerStatus
 from .controller.controller_step import ControllerStep as ControllerStep
 from .controller.feedforward import Controller as Controller
+from .controller.linearisation import linearise as linearise
 from .controller.motion_feedforward import controller_of as controller_of
 from .core.errors import CtrlgenError as CtrlgenError
 from .core.errors import Fault as Fault

@@ -212,6 +212,10 @@ def test_the_report_of_a_solution_holds_the_budget_to_first_order(circle, tmp_pa
     for g in whole.groups:
         assert f"± {g.shown(whole.factor * whole.peak(g)):.4g} {g.unit} ({g.name})" in page
     first, hidden = whole.lines[0], whole.lines[-1]
+    screen = page.partition("<h2>Solution")[0]
+    assert (
+        f"± {whole.groups[0].shown(whole.factor * whole.peak(whole.groups[0])):.4g}" in screen and first.name in screen
+    )
     assert f"<code>{first.name}</code>" in page and f"{1e9 * first.peak['translation']:.3g}" in page
     assert f'<code>{hidden.name}</code></td><td class="n">{hidden.sd}' not in page
     assert "keeps 550 degC with 99.9 %: margin" in page and "<code>ctrlgen budget</code> gives the whole" in page

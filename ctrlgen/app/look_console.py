@@ -33,7 +33,7 @@ def look(files: Sequence[Path], device: Path | None, to: Path | None, figure: Pa
     for facts in tables:
         print_table(facts)
     if figure is not None:
-        from ctrlgen.recordings.look.figure import draw_columns  # matplotlib takes a moment to import
+        from ctrlgen.recordings.look.columns_drawn import draw_columns  # matplotlib takes a moment to import
 
         draw_columns(tables, figure)
         out.print(str(figure), soft_wrap=True, markup=False)

@@ -17,6 +17,7 @@ from ctrlgen.budget.budget_section import budget_section
 from ctrlgen.budget.robust import solve
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.core.files import whole_folder, write_text
+from ctrlgen.core.shown import Shown
 from ctrlgen.core.units import from_si
 from ctrlgen.devices import Device
 from ctrlgen.firmware.c.toolchains import find_compilers
@@ -48,14 +49,24 @@ STEPS = 8  # calls of `progress` in `run`: model, solve, C, four builds, report
 VERIFY_STEPS = 27  # in `verify` with every tool installed: also reference, errors, six cores, three boards, four analysers, two fuzzers
 
 
-@dataclass(frozen=True)
-class Outcome:
+@dataclass(frozen=True, repr=False)
+class Outcome(Shown):
     """The results of a run; `c` and `comparison` are None where they were not asked for."""
 
     solution: Solution
     c: CFolder | None
     comparison: Comparison | None
     expected: tuple[ExpectationResult, ...]
+
+    def facts(self) -> dict[str, object]:
+        """What it is, in a few words."""
+        return {
+            "passed": self.passed,
+            "scenario": self.solution.scenario.file.title,
+            "C in": "none" if self.c is None else self.c.path,
+            "comparisons": 0 if self.comparison is None else len(self.comparison.rows),
+            "expectations": f"{sum(e.passed for e in self.expected)} of {len(self.expected)} met",
+        }
 
     @property
     def passed(self) -> bool:

@@ -93,7 +93,7 @@ def table(result: Simulated) -> str:
 
 def draw(result: Simulated) -> bytes:
     """A panel a signal, over time; measured readings as dots."""
-    roles = [role for role in ("drive", "reading") if role in result.model.signals]
+    roles: list[str] = [role for role in ("drive", "reading") if role in result.model.signals]
     roles += [r for r in result.model.signals if r not in (*roles, "pose")]
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(len(roles), figsize=(8.2, 0.6 + 1.9 * len(roles)), sharex=True, squeeze=False)

@@ -23,6 +23,7 @@ from ctrlgen.budget.robust import solve
 from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.budget.uncertainty import Uncertainties, load_uncertainties
 from ctrlgen.core.errors import Fault, InputError, SolverError
+from ctrlgen.core.shown import Shown
 from ctrlgen.devices import Device
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import Solution
@@ -61,8 +62,8 @@ class Agreement:
         return max(self.difference, self.difference_of_interval) <= TOLERANCE
 
 
-@dataclass(frozen=True)
-class ErrorBudget:
+@dataclass(frozen=True, repr=False)
+class ErrorBudget(Shown):
     """The error budget of a path. `combined` (n, channels) is the standard uncertainty u_c of the followed signal [SI], `lines` come in
     the order of what to measure or tighten next; `safeties` of the limits at `probability`. Without draws `drawn` is None, without a finer
     model `model_difference`."""
@@ -80,6 +81,17 @@ class ErrorBudget:
     draws: int
     seed: int
     model_difference: ModelDifference | None = None
+
+    def facts(self) -> dict[str, object]:
+        """What it is, in a few words."""
+        return {
+            "scenario": self.solution.scenario.file.title,
+            "largest standard uncertainty": ", ".join(
+                f"{g.name} {g.shown(self.peak(g)):.3g} {g.unit}" for g in self.groups
+            ),
+            "first to measure": self.lines[0].name if self.lines else "nothing",
+            "draws": self.draws,
+        }
 
     @property
     def factor(self) -> float:

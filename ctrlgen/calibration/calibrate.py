@@ -20,6 +20,7 @@ from threadpoolctl import threadpool_limits
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text
+from ctrlgen.core.shown import Shown
 from ctrlgen.devices import Device, files_of, load_device
 from ctrlgen.devices.changed_numbers import changed
 from ctrlgen.devices.run_time import RunTimeConstant
@@ -97,8 +98,8 @@ class ReadingError:
     noise: float
 
 
-@dataclass(frozen=True)
-class Calibration:
+@dataclass(frozen=True, repr=False)
+class Calibration(Shown):
     """The constants of a specimen of `device`, described by `inputs`, from `recording`. `covariance` (k, k) [SI] of the constants in
     their order; that of one which is not determined is what its bounds say."""
 
@@ -109,6 +110,14 @@ class Calibration:
     covariance: np.ndarray
     errors: tuple[ReadingError, ...]
     notes: tuple[str, ...]
+
+    def facts(self) -> dict[str, object]:
+        """What it is, in a few words."""
+        return {
+            "device": self.device.name,
+            "recording": self.recording.title,
+            "constants": f"{sum(c.determined for c in self.constants)} of {len(self.constants)} determined",
+        }
 
     @property
     def calibrated(self) -> Device:

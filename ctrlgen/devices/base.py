@@ -11,6 +11,7 @@ import casadi as ca
 from pydantic import PrivateAttr, model_validator
 
 from ctrlgen.core.names import CName
+from ctrlgen.core.shown import Shown
 from ctrlgen.core.units import Quantity
 from ctrlgen.devices.device_physics import DevicePhysics
 from ctrlgen.devices.machine import Machine, MachineParts, machine_parts
@@ -22,7 +23,7 @@ from ctrlgen.devices.sensor import AnySensor
 from ctrlgen.effects import EffectTable
 
 
-class Device(Section):
+class Device(Shown, Section):
     """Base of every device: one subclass in one file, chosen by `kind` in the device file."""
 
     library: ClassVar[dict[str, type[Device]]] = {}
@@ -54,6 +55,12 @@ class Device(Section):
 
     # by signal, such as ("reading.axis", "mm"); empty: the units of the kind of device
     _told_in: tuple[tuple[str, str], ...] = PrivateAttr(())
+
+    def facts(self) -> dict[str, object]:
+        """What it is, in a few words."""
+        numbers = sum(1 for _ in self.quantities())
+        effects = ", ".join(f"{e.kind} at {e.at}" for e in self.effect) or "none"
+        return {"name": self.name, "title": self.title, "kind": self.kind, "numbers": numbers, "effects": effects}
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from ctrlgen.controller.motion_feedforward import controller_of
+from ctrlgen.core.shown import Shown
 from ctrlgen.firmware.c.deviations import deviations_context
 from ctrlgen.firmware.c.misra import CPPCHECK
 from ctrlgen.firmware.c.real import Real
@@ -31,8 +32,8 @@ from ctrlgen.trajectory.scenario import Scenario, check_tightened
 from ctrlgen.trajectory.solution import Solution
 
 
-@dataclass(frozen=True)
-class CFolder:
+@dataclass(frozen=True, repr=False)
+class CFolder(Shown):
     """The generated package: its `path`, and the names of its parts in each arithmetic."""
 
     path: Path
@@ -46,6 +47,16 @@ class CFolder:
     worst_operations: int
     # In the controller's state, behind its own: constants of the start and what follows from them.
     given_numbers: int = 0
+
+    def facts(self) -> dict[str, object]:
+        """What it is, in a few words."""
+        return {
+            "path": self.path,
+            "controller": self.name,
+            "arithmetic": ", ".join(real.value for real in self.online),
+            "operations a sample": self.operations,
+            "at worst": self.worst_operations,
+        }
 
     def sources(self, real: Real) -> list[Path]:
         """The C of the library in one arithmetic."""

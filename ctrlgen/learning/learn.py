@@ -17,6 +17,7 @@ import numpy as np
 from ctrlgen.budget.contributors import Group, groups_of
 from ctrlgen.budget.robust import solve
 from ctrlgen.core.errors import Fault, InputError, SolverError
+from ctrlgen.core.shown import Shown
 from ctrlgen.learning.learning_options import LearningOptions
 from ctrlgen.learning.lifted import Lifted
 from ctrlgen.learning.norm_optimal import Wanted, next_drives
@@ -53,8 +54,8 @@ class RunResult:
     cost_se: float
 
 
-@dataclass(frozen=True, eq=False)
-class Learning:
+@dataclass(frozen=True, eq=False, repr=False)
+class Learning(Shown):
     """The runs so far and the next one. `solution` is of the scenario as described. `base`, the run that is gone on from; `step`, the
     share of the full step that is taken; `stop`, why there is nothing more to learn, empty where there is: then `next` plays the drives of
     the base run. `repeating` (n, n_y) [SI] is what repeats beyond the model, `kept` (n, n_y) the factor of each of its coefficients over
@@ -76,6 +77,14 @@ class Learning:
     predicted_error: np.ndarray
     inputs: dict[str, str]
     notes: tuple[str, ...]
+
+    def facts(self) -> dict[str, object]:
+        """What it is, in a few words."""
+        return {
+            "scenario": self.solution.scenario.file.title,
+            "runs": len(self.runs),
+            "next": self.stop or f"a step of {100 * self.step:.3g} %",
+        }
 
 
 def learn(

@@ -15,6 +15,7 @@ from typing import Any, Literal
 import casadi as ca
 import numpy as np
 
+from ctrlgen.core.shown import Shown
 from ctrlgen.devices import Device, Limit, Signal
 from ctrlgen.effects import LawInputs
 
@@ -29,8 +30,8 @@ class Law:
     documented: Sequence[Callable[..., Any]] = ()
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Model:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Model(Shown):
     """The physics of one device, symbolic; made by `build_model`."""
 
     name: str
@@ -91,6 +92,16 @@ class Model:
     force_scale: float
 
     probability: float | None = None  # with which the limits, tightened by their reserves, hold; None: as described
+
+    def facts(self) -> dict[str, object]:
+        """What it is, in a few words."""
+        return {
+            "of": self.device.title,
+            "drives": ", ".join(self.signals["drive"].channels),
+            "states": self.x.numel(),
+            "signals": ", ".join(self.signals),
+            "limits": len(self.limits) + len(self.rate_limits),
+        }
 
     @cached_property
     def rates(self) -> ca.SX:

@@ -2,34 +2,63 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 
-from ctrlgen.core.errors import SolverError
+from ctrlgen.core.errors import Fault, InputError, SolverError
+from ctrlgen.core.shown import Shown
+from ctrlgen.core.units import from_si
+from ctrlgen.devices import Signal
 from ctrlgen.model.discretisation import held_step, one_step_map
 from ctrlgen.model.model import Model
 from ctrlgen.numerics.newton import newton_solver
+
+if TYPE_CHECKING:
+    import pandas
 
 PERIODIC = 1e-9  # typical sizes by which a period may end elsewhere than it began
 MOST_NEWTON_STEPS = 50  # from a displacement far off; the sample before needs three
 
 
-@dataclass(frozen=True)
-class Trace:
-    """Signals of a model at sample times, SI: `time` (n,) [s]; `signals` name -> (n, channels); `x` (n, n_x); `z` (n, n_axes)."""
+@dataclass(frozen=True, repr=False)
+class Trace(Shown):
+    """Signals of a model at sample times, SI: `time` (n,) [s]; `signals` name -> (n, channels); `x` (n, n_x); `z` (n, n_axes).
+    `described`: the channels and units of the signals by their names."""
 
     time: np.ndarray
     signals: dict[str, np.ndarray]
     x: np.ndarray
     z: np.ndarray
+    described: Mapping[str, Signal] = field(default_factory=dict)
+
+    def facts(self) -> dict[str, object]:
+        """What it is, in a few words."""
+        return {
+            "samples": len(self.time),
+            "length": f"{self.time[-1]:.6g} s" if len(self.time) else "none",
+            "signals": ", ".join(self.signals),
+        }
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The signals over time [s], a column a channel, named role.channel [unit], in that unit."""
+        import pandas  # takes half a second to import
+
+        columns = {
+            f"{role}.{channel} [{unit}]": from_si(self.signals[role][:, i], unit)
+            for role, signal in self.described.items()
+            for i, (channel, unit) in enumerate(zip(signal.channels, signal.units, strict=True))
+        }
+        return pandas.DataFrame(columns, index=pandas.Index(self.time, name="time [s]"))
 
 
 def trace(model: Model, time: np.ndarray, x: np.ndarray, z: np.ndarray, u: np.ndarray) -> Trace:
     """Every signal at given states x (n, n_x), displacements z (n, n_axes) and drives u (n, n_u), SI."""
     values = model.evaluate.map(len(time))(x.T, z.T, u.T, np.tile(model.p_nominal[:, None], (1, len(time))))
-    return Trace(time, {role: v.full().T for role, v in zip(model.signals, values, strict=True)}, x, z)
+    return Trace(time, {role: v.full().T for role, v in zip(model.signals, values, strict=True)}, x, z, model.signals)
 
 
 def balance_solver(model: Model) -> ca.Function:
@@ -50,8 +79,9 @@ def simulate(
     It starts at rest unless `x_0` (n_x,) is given, and at the displacement that balances the first drive, with inertia
     at home, unless `z_0` (n_axes,) is given. Sample k of the result is the state at k sample_time, before row k of `u`
     acts; there are n + 1 samples, the last with the last drive. Raises SolverError where no displacement balances the
-    force, or where the motion grows beyond all numbers.
+    force, or where the motion grows beyond all numbers; InputError for drives of another shape, or that are not finite.
     """
+    u = _checked(model, u, sample_time)
     if model.inertial:
         return _simulate_inertial(model, u, sample_time, x_0, z_0)
     steps = len(u)
@@ -76,6 +106,23 @@ def simulate(
     drives = np.vstack([u, u[-1:]])
     n = model.x.numel()
     return trace(model, sample_time * np.arange(steps + 1), states[:, :n], states[:, n:], drives)
+
+
+def _checked(model: Model, u: np.ndarray, sample_time: float) -> np.ndarray:
+    """The drives (n, n_u), of the right shape and finite."""
+    drives = np.asarray(u, dtype=float)
+    channels = model.signals["drive"].channels
+    faults = []
+    if drives.ndim != 2 or drives.shape[1] != len(channels) or not len(drives):
+        what = f"has the shape {drives.shape}; (n, {len(channels)}) is needed: a row a sample, a column a drive ({', '.join(channels)})"
+        faults.append(Fault("u", what))
+    elif not np.isfinite(drives).all():
+        faults.append(Fault("u", f"holds {int(np.sum(~np.isfinite(drives)))} numbers that are not finite"))
+    if not 0 < sample_time < np.inf:
+        faults.append(Fault("sample_time", f"is {sample_time!r}; seconds above zero are needed"))
+    if faults:
+        raise InputError(f"simulate {model.name}", faults)
+    return drives
 
 
 def _simulate_inertial(

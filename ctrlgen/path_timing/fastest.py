@@ -16,6 +16,7 @@ import numpy as np
 
 from ctrlgen.budget.robust import solve
 from ctrlgen.core.errors import Fault, InputError, SolverError
+from ctrlgen.core.shown import Shown
 from ctrlgen.core.units import ExampleGiven, Quantity, read_quantity, show
 from ctrlgen.model.model import Model
 from ctrlgen.path_timing.binding import Binding, bindings
@@ -38,8 +39,8 @@ STILL = 1e-9  # typical sizes, below which the length of a path is rounding
 HELD_POINTS = 400  # at which it is looked at whether a path can be held
 
 
-@dataclass(frozen=True)
-class FastestPath:
+@dataclass(frozen=True, repr=False)
+class FastestPath(Shown):
     """The fastest motion along the path of a `scenario`.
 
     `optimum` in continuous time; `share` (N + 1,) of the path behind at each sample, of a closed one at its end too; `solution` of the
@@ -58,6 +59,15 @@ class FastestPath:
     between: np.ndarray
     repetition: Repetition | None
     notes: tuple[str, ...]
+
+    def facts(self) -> dict[str, object]:
+        """What it is, in a few words."""
+        return {
+            "scenario": self.scenario.file.title,
+            "duration": f"{self.duration:.6g} s",
+            "as stated": "not stated" if self.given is None else f"{self.given:.6g} s",
+            "set-points": len(self.share),
+        }
 
     @property
     def sample_time(self) -> float:

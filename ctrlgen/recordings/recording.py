@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ctrlgen.core.shown import Shown
+
 
 class Timing(NamedTuple):
     """What of a record a simulation is built for: see `Record`. `poses`: each drive is held for a sample time and read at its end."""
@@ -16,8 +18,8 @@ class Timing(NamedTuple):
     poses: bool = False
 
 
-@dataclass(frozen=True, eq=False)
-class Record:
+@dataclass(frozen=True, eq=False, repr=False)
+class Record(Shown):
     """One uninterrupted run, SI; n samples of n_u drives and n_y observed channels.
 
     `name`: file and rows. `role`: fit, hold_out or rest. `time` (n,) [s] on the clock common to the records of one
@@ -49,6 +51,16 @@ class Record:
     poses: bool = False
     held: tuple[tuple[int, int, int], ...] = ()
 
+    def facts(self) -> dict[str, object]:
+        """What it is, in a few words."""
+        return {
+            "file": self.name,
+            "role": self.role,
+            "samples": len(self.time),
+            "step": "settled poses" if np.isinf(self.sample_time) else f"{self.sample_time:.6g} s",
+            "usable": f"{100 * self.valid.mean():.3g} %" if self.valid.size else "none",
+        }
+
     def __post_init__(self) -> None:
         if np.isinf(self.sample_time):  # not where it is still to be found
             object.__setattr__(self, "poses", True)
@@ -59,8 +71,8 @@ class Record:
         return Timing(self.sample_time, self.linear, self.poses)
 
 
-@dataclass(frozen=True, eq=False)
-class Recording:
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(Shown):
     """Records of one device.
 
     `kind`: "series" or "poses". `channels` observed, such as 'reading.delta_x', with the reader's `units` and the stated
@@ -79,6 +91,15 @@ class Recording:
     notes: tuple[str, ...]
     tolerance: tuple[float | None, ...] = ()
     drive_units: tuple[str, ...] = ()
+
+    def facts(self) -> dict[str, object]:
+        """What it is, in a few words."""
+        return {
+            "title": self.title,
+            "device": self.device,
+            "readings": ", ".join(f"{c} [{u}]" for c, u in zip(self.channels, self.units, strict=True)),
+            "records": ", ".join(f"{len(r.time)} {r.role}" for r in self.records),
+        }
 
     def __post_init__(self) -> None:
         if not self.tolerance:  # none stated

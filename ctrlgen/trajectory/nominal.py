@@ -110,7 +110,9 @@ def _driven(problem: PathProblem, needed: InverseTrajectory, u: np.ndarray) -> T
 
 def _first(trace: Trace, n: int) -> Trace:
     """The first n samples of a trace."""
-    return Trace(trace.time[:n], {k: v[:n] for k, v in trace.signals.items()}, trace.x[:n], trace.z[:n])
+    return Trace(
+        trace.time[:n], {k: v[:n] for k, v in trace.signals.items()}, trace.x[:n], trace.z[:n], trace.described
+    )
 
 
 def _error_between_samples(problem: PathProblem, samples: Trace, u: np.ndarray) -> np.ndarray:

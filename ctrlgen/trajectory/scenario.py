@@ -14,6 +14,7 @@ import casadi as ca
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, read_toml, validate
 from ctrlgen.core.names import C_NAME, checked
+from ctrlgen.core.shown import Shown
 from ctrlgen.devices import Device, files_of, load_device
 from ctrlgen.effects import Place
 from ctrlgen.model.assembly import build_model
@@ -39,8 +40,8 @@ class Input:
         return hashlib.sha256(self.text.encode()).hexdigest()
 
 
-@dataclass(frozen=True)
-class Scenario:
+@dataclass(frozen=True, repr=False)
+class Scenario(Shown):
     """A scenario ready to be solved. `file` is what scenario.toml says; `name` the folder's name as a C identifier.
 
     `inputs`: the "scenario" itself, its "device" (with "device_code" where that names a Python file) and, where a path is read from
@@ -53,6 +54,15 @@ class Scenario:
     device: Device
     inputs: dict[str, Input]
     home: Mapping[str, float] = field(default_factory=dict)
+
+    def facts(self) -> dict[str, object]:
+        """What it is, in a few words."""
+        return {
+            "title": self.file.title,
+            "device": self.device.name,
+            "path": self.file.path.kind,
+            "clock": "settled poses" if self.sample_time is None else f"{1 / self.sample_time:g} Hz",
+        }
 
     @property
     def controller_name(self) -> str:

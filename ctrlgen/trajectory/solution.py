@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ctrlgen.core.shown import Shown
 from ctrlgen.devices import Limit
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import Trace
@@ -35,8 +36,8 @@ class Margin:
         return abs(self.limit.described(self.bound) - self.bound)
 
 
-@dataclass(frozen=True)
-class Solution:
+@dataclass(frozen=True, repr=False)
+class Solution(Shown):
     """A solved scenario, SI. `trace` holds the samples; `drive` (n, axes) acts from sample k to k + 1. `iterations` of IPOPT, or with
     inertia of Newton's method; `between_samples` (channels,) is the largest distance from the path between samples, with inertia."""
 
@@ -49,6 +50,15 @@ class Solution:
     iterations: int
     rows_added: tuple[str, ...]
     between_samples: np.ndarray | None = None
+
+    def facts(self) -> dict[str, object]:
+        """What it is, in a few words."""
+        return {
+            "scenario": self.scenario.file.title,
+            "samples": len(self.command),
+            "tightest limit": f"{self.tightest.limit.label} of {self.tightest.channel}, {100 * (self.tightest.share or 0):.3g} % left",
+            "solved by": f"{self.solver}, {self.iterations} iterations",
+        }
 
     @property
     def solver(self) -> str:

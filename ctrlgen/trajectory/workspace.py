@@ -14,6 +14,7 @@ import numpy as np
 
 from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.shown import Shown
 from ctrlgen.core.units import same_dimension
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import simulate
@@ -64,12 +65,16 @@ def _raised(model: Model, height: float) -> np.ndarray:
     return pose
 
 
-@dataclass(frozen=True)
-class Workspace:
+@dataclass(frozen=True, repr=False)
+class Workspace(Shown):
     """The poses in which one model can be held in equilibrium; poses are rows (n, channels) in SI. Raises InputError for more drives
     than axes: the limits of the drives then bound what they push together, and not one drive each."""
 
     model: Model
+
+    def facts(self) -> dict[str, object]:
+        """What it is, in a few words."""
+        return {"of": self.model.device.title, "channels": ", ".join(self.model.signals["pose"].channels)}
 
     def __post_init__(self) -> None:
         if self.model.redundant:

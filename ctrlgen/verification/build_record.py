@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, PlainSerializer
 
+from ctrlgen.core.shown import Shown
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.player.compression import INSTRUCTION_BUDGET
@@ -67,8 +68,8 @@ class BuildRecord(Summary):
     checks: list[ToolCheck] = Field(description="Analysers and tests of the generated C.")
 
 
-@dataclass(frozen=True)
-class Build:
+@dataclass(frozen=True, repr=False)
+class Build(Shown):
     """One generated package with the results of every check.
 
     `errors` along the trajectory are those of `ctrlgen.verification.tracking.tracking_errors`: online C, player C ->
@@ -82,6 +83,15 @@ class Build:
     in_loop: InLoop
     checks: tuple[Check, ...]
     errors: Mapping[Piece, Mapping[Real, np.ndarray]]
+
+    def facts(self) -> dict[str, object]:
+        """What it is, in a few words."""
+        return {
+            "C in": self.c.path,
+            "failures": len(self.failures),
+            "comparisons": len(self.comparison.rows),
+            "checks": len(self.checks),
+        }
 
     @property
     def failures(self) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+from ctrlgen.core.shown import Shown
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.toolchains import COMPILERS, find_compilers
 from ctrlgen.firmware.folder import CFolder, write_harness
@@ -26,13 +27,22 @@ from ctrlgen.verification.player_comparison import player_rows
 from ctrlgen.verification.reference import ReferenceAnswers
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(Shown):
     """All rows; `compilers`: name -> version line; `missing`: compilers that were not found."""
 
     rows: tuple[ComparisonEntry, ...]
     compilers: dict[str, str]
     missing: tuple[str, ...]
+
+    def facts(self) -> dict[str, object]:
+        """What it is, in a few words."""
+        return {
+            "passed": self.passed,
+            "rows": len(self.rows),
+            "compilers": ", ".join(self.compilers) or "none",
+            "missing": ", ".join(self.missing) or "none",
+        }
 
     @property
     def passed(self) -> bool:

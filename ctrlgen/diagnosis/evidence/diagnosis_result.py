@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+from ctrlgen.core.shown import Shown
 from ctrlgen.core.units import to_si
 from ctrlgen.devices import Device
 from ctrlgen.devices.changed_numbers import changed, written
@@ -28,8 +29,8 @@ from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Recording
 
 
-@dataclass(frozen=True, eq=False)
-class Diagnosis:
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosis(Shown):
     """The answer: verdict, findings and supporting analyses, each in the recording's units; `search` and `fitter` hold how it came about.
 
     attribution: shares of the causes and of the rest. shares: of what the residual is a function, whatever the law, before and
@@ -57,6 +58,18 @@ class Diagnosis:
     fitter: Fitter
     profiles: tuple[Profile, ...] = ()
     bootstrap: Bootstrap | None = None
+
+    def facts(self) -> dict[str, object]:
+        """What it is, in a few words."""
+        return {
+            "verdict": self.verdict.value,
+            "found": "; ".join(f"{f.effect} at {f.location}" for f in self.findings) or "nothing",
+            **{
+                f"held-out error of {channel}": f"{e.rms_before:.4g} -> {e.rms_after:.4g} {e.unit}"
+                for channel, e in self.held_out.items()
+                if e.rms_before is not None and e.rms_after is not None
+            },
+        }
 
     @cached_property
     def values(self) -> dict[str, Estimate]:
