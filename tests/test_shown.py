@@ -53,7 +53,7 @@ def test_a_notebook_shows_a_table_whose_texts_are_escaped():
         def facts(self):
             return {"title": "<script>alert(1)</script>", "n": 3}
 
-    table = Odd()._repr_html_()
+    table = vars(Shown)["_repr_html_"](Odd())  # as Jupyter finds it
     assert table.startswith("<table>") and "<script>" not in table and "&lt;script&gt;" in table and ">3<" in table
 
 

@@ -16,7 +16,7 @@ from ctrlgen.devices import load_device
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import Trace, simulate
-from ctrlgen.recordings.look.drives import DriveFile, read_drives
+from ctrlgen.recordings.look.drive_file import DriveFile, read_drives
 from ctrlgen.reporting.plots import COLOURS, STYLE, image
 
 MOST_SAMPLES = 2_000_000  # with a dozen signals these fill 200 MB
