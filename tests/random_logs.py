@@ -152,3 +152,56 @@ def _head(
         shown = [f"[{u}]" if place == "bracket row" else u or "-" for u in units]
         lines.append(separator.join([*shown, *("-" for _ in extra)]))
     return [*above, *lines]
+
+
+DAMAGES = ("no cell", "junk line", "header again", "no end", "quote", "blank lines", "odd cell", "two cells", "remark")
+ODD = ("12:30", "0x1F", "1_000", "1,2,3", "#REF!", "1.2.3.4", "--5", "1e", "5 V", "=A1", "1.000.00")
+
+
+def damaged(log: Log, seed: int) -> tuple[Log, str]:
+    """The log with one row or line spoilt, and how; its truth is that of the whole one, with NaN where a number was spoilt."""
+    rng = np.random.default_rng(1000 + seed)
+    encoding = log.described.split(" ")[1]
+    text = log.content.decode(encoding)
+    end = next(e for e in ("\r\n", "\n", "\r") if e in text)
+    lines = text.rstrip(end).split(end)
+    n = len(next(iter(log.columns.values())))
+    k = int(rng.integers(n // 2, n - 2))  # a row in the second half
+    at = len(lines) - n + k
+    separator = {"tab": "\t", "blank": " "}.get(str(log.answers["separator"]), str(log.answers["separator"]))
+    cells, how = lines[at].split(separator), DAMAGES[int(rng.integers(len(DAMAGES)))]
+    columns = {name: values.copy() for name, values in log.columns.items()}
+    last = list(columns)[-1]
+    if how == "no cell":
+        lines[at] = separator.join(cells[:1] + cells[2:])
+    elif how == "two cells":
+        lines[at] = separator.join([*cells[:2], "7", *cells[2:]])
+    elif how == "odd cell":
+        place = 2 if len(cells) in (3, 4) and '"' not in lines[at] else len(cells)
+        if place < len(cells):
+            cells[place] = ODD[int(rng.integers(len(ODD)))]
+            columns[last][k] = np.nan
+        lines[at] = separator.join(cells)
+    elif how == "quote":
+        lines[at] = '"' + lines[at]
+    elif how in ("junk line", "header again", "blank lines", "remark"):
+        junk = {
+            "junk line": "*** trigger ***",
+            "header again": lines[0] if isinstance(last, str) else "*",
+            "blank lines": "",
+            "remark": "# paused",
+        }[how]
+        lines.insert(at, junk)
+    elif how == "no end":
+        lines[-1] = separator.join(lines[-1].split(separator)[:2])
+        columns = {name: values[:-1] for name, values in columns.items()}
+    spoilt = end.join(lines)
+    return Log(
+        spoilt.encode(encoding),
+        columns,
+        log.time,
+        log.time_unit,
+        f"{log.described}, {how} in row {k}",
+        True,
+        log.answers,
+    ), how

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from random_logs import Log, random_log
+from random_logs import Log, damaged, random_log
 
 from ctrlgen.core.errors import InputError
 from ctrlgen.recordings.formats import read_table
@@ -64,3 +64,24 @@ def test_with_the_answer_it_is_read(outcomes, tmp_path):
         log, path = random_log(seed), tmp_path / f"{seed}.csv"
         path.write_bytes(log.content)
         compared(log, path, Layout.model_validate(log.answers))
+
+
+def test_a_damaged_log_is_never_read_as_another(tmp_path):
+    """Refused, or read to the same rows, without the number that was spoilt."""
+    path, seen = tmp_path / "run.csv", set()
+    for seed in range(COUNT // 2):
+        log, how = damaged(random_log(seed), seed)
+        path.write_bytes(log.content)
+        try:
+            compared(log, path, Layout.model_validate({"missing": None, **log.answers}))
+            seen.add((how, "read"))
+        except InputError:
+            seen.add((how, "refused"))
+    assert {
+        ("blank lines", "read"),
+        ("remark", "read"),
+        ("no end", "read"),
+        ("quote", "refused"),
+        ("no cell", "refused"),
+    } <= seen
+    assert not seen & {("quote", "read"), ("no cell", "read"), ("two cells", "read")}

@@ -108,6 +108,16 @@ def test_unknown_words_are_one_fault_with_the_key_that_leaves_them_out(written):
     assert np.isnan(written(column("x", *cells), missing=("FAULT 7", "E12")).numbers("x")[1:]).sum() == 3
 
 
+@pytest.mark.parametrize("head", ["t,u,x\ns,V,um", "s,V,um\nt,u,x", "t,u,x\n[s],[V],[um]", "name,t,u,x\nunit,s,V,um"])
+def test_units_in_a_row_of_their_own(written, head):
+    first = "," if head.startswith("name") else ""
+    table = written(f"{head}\n{first}0,1,2\n{first}1,2,3\n")
+    assert [table.unit(table.find(name)) for name in "tux"] == ["s", "V", "um"] and table.numbers("u").tolist() == [
+        1,
+        2,
+    ]
+
+
 def test_units_in_cells_are_told_as_such(written):
     with pytest.raises(InputError, match="write the unit into the name"):
         written("t,x\n0,1 mV\n1,2 mV\n").numbers("x")

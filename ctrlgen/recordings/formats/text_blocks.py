@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
-from ctrlgen.recordings.formats.number_cells import Ambiguous, is_number, is_reading
+from ctrlgen.recordings.formats.number_cells import OVER, Ambiguous, is_number, is_reading
 from ctrlgen.recordings.formats.text_cells import cells_of, is_comment, width_of
 
 FEWEST_ROWS = 2  # of a table among other text
@@ -46,7 +46,7 @@ def kind_of(line: str, separator: str) -> Kind:
     readings = [c for c in filled if is_reading(c)]
     if filled and len(readings) == len(filled):
         return "row"
-    return "mixed" if readings or not filled else "text"
+    return "mixed" if not filled or any(c.lower() not in OVER for c in readings) else "text"
 
 
 def blocks_of(lines: Sequence[str], separator: str) -> list[Block]:
@@ -57,30 +57,27 @@ def blocks_of(lines: Sequence[str], separator: str) -> list[Block]:
     kinds = [kind_of(line, separator) for line in lines]
     filled = [k for k, kind in enumerate(kinds) if kind not in ("blank", "remark")]
     if not any(kinds[a] == kinds[b] == "row" for a, b in pairwise(filled)):
-        return _beside_text(lines, kinds, separator)
+        kinds = _beside_text(lines, kinds, separator)
     blocks: list[Block] = []
     run: list[int] = []
     above: list[int] = []
-    for k, kind in enumerate(kinds):
+    for k, kind in enumerate([*kinds, "text"]):
         if kind == "row" or (kind == "mixed" and run and _belongs(lines[k], lines[run[-1]], separator)):
             run.append(k)
         elif kind != "blank" and not (run and kind == "remark"):
-            if len(run) >= FEWEST_ROWS:
+            if len(run) >= FEWEST_ROWS or (run and _is_lost(lines[run[0]], blocks, separator)):
                 blocks.append(_block(lines, run, above, separator))
                 above = []
             else:
                 above += run
             run = []
             above.append(k)
-    if len(run) >= FEWEST_ROWS:
-        blocks.append(_block(lines, run, above, separator))
     return _of_several_columns(blocks)
 
 
-def _belongs(line: str, before: str, separator: str) -> bool:
-    """Whether a line with text in it is a row of the table of the line `before`."""
-    width = width_of(before, separator)
-    return width_of(line, separator) == width or _longer_by_a_remark(line, width, separator)
+def _is_lost(line: str, blocks: Sequence[Block], separator: str) -> bool:
+    """Whether a single row stands below a table of its width, from which some other text cut it off."""
+    return bool(blocks) and width_of(line, separator) == blocks[-1].width
 
 
 def _of_several_columns(blocks: list[Block]) -> list[Block]:
@@ -89,21 +86,29 @@ def _of_several_columns(blocks: list[Block]) -> list[Block]:
     return wide or blocks
 
 
-def _beside_text(lines: Sequence[str], kinds: Sequence[Kind], separator: str) -> list[Block]:
-    """The table of a file in which every row holds some text: its longest run of lines of the usual number of cells."""
-    mixed = [k for k, kind in enumerate(kinds) if kind in ("mixed", "row")]
-    if not mixed:
-        return []
-    width = Counter(width_of(lines[k], separator) for k in mixed).most_common(1)[0][0]
-    runs: list[list[int]] = [[]]
-    for k, kind in enumerate(kinds):
-        if kind in ("mixed", "row") and width_of(lines[k], separator) == width:
-            runs[-1].append(k)
-        elif kind not in ("blank", "remark"):
-            runs.append([])
-    run = max(runs, key=len)
-    above = [k for k in range(run[0] if run else 0) if kinds[k] != "blank"]
-    return [_block(lines, run, above, separator)] if run else []
+def _beside_text(lines: Sequence[str], kinds: Sequence[Kind], separator: str) -> list[Kind]:
+    """The kinds of lines of a file in which every row holds some text: lines of the usual number of cells are rows, and so are others
+    between them that are partly numbers, which are then damaged."""
+    widths = {k: width_of(lines[k], separator) for k, kind in enumerate(kinds) if kind in ("mixed", "row")}
+    if not widths:
+        return list(kinds)
+    usual = Counter(widths.values()).most_common(1)[0][0]
+    rows = [k for k, width in widths.items() if width == usual]
+    inside = {k for k in widths if rows[0] <= k <= rows[-1]}
+    head = next((k for k, after in pairwise(rows) if not _is_named(lines[k], lines[after], separator)), rows[0])
+    return ["row" if k in inside and k >= head else kind for k, kind in enumerate(kinds)]
+
+
+def _is_named(line: str, below: str, separator: str) -> bool:
+    """Whether a line holds a text where the one below it, of as many cells, holds a number: it belongs to a header."""
+    pairs = zip(cells_of(line, separator), cells_of(below, separator), strict=False)
+    return any(not is_reading(cell) and is_number(under) for cell, under in pairs)
+
+
+def _belongs(line: str, before: str, separator: str) -> bool:
+    """Whether a line with text in it is a row of the table of the line `before`."""
+    width = width_of(before, separator)
+    return width_of(line, separator) == width or _longer_by_a_remark(line, width, separator)
 
 
 def _block(lines: Sequence[str], run: list[int], above: list[int], separator: str) -> Block:
@@ -116,18 +121,21 @@ def _block(lines: Sequence[str], run: list[int], above: list[int], separator: st
     cut = run[-1] if widths[-1] < width and run[-1] == len(lines) - 1 and len(run) > FEWEST_ROWS else None
     if cut is not None:
         run, widths = run[:-1], widths[:-1]
+    usual = [k for k, w in zip(run, widths, strict=True) if w == width]
+    remarks = all(
+        kind_of(lines[k], separator) == "row" for k in usual[:FOOTED]
+    )  # else the text is a cell that was pushed aside
     wrong = [
         (k, w)
         for k, w in zip(run, widths, strict=True)
-        if w != width and not _longer_by_a_remark(lines[k], width, separator)
+        if w != width and not (remarks and _longer_by_a_remark(lines[k], width, separator))
     ]
     if wrong:
         listed = ", ".join(f"line {k + 1} has {w}" for k, w in wrong[:MOST_LISTED]) + (
             ", ..." if len(wrong) > MOST_LISTED else ""
         )
-        usual = next(k for k, w in zip(run, widths, strict=True) if w == width)
-        what = f"line {usual + 1} has {width} cells, but {listed}; repair these, or write the line of the names, layout = {{ header = 5 }},"
-        raise Ambiguous(f"{what} if they stand above the table")
+        mend = "repair these, or write the line of the names, layout = { header = 5 } for one, if they stand above the table"
+        raise Ambiguous(f"line {usual[0] + 1} has {width} cells, but {listed}; {mend}")
     return Block(tuple(run), width, max(widths), tuple(above), cut, below)
 
 

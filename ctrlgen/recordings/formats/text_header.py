@@ -135,6 +135,13 @@ def _names_and_units(candidates: Sequence[tuple[int, list[str]]]) -> Header:
         at = next(
             (n for n in range(min(2, len(candidates) - 1)) if _is_units(candidates[n][1], candidates[n + 1][1])), None
         )
+    if (
+        at is None
+        and len(candidates) > 1
+        and is_unit_row(candidates[1][1])
+        and not any(map(is_number, candidates[0][1]))
+    ):
+        at, names_at = 1, 0  # units above the names
     names_at = names_at if names_at is not None else 0 if at is None else min(at + 1, len(candidates) - 1)
     line, names = candidates[names_at]
     notes = [f"names in line {line + 1}"] if line else []
