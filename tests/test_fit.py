@@ -33,7 +33,7 @@ class Scripted:
         self.rms, self.error, self.starts = rms, errors, starts
         self.noise = errors.noise
 
-    def fit(self, structure, steps=40):
+    def fit(self, structure, steps=40, enough=np.inf):
         self.starts.append(structure.nominal_starts)
         return SimpleNamespace(structure=structure, objective=float(N))
 

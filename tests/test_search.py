@@ -227,6 +227,12 @@ def test_a_number_that_meets_its_bound_stops_there_and_the_others_go_on():
     assert levenberg_marquardt(tight, np.ones(2), 1) == pytest.approx([0.0, 2.05 / 1.01], rel=1e-4)
 
 
+@pytest.mark.parametrize(("enough", "reached"), [(np.inf, 3.0), (2500.5, 3.0), (1.0, 0.0)])
+def test_a_fit_ends_where_it_cannot_win(enough, reached):
+    floor = Linear([[1.0], [0.0]], [3.0, 50.0], [-9.0], [9.0])  # at best 2500
+    assert levenberg_marquardt(floor, np.zeros(1), 40, enough)[0] == pytest.approx(reached, abs=1e-4)
+
+
 class Product:
     """A force constant and a gain, of which the readings know the product and the data sheet the first."""
 

@@ -144,16 +144,17 @@ class Fitter:
         theta: np.ndarray | None = None,
         steps: int = FIT.max_steps,
         nested: Fit | None = None,
+        enough: float = np.inf,
     ) -> Fit:
         """The optimum reached from `theta` (k,) [SI], or from the structure's own starting values, in at most so many steps.
 
         A fit that ends above the fit `nested` in it started too far away. It is repeated from `nested`'s initial states with
         its new causes almost off, and once more with the device's own numbers as stated, which `nested` may have bent to
-        stand in for the new causes. The best of them is returned.
+        stand in for the new causes. The best of them is returned. A fit ends before where it cannot reach an objective that is `enough`.
         """
         problem = self.problem(structure)
         start = np.concatenate([structure.start if theta is None else theta, np.zeros(problem.n_initial)])
-        first = self._optimum(problem, start, steps)
+        first = self._optimum(problem, start, steps, enough if nested is None else min(enough, nested.objective))
         if nested is None or first.objective <= nested.objective:
             return first
         near = start.copy()
@@ -166,8 +167,10 @@ class Fitter:
         for i, p in enumerate(structure.free_parameters):
             if p.cause is None:
                 stated[i] = p.nominal
-        again = (self._optimum(problem, x, steps) for x in (near, stated))
-        return min(first, *again, key=lambda fit: fit.objective)
+        best = first
+        for x in (near, stated):
+            best = min(best, self._optimum(problem, x, steps, best.objective), key=lambda fit: fit.objective)
+        return best
 
     def described(self, device: Device) -> tuple[Fitter, Fit]:
         """The device as described, without causes, and the fitter with the discrepancy that it leaves.
@@ -187,7 +190,7 @@ class Fitter:
             return fitter, fit
         for p in fit.structure.free_parameters:
             for start in (p.nominal - p.sd, p.nominal + p.sd) if p.sd else ():
-                again = fitter.fit(Structure(device, nominal_starts={p.path: start}))
+                again = fitter.fit(Structure(device, nominal_starts={p.path: start}), enough=fit.objective)
                 fit = min(fit, again, key=lambda fit: fit.objective)
         return fitter.with_errors_of(fit), fit
 
@@ -198,17 +201,17 @@ class Fitter:
         residual = problem.residual(problem.to_scaled(start))
         return float(residual @ residual)
 
-    def _optimum(self, problem: LeastSquaresProblem, start: np.ndarray, steps: int) -> Fit:
+    def _optimum(self, problem: LeastSquaresProblem, start: np.ndarray, steps: int, enough: float = np.inf) -> Fit:
         """The optimum from `start` [SI], taken from the checkpoint where it was found before."""
         if self.checkpoint is None:
-            return _fit_at(problem, levenberg_marquardt(problem, problem.to_scaled(start), steps))
+            return _fit_at(problem, levenberg_marquardt(problem, problem.to_scaled(start), steps, enough))
         s, noise, corner = problem.structure, self.error.weighted, self.error.corner
         valid = [r.valid for r in self.recording.records]
         begun = (s.starts, s.expanded_at, sorted(s.nominal_starts.items()), s.free)
-        key = key_of(s.causes, *begun, start, steps, noise.sd, corner, *noise.ar, *valid)
+        key = key_of(s.causes, *begun, start, steps, enough, noise.sd, corner, *noise.ar, *valid)
         optimum = self.checkpoint.recall(key)
         if optimum is None:
-            optimum = levenberg_marquardt(problem, problem.to_scaled(start), steps)
+            optimum = levenberg_marquardt(problem, problem.to_scaled(start), steps, enough)
             self.checkpoint.keep(key, optimum)
         return _fit_at(problem, optimum)
 

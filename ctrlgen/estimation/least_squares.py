@@ -8,6 +8,7 @@ near what is stated of them.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -42,6 +43,15 @@ def _bounded(values: np.ndarray, most: float) -> np.ndarray:
     return np.clip(np.nan_to_num(values, nan=most), -most, most)
 
 
+class Evaluated(NamedTuple):
+    """A residual (m,) and its Jacobian (m, n) at x (n,); `curvature` as of `huber_curvature`, of the readings."""
+
+    x: np.ndarray
+    residual: np.ndarray
+    J: np.ndarray
+    curvature: np.ndarray
+
+
 class LeastSquaresProblem:
     """Residual (m,) and Jacobian (m, k + n_s) of k free parameters and n_s initial states, as functions of scaled x.
 
@@ -62,8 +72,7 @@ class LeastSquaresProblem:
         self.prior = [(i, p) for i, p in enumerate(parameters) if p.sd]
         self.log = np.array([_by_logarithm(p) for p in parameters] + [False] * self.n_initial, dtype=bool)
         self.step_limit = np.where(self.log, FIT.longest_log_step, np.inf)
-        self._last: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
-        self._curvature = np.ones(0)
+        self._last: list[Evaluated] = []
 
     def to_scaled(self, values: np.ndarray) -> np.ndarray:
         """x of SI `values`, (k + n_s,)."""
@@ -104,9 +113,10 @@ class LeastSquaresProblem:
         return self._with_prior(rows, x)
 
     def evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Residual (m,) and Jacobian (m, k + n_s) by x; the last result is kept."""
-        if self._last is not None and np.array_equal(self._last[0], x):
-            return self._last[1:]
+        """Residual (m,) and Jacobian (m, k + n_s) by x; the last two results are kept."""
+        for kept in self._last:
+            if np.array_equal(kept.x, x):
+                return kept.residual, kept.J
         values, k = self.to_si(x), self.k
         si_by_scaled = self.si_by_scaled(values)
         rows, blocks, curvature = [], [], []
@@ -124,14 +134,16 @@ class LeastSquaresProblem:
         for row, (i, p) in enumerate(self.prior):
             P[row, i] = self.scale[i] / p.sd
         J = np.nan_to_num(np.vstack([*blocks, P, np.eye(len(x))[k:]]), posinf=0.0, neginf=0.0)
-        self._last = x.copy(), self._with_prior(rows, x), J
-        self._curvature = np.concatenate(curvature or [np.zeros(0)])
-        return self._last[1:]
+        evaluated = Evaluated(x.copy(), self._with_prior(rows, x), J, np.concatenate(curvature or [np.zeros(0)]))
+        # the one that a step began at, and where it led
+        self._last = [*self._last[-1:], evaluated]
+        return evaluated.residual, J
 
     def normal_matrix(self, J: np.ndarray) -> np.ndarray:
-        """J'J (k + n_s, k + n_s) of the Jacobian last evaluated, with more weight on readings beyond the corner of the loss."""
-        beyond = np.flatnonzero(self._curvature > 1.0)
-        more = J[beyond] * np.sqrt(self._curvature[beyond] - 1.0)[:, None]
+        """J'J (k + n_s, k + n_s) of one of the last two Jacobians, with more weight on readings beyond the corner of the loss."""
+        curvature = next(kept.curvature for kept in self._last if kept.J is J)
+        beyond = np.flatnonzero(curvature > 1.0)
+        more = J[beyond] * np.sqrt(curvature[beyond] - 1.0)[:, None]
         return J.T @ J + more.T @ more
 
     def _white(self, record: Record, y: np.ndarray) -> np.ndarray:

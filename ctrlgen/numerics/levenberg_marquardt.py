@@ -8,6 +8,9 @@ import numpy as np
 import scipy
 
 NEGLIGIBLE = 0.01  # squared standard deviations: a step that promises less ends the search
+GENEROUS = (
+    4.0  # a step along a curved valley may bring several times what the quadratic model of its beginning promises
+)
 PROBE = 0.1  # share of a step from which the curvature along it is taken
 FIRST_DAMPING = 1e-6
 FAILING = 1e-2  # damping above which three steps in a row have failed: 1e-6, 1e-4, 3e-3
@@ -36,28 +39,33 @@ class Problem(Protocol):
         """The residual (m,) and its Jacobian (m, n)."""
 
     def normal_matrix(self, J: np.ndarray) -> np.ndarray:
-        """What stands for half the Hessian (n, n) of the objective where `J` was evaluated last: J'J, or more of it."""
+        """What stands for half the Hessian (n, n) of the objective where `J`, one of the last two, was evaluated: J'J, or more of it."""
 
 
-def levenberg_marquardt(problem: Problem, x: np.ndarray, steps: int) -> np.ndarray:
+def levenberg_marquardt(problem: Problem, x: np.ndarray, steps: int, enough: float = np.inf) -> np.ndarray:
     """The x (n,) of least |residual|^2 within the bounds, from a starting `x`, in at most so many steps.
 
     Marquardt's damping (D. W. Marquardt, J. SIAM 11 (1963) 431). A step that does not lower the objective is tried again:
     first along the curved valley of the objective; then with the nuisance variables fixed, along which the residual may have
     a kink; then, when the damping has already grown, without the parameter that promises most, for the derivative by the
-    moment of an event between two samples may be wrong. Ends when a step promises less than `NEGLIGIBLE`.
+    moment of an event between two samples may be wrong. Ends when a step promises less than `NEGLIGIBLE`, and where all that are left,
+    each with `GENEROUS` times what the next one promises, would not bring |residual|^2 down to what is `enough`.
     """
     low, high = problem.bounds
     parameters = np.arange(len(x)) < problem.k
     x, damping = np.clip(x, low, high), FIRST_DAMPING
     r, J = problem.evaluate(x)
-    for _ in range(steps):
-        gradient, H = J.T @ r, problem.normal_matrix(J)
+    gradient, H = J.T @ r, problem.normal_matrix(J)
+    at_once = True  # whether the last step was good as it was
+    for left in range(steps, 0, -1):
         least, most = np.maximum(low - x, -problem.step_limit), np.minimum(high - x, problem.step_limit)
         step = _damped_step(H, gradient, least, most, damping)
-        if -(gradient @ step + 0.5 * step @ H @ step) < NEGLIGIBLE:
+        promised = -(gradient @ step + 0.5 * step @ H @ step)
+        if promised < NEGLIGIBLE or (at_once and r @ r - left * GENEROUS * promised > enough):
             break
-        better = _if_better(problem, r, np.clip(x + step, low, high))
+        # its derivatives are needed next where it is good, as it mostly is after a good one
+        better = _if_better(problem, r, np.clip(x + step, low, high), with_slopes=at_once)
+        at_once = better is not None
         if better is None and damping <= FAILING:
             better = _along_valley(problem, x, r, J, H, step, damping)
         if better is None and 0 < np.count_nonzero(step[parameters]) < np.count_nonzero(step):
@@ -71,6 +79,7 @@ def levenberg_marquardt(problem: Problem, x: np.ndarray, steps: int) -> np.ndarr
         if better is not None:
             x, damping = better, max(damping / RELAX, LEAST_DAMPING)
             r, J = problem.evaluate(x)
+            gradient, H = J.T @ r, problem.normal_matrix(J)
         else:
             damping = max(damping * STIFFEN, FIRST_STIFFENING)
             if damping > MOST_DAMPING:
@@ -119,7 +128,7 @@ def _along_valley(
     return next((better for better in tried if better is not None), None)
 
 
-def _if_better(problem: Problem, r: np.ndarray, x: np.ndarray) -> np.ndarray | None:
-    """x where its residual is smaller than `r`, else None."""
-    residual = problem.residual(x)
+def _if_better(problem: Problem, r: np.ndarray, x: np.ndarray, with_slopes: bool = False) -> np.ndarray | None:
+    """x where its residual is smaller than `r`, else None; `with_slopes` it is evaluated with its Jacobian, which the problem keeps."""
+    residual = problem.evaluate(x)[0] if with_slopes else problem.residual(x)
     return x if residual @ residual < r @ r else None

@@ -99,9 +99,11 @@ def restart_elsewhere(
                     (structure.restarted(k, begin) for begin in group), key=trials.fitter.initial_objective
                 )[:most]
             ]
-            again = (trials.fitter.fit(s, steps=SEARCH.candidate_steps) for s in promising)
-            best = min(again, key=lambda fit: fit.objective)
-            if best.objective < candidate.fit.objective:
+            best = candidate.fit
+            for s in promising:
+                again = trials.fitter.fit(s, steps=SEARCH.candidate_steps, enough=best.objective)
+                best = min(best, again, key=lambda fit: fit.objective)
+            if best is not candidate.fit:
                 candidate = trials.converged(trials.scored(best.structure, best, candidate.cause))
         except FAILURES as error:
             trials.note_failure(cause, error)

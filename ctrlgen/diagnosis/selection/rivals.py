@@ -163,8 +163,11 @@ def replacements(trials: Trials, current: CandidateModel, k: int) -> list[Candid
         if s.z**2 > SEARCH.rival_share * gained and s.hypothesis != structure.causes[k]
     ]
 
+    # what cannot take away so much of it is no rival
+    enough = without - SEARCH.rival_share * gained
+
     def one(branch: Trials, s: Suspect) -> list[CandidateModel]:
-        return branch.tried(replace_cause(branch, current.fit, k, others, s), s.hypothesis)
+        return branch.tried(replace_cause(branch, current.fit, k, others, s), s.hypothesis, enough=enough)
 
     tried = trials.each(one, able, lambda s: f"{trying(s.hypothesis)} instead")
     fits = [t for fitted in tried for t in fitted]

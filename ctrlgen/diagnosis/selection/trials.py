@@ -123,14 +123,18 @@ class Trials:
         cause: Hypothesis | None = None,
         steps: int = SEARCH.candidate_steps,
         nested: Fit | None = None,
+        enough: float = np.inf,
     ) -> CandidateModel:
         """Fits and scores one structure, in which that of `nested` is nested. A structure that was fitted before is not
-        fitted again unless its start values are better than that fit."""
+        fitted again unless its start values are better than that fit. The fit ends before where it cannot reach an objective that is
+        `enough`."""
         key = frozenset(structure.causes)
         known, done = self.fitted.get(key, (None, 0))
         if known is not None and done >= steps and known.fit.objective <= self.fitter.initial_objective(structure):
             return replace(known, cause=cause)
-        fit = self.fitter.fit(structure, steps=steps, nested=nested)
+        fit = self.fitter.fit(structure, steps=steps, nested=nested, enough=enough)
+        if fit.objective > enough:
+            steps = done  # it may have ended before
         if known is not None and known.fit.objective <= fit.objective:
             self.fitted[key] = (known, steps)
             return replace(known, cause=cause)
@@ -144,13 +148,14 @@ class Trials:
         cause: Hypothesis | None,
         nested: Fit | None = None,
         steps: int = SEARCH.candidate_steps,
+        enough: float = np.inf,
     ) -> list[CandidateModel]:
         """The trial; none, with a note, where no such device can be built or simulated. What it adds to `nested` is begun again
-        with half the amplitude where that may be why."""
+        with half the amplitude where that may be why. Other arguments as of `fit`."""
         known = nested.structure.causes if nested else structure.causes
         for _ in range(SEARCH.halvings + 1):
             try:
-                return [self.fit(structure, cause, steps=steps, nested=nested)]
+                return [self.fit(structure, cause, steps, nested, enough)]
             except FAILURES as error:
                 failure = error
             if set(structure.causes) <= set(known):
