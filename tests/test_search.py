@@ -40,6 +40,20 @@ def test_what_is_left_without_a_cause_is_what_the_free_numbers_cannot_take_over(
     assert linearised_optimum(off) == pytest.approx(best.objective, rel=0.02)
 
 
+def test_what_a_model_leaves_without_a_cause_is_screened_once_under_the_same_errors(monkeypatch):
+    fitter, screens = fitter_of(n=300), []
+    trials = trials_of(fitter)
+    fit = fitter.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 1e-7}), steps=0)
+    monkeypatch.setattr(
+        trials.screen, "run", lambda bare: screens.append(bare) or Screened((), np.zeros((0, 0)), 1, {})
+    )
+    first = trials.screened_without(fit, 0)
+    assert trials.screened_without(fit, 0) == first and first[0].structure.causes == () and len(screens) == 1
+    trials.use(fitter)
+    trials.screened_without(fit, 0)
+    assert len(screens) == 2
+
+
 def test_a_structure_is_fitted_again_from_a_better_start_only():
     fitter = fitter_of()
     trials = trials_of(fitter)

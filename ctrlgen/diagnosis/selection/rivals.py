@@ -150,8 +150,7 @@ def replacements(trials: Trials, current: CandidateModel, k: int) -> list[Candid
     structure = current.fit.structure
     others = current.fit.restarted.without(k)
     try:
-        bare = trials.fitter.fit(others, steps=0)
-        screened = trials.screen.run(bare)
+        bare, screened = trials.screened_without(current.fit, k)
     except FAILURES as error:
         trials.note_failure(structure.causes[k], error)
         return []

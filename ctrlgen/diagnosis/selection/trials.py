@@ -46,6 +46,7 @@ class Trials:
         self.fitter, self.screen, self.step, self.jobs = fitter, screen, step, jobs
         self.fitted: dict[frozenset[Any], tuple[CandidateModel, int]] = {}
         self.screens: dict[frozenset[Any], tuple[Fit, Screened]] = {}
+        self.bare: dict[tuple[int, int], tuple[Fit, Fit, Screened]] = {}
         self.mismatch: np.ndarray | None = None
         self.refused: list[Refusal] = []
         self.failed: list[str] = []
@@ -64,6 +65,7 @@ class Trials:
         self.screen.fitter = fitter
         self.fitted.clear()
         self.screens.clear()
+        self.bare.clear()
 
     def each(
         self,
@@ -133,8 +135,6 @@ class Trials:
         if known is not None and done >= steps and known.fit.objective <= self.fitter.initial_objective(structure):
             return replace(known, cause=cause)
         fit = self.fitter.fit(structure, steps=steps, nested=nested, enough=enough)
-        if fit.objective > enough:
-            steps = done  # it may have ended before
         if known is not None and known.fit.objective <= fit.objective:
             self.fitted[key] = (known, steps)
             return replace(known, cause=cause)
@@ -184,6 +184,15 @@ class Trials:
             self.failed += [f"{cause_name(h)}: {why}" for h, why in screened.dropped.items()]
             self.screens[key] = candidate.fit, screened
         return screened
+
+    def screened_without(self, fit: Fit, k: int) -> tuple[Fit, Screened]:
+        """The fit without cause k, its other numbers as they are, and the screen of what that leaves."""
+        known = self.bare.get((id(fit), k))
+        if known is None:
+            bare = self.fitter.fit(fit.restarted.without(k), steps=0)
+            # the fit with them: its identity is its own as long as it is kept
+            known = self.bare[id(fit), k] = (fit, bare, self.screen.run(bare))
+        return known[1:]
 
     def objections(self, candidate: CandidateModel, accepted: Sequence[Hypothesis] = ()) -> dict[int, str]:
         """What speaks against the causes of a candidate that are not yet `accepted`."""
