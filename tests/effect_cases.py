@@ -76,7 +76,13 @@ SUGGESTED = {
     "jump_positions": (-0.3, 0.1, 0.6),
     "edges_above": (-0.3, 0.2),
     "edges_below": (-0.2, 0.3),
+    "edges_beyond": (0.2, 0.5),
     "speeds": (0.1, 3.0),
+    "drives": (0.1, 0.4),
+    "since": (0.3, 1.0),
+    "warmer": (-0.3, 0.2),
+    "middles": (-0.3, 0.4),
+    "lengths": (0.1, 0.6),
 }
 
 

@@ -173,6 +173,17 @@ def test_of_two_clocks(samples):
     assert found.fit.values(0)["offset"] == pytest.approx(samples * H, abs=1e-5)
 
 
+def test_of_a_reading_that_moves_in_the_warmth_alone():
+    rng, t, parts = np.random.default_rng(3), H * np.arange(N), []
+    for u, role in zip(given(N), ("fit", "hold_out"), strict=True):
+        room = 2 * np.sin(2 * np.pi * 0.9 * t + rng.uniform(0, 6))
+        y = move(u) + 3e-8 * np.maximum(room - 0.7, 0) + NOISE * rng.standard_normal(N)
+        parts.append(replace(record(u, y, role), ambient=room))
+    fitter = fitter_of(AXIS, ("reading.axis",), ("um",), (NOISE,), "series", parts)
+    planted = Planted("sensor:axis", {"slope": 3e-8, "reference": 0.7}, within={"reference": 0.02})
+    recover(fitter, AXIS, "temperature_sensitivity_above", planted)
+
+
 STATED = {"zero_per_record"}
 
 
@@ -217,5 +228,6 @@ def test_no_law_is_left_out():
         "clock_offset",
         "payload",
         "second_pole",
+        "temperature_sensitivity_above",
     }
     assert not set(Effect.library) - battery - here - STATED - IN_THE_LOOP - SMOOTHERS

@@ -30,6 +30,16 @@ def beyond(x, width):
     return 1 / (1 + exp(-4 * x / width))
 
 
+def past(s, p, sign):
+    """The same beyond an edge of the displacement, no faster than within a quarter of a sample."""
+    return beyond(sign * (s.displacement - p.edge), np.hypot(p.width, s.velocity * H / 4))
+
+
+def ramp(x, corner):
+    """From zero on in proportion, the corner rounded."""
+    return x * x / (x + corner) if x > 0 else 0.0
+
+
 def too_fast(s, p):
     x = np.maximum(abs(s.velocity) - p.speed, 0)
     return -p.damping * sign(s.velocity) * x * x / (x + p.speed / 100)
@@ -153,7 +163,7 @@ LAWS = {
     **{
         f"coulomb_{side}": (
             {"reach": 0.02, "smoothing": 0.3, "edge": 0.2, "width": 0.3},
-            lambda s, p, sign=sign: -p.force * s.z * beyond(sign * (s.displacement - p.edge), p.width),
+            lambda s, p, sign=sign: -p.force * s.z * past(s, p, sign),
             lambda s, p: {"z": dahl_rate(s, p)},
         )
         for side, sign in SIDES.items()
@@ -166,11 +176,42 @@ LAWS = {
     **{
         f"viscous_{side}": (
             {"edge": 0.2, "width": 0.3},
-            lambda s, p, sign=sign: -p.damping * s.velocity * beyond(sign * (s.displacement - p.edge), p.width),
+            lambda s, p, sign=sign: -p.damping * s.velocity * past(s, p, sign),
         )
         for side, sign in SIDES.items()
     },
     "viscous_at_speed": ({"speed": 0.1}, too_fast),
+    **{
+        f"stiffness_{side}": (
+            {"edge": 0.2},
+            lambda s, p, sign=sign: -sign * p.stiffness * ramp(sign * (s.displacement - 0.2), 1e-6 * s.travel),
+        )
+        for side, sign in SIDES.items()
+    },
+    **{
+        f"backlash_{side}": (
+            {"edge": 0.2, "width": 0.3},
+            lambda s, p: 0.999 * (s.w + s.start * p.gap / 2 - s.displacement),
+        )
+        for side in SIDES
+    },
+    "stiffness_beyond": (
+        {"edge": 0.2},
+        lambda s, p: -p.stiffness * sign(s.displacement) * ramp(abs(s.displacement) - 0.2, 1e-6 * s.travel),
+    ),
+    "drive_gain_beyond": (
+        {"level": 0.2},
+        lambda s, p: p.gain * sign(s.value) * ramp(abs(s.value) - 0.2, 2e-4),
+    ),
+    "local_error": (
+        {"position": 0.2, "length": 0.3, "rounding": 0.4},
+        lambda s, p: (
+            p.error
+            * (beyond(s.value - 0.05, 0.4) - beyond(s.value - 0.35, 0.4))
+            / (beyond(0.15, 0.4) - beyond(-0.15, 0.4))
+        ),
+    ),
+    "temperature_sensitivity_above": ({"reference": 0.2}, lambda s, p: p.slope * ramp(s.ambient - 0.2, 1e-3)),
     "butterfly": (
         {"linear": 0.6, "reach": 0.3, "taper": 0.5},
         lambda s, p: p.share * (((s.value - weighted(s, p, s.value)) / risen(s.scale)) ** 2 * s.scale - 0.6 * s.value),

@@ -22,12 +22,14 @@ from pkgutil import iter_modules
 from ctrlgen.effects._effect import Effect, Place
 from ctrlgen.effects._law_inputs import Expression, LawInputs, LawNumbers
 from ctrlgen.effects._parameter import Channel, Param, State
+from ctrlgen.effects._region import ActsIn, Side
 from ctrlgen.effects._table import EffectTable, faults_at, read_effect
 
 for _module in iter_modules(__path__):
     import_module(f"{__name__}.{_module.name}")
 
 __all__ = [
+    "ActsIn",
     "Channel",
     "Effect",
     "EffectTable",
@@ -36,6 +38,7 @@ __all__ = [
     "LawNumbers",
     "Param",
     "Place",
+    "Side",
     "State",
     "faults_at",
     "read_effect",

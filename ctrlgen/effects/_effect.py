@@ -10,6 +10,7 @@ from typing import ClassVar
 from ctrlgen.core.units import Quantity, same_dimension
 from ctrlgen.effects._law_inputs import Expression, LawInputs, LawNumbers
 from ctrlgen.effects._parameter import Channel, Param, State
+from ctrlgen.effects._region import ActsIn
 
 
 class Place(Enum):
@@ -37,6 +38,8 @@ class Effect:
     source: ClassVar[str]
     params: ClassVar[tuple[Param, ...]]
     states: ClassVar[tuple[State, ...]] = ()
+    # Where it acts, if not everywhere.
+    acts_in: ClassVar[ActsIn | None] = None
     # Remembers so much that a simulation of a recording applies it to the simulated readings as a whole, where nothing follows it,
     # and leaves it out of the model: `estimation.late_readings`.
     apart: ClassVar[bool] = False

@@ -1,17 +1,55 @@
-"""Where a law acts that does not act everywhere: beyond one displacement, with the edge smoothed."""
+"""Where a law acts that does not act everywhere: beyond an edge of one quantity, or on a short stretch of it."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
 import casadi as ca
 
-from ctrlgen.effects import Expression, LawInputs, LawNumbers, Param
+from ctrlgen.effects._law_inputs import Expression, LawInputs, LawNumbers
+from ctrlgen.effects._parameter import Param
 
 EDGE = (
     Param("edge", "travel", (-5.0, 5.0), "displacement at which it sets in"),
-    Param("width", "travel", (3e-4, 0.5), "width over which it sets in"),
+    Param("width", "travel", (1e-5, 0.5), "width over which it sets in"),
 )
+# Of a sample: an integrator's step. A force that jumps between two nodes of a step acts too long or too short by a part of it.
+STEP = 0.25
+CORNER = 1e-6  # typical travels over which the corner of a spring is rounded: less than what is touched
+
+
+class Side(StrEnum):
+    """On which side of a number a law acts: `OUTWARD`, away from zero, by the number's sign; `BOTH`, farther from zero than it, either
+    way; `AROUND`, on a stretch with the number in its middle."""
+
+    ABOVE = "above"
+    BELOW = "below"
+    OUTWARD = "outward"
+    BOTH = "both"
+    AROUND = "around"
+
+
+@dataclass(frozen=True)
+class ActsIn:
+    """The region of a law: of which `quantity`, on which `side` of the law's parameter `at`; `length`, of a stretch, another parameter."""
+
+    quantity: str
+    at: str
+    side: Side
+    length: str = ""
 
 
 def beyond_edge(s: LawInputs, p: LawNumbers, side: int) -> Expression:
-    """(1 + tanh(2 sigma (d - d_0)/w))/2: zero before the edge d_0 on its `side` sigma, one beyond, changing over the width w."""
-    return (1 + ca.tanh(2 * side * (s.displacement - p.edge) / p.width)) / 2
+    """(1 + tanh(2 sigma (d - d_0)/W))/2, W^2 = w^2 + (v h/4)^2: zero before the edge d_0 on its `side` sigma, one beyond, changing over
+    the width w, but no faster than within a quarter of a sample h, so that the moment at which the edge is crossed counts."""
+    h = 0.0 if math.isnan(s.sample_time) else s.sample_time
+    width = ca.sqrt(p.width**2 + (STEP * h * s.velocity) ** 2)
+    return (1 + ca.tanh(2 * side * (s.displacement - p.edge) / width)) / 2
+
+
+def ramp(x: Expression, corner: Expression) -> Expression:
+    """x^2/(x + e), x where positive: zero before, x beyond, the corner rounded over e."""
+    x = ca.fmax(x, 0)
+    return x**2 / (x + corner)

@@ -2,8 +2,8 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
-from ctrlgen.effects._region import EDGE, beyond_edge
+from ctrlgen.effects import ActsIn, Effect, Expression, LawInputs, LawNumbers, Param, Place, Side
+from ctrlgen.effects._region import EDGE, beyond_edge, ramp
 
 
 class RegionalDamping(Effect, listed=False):
@@ -15,20 +15,24 @@ class RegionalDamping(Effect, listed=False):
 
 
 class ViscousAbove(RegionalDamping):
-    """Delta F = -c v (1 + tanh(2 (d - d_0)/w))/2: damping above the displacement d_0. Holds for slow flow."""
+    """Delta F = -c v (1 + tanh(2 (d - d_0)/W))/2: damping above the displacement d_0, W the width w or a quarter of a sample's way.
+    Holds for slow flow."""
 
     title = "Damping in the upper part of the travel"
     params = (Param("damping", "channel*s/travel", (0.0, 10.0), "c: damping beyond the edge", off=0.0), *EDGE)
+    acts_in = ActsIn("position", "edge", Side.ABOVE)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.damping * s.velocity * beyond_edge(s, p, 1)
 
 
 class ViscousBelow(RegionalDamping):
-    """Delta F = -c v (1 - tanh(2 (d - d_0)/w))/2: damping below the displacement d_0. Holds for slow flow."""
+    """Delta F = -c v (1 - tanh(2 (d - d_0)/W))/2: damping below the displacement d_0, W the width w or a quarter of a sample's way.
+    Holds for slow flow."""
 
     title = "Damping in the lower part of the travel"
     params = ViscousAbove.params
+    acts_in = ActsIn("position", "edge", Side.BELOW)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.damping * s.velocity * beyond_edge(s, p, -1)
@@ -43,7 +47,7 @@ class ViscousAtSpeed(RegionalDamping):
         Param("damping", "channel*s/travel", (0.0, 10.0), "c: damping above the speed", off=0.0),
         Param("speed", "travel/s", (1e-3, 1e3), "v_0: speed at which it sets in"),
     )
+    acts_in = ActsIn("speed", "speed", Side.ABOVE)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
-        x = ca.fmax(ca.fabs(s.velocity) - p.speed, 0)
-        return -p.damping * ca.sign(s.velocity) * x**2 / (x + 0.01 * p.speed)
+        return -p.damping * ca.sign(s.velocity) * ramp(ca.fabs(s.velocity) - p.speed, 0.01 * p.speed)

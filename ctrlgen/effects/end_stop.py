@@ -1,8 +1,8 @@
-"""A stage that runs into a stop."""
+"""A stop, or a second spring, that is touched from one place on."""
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import ActsIn, Effect, Expression, LawInputs, LawNumbers, Param, Place, Side
 
 CORNER = 1e-3  # of e
 
@@ -28,6 +28,7 @@ class EndStop(Effect):
         ),
         Param("power", "1", (1.0, 2.0), "n: how the force grows with the depth"),
     )
+    acts_in = ActsIn("position", "gap", Side.OUTWARD)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         side = ca.sign(p.gap)

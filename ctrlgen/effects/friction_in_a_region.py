@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Place, State
+from ctrlgen.effects import ActsIn, Effect, Expression, LawInputs, LawNumbers, Place, Side, State
 from ctrlgen.effects._bristles import BRISTLES, CONTACT, bristle_rate
 from ctrlgen.effects._region import EDGE, beyond_edge
 from ctrlgen.effects._smooth_step import CLOCK, WHEN, smooth_step
@@ -22,22 +22,24 @@ class RegionalFriction(Effect, listed=False):
 
 
 class CoulombAbove(RegionalFriction):
-    """Delta F = -f z (1 + tanh(2 (d - d_0)/w))/2, z Dahl's bristles of `coulomb`: friction above the displacement d_0. Holds for
-    contacts that do not wear."""
+    """Delta F = -f z (1 + tanh(2 (d - d_0)/W))/2, z Dahl's bristles of `coulomb`: friction above the displacement d_0, W the width w
+    or a quarter of a sample's way. Holds for contacts that do not wear."""
 
     title = "Dry friction in the upper part of the travel"
     params = (*CONTACT, *EDGE)
+    acts_in = ActsIn("position", "edge", Side.ABOVE)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.force * s.states.z * beyond_edge(s, p, 1)
 
 
 class CoulombBelow(RegionalFriction):
-    """Delta F = -f z (1 - tanh(2 (d - d_0)/w))/2, z Dahl's bristles of `coulomb`: friction below the displacement d_0. Holds for
-    contacts that do not wear."""
+    """Delta F = -f z (1 - tanh(2 (d - d_0)/W))/2, z Dahl's bristles of `coulomb`: friction below the displacement d_0, W the width w
+    or a quarter of a sample's way. Holds for contacts that do not wear."""
 
     title = "Dry friction in the lower part of the travel"
     params = (*CONTACT, *EDGE)
+    acts_in = ActsIn("position", "edge", Side.BELOW)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.force * s.states.z * beyond_edge(s, p, -1)
@@ -49,6 +51,7 @@ class CoulombAfter(RegionalFriction):
     title = "Dry friction that sets in at a moment"
     params = (*CONTACT, *WHEN)
     states = (*BRISTLES, *CLOCK)
+    acts_in = ActsIn("time", "moment", Side.ABOVE)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.force * s.states.z * smooth_step(s, p)

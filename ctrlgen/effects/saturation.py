@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import ActsIn, Effect, Expression, LawInputs, LawNumbers, Param, Place, Side
 
 
 class Saturation(Effect):
@@ -24,6 +24,7 @@ class Saturation(Effect):
             "L: drive that is not exceeded",
         ),
     )
+    acts_in = ActsIn("drive", "level", Side.BOTH)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         corner = (p.level / 200) ** 2

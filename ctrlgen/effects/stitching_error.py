@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import ActsIn, Effect, Expression, LawInputs, LawNumbers, Param, Place, Side
 
 
 class StitchingError(Effect):
@@ -19,6 +19,7 @@ class StitchingError(Effect):
         Param("position", "channel", (-2.0, 2.0), "y_0: position at which it sets in"),
         Param("width", "channel", (1e-4, 0.05), "w: width over which it sets in"),
     )
+    acts_in = ActsIn("position", "position", Side.ABOVE)
 
     @classmethod
     def contradiction(cls, p: dict[str, float]) -> str:

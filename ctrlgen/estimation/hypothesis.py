@@ -127,12 +127,13 @@ class Hypothesis:
         """Start values of one parameter [SI], those that the recording suggests included."""
         low, high = self.bounds(p, channel)
         prior = self.prior.of(p)
-        if prior.scales_with_peak and p.unit in hints.peaks:
-            return [min(max(value * hints.peaks[p.unit], low), high) for value in prior.start_values]
         suggested = [
             *hints.suggested.get(prior.start_from_data, ()),
             *(hints.suggested.get("lines", ()) if p.unit == "Hz" else ()),
         ]
+        if prior.scales_with_peak and p.unit in hints.peaks:
+            starts_at = [*(value * hints.peaks[p.unit] for value in prior.start_values), *suggested]
+            return [min(max(value, low), high) for value in starts_at]
         if prior.only_from_data:
             return [value for value in suggested if low <= value <= high]
         starts = prior.start_values or (() if suggested else (sum(p.bounds) / 2,))

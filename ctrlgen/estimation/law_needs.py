@@ -73,7 +73,10 @@ NEEDS: Mapping[str, LawNeeds] = MappingProxyType(
             "it needs beams or a winding that can break",
             families=frozenset({"thermal", "electromagnetic", "electrostatic"}),
         ),
-        "backlash": LawNeeds("it needs a part with clearance", transmissions=_CLEARANCE),
+        **dict.fromkeys(
+            ("backlash", "backlash_above", "backlash_below"),
+            LawNeeds("it needs a part with clearance", transmissions=_CLEARANCE),
+        ),
         "cyclic": LawNeeds(
             "it needs a sensor or a part that repeats",
             actuators=_PERIODIC_ACTUATORS,

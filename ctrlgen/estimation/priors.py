@@ -265,10 +265,11 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             parameters={"skew": _starts((-0.3, 0.3)), "reach": peaks(3e-4, 3e-3, 0.03)},
         ),
         "end_stop": LawPrior(
-            "A contact is neither a spring nor Hertz's ball; 5 %: judgement. A spring is plainest. A stop beyond the peak is untouched.",
+            "A contact is neither a spring nor Hertz's ball; 5 %: judgement. A spring is plainest. A stop beyond the peak is "
+            "untouched; a soft one is a second spring, from where most of the residual is.",
             model_form_error=0.05,
             parameters={
-                "gap": peaks(-0.97, -0.9, -0.7, -0.4, 0.4, 0.7, 0.9, 0.97),
+                "gap": replace(peaks(-0.97, -0.9, -0.7, -0.4, 0.4, 0.7, 0.9, 0.97), start_from_data="edges_outward"),
                 "power": ParameterPrior((1.0, 1.5), usual=1.0),
             },
         ),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from ctrlgen.estimation.law_prior import ONE_IN_A_HUNDRED, ONE_IN_TEN, LawPrior, ParameterPrior, peaks
 
@@ -13,10 +14,14 @@ _REASON = (
 _FORM = 0.05
 
 
+def _seen(suggested: str) -> ParameterPrior:
+    """Starts where the recording suggests some."""
+    return ParameterPrior(start_from_data=suggested, only_from_data=True)
+
+
 def _edge(suggested: str) -> dict[str, ParameterPrior]:
     """Starts of the edge from the recording, wide and sharp."""
-    edge = ParameterPrior(start_from_data=suggested, only_from_data=True)
-    return {"edge": edge, "width": ParameterPrior((3e-4, 0.05))}
+    return {"edge": _seen(suggested), "width": ParameterPrior((3e-4, 0.05))}
 
 
 def _friction(where: dict[str, ParameterPrior], log_prior_odds: float) -> LawPrior:
@@ -31,19 +36,36 @@ def _friction(where: dict[str, ParameterPrior], log_prior_odds: float) -> LawPri
     )
 
 
-def _damping(where: dict[str, ParameterPrior]) -> LawPrior:
+def _law(**where: ParameterPrior) -> LawPrior:
     return LawPrior(_REASON, log_prior_odds=ONE_IN_TEN, model_form_error=_FORM, in_a_region=True, parameters=where)
 
 
 # it may happen at any time, and is as rare as any event
-_FROM_A_MOMENT = {"moment": ParameterPrior(start_from_data="moments"), "rise": peaks(1.0)}
-_ABOVE_A_SPEED = {"speed": ParameterPrior(start_from_data="speeds", only_from_data=True)}
+_FROM_A_MOMENT = {"moment": _seen("since"), "rise": peaks(1.0)}
+
+
+def _backlash(suggested: str) -> LawPrior:
+    """Play that opens within a part of the travel."""
+    gap = peaks(1e-3, 0.01, 0.1)
+    return _law(gap=gap, edge=_seen(suggested), width=ParameterPrior((0.05, 0.2)))
+
 
 IN_A_REGION: Mapping[str, LawPrior] = {
+    "backlash_above": _backlash("edges_above"),
+    "backlash_below": _backlash("edges_below"),
     "coulomb_above": _friction(_edge("edges_above"), ONE_IN_TEN),
     "coulomb_below": _friction(_edge("edges_below"), ONE_IN_TEN),
     "coulomb_after": _friction(_FROM_A_MOMENT, ONE_IN_A_HUNDRED),
-    "viscous_above": _damping(_edge("edges_above")),
-    "viscous_below": _damping(_edge("edges_below")),
-    "viscous_at_speed": _damping(_ABOVE_A_SPEED),
+    "drive_gain_beyond": _law(level=_seen("drives")),
+    "local_error": replace(
+        _law(position=_seen("middles"), length=_seen("lengths"), rounding=ParameterPrior((0.003, 0.03))),
+        repeatable=True,
+    ),
+    "stiffness_above": _law(edge=_seen("edges_above")),
+    "stiffness_below": _law(edge=_seen("edges_below")),
+    "stiffness_beyond": _law(edge=_seen("edges_beyond")),
+    "temperature_sensitivity_above": _law(reference=_seen("warmer")),
+    "viscous_above": _law(**_edge("edges_above")),
+    "viscous_below": _law(**_edge("edges_below")),
+    "viscous_at_speed": _law(speed=_seen("speeds")),
 }

@@ -22,6 +22,7 @@ from ctrlgen.diagnosis.report.narrative import (
 from ctrlgen.diagnosis.report.shares_sentences import rest_kind
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
+from ctrlgen.diagnosis.selection.finding_region import EndEntry, places_of
 from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding, Role
 from ctrlgen.diagnosis.selection.verdict import (
     Verdict,
@@ -89,7 +90,7 @@ def _cause(diagnosis: Diagnosis) -> str:
 def _main(findings: Sequence[Finding]) -> str:
     """The main cause with its first numbers and its share; the names of the others with theirs."""
     main, *others = findings
-    numbers = ", ".join(f"{name} = {interval(e)}" for name, e in _first_numbers(main).items())
+    numbers = ", ".join([*(f"{name} = {interval(e)}" for name, e in _first_numbers(main).items()), *where(main)])
     share = f"; it takes away {_share(main.share)}" if main.share else ""
     causes = [f for f in others if f.role is Role.CAUSE]
     names = [f"{cause_name(f.cause)}{_in_brackets(f)}" for f in causes[:BESIDE]]
@@ -118,9 +119,32 @@ def _first_numbers(finding: Finding) -> dict[str, Estimate]:
     law = finding.cause.law
     amplitude = law.amplitude().name
     # where it is comes before how it is
+    told = places_of(law)
     places = [p.name for p in law.params if finding.cause.prior.of(p).start_from_data]
-    first = sorted(finding.parameters, key=lambda name: (name != amplitude, name not in places))[:NUMBERS]
-    return {name: finding.parameters[name] for name in first}
+    first = sorted(finding.parameters, key=lambda name: (name != amplitude, name not in places))
+    most = NUMBERS - bool(told)
+    return {name: finding.parameters[name] for name in [name for name in first if name not in told][:most]}
+
+
+def where(finding: Finding) -> list[str]:
+    """'below a position of -11.487 um (-11.493 ... -11.481 um)', for a law that acts in a region."""
+    region = finding.region
+    if region is None:
+        return []
+    low, high = (None if end is None else _end(end, region.unit) for end in (region.lower, region.upper))
+    if low and high:
+        return [f"between positions of {low} and {high}"]
+    if region.quantity == "time":
+        return [f"from {low} on"]
+    beyond = "above" if low else "below"
+    if region.size and region.quantity != "speed":
+        return [f"beyond {region.quantity}s of +-{low}"]
+    article = "a rise of the temperature" if region.quantity == "temperature" else f"a {region.quantity}"
+    return [f"{beyond} {article} of {low or high}"]
+
+
+def _end(end: EndEntry, unit: str) -> str:
+    return interval(Estimate(end.value, end.ci95, unit))
 
 
 def _rivals(diagnosis: Diagnosis) -> str:

@@ -18,6 +18,7 @@ from ctrlgen.diagnosis.report.answer import sentence
 from ctrlgen.diagnosis.report.shares_sentences import noise_of, shares_sentences
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.cause_entry import Cause
+from ctrlgen.diagnosis.selection.finding_region import RegionEntry
 from ctrlgen.diagnosis.selection.findings import ChanceEntry, ChannelErrorEntry, Finding, Role, SupportEntry, WorthEntry
 from ctrlgen.diagnosis.selection.precedence import why_alike
 from ctrlgen.diagnosis.selection.search_history import RoundEntry, search_history
@@ -74,6 +75,7 @@ class FindingEntry(Cause):
     chance: ChanceEntry | None = Field(description="Chance that luck found it; null where it was read from the data.")
     worth: dict[str, WorthEntry] = Field(description="What it is worth, by channel.")
     parameters: dict[str, EstimateEntry] = Field(description="Parameters of the effect, by name.")
+    region: RegionEntry | None = Field(description="Where it acts; null where it acts everywhere.")
     terms: list[dict[str, EstimateEntry]] = Field(
         description="Parameters of further terms of the same law at the same place, such as harmonics."
     )

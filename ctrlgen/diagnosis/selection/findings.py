@@ -11,6 +11,7 @@ from pydantic import Field
 from ctrlgen.core.units import difference, from_si
 from ctrlgen.diagnosis.selection.attribution import Attribution, ShareEntry, one_finding
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
+from ctrlgen.diagnosis.selection.finding_region import RegionEntry, region_of
 from ctrlgen.diagnosis.selection.law_titles import title
 from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.selection.verdict import unconfirmed
@@ -122,6 +123,11 @@ class Finding:
     title: str = ""
     support: SupportEntry | None = None
     chance: ChanceEntry | None = None
+
+    @property
+    def region(self) -> RegionEntry | None:
+        """Where it acts; None for a number of the device or a law that acts everywhere."""
+        return None if self.effect == PARAMETER else region_of(self.cause.law, self.parameters)
 
     @property
     def contradicted(self) -> bool:

@@ -18,7 +18,8 @@ import numpy as np
 
 from ctrlgen.diagnosis.selection.candidate_terms import CandidateTerm, Peaks, signal_peaks, signals_along
 from ctrlgen.diagnosis.selection.law_terms import LawTerms
-from ctrlgen.diagnosis.selection.regions import region_edges
+from ctrlgen.diagnosis.selection.motion_regions import Along, motion_of, suggested
+from ctrlgen.diagnosis.selection.regions import Leftover, Region, find_regions
 from ctrlgen.diagnosis.selection.score_gradient import ScoreGradient, Sums, law_terms
 from ctrlgen.diagnosis.selection.spatial_periods import jump_positions, merged_periods, resolved_way, spatial_periods
 from ctrlgen.diagnosis.selection.subset_search import SubsetSearch, Suspect
@@ -38,7 +39,7 @@ class Screened:
     `together` sets of two to four suspects that would jointly explain most, with the chi^2 they would: causes can hide
     each other; `undetectable` the hypotheses that this record cannot see, with the free number (its place in the fit's slopes)
     whose own effect looks most like theirs, -1 where they do not reach the readings at all; `dropped` the hypotheses whose law
-    could not be evaluated, with the reason."""
+    could not be evaluated, with the reason; `regions` where most of what is left is."""
 
     suspects: tuple[Suspect, ...]
     cosine: np.ndarray
@@ -47,6 +48,7 @@ class Screened:
     subsets: tuple[tuple[float, tuple[Suspect, ...]], ...] = ()
     undetectable: dict[Hypothesis, int] = field(default_factory=dict)
     dropped: dict[Hypothesis, str] = field(default_factory=dict)
+    regions: dict[Along, tuple[Region, ...]] = field(default_factory=dict)
 
 
 class Screen:
@@ -55,7 +57,7 @@ class Screen:
     def __init__(self, fitter: Fitter, hypotheses: list[Hypothesis], seed: int = 0) -> None:
         self.fitter, self.hypotheses, self.seed = fitter, hypotheses, seed
         self.peaks: Peaks | None = None
-        self.motions: dict[int, np.ndarray] = {}
+        self.motion: dict[Along, np.ndarray] = {}
         self.laws: dict[Timing, LawTerms] = {}
 
     def run(self, fit: Fit, dropped: dict[Hypothesis, str] | None = None) -> Screened:
@@ -67,7 +69,8 @@ class Screen:
         sums: Sums | None = None
         columns: list[CandidateTerm] = []
         U, back = _directions(fit.J)
-        first, seen = 0, self.data_hints(fit)
+        regions = self._regions(fit)
+        first, seen = 0, self.data_hints(fit, regions)
         for record, start in zip(
             self.fitter.fit_records, fit.initial_states or [None] * len(self.fitter.fit_records), strict=True
         ):
@@ -86,7 +89,8 @@ class Screen:
             return Screened((), np.zeros((0, 0)), np.inf, {}, dropped=dropped)
         size = np.linalg.norm(fit.J[:first], axis=0)
         likeness = np.abs(back @ sums.US) / np.maximum(size, 1e-150)[:, None]
-        return replace(self._screened(columns, sums, U.T @ fit.residual, likeness), dropped=dropped)
+        screened = self._screened(columns, sums, U.T @ fit.residual, likeness)
+        return replace(screened, dropped=dropped, regions=regions)
 
     def _laws(self, fit: Fit, timing: Timing) -> LawTerms:
         """The terms of the hypotheses' laws for records of one timing."""
@@ -95,20 +99,28 @@ class Screen:
             self.laws[timing] = law_terms(fit.structure.device, self.hypotheses, channels, timing)
         return self.laws[timing]
 
-    def data_hints(self, fit: Fit) -> Callable[[Place, int], DataHints]:
-        """What the records show at each place, after what `fit` explains."""
+    def _follow(self, fit: Fit) -> Peaks:
+        """How far the signals at every place go; with the motion along which regions are sought."""
         if self.peaks is None:
             signals = signals_along(self.fitter, fit)
             self.peaks = signal_peaks(signals)
-            axes = sorted(i for place, i in signals[0] if place is Place.FORCE) if signals else []
-            self.motions = {i: np.hstack([record[Place.FORCE, i][1:] for record in signals]) for i in axes}
-        most, along, regions = self.peaks, self._along_path(fit), self._regions(fit)
+            self.motion = motion_of(self.fitter, fit, signals)
+        return self.peaks
+
+    def data_hints(
+        self, fit: Fit, regions: dict[Along, tuple[Region, ...]] | None = None
+    ) -> Callable[[Place, int], DataHints]:
+        """What the records show at each place, after what `fit` explains; `regions` of what is left, where they are known already."""
+        regions = self._regions(fit) if regions is None else regions
+        most, along = self._follow(fit), self._along_path(fit)
         moments, part = self._moments()
         common = {"lines": self._spectral_peaks(fit), "moments": moments}
 
         def at(place: Place, i: int) -> DataHints:
-            here = along.get((place, i), {}) | regions.get((place, i), {})
-            return DataHints(most.get((place, i), {}) | {"s": part}, common | here)
+            return DataHints(
+                most.get((place, i), {}) | {"s": part},
+                common | along.get((place, i), {}) | suggested(regions, place, i),
+            )
 
         return at
 
@@ -180,20 +192,13 @@ class Screen:
             found[Place.FORCE, j] = {"spatial_periods": repeats}
         return found
 
-    def _regions(self, fit: Fit) -> dict[tuple[Place, int], dict[str, tuple[float, ...]]]:
-        """Of each axis the displacements and the speed beyond which most of what is left is."""
-        if self.fitter.recording.kind == "poses":
+    def _regions(self, fit: Fit) -> dict[Along, tuple[Region, ...]]:
+        """The regions in which most of what is left is."""
+        self._follow(fit)
+        if not self.motion:
             return {}
-        readings = fit.residual[: sum(r.valid.size for r in self.fitter.fit_records)]
-        squares = np.sum(readings.reshape(-1, len(self.fitter.recording.channels)) ** 2, axis=1)
-        return {
-            (Place.FORCE, i): {
-                "edges_above": region_edges(displacement, squares, 1),
-                "edges_below": region_edges(displacement, squares, -1),
-                "speeds": region_edges(np.abs(velocity), squares, 1),
-            }
-            for i, (displacement, velocity) in self.motions.items()
-        }
+        stretches = [key for key in self.motion if key[1] is Place.SENSOR]
+        return find_regions(Leftover.of(fit), self.motion, stretches, self.seed)
 
     def _screened(
         self, columns: list[CandidateTerm], sums: Sums, gradient: np.ndarray, likeness: np.ndarray

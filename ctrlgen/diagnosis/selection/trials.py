@@ -18,6 +18,7 @@ from ctrlgen.core.forks import in_forks
 from ctrlgen.diagnosis.selection.candidate_model import Attempt, CandidateModel, Refusal
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection, scored
+from ctrlgen.diagnosis.selection.motion_regions import no_region
 from ctrlgen.diagnosis.selection.objections import objections
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
 from ctrlgen.diagnosis.settings import SEARCH
@@ -198,7 +199,11 @@ class Trials:
         """What speaks against the causes of a candidate that are not yet `accepted`."""
         noise = self.fitter.noise
         exact = candidate.errors.is_noise and bool(noise.known.all() and not noise.guessed.any())
-        return objections(self.fitter.recording, candidate.fit, accepted, exact)
+        against = objections(self.fitter.recording, candidate.fit, accepted, exact)
+        for k in (k for k, c in enumerate(candidate.causes) if c not in accepted and k not in against):
+            if reason := no_region(self.screen.motion, candidate.fit, k):
+                against[k] = reason
+        return against
 
     def with_errors(self, candidate: CandidateModel) -> CandidateModel:
         """The same structure under the discrepancy that it leaves itself, estimated and fitted in turn."""

@@ -72,13 +72,34 @@ class RegionSettings:
     fewest_in_cell: int = 4
     """Samples of a cell, below which nothing is said."""
     outlying: float = 0.99
-    """Quantile of the squares beyond which they count no more."""
+    """Quantile of the residual's size beyond which it counts no more."""
     least_ratio: float = 1.5
-    """Mean square on the far side of an edge over that on the near side, from which it counts. Judgement."""
+    """Mean square inside over that outside, from which a region counts. Judgement."""
+    draws: int = 99
+    """Residuals in random order: chance exceeds the largest of them once in a hundred recordings."""
+    usual_quantile: float = 0.95
+    """Quantile of the largest contrast along one quantity in these, in which contrasts of that quantity count: five of them lie above."""
+    blocks: int = 200
+    """Stretches of the residual that are put in random order: each longer than the memory of most residuals, and enough of them for
+    many orders. Judgement."""
+    most_rows: int = 20000
+    """Readings that are looked at: of more, every second, third and so on."""
+    longest: float = 0.4
+    """Cells of the longest stretch between two edges, over all: a longer one is what lies beyond one edge, or the other. Judgement."""
+    shortest: int = 2
+    """Cells of the shortest region."""
+    least_outside: float = 0.1
+    """Cells outside of a region, over all, which the numbers must be told by. Judgement."""
+    least_inside: float = 0.002
+    """Share of the samples inside, below which nothing is known of a region: a few. Judgement."""
+    most_inside: float = 0.98
+    """The same above which nothing is known outside of it. Judgement."""
+    ridge: float = 1e-10
+    """Added to the scaled slopes' products, where a number acts inside a region alone."""
     most: int = 2
-    """Edges on either side that are tried. Judgement."""
-    apart: int = 6
-    """Cells between two of them. Judgement."""
+    """Stretches that are tried. Judgement."""
+    silent: float = 2.0
+    """Mean square outside of a region, over the least one, up to which that part is as quiet. Judgement."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +141,7 @@ class SearchSettings:
     """Single candidates fitted a round, and as many sets of each size."""
     cheap_factor: int = 3
     """Times as many for settled poses, whose fits are cheap."""
-    regional_per_round: int = 2
+    regional_per_round: int = 3
     """Laws in a region fitted a round, beside them. Judgement."""
     candidate_steps: int = 8
     """Levenberg-Marquardt steps of a candidate at first; the promising ones are fitted until they converge."""

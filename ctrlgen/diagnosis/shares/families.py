@@ -101,11 +101,16 @@ FAMILY_OF = {
             "drive_hysteresis",
             "slack_friction",
             "backlash",
+            "backlash_above",
+            "backlash_below",
         ),
         Family.HYSTERESIS,
     ),
     **dict.fromkeys(("stiffening", "one_sided_stiffening", "end_stop", "link_load", "lost_motion"), Family.ELASTIC),
-    **dict.fromkeys(("asymmetric_gain", "dead_zone", "saturation", "heater_resistance"), Family.DRIVE),
+    **dict.fromkeys(("stiffness_above", "stiffness_below", "stiffness_beyond"), Family.ELASTIC),
+    **dict.fromkeys(
+        ("asymmetric_gain", "dead_zone", "drive_gain_beyond", "saturation", "heater_resistance"), Family.DRIVE
+    ),
     **dict.fromkeys(
         ("drive_gain", "lever_ratio", "sensor_gain", "stiffness", "drive_offset", "home_offset", "zero_per_record"),
         Family.GAIN,
@@ -118,9 +123,10 @@ FAMILY_OF = {
     **dict.fromkeys(("clock_offset", "delay", "low_pass"), Family.TIMING),
     **dict.fromkeys(("abbe_arm", "bow", "cubic_sensor", "finite_rotation", "frame_rotation_x"), Family.GEOMETRY),
     **dict.fromkeys(("frame_rotation_y", "frame_rotation_z", "raised_point", "screw_motion"), Family.GEOMETRY),
-    **dict.fromkeys(("rectified", "stitching_error"), Family.GEOMETRY),
+    **dict.fromkeys(("local_error", "rectified", "stitching_error"), Family.GEOMETRY),
     **dict.fromkeys(("cogging", "cyclic", "quantisation"), Family.PERIODIC),
     **dict.fromkeys(("expansion", "second_pole", "temperature_sensitivity", "thermal_lag"), Family.THERMAL),
+    "temperature_sensitivity_above": Family.THERMAL,
     **dict.fromkeys(("degradation", "drift", "force_step", "lost_beams", "sensor_step", "vibration"), Family.EVENTS),
 }
 """By effect of the library its family: the place where its name says what it is, not every kind in which it can show."""
