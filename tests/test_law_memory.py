@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import tomllib
 from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
 import pytest
+from conftest import AXIS_FILE
 from law_inputs import law_inputs
 from numpy import abs, exp, sign, tanh
 from scipy.integrate import solve_ivp
 from written_laws import H, parameters
 
 import ctrlgen.effects  # noqa: F401  fills the library
+from ctrlgen import build_model
+from ctrlgen.core.files import validate
+from ctrlgen.devices import Device
 from ctrlgen.effects import Effect
+
+EVENT = '\n[[effect]]\nkind = "coulomb_after"\nat = "axis"\n{}\n'
 
 
 def along(kind: str, path: np.ndarray, p: SimpleNamespace, velocity: float | None = None) -> np.ndarray:
@@ -175,3 +182,12 @@ def test_the_force_of_dry_friction_at_standstill_is_whatever_holds_the_stage():
         "directional_friction",
         "stribeck",
     }
+
+
+def test_no_record_has_a_clock_of_its_own():
+    """Friction from a moment on: how far it is bent when a record begins is not known, what time it is then is."""
+    text = "force = '0.2 N'\nreach = '3 um'\nsmoothing = '10 um/s'\nmoment = '1 s'\nrise = '10 ms'"
+    device = validate(Device.library["axis"], tomllib.loads(AXIS_FILE.read_text() + EVENT.format(text)), "device")
+    model = build_model(device)
+    assert len(model.clocks) == 1 and not set(model.clocks) & {*model.bristles, *model.free_memories}
+    assert len(model.bristles) == 1 and set(model.bristles) <= set(model.free_memories)

@@ -58,7 +58,7 @@ class MemoryPlaces:
 def memory_places(memories: Sequence[Memory], first: int, closed: Callable[[ca.SX], ca.SX]) -> MemoryPlaces:
     """The places of the effects' states, of which the `first` is the first in x; `closed` completes what a new value is made of."""
     placed = [(first + k, member, state) for k, (member, state, _) in enumerate(memories)]
-    bristles = tuple(k for k, m, s in placed if m.effect.set_valued and not s.stepped)
+    bristles = tuple(k for k, m, s in placed if m.effect.set_valued and not (s.stepped or s.clock))
     return MemoryPlaces(
         {k: closed(m.stepped[s.name]) for k, m, s in placed if s.stepped},
         tuple(k for k, _, s in placed if s.clock),
