@@ -211,7 +211,7 @@ LAWS = {
             / (beyond(0.15, 0.4) - beyond(-0.15, 0.4))
         ),
     ),
-    "temperature_sensitivity_above": ({"reference": 0.2}, lambda s, p: p.slope * ramp(s.ambient - 0.2, 1e-3)),
+    "temperature_sensitivity_above": ({"reference": 0.2}, lambda s, p: p.slope * max(s.ambient - 0.2, 0.0)),
     "butterfly": (
         {"linear": 0.6, "reach": 0.3, "taper": 0.5},
         lambda s, p: p.share * (((s.value - weighted(s, p, s.value)) / risen(s.scale)) ** 2 * s.scale - 0.6 * s.value),

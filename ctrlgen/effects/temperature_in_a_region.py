@@ -1,13 +1,12 @@
 """A reading that moves with the temperature of the surroundings above one temperature: a clearance that is used up, a seal that grips."""
 
-from ctrlgen.effects import ActsIn, Effect, Expression, LawInputs, LawNumbers, Param, Place, Side
-from ctrlgen.effects._region import ramp
+import casadi as ca
 
-ROUNDING = 1e-3  # K
+from ctrlgen.effects import ActsIn, Effect, Expression, LawInputs, LawNumbers, Param, Place, Side
 
 
 class TemperatureSensitivityAbove(Effect):
-    """Delta y = c x^2/(x + e), x = T - T_0 where positive, T the rise of the surroundings' temperature; e = 1 mK rounds the corner.
+    """Delta y = c max(T - T_0, 0), T the rise of the surroundings' temperature, T_0 that from which on the reading moves.
 
     Holds for changes slow against the instrument's thermal time constant.
     """
@@ -24,4 +23,4 @@ class TemperatureSensitivityAbove(Effect):
     acts_in = ActsIn("temperature", "reference", Side.ABOVE)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
-        return p.slope * ramp(s.ambient - p.reference, ROUNDING)
+        return p.slope * ca.fmax(s.ambient - p.reference, 0)
