@@ -106,6 +106,20 @@ def weighted(s, p, here):
     return float(w @ (here - began - [getattr(s, f"play{k}") for k in j])) / w.sum()
 
 
+def heavy_narrow(s, p):
+    """sum_j w_j (value - play_j) of plays r (j/8)^2, each of which takes its part of the weight that the narrower ones leave."""
+    left, behind = 1.0, 0.0
+    for j in range(1, 9):
+        w = left * (PARTS[f"part{j}"] if j < 8 else 1.0)
+        radius = p.reach * (j / 8) ** 2
+        behind += w * (s.value - getattr(s, f"play{j}") - np.clip(s.start, -1, 1) * radius)
+        left -= w
+    return behind
+
+
+PARTS = {f"part{j}": 0.9 - 0.1 * j for j in range(1, 8)}
+
+
 def risen(drive):
     """What plays of reach 0.3 and taper 0.5 come to together once a drive has risen to `drive`."""
     j = np.arange(1, 9)
@@ -314,6 +328,13 @@ LAWS = {
         {"tau": 0.3, "second": 0.2},
         lambda s, p: p.share * (s.x - s.value),
         lambda s, p: {"v": (s.value - s.v) / 0.3, "w": (s.v - s.w) / 0.06, "x": (s.w - s.x) / 0.0216},
+    ),
+    **dict.fromkeys(
+        ("weighted_displacement_hysteresis", "weighted_drive_hysteresis"),
+        (
+            {"reach": 0.3, "reversible": 0.7, **PARTS},
+            lambda s, p: -p.share * (heavy_narrow(s, p) - 0.7 * s.value),
+        ),
     ),
     "zero_per_record": ({}, lambda s, p: p.share * s.zero),
     "vibration": ({"frequency": 3.0, "phase": 0.9}, lambda s, p: p.amplitude * sin(TWO_PI * 3 * s.t + 0.9)),

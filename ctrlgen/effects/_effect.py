@@ -62,6 +62,8 @@ class Effect:
     shifts_drive: ClassVar[bool] = False
     # Its amplitude [s] moves a signal in time, so far that no slope at zero tells what it would explain.
     moves_in_time: ClassVar[bool] = False
+    # Its force begins with a corner where something is touched: the integrator's steps are shorter.
+    corner: ClassVar[bool] = False
     # The force at standstill takes any value that holds the stage there (dry friction). The integrator must then be
     # implicit, in the effect's states too, whose rates must be linear in the states.
     set_valued: ClassVar[bool] = False
@@ -103,6 +105,11 @@ class Effect:
     def contradiction(cls, p: dict[str, float]) -> str:
         """Why parameters [SI] describe something else than the law; empty where they do not."""
         return ""
+
+    @classmethod
+    def from_plainer(cls, numbers: dict[str, float]) -> dict[str, float]:
+        """Where a fit of this law begins [SI] that a plainer form of it, with these `numbers`, has ended."""
+        return numbers
 
     @classmethod
     def applies_to(cls, channel: Channel) -> bool:

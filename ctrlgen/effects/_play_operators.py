@@ -3,7 +3,8 @@
 `hysteresis` of a stage, `drive_hysteresis` of a piezo stack and `displacement_hysteresis` of a joint behind the stage
 share these expressions and stay three laws: the first is a restoring force that slips with the displacement and places
 reversals between samples, the others are lags of a signal itself, so that their terms, units and parameters differ.
-`asymmetric_lag` are the latter two with edges of their own; `asymmetric_hysteresis` and `bouc_wen` are differential laws without plays.
+`asymmetric_lag` are the latter two with edges of their own, `weighted_hysteresis` with weights of their own; `asymmetric_hysteresis`
+and `bouc_wen` are differential laws without plays.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from ctrlgen.effects._law_inputs import LawInputs
 from ctrlgen.effects._parameter import State
 
 ELEMENTS = 8
+LEAST_PART = 0.02  # of a play in what is left to it, where a fit begins
 
 
 def play_states(unit: str) -> tuple[State, ...]:
@@ -80,3 +82,31 @@ def _play_names() -> list[str]:
 def radii(reach: ca.SX) -> list[ca.SX]:
     """r_j = reach j/8."""
     return [reach * j / ELEMENTS for j in range(1, ELEMENTS + 1)]
+
+
+def graded_radii(reach: ca.SX) -> list[ca.SX]:
+    """r_j = reach (j/8)^2: narrow plays closer to one another, from a 64th of the reach."""
+    return [reach * (j / ELEMENTS) ** 2 for j in range(1, ELEMENTS + 1)]
+
+
+def parted_weights(parts: list[ca.SX]) -> list[ca.SX]:
+    """w_j (8,), of which each takes its part (7,) of what the narrower ones leave, and the last the rest: sum w_j = 1."""
+    weights, left = [], 1.0
+    for part in parts:
+        weights.append(part * left)
+        left = left * (1 - part)
+    return [*weights, left]
+
+
+def graded_parts(taper: float) -> list[float]:
+    """The parts (7,) of graded plays that stand for plays of equal distances with w_j ~ j^-taper: each of these to the nearest. None is
+    all or nothing, where the weights of the others would have no slope."""
+    weights = [0.0] * ELEMENTS
+    for j in range(1, ELEMENTS + 1):
+        nearest = min(range(ELEMENTS), key=lambda i: abs(((i + 1) / ELEMENTS) ** 2 - j / ELEMENTS))
+        weights[nearest] += float(j) ** -taper
+    parts, left = [], sum(weights)
+    for weight in weights[:-1]:
+        parts.append(min(max(weight / left, LEAST_PART), 1 - LEAST_PART))
+        left -= weight
+    return parts

@@ -91,6 +91,12 @@ class Hypothesis:
         return self.prior.family
 
     @property
+    def finer(self) -> tuple[Hypothesis, ...]:
+        """The finer forms of its law, at the same place."""
+        kinds = (kind for kind, law in sorted(Effect.library.items()) if self.effect in prior_of(law).refines)
+        return tuple(replace(self, effect=kind) for kind in kinds)
+
+    @property
     def prior(self) -> LawPrior:
         """What the search believes of the law; the default for a number of the device."""
         return DEFAULT if self.effect == PARAMETER else prior_of(self.law)
@@ -236,6 +242,8 @@ def why_not_offered(
         return ""
     there = available(physics, sample_time) - (frozenset() if ambient else {"ambient"})
     prior = prior_of(law)
+    if prior.refines:
+        return f"it is tried in place of {' or '.join(sorted(prior.refines))} alone"
     if not prior.suspected:
         return f"it is never suspected: {prior.reason}"
     if there_already := prior.unless & there:

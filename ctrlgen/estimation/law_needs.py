@@ -113,6 +113,8 @@ USUAL: Sequence[Usual] = (
                 "displacement_hysteresis",
                 "asymmetric_drive_hysteresis",
                 "asymmetric_displacement_hysteresis",
+                "weighted_displacement_hysteresis",
+                "weighted_drive_hysteresis",
             }
         ),
         "a piezo without a sensor of its own lags by 2 % of a small and 10 to 15 % of a full motion (Physik Instrumente, piezo tutorial)",

@@ -73,6 +73,8 @@ class LawPrior:
     model_form_error: error of the law's form after its parameters are fitted, as a share of what the law explains.
     family: name shared by laws that are forms of one physics; a place has at most one of a family.
     nested_case: the simpler law inside this one; where the fit does not exclude it, it is named as an alternative.
+    refines: the plainer laws of which this is a finer form, with more numbers. It is never suspected itself, but tried in the place of
+        one of them that is among the causes, where that leaves more than noise.
     unless: what a device must not have (words of `Effect.requires`) for the law to be suspected there: another law says the same.
     suspected: False for what a device file may state, and no recording shows beside what else it shows.
     in_a_region: the law is another one in a part of the motion: it is tried beside the others and never takes their turn.
@@ -89,6 +91,7 @@ class LawPrior:
     model_form_error: float = 0.0
     family: str | None = None
     nested_case: NestedCase | None = None
+    refines: frozenset[str] = frozenset()
     unless: frozenset[str] = frozenset()
     suspected: bool = True
     in_a_region: bool = False

@@ -15,6 +15,7 @@ from types import MappingProxyType
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.law_prior import ONE_IN_A_HUNDRED, ONE_IN_TEN, LawPrior, NestedCase, ParameterPrior, peaks
 from ctrlgen.estimation.priors_in_a_region import IN_A_REGION
+from ctrlgen.estimation.priors_of_a_lag import HYSTERESIS, OF_A_LAG
 
 
 def prior_of(law: type[Effect]) -> LawPrior:
@@ -27,18 +28,7 @@ _starts = ParameterPrior  # shorthand: _starts((0.1, 1.0)) is a parameter with t
 
 
 # a force that slips after no way is dry friction, and one that never slips a spring
-_TAPER = ParameterPrior((0.5,), at_low_bound="a single play, or a gain")
 _LOOP = ParameterPrior((0.01, 0.03, 0.1, 0.3, 1.0), at_bound="dry friction, or a spring")
-
-
-def _reach(*multiples: float, peaks: bool = False) -> ParameterPrior:
-    """Start values of the way after which plays follow: where none does, or all do at once, what is left is proportional."""
-    return ParameterPrior(multiples, scales_with_peak=peaks, at_bound="a gain")
-
-
-def _reversible(*values: float) -> ParameterPrior:
-    """Start values of the part of a loop that is none."""
-    return ParameterPrior(values, at_bound="a gain beside a smaller loop", proportional=True)
 
 
 _EVENT = {"moment": ParameterPrior(start_from_data="moments"), "rise": peaks(1.0)}  # it may happen at any time
@@ -47,27 +37,9 @@ _EVENTS_ARE_RARE = (
     "something of any structured residual. Judgement."
 )
 _DRY_FRICTION = "Forms of one contact. Measured friction differs by a few per cent from any of them; 2 % is judgement."
-_HYSTERESIS = (
-    "Forms of one loop. 2 %: nature leaves about a fiftieth of a loop beside any of them, judged on simulated cases."
-)
 _IN_BALANCE = (
     " In a stage in balance a force that lags and a displacement that lags show the same to first order; there the latter is "
     "suspected, whose memory stays out of the balance."
-)
-_ASYMMETRIC_LAG = LawPrior(
-    "Rarer than a symmetric loop: judgement. Heaters have none. Begun with one branch wider, or the other. "
-    + _HYSTERESIS,
-    log_prior_odds=ONE_IN_TEN,
-    model_form_error=0.02,
-    family="hysteresis",
-    parameters={
-        "reach": _reach(0.1, 0.4, peaks=True),
-        "taper": _starts((0.5,)),
-        "reversible": _reversible(0.0),
-        "upper": _starts((-0.3, 0.3)),
-        "lower": _starts((0.0,)),
-        "side": _starts((0.0,)),
-    },
 )
 _CREEP = "Forms of one relaxation spectrum; 1 %: judgement."
 
@@ -165,7 +137,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             "Rarer than a gain that is wrong in both directions: judgement.", log_prior_odds=ONE_IN_TEN
         ),
         "butterfly": LawPrior(
-            "Actuators without bias are rare: judgement. " + _HYSTERESIS,
+            "Actuators without bias are rare: judgement. " + HYSTERESIS,
             log_prior_odds=ONE_IN_TEN,
             unless=frozenset({"heat"}),
             model_form_error=0.02,
@@ -183,15 +155,6 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
         "degradation": LawPrior(
             "From a loss that ends within the recording to a steady one.",
             parameters={"levels_off": _starts((3.0, 30.0, 1e4))},
-        ),
-        "drive_hysteresis": LawPrior(
-            "Rarer than hysteresis of the stage, which explains the same in a stage of constant stiffness: judgement. Heaters have none. "
-            + _HYSTERESIS,
-            log_prior_odds=ONE_IN_TEN,
-            unless=frozenset({"heat"}),
-            model_form_error=0.02,
-            family="hysteresis",
-            parameters={"reach": _reach(0.03, 0.1, 0.3, 1.0), "taper": replace(_TAPER, start_values=(0.0,))},
         ),
         "reversed": LawPrior(
             "A wiring fault is rarer than a wrong gain: judgement. A lead is swapped or it is not.",
@@ -225,17 +188,15 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
         ),
         # Force ----------------------------------------------------------------------------------------------------------------
         "asymmetric_hysteresis": LawPrior(
-            "Rarer than a symmetric loop: judgement. " + _HYSTERESIS + _IN_BALANCE,
+            "Rarer than a symmetric loop: judgement. " + HYSTERESIS + _IN_BALANCE,
             log_prior_odds=ONE_IN_TEN,
             unless=frozenset({"balanced"}),
             model_form_error=0.02,
             family="hysteresis",
             parameters={"reach": _LOOP, "skew": _starts((-0.6, 0.6))},
         ),
-        "asymmetric_displacement_hysteresis": _ASYMMETRIC_LAG,
-        "asymmetric_drive_hysteresis": replace(_ASYMMETRIC_LAG, unless=frozenset({"heat"})),
         "bouc_wen": LawPrior(
-            _HYSTERESIS + _IN_BALANCE,
+            HYSTERESIS + _IN_BALANCE,
             unless=frozenset({"balanced"}),
             model_form_error=0.02,
             family="hysteresis",
@@ -256,6 +217,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             parameters={"reach": peaks(3e-4, 3e-3, 0.03), "smoothing": peaks(1e-4, 0.1)},
         ),
         **IN_A_REGION,
+        **OF_A_LAG,
         "directional_friction": LawPrior(
             "Dry friction alike in both directions is commoner: judgement. " + _DRY_FRICTION,
             log_prior_odds=-1.0,
@@ -277,7 +239,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             _EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, of_time=True, domain="disturbance", parameters=_EVENT
         ),
         "hysteresis": LawPrior(
-            _HYSTERESIS + _IN_BALANCE,
+            HYSTERESIS + _IN_BALANCE,
             unless=frozenset({"balanced"}),
             model_form_error=0.02,
             family="hysteresis",
@@ -294,7 +256,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             parameters={"frequency": _starts((10.0, 20.0, 40.0, 80.0, 160.0, 320.0)), "damping": _starts((0.02, 0.2))},
         ),
         "slack_friction": LawPrior(
-            "Friction without a slack before it is commoner: judgement. " + _HYSTERESIS + _IN_BALANCE,
+            "Friction without a slack before it is commoner: judgement. " + HYSTERESIS + _IN_BALANCE,
             log_prior_odds=-1.0,
             unless=frozenset({"balanced"}),
             model_form_error=0.02,
@@ -320,22 +282,6 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             model_form_error=0.01,
             family="creep",
             parameters={"tau": _starts((0.03, 0.3, 3.0, 30.0, 300.0)), "slow": _starts((0.0, 0.25))},
-        ),
-        "displacement_bouc_wen": LawPrior(
-            _HYSTERESIS,
-            model_form_error=0.02,
-            family="hysteresis",
-            parameters={"reach": _reach(0.01, 0.03, 0.1, 0.3, 1.0, peaks=True), "loop": _starts((0.55, 0.9))},
-        ),
-        "displacement_hysteresis": LawPrior(
-            _HYSTERESIS,
-            model_form_error=0.02,
-            family="hysteresis",
-            parameters={
-                "reach": _reach(0.03, 0.1, 0.3, 1.0, peaks=True),
-                "taper": _TAPER,
-                "reversible": _reversible(0.0, 1.0),
-            },
         ),
         "finite_rotation": LawPrior("One geometry for all components.", acts_on_all=True),
         "lever_ratio": LawPrior(

@@ -15,6 +15,7 @@ from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
 from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.estimation.settings import FIT
 from ctrlgen.estimation.structure import Structure
 
 
@@ -25,6 +26,7 @@ def fit_candidates(trials: Trials, current: CandidateModel, screened: Screened) 
         return t if current.errors.is_noise else restart_elsewhere(branch, t, current, screened)
 
     candidates = fit_each(trials, current.fit, significant(trials, current, screened), in_other_shapes)
+    candidates = (*candidates, *finer_forms(trials, current))
     candidates = (*candidates, *fit_other_clocks(trials, current, candidates))
     if trials.selection.parameters_may_mask_cause(current.fit):
         candidates = (*candidates, *_as_stated(trials, current))
@@ -67,6 +69,22 @@ def fit_each(
         ]
 
     return tuple(t for fitted in trials.each(one, suspects, lambda s: trying(s.hypothesis)) for t in fitted)
+
+
+def finer_forms(trials: Trials, current: CandidateModel) -> tuple[CandidateModel, ...]:
+    """`current` with a finer form of one of its laws in that one's place, for each that has one, where more than noise is left."""
+    if current.errors.is_noise:
+        return ()
+
+    def one(branch: Trials, form: tuple[int, Hypothesis]) -> list[CandidateModel]:
+        k, finer = form
+        start = finer.law.from_plainer(current.fit.values(k))
+        structure = current.fit.restarted.without(k).with_cause(finer, start)
+        return branch.tried(structure, finer, steps=FIT.max_steps)
+
+    forms = [(k, finer) for k, cause in enumerate(current.causes) for finer in cause.finer]
+    fits = trials.each(one, forms, lambda form: f"{trying(form[1])} instead")
+    return tuple(t for fitted in fits for t in fitted)
 
 
 def trying(*causes: Hypothesis) -> str:

@@ -99,6 +99,15 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
             ("thermal", "A share of the actuator's action that builds up slowly, as heat spreads through a body"),
             ("", "A share of the drive's action that builds up slowly"),
         ),
+        "weighted_displacement_hysteresis": (
+            ("piezo", "Hysteresis of the piezo, or of a joint behind it: the displacement lags"),
+            ("", "Hysteresis of a joint or guide between stage and mechanism: the displacement lags"),
+        ),
+        "weighted_drive_hysteresis": (
+            ("piezo", "Hysteresis of the piezo: the displacement lags behind the voltage"),
+            ("electromagnetic", "Hysteresis of the motor's iron: the force lags behind the current"),
+            ("", "Hysteresis of the actuator: its force lags behind the drive"),
+        ),
     }
 )
 

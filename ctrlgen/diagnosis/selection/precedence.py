@@ -15,6 +15,7 @@ from ctrlgen.diagnosis.selection.confusable import explains_alike
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
 from ctrlgen.diagnosis.settings import CONFUSABLE, PRECEDENCE, SEARCH
+from ctrlgen.diagnosis.shares.families import FAMILY_OF, Family
 from ctrlgen.effects import Place
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis
 from ctrlgen.recordings.recording import Recording
@@ -38,6 +39,25 @@ def acting_first(
         if explains_alike(compare, t, best) or nearly:
             return t
     return best
+
+
+def one_loop_first(
+    trials: Trials, current: CandidateModel, best: CandidateModel, candidates: Sequence[CandidateModel]
+) -> CandidateModel:
+    """The best candidate; where it adds a further loop to a hysteresis at its place, rather the finer form of that one, if it takes away
+    nearly as much: a play is one width of a hysteresis."""
+    for added in (c for c in best.causes if c not in current.causes and _is_loop(c)):
+        there = [c for c in current.causes if c.at == added.at and _is_loop(c)]
+        forms = {finer for c in there for finer in c.finer}
+        finer = [t for t in candidates if t.cause in forms and len(t.causes) == len(current.causes)]
+        for t in trials.selection.ranked([t for t in finer if trials.selection.improves_enough(current, t)]):
+            if _share_of(current, best, t) >= PRECEDENCE.nearly_as_much:
+                return t
+    return best
+
+
+def _is_loop(cause: Hypothesis) -> bool:
+    return FAMILY_OF.get(cause.effect) is Family.HYSTERESIS
 
 
 def _of_time(candidate: CandidateModel, current: CandidateModel) -> bool:

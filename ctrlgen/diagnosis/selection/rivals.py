@@ -18,7 +18,7 @@ from ctrlgen.diagnosis.selection.supported import amplitude_may_be_zero
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
 from ctrlgen.estimation.fit import Fit
-from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis
 from ctrlgen.estimation.settings import FIT
 from ctrlgen.estimation.structure import Structure
 
@@ -39,6 +39,9 @@ def simplified(trials: Trials, current: CandidateModel) -> CandidateModel:
     """The model with the special case of each law in its place that the fit does not exclude, where it explains alike: how
     the friction falls with speed, say, is then within what noise or discrepancy feigns."""
     for k in range(len(current.causes)):
+        plainer = _plainer(trials, current, k)
+        if plainer is not current:
+            return simplified(trials, plainer)
         current = _in_usual_shape(trials, current, k)
         special = current.fit.nested_case(k)
         candidates = replacements(trials, current, k) if special else []
@@ -46,6 +49,23 @@ def simplified(trials: Trials, current: CandidateModel) -> CandidateModel:
             if explains_alike(trials.selection, t, current) and not trials.objections(t, current.causes):
                 return simplified(trials, trials.converged(t))
     return current
+
+
+def _plainer(trials: Trials, current: CandidateModel, k: int) -> CandidateModel:
+    """The model with the plainest of the laws that cause k is a finer form of, where that is enough beside what came later."""
+    cause = current.causes[k]
+    if not cause.prior.refines:
+        return current
+    others, fits = current.fit.restarted.without(k), []
+    for plain in (replace(cause, effect=effect) for effect in sorted(cause.prior.refines)):
+        channel = plain.channel_on(current.fit.structure.device)
+        common = {p.name for p in plain.law.params} & current.fit.values(k).keys()
+        numbers = {name: current.fit.values(k)[name] for name in common}
+        starts = [others.with_cause(plain, shape | numbers) for shape in plain.shapes(channel, DataHints())]
+        begun = min(starts, key=trials.fitter.initial_objective)
+        fits += [trials.converged(t) for t in trials.tried(begun, plain)]
+    sound = [t for t in fits if not trials.selection.improves_enough(t, current) and not trials.objections(t)]
+    return trials.selection.ranked(sound)[0] if sound else current
 
 
 def acting_instead(trials: Trials, current: CandidateModel) -> CandidateModel:
@@ -125,7 +145,7 @@ def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Rou
     alike = {
         t.cause: t
         for t in reversed(candidates)
-        if not (_same_name(t.cause, there[k]) or _contains(t, there[k])) and is_alike(t)
+        if not (_same_name(t.cause, there[k]) or _contains(t, there[k]) or _one_law(t.cause, there[k])) and is_alike(t)
     }
     # a line and a pitch at one speed: how rare a line is does not tell them apart
     for t in counterparts(trials, current, k):
@@ -191,6 +211,11 @@ def _contains(rival: CandidateModel, cause: Hypothesis) -> bool:
     """Whether a rival's law is the cause's but for numbers that it does not tell from those of the cause: it is no other physics."""
     places = [k for k, c in enumerate(rival.causes) if c == rival.cause and c.location == cause.location]
     return any(rival.fit.nested_case(k) == cause.effect for k in places)
+
+
+def _one_law(a: Hypothesis | None, b: Hypothesis) -> bool:
+    """Whether one cause is a finer form of the other."""
+    return a is not None and (b in a.finer or a in b.finer)
 
 
 def _same_name(a: Hypothesis | None, b: Hypothesis) -> bool:

@@ -100,6 +100,8 @@ FAMILY_OF = {
             "displacement_hysteresis",
             "drive_hysteresis",
             "slack_friction",
+            "weighted_displacement_hysteresis",
+            "weighted_drive_hysteresis",
             "backlash",
             "backlash_above",
             "backlash_below",
