@@ -69,7 +69,9 @@ def clipped(s, p):
 def gripping(s, p):
     """Springs that slip at r_j, each behind half the slack to either side."""
     r = p.reach * np.arange(1, 9) / 8
-    plays = np.array([getattr(s, f"play{j}") for j in range(1, 9)]) + np.clip(s.start, -1, 1) * (r + p.slack / 2)
+    plays = (
+        np.array([getattr(s, f"play{j}") for j in range(1, 9)]) + s.turn + np.clip(s.start, -1, 1) * (r + p.slack / 2)
+    )
     e = s.displacement - plays
     return -p.force * np.sum(sign(e) * np.maximum(abs(e) - p.slack / 2, 0)) / r.sum()
 
@@ -100,9 +102,9 @@ def logarithmic(s, p):
 
 
 def weighted(s, p, here):
-    """sum_j w_j (here - play_j); each play is counted from where it began, at a share of its radius."""
+    """sum_j w_j (here - play_j); each play is counted from where it began, a share of its radius off the turn."""
     j = np.arange(1, 9)
-    w, began = j**-p.taper, np.clip(s.start, -1, 1) * p.reach * j / 8
+    w, began = j**-p.taper, s.turn + np.clip(s.start, -1, 1) * p.reach * j / 8
     return float(w @ (here - began - [getattr(s, f"play{k}") for k in j])) / w.sum()
 
 
@@ -112,7 +114,7 @@ def heavy_narrow(s, p):
     for j in range(1, 9):
         w = left * (PARTS[f"part{j}"] if j < 8 else 1.0)
         radius = p.reach * (j / 8) ** 2
-        behind += w * (s.value - getattr(s, f"play{j}") - np.clip(s.start, -1, 1) * radius)
+        behind += w * (s.value - getattr(s, f"play{j}") - s.turn - np.clip(s.start, -1, 1) * radius)
         left -= w
     return behind
 

@@ -19,17 +19,20 @@ LEAST_PART = 0.02  # of a play in what is left to it, where a fit begins
 
 
 def play_states(unit: str) -> tuple[State, ...]:
-    """The plays of a signal in `unit`, counted from where they begin, and `start`: P_j begins at start r_j.
+    """The plays of a signal in `unit`, counted from where they begin, and the turning point before: P_j begins at turn + start r_j.
 
-    At rest in the middle start is 0; after a long way down it is 1, after a long way up -1.
+    At rest in the middle of all plays, at `turn`, start is 0; after a long way down to there it is 1, after a long way up -1.
     """
     plays = (State(name, unit, 1.0, stepped=True) for name in _play_names())
-    return (*plays, State("start", "1", 1.0, per_record=True))
+    return (*plays, State("turn", unit, 1.0, per_record=True), State("start", "1", 1.0, per_record=True))
 
 
 def beginning(s: LawInputs, radius: ca.SX) -> ca.SX:
     """Where a play of this `radius` begins: within it; in its middle where the law has no `start`."""
-    return radius * ca.fmax(ca.fmin(s.states.start, 1.0), -1.0) if hasattr(s.states, "start") else 0.0 * radius
+    if not hasattr(s.states, "start"):
+        return 0.0 * radius
+    turn = s.states.turn if hasattr(s.states, "turn") else 0.0
+    return turn + radius * ca.fmax(ca.fmin(s.states.start, 1.0), -1.0)
 
 
 def weighted_lag(s: LawInputs, value: ca.SX, reach: ca.SX, taper: ca.SX) -> ca.SX:

@@ -15,6 +15,7 @@ import numpy as np
 from ctrlgen.devices import Device
 from ctrlgen.estimation.checkpoint import Checkpoint, key_of
 from ctrlgen.estimation.error_model import ErrorModel, error_model
+from ctrlgen.estimation.initial_memory import begins_worse, turning_point_before
 from ctrlgen.estimation.least_squares import LeastSquaresProblem, initial_state_sd, limited, whiten_residual
 from ctrlgen.estimation.noise import Noise
 from ctrlgen.estimation.settings import DISCREPANCY, FIT, HELD_OUT_REFIT, SIMULATION, STATISTICS
@@ -154,7 +155,8 @@ class Fitter:
         """
         problem = self.problem(structure)
         start = np.concatenate([structure.start if theta is None else theta, np.zeros(problem.n_initial)])
-        first = self._optimum(problem, start, steps, enough if nested is None else min(enough, nested.objective))
+        begun = self._optimum(problem, start, steps, enough if nested is None else min(enough, nested.objective))
+        first = self._from_turning_points(problem, begun, steps)
         if nested is None or first.objective <= nested.objective:
             return first
         near = start.copy()
@@ -171,6 +173,23 @@ class Fitter:
         for x in (near, stated):
             best = min(best, self._optimum(problem, x, steps, best.objective), key=lambda fit: fit.objective)
         return best
+
+    def _from_turning_points(self, problem: LeastSquaresProblem, fit: Fit, steps: int) -> Fit:
+        """The fit, or the one reached with its plays at the turning points before the records that begin worse than they go on."""
+        states, first = list(fit.initial_states), 0
+        for i, record in enumerate(self.fit_records):
+            white = fit.residual[first : first + record.observed.size]
+            first += record.observed.size
+            simulator = self.simulator(fit.structure, record)
+            if simulator.plays and begins_worse(record, white):
+                sd = initial_state_sd(simulator)
+                begun = states[i] / sd
+                turned = turning_point_before(simulator, fit.theta, record, begun, self._white)
+                states[i] = states[i] if turned is begun else sd * turned
+        if all(a is b for a, b in zip(states, fit.initial_states, strict=True)):
+            return fit
+        again = self._optimum(problem, np.concatenate([fit.theta, *states]), steps)
+        return min(fit, again, key=lambda f: f.objective)
 
     def described(self, device: Device) -> tuple[Fitter, Fit]:
         """The device as described, without causes, and the fitter with the discrepancy that it leaves.
@@ -222,7 +241,8 @@ class Fitter:
     def begun(self, fit: Fit, record: Record) -> tuple[np.ndarray, np.ndarray]:
         """What is added to the free initial states [SI] so that they suit a record best, and the readings (n, n_y) [SI] from there.
 
-        One Gauss-Newton step from rest, shortened until it lowers the objective; from rest where no step does.
+        One Gauss-Newton step from rest, shortened until it lowers the objective; from rest where no step does. Where the record then
+        begins worse than it goes on and a law has plays, another from the turning point before it.
         """
         simulator, error = self.simulator(fit.structure, record), self.error.weighted
         key = (id(simulator), id(record), fit.theta.tobytes(), error.sd.tobytes(), *(a.tobytes() for a in error.ar))
@@ -236,24 +256,38 @@ class Fitter:
 
     def _begun(self, simulator: Simulator, fit: Fit, record: Record) -> tuple[np.ndarray, np.ndarray]:
         sd = initial_state_sd(simulator)
-        rest = np.zeros(len(sd))
         if len(sd) == 0:
-            return rest, simulator.simulate(record, fit.theta)
-        y, Y = simulator.sensitivities(record, fit.theta, rest, by_free=False)
+            return sd, simulator.simulate(record, fit.theta)
+        objective, begun, y = self._begun_near(simulator, fit.theta, record, np.zeros(len(sd)))
+        if simulator.plays and begins_worse(record, self._white(record, y)):
+            turned = turning_point_before(simulator, fit.theta, record, begun, self._white)
+            if turned is not begun:
+                again = self._begun_near(simulator, fit.theta, record, turned)
+                objective, begun, y = min((objective, begun, y), again, key=lambda found: found[0])
+        return sd * begun, y
+
+    def _begun_near(
+        self, simulator: Simulator, theta: np.ndarray, record: Record, begun: np.ndarray
+    ) -> tuple[float, np.ndarray, np.ndarray]:
+        """The objective, the initial states in their prior deviations and the readings, one Gauss-Newton step from `begun`."""
+        sd = initial_state_sd(simulator)
+        y, Y = simulator.sensitivities(record, theta, sd * begun, by_free=False)
         white = self._white(record, y)
+        objective = float(white @ white + begun @ begun)
         J = self.error.whiten(Y, record.valid).reshape(len(white), len(sd)) * sd
         if not (np.isfinite(white).all() and np.isfinite(J).all()):
-            return rest, y
+            return np.inf, begun, y
         with_prior = np.vstack([J, np.eye(len(sd))])
-        step = np.linalg.lstsq(with_prior, np.concatenate([white, rest]), rcond=None)[0]
+        step = np.linalg.lstsq(with_prior, np.concatenate([white, -begun]), rcond=None)[0]
         # a gap or a friction threshold makes the first step useless
         for _ in range(HELD_OUT_REFIT.halvings):
-            shifted = simulator.simulate(record, fit.theta, sd * step)
+            there = begun + step
+            shifted = simulator.simulate(record, theta, sd * there)
             residual = self._white(record, shifted)
-            if residual @ residual + step @ step <= white @ white:
-                return sd * step, shifted
+            if (value := float(residual @ residual + there @ there)) <= objective:
+                return value, there, shifted
             step = step / 4
-        return rest, y
+        return objective, begun, y
 
     def _white(self, record: Record, y: np.ndarray) -> np.ndarray:
         """The whitened residual (n n_y,); large values are not limited."""

@@ -265,6 +265,22 @@ class HeldOutRefitSettings:
 
 
 @dataclass(frozen=True)
+class InitialMemorySettings:
+    """Where the plays of a hysteresis stood when a record began."""
+
+    rows: int = 300
+    """Samples at the beginning of a record, a quarter of it at most, that tell where plays stood before it: each is dragged along as
+    soon as the motion has gone its width. Judgement."""
+    worse: float = 1.5
+    """Mean square there over that of the rest, from which on the beginning is wrong. Judgement."""
+    ways_back: tuple[float, ...] = (0.05, 0.15, 0.4, 1.0, 2.0)
+    """How far the motion has come back since it turned last before a record, in prior deviations of a place, from which a search for
+    the turning point begins. Judgement."""
+    far: float = 30.0
+    """From where every play is dragged along, in the same."""
+
+
+@dataclass(frozen=True)
 class ResidualTestsSettings:
     """Model validation on the held-out records, the fitted ones and rest."""
 
@@ -371,6 +387,7 @@ NOISE_UPDATE = NoiseUpdateSettings()
 OUTLIERS = OutlierSettings()
 POSE_OUTLIERS = PoseOutlierSettings()
 HELD = HeldSettings()
+INITIAL_MEMORY = InitialMemorySettings()
 SIMULATION = SimulationSettings()
 FIT = FitSettings()
 HELD_OUT_REFIT = HeldOutRefitSettings()

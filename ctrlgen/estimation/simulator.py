@@ -97,6 +97,21 @@ class Simulator:
         return (*range(m.n_states), *m.free_memories, *moving)
 
     @cached_property
+    def plays(self) -> tuple[tuple[int, int, int], ...]:
+        """Of each law with plays: the place in S of its narrowest, and among the free initial states those of the turning point before a
+        record and of the side on which plays stood there."""
+        names, free = self.model.x_names, {k: i for i, k in enumerate(self.free_initial_states)}
+        places = {name: k for k, name in enumerate(names)}
+        found = []
+        for name in (name for name in names if "_turn_" in name):
+            play, turn, start = (
+                places.get(name.replace("_turn_", f"_{other}_")) for other in ("play1", "turn", "start")
+            )
+            if play is not None and turn in free and start in free:
+                found.append((play, free[turn], free[start]))
+        return tuple(found)
+
+    @cached_property
     def _observed(self) -> ca.SX:
         signals = self.model.signals
         rows = []

@@ -1,0 +1,61 @@
+"""Where the plays of a hysteresis stood when a record began: what moved before it is not recorded.
+
+Plays that were dragged along remember where the motion turned last. One that the motion does not drag along at first has no slope by
+that place, and a search from the middle of all plays stays there: a few places are tried first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ctrlgen.estimation.least_squares import initial_state_sd
+from ctrlgen.estimation.settings import INITIAL_MEMORY
+from ctrlgen.estimation.simulator import Simulator
+from ctrlgen.recordings.gaps import rows_of
+from ctrlgen.recordings.recording import Record
+
+White = Callable[[Record, np.ndarray], np.ndarray]  # (record, readings) -> whitened residual (n n_y,)
+
+
+def begins_worse(record: Record, white: np.ndarray) -> bool:
+    """Whether the whitened residual (n n_y,) of a record is larger in its first part than after it."""
+    squares = white.reshape(len(record.time), -1) ** 2
+    rows = _first_rows(record)
+    return bool(squares[:rows].mean() > INITIAL_MEMORY.worse * max(squares[rows:].mean(), 1.0))
+
+
+def turning_point_before(
+    simulator: Simulator, theta: np.ndarray, record: Record, begun: np.ndarray, white: White
+) -> np.ndarray:
+    """The free initial states in their prior deviations with which the first part of a record is foretold best: as `begun`, or with a
+    turning point before the record at one of several ways back from where it begins."""
+    sd = initial_state_sd(simulator)
+    first = rows_of(record, np.arange(len(record.time)) < _first_rows(record))
+
+    def squares(states: np.ndarray) -> float:
+        residual = white(first, simulator.simulate(first, theta, sd * states))
+        return float(residual @ residual + states @ states)
+
+    def moved(turn: int, start: int, place: float, side: float) -> np.ndarray:
+        states = best.copy()
+        states[[turn, start]] = place, side / sd[start]
+        return states
+
+    best, least = begun, squares(begun)
+    for play, turn, start in simulator.plays:
+        # dragged along from either side, the narrowest play tells where the motion begins
+        far = [moved(turn, start, place, 0.0) for place in (INITIAL_MEMORY.far, -INITIAL_MEMORY.far)]
+        ends = [simulator.simulate_states(first, theta, sd * f)[0][0, play] / sd[turn] + f[turn] for f in far]
+        here = float(np.mean(ends))
+        for way in (0.0, *INITIAL_MEMORY.ways_back):
+            for side, place in ((-1.0, here + way), (1.0, here - way), (0.0, here + way), (0.0, here - way)):
+                states = moved(turn, start, place, side)
+                if (value := squares(states)) < least:
+                    best, least = states, value
+    return best
+
+
+def _first_rows(record: Record) -> int:
+    return min(INITIAL_MEMORY.rows, max(len(record.time) // 4, 1))

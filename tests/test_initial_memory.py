@@ -1,0 +1,47 @@
+"""Records that begin in the middle of a motion: where the plays of a hysteresis stood is found from what follows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from axis_records import H, record
+from recovery import fitter_of
+from test_finer_forms import NOISE, SERVO, lagging, moved
+
+from ctrlgen.core.files import validate
+from ctrlgen.devices import Device
+from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.structure import Structure
+
+LAW = Hypothesis("displacement_hysteresis", "stage:axis", "axis")
+REACH, SHARE = 2e-5, 0.15
+BEGUN = {"share": SHARE, "reach": REACH, "taper": 0.0, "reversible": 0.0}
+
+
+def cut(fit_from: int, held_from: int) -> tuple[Fitter, Structure]:
+    """Records from these samples on; the axis went through plays that lag by up to 1.7 um, 170 times the noise, before."""
+    device = validate(Device.library["servo"], SERVO, "device")
+    rng, parts = np.random.default_rng(1), []
+    for seed, role, begin in ((2, "fit", fit_from), (4, "hold_out", held_from)):
+        u = moved(seed)
+        y = lagging(u, REACH * np.arange(1, 9) / 8, SHARE) + NOISE * rng.standard_normal(len(u))
+        parts.append(record(u[begin:], y[begin:], role, h=H))
+    fitter = fitter_of(device, ("reading.axis",), ("um",), (NOISE,), "series", parts)
+    return fitter, Structure(device).with_cause(LAW, BEGUN)
+
+
+@pytest.mark.parametrize("begin", [280, 440])
+def test_a_held_out_record_begins_with_the_memory_of_what_was_before(begin):
+    fitter, structure = cut(0, begin)
+    fit, held = fitter.fit(structure, steps=3), fitter.held_out_records[0]
+    assert (
+        np.sqrt(np.mean((held.observed - fitter.predict(fit, held)) ** 2)) < 1.1 * NOISE
+    )  # 6 of it from the middle of all plays
+
+
+def test_a_record_to_fit_begins_with_the_memory_of_what_was_before():
+    fitter, structure = cut(280, 0)
+    fit = fitter.fit(structure)
+    assert np.sqrt(fit.chi2 / fit.n) < 1.1  # 15 from the middle of all plays
+    assert fit.values(0)["share"] == pytest.approx(SHARE, rel=0.01)
