@@ -25,6 +25,9 @@ SHORTEST = {"series": 20, "poses": 3}  # rows below which a record says nothing
 BREAK = 1.5  # sample times without a sample: a gap
 LONGEST = 100  # rows of a gap that is bridged unasked
 RIGHT = 2e-3  # of the drive's range: how far off a bridge may be that nobody asked for
+# Rows in all of which a bridge of a device without inertia may be that far off, and farther in fewer: what it leaves in a memory grows
+# with how long it lasts, and a mass alone is kicked by the least.
+BRIEF = 5
 REST_SAMPLES = 5  # on each side of a gap, over which the drive must be at rest
 STEPPED = 0.5  # of the samples around differ from the one before, at most, where a drive steps
 # steps that tell the clock of a drive that steps: a chance divisor of so many distances is one in thirty
@@ -36,14 +39,14 @@ TOLD = 1e-6  # of the drive's range: how far off a bridge must be for a note to 
 LISTED_CUTS = 5  # places at which a record was cut that a note names
 
 
-def bridged(record: Record, gap: Gap | None) -> tuple[Record, list[str]]:
+def bridged(record: Record, gap: Gap | None, inertial: bool = True) -> tuple[Record, list[str]]:
     """The record with the rows that it lacks, their readings not valid, and their drive as `gap` says or, unasked, as each drive tells;
     gaps that cannot be bridged stay as they were. A note on how many were, and the longest."""
     whole, kept = _on_its_grid(record)
     known = np.isfinite(whole.drive).all(axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[True], known, [True]]).astype(int))).reshape(-1, 2)
     inside = [(a, b) for a, b in edges.tolist() if a > 0 and b < len(known)]
-    drives = [_Drive(u) for u in whole.drive.T] if inside else []
+    drives = [_Drive(u, inertial) for u in whole.drive.T] if inside else []
     drive, valid, sizes = whole.drive.copy(), whole.valid.copy(), []
     for a, b in inside:
         if b - a > (known.sum() if gap else LONGEST):
@@ -78,8 +81,9 @@ class _Drive:
     """One drive (n,), NaN where it is not known, and what it tells of its gaps: `ways` that it was taken across them, and `off`, the
     largest error in trials of those [range of the drive]."""
 
-    def __init__(self, u: np.ndarray) -> None:
+    def __init__(self, u: np.ndarray, inertial: bool) -> None:
         self.u = u
+        self.brief = 1 if inertial else BRIEF
         self.ways: set[Way] = set()
         self.off = 0.0
         self.span = float(np.nanmax(u) - np.nanmin(u))
@@ -120,7 +124,7 @@ class _Drive:
         apart = float(np.abs(values["smooth"] - values["linear"]).max())
         if apart > (USUAL * errors["linear"] + RIGHT) * self.span:
             best = "linear"
-        if errors[best] > RIGHT or self._jumps(a, b):
+        if errors[best] > RIGHT * max(self.brief / (b - a), 1.0) or self._jumps(a, b):
             return None
         self.ways.add(best)
         self.off = max(self.off, errors[best])
@@ -161,12 +165,13 @@ def rows_of(record: Record, kept: np.ndarray) -> Record:
     return replace(record, time=time, drive=drive, observed=observed, valid=valid, ambient=ambient)
 
 
-def stretches(record: Record, gap: Gap | None = None) -> tuple[list[Record], list[str]]:
+def stretches(record: Record, gap: Gap | None = None, inertial: bool = True) -> tuple[list[Record], list[str]]:
     """The record with short gaps bridged, cut at the others in time and where a drive is missing, and joined across one in which the
-    drive rests; and a note on what was done. `gap` says what the drive does in all of them."""
+    drive rests; and a note on what was done. `gap` says what the drive does in all of them; a device that is not `inertial` follows a
+    drive at once, and a bridge may be rougher the shorter it is."""
     # one thread: the matrices are small
     with threadpool_limits(1):
-        record, bridged_notes = (record, []) if gap == "split" else bridged(record, gap)
+        record, bridged_notes = (record, []) if gap == "split" else bridged(record, gap, inertial)
     known = np.isfinite(record.drive).all(1)
     breaks = (np.flatnonzero(np.diff(record.time) > BREAK * record.sample_time) + 1).tolist()
     edges = np.flatnonzero(np.diff(np.r_[False, known, False].astype(int)))

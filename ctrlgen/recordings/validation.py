@@ -73,7 +73,7 @@ def validate_record(
         sample_time, clock_notes, clock_faults = _sample_time(record, where)
         faults += clock_faults
         if not faults:
-            parts, gap_notes = stretches(replace(record, sample_time=sample_time), gap)
+            parts, gap_notes = stretches(replace(record, sample_time=sample_time), gap, model.inertial)
             notes = clock_notes + gap_notes
             if not parts:
                 faults = [Fault(where, f"{record.name}: {notes[-1]} No usable stretch remains; record without gaps")]
