@@ -1,20 +1,10 @@
 """Hysteresis whose narrow and wide plays have weights of their own."""
 
 from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
-from ctrlgen.effects._play_operators import (
-    ELEMENTS,
-    graded_parts,
-    graded_radii,
-    lags,
-    parted_weights,
-    play_states,
-    updated_plays,
-)
+from ctrlgen.effects import _play_operators as plays
 
-PARTS = tuple(
-    Param(f"part{j}", "1", (0.0, 1.0), f"f_{j}: part of play {j} in what the narrower plays leave")
-    for j in range(1, ELEMENTS)
-)
+OF_REST = "f_{j}: part of play {j} in what the narrower plays leave"
+PARTS = tuple(Param(f"part{j}", "1", (0.0, 1.0), OF_REST.format(j=j)) for j in range(1, plays.ELEMENTS))
 
 
 class WeightedLag(Effect, listed=False):
@@ -29,17 +19,18 @@ class WeightedLag(Effect, listed=False):
 
     @classmethod
     def from_plainer(cls, numbers: dict[str, float]) -> dict[str, float]:
-        parts = graded_parts(numbers.get("taper", 0.5))
+        parts = plays.graded_parts(numbers.get("taper", 0.5))
         begun = {"share": numbers["share"], "reach": numbers["reach"], "reversible": numbers.get("reversible", 0.0)}
         return begun | {part.name: value for part, value in zip(PARTS, parts, strict=True)}
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
-        weights = parted_weights([getattr(p, part.name) for part in PARTS])
-        behind = sum(w * lag for w, lag in zip(weights, lags(s, s.value, graded_radii(p.reach)), strict=True))
+        weights = plays.parted_weights([getattr(p, part.name) for part in PARTS])
+        lags = plays.lags(s, s.value, plays.graded_radii(p.reach))
+        behind = sum(w * lag for w, lag in zip(weights, lags, strict=True))
         return -p.share * (behind - p.reversible * s.value)
 
     def update(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
-        return updated_plays(s, [s.value], graded_radii(p.reach))
+        return plays.updated_plays(s, [s.value], plays.graded_radii(p.reach))
 
 
 def _shape(unit: str) -> tuple[Param, ...]:
@@ -54,7 +45,7 @@ class WeightedDisplacementHysteresis(WeightedLag):
     place = Place.DISPLACEMENT
     requires = frozenset({"actuator"})
     params = (Param("share", "1", (-0.999, 0.999), "share of the displacement that lags", off=0.0), *_shape("travel"))
-    states = play_states("travel")
+    states = plays.play_states("travel")
 
 
 class WeightedDriveHysteresis(WeightedLag):
@@ -64,4 +55,4 @@ class WeightedDriveHysteresis(WeightedLag):
     place = Place.DRIVE
     requires = frozenset({"actuator", "force"})
     params = (Param("share", "1", (-0.999, 0.999), "share of the drive that lags", off=0.0), *_shape("channel"))
-    states = play_states("channel")
+    states = plays.play_states("channel")

@@ -43,7 +43,11 @@ _WEIGHTED_LAG = LawPrior(
     suspected=False,
     model_form_error=0.02,
     family="hysteresis",
-    parameters={"reach": _reach(0.3, peaks=True), "reversible": _reversible(0.0)},
+    parameters={
+        "reach": _reach(0.3, peaks=True),
+        "reversible": _reversible(0.0),
+        **{f"part{j}": ParameterPrior((0.3,)) for j in range(1, 8)},
+    },
 )
 
 OF_A_LAG: Mapping[str, LawPrior] = {

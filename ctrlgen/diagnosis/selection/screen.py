@@ -21,7 +21,13 @@ from ctrlgen.diagnosis.selection.law_terms import LawTerms
 from ctrlgen.diagnosis.selection.motion_regions import Along, motion_of, suggested
 from ctrlgen.diagnosis.selection.regions import Leftover, Region, find_regions
 from ctrlgen.diagnosis.selection.score_gradient import ScoreGradient, Sums, law_terms
-from ctrlgen.diagnosis.selection.spatial_periods import jump_positions, merged_periods, resolved_way, spatial_periods
+from ctrlgen.diagnosis.selection.spatial_periods import (
+    jump_positions,
+    merged_periods,
+    resolved_way,
+    slowest_periods,
+    spatial_periods,
+)
 from ctrlgen.diagnosis.selection.subset_search import SubsetSearch, Suspect
 from ctrlgen.diagnosis.settings import SCREEN
 from ctrlgen.effects import Place
@@ -155,7 +161,8 @@ class Screen:
         record = max(records, key=lambda r: r.valid.size)
         foreseen, behind = (self.fitter.predict(each, record) for each in (fit, _without_sensor_causes(fit)))
         residual = record.observed - foreseen
-        names = [c.name for c in channels(nominal_physics(fit.structure.device), Place.SENSOR)]
+        sensors = channels(nominal_physics(fit.structure.device), Place.SENSOR)
+        names, sizes = [c.name for c in sensors], {c.name: c.scale for c in sensors}
         read = [(i, c.removeprefix("reading.")) for i, c in enumerate(self.fitter.recording.channels)]
         paths = (record.observed, foreseen, behind)
 
@@ -166,7 +173,7 @@ class Screen:
 
         by_sensor = {
             (Place.SENSOR, names.index(name)): {
-                "spatial_periods": periods(i, good),
+                "spatial_periods": (*periods(i, good), *slowest_periods(record.observed[good, i], sizes[name])),
                 "jump_positions": jump_positions(record.observed[good, i], residual[good, i]),
             }
             for i, name in read

@@ -47,6 +47,15 @@ def spatial_periods(path: np.ndarray, left: np.ndarray, shortest: float = 0.0) -
     return tuple(span / cycles for cycles in found)
 
 
+def slowest_periods(path: np.ndarray, typical: float) -> tuple[float, ...]:
+    """The ways [path's unit] of so few cycles over `path` (n,) that its spectrum does not tell them from a trend, where it is short
+    beside the `typical` size, of which the start values of the laws are shares; none where it is not."""
+    span = float(np.ptp(path)) if len(path) else 0.0
+    if not 0 < span < SPATIAL_PERIODS.short_path * typical:
+        return ()
+    return tuple(span / cycles for cycles in SPATIAL_PERIODS.slowest_cycles)
+
+
 def _strongest(power: np.ndarray, first: int, beyond: int, found: list[float]) -> float | None:
     """Cycles within the path of the highest peak of `power` between two numbers of them, apart from those `found`; None where
     chance would show one as high."""

@@ -43,6 +43,10 @@ class SpatialPeriodSettings:
     """Cycles within the path from which on a wave is sought apart from the slower ones, which trends feign."""
     fewest_slow_cycles: int = 3
     """Cycles within the path of the longest period: fewer are seen by the start values of the laws, if the path is the travel."""
+    slowest_cycles: tuple[float, ...] = (1.5, 2.0, 2.5)
+    """Cycles within a path that is short beside the typical size, below `fewest_slow_cycles`, of which each is tried."""
+    short_path: float = 0.3
+    """Path over the typical size, below which those are tried: the start values of the laws are 1/20 of that size and more."""
     most_slow: int = 2
     """Periods between both that are tried. Judgement."""
     same_period: float = 1e-4
