@@ -4,8 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from axis_records import H, record
+from recovery import fitter_of
 
-from ctrlgen.diagnosis.selection.spatial_periods import resolved_way, spatial_periods
+from ctrlgen.core.files import validate
+from ctrlgen.devices import Device
+from ctrlgen.diagnosis.selection.screen import Screen
+from ctrlgen.diagnosis.selection.search import Searcher
+from ctrlgen.diagnosis.selection.spatial_periods import resolved_way, slowest_periods, spatial_periods
+from ctrlgen.estimation.hypothesis import Hypothesis
 
 LENGTH = 10e-3  # m
 
@@ -65,3 +72,27 @@ def test_a_way_below_the_shortest_is_not_told():
     left = np.sin(2 * np.pi * path / 5e-5) + 0.1 * np.random.default_rng(3).standard_normal(len(path))
     assert spatial_periods(path, left, 4e-5) == (pytest.approx(5e-5, rel=1e-3),)
     assert spatial_periods(path, left, 6e-5) == ()
+
+
+@pytest.mark.parametrize("pitch", [2.1e-4, 3.1e-4])
+def test_a_pitch_of_which_a_short_stroke_holds_two_periods_is_found(pitch):
+    """Approaches of half a millimetre, with rests, on a travel of 25 mm: the law's own starts begin at 1.25 mm."""
+    table = {"kind": "servo", "name": "servo", "title": "an axis", "source": "round numbers", "travel": "25 mm"}
+    device, parts, rng = validate(Device.library["servo"], table, "device"), [], np.random.default_rng(4)
+    for turns, role in ((3, "fit"), (2, "hold_out")):
+        stroke = np.r_[np.linspace(0, 5e-4, 100), np.full(150, 5e-4), np.linspace(5e-4, 0, 100), np.zeros(50)]
+        u = 2e-2 + np.tile(stroke, turns)
+        y = u + 1e-5 * np.sin(2 * np.pi * u / pitch + 0.7) + 1e-7 * rng.standard_normal(len(u))
+        parts.append(record(u, y, role, h=H))
+    fitter = fitter_of(device, ("reading.axis",), ("um",), (1e-7,), "series", parts)
+    offered = [Hypothesis(kind, "sensor:axis", "axis") for kind in ("cyclic", "sensor_gain", "bow", "cubic_sensor")]
+    chosen = Searcher(fitter, Screen(fitter, offered), lambda _: None).run(device).chosen
+    assert [c.effect for c in chosen.causes] == ["cyclic"] and chosen.errors.is_noise
+    assert chosen.fit.values(0)["period"] == pytest.approx(pitch, rel=1e-2)
+
+
+def test_a_slow_pitch_is_sought_on_paths_that_are_short_beside_the_travel_alone():
+    path = np.linspace(0, 1e-3, 100)
+    left = np.sin(2 * np.pi * path / 4e-4) + 300 * path
+    assert slowest_periods(path, left, 25e-3) == pytest.approx((4e-4,), rel=0.01)
+    assert slowest_periods(path, left, 2e-3) == () and slowest_periods(path[:1], left[:1], 25e-3) == ()

@@ -173,7 +173,10 @@ class Screen:
 
         by_sensor = {
             (Place.SENSOR, names.index(name)): {
-                "spatial_periods": (*periods(i, good), *slowest_periods(record.observed[good, i], sizes[name])),
+                "spatial_periods": (
+                    *periods(i, good),
+                    *slowest_periods(foreseen[good, i], residual[good, i], sizes[name]),
+                ),
                 "jump_positions": jump_positions(record.observed[good, i], residual[good, i]),
             }
             for i, name in read

@@ -47,13 +47,26 @@ def spatial_periods(path: np.ndarray, left: np.ndarray, shortest: float = 0.0) -
     return tuple(span / cycles for cycles in found)
 
 
-def slowest_periods(path: np.ndarray, typical: float) -> tuple[float, ...]:
-    """The ways [path's unit] of so few cycles over `path` (n,) that its spectrum does not tell them from a trend, where it is short
-    beside the `typical` size, of which the start values of the laws are shares; none where it is not."""
+def slowest_periods(path: np.ndarray, left: np.ndarray, typical: float) -> tuple[float, ...]:
+    """The way [path's unit] of few cycles over `path` (n,) of which a wave beside a straight line takes most from `left` (n,), each place
+    counted once however long it was visited. None where the path is not short beside the `typical` size, of which the start values of the
+    laws are shares: a spectrum does not tell so few cycles from a trend."""
     span = float(np.ptp(path)) if len(path) else 0.0
     if not 0 < span < SPATIAL_PERIODS.short_path * typical:
         return ()
-    return tuple(span / cycles for cycles in SPATIAL_PERIODS.slowest_cycles)
+    n = SPATIAL_PERIODS.jump_cells
+    cell = _cells(path, n)
+    count = np.bincount(cell, minlength=n)
+    read = np.flatnonzero(count)
+    mean, place = np.bincount(cell, weights=left, minlength=n)[read] / count[read], read / n
+    least, best = np.inf, 0.0
+    for cycles in np.linspace(*SPATIAL_PERIODS.slowest_cycles, SPATIAL_PERIODS.slowest_tried).tolist():
+        angle = 2 * np.pi * cycles * place
+        columns = np.column_stack([np.ones(len(place)), place, np.cos(angle), np.sin(angle)])
+        rest = mean - columns @ np.linalg.lstsq(columns, mean, rcond=None)[0]
+        if (squares := float(rest @ rest)) < least:
+            least, best = squares, cycles
+    return (span / best,)
 
 
 def _strongest(power: np.ndarray, first: int, beyond: int, found: list[float]) -> float | None:

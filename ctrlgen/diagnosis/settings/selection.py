@@ -43,10 +43,12 @@ class SpatialPeriodSettings:
     """Cycles within the path from which on a wave is sought apart from the slower ones, which trends feign."""
     fewest_slow_cycles: int = 3
     """Cycles within the path of the longest period: fewer are seen by the start values of the laws, if the path is the travel."""
-    slowest_cycles: tuple[float, ...] = (1.5, 2.0, 2.5)
-    """Cycles within a path that is short beside the typical size, below `fewest_slow_cycles`, of which each is tried."""
+    slowest_cycles: tuple[float, float] = (1.4, 3.2)
+    """Cycles within a path that is short beside the typical size, about and below `fewest_slow_cycles`, between which one is sought."""
+    slowest_tried: int = 361
+    """How many of them are tried: the phase at a zero a hundred periods away is then right to a part of a turn."""
     short_path: float = 0.3
-    """Path over the typical size, below which those are tried: the start values of the laws are 1/20 of that size and more."""
+    """Path over the typical size, below which that is done: the start values of the laws are 1/20 of that size and more."""
     most_slow: int = 2
     """Periods between both that are tried. Judgement."""
     same_period: float = 1e-4
