@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from axis_records import H, record
+from play_records import NOISE, SERVO, N, lagging, moved
 from recovery import fitter_of
 
 from ctrlgen.core.files import validate
@@ -13,27 +14,9 @@ from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.estimation.hypothesis import Hypothesis
 
-N, NOISE = 600, 1e-8
-SERVO = {"kind": "servo", "name": "servo", "title": "an axis", "source": "round numbers", "travel": "100 um"}
 OFFERED = [Hypothesis(kind, "stage:axis", "axis") for kind in ("displacement_hysteresis", "backlash", "creep")]
 TWO_GROUPS = np.r_[np.linspace(1e-6, 3e-6, 80), np.linspace(2e-5, 3e-5, 20)]  # half widths of plays of equal weight [m]
 EVEN = np.linspace(1e-7, 2e-5, 200)
-
-
-def moved(seed: int) -> np.ndarray:
-    """Half a dozen sines that no period joins, from rest, within 70 um."""
-    rng, t = np.random.default_rng(seed), np.linspace(0, 1, N)
-    u = sum(rng.uniform(0.3, 1.0) * np.sin(2 * np.pi * rng.uniform(1, 9) * t) for _ in range(6))
-    return 7e-5 * u / np.abs(u).max()
-
-
-def lagging(u: np.ndarray, radii: np.ndarray, share: float = 0.15) -> np.ndarray:
-    """Plays of these half widths that began in the middle, together `share` of the way."""
-    play, out = np.zeros(len(radii)), []
-    for d in u:
-        play = np.clip(play, d - radii, d + radii)
-        out.append((1 - share) * d + share * play.mean())
-    return np.array(out)
 
 
 def found(radii: np.ndarray):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from axis_records import H, record
+from play_records import NOISE, SERVO, lagging, moved
 from recovery import fitter_of
-from test_finer_forms import NOISE, SERVO, lagging, moved
 
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
