@@ -155,7 +155,7 @@ def _head(
 
 
 DAMAGES = ("no cell", "junk line", "header again", "no end", "quote", "blank lines", "odd cell", "two cells", "remark")
-ODD = ("12:30", "0x1F", "1_000", "1,2,3", "#REF!", "1.2.3.4", "--5", "1e", "5 V", "=A1", "1.000.00")
+ODD = ("12:30", "0x1F", "1_000", "1,2,3", "#REF!", "1.2.3.4", "--5", "1e", "5V", "=A1", "1.000.00")
 
 
 def damaged(log: Log, seed: int) -> tuple[Log, str]:
