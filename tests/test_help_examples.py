@@ -18,8 +18,15 @@ from ctrlgen.app.shipped_examples import examples
 EXAMPLE = re.compile(r"Example:  (ctrlgen .*)")
 COMMANDS = {command.callback.__name__: command.help for command in app.registered_commands}
 QUICK = {"check", "example", "learn"}
+ELSEWHERE = {"verify"}  # .ci/run runs it as printed
+
+
+def mark_of(name: str) -> tuple[pytest.MarkDecorator, ...]:
+    return () if name in QUICK else (pytest.mark.exhaustive if name in ELSEWHERE else pytest.mark.long,)
+
+
 MATCHES = [
-    pytest.param(name, line, marks=() if name in QUICK else pytest.mark.long, id=name)
+    pytest.param(name, line, marks=mark_of(name), id=name)
     for name, told in sorted(COMMANDS.items())
     for line in EXAMPLE.findall(told or "")
 ]
