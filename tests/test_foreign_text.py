@@ -255,6 +255,7 @@ RUNS = "lever_runs/run_a.toml lever_runs/run_b.toml"
         f"diagnose devices/xy_lever_stage.toml {RUNS} --laws creep,backlash",
         "batch lever_runs/jobs.toml",
     ],
+    ids=lambda words: words.split()[0],
 )
 def test_nothing_foreign_is_in_any_result_of_a_command(words, tmp_path):
     command, *given = words.split()
