@@ -25,6 +25,7 @@ from typing import TypeVar
 import numpy as np
 
 from ctrlgen.diagnosis.settings import REGIONS
+from ctrlgen.estimation.error_model import correlation_time
 from ctrlgen.estimation.fit import Fit
 
 Quantity = TypeVar("Quantity", bound=Hashable)
@@ -86,9 +87,10 @@ def find_regions(
 
 
 def _shuffled(r: np.ndarray, seed: int) -> np.ndarray:
-    """The residual (draws, n, n_y) with its stretches in random order, begun anywhere."""
+    """The residual (draws, n, n_y) with its stretches in random order, begun anywhere; each is longer than its memory."""
     rng, n = np.random.default_rng(seed), len(r)
-    length = max(n // REGIONS.blocks, 1)
+    memory = max(correlation_time([e]) for e in r.T)
+    length = int(min(max(n / REGIONS.blocks, REGIONS.memories * memory, 1), max(n / REGIONS.fewest_blocks, 1)))
     blocks = [np.arange(n)[i : i + length] for i in range(0, n, length)]
     orders = [
         np.roll(np.concatenate([blocks[j] for j in rng.permutation(len(blocks))]), rng.integers(n))

@@ -86,8 +86,11 @@ class RegionSettings:
     usual_quantile: float = 0.95
     """Quantile of the largest contrast along one quantity in these, in which contrasts of that quantity count: five of them lie above."""
     blocks: int = 200
-    """Stretches of the residual that are put in random order: each longer than the memory of most residuals, and enough of them for
-    many orders. Judgement."""
+    """Stretches of a residual without memory that are put in random order. Judgement."""
+    memories: float = 4.0
+    """Correlation times of the residual that a stretch holds at least: what is cut at its ends is then a part of it. Judgement."""
+    fewest_blocks: int = 20
+    """Stretches at least, whatever the memory: fewer have too few orders. Judgement."""
     most_rows: int = 20000
     """Readings that are looked at: of more, every second, third and so on."""
     longest: float = 0.4
