@@ -46,7 +46,7 @@ class Leftover:
         """What `fit` leaves."""
         n_y = fit.shapes[0][1]
         m, k = sum(n * n_y for n, _ in fit.shapes), fit.J.shape[1]
-        return cls(fit.residual[:m].reshape(-1, n_y), fit.J[:m].reshape(-1, n_y, k), fit.residual[m:], fit.J[m:])
+        return cls(fit.residual[:m].reshape(-1, n_y), fit.J[:m].reshape(m // n_y, n_y, k), fit.residual[m:], fit.J[m:])
 
 
 @dataclass(frozen=True)
