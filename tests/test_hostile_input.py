@@ -157,7 +157,7 @@ def test_json_that_is_nested_without_end(tmp_path):
 @pytest.mark.parametrize(
     ("given", "says"),
     [
-        (SCENARIOS / "nist_hexapod" / "travels.csv", "is a measurement; name the recording.toml that describes it"),
+        (SCENARIOS / "nist_hexapod" / "travels.csv", "writes a recording.toml with what it says, to complete"),
         (DEVICE, "describes a device; name a recording.toml"),
         (SCENARIOS / "circle20" / "scenario.toml", "describes a scenario; name a recording.toml"),
     ],

@@ -8,7 +8,6 @@ from rich.markup import escape
 
 from ctrlgen.app.console import Column, out, show_table, table_of
 from ctrlgen.core.units import difference, from_si, show, show_difference
-from ctrlgen.reporting.numbers import number
 
 if TYPE_CHECKING:
     from ctrlgen.app.scenario_pipeline import Outcome, WorkspaceSummary
@@ -160,6 +159,8 @@ def print_workspace(summary: WorkspaceSummary) -> None:
 
 def print_simulated(result: Simulated) -> None:
     """The range of every signal, its last value, and the rms of what was measured less what was simulated."""
+    from ctrlgen.reporting.numbers import number
+
     shown = table_of(
         ("signal", "left"), ("unit", "left"), ("smallest", "right"), ("largest", "right"), ("last", "right")
     )
