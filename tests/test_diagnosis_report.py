@@ -93,6 +93,7 @@ def test_the_json_is_the_contract(found):
             "source",
             "support",
             "chance",
+            "region",
         )
     }
     assert (finding["effect"], finding["location"]) == ("creep", "stage:axis")
@@ -244,7 +245,7 @@ def test_the_page_needs_nothing_from_elsewhere_and_says_it_at_the_top(found):
         and "<link" not in text
     )
     assert "A flexure or its glue keeps moving" in text and "Explained" in text.split("<h2>")[0]
-    assert text.count("<figure>") == 9 and "seed 7" in text and "0" * 64 in text
+    assert text.count("<figure>") == 10 and "seed 7" in text and "0" * 64 in text
     assert text.index("device.next.toml") < text.index("<figure>")
 
 
@@ -303,7 +304,7 @@ def test_the_page_shows_whatever_evidence_there_is(found):
         detectability=DetectabilityEntry(smallest={"drift": drift}, undetectable=[]),
     )
     text = page(told, Provenance({}, 0))
-    assert text.count("<figure>") == 10
+    assert text.count("<figure>") == 11
     for words in ("more below 1 Hz", "slow multisine", "added creep", "nm/s", "position explains 80%"):
         assert words in text
 

@@ -19,6 +19,7 @@ from package_programs import STRICT
 
 import ctrlgen.firmware.fmi.fmu as fmu
 from ctrlgen import InputError, build_model, load_device, load_scenario, solve, user_device
+from ctrlgen.app.batch import BatchFile
 from ctrlgen.core.errors import Fault, ToolError
 from ctrlgen.core.escaping import c_comment, c_format, csv_cell, kconfig, markdown, markdown_code, toml
 from ctrlgen.core.file_limits import DEEPEST, LARGEST_TEXT, LARGEST_TOML, LONGEST_CHAIN, LONGEST_KEY, LONGEST_TEXT
@@ -38,7 +39,9 @@ PLAIN = "a plain text"
 
 
 def schema_of(table: dict[str, Any]) -> type[Any]:
-    """The schema of a shipped file that is a device, a scenario or a recording."""
+    """The schema of a shipped file that is a device, a scenario, a recording or a list of jobs."""
+    if "job" in table:
+        return BatchFile
     return RecordingFile if "record" in table else ScenarioFile if "path" in table else Device.library[table["kind"]]
 
 
@@ -76,7 +79,7 @@ def test_only_titles_and_sources_may_be_any_text(path):
         except InputError:
             assert not free
         else:
-            assert free or schema in (ScenarioFile, RecordingFile), place
+            assert free or schema in (ScenarioFile, RecordingFile, BatchFile), place
 
 
 @pytest.mark.parametrize(

@@ -57,10 +57,10 @@ def foreign_parts(table: Any) -> list[Fault]:
         if depth > DEEPEST:
             return [Fault("syntax", TOO_DEEP)]
         if isinstance(value, str):
-            faults += _faults(where or "file", value, LONGEST_TEXT, "a text")
+            faults += _faults(where or "file", value, LONGEST_TEXT, key=False)
         elif isinstance(value, dict):
             for key, member in value.items():
-                if fault := [*_faults(f"{where or 'file'}: the key", str(key), LONGEST_KEY, "a key")]:
+                if fault := [*_faults(f"{where or 'file'}: the key", str(key), LONGEST_KEY, key=True)]:
                     faults += fault
                 else:
                     parts.append((f"{where}.{key}" if where else str(key), depth + 1, member))
@@ -72,10 +72,12 @@ def foreign_parts(table: Any) -> list[Fault]:
 TOO_DEEP = f"lists or tables stand more than {DEEPEST} deep inside one another, which no file of ctrlgen needs; is it the right one?"
 
 
-def _faults(where: str, text: str, longest: int, what: str) -> Iterator[Fault]:
+def _faults(where: str, text: str, longest: int, key: bool) -> Iterator[Fault]:
     if len(text) > longest:
-        yield Fault(where, f"has {len(text)} characters; {what} has at most {longest}: shorten it")
-    elif unseen := unseen_character(text, lines=what == "a text"):
+        yield Fault(
+            where, f"has {len(text)} characters; a {'key' if key else 'text'} has at most {longest}: shorten it"
+        )
+    elif unseen := unseen_character(text, lines=not key):
         place, name = unseen
         yield Fault(where, f"has a character that is not shown, {name}, after {place} others; remove it")
 

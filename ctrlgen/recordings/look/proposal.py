@@ -73,14 +73,14 @@ class Match:
 
 @dataclass(frozen=True)
 class Proposal:
-    """A recording.toml for the files of `tables`: `matches` of all of them, `left` columns that no signal is, `asked`: what the files do
+    """A recording.toml for the files of `tables`: `matches` of all of them, `left` columns that no signal is, `missing`: what the files do
     not say and must be answered, `remarks`: what is odd."""
 
     model: Model
     tables: tuple[TableFacts, ...]
     matches: tuple[Match, ...]
     left: tuple[str, ...]
-    asked: tuple[str, ...]
+    missing: tuple[str, ...]
     remarks: tuple[str, ...]
 
     @property
@@ -88,6 +88,14 @@ class Proposal:
         """Few rows without a time are poses."""
         few = self.tables[0].time is None and self.tables[0].rows <= MOST_POSES
         return "poses" if few else "series"
+
+    @property
+    def asked(self) -> tuple[str, ...]:
+        """Every question that the files leave open."""
+        return (
+            *(f"{m.signal} = column {m.column!r}: {'; '.join(m.why)}" for m in self.matches if m.why),
+            *self.missing,
+        )
 
     @property
     def certain(self) -> bool:
@@ -103,8 +111,7 @@ def propose(tables: Sequence[TableFacts], model: Model) -> Proposal:
     signals = [name for name in signal_units(model) if name.partition(".")[0] in ("drive", "reading")]
     matches = _matched(model, signals, columns)
     found = {match.signal for match in matches}
-    asked = [f"{m.signal} = column {m.column!r}: {'; '.join(m.why)}" for m in matches if m.why]
-    asked += [
+    asked = [
         f"{name}: which column? Free are {', '.join(c.name for c in columns if c.name not in {m.column for m in matches}) or 'none'}"
         for name in signals
         if name.startswith("drive.") and name not in found
@@ -250,7 +257,7 @@ def recording_toml(proposal: Proposal, folder: Path, title: str) -> str:
         why = f" # {'; '.join(match.why)}" if match.why else ""
         lines.append(f'"{match.signal}" = {{ column = {_quoted(match.column)}, unit = "{match.unit}" }}{why}')
     lines += [f"# not used: {', '.join(proposal.left)}"] if proposal.left else []
-    lines += [f"# to be answered: {question}" for question in proposal.asked if " = column " not in question]
+    lines += [f"# to be answered: {question}" for question in proposal.missing]
     lines += [f"# odd: {remark}" for remark in proposal.remarks]
     return "\n".join(line.replace("\n", " ") for line in lines) + "\n"
 
