@@ -1,23 +1,26 @@
 """How much of the mismatch each accepted cause takes away, with intervals: one account, of the error that the tables call "before".
 
-The energy E(S) that the causes S leave on the held-out records: the accepted model without the other causes, its parameters
-fitted again in a few steps. What a cause takes away is its Shapley value,
+The energy E(S) that the causes S leave on the held-out records: the device with these causes as the accepted model has them, its
+own numbers fitted again, as every model is: held by what its file states of them, under the discrepancy that the set itself leaves.
+No causes leave what the tables call "before", all of them what they call "after". What a cause takes away is its Shapley value,
 
-    phi_k = mean over orders of E(before k) - E(after k),
+    phi_k = mean over orders of E(before k) - E(after k),      sum phi = E(none) - E(all),
 
 the average over all orders in which the causes may be added (R. Lindeman, P. Merenda, R. Gold, Introduction to Bivariate and
-Multivariate Analysis, 1980; L. Shapley, Contributions to the Theory of Games II, 1953, 307). With the energies beyond noise E0 of
-the device as described and E1 of the accepted model,
+Multivariate Analysis, 1980; L. Shapley, Contributions to the Theory of Games II, 1953, 307). With the numbers of the accepted model
+instead, a set would be told by an error that nobody sees: that of a device whose numbers fit what is not there, often several times
+"before". Freed of what the file states, numbers would bend to take what is missing. In energies beyond noise
 
-    left = E1/E0,   share_k = (1 - left) max(phi_k, 0)/sum max(phi, 0),
+    share_k = phi_k/E(none),   left = E(all)/E(none),
 
-so that shares are never negative and add up to one with what is left, in every channel and in all. Intervals are those of a
-bootstrap over blocks of the records. Where the noise of a channel is not known, its whole error counts.
+which are one, in every channel and in all. A cause that takes nothing away itself is counted with the one that it serves, so that no
+share is negative. Intervals are those of a bootstrap over blocks of the records. Where the noise of a channel is not known, its whole
+error counts.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from math import comb
 
@@ -33,7 +36,6 @@ from ctrlgen.estimation.free_parameters import FreeParameter
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.least_squares import LeastSquaresProblem
 from ctrlgen.estimation.misfit import Misfit, misfit
-from ctrlgen.estimation.settings import STATISTICS
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 from ctrlgen.recordings.recording import Record
@@ -52,9 +54,9 @@ class Attribution:
     """The `shares` of the causes of a model, in its order, and that of the `rest`; None where nothing is to share.
 
     Causes of one law at one place are one: each has the share of all of them. A cause whose share may be zero has none, and what it
-    takes away counts for the others. `channels`: by reading the shares of the causes and, last, what is left; of readings that show
-    a mismatch alone. `serves`: by cause the other one that needs it most. `held_out`: whether they are of the held-out records; of
-    the records to fit where the held-out ones show no mismatch.
+    takes away counts for the one that it serves. `channels`: by reading the shares of the causes and, last, what is left; of readings
+    that show a mismatch alone. `serves`: by cause the other one that needs it most. `held_out`: whether they are of the held-out
+    records; of the records to fit where the held-out ones show no mismatch.
     """
 
     shares: tuple[ShareEntry | None, ...]
@@ -72,39 +74,24 @@ class Attribution:
 def attribute(
     fitter: Fitter, described: CandidateModel, model: CandidateModel, seed: int = 0, jobs: int = 1
 ) -> Attribution:
-    """The shares of the causes of a `model` of what the device as `described` leaves.
-
-    E(S) is the energy beyond noise that the causes S leave alone, all other numbers as the model has them: fitted again, the
-    device's own would bend to take what is missing. Those that its file hardly knows are adapted. The sets are fitted in `jobs`
-    processes.
-    """
+    """The shares of the causes of a `model` of what the device as `described` leaves. The sets are fitted in `jobs` processes."""
     fit = model.fit
-    n = len(fit.structure.causes)
+    causes, of = fit.structure.causes, _groups(fit.structure.causes)
+    n = max(of, default=-1) + 1
     held = described.held_out.excess > ATTRIBUTION.least_excess * np.sum(described.held_out.n_plain)
     records = fitter.held_out_records if held else fitter.fit_records
-    before = _by_block(fitter.noise.known, as_fitted(fitter, described.fit, records))
-    if not n or before.sum() <= 0:
-        return Attribution((None,) * n, None, held)
-    after = _by_block(fitter.noise.known, as_fitted(fitter, fit, records))
-    left = {frozenset(range(n)): after}
-    # for the initial states of incomplete models, which leave much
-    rough = fitter.with_errors_of(described.fit)
-    subsets = _subsets(n)
     known = fitter.noise.known
-    energies = in_forks(lambda present: _left_or_all(known, rough, fit, present, records, before), subsets, jobs)
-    left |= dict(zip(subsets, energies, strict=True))
-    most = ATTRIBUTION.diverged * np.maximum(np.maximum(before, left[frozenset()]), 1.0)
-    left = {S: np.minimum(E, most) for S, E in left.items()}
-    of = _groups(fit.structure.causes)
-    parts = np.zeros((max(of) + 1, *before.shape))
-    for k, group in enumerate(of):
-        parts[group] += _shapley(left, k, n)
-    value, low, high = _with_intervals(parts, before, after, seed)
-    unclear = low[:-1] <= 0
-    if np.any(unclear) and not np.all(unclear):
-        parts[unclear] = 0.0
-        value, low, high = _with_intervals(parts, before, after, seed)
-    shares = [ShareEntry(value=v, ci95=(a, b)) for v, a, b in zip(value, low, high, strict=True)]
+    before = _by_block(known, as_fitted(fitter, described.fit, records))
+    if not n or before.sum() <= 0:
+        return Attribution((None,) * len(causes), None, held)
+    after = _by_block(known, as_fitted(fitter, fit, records))
+    subsets = _subsets(n)
+    members = [frozenset(k for k, group in enumerate(of) if group in S) for S in subsets]
+    energies = in_forks(lambda present: _left_or_all(known, fitter, fit, present, records, before), members, jobs)
+    left = {frozenset(): before, frozenset(range(n)): after} | dict(zip(subsets, energies, strict=True))
+    serves = [_needed_by(left, g, n) for g in range(n)]
+    parts, told = _counted(np.array([_shapley(left, g, n) for g in range(n)]), before, after, serves, seed)
+    shares = [ShareEntry(value=v, ci95=(a, b)) for v, a, b in _with_intervals(parts, before, after, seed)]
     by_channel = _shares(*(v.sum(axis=-2) for v in (parts, before, after)))
     shown = before.sum(axis=0) > ATTRIBUTION.least_excess * described.held_out.n_plain.sum(axis=0)
     channels = {
@@ -112,20 +99,42 @@ def attribute(
         for i, name in enumerate(fitter.recording.channels)
         if shown[i]
     }
-    told = tuple(None if unclear[g] else shares[g] for g in of)
-    return Attribution(told, shares[-1], held, channels, tuple(_needed_by(left, k, n) for k in range(n)))
+    served = (serves[g] for g in of)
+    return Attribution(
+        tuple(shares[g] if told[g] else None for g in of),
+        shares[-1],
+        held,
+        channels,
+        tuple(None if g is None else of.index(g) for g in served),
+    )
 
 
-def _with_intervals(
-    parts: np.ndarray, before: np.ndarray, after: np.ndarray, seed: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Shares (n + 1,) over all channels with the ends of their 95 % intervals, from (n, b, n_y), (b, n_y) and (b, n_y)."""
+def _counted(
+    parts: np.ndarray, before: np.ndarray, after: np.ndarray, serves: list[int | None], seed: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """What each of n causes takes away (n, b, n_y), that of causes whose share may be zero with the cause that they serve; and which
+    have a share, (n,). None has one where that of each may be zero."""
+    parts, told = parts.copy(), np.ones(len(parts), bool)
+    while True:
+        zero = told & (_with_intervals(parts, before, after, seed)[:-1, 1] <= 0)
+        told &= ~zero
+        if not zero.any() or not told.any():
+            return parts, told
+        for g in np.flatnonzero(zero):
+            served = serves[g]
+            if served is not None and told[served]:
+                parts[served] += parts[g]
+            parts[g] = 0.0
+
+
+def _with_intervals(parts: np.ndarray, before: np.ndarray, after: np.ndarray, seed: int) -> np.ndarray:
+    """Shares over all channels with the ends of their 95 % intervals, (n + 1, 3), from (n, b, n_y), (b, n_y) and (b, n_y)."""
     parts, before, after = (v.sum(axis=-1) for v in (parts, before, after))
     drawn = np.random.default_rng(seed).integers(0, len(before), (ATTRIBUTION.draws, len(before)))
     sampled = _shares(*(v[..., drawn].sum(axis=-1) for v in (parts, before, after)))
     low, high = np.quantile(sampled, (0.025, 0.975), axis=1)
     value = _shares(*(v.sum(axis=-1) for v in (parts, before, after)))
-    return value, np.minimum(low, value), np.maximum(high, value)
+    return np.column_stack([value, np.minimum(low, value), np.maximum(high, value)])
 
 
 def _needed_by(left: dict[frozenset[int], np.ndarray], k: int, n: int) -> int | None:
@@ -176,22 +185,25 @@ def _by_block(known: np.ndarray, left: Misfit) -> np.ndarray:
 def _left_or_all(
     known: np.ndarray, fitter: Fitter, fit: Fit, present: frozenset[int], records: list[Record], everything: np.ndarray
 ) -> np.ndarray:
-    """What `left_by` leaves of each block and channel; all of it where no such device can stand or be simulated."""
+    """What `left_by` leaves of each block and channel, no more in all than a multiple of `everything`; all of it where no such device
+    can stand or be simulated."""
     try:
-        return _by_block(known, left_by(fitter, fit, present, records))
+        left = _by_block(known, left_by(fitter, fit, present, records))
     except FAILURES:
         return everything
+    most = ATTRIBUTION.diverged * everything.sum()
+    return left * (most / left.sum() if left.sum() > most else 1.0)
 
 
 def _subsets(n: int) -> list[frozenset[int]]:
-    """The sets of causes but the whole one: all, or none, those of one, and of all but one, where there are too many."""
-    sizes = range(n) if n <= ATTRIBUTION.most_causes else (0, 1, n - 1)
+    """The sets of causes but none and all of them: every one, or those of one, and of all but one, where there are too many."""
+    sizes = range(1, n) if n <= ATTRIBUTION.most_causes else (1, n - 1)
     return [frozenset(chosen) for size in sizes for chosen in combinations(range(n), size)]
 
 
 def _shapley(left: dict[frozenset[int], np.ndarray], k: int, n: int) -> np.ndarray:
-    """What cause k takes away of each block and channel, the mean over orders; of many causes, that of coming first and last,
-    scaled so that the parts add up."""
+    """What cause k takes away of each block and channel, the mean over orders; of many causes, that of coming first and last, which
+    is the same where readings are sums of what each does and energies so of pairs at most, scaled so that the parts add up."""
     if n <= ATTRIBUTION.most_causes:
         return sum(
             (left[S] - left[S | {k}]) / (n * comb(n - 1, len(S))) for S in left if k not in S and S | {k} in left
@@ -208,16 +220,21 @@ def _shapley(left: dict[frozenset[int], np.ndarray], k: int, n: int) -> np.ndarr
 
 
 def left_by(fitter: Fitter, fit: Fit, present: frozenset[int], records: list[Record]) -> Misfit:
-    """What the model leaves with the `present` causes alone, those of the device's own numbers adapted that are hardly known."""
+    """What the model leaves with the `present` causes alone, which stay as they are, the device's own numbers fitted to that.
+
+    Numbers and discrepancy are estimated in turn, as for the device as described (`Fitter.described`).
+    """
     structure = fit.structure
     values = {_key(structure, p): value for p, value in zip(structure.free_parameters, fit.theta, strict=True)}
     for k in sorted(set(range(len(structure.causes))) - present, reverse=True):
         structure = structure.without(k)
     theta = np.array([values.get(_key(structure, p), p.nominal) for p in structure.free_parameters])
-    problem = _WithinStated(structure, fitter, theta)
-    x = levenberg_marquardt(problem, problem.start, ATTRIBUTION.steps)
     nothing = np.zeros(0)
-    reduced = Fit(structure, problem.to_si(x)[: problem.k], (), 0.0, fit.n, nothing, nothing, 0.0, fit.shapes)
+    reduced = Fit(structure, theta, (), 0.0, fit.n, nothing, nothing, 0.0, fit.shapes)
+    for _ in range(ATTRIBUTION.updates):
+        problem = _CausesAsFound(structure, fitter.with_errors_of(reduced), reduced.theta)
+        x = levenberg_marquardt(problem, problem.start, ATTRIBUTION.steps)
+        reduced = replace(reduced, theta=problem.to_si(x)[: problem.k])
     return as_fitted(fitter, reduced, records)
 
 
@@ -226,8 +243,8 @@ def _key(structure: Structure, p: FreeParameter) -> tuple[Hypothesis | None, str
     return (None, p.path) if p.cause is None else (structure.causes[p.cause], p.name)
 
 
-class _WithinStated(LeastSquaresProblem):
-    """A fit in which numbers stay as they are, but for those of the device that are hardly known, within their stated 95 %."""
+class _CausesAsFound(LeastSquaresProblem):
+    """A fit of the device's own numbers, held by what its file states of them; those of its causes stay as they are."""
 
     def __init__(self, structure: Structure, fitter: Fitter, theta: np.ndarray) -> None:
         super().__init__(structure, fitter.recording, fitter.error)
@@ -236,10 +253,6 @@ class _WithinStated(LeastSquaresProblem):
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         low, high = super().bounds
-        for i, (p, value) in enumerate(zip(self.structure.free_parameters, self.start[: self.k], strict=True)):
-            open_ = p.cause is None and p.sd is not None and p.sd >= ATTRIBUTION.hardly_known * abs(p.nominal)
-            reach = STATISTICS.z_95 * (p.sd or 0.0) / self.scale[i] if open_ else ATTRIBUTION.fixed
-            centre = p.nominal / self.scale[i] if open_ else value
-            low[i] = max(low[i], min(centre - reach, value))
-            high[i] = min(high[i], max(centre + reach, value + ATTRIBUTION.fixed))
-        return low, high
+        own = np.array([p.cause is None for p in self.structure.free_parameters] + [True] * self.n_initial, dtype=bool)
+        at, reach = self.start, ATTRIBUTION.fixed
+        return np.where(own, low, np.maximum(low, at - reach)), np.where(own, high, np.minimum(high, at + reach))

@@ -332,11 +332,11 @@ class AttributionSettings:
     diverged: float = 4.0
     """Energy of a subset, over that of the device without any, that stands for a larger one: a cause without its partner may
     diverge."""
+    updates: int = 2
+    """Estimates of the discrepancy of a set of causes, after each of which the device's own numbers are fitted: those of the accepted
+    model leave several times what they leave once they are fitted, and the second ends where the tables do to a per cent or two."""
     steps: int = 4
-    """Levenberg-Marquardt steps of an incomplete model from the numbers of the complete one. Judgement."""
-    hardly_known: float = 0.25
-    """Stated standard deviation of a number of the device, over the number, from which on it is adapted to incomplete models, as
-    it was to the chosen one. Judgement."""
+    """Levenberg-Marquardt steps of each of these fits, from the numbers of the accepted model. Judgement."""
     fixed: float = 1e-9
     """Range, over its typical size, of a number that stays as it is: rounding."""
     least_share: float = 0.01
