@@ -135,6 +135,24 @@ def test_shares_of_causes_that_have_nothing_in_common_are_their_energies():
         assert found.before == pytest.approx(np.sqrt(6.5 + rest), rel=1e-6)
 
 
+def test_a_refit_ends_at_the_optimum_where_numbers_act_by_their_ratio_alone():
+    """Force over stiffness, with sensitivities by difference quotients as `size.sensitivities` has them: both alike change nothing but
+    what these err by, and a law that is missing must not send the numbers there."""
+    t = np.arange(2000) / 2000
+    a, b, missing = (np.sin(2 * np.pi * f * t)[:, None] for f in (3, 7, 11))
+
+    def model(x):
+        ratio = (1 + x[0]) / (1 + x[1])
+        return 100 * (ratio * a + ratio**3 * b)
+
+    steps = 1e-4 * np.eye(2)
+    columns = np.column_stack([((model(s) - model(-s)) / 2e-4).ravel() for s in steps])
+    observed = model(np.array([0.1, 0.0])) + 30 * missing
+    x = truth.refit(observed, model, columns)
+    assert (1 + x[0]) / (1 + x[1]) == pytest.approx(1.1, abs=1e-3)
+    assert np.abs(x).max() < 0.2
+
+
 def test_a_share_is_the_mean_over_orders():
     energy = {frozenset(): 10.0, frozenset({0}): 4.0, frozenset({1}): 7.0, frozenset({0, 1}): 2.0}
     assert truth.shapley(energy, 0, 2) == pytest.approx((6 + 5) / 2)
