@@ -126,7 +126,7 @@ def test_sets_of_causes_begin_and_end_where_the_tables_do():
     for present, model in ((frozenset(), described), (frozenset({0}), fit)):
         energy = attribution.left_by(fitter, fit, present, records).plain.sum()
         assert energy == pytest.approx(attribution.as_fitted(fitter, model, records).plain.sum(), rel=0.02)
-    low, high = attribution._CausesAsFound(fit.structure, fitter, fit.theta).bounds
+    low, high = attribution.CausesAsFound(fit.structure, fitter, fit.theta).bounds
     fixed = [p.cause is not None for p in fit.structure.free_parameters]
     assert ((high - low)[: len(fixed)] < 1e-6).tolist() == fixed
 

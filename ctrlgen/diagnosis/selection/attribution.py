@@ -232,7 +232,7 @@ def left_by(fitter: Fitter, fit: Fit, present: frozenset[int], records: list[Rec
     nothing = np.zeros(0)
     reduced = Fit(structure, theta, (), 0.0, fit.n, nothing, nothing, 0.0, fit.shapes)
     for _ in range(ATTRIBUTION.updates):
-        problem = _CausesAsFound(structure, fitter.with_errors_of(reduced), reduced.theta)
+        problem = CausesAsFound(structure, fitter.with_errors_of(reduced), reduced.theta)
         x = levenberg_marquardt(problem, problem.start, ATTRIBUTION.steps)
         reduced = replace(reduced, theta=problem.to_si(x)[: problem.k])
     return as_fitted(fitter, reduced, records)
@@ -243,7 +243,7 @@ def _key(structure: Structure, p: FreeParameter) -> tuple[Hypothesis | None, str
     return (None, p.path) if p.cause is None else (structure.causes[p.cause], p.name)
 
 
-class _CausesAsFound(LeastSquaresProblem):
+class CausesAsFound(LeastSquaresProblem):
     """A fit of the device's own numbers, held by what its file states of them; those of its causes stay as they are."""
 
     def __init__(self, structure: Structure, fitter: Fitter, theta: np.ndarray) -> None:
@@ -252,6 +252,7 @@ class _CausesAsFound(LeastSquaresProblem):
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Those of the parameters, but of the causes' numbers only as far as rounding."""
         low, high = super().bounds
         own = np.array([p.cause is None for p in self.structure.free_parameters] + [True] * self.n_initial, dtype=bool)
         at, reach = self.start, ATTRIBUTION.fixed
