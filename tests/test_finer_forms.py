@@ -29,6 +29,7 @@ def found(radii: np.ndarray):
     return Searcher(fitter, Screen(fitter, OFFERED), lambda _: None).run(device).chosen
 
 
+@pytest.mark.long
 def test_two_groups_of_plays_are_one_hysteresis_and_nothing_beside_it():
     chosen = found(TWO_GROUPS)
     assert [c.effect for c in chosen.causes] == ["weighted_displacement_hysteresis"]
@@ -42,5 +43,6 @@ def test_two_groups_of_plays_are_one_hysteresis_and_nothing_beside_it():
     assert np.sqrt(chosen.held_out.plain_mean[0]) < 2  # of the noise, for the same reason; 9 with the plain law
 
 
+@pytest.mark.long
 def test_plays_of_even_weights_keep_the_plain_law():
     assert [c.effect for c in found(EVEN).causes] == ["displacement_hysteresis"]

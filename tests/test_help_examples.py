@@ -16,8 +16,12 @@ from ctrlgen.app.commands.cli import app
 from ctrlgen.app.shipped_examples import examples
 
 EXAMPLE = re.compile(r"Example:  (ctrlgen .*)")
-COMMANDS = {command.callback.__name__: command.help for command in app.registered_commands}
-QUICK = {"check", "example", "learn"}
+COMMANDS = {command.callback.__name__: command.help for command in app.registered_commands} | {
+    f"{group.name} {command.callback.__name__}": command.help
+    for group in app.registered_groups
+    for command in group.typer_instance.registered_commands
+}
+QUICK = {"check", "example", "look", "new device", "new scenario", "simulate"}
 ELSEWHERE = {"verify"}  # .ci/run runs it as printed
 
 

@@ -34,6 +34,7 @@ def test_a_stretch_is_found_with_both_ends():
     assert (first.low, first.high) == (pytest.approx(0.2, abs=1.5 * CELL), pytest.approx(0.4, abs=1.5 * CELL))
 
 
+@pytest.mark.long
 def test_noise_has_a_region_in_no_more_than_one_recording_of_twenty():
     """Of five quantities; one in a hundred is meant."""
     rng = np.random.default_rng(6)

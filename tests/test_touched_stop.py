@@ -60,16 +60,6 @@ def test_the_law_is_that_of_the_stop_at_the_depth_at_which_it_is_touched(touched
         assert np.std(r.observed - fitter.predict(fit, r)) < 1.1 * NOISE
 
 
-def test_a_touch_is_right_to_a_part_in_a_thousand_of_what_it_does(touched):
-    """What steps miss at the corner bends the numbers of a stop that is only touched, which then foretell no run into it."""
-    fitter, gap = touched
-    true = Structure(AXIS).with_cause(STOP, {"stiffness": STIFFNESS, "gap": gap, "power": 1.0})
-    record = fitter.fit_records[0]
-    exact, free = (stopped(record.drive[:, 0], edge) for edge in (gap, np.inf))
-    missed = fitter.predict(fitter.fit(true, steps=0), record)[:, 0] - exact
-    assert np.sqrt(np.mean(missed**2)) < 0.001 * np.sqrt(np.mean((exact - free) ** 2))
-
-
 @pytest.mark.long
 def test_a_shape_that_the_fit_leaves_open_is_the_usual_one(touched):
     fitter, gap = touched

@@ -62,8 +62,6 @@ class Effect:
     shifts_drive: ClassVar[bool] = False
     # Its amplitude [s] moves a signal in time, so far that no slope at zero tells what it would explain.
     moves_in_time: ClassVar[bool] = False
-    # Its force begins with a corner where something is touched: the integrator's steps are shorter.
-    corner: ClassVar[bool] = False
     # The force at standstill takes any value that holds the stage there (dry friction). The integrator must then be
     # implicit, in the effect's states too, whose rates must be linear in the states.
     set_valued: ClassVar[bool] = False

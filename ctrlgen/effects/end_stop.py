@@ -16,7 +16,6 @@ class EndStop(Effect):
     """
 
     place = Place.FORCE
-    corner = True
     requires = frozenset({"force"})
     source = "K. L. Johnson, Contact Mechanics (1985), eq. (4.23): Hertz; the corner is rounded"
     params = (

@@ -19,9 +19,6 @@ from ctrlgen.numerics.phi_functions import phi_matrices
 EXPLICIT_STEP = 0.8  # nonlinear forces are then right to 1e-3 of themselves
 IMPLICIT_STEP = 0.2  # friction whose reversal takes no time is then right to 2 % of itself
 CONTACT_STEP = 0.25  # at the rate of a stiffening flexure
-# At that of a contact whose force begins with a corner, which lies within a step: what a touch does is then right to half a thousandth,
-# a third of what it is with the steps of a smooth one, and the numbers of a stop that is touched foretell a run into it.
-CORNER_STEP = 0.1
 LAG_OVER = 5.0  # rates above this per sample do not shorten the step: such a lag is over within a sample, and exact
 STIFFER_AWAY = 1.2  # a stage this much faster at the ends of its travel than at home touches something there
 LEAST_IMPLICIT_STEPS = 4  # a sample, so that the moment of a reversal is followed
@@ -210,8 +207,7 @@ def contact_steps(model: Model, sample_time: float) -> int:
     slopes = (slope_at_rest(model, displacement=d)[first:, first:] for d in (NEAR_HOME, 1.0, -1.0))
     home, *ends = (np.abs(np.linalg.eigvals(A)).max(initial=0.0) if np.isfinite(A).all() else 0.0 for A in slopes)
     fastest = max(ends)
-    longest = CORNER_STEP if any(effect.corner for effect in model.device.effect) else CONTACT_STEP
-    return int(min(np.ceil(sample_time * fastest / longest), MOST_STEPS)) if fastest > STIFFER_AWAY * home else 1
+    return int(min(np.ceil(sample_time * fastest / CONTACT_STEP), MOST_STEPS)) if fastest > STIFFER_AWAY * home else 1
 
 
 def slope_at_rest(model: Model, speed: float = 0.0, displacement: float = NEAR_HOME) -> np.ndarray:

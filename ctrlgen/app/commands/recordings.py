@@ -47,7 +47,7 @@ def look(
     Columns are matched by unit, name and range. What the files do not say is asked: a line "to be answered", and a comment in
     the recording.toml.
 
-    Example:  ctrlgen look scenarios/nist_hexapod/poses.csv
+    Example:  ctrlgen look scenarios/nist_hexapod/measured.csv
     """
     from ctrlgen.app.look_console import look as looked
 
