@@ -78,7 +78,7 @@ def scenario(
 ) -> None:
     """Begin a scenario: a path in the middle of what the device can reach, half as large as would fit.
 
-    Example:  ctrlgen new scenario scenarios/mine --device scenarios/devices/xy_lever_stage.toml
+    Example:  ctrlgen new scenario circle --device scenarios/devices/xy_lever_stage.toml
     """
     from ctrlgen.app.new_files.write import write_scenario
 
