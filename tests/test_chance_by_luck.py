@@ -190,7 +190,7 @@ def test_the_level_holds_for_causes_fitted_where_there_are_none():
         BACKLASH: {"gap": 2e-8},
         Hypothesis("drive_gain", "actuator:axis", "axis"): {"gain": 1.001},
         Hypothesis("stiffening", "stage:axis", "axis"): {"k3": 1e15},
-        LATE: {"gain": 1e-3},
+        LATE: {"gain": 1e-3, "tau": 0.1, "decades": 2.0},
     }
     p = []
     for seed in range(60):
