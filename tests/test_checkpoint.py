@@ -29,9 +29,9 @@ def sought(monkeypatch) -> list[int]:
     """One entry for every optimum that is looked for."""
     calls, real = [], fit.levenberg_marquardt
 
-    def counted(problem, x, steps):
+    def counted(problem, x, steps, enough):
         calls.append(steps)
-        return real(problem, x, steps)
+        return real(problem, x, steps, enough)
 
     monkeypatch.setattr(fit, "levenberg_marquardt", counted)
     return calls
