@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -144,7 +144,7 @@ def _context(
         ],
         "target": c["rows"][0]["target"],
         "period": f"{scenario.sample_time:.6g}" if scenario.sample_time else "",
-        "memory": _memory(c, [contexts[real].get("chosen") for real in Real]),
+        "memory": _memory(c, contexts),
         "vectors": _test_calls(c),
         "tolerance": {real.suffix: contexts[real]["tolerance"] for real in Real},
         "figures": list(figures),
@@ -158,26 +158,20 @@ def _test_calls(c: dict[str, Any]) -> int:
     return online + (len(c["played"]) + len(c["timed"]) + 4 + c["played_unusable"] if c["player"] else 0)
 
 
-def _memory(c: dict[str, Any], chosen: Sequence[PlayerCandidate | None]) -> list[dict[str, Any]]:
-    """Rows of the README's table of memory, bytes in double and float; `chosen`: the player's form in each arithmetic."""
-    x, n, nu, n_s, m, count = len(c["x_names"]), c["n"], c["nu"], c["n_s"], c["m"], len(c["rows"])
-    timed = len(c["timed"])
+def _memory(c: dict[str, Any], contexts: Mapping[Real, dict[str, Any]]) -> list[dict[str, Any]]:
+    """Rows of the README's table of memory, bytes in double and float."""
+    x, n, nu, n_s = len(c["x_names"]), c["n"], c["nu"], c["n_s"]
+    chosen: list[PlayerCandidate | None] = [contexts[real].get("chosen") for real in Real]
     rated = nu if c["rated"] else 0
     given = (f" + {rated}" if rated else "") + (f" + {c['given_numbers']}" if c["given_numbers"] else "")
     state = f"`sizeof({c['online']}_state)` = ({x} + {n}{given}) numbers and a word, RAM, one a device"
     output = f"`sizeof({c['online']}_output)` = ({nu} + {n} + {n_s}) numbers, RAM or stack"
-    vectors = f"{count} x ({m} + {nu}) numbers and 3 x {count} integers of 4 B, constants; only if the test is called"
-    played = len(c["played"])
-    if played:
-        vectors = vectors.replace(
-            ", constants", f", {played} x {nu} + {timed} x {nu + 1} numbers and {played} indices of 4 B, constants"
-        )
     rows = [
         _counted("state", x + n + rated + 1 + c["given_numbers"], 0, state),  # a word is aligned as a number
         _counted("output", nu + n + n_s, 0, output),
-        _counted("vectors", count * (m + nu) + played * nu + timed * (nu + 1), 12 * count + 4 * played, vectors),
+        _vectors(contexts),
     ]
-    if played:
+    if c["played"]:
         forms = "; ".join(
             f"{real.value}: {kept.kind}, {kept.size}" for real, kept in zip(Real, chosen, strict=True) if kept
         )
@@ -185,6 +179,26 @@ def _memory(c: dict[str, Any], chosen: Sequence[PlayerCandidate | None]) -> list
         formula = f"constants, only if the player is called; {forms}"
         rows.insert(2, {"what": "player's table", "double": sizes[0], "float": sizes[1], "formula": formula})
     return rows
+
+
+def _vectors(contexts: Mapping[Real, dict[str, Any]]) -> dict[str, Any]:
+    """The row of the reference vectors. A call near a limit may be one of double alone, or of float: their numbers may differ."""
+    row: dict[str, Any] = {"what": "vectors"}
+    formulas = []
+    for real in Real:
+        c = contexts[real]
+        m, nu, count, played, timed = c["m"], c["nu"], len(c["rows"]), len(c["played"]), len(c["timed"])
+        row[real.value] = real.bytes * (count * (m + nu) + played * nu + timed * (nu + 1)) + 12 * count + 4 * played
+        formula = f"{count} x ({m} + {nu}) numbers and 3 x {count} integers of 4 B"
+        formulas.append(
+            formula + (f", {played} x {nu} + {timed} x {nu + 1} numbers and {played} indices of 4 B" if played else "")
+        )
+    counted = (
+        formulas[0]
+        if len(set(formulas)) == 1
+        else "; ".join(f"{r.value}: {f}" for r, f in zip(Real, formulas, strict=True))
+    )
+    return row | {"formula": f"{counted}, constants; only if the test is called"}
 
 
 def _counted(what: str, numbers: int, extra: int, formula: str) -> dict[str, Any]:
