@@ -80,10 +80,10 @@ def linearised(r: Simulator, moved: Record, p: np.ndarray) -> np.ndarray:
     return np.array(Y)
 
 
-def agree(found: np.ndarray, wanted: np.ndarray) -> None:
+def agree(found: np.ndarray, wanted: np.ndarray, rounding: float = 1e-10) -> None:
     size = np.abs(wanted).max(axis=(0, 1))
     assert np.all(size > 0)
-    assert np.all(np.abs(found - wanted).max(axis=(0, 1)) < 1e-10 * size)
+    assert np.all(np.abs(found - wanted).max(axis=(0, 1)) < rounding * size)
 
 
 @pytest.mark.long
@@ -102,11 +102,14 @@ def test_carried_slopes_are_those_of_the_whole_sample(monkeypatch, tmp_path, eff
     assert r.equations.model.held.numel() == ("loop" in text)
     moved = record(size)
     y, Y = r.sensitivities(moved, p)
-    agree(Y, differentiated(r, moved, p))
-    agree(linearised(r, moved, p), Y[:, :, : len(p)])
+    # Steps with dry friction are solved for by an elimination that is written out, in another order than the whole sample's: rounding
+    # grows by the stiffness of the bristles, and a term that is missing would show in the third digit
+    rounding = 1e-8 if "coulomb" in effects else 1e-10
+    agree(Y, differentiated(r, moved, p), rounding)
+    agree(linearised(r, moved, p), Y[:, :, : len(p)], rounding)
     assert np.allclose(y, r.simulate(moved, p), rtol=0, atol=1e-12 * np.abs(y).max())
     alone = r.sensitivities(moved, p, by_free=False)[1]
-    agree(alone, Y[:, :, len(p) :])
+    agree(alone, Y[:, :, len(p) :], rounding)
 
 
 class Counted:

@@ -294,6 +294,8 @@ class _RecordReader:
     def _check_thinned(self, sample_time: float) -> None:
         """A fault where the filter leaves too few rows of a record that has enough of them."""
         first, last = self.rows or (0, 0)
+        if not np.isfinite(sample_time):  # a clock that has a fault of its own
+            return
         every, least = self._kept(sample_time), SHORTEST["series"]
         if last - first < least or (last - first) // every >= least:
             return
