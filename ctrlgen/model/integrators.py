@@ -18,7 +18,7 @@ from ctrlgen.numerics.phi_functions import phi_matrices
 # Step length: time times the fastest rate (magnitude of an eigenvalue of A) per step, and steps a sample
 EXPLICIT_STEP = 0.8  # nonlinear forces are then right to 1e-3 of themselves
 IMPLICIT_STEP = 0.2  # friction whose reversal takes no time is then right to 2 % of itself
-CONTACT_STEP = 0.25  # at the rate of a stiffening flexure
+CONTACT_STEP = 0.25  # at the rate of a stop or a stiffening flexure: impacts are then right to 1 or 2 % of themselves
 LAG_OVER = 5.0  # rates above this per sample do not shorten the step: such a lag is over within a sample, and exact
 STIFFER_AWAY = 1.2  # a stage this much faster at the ends of its travel than at home touches something there
 LEAST_IMPLICIT_STEPS = 4  # a sample, so that the moment of a reversal is followed
