@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import re
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +18,7 @@ from ctrlgen.core.errors import InputError
 from ctrlgen.recordings.formats import read_table
 from ctrlgen.recordings.look.column_facts import between_samples, rests, table_facts
 from ctrlgen.recordings.look.oddities import early, table_oddities
-from ctrlgen.recordings.look.proposal import propose
+from ctrlgen.recordings.look.proposal import propose, recording_toml
 from ctrlgen.recordings.reader import load_recordings
 
 RATE = 1000.0
@@ -176,3 +178,13 @@ def test_the_command_draws_prints_and_writes(tmp_path):
     assert ctrlgen("check", to, "--device", AXIS_FILE).returncode == 0
     with pytest.raises(InputError, match="exists"):
         look([Path(log)], AXIS_FILE, to, None)
+
+
+def test_names_of_columns_are_no_lines_of_the_file(axis, tmp_path):
+    """A name may hold what TOML reads as the end of a comment or of a string."""
+    table = {"t": T.tolist(), "drive": U.tolist(), "position": Y.tolist(), 'x\n[evil]\r"\x00': (2 * Y).tolist()}
+    (tmp_path / "log.json").write_text(json.dumps(table))
+    proposal = propose([table_facts(read_table(tmp_path / "log.json"))], axis)
+    read = tomllib.loads(recording_toml(proposal, tmp_path, 'a "title"\n[x]'))
+    assert set(read) == {"title", "device", "kind", "record", "columns"}
+    assert read["columns"]["drive.axis"]["column"] == "drive"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import write_bytes
 from ctrlgen.core.units import difference
 from ctrlgen.model.model import Model
-from ctrlgen.reporting.plots import COLOURS, STYLE
+from ctrlgen.reporting.plots import COLOURS, STYLE, image
 
 LINES = ("-", "--")  # the curves of the X and Y drives of a stage often coincide
 POINTS = 400  # frequencies, beside those of the poles
@@ -42,10 +41,7 @@ def draw_bode(model: Model, pose: np.ndarray, path: Path) -> None:
     omega = np.unique(np.concatenate([np.logspace(low, high, POINTS), poles]))
     response = control.frequency_response(system, omega, squeeze=False)
     figure = _figure(model, response, np.atleast_2d(system.dcgain()), omega / (2 * np.pi))
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format=path.suffix[1:], dpi=150)
-    plt.close(figure)
-    write_bytes(path, buffer.getvalue())
+    write_bytes(path, image(figure, path.suffix))
 
 
 def _figure(model: Model, response: control.FrequencyResponseData, static: np.ndarray, hertz: np.ndarray) -> Figure:

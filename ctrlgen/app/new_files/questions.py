@@ -16,7 +16,6 @@ class Question:
     key: str
     text: str
     answer: str
-    positive: bool = True
 
 
 @dataclass(frozen=True)
@@ -128,7 +127,7 @@ def read(question: Question, text: str) -> float:
         except ValueError as error:
             faults.append(error)
             continue
-        if question.positive and not si > to_si(0.0, wanted):
+        if not si > to_si(0.0, wanted):
             raise ValueError(f"{text!r} must be above zero")
         return si
     raise faults[0]

@@ -16,6 +16,7 @@ import numpy as np
 from ctrlgen.app.new_files.questions import KINDS, Answer, answers
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import write_text
+from ctrlgen.core.names import C_NAME, checked
 from ctrlgen.core.units import from_si, same_dimension
 from ctrlgen.devices import load_device
 from ctrlgen.model.assembly import build_model
@@ -41,9 +42,10 @@ def write_device(file: Path, kind: str, name: str | None = None, given: Mapping[
     if file.suffix != ".toml":
         raise InputError("new device", [Fault(str(file), "must end in .toml")])
     chosen = _identifier(file.stem) if name is None else name
-    if not re.fullmatch(r"[a-z][a-z0-9_]*", chosen, re.ASCII):
-        what = "must begin with a letter, then lower-case letters, digits and _, such as my_stage: it names the C functions"
-        raise InputError("--name", [Fault(chosen, what)])
+    try:
+        checked(chosen, C_NAME)
+    except ValueError as error:
+        raise InputError("--name", [Fault("name", str(error))]) from None
     numbers = answers(kind, given or {})
     text = _render(f"{kind}.toml.j2", name=chosen, title=KINDS[kind].title, sizes=Sizes(numbers))
     with TemporaryDirectory() as folder:  # read back before it is put in place
@@ -138,7 +140,6 @@ class Reach:
     units: tuple[str, ...]
     middle: tuple[float, ...]
     half: tuple[float, ...]
-    timed: bool
 
     def plane(self) -> tuple[int, ...]:
         """The channels of a path: the first two lengths, or else the first two angles, or else the first channel."""
@@ -188,7 +189,7 @@ def reachable(model: Model) -> Reach:
     middle = middle_pose(model)
     ends = np.array(workspace.ranges(middle))
     half = SHARE * np.min(np.abs(ends - middle[:, None]), axis=1)
-    return Reach(pose.channels, pose.units, tuple(middle), tuple(half), model.inertial or model.n_states > 0)
+    return Reach(pose.channels, pose.units, tuple(middle), tuple(half))
 
 
 def _render(template: str, **values: object) -> str:

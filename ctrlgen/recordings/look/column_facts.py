@@ -17,7 +17,6 @@ TIME_NAME = re.compile(
     re.IGNORECASE,
 )
 SUFFIX = re.compile(r"^(?P<name>.*[A-Za-z0-9)])[_.](?P<unit>[A-Za-z%]{1,4})$")  # of a name: drive_V, time.ms
-EVEN = 0.01  # of a step, rms: clocks jitter by less
 GAP = 1.5  # steps between two rows from which rows are missing
 END = 1e-9  # of the range: rounding of a file
 CLIPPED = 20  # rows at an end, in runs of three and more, from which it is told
@@ -31,12 +30,11 @@ SMOOTH = 0.1  # median of second differences over that of first ones, of a drive
 @dataclass(frozen=True)
 class ColumnFacts:
     """One column: `unit` as the file states it or its name ends, None where neither does; `values` (n,), NaN where there is no number,
-    None where the column is text; `why`: what is wrong with it; `notes`: what was interpreted."""
+    None where the column is text; `notes`: what was interpreted."""
 
     name: str
     unit: str | None
     values: np.ndarray | None
-    why: str = ""
     notes: tuple[str, ...] = ()
 
     @property
@@ -117,9 +115,9 @@ def _facts(table: MeasurementTable, name: str) -> ColumnFacts:
     unit = _suffix(name) if stated is None else unit_of(stated)
     try:
         read = table.reading(name)
-    except InputError as error:
-        return ColumnFacts(name, unit, None, "; ".join(fault.what for fault in error.faults))
-    return ColumnFacts(name, unit, read.values, "", read.notes)
+    except InputError:  # it holds text
+        return ColumnFacts(name, unit, None)
+    return ColumnFacts(name, unit, read.values, read.notes)
 
 
 def _suffix(name: str) -> str | None:

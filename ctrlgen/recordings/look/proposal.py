@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ctrlgen.core.escaping import toml
 from ctrlgen.core.units import same_dimension, to_si
 from ctrlgen.model.model import Model
 from ctrlgen.recordings.look.column_facts import ColumnFacts, TableFacts, between_samples, rests
@@ -57,7 +58,6 @@ CLEAR = 1.0
 """How much more alike the chosen column must be than the next best that is free, to be certain."""
 MOST_POSES = 500
 """Rows without a time that are taken for poses."""
-LAGGED = "comes before its drive"
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ def _remarks(model: Model, facts: TableFacts, matches: Sequence[Match]) -> list[
         rows = [early(_values(facts, d), _values(facts, match)) for d in drives]
         if len(drives) == 1 and rows[0]:
             said.append(
-                f"{match.signal} {LAGGED} by {rows[0]} rows: are the columns those of one clock? `later` shifts one"
+                f"{match.signal} comes before its drive by {rows[0]} rows: are the columns those of one clock? `later` shifts one"
             )
     return said
 
@@ -243,8 +243,8 @@ def recording_toml(proposal: Proposal, folder: Path, title: str) -> str:
     """The text of a recording.toml in `folder`, with comments where something is assumed."""
     lines = [
         "# Begun by ctrlgen look. Lines that end in a comment hold what the files do not say: correct what is wrong.",
-        f"title  = {_quoted(title)}",
-        f"device = {_quoted(proposal.model.device.name)}",
+        f"title  = {toml(title)}",
+        f"device = {toml(proposal.model.device.name)}",
         f'kind   = "{proposal.kind}"' + ("" if proposal.tables[0].time else " # assumed: no column is a time"),
         "",
     ]
@@ -255,23 +255,24 @@ def recording_toml(proposal: Proposal, folder: Path, title: str) -> str:
     lines.append("[columns]")
     for match in proposal.matches:
         why = f" # {'; '.join(match.why)}" if match.why else ""
-        lines.append(f'"{match.signal}" = {{ column = {_quoted(match.column)}, unit = "{match.unit}" }}{why}')
+        lines.append(f'"{match.signal}" = {{ column = {toml(match.column)}, unit = "{match.unit}" }}{why}')
     lines += [f"# not used: {', '.join(proposal.left)}"] if proposal.left else []
     lines += [f"# to be answered: {question}" for question in proposal.missing]
     lines += [f"# odd: {remark}" for remark in proposal.remarks]
-    return "\n".join(line.replace("\n", " ") for line in lines) + "\n"
+    # names of columns stand in comments, too, where nothing escapes what is not shown
+    return "\n".join("".join(c if c.isprintable() else " " for c in line) for line in lines) + "\n"
 
 
 def _record(proposal: Proposal, facts: TableFacts, folder: Path, role: str) -> list[str]:
     """The [[record]] tables of one file: what moves, and the rests before or after, which give the noise."""
     path = Path(os.path.relpath(facts.table.path.resolve(), folder.resolve())).as_posix()
-    head = [f"file = {_quoted(path)}"]
+    head = [f"file = {toml(path)}"]
     if proposal.kind == "poses":
         return ["[[record]]", *head, f'role = "{role}"', ""]
     if facts.time is None:
         head.append('sample_rate = "1 kHz" # assumed: no column is a time')
     else:
-        head.append(f'time = {{ column = {_quoted(facts.time.column)}, unit = "{facts.time.unit}" }}')
+        head.append(f'time = {{ column = {toml(facts.time.column)}, unit = "{facts.time.unit}" }}')
     names = [m.column for m in proposal.matches if m.signal.startswith("drive.")]
     drives = [facts.column(name).values for name in names if any(c.name == name for c in facts.columns)]
     known = [values for values in drives if values is not None]
@@ -299,9 +300,3 @@ def _record(proposal: Proposal, facts: TableFacts, folder: Path, role: str) -> l
                 "",
             ]
     return lines
-
-
-def _quoted(text: str) -> str:
-    """A text as TOML writes it."""
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
-    return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'
