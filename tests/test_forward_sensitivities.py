@@ -129,10 +129,12 @@ class Counted:
         return J.T @ J
 
 
-def test_slopes_are_worked_out_where_a_step_is_accepted_only():
-    problem = Counted()
-    found = levenberg_marquardt(problem, np.array([2.5]), 40)
-    sizes = [abs(x**3 - 20 * x + 30) for x in problem.slopes]
-    assert sizes == sorted(sizes, reverse=True) and problem.slopes[-1] == found[0]
-    assert len(problem.residuals) > len(problem.slopes)  # some were rejected
-    assert set(problem.slopes[1:]) <= set(problem.residuals)
+def test_slopes_come_with_the_readings_after_a_good_step_and_wait_after_a_refused_one():
+    smooth, bent = Counted(), Counted()
+    levenberg_marquardt(smooth, np.array([-6.0]), 40)
+    assert not smooth.residuals  # every step was good, and none was simulated without them before
+    found = levenberg_marquardt(bent, np.array([2.5]), 40)
+    slopes = list(dict.fromkeys(bent.slopes))
+    sizes = [abs(x**3 - 20 * x + 30) for x in slopes]
+    assert [k for k in range(1, len(sizes)) if sizes[k] > min(sizes[:k])] == [1]  # the first went too far
+    assert set(slopes[2:4]) <= set(bent.residuals) and slopes[-1] == found[0]
