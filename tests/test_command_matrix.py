@@ -85,7 +85,11 @@ def test_every_command_refuses_files_of_other_kinds_in_words(command, tmp_path, 
     fitting = {"check": {"device", "scenario"}, "bode": {"device"}, "workspace": {"device"}, "batch": {"jobs"}}
     fitting |= {"look": {"log"}, "simulate": {"device"}}
     takes_two = {"learn", "diagnose", "calibrate"}
-    out = [] if command in ("check", "compare", "example", "reproduce", "look") else ["--out", tmp_path / "out.svg"]
+    out = (
+        []
+        if command in ("check", "compare", "example", "reproduce", "look", "laws")
+        else ["--out", tmp_path / "out.svg"]
+    )
     for kind, file in kinds.items():
         if kind in fitting.get(command, {"scenario"}):
             continue

@@ -31,6 +31,7 @@ from ctrlgen.core.files import MARKER, read_toml, validate, whole_folder, write_
 from ctrlgen.core.parallel import Failure, run_all
 from ctrlgen.devices.section import Section
 from ctrlgen.diagnosis.diagnosis_folder import Replicates, diagnose_into, digests
+from ctrlgen.effects import installed
 from ctrlgen.estimation.hypothesis import selected_laws
 from ctrlgen.version import code_hash
 
@@ -80,7 +81,13 @@ class Task:
         """Everything the result depends on, files as their SHA-256. Raises InputError where a file cannot be read."""
         hashes = digests(Path(self.device), [Path(r) for r in self.recordings])
         laws = None if self.laws is None else list(self.laws)
-        return {"code": code_hash(), "seed": self.seed, "replicates": self.replicates, "laws": laws, "files": hashes}
+        return {
+            "code": code_hash() + installed().digest,
+            "seed": self.seed,
+            "replicates": self.replicates,
+            "laws": laws,
+            "files": hashes,
+        }
 
     def __call__(self) -> dict[str, bytes]:
         """The content of the result folder by file name; it is made in a temporary folder."""

@@ -13,7 +13,7 @@ from ctrlgen.devices import load_device
 from ctrlgen.devices.mechanism.mechanism import Mechanism
 from ctrlgen.devices.mechanism.modes import summary
 from ctrlgen.devices.sensor import describe
-from ctrlgen.effects import Effect
+from ctrlgen.effects import laws
 from ctrlgen.estimation.law_needs import not_offered, refusals, usual
 from ctrlgen.firmware.package import MANIFEST, verify_package
 from ctrlgen.model.assembly import build_model
@@ -106,7 +106,7 @@ def _check_device(file: Path, figure: Path | None) -> None:
     physics = device.physics(device.values())
     parts, there = device.parts(physics), available(physics)
     out.print(f"  machine: {parts.text}", markup=False, soft_wrap=True)
-    if refused := not_offered([name for name, law in sorted(Effect.library.items()) if law.requires <= there], parts):
+    if refused := not_offered([name for name, law in sorted(laws().items()) if law.requires <= there], parts):
         out.print(f"  not offered in a diagnosis: {refusals(refused)}", markup=False, soft_wrap=True)
     for row in usual(parts):
         out.print(f"  usual: {row.text}", markup=False, soft_wrap=True)

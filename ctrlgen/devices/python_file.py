@@ -88,8 +88,7 @@ def as_toml(device: Device, file: str) -> str:
         effects = tomlkit.aot()
         for e in device.effect:
             table = tomlkit.table()
-            placed = {"kind": e.kind, "at": e.at} | ({} if e.of is None else {"of": e.of})
-            table.update(placed | {name: _number(number) for name, number in e.values.items()})
+            table.update(e.placed() | {name: _number(number) for name, number in e.values.items()})
             effects.append(table)
         document.add("effect", effects)
     return document.as_string()

@@ -15,6 +15,7 @@ from ctrlgen.diagnosis.report.diagnosis_record import Provenance, diagnosis_reco
 from ctrlgen.diagnosis.report.html_report import page
 from ctrlgen.diagnosis.report.writeback import write_next
 from ctrlgen.diagnosis.selection.search_result import SearchResult
+from ctrlgen.effects import installed
 from ctrlgen.estimation.checkpoint import Checkpoint
 from ctrlgen.estimation.simulator import compiled_simulator
 from ctrlgen.model.assembly import build_model
@@ -126,7 +127,8 @@ def _checkpoint(
     """The checkpoint of a diagnosis into `out`, valid for the same program, files, seed and effects."""
     files = digests(Path(device), recordings)
     return Checkpoint(
-        unfinished(out), {"code": code_hash(), "seed": seed, "laws": laws and sorted(laws), "files": files}
+        unfinished(out),
+        {"code": code_hash() + installed().digest, "seed": seed, "laws": laws and sorted(laws), "files": files},
     )
 
 

@@ -12,6 +12,9 @@ The theorems of `tests/test_effects.py` and `tests/test_effects_in_c.py` then ho
 units, C equal to Python. What the diagnosis believes of it beforehand has defaults; `ctrlgen/estimation/priors.py` takes a row
 where they are wrong.
 
+A law of somebody else stands in his own package and is found by an entry point: `_installed.py`. `Effect.library` holds ours and, once
+they were asked for, those; `laws()` is every law there is.
+
 A law's file imports what it needs from here: `Effect`, `Param`, `Place`, `State` and the types of what it is given. Files that begin
 with an underscore are no laws: the law's interface, the reader of [[effect]] tables, and expressions that several laws share.
 """
@@ -20,26 +23,35 @@ from importlib import import_module
 from pkgutil import iter_modules
 
 from ctrlgen.effects._effect import Effect, Place
+from ctrlgen.effects._installed import Installed, LeftOut, installed, law_of, laws, load_laws
 from ctrlgen.effects._law_inputs import Expression, LawInputs, LawNumbers
 from ctrlgen.effects._parameter import Channel, Param, State
 from ctrlgen.effects._region import ActsIn, Side
+from ctrlgen.effects._requirements import REQUIREMENTS
 from ctrlgen.effects._table import EffectTable, faults_at, read_effect
 
 for _module in iter_modules(__path__):
     import_module(f"{__name__}.{_module.name}")
 
 __all__ = [
+    "REQUIREMENTS",
     "ActsIn",
     "Channel",
     "Effect",
     "EffectTable",
     "Expression",
+    "Installed",
     "LawInputs",
     "LawNumbers",
+    "LeftOut",
     "Param",
     "Place",
     "Side",
     "State",
     "faults_at",
+    "installed",
+    "law_of",
+    "laws",
+    "load_laws",
     "read_effect",
 ]

@@ -25,7 +25,8 @@ class Place(Enum):
 
 
 class Effect:
-    """Base of every effect: one law a file in `ctrlgen/effects/`; one that acts at several places or axes is named for each.
+    """Base of every effect: one law a file in `ctrlgen/effects/`, or in a package of its author. One that acts at several places or axes
+    is named for each.
 
     `term(s, p)` is the law's contribution, in the unit of the place: `p` holds the parameters in SI, and `LawInputs` says what `s`
     holds.
@@ -36,15 +37,17 @@ class Effect:
     title: ClassVar[str]  # what it is, without symbols, for a report; by default the first line of the law's file
     place: ClassVar[Place]
     source: ClassVar[str]
+    package: ClassVar[str] = ""  # the installed package that brings it; none of ctrlgen's own
     params: ClassVar[tuple[Param, ...]]
     states: ClassVar[tuple[State, ...]] = ()
+    # What the search believes of a law of another package: an `estimation.law_prior.LawPrior`. Ours have rows in `estimation.priors`.
+    prior: ClassVar[object] = None
     # Where it acts, if not everywhere.
     acts_in: ClassVar[ActsIn | None] = None
     # Remembers so much that a simulation of a recording applies it to the simulated readings as a whole, where nothing follows it,
     # and leaves it out of the model: `estimation.late_readings`.
     apart: ClassVar[bool] = False
-    # What the device must have, of: acceleration, actuator, ambient, balanced, bipolar, displacement_command, force, heat,
-    # sample_time, second_order_kinematics, spatial, state, tangent_compliance, unheated, velocity, voltage.
+    # What the device must have: words of `_requirements`.
     requires: ClassVar[frozenset[str]] = frozenset()
     # Couples a channel to another one, `of`, whose index is `partner`; a symmetric one acts on both.
     pairs: ClassVar[bool] = False
@@ -92,7 +95,17 @@ class Effect:
                 f"{cls.__name__}: give one parameter an `off` value, so that the model without this "
                 f"effect is a special case of the model with it"
             )
+        same = Effect.library.get(cls.kind)
+        if same is not None and same.__module__ != cls.__module__:
+            raise TypeError(
+                f"{same.__module__} has a law of the name {cls.kind}; name the class {cls.__name__} otherwise"
+            )
         Effect.library[cls.kind] = cls
+
+    def placed(self) -> dict[str, str]:
+        """The keys of its [[effect]] table before its numbers: kind, package, at, of."""
+        keys = {"kind": self.kind, "package": self.package, "at": self.at, "of": self.of or ""}
+        return {key: text for key, text in keys.items() if text}
 
     @classmethod
     def amplitude(cls) -> Param:

@@ -9,6 +9,7 @@ from pydantic_core import PydanticCustomError, core_schema
 
 from ctrlgen.core.units import Quantity, read_quantity, same_dimension, show, to_si, written_unit
 from ctrlgen.effects._effect import Effect
+from ctrlgen.effects._installed import installed, law_of
 from ctrlgen.effects._parameter import PLACEHOLDERS, Channel, Param
 
 
@@ -21,12 +22,9 @@ def read_effect(given: Any) -> Effect:
         return given
     if not isinstance(given, dict):
         raise ValueError("an effect is a table: [[effect]] with kind, at and its parameters")
-    kind = given.get("kind")
-    if not isinstance(kind, str) or kind not in Effect.library:
-        raise ValueError(f"kind = {kind!r} is not a known effect; known are: {', '.join(sorted(Effect.library))}")
-    law = Effect.library[kind]
-    keys = ["kind", "at", *(["of"] if law.pairs else []), *(p.name for p in law.params)]
-    faults = [f"unknown key {key!r} (has: {', '.join(keys[1:])})" for key in given if key not in keys]
+    law = _law(given)
+    keys = ["kind", "package", "at", *(["of"] if law.pairs else []), *(p.name for p in law.params)]
+    faults = [f"unknown key {key!r} (has: {', '.join(keys[2:])})" for key in given if key not in keys]
     at, of = given.get("at"), given.get("of")
     if not isinstance(at, str):
         faults.append(f'at is missing: name the {law.place.value} channel, such as at = "1X", or "all"')
@@ -39,8 +37,29 @@ def read_effect(given: Any) -> Effect:
         except ValueError as error:
             faults.append(str(error))
     if faults:
-        raise ValueError(f"{kind}: " + "; ".join(faults))
+        raise ValueError(f"{law.kind}: " + "; ".join(faults))
     return law(str(at), values, of)
+
+
+def _law(given: dict[str, Any]) -> type[Effect]:
+    """The law of a table, of the package that it names. Raises ValueError that says what to install where there is none."""
+    kind, package = given.get("kind"), given.get("package")
+    law = law_of(kind) if isinstance(kind, str) else None
+    if law is not None and package in (None, law.package):
+        return law
+    if law is not None:
+        whose = f"the package {law.package}" if law.package else "ctrlgen itself"
+        raise ValueError(f"package = {package!r}: {kind} is here a law of {whose}; name that one, or leave it out")
+    if unusable := [each for each in installed().left_out if each.kind == kind]:
+        raise ValueError("; ".join(map(str, unusable)))
+    if isinstance(package, str):
+        raise ValueError(
+            f"{kind} is a law of the package {package}, which is not installed here or does not bring it; pip install {package}"
+        )
+    raise ValueError(
+        f"kind = {kind!r} is not a known effect; known are: {', '.join(sorted(Effect.library))}. A law of another package "
+        "is known once that package is installed"
+    )
 
 
 def _read_parameter(param: Param, given: dict[str, Any]) -> Quantity:
@@ -106,7 +125,7 @@ class _TableReader:
         return {
             "type": "object",
             "title": "effect",
-            "properties": {"kind": kinds, "at": text, "of": text},
+            "properties": {"kind": kinds, "package": text, "at": text, "of": text},
             "required": ["kind", "at"],
         }
 

@@ -14,7 +14,7 @@ from ctrlgen.core.units import Quantity
 from ctrlgen.devices import Device, DevicePhysics, InertialPhysics
 from ctrlgen.devices.quantities import walk
 from ctrlgen.devices.section import Section
-from ctrlgen.effects import Channel, Effect, Param, Place
+from ctrlgen.effects import Channel, Effect, Param, Place, laws
 from ctrlgen.estimation.disturbance_inputs import unread_axes
 from ctrlgen.estimation.law_prior import LawPrior
 from ctrlgen.estimation.priors import DEFAULT, prior_of
@@ -93,7 +93,7 @@ class Hypothesis:
     @property
     def finer(self) -> tuple[Hypothesis, ...]:
         """The finer forms of its law, at the same place."""
-        kinds = (kind for kind, law in sorted(Effect.library.items()) if self.effect in prior_of(law).refines)
+        kinds = (kind for kind, law in sorted(laws().items()) if self.effect in prior_of(law).refines)
         return tuple(replace(self, effect=kind) for kind in kinds)
 
     @property
@@ -161,11 +161,11 @@ class Hypothesis:
 
 def selected_laws(names: Sequence[str] | None = None) -> tuple[type[Effect], ...]:
     """The effects of these names, all for None, in alphabetical order. Raises InputError for a name that is no effect's."""
-    unknown = sorted(set(names or ()) - set(Effect.library))
+    unknown = sorted(set(names or ()) - set(laws()))
     if unknown:
-        known = ", ".join(sorted(Effect.library))
+        known = ", ".join(sorted(laws()))
         raise InputError("laws", [Fault(name, f"is not a known effect; known are: {known}") for name in unknown])
-    return tuple(law for name, law in sorted(Effect.library.items()) if names is None or name in names)
+    return tuple(law for name, law in sorted(laws().items()) if names is None or name in names)
 
 
 def hypotheses(

@@ -19,8 +19,8 @@ from ctrlgen.estimation.priors_of_a_lag import HYSTERESIS, OF_A_LAG
 
 
 def prior_of(law: type[Effect]) -> LawPrior:
-    """The row of a law, or the default."""
-    return PRIORS.get(law.kind, DEFAULT)
+    """The row of a law; of one of another package what it states itself; or the default."""
+    return PRIORS.get(law.kind) or (law.prior if isinstance(law.prior, LawPrior) else DEFAULT)
 
 
 DEFAULT = LawPrior()

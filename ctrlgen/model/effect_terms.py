@@ -14,30 +14,11 @@ import casadi as ca
 from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import same_dimension
 from ctrlgen.devices import BalancedPhysics, Device, DevicePhysics, ImposedPhysics, InertialPhysics
-from ctrlgen.effects import Channel, Effect, LawInputs, Place, State, faults_at
+from ctrlgen.effects import REQUIREMENTS, Channel, Effect, LawInputs, Place, State, faults_at
 
 # Typical displacements beyond which a law reads the stage's force at that end: a search may try values farther out, where
 # no stage goes and a restoring force may have no value (a root of a negative number).
 REACH = 10.0
-# The words of `Effect.requires`, in messages
-REQUIREMENTS = {
-    "acceleration": "an imposed motion",
-    "actuator": "an actuator, and not an imposed motion",
-    "ambient": "the temperature of the surroundings",
-    "balanced": "a stage in balance, without inertia",
-    "bipolar": "a drive of both signs",
-    "displacement_command": "an actuator that is told how far to go",
-    "force": "forces in N or N*m",
-    "heat": "heaters",
-    "sample_time": "a sample time",
-    "second_order_kinematics": "the second-order kinematics of the links, and a pose that is without it",
-    "spatial": "a pose of six components",
-    "state": "heaters, whose temperature it reads",
-    "tangent_compliance": "the tangent compliance of the stages",
-    "unheated": "actuators without heaters",
-    "velocity": "axes with inertia or an imposed motion",
-    "voltage": "a drive in volt",
-}
 
 
 @dataclass

@@ -132,6 +132,22 @@ def simulate(
 
 
 @app.command(rich_help_panel=DEVICE_PANEL)
+def laws(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(help="Laws of which to print equation, range, parameters and source.", show_default=False),
+    ] = None,
+) -> None:
+    """List the physical effects that a device file may name, those of installed packages included.
+
+    Example:  ctrlgen laws creep
+    """
+    from ctrlgen.app.laws_console import print_laws
+
+    print_laws(names or [])
+
+
+@app.command(rich_help_panel=DEVICE_PANEL)
 def reproduce(
     source: Annotated[
         list[str] | None, typer.Argument(help="S0, S1, S2, S3; all by default.", show_default=False)

@@ -97,7 +97,7 @@ def _effects(diagnosis: Diagnosis, estimates: Sequence[tuple[FreeParameter, floa
     for k, effect in enumerate(diagnosis.corrected.effect):
         if k < len(diagnosis.device.effect):
             continue
-        table: dict[str, Any] = {"kind": effect.kind, "at": effect.at} | ({"of": effect.of} if effect.of else {})
+        table: dict[str, Any] = dict(effect.placed())
         for name, number in effect.values.items():
             table[name] = number.text
             if (path := f"effect[{k}].{name}") in fitted:
