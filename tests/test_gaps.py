@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from axis_records import AXIS, NOISE, H, drive, record
+from axis_records import AXIS, NOISE, H, drive, move, record
 from conftest import AXIS_FILE
 from recorded import refused, samples, two
 from scipy.signal import lfilter
@@ -18,6 +18,7 @@ from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.noise import estimate_noise
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings import gaps
+from ctrlgen.recordings.after_gaps import Described
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recording import Record, Recording
 
@@ -64,16 +65,57 @@ def test_a_drive_that_nobody_knows_between_its_rows_is_not_made_up(rate):
     assert all(np.isin(p.drive[:, 0], WHITE).all() for p in parts) and "not known across gaps" in notes[-1]
 
 
-def test_single_rows_of_a_rough_drive_are_bridged_where_nothing_has_inertia():
-    """Noise through two poles of 1 Hz, sampled at 100 Hz: half a per cent of its range off where a row is missing."""
-    u = lfilter([1.0], [1.0, -2 * 0.94, 0.94**2], WHITE)
-    given, there = lacking(u, 0.005)
-    assert len(gaps.stretches(given)[0]) > 3
-    (whole,), (note,) = gaps.stretches(given, inertial=False)
-    off = np.abs(whole.drive[:, 0] - u).max() / np.ptp(u)
-    assert np.array_equal(whole.valid[:, 0], there) and 2e-3 < off < 2e-2 and "by trials" in note
-    left = [np.convolve(v, np.exp(-np.arange(N) / 100) / 100)[:N] for v in (whole.drive[:, 0], u)]
-    assert np.abs(left[0] - left[1]).max() < 2e-4 * np.ptp(u)  # in a memory of a second
+ROUGH = lfilter([1.0], [1.0, -2 * 0.94, 0.94**2], WHITE)  # noise through two poles of 1 Hz, sampled at 100 Hz
+SERVO = """kind = "servo"
+name = "s"
+title = "S"
+source = "a test"
+travel = "60 um"
+"""
+
+
+def servo(tmp_path) -> Described:
+    (tmp_path / "servo.toml").write_text(SERVO)
+    model = ctrlgen.build_model(ctrlgen.load_device(tmp_path / "servo.toml"))
+    return Described(model, ("reading.axis",), {"reading.axis": NOISE})
+
+
+@pytest.mark.parametrize("longest", [1, 7])
+def test_a_rough_drive_is_bridged_where_the_readings_after_it_hardly_notice(longest, tmp_path):
+    """Off by half a per cent of its range in a row, by some per cent in seven: nothing of it is left in a memory of seconds."""
+    u = 20e-6 * ROUGH / np.abs(ROUGH).max()
+    there = np.ones(N, bool)
+    for k in range(60, N - 60, 400):
+        there[k : k + longest] = False
+    whole = record(u, u + NOISE * WHITE, "fit", h=0.01)
+    (bridged,), (note,) = gaps.stretches(gaps.rows_of(whole, there), device=servo(tmp_path))
+    off = np.abs(bridged.drive[:, 0] - u).max() / np.ptp(u)
+    assert 1e-3 < off < 0.1 and "by trials" in note
+    behind = ~bridged.valid[:, 0] & there
+    gone = np.flatnonzero(~there)
+    assert 0 < behind.sum() <= 5 * (~there).sum() and f"nor of {behind.sum()} samples after them" in note
+    assert all(gone[gone < k].max() + 5 * longest >= k for k in np.flatnonzero(behind))
+    slow = 0.2 * np.exp(-np.arange(N) / 700) / 700
+    left = [np.convolve(v, slow)[:N] for v in (bridged.drive[:, 0], u)]
+    assert np.sqrt(np.mean((left[0] - left[1])[bridged.valid[:, 0]] ** 2)) < 0.3 * NOISE
+
+
+@pytest.mark.parametrize("amplitude, pieces", [(0.003, 1), (1.0, 10)])
+def test_a_stage_rings_after_a_gap_and_what_its_noise_hides_costs_nothing(amplitude, pieces):
+    """The stage remembers a wrong drive for as long as it rings: readings that it changes by more than a part of their noise are not
+    used, and the record is cut where those would be most of it."""
+    u = amplitude * ROUGH / np.abs(ROUGH).max()
+    there = np.ones(N, bool)
+    there[60:-60:97] = False
+    y = move(u)
+    whole = record(u, y + NOISE * WHITE, "fit")
+    device = Described(ctrlgen.build_model(AXIS), ("reading.axis",), {})
+    parts, _ = gaps.stretches(gaps.rows_of(whole, there), device=device)
+    assert len(parts) == 1 if pieces == 1 else len(parts) > pieces
+    for part in parts:
+        if pieces == 1:
+            off = (move(part.drive[:, 0]) - y)[part.valid[:, 0]]
+            assert np.sqrt(np.mean(off**2)) < 0.3 * NOISE and part.valid.mean() > 0.75
 
 
 def test_a_jump_inside_of_a_gap_of_a_smooth_drive_is_not_bridged():

@@ -1,13 +1,14 @@
 """Rows that are missing in a series: the drive is bridged across them where it is known, else the record ends and another begins.
 
 A gap is no new experiment: a device that remembers goes on remembering. What is bridged are rows of the drive alone; a reading is
-never filled in. Where recording.toml does not say what the drive did, it must tell itself: it steps, and stands at one value on both
-sides or steps by a clock, or trials in rows that are there show that a straight line, or a drive as smooth as around, is right.
+never filled in. Where recording.toml does not say what the drive did, it tells itself (`bridges`), and how right that is. What matters is
+what an error of it does to the readings after the gap (`after_gaps`): those that it changes by more than a fraction of their noise carry
+no weight; where these would be too many, or the drive is not known at all, the record ends.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
 
@@ -15,7 +16,9 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from ctrlgen.recordings import drive_across_gaps
-from ctrlgen.recordings.drive_across_gaps import Way
+from ctrlgen.recordings.after_gaps import FRACTION, Described
+from ctrlgen.recordings.after_gaps import Gap as AfterGap
+from ctrlgen.recordings.bridges import Bridge, DriveWithGaps
 from ctrlgen.recordings.preprocessing import WHOLE_SAMPLES
 from ctrlgen.recordings.recording import Record
 
@@ -24,119 +27,118 @@ Gap = Literal["linear", "held", "split"]
 SHORTEST = {"series": 20, "poses": 3}  # rows below which a record says nothing
 BREAK = 1.5  # sample times without a sample: a gap
 LONGEST = 100  # rows of a gap that is bridged unasked
-RIGHT = 2e-3  # of the drive's range: how far off a bridge may be that nobody asked for
-# Rows in all of which a bridge of a device without inertia may be that far off, and farther in fewer: what it leaves in a memory grows
-# with how long it lasts, and a mass alone is kicked by the least.
-BRIEF = 5
+# of a drive's range: a bridge that may be farther off has lost where the drive turned, and what remembers it is known to no twentieth
+LOST = 0.05
+DEAREST = (
+    0.2  # of a record's rows whose readings gaps may cost behind them: beyond it a memory that is begun anew is cheaper
+)
 REST_SAMPLES = 5  # on each side of a gap, over which the drive must be at rest
-STEPPED = 0.5  # of the samples around differ from the one before, at most, where a drive steps
-# steps that tell the clock of a drive that steps: a chance divisor of so many distances is one in thirty
-FEWEST_STEPS = 6
-DWELLS = 4.0  # times a gap in the usual time between steps, from which on two equal sides have no step between
-AROUND = 50  # rows on each side that tell how much a drive changes in as many rows as a gap has
-USUAL = 3.0  # times that change, beyond which a drive jumped inside of the gap
 TOLD = 1e-6  # of the drive's range: how far off a bridge must be for a note to say so
 LISTED_CUTS = 5  # places at which a record was cut that a note names
 
 
-def bridged(record: Record, gap: Gap | None, inertial: bool = True) -> tuple[Record, list[str]]:
+@dataclass(frozen=True)
+class _Bridged:
+    """A gap of rows `a` to `b`, half open, and how each drive is taken there."""
+
+    a: int
+    b: int
+    bridges: tuple[Bridge, ...]
+
+    @property
+    def off(self) -> np.ndarray:
+        """How far each drive (n_u,) may be off [its range]."""
+        return np.array([bridge.off for bridge in self.bridges])
+
+    def into(self, drive: np.ndarray) -> None:
+        """Writes the drives that are missing into `drive` (n, n_u)."""
+        rows = drive[self.a : self.b]
+        rows[:] = np.where(np.isfinite(rows), rows, np.column_stack([bridge.values for bridge in self.bridges]))
+
+
+def bridged(record: Record, gap: Gap | None, device: Described | None = None) -> tuple[Record, list[str]]:
     """The record with the rows that it lacks, their readings not valid, and their drive as `gap` says or, unasked, as each drive tells;
-    gaps that cannot be bridged stay as they were. A note on how many were, and the longest."""
+    gaps that cannot be bridged stay as they were. Readings after a gap that the `device` as described says are still wrong are not valid
+    either. A note on how many were bridged, the longest, and what that leaves."""
     whole, kept = _on_its_grid(record)
     known = np.isfinite(whole.drive).all(axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[True], known, [True]]).astype(int))).reshape(-1, 2)
     inside = [(a, b) for a, b in edges.tolist() if a > 0 and b < len(known)]
-    drives = [_Drive(u, inertial) for u in whole.drive.T] if inside else []
-    drive, valid, sizes = whole.drive.copy(), whole.valid.copy(), []
+    drives = [DriveWithGaps(u) for u in whole.drive.T] if inside else []
+    told: list[_Bridged] = []
     for a, b in inside:
         if b - a > (known.sum() if gap else LONGEST):
             continue
-        told = [drive_across_gaps.across(d.u, a, b, gap) if gap and gap != "split" else d.across(a, b) for d in drives]
-        values = [v for v in told if v is not None]
-        if len(values) < len(drives):
-            continue
-        drive[a:b] = np.where(np.isfinite(drive[a:b]), drive[a:b], np.column_stack(values))
-        valid[a:b] = False
-        kept[a:b] = True
-        sizes.append(b - a)
-    if not sizes:
+        if gap and gap != "split":
+            bridges = [Bridge(drive_across_gaps.across(d.u, a, b, gap), 0.0, gap) for d in drives]
+        else:
+            bridges = [d.across(a, b) for d in drives]
+        if all(bridge.off <= LOST for bridge in bridges):
+            told.append(_Bridged(a, b, tuple(bridges)))
+    drive, valid = whole.drive.copy(), whole.valid.copy()
+    for each in told:
+        each.into(drive)
+    told, wrong = _followed(replace(whole, drive=drive), told, device)
+    if not told:
         return record, []
-    ways = [gap] if gap else sorted({way for d in drives for way in d.ways})
-    off = max(d.off for d in drives)
+    drive = whole.drive.copy()
+    for each in told:
+        each.into(drive)
+        valid[each.a : each.b] = False
+        kept[each.a : each.b] = True
+    after = int((wrong & valid).any(axis=1).sum())
+    valid &= ~wrong
+    observed = np.where(valid, whole.observed, np.nan)
+    return rows_of(replace(whole, drive=drive, valid=valid, observed=observed), kept), [_note(record.name, told, after)]
+
+
+def _followed(record: Record, told: list[_Bridged], device: Described | None) -> tuple[list[_Bridged], np.ndarray]:
+    """Of the gaps that the drives of a bridged record tell those after which few enough readings are wrong, the cheapest first; and which
+    readings (n, n_y) are."""
+    squares = np.zeros(record.observed.shape)
+    if device is None or not told:
+        return told, squares > 0
+    # gaps that stay open are at any value: only differences are taken
+    record = replace(record, drive=_without_nan(record.drive))
+    spans = np.ptp(record.drive, axis=0)
+    wrong = device.after(record, [AfterGap(g.a, g.b, g.off * spans) for g in told])
+    more = [len(record.time) - g.b - len(w) for g, w in zip(told, wrong, strict=True)]
+    costs = [_cost(w, n) for w, n in zip(wrong, more, strict=True)]
+    order = np.argsort(costs, kind="stable")
+    cheap = order[np.cumsum(np.array(costs)[order]) <= DEAREST * len(record.time)]
+    for k in cheap.tolist():
+        squares[told[k].b :] += np.pad(wrong[k] ** 2, ((0, more[k]), (0, 0)), mode="edge")
+    return [told[k] for k in sorted(cheap.tolist())], squares > FRACTION**2
+
+
+def _cost(wrong: np.ndarray, more: int) -> int:
+    """Rows after a gap in which it leaves a reading too `wrong` (rows, n_y) [its noise], and the `more` that follow."""
+    rows = np.any(wrong > FRACTION, axis=1)
+    return int(rows.sum() + rows[-1] * more)
+
+
+def _without_nan(drive: np.ndarray) -> np.ndarray:
+    """The drives (n, n_u) with straight lines where they are missing."""
+    rows = np.arange(len(drive))
+    return np.column_stack([np.interp(rows, np.flatnonzero(ok := np.isfinite(u)), u[ok]) for u in drive.T])
+
+
+def _note(name: str, told: list[_Bridged], after: int) -> str:
+    """How many gaps were bridged, how, and how many samples after them are not used."""
+    sizes = [g.b - g.a for g in told]
+    ways = sorted({bridge.way for g in told for bridge in g.bridges})
+    off = max(g.off.max() for g in told)
     right = f" (within {100 * off:.1g} % of its range, by trials)" if off > TOLD else ""
     count = (
         f"{len(sizes)} gaps, the longest of {max(sizes)} samples, are"
         if len(sizes) > 1
         else f"a gap of {sizes[0]} samples is"
     )
-    note = (
-        f"{record.name}: {count} bridged, {sum(sizes)} samples in all: the drive is taken as {' or '.join(map(str, ways))} there{right}; "
-        "readings of theirs are not used."
+    more = f", nor of {after} samples after them, which that changes" if after else ""
+    return (
+        f"{name}: {count} bridged, {sum(sizes)} samples in all: the drive is taken as {' or '.join(ways)} there{right}; "
+        f"readings of theirs are not used{more}."
     )
-    observed = np.where(valid, whole.observed, np.nan)
-    return rows_of(replace(whole, drive=drive, valid=valid, observed=observed), kept), [note]
-
-
-class _Drive:
-    """One drive (n,), NaN where it is not known, and what it tells of its gaps: `ways` that it was taken across them, and `off`, the
-    largest error in trials of those [range of the drive]."""
-
-    def __init__(self, u: np.ndarray, inertial: bool) -> None:
-        self.u = u
-        self.brief = 1 if inertial else BRIEF
-        self.ways: set[Way] = set()
-        self.off = 0.0
-        self.span = float(np.nanmax(u) - np.nanmin(u))
-        change = np.diff(u) != 0
-        pairs = np.isfinite(u[1:]) & np.isfinite(u[:-1])
-        self.moves = np.where(pairs, change, np.nan)
-        alone = pairs[1:-1] & change[1:-1] & ~change[:-2] & ~change[2:]
-        steps = np.flatnonzero(alone) + 2
-        self.step = int(steps[0]) if len(steps) else 0
-        self.clock = int(np.gcd.reduce(np.diff(steps))) if len(steps) > FEWEST_STEPS else 1
-        self.dwell = float(np.median(np.diff(steps))) if len(steps) > 1 else len(u)
-
-    def across(self, a: int, b: int) -> np.ndarray | None:
-        """The drive (b - a,) in rows a to b, half open; None where it does not tell."""
-        around = self.moves[max(a - AROUND, 0) : b + AROUND]
-        stepped = np.nanmean(around) <= STEPPED if np.isfinite(around).any() else False
-        return self._held(a, b) if stepped else self._as_elsewhere(a, b)
-
-    def _held(self, a: int, b: int) -> np.ndarray | None:
-        """A drive that mostly stands still: at the one value of both sides, or from one to the other where its clock strikes once."""
-        before, after, length = self.u[a - 1], self.u[b], b - a
-        strikes = [k for k in range(a, b + 1) if (k - self.step) % self.clock == 0] if self.clock > 1 else []
-        if before == after and (length <= self.dwell / DWELLS or (self.clock > 1 and len(strikes) <= 1)):
-            self.ways.add("held")
-            return np.full(length, before)
-        if len(strikes) == 1 and before != after:
-            self.ways.add("held")
-            return np.where(np.arange(a, b) < strikes[0], before, after)
-        return None
-
-    def _as_elsewhere(self, a: int, b: int) -> np.ndarray | None:
-        """A drive that moves: linear or smooth, whichever is right in trials around."""
-        ways: tuple[Way, ...] = ("linear", "smooth")
-        errors = {way: drive_across_gaps.error(self.u, a, b, way) for way in ways}
-        values = {way: drive_across_gaps.across(self.u, a, b, way) for way in ways}
-        best = min(ways, key=lambda way: errors[way])
-        # beside a step, what is smooth elsewhere goes astray
-        apart = float(np.abs(values["smooth"] - values["linear"]).max())
-        if apart > (USUAL * errors["linear"] + RIGHT) * self.span:
-            best = "linear"
-        if errors[best] > RIGHT * max(self.brief / (b - a), 1.0) or self._jumps(a, b):
-            return None
-        self.ways.add(best)
-        self.off = max(self.off, errors[best])
-        return values[best]
-
-    def _jumps(self, a: int, b: int) -> bool:
-        """Whether it changes more across rows a to b than around in as many rows."""
-        apart = b - a + 1
-        sides = (self.u[max(a - AROUND - apart, 0) : a], self.u[b : b + AROUND + apart])
-        near = np.concatenate([np.abs(side[apart:] - side[:-apart]) for side in sides])
-        usual = np.max(near[np.isfinite(near)], initial=0.0)
-        return bool(abs(self.u[b] - self.u[a - 1]) > USUAL * usual)
 
 
 def _on_its_grid(record: Record) -> tuple[Record, np.ndarray]:
@@ -165,13 +167,15 @@ def rows_of(record: Record, kept: np.ndarray) -> Record:
     return replace(record, time=time, drive=drive, observed=observed, valid=valid, ambient=ambient)
 
 
-def stretches(record: Record, gap: Gap | None = None, inertial: bool = True) -> tuple[list[Record], list[str]]:
+def stretches(
+    record: Record, gap: Gap | None = None, device: Described | None = None
+) -> tuple[list[Record], list[str]]:
     """The record with short gaps bridged, cut at the others in time and where a drive is missing, and joined across one in which the
-    drive rests; and a note on what was done. `gap` says what the drive does in all of them; a device that is not `inertial` follows a
-    drive at once, and a bridge may be rougher the shorter it is."""
+    drive rests; and a note on what was done. `gap` says what the drive does in all of them; the `device` as described says what an error
+    of it would do to the readings, which without it end with the gap."""
     # one thread: the matrices are small
     with threadpool_limits(1):
-        record, bridged_notes = (record, []) if gap == "split" else bridged(record, gap, inertial)
+        record, bridged_notes = (record, []) if gap == "split" else bridged(record, gap, device)
     known = np.isfinite(record.drive).all(1)
     breaks = (np.flatnonzero(np.diff(record.time) > BREAK * record.sample_time) + 1).tolist()
     edges = np.flatnonzero(np.diff(np.r_[False, known, False].astype(int)))

@@ -163,7 +163,8 @@ class _File:
             if record is None:
                 continue
             record = replace(record, name=f"{self.path.resolve().parent.name}/{record.name}") if self.prefix else record
-            result = validation.validate_record(record, self.written.kind, self.model, names, where, table.gap)
+            noise = {n: deviation(c.noise, c.unit) for n, c in sound.items() if c.noise}
+            result = validation.validate_record(record, self.written.kind, self.model, names, where, table.gap, noise)
             records += result.records
             places += [where] * len(result.records)
             notes += [note for note in reader.notes if note not in notes] + list(result.notes)

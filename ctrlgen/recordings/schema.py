@@ -88,7 +88,8 @@ class RecordTable(Section):
     gap: Literal["linear", "held", "split"] | None = None
     """What the drive does across rows that are missing, or that hold no number for it: `linear` or `held` bridges every gap that is a
     whole number of samples so, `split` ends a record there and begins another. Left out: gaps of at most 100 samples are bridged where
-    the drive itself tells what it did there, by its steps or its smoothness, and the others split.
+    the drive itself tells what it did there, by its steps or its smoothness, well enough for the readings after them, and the others
+    split.
     """
     rows: tuple[Annotated[int, Field(ge=0)], Annotated[int, Field(ge=0)]] | None = None
     """The half-open range [first, one past the last] of the file's rows that is used, from 0. Left out: all."""

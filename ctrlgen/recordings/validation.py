@@ -4,14 +4,15 @@ Refused: time that does not increase or is unevenly sampled, drives that are mis
 with too few numbers, records in which nothing changes, held-out data that are fitted as well, too few samples to hold any
 out.
 Marked or noted: gaps, missing samples, outliers, stuck and clipped stretches, dead channels, jitter below 1 %.
-No reading is filled in. A drive is across short gaps where it is held or smooth (`gaps`); where it is not known one record ends and
-another begins.
+No reading is filled in. A drive is across short gaps where that is right enough (`gaps`); where it is not known one record ends and another
+begins.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import from_si, show
 from ctrlgen.devices.limit import spans
 from ctrlgen.model.model import Model
+from ctrlgen.recordings.after_gaps import Described
 from ctrlgen.recordings.gaps import BREAK, SHORTEST, Gap, rows_between, stretches
 from ctrlgen.recordings.outliers import outliers, stuck_samples
 from ctrlgen.recordings.recording import Record
@@ -57,13 +59,19 @@ class Validated:
 
 
 def validate_record(
-    record: Record, kind: str, model: Model, names: ChannelNames, where: str, gap: Gap | None = None
+    record: Record,
+    kind: str,
+    model: Model,
+    names: ChannelNames,
+    where: str,
+    gap: Gap | None = None,
+    noise: Mapping[str, float] = MappingProxyType({}),
 ) -> Validated:
     """One record as read -> its uninterrupted stretches with every doubtful sample marked.
 
     `record.valid` is False in channels that this record has no column for; `kind` is "series" or "poses"; `where` is the
     record's place in recording.toml, such as "record[0]". `gap`: what the drive does across rows that are missing, where the
-    file says it.
+    file says it; `noise`: the standard deviation that it states for some observed channels [SI].
     """
     recorded = np.any(record.valid, axis=0)
     faults = _missing_numbers(record, kind, names, where, recorded) + _beyond_limits(record, kind, model, names, where)
@@ -73,7 +81,9 @@ def validate_record(
         sample_time, clock_notes, clock_faults = _sample_time(record, where)
         faults += clock_faults
         if not faults:
-            parts, gap_notes = stretches(replace(record, sample_time=sample_time), gap, model.inertial)
+            parts, gap_notes = stretches(
+                replace(record, sample_time=sample_time), gap, Described(model, names.observed, noise)
+            )
             notes = clock_notes + gap_notes
             if not parts:
                 faults = [Fault(where, f"{record.name}: {notes[-1]} No usable stretch remains; record without gaps")]
