@@ -27,13 +27,16 @@ def move(u, force=None, fine=10, numbers=(M, C, K, KF)):
     m, c, stiffness, k_f = numbers
     A, B = np.array([[0, 1], [-stiffness / m, -c / m]]), np.array([[0], [1 / m]])
     Ad, Bd, *_ = cont2discrete((A, B, np.eye(2), np.zeros((2, 1))), H / fine)
-    x, memory, out = np.zeros(2), 0.0, np.zeros(len(u))
-    for k, volts in enumerate(u):
-        out[k] = x[0]
+    (a_qq, a_qv), (a_vq, a_vv), (b_q, b_v) = *Ad.tolist(), Bd[:, 0].tolist()  # plain numbers are quick one at a time
+    q, v, memory, extra, out = 0.0, 0.0, 0.0, 0.0, []
+    for k, volts in enumerate(np.asarray(u, float).tolist()):
+        out.append(q)
         for j in range(fine):
-            extra, memory = (0.0, 0.0) if force is None else force((k + j / fine) * H, x[0], x[1], memory)
-            x = Ad @ x + Bd[:, 0] * (k_f * volts + extra)
-    return out
+            if force is not None:
+                extra, memory = force((k + j / fine) * H, q, v, memory)
+            pushed = k_f * volts + extra
+            q, v = a_qq * q + a_qv * v + b_q * pushed, a_vq * q + a_vv * v + b_v * pushed
+    return np.array(out, float)
 
 
 def drive(n=N, slow=1.5, fast=0.3):

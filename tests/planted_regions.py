@@ -8,6 +8,7 @@ below which it creeps.
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import copysign
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ Where = Callable[[float, float, float], float]
 
 def beyond(x: float, edge: float, width: float) -> float:
     """A ramp from 0 to 1 about the edge."""
-    return float(np.clip((x - edge) / width + 0.5, 0.0, 1.0))
+    return min(max((x - edge) / width + 0.5, 0.0), 1.0)
 
 
 def _friction(u: np.ndarray, where: Where) -> np.ndarray:
@@ -56,7 +57,7 @@ def viscous_below(u, t):
 
 
 def viscous_at_speed(u, t):
-    return move(u, lambda time, q, v, memory: (-DAMPER * np.sign(v) * max(abs(v) - SPEED, 0.0), memory), fine=100)
+    return move(u, lambda time, q, v, memory: (-DAMPER * copysign(max(abs(v) - SPEED, 0.0), v), memory), fine=100)
 
 
 def _spring(u: np.ndarray, x: Callable[[float], float]) -> np.ndarray:
@@ -74,7 +75,7 @@ def stiffness_below(u, t):
 
 def stiffness_beyond(u, t):
     """A spring that touches on either side."""
-    return _spring(u, lambda q: -np.sign(q) * max(abs(q) - ABOVE, 0.0))
+    return _spring(u, lambda q: -copysign(max(abs(q) - ABOVE, 0.0), q))
 
 
 def end_stop(u, t):

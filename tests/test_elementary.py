@@ -70,7 +70,7 @@ ZERO_AT_ZERO = (
     "hyperbolic_sine",
     "whole_below",
 )
-N = 200_000
+N = 50_000
 
 
 def source(real: Real, text: str | None = None) -> str:

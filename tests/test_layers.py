@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import ast
 import re
+from functools import cache
 from graphlib import TopologicalSorter
+from pathlib import Path
 
-import pytest
 from conftest import ROOT, SCENARIOS
 
 import ctrlgen
@@ -77,25 +78,42 @@ def folder_of(name: str) -> str:
     return ".".join(NAMES[name].parent.relative_to(PACKAGE).parts)
 
 
-def our_imports(path) -> set[str]:
+@cache
+def nodes_of(path: Path) -> tuple[ast.AST, ...]:
+    """What a file imports, says and documents."""
+    kinds = ast.Import | ast.ImportFrom | ast.Constant | DOCUMENTED
+    return tuple(node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, kinds))
+
+
+def imported_packages(path: Path) -> set[str]:
+    """The first words of all that a file imports."""
+    names = [a.name for node in nodes_of(path) if isinstance(node, ast.Import) for a in node.names]
+    names += [node.module or "" for node in nodes_of(path) if isinstance(node, ast.ImportFrom)]
+    return {name.split(".")[0] for name in names}
+
+
+@cache
+def our_imports(path: Path) -> frozenset[str]:
     """Modules of ours that a file imports, those that it imports late or for type checkers included."""
     names = set()
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in nodes_of(path):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "ctrlgen":
             module = node.module.removeprefix("ctrlgen").removeprefix(".")
             inside = {f"{module}.{a.name}".removeprefix(".") for a in node.names}
             names |= {name for name in inside if name in NAMES} or {module}
         elif isinstance(node, ast.Import):
             names |= {a.name.removeprefix("ctrlgen.") for a in node.names if a.name.startswith("ctrlgen.")}
-    return names
+    return frozenset(names)
 
 
-@pytest.mark.parametrize("path", [p for p in MODULES if p.parent != PACKAGE], ids=name_of)
-def test_a_folder_imports_only_what_it_may(path):
-    own = folder_of(name_of(path))
-    allowed = {own, *MAY_IMPORT[own].split()}
-    for imported in our_imports(path) - {"version", ""}:
-        assert folder_of(imported) in allowed, f"{name_of(path)} imports {imported}"
+def test_a_folder_imports_only_what_it_may():
+    for path in MODULES:
+        if path.parent == PACKAGE:
+            continue
+        own = folder_of(name_of(path))
+        allowed = {own, *MAY_IMPORT[own].split()}
+        for imported in our_imports(path) - {"version", ""}:
+            assert folder_of(imported) in allowed, f"{name_of(path)} imports {imported}"
 
 
 def test_no_modules_import_each_other_in_a_circle():
@@ -120,60 +138,55 @@ def test_paths_are_solved_through_the_one_door_that_knows_robust_limits():
     assert inner == {"budget.robust", "budget.moved_path"}
 
 
-@pytest.mark.parametrize(
-    "path", [p for p in MODULES if p.parent.name == "effects" and not p.stem.startswith("_")], ids=lambda p: p.stem
-)
-def test_a_law_needs_the_extension_point_and_shared_helpers_and_nothing_else(path):
-    imported = our_imports(path)
-    assert "effects" in imported
-    assert all(name == "effects" or name.startswith("effects._") for name in imported)
+def test_a_law_needs_the_extension_point_and_shared_helpers_and_nothing_else():
+    laws = [p for p in MODULES if p.parent.name == "effects" and not p.stem.startswith("_")]
+    assert len(laws) > 50
+    for path in laws:
+        imported = our_imports(path)
+        assert "effects" in imported, path.stem
+        assert all(name == "effects" or name.startswith("effects._") for name in imported), path.stem
 
 
 SHOWN = {"app.commands.app": {"circle20"}}  # the example of --help
 WORDS = {"raster", "spiral", "unreachable"}  # names of scenarios that are words: kinds of path, an exception
 
 
-@pytest.mark.parametrize("path", MODULES, ids=name_of)
-def test_no_module_knows_a_scenario_or_a_recording_by_name(path):
-    tree = ast.parse(path.read_text())
-    # Examples of a command
-    told = {ast.get_docstring(n, clean=False) for n in ast.walk(tree) if isinstance(n, DOCUMENTED)}
-    texts = {n.value for n in ast.walk(tree) if isinstance(n, ast.Constant) and isinstance(n.value, str)} - told
+def test_no_module_knows_a_scenario_or_a_recording_by_name():
     folders = {
         p.parent.name for kind in ("scenario", "recording", "device", "run_a") for p in SCENARIOS.glob(f"*/{kind}.toml")
     }
     assert {"nist_hexapod", "emps", "rotary_axis", "friction_damper", "circle20"} <= folders
-    known = SHOWN.get(name_of(path), set()) | WORDS
-    words = {word for text in texts for word in re.findall(r"\w+", text)}
-    assert not words & (folders - known)
+    for path in MODULES:
+        # Examples of a command
+        told = {ast.get_docstring(n, clean=False) for n in nodes_of(path) if isinstance(n, DOCUMENTED)}
+        texts = {n.value for n in nodes_of(path) if isinstance(n, ast.Constant) and isinstance(n.value, str)} - told
+        known = SHOWN.get(name_of(path), set()) | WORDS
+        words = {word for text in texts for word in re.findall(r"\w+", text)}
+        assert not words & (folders - known), name_of(path)
 
 
-@pytest.mark.parametrize("path", MODULES, ids=name_of)
-def test_no_module_reaches_what_makes_concealed_recordings(path):
-    for node in ast.walk(ast.parse(path.read_text())):
-        names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
-        names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
-        assert not {name.split(".")[0] for name in names} & {"battery", "plants", "papers", "tests"}, path
+def test_no_module_reaches_what_makes_concealed_recordings():
+    for path in MODULES:
+        assert not imported_packages(path) & {"battery", "plants", "papers", "tests"}, name_of(path)
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "battery").glob("*.py")), ids=lambda p: p.stem)
-def test_what_makes_concealed_recordings_imports_nothing_of_ours(path):
-    assert not our_imports(path)
+def test_what_makes_concealed_recordings_imports_nothing_of_ours():
+    paths = sorted((ROOT / "battery").glob("*.py"))
+    assert len(paths) > 20
+    for path in paths:
+        assert not our_imports(path), path.stem
 
 
-@pytest.mark.parametrize("path", MODULES, ids=name_of)
-def test_files_are_short_enough_to_be_one_noun(path):
-    assert len(path.read_text().splitlines()) <= 400
+def test_files_are_short_enough_to_be_one_noun():
+    lengths = {name_of(path): len(path.read_text().splitlines()) for path in MODULES}
+    assert {name: length for name, length in lengths.items() if length > 400} == {}
 
 
 def test_the_independent_models_import_nothing_of_ctrlgen() -> None:
     paths = sorted((ROOT / "plants").glob("*.py"))
     assert len(paths) > 5
     for path in paths:
-        for node in ast.walk(ast.parse(path.read_text())):
-            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
-            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
-            assert not any(name.split(".")[0] == "ctrlgen" for name in names), path.name
+        assert "ctrlgen" not in imported_packages(path), path.name
 
 
 def test_a_public_class_has_a_name_of_its_own():

@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -15,7 +17,7 @@ from inertial_stages import LINE, coil
 from package_programs import build
 from three_stacks import circle, loaded, stage
 
-from ctrlgen import build_model, generate, load_device, load_scenario, user_device
+from ctrlgen import Controller, build_model, generate, load_device, load_scenario, user_device
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.devices.run_time import RunTime
 from ctrlgen.firmware.c.preprocessor import Macro, resolved
@@ -23,6 +25,7 @@ from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.templates import write
 from ctrlgen.firmware.c.toolchains import FLAGS
 from ctrlgen.firmware.online.online import online_context
+from ctrlgen.trajectory.scenario import Scenario
 
 LIMITER = ROOT / "codegen" / "limiter"
 DEVICES = (
@@ -44,8 +47,8 @@ def pushed(u, p):
     return [p.g * u.a, p.g * u.b]
 
 
-def written(name: str, real: Real, folder: Path) -> None:
-    """`limiter.h`, `generated.c` and `limiter_config.h` of a device, its controller named limiter."""
+def controlled(name: str, folder: Path) -> tuple[Scenario, Controller]:
+    """A scenario of the device and its controller; files of its own are written to `folder`."""
     stages = {
         "redundant stage": (stage(drive_rate={"a": "5 V/ms"}), circle(20)),
         "axes that settle": (stage(**WEAK, drive={"a": "100 V", "b": "100 V"}, force=pushed), circle(20), SETTLED),
@@ -62,11 +65,29 @@ def written(name: str, real: Real, folder: Path) -> None:
         if name == "constants of the start":
             scenario = replace(scenario, device=load_device(SCENARIOS / "devices" / "mems_hexapod_run_time.toml"))
         model = build_model(scenario.device)
-    controller = controller_of(model, scenario.file.follow, scenario.sample_time)
-    context = online_context(scenario, controller, real, "limiter")
-    write("online.h", context, folder / "limiter.h")
-    write("online.c", context, folder / "generated.c")
-    write("limiter_config.h", context, folder / "limiter_config.h")
+    return scenario, controller_of(model, scenario.file.follow, scenario.sample_time)
+
+
+def folders_of(name: str, made: Path) -> list[Path]:
+    """For each arithmetic, which the macros do not depend on, of the first device, and for float of the others: `limiter.h`,
+    `generated.c` and `limiter_config.h`, the controller named limiter."""
+    scenario, controller = controlled(name, made)
+    folders = []
+    for real in Real if name == DEVICES[0] else (Real.FLOAT,):
+        context = online_context(scenario, controller, real, "limiter")
+        folder = made / real.suffix
+        folder.mkdir()
+        write("online.h", context, folder / "limiter.h")
+        write("online.c", context, folder / "generated.c")
+        write("limiter_config.h", context, folder / "limiter_config.h")
+        folders.append(folder)
+    return folders
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory) -> Callable[[str], list[Path]]:
+    """`folders_of` a device, made once."""
+    return cache(lambda name: folders_of(name, tmp_path_factory.mktemp("limiter")))
 
 
 def tokens(source: Path, folder: Path) -> list[str]:
@@ -83,20 +104,19 @@ def without_type(text: str) -> str:
 
 
 @pytest.mark.parametrize("name", DEVICES)
-def test_the_generated_limiter_is_the_limiter_with_the_configuration_of_the_device(name, tmp_path):
+def test_the_generated_limiter_is_the_limiter_with_the_configuration_of_the_device(name, written):
     if not shutil.which("gcc"):
         pytest.skip("gcc is missing: its preprocessor was not compared")
-    for real in Real if name == DEVICES[0] else (Real.FLOAT,):
-        written(name, real, tmp_path)
-        assert tokens(tmp_path / "generated.c", tmp_path) == tokens(LIMITER / "limiter.c", tmp_path)
+    for folder in written(name):
+        assert tokens(folder / "generated.c", folder) == tokens(LIMITER / "limiter.c", folder)
 
 
 @pytest.mark.parametrize("name", DEVICES)
-def test_the_limiter_compiles_as_it_stands_without_a_warning(name, compiler, tmp_path):
-    written(name, Real.DOUBLE, tmp_path)
-    words = [compiler, *FLAGS, f"-I{tmp_path}", "-c", str(LIMITER / "limiter.c"), "-o", str(tmp_path / "limiter.o")]
-    done = subprocess.run(words, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+def test_the_limiter_compiles_as_it_stands_without_a_warning(name, compiler, written):
+    for folder in written(name):
+        words = [compiler, *FLAGS, f"-I{folder}", "-c", str(LIMITER / "limiter.c"), "-o", str(folder / "limiter.o")]
+        done = subprocess.run(words, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize(
@@ -141,7 +161,9 @@ HOSTILE = (
 )
 
 
-@pytest.mark.parametrize("changing", ["input", "real", "limiter", "state", "N"])
+@pytest.mark.parametrize(
+    "changing", ["input", *(pytest.param(name, marks=pytest.mark.long) for name in ("real", "limiter", "state", "N"))]
+)
 def test_constants_may_have_any_name(changing, tmp_path):
     """Springs beside each other, one a name, each given at the start: the C compiles and passes its own test."""
     names = HOSTILE.split()

@@ -68,7 +68,7 @@ def beyond(drive: np.ndarray, seen: list[np.ndarray], h: float) -> list[str]:
 def test_no_drive_leaves_what_was_recorded(device, form):
     """Devices of each kind of dynamics, sizes, rates and lengths drawn at random."""
     model, offered = build_model(device), 0
-    for seed in range(4):
+    for seed in range(2):
         rng = np.random.default_rng(seed)
         n, h = int(rng.integers(120, 700)), float(10 ** rng.uniform(-4, -1))
         size = rng.uniform(0.05, 0.9) * model.u_bounds[1]
@@ -82,7 +82,7 @@ def test_no_drive_leaves_what_was_recorded(device, form):
             if found is not None:
                 offered += 1
                 assert not beyond(found[0].drive, seen, h), (shape.kind, seed)
-    assert offered >= 8  # two a recording at the least
+    assert offered >= 4  # two a recording at the least
 
 
 @pytest.mark.parametrize("one_way", [False, True])

@@ -124,17 +124,20 @@ class Library:
 
 
 @pytest.fixture(scope="module")
-def libraries(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("volts")
-    scenario = scenario_of(folder, EFFECTS, ('drive = "power"', 'drive = "voltage"'))
-    made = generate(scenario, build_model(scenario.device), folder / "c")
+def volts(tmp_path_factory) -> Scenario:
+    return scenario_of(tmp_path_factory.mktemp("volts"), EFFECTS, ('drive = "power"', 'drive = "voltage"'))
+
+
+@pytest.fixture(scope="module")
+def libraries(volts, tmp_path_factory):
+    scenario = volts
+    made = generate(scenario, build_model(scenario.device), tmp_path_factory.mktemp("volts_c") / "c")
     return {real: Library(scenario, made.path, real, made.online[real]) for real in Real}
 
 
 @pytest.fixture(scope="module")
-def controller(libraries):
-    device = libraries[Real.DOUBLE].scenario.device
-    return controller_of(build_model(device), "pose", 1e-3)
+def controller(volts):
+    return controller_of(build_model(volts.device), "pose", 1e-3)
 
 
 def test_a_controller_with_another_slack_has_the_same_kernels_and_limits_of_its_own(controller):

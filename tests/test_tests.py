@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from functools import cache
 
 import pytest
 from conftest import ROOT
@@ -10,21 +11,30 @@ from conftest import ROOT
 TESTS = sorted((ROOT / "tests").glob("*.py"))
 
 
-@pytest.mark.parametrize("path", TESTS, ids=lambda p: p.stem)
-def test_no_test_module_is_imported(path):
-    imported = set()
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            imported |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            imported |= {node.module or "", *(f"{node.module}.{alias.name}" for alias in node.names)}
-    assert not {name for name in imported if name.removeprefix("tests.").startswith("test_")}
+NAMING = ast.Import | ast.ImportFrom | ast.Attribute | ast.Call
 
 
-def private_names(tree: ast.AST) -> set[str]:
+@cache
+def naming(text: str) -> tuple[ast.AST, ...]:
+    """What a module imports, takes by a dot and calls."""
+    return tuple(node for node in ast.walk(ast.parse(text)) if isinstance(node, NAMING))
+
+
+def test_no_test_module_is_imported():
+    for path in TESTS:
+        imported = set()
+        for node in naming(path.read_text()):
+            if isinstance(node, ast.Import):
+                imported |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                imported |= {node.module or "", *(f"{node.module}.{alias.name}" for alias in node.names)}
+        assert not {name for name in imported if name.removeprefix("tests.").startswith("test_")}, path.stem
+
+
+def private_names(text: str) -> set[str]:
     """Names with a leading underscore that a module takes from elsewhere: imported, by a dot, or as a text to replace."""
     found = set()
-    for node in ast.walk(tree):
+    for node in naming(text):
         if isinstance(node, ast.ImportFrom):
             found |= {*(node.module or "").split("."), *(alias.name for alias in node.names)}
         elif isinstance(node, ast.Import):
@@ -40,9 +50,9 @@ def private_names(tree: ast.AST) -> set[str]:
 PATCHING = ("setattr", "delattr")
 
 
-@pytest.mark.parametrize("path", TESTS, ids=lambda p: p.stem)
-def test_no_test_uses_a_private_name(path):
-    assert not private_names(ast.parse(path.read_text()))
+def test_no_test_uses_a_private_name():
+    used = {path.stem: private_names(path.read_text()) for path in TESTS}
+    assert {name: names for name, names in used.items() if names} == {}
 
 
 @pytest.mark.parametrize(
@@ -56,10 +66,10 @@ def test_no_test_uses_a_private_name(path):
     ],
 )
 def test_a_private_name_is_found_wherever_it_is_used(text):
-    assert private_names(ast.parse(text))
+    assert private_names(text)
 
 
-@pytest.mark.parametrize("path", TESTS, ids=lambda p: p.stem)
-def test_a_file_of_tests_is_of_one_subject(path):
+def test_a_file_of_tests_is_of_one_subject():
     """Of 400 lines at most, as the modules of the program."""
-    assert len(path.read_text().splitlines()) <= 400
+    lengths = {path.stem: len(path.read_text().splitlines()) for path in TESTS}
+    assert {name: length for name, length in lengths.items() if length > 400} == {}
