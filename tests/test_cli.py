@@ -36,6 +36,7 @@ COMMANDS = (
     "diagnose",
     "calibrate",
     "batch",
+    "view",
 )
 
 

@@ -83,11 +83,11 @@ def test_every_command_refuses_files_of_other_kinds_in_words(command, tmp_path, 
         "nothing": tmp_path / "nothing",
     }
     fitting = {"check": {"device", "scenario"}, "bode": {"device"}, "workspace": {"device"}, "batch": {"jobs"}}
-    fitting |= {"look": {"log"}, "simulate": {"device"}}
+    fitting |= {"look": {"log"}, "simulate": {"device"}, "view": {"folder"}}
     takes_two = {"learn", "diagnose", "calibrate"}
     out = (
         []
-        if command in ("check", "compare", "example", "reproduce", "look", "laws")
+        if command in ("check", "compare", "example", "reproduce", "look", "laws", "view")
         else ["--out", tmp_path / "out.svg"]
     )
     for kind, file in kinds.items():

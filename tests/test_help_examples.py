@@ -23,6 +23,7 @@ COMMANDS = {command.callback.__name__: command.help for command in app.registere
 }
 QUICK = {"check", "example", "laws", "look", "new device", "new scenario", "simulate"}
 ELSEWHERE = {"verify"}  # .ci/run runs it as printed
+ENDLESS = {"view"}  # test_view_server.py runs it as printed, and ends it
 
 
 def mark_of(name: str) -> tuple[pytest.MarkDecorator, ...]:
@@ -33,6 +34,7 @@ MATCHES = [
     pytest.param(name, line, marks=mark_of(name), id=name)
     for name, told in sorted(COMMANDS.items())
     for line in EXAMPLE.findall(told or "")
+    if name not in ENDLESS
 ]
 
 

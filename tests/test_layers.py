@@ -60,7 +60,8 @@ MAY_IMPORT = {
 }
 MAY_IMPORT["app"] += " recordings.look recordings.formats"
 MAY_IMPORT["app.new_files"] = f"{C} devices model trajectory"
-MAY_IMPORT["app.commands"] = f"app app.new_files {MAY_IMPORT['app']}"
+MAY_IMPORT["app.viewer"] = FOUNDATION
+MAY_IMPORT["app.commands"] = f"app app.new_files app.viewer {MAY_IMPORT['app']}"
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
 

@@ -18,6 +18,7 @@ from ctrlgen.budget.robust import solve
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.core.files import whole_folder, write_text
 from ctrlgen.core.shown import Shown
+from ctrlgen.core.steps import noted
 from ctrlgen.core.units import from_si
 from ctrlgen.devices import Device
 from ctrlgen.firmware.c.toolchains import find_compilers
@@ -98,6 +99,7 @@ def run(scenario: Scenario | Path | str, out: Path | str, progress: Progress = q
     find_compilers()
     scenario = _with_online(scenario)
     with whole_folder(Path(out)) as draft:
+        progress = noted(draft, progress)
         solution = solve_scenario(scenario, progress)
         expected = expectations(solution)
         progress("C sources")
@@ -119,6 +121,7 @@ def verify(scenario: Scenario | Path | str, out: Path | str, progress: Progress 
     find_compilers()
     scenario = _with_online(scenario)
     with whole_folder(Path(out)) as draft:
+        progress = noted(draft, progress)
         solution = solve_scenario(scenario, progress)
         expected = expectations(solution)
         progress("C sources")
@@ -145,6 +148,7 @@ def verify(scenario: Scenario | Path | str, out: Path | str, progress: Progress 
 def solve_into(scenario: Scenario | Path | str, out: Path | str, progress: Progress = quiet) -> Outcome:
     """Solves and reports into the folder `out`, without C. Raises InputError, Unreachable, SolverError."""
     with whole_folder(Path(out)) as draft:
+        progress = noted(draft, progress)
         solution = solve_scenario(scenario, progress)
         expected = expectations(solution)
         progress("report")
@@ -156,6 +160,7 @@ def generate_into(scenario: Scenario | Path | str, out: Path | str, progress: Pr
     """Solves and writes only the folder of C, which needs no compiler. Raises InputError, Unreachable, SolverError."""
     scenario = _with_online(scenario)
     with whole_folder(Path(out)) as draft:
+        progress = noted(draft, progress)
         solution = solve_scenario(scenario, progress)
         c = generate(solution.scenario, solution.model, draft, solution, draw_solution(solution))
     return replace(c, path=Path(out))

@@ -19,6 +19,7 @@ from pydantic import BaseModel, ValidationError
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.file_limits import LARGEST_TEXT, TOO_DEEP, foreign_parts, unreadable_toml
+from ctrlgen.core.steps import STEPS
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -243,6 +244,7 @@ def whole_folder(out: Path) -> Iterator[Path]:
     retired = draft.with_name(draft.name + ".old")
     try:
         yield draft
+        (draft / STEPS).unlink(missing_ok=True)
         made = sorted(str(path.relative_to(draft)) for path in draft.rglob("*") if path.is_file())
         (draft / MARKER).write_text("\n".join(made) + "\n", encoding="utf-8")
         draft.chmod(0o755)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ctrlgen.core.files import whole_folder, write_text
+from ctrlgen.core.steps import noted
 from ctrlgen.devices import Device, files_of, load_device
 from ctrlgen.diagnosis.diagnose import diagnose_recording
 from ctrlgen.diagnosis.evidence.bootstrap import Bootstrap, bootstrap
@@ -86,8 +87,8 @@ def diagnose_into(
     An interrupted diagnosis leaves its fits in a file beside `out`; the same call continues from them. With `replicates`
     bootstrap.json is written too, and the diagnosis holds it as `bootstrap`.
     """
-    step = progress or (lambda _: None)
     with whole_folder(Path(out)) as draft:
+        step = noted(draft, progress)
         model = build_model(load_device(device))
         step("reading")
         recording = load_recordings(list(recordings), model)

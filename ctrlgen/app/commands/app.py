@@ -11,11 +11,12 @@ from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.version import program
 
 # the parts of `ctrlgen --help`, in their order
-PANELS = SCENARIO_PANEL, ACCURACY_PANEL, DEVICE_PANEL, RECORDING_PANEL = (
+PANELS = SCENARIO_PANEL, ACCURACY_PANEL, DEVICE_PANEL, RECORDING_PANEL, RESULT_PANEL = (
     "Drives and C of a scenario",
     "How well and how fast",
     "Devices",
     "Recordings of the real stage",
+    "Results",
 )
 
 app = typer.Typer(
