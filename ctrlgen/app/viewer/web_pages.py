@@ -114,7 +114,6 @@ class _Pages:
         found, record = result_at(self.folders, place)
         files = self._files(place)
         others = [r for r in found_results(self.folders) if r.kind is found.kind and r.place != place]
-        inputs = record.get("inputs")
         return self._page(
             "result",
             found=found,
@@ -123,7 +122,7 @@ class _Pages:
             others=others[:MOST_SHOWN],
             files=files[:MOST_SHOWN],
             left=max(0, len(files) - MOST_SHOWN),
-            inputs=sorted(inputs.items())[:MOST_SHOWN] if isinstance(inputs, dict) else [],
+            inputs=sorted(_inputs(record).items())[:MOST_SHOWN],
         )
 
     def job(self, request: Request) -> Response:
@@ -143,7 +142,7 @@ class _Pages:
             raise HTTPException(400, told)
         (a, left), (b, right) = (result_at(self.folders, self.folders.place(at)) for at in chosen)
         parts, more = compared(left, right)
-        sides = [record.get("inputs") if isinstance(record.get("inputs"), dict) else {} for record in (left, right)]
+        files_a, files_b = _inputs(left), _inputs(right)
         programs = {_program(left), _program(right)}
         return self._page(
             "compare",
@@ -153,7 +152,7 @@ class _Pages:
             left=more,
             rows=sum(len(p.differ) + len(p.agree) for p in parts),
             differ=sum(len(p.differ) for p in parts),
-            inputs=[n for n in dict.fromkeys([*sides[0], *sides[1]]) if sides[0].get(n) != sides[1].get(n)],
+            inputs=[n for n in files_a | files_b if files_a.get(n) != files_b.get(n)],
             programs=sorted(programs) if len(programs) > 1 else [],
             swapped=f"/compare?{urlencode([('of', at) for at in reversed(chosen)])}",
             cells=_cells,
@@ -235,6 +234,12 @@ class _Pages:
 
 def _link(page: str, place: Place) -> str:
     return f"/{page}/{quote(place.address)}"
+
+
+def _inputs(record: dict[str, Any]) -> dict[str, Any]:
+    """The files that a result was made from, with their SHA-256."""
+    inputs = record.get("inputs")
+    return inputs if isinstance(inputs, dict) else {}
 
 
 def _program(record: dict[str, Any]) -> str:
