@@ -14,7 +14,7 @@ from ctrlgen import load_device
 from ctrlgen.devices.changed_numbers import changed
 from ctrlgen.diagnosis.selection import model_selection
 from ctrlgen.estimation.error_model import ErrorModel
-from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.held_out import HeldOutRefit
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.robust_covariance import sandwich_over_model
@@ -58,28 +58,6 @@ def test_the_errors_of_a_device_are_those_that_it_leaves_itself():
     starts: list[dict] = []
     fitter, found = Scripted(50.0, ErrorModel.of_noise(noise_of()), starts).described(AXIS)
     assert fitter.error.rms[0] == 50.0 and found.structure.causes == () and len(starts) == 3
-
-
-def fitted(cause: Hypothesis, start: dict[str, float], sd: float) -> Fit:
-    structure = Structure(AXIS).with_cause(cause, start)
-    theta = structure.start
-    return Fit(structure, theta, (), float(N), N, np.zeros(len(theta)), np.eye(len(theta)) / sd, 0.0)
-
-
-@pytest.mark.parametrize("sd, may", [(0.3 / 1.959964 * 1.001, True), (0.3 / 1.959964 * 0.999, False)])
-def test_a_law_may_be_its_special_case_within_the_interval_of_95_per_cent(sd, may):
-    """Friction that breaks away at 1.3 times its force of sliding is Coulomb's where 1.3 cannot be told from 1."""
-    start = {"force": 0.1, "breakaway": 1.3, "speed": 1e-3, "reach": 1e-6}
-    fit = fitted(Hypothesis("stribeck", "stage:axis", "axis"), start, sd)
-    assert fit.nested_case(0) == ("coulomb" if may else None)
-
-
-def test_a_number_of_the_device_and_a_law_without_special_cases_are_what_they_are():
-    creep = {"gain": 0.1, "tau": 1.0, "slow": 0.1}
-    assert fitted(Hypothesis("creep", "stage:axis", "axis"), creep, 1.0).nested_case(0) is None
-    number = next(u.path for u in Structure(AXIS).free_parameters)
-    cause = Hypothesis("parameter", "stage:axis", path=number)
-    assert fitted(cause, {"value": 1.0}, 1.0).nested_case(0) is None
 
 
 @pytest.mark.parametrize("path", sorted((DEVICES).glob("*.toml")), ids=lambda path: path.stem)

@@ -43,16 +43,6 @@ def test_only_an_amplitude_is_fixed_or_limited_to_what_is_plausible(law):
             assert p.bounds[0] <= low < high <= p.bounds[1]
 
 
-@every_law
-def test_a_nested_case_is_a_law_of_the_same_family_with_the_parameter_inside_its_bounds(law):
-    nested = prior_of(law).nested_case
-    if nested is None:
-        return
-    assert prior_of(Effect.library[nested.effect]).family == prior_of(law).family
-    p = next(p for p in law.params if p.name == nested.parameter)
-    assert p.bounds[0] <= nested.value <= p.bounds[1]
-
-
 def test_a_law_without_a_row_starts_at_three_values_spread_over_the_bounds():
     time = Param("tau", "s", (1e-3, 1e3), "time constant")
     assert DEFAULT.of(time).start_values == pytest.approx((1e-2, 1.0, 1e2))

@@ -19,7 +19,7 @@ from ctrlgen.diagnosis.selection.screen import Screen, Screened
 from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.estimation.error_model import ErrorModel
-from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.noise import NoiseSource
 from ctrlgen.estimation.noise_update import update_noise, update_noise_colour
@@ -78,16 +78,6 @@ def test_a_cause_that_leaves_more_than_noise_is_begun_again_in_another_shape():
     assert not stuck.errors.is_noise and found.errors.is_noise
     assert found.fit.values(0)["frequency"] == pytest.approx(50.0, rel=1e-3)
     assert restart_elsewhere(trials, found, nominal, screened) is found
-
-
-@pytest.mark.parametrize("breakaway, sd, special", [(1.0, 0.03, "coulomb"), (1.4, 0.03, None), (1.4, 0.3, "coulomb")])
-def test_a_law_may_as_well_be_its_special_case_where_the_fit_does_not_exclude_it(breakaway, sd, special):
-    stribeck = Hypothesis("stribeck", "stage:axis", "axis")
-    rubbing = {"force": 0.01, "breakaway": breakaway, "speed": 1e-4, "reach": 2e-8}
-    structure = Structure(AXIS).with_cause(stribeck, rubbing).with_cause(BACKLASH, {"gap": 6e-8})
-    J = np.eye(len(structure.free_parameters)) / sd
-    fit = Fit(structure, structure.start, (), 0.0, 1500, np.zeros(0), J, 0.0)
-    assert fit.nested_case(0) == special and fit.nested_case(1) is None
 
 
 def test_a_rival_of_the_same_family_begins_with_the_numbers_they_have_in_common():

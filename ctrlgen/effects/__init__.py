@@ -26,6 +26,7 @@ from ctrlgen.effects._effect import Effect, Place
 from ctrlgen.effects._installed import Installed, LeftOut, installed, law_of, laws, load_laws
 from ctrlgen.effects._law_inputs import Expression, LawInputs, LawNumbers
 from ctrlgen.effects._parameter import Channel, Param, State
+from ctrlgen.effects._plainer import Plainer
 from ctrlgen.effects._region import ActsIn, Side
 from ctrlgen.effects._requirements import REQUIREMENTS
 from ctrlgen.effects._table import EffectTable, faults_at, read_effect
@@ -46,6 +47,7 @@ __all__ = [
     "LeftOut",
     "Param",
     "Place",
+    "Plainer",
     "Side",
     "State",
     "faults_at",

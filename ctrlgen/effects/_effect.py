@@ -10,6 +10,7 @@ from typing import ClassVar
 from ctrlgen.core.units import Quantity, same_dimension
 from ctrlgen.effects._law_inputs import Expression, LawInputs, LawNumbers
 from ctrlgen.effects._parameter import Channel, Param, State
+from ctrlgen.effects._plainer import Plainer
 from ctrlgen.effects._region import ActsIn
 
 
@@ -42,6 +43,8 @@ class Effect:
     states: ClassVar[tuple[State, ...]] = ()
     # What the search believes of a law of another package: an `estimation.law_prior.LawPrior`. Ours have rows in `estimation.priors`.
     prior: ClassVar[object] = None
+    # The plainer law that it generalises, if there is one in the library.
+    plainer: ClassVar[Plainer | None] = None
     # Where it acts, if not everywhere.
     acts_in: ClassVar[ActsIn | None] = None
     # Remembers so much that a simulation of a recording applies it to the simulated readings as a whole, where nothing follows it,
@@ -116,6 +119,11 @@ class Effect:
     def contradiction(cls, p: dict[str, float]) -> str:
         """Why parameters [SI] describe something else than the law; empty where they do not."""
         return ""
+
+    @classmethod
+    def as_plainer(cls, numbers: dict[str, float]) -> dict[str, float]:
+        """The numbers [SI] of the law `plainer` where this one, with these `numbers`, is that law; those of other names are not read."""
+        return numbers
 
     @classmethod
     def from_plainer(cls, numbers: dict[str, float]) -> dict[str, float]:

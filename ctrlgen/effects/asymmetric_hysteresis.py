@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, Plainer, State
 
 
 class AsymmetricHysteresis(Effect):
@@ -20,6 +20,7 @@ class AsymmetricHysteresis(Effect):
         Param("reach", "travel", (1e-3, 5.0), "travel over which the force settles"),
         Param("skew", "1", (-0.95, 0.95), "a: relative excess of stiffness far on the positive side"),
     )
+    plainer = Plainer("bouc_wen", {"skew": 0.0}, {"loop": 1.0})
     states = (State("z", "travel", 0.1, stepped=True, free=True), State("w", "travel", 1.0, stepped=True))
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

@@ -2,8 +2,10 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, Plainer
 from ctrlgen.effects._play_operators import kept_between, play_states, radii, weighted_lag
+
+ALIKE = {"upper": 0.0, "lower": 0.0, "side": 0.0}  # edges that do not lean
 
 
 class AsymmetricLag(Effect, listed=False):
@@ -46,6 +48,7 @@ class AsymmetricDisplacementHysteresis(AsymmetricLag):
     place = Place.DISPLACEMENT
     requires = frozenset({"actuator"})
     params = (Param("share", "1", (-0.999, 0.999), "share of the displacement that lags", off=0.0), *_shape("travel"))
+    plainer = Plainer("displacement_hysteresis", ALIKE)
     states = play_states("travel")
 
 
@@ -56,4 +59,5 @@ class AsymmetricDriveHysteresis(AsymmetricLag):
     place = Place.DRIVE
     requires = frozenset({"actuator", "force"})
     params = (Param("share", "1", (-0.999, 0.999), "share of the drive that lags", off=0.0), *_shape("channel"))
+    plainer = Plainer("drive_hysteresis", {**ALIKE, "reversible": 0.0})
     states = play_states("channel")

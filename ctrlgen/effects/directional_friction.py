@@ -2,7 +2,8 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, Plainer, State
+from ctrlgen.effects._bristles import SHARPEST
 
 
 class DirectionalFriction(Effect):
@@ -21,6 +22,7 @@ class DirectionalFriction(Effect):
         Param("skew", "1", (-0.95, 0.95), "a: relative excess of the force of sliding forward"),
         Param("reach", "travel", (1e-6, 0.03), "displacement over which the contact yields"),
     )
+    plainer = Plainer("coulomb", {"skew": 0.0}, {"smoothing": SHARPEST})
     states = (State("z", "1", 1.0), State("w", "1", 1.0))
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

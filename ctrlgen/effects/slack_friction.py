@@ -2,8 +2,8 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
-from ctrlgen.effects._play_operators import lags, play_states, radii, updated_plays
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, Plainer, State
+from ctrlgen.effects._play_operators import ELEMENTS, lags, play_states, radii, updated_plays
 from ctrlgen.effects._reversal_points import reversal_point
 
 
@@ -23,11 +23,17 @@ class SlackFriction(Effect):
         Param("slack", "travel", (0.0, 10.0), "b: travel without force after a reversal"),
         Param("reach", "travel", (1e-3, 5.0), "r: travel after which all contacts slide, once the slack is crossed"),
     )
+    plainer = Plainer("hysteresis", {"slack": 0.0}, {"taper": 0.0})
     states = (
         *play_states("travel"),
         State("d", "travel", 1.0, stepped=True),
         State("v", "travel/s", 100.0, stepped=True),
     )
+
+    @classmethod
+    def as_plainer(cls, numbers: dict[str, float]) -> dict[str, float]:
+        # k = 8 f/sum_j r_j
+        return {"reach": numbers["reach"], "stiffness": ELEMENTS * numbers["force"] / sum(radii(numbers["reach"]))}
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         bent = (

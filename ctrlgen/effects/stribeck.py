@@ -2,7 +2,8 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, Plainer, State
+from ctrlgen.effects._bristles import SHARPEST
 
 
 class Stribeck(Effect):
@@ -21,6 +22,7 @@ class Stribeck(Effect):
         Param("speed", "travel/s", (1e-3, 1e3), "v_s: Stribeck speed, above which the excess has decayed"),
         Param("reach", "travel", (1e-6, 0.03), "displacement over which the contact yields"),
     )
+    plainer = Plainer("coulomb", {"breakaway": 1.0}, {"smoothing": SHARPEST})
     states = (State("z", "1", 1.0),)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

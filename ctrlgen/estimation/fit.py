@@ -18,7 +18,7 @@ from ctrlgen.estimation.error_model import ErrorModel, error_model
 from ctrlgen.estimation.initial_memory import begins_worse, turning_point_before
 from ctrlgen.estimation.least_squares import LeastSquaresProblem, initial_state_sd, limited, whiten_residual
 from ctrlgen.estimation.noise import Noise
-from ctrlgen.estimation.settings import DISCREPANCY, FIT, HELD_OUT_REFIT, SIMULATION, STATISTICS
+from ctrlgen.estimation.settings import DISCREPANCY, FIT, HELD_OUT_REFIT, SIMULATION
 from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
@@ -83,16 +83,6 @@ class Fit:
             if p.cause == cause:
                 values[p.name] = float(value)
         return values
-
-    def nested_case(self, cause: int) -> str | None:
-        """The effect that the law of one cause contains as a special case, where that lies in the 95 % interval; else None."""
-        nested = self.structure.causes[cause].prior.nested_case
-        if nested is None:
-            return None
-        parameters = self.structure.free_parameters
-        i = next(i for i, p in enumerate(parameters) if p.cause == cause and p.name == nested.parameter)
-        sd = np.sqrt(max(self.covariance[i, i], 0.0))
-        return nested.effect if abs(self.theta[i] - nested.value) <= STATISTICS.z_95 * sd else None
 
 
 @dataclass(frozen=True, eq=False)

@@ -57,22 +57,12 @@ def peaks(*multiples: float) -> ParameterPrior:
 
 
 @dataclass(frozen=True)
-class NestedCase:
-    """The law `effect` that this law becomes where `parameter` is at `value` [SI]."""
-
-    effect: str
-    parameter: str
-    value: float
-
-
-@dataclass(frozen=True)
 class LawPrior:
     """What the search believes of one law.
 
     log_prior_odds: ln of how many times commoner the law is than a wrong gain; decides among causes that explain alike.
     model_form_error: error of the law's form after its parameters are fitted, as a share of what the law explains.
     family: name shared by laws that are forms of one physics; a place has at most one of a family.
-    nested_case: the simpler law inside this one; where the fit does not exclude it, it is named as an alternative.
     refines: the plainer laws of which this is a finer form, with more numbers. It is never suspected itself, but tried in the place of
         one of them that is among the causes, where that leaves more than noise.
     unless: what a device must not have (words of `Effect.requires`) for the law to be suspected there: another law says the same.
@@ -90,7 +80,6 @@ class LawPrior:
     log_prior_odds: float = 0.0
     model_form_error: float = 0.0
     family: str | None = None
-    nested_case: NestedCase | None = None
     refines: frozenset[str] = frozenset()
     unless: frozenset[str] = frozenset()
     suspected: bool = True

@@ -70,7 +70,7 @@ class LeastSquaresProblem:
         self.k = len(parameters)
         self.scale = np.concatenate([[p.size for p in parameters], *self.initial_sd]).astype(float)
         self.prior = [(i, p) for i, p in enumerate(parameters) if p.sd]
-        self.log = np.array([_by_logarithm(p) for p in parameters] + [False] * self.n_initial, dtype=bool)
+        self.log = np.array([by_logarithm(p) for p in parameters] + [False] * self.n_initial, dtype=bool)
         self.step_limit = np.where(self.log, FIT.longest_log_step, np.inf)
         self._last: list[Evaluated] = []
 
@@ -168,6 +168,6 @@ def _clipped(sensitivities: np.ndarray) -> np.ndarray:
     return np.clip(np.nan_to_num(sensitivities), -FIT.reading_limit, FIT.reading_limit)
 
 
-def _by_logarithm(p: FreeParameter) -> bool:
+def by_logarithm(p: FreeParameter) -> bool:
     """Whether a parameter is fitted by its logarithm: a positive time or speed that shapes a cause."""
     return p.cause is not None and not p.amplitude and (p.unit == "s" or p.unit.endswith("/s")) and p.low > 0

@@ -1,7 +1,8 @@
 """Error of the prediction of the held-out records that the uncertainty of the fitted parameters alone leaves.
 
-dy = (Y - Y_s (Y_s'W'W Y_s + I)^-1 Y_s'W'W Y) dp, dp ~ N(0, C): Y the sensitivities of the readings by the parameters, Y_s by
-the initial states in their prior standard deviations, which follow the readings (see `Fitter.predict`); W whitens.
+dy = (Y - Y_s (Y_s'W'W Y_s + I)^-1 Y_s'W'W Y) dp, dp ~ N(0, C) by `posterior`: Y the sensitivities of the readings by
+the parameters, Y_s by the initial states in their prior standard deviations, which follow the readings (see `Fitter.predict`); W
+whitens.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import numpy as np
 
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.least_squares import initial_state_sd
+from ctrlgen.estimation.posterior import Posterior
 from ctrlgen.recordings.recording import Record
 
 
@@ -19,10 +21,12 @@ def prediction_uncertainty(fitter: Fitter, fit: Fit) -> np.ndarray:
     Zero where no parameter is free; infinite where the sensitivities have diverged.
     """
     squares = np.zeros(len(fitter.recording.channels))
-    count = np.zeros_like(squares)
-    for record in fitter.held_out_records if len(fit.theta) else ():
-        Y = _sensitivities(fitter, fit, record)
-        variance = np.einsum("nij,jk,nik->ni", Y, fit.covariance, Y)
+    if not len(fit.theta):
+        return squares
+    count, posterior = np.zeros_like(squares), Posterior.of(fit)
+    for record in fitter.held_out_records:
+        Y = _sensitivities(fitter, fit, record) * posterior.slope(fit.theta)
+        variance = np.einsum("nij,jk,nik->ni", Y, posterior.C, Y)
         squares += np.sum(np.where(record.valid, np.maximum(variance, 0.0), 0.0), axis=0)
         count += record.valid.sum(axis=0)
     rms = np.sqrt(squares / np.maximum(count, 1))

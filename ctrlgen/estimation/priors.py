@@ -13,7 +13,7 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from ctrlgen.effects import Effect
-from ctrlgen.estimation.law_prior import ONE_IN_A_HUNDRED, ONE_IN_TEN, LawPrior, NestedCase, ParameterPrior, peaks
+from ctrlgen.estimation.law_prior import ONE_IN_A_HUNDRED, ONE_IN_TEN, LawPrior, ParameterPrior, peaks
 from ctrlgen.estimation.priors_in_a_region import IN_A_REGION
 from ctrlgen.estimation.priors_of_a_lag import HYSTERESIS, OF_A_LAG
 
@@ -223,7 +223,6 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             log_prior_odds=-1.0,
             model_form_error=0.02,
             family="dry friction",
-            nested_case=NestedCase("coulomb", "skew", 0.0),
             parameters={"skew": _starts((-0.3, 0.3)), "reach": peaks(3e-4, 3e-3, 0.03)},
         ),
         "end_stop": LawPrior(
@@ -268,7 +267,6 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             log_prior_odds=-1.0,
             model_form_error=0.02,
             family="dry friction",
-            nested_case=NestedCase("coulomb", "breakaway", 1.0),
             parameters={"breakaway": _starts((1.8,)), "speed": peaks(0.01, 0.05, 0.2), "reach": peaks(1e-3, 0.01)},
         ),
         # Displacement and pose ------------------------------------------------------------------------------------------------

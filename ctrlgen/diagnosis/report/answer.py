@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
-from ctrlgen.diagnosis.report.luck_sentences import MAY_BE_LUCK, doubt_of_luck
+from ctrlgen.diagnosis.report.luck_sentences import doubt_of_luck, short_doubt
 from ctrlgen.diagnosis.report.narrative import (
     cause_text,
     channel_sentence,
@@ -103,7 +103,7 @@ def _main(findings: Sequence[Finding]) -> str:
 def _in_brackets(finding: Finding) -> str:
     """' (12 %)' after the name of a further cause, ' (12 %, may be luck)', or nothing."""
     told = [per_cent(finding.share.value)] if finding.share else []
-    told += [MAY_BE_LUCK] if doubt_of_luck(finding) else []
+    told += [short_doubt(finding)] if doubt_of_luck(finding) else []
     return f" ({', '.join(told)})" if told else ""
 
 

@@ -42,6 +42,11 @@ def doubt_of_luck(finding: Finding) -> str:
     return f"it {MAY_BE_LUCK} ({_size(chance.by_luck or 0.0)})" if chance.weak else NOT_EXCLUDED
 
 
+def short_doubt(finding: Finding) -> str:
+    """`doubt_of_luck` without its number, for brackets."""
+    return MAY_BE_LUCK if finding.chance is not None and finding.chance.weak else NOT_EXCLUDED
+
+
 def luck_steps(findings: Sequence[Finding]) -> list[str]:
     """What to record where luck is not excluded, by cause."""
     doubted = [(f, f.chance) for f in findings if f.chance is not None and f.role is Role.CAUSE and doubt_of_luck(f)]

@@ -1,4 +1,4 @@
-"""Rivals: what would be suspected in place of a cause, with all the others as they are, and special cases of its law."""
+"""Rivals: what would be suspected in place of a cause, with all the others as they are, and the plainer law that it may be."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
 from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis
+from ctrlgen.estimation.plainer_law import may_be_plainer, plainer_start
 from ctrlgen.estimation.settings import FIT
 from ctrlgen.estimation.structure import Structure
 
@@ -36,22 +37,30 @@ def swapped(trials: Trials, current: CandidateModel, before: int) -> CandidateMo
 
 
 def simplified(trials: Trials, current: CandidateModel) -> CandidateModel:
-    """The model with the special case of each law in its place that the fit does not exclude, where it explains alike: how
-    the friction falls with speed, say, is then within what noise or discrepancy feigns."""
+    """The model with the plainer law in place of each one that generalises it, where the fit does not exclude that both are one and it
+    explains alike: how the friction falls with speed, say, is then within what noise or discrepancy feigns."""
     for k in range(len(current.causes)):
-        plainer = _plainer(trials, current, k)
-        if plainer is not current:
-            return simplified(trials, plainer)
+        coarser = _coarser(trials, current, k)
+        if coarser is not current:
+            return simplified(trials, coarser)
         current = _in_usual_shape(trials, current, k)
-        special = current.fit.nested_case(k)
-        candidates = replacements(trials, current, k) if special else []
-        for t in (t for t in candidates if t.cause and t.cause.effect == special):
+        for t in _as_plainer(trials, current, k):
             if explains_alike(trials.selection, t, current) and not trials.objections(t, current.causes):
-                return simplified(trials, trials.converged(t))
+                return simplified(trials, t)
     return current
 
 
-def _plainer(trials: Trials, current: CandidateModel, k: int) -> CandidateModel:
+def _as_plainer(trials: Trials, current: CandidateModel, k: int) -> list[CandidateModel]:
+    """The model with the plainer law that cause k may be in its place, begun where both are one; none where there is no such law, or
+    this machine cannot have it."""
+    plain = may_be_plainer(current.fit, k)
+    if plain not in trials.screen.hypotheses:
+        return []
+    begun = current.fit.restarted.without(k).with_cause(plain, plainer_start(current.fit, k, plain))
+    return [trials.converged(t) for t in trials.tried(begun, plain)]
+
+
+def _coarser(trials: Trials, current: CandidateModel, k: int) -> CandidateModel:
     """The model with the plainest of the laws that cause k is a finer form of, where that is enough beside what came later."""
     cause = current.causes[k]
     if not cause.prior.refines:
@@ -129,18 +138,17 @@ def _begun_usual(trials: Trials, fit: Fit, k: int, i: int, usual: float) -> tupl
 
 
 def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Round] = ()) -> tuple[CandidateModel, ...]:
-    """What explains alike in place of cause k, or is the special case of its law that the fit does not exclude; with what the
-    `rounds` tried in its place."""
-    there, special = current.causes, current.fit.nested_case(k)
+    """What explains alike in place of cause k, or is the plainer law that the fit does not exclude; with what the `rounds` tried in its
+    place."""
+    there, plainer = current.causes, _as_plainer(trials, current, k)
     tried = [t for r in rounds for t in r.candidates if not current.errors.is_noise]
-    candidates = [*replacements(trials, current, k), *_in_place_of(k, there, tried)]
+    candidates = [*plainer, *replacements(trials, current, k), *_in_place_of(k, there, tried)]
     # at the end of its range, or of a size that may be zero, the cause stands for something else, which need not do quite as well
     open_ = outside_its_range(current.fit, k) or amplitude_may_be_zero(current.fit, k)
     slack = SEARCH.bound_slack if open_ else 0.0
 
     def is_alike(t: CandidateModel) -> bool:
-        named = special and t.cause and t.cause.effect == special
-        return bool(named) or explains_alike(trials.selection, t, current, slack)
+        return t in plainer or explains_alike(trials.selection, t, current, slack)
 
     alike = {
         t.cause: t
@@ -210,7 +218,7 @@ def replace_cause(trials: Trials, fit: Fit, k: int, others: Structure, suspect: 
 def _contains(rival: CandidateModel, cause: Hypothesis) -> bool:
     """Whether a rival's law is the cause's but for numbers that it does not tell from those of the cause: it is no other physics."""
     places = [k for k, c in enumerate(rival.causes) if c == rival.cause and c.location == cause.location]
-    return any(rival.fit.nested_case(k) == cause.effect for k in places)
+    return any((plain := may_be_plainer(rival.fit, k)) and plain.effect == cause.effect for k in places)
 
 
 def _one_law(a: Hypothesis | None, b: Hypothesis) -> bool:

@@ -1,0 +1,19 @@
+"""The plainer law inside a law that generalises it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Plainer:
+    """The law `kind`, which a law is where its numbers `where` have these values; what `kind` alone has is then as in `beside`.
+
+    Both count in the units of the laws' bounds. Numbers of one name mean the same in both laws; where they do not,
+    `Effect.as_plainer` translates them.
+    """
+
+    kind: str
+    where: Mapping[str, float]
+    beside: Mapping[str, float] = field(default_factory=dict)

@@ -1,0 +1,132 @@
+"""A law that generalises another one is named where it says more: else the plainer law is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from axis_records import AXIS, NOISE, fitter_of
+from effect_cases import Law, shapes
+from test_effects import rich
+
+from ctrlgen.diagnosis.selection.rivals import rivals, simplified
+from ctrlgen.diagnosis.selection.screen import Screen
+from ctrlgen.diagnosis.selection.trials import Trials
+from ctrlgen.effects import Effect
+from ctrlgen.estimation.fit import Fit
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.plainer_law import may_be_plainer, plainer_start
+from ctrlgen.estimation.priors import prior_of
+from ctrlgen.estimation.structure import Structure
+
+GENERAL = {kind: law for kind, law in Effect.library.items() if law.plainer}
+every_general_law = pytest.mark.parametrize("law", GENERAL.values(), ids=GENERAL)
+
+
+def at_neutral(law: type[Effect], where, amplitude: float) -> dict[str, float]:
+    """Numbers [SI] with which a law is its plainer one."""
+    neutral = {p.name: where.si(law.plainer.where[p.name], p) for p in law.params if p.name in law.plainer.where}
+    return {**shapes(law, where)[0], law.amplitude().name: amplitude, **neutral}
+
+
+def test_laws_say_what_they_generalise():
+    assert set(GENERAL) == {
+        *("directional_friction", "stribeck", "asymmetric_hysteresis", "slack_friction"),
+        *("asymmetric_displacement_hysteresis", "asymmetric_drive_hysteresis"),
+    }
+
+
+@every_general_law
+def test_a_plainer_law_is_of_the_same_family_and_place_and_both_name_their_numbers(law):
+    plain = Effect.library[law.plainer.kind]
+    assert prior_of(plain).family == prior_of(law).family and plain.place is law.place
+    for given, of in ((law.plainer.where, law), (law.plainer.beside, plain)):
+        bounds = {p.name: p.bounds for p in of.params if p is not of.amplitude()}
+        assert all(bounds[name][0] <= value <= bounds[name][1] for name, value in given.items())
+
+
+@every_general_law
+def test_a_law_is_its_plainer_one_where_the_numbers_by_which_they_differ_are_neutral(law):
+    """Dahl's bristles are Coulomb's at the sharpest corner, which is as small as a speed is of interest: a thousandth."""
+    signals = rich(800, 1e-3)
+    general, plain = Law(law, 1e-3), Law(Effect.library[law.plainer.kind], 1e-3)
+    numbers = at_neutral(law, general.where, 0.3)
+    both = law.as_plainer(numbers) | {
+        p.name: plain.where.si(law.plainer.beside[p.name], p)
+        for p in plain.effect.params
+        if p.name in law.plainer.beside
+    }
+    a, b = (
+        one.walk(signals)([values[p.name] for p in one.effect.params]).full().ravel()
+        for one, values in ((general, numbers), (plain, both))
+    )
+    assert np.ptp(a) > 1e-3 and np.abs(a - b).max() < 1e-3 * np.ptp(a)
+
+
+def fit_of(law: str, numbers: dict[str, float], sd: float, at: str = "stage:axis") -> Fit:
+    structure = Structure(AXIS).with_cause(Hypothesis(law, at, "axis"), numbers)
+    return Fit(structure, structure.start, (), 0.0, 1500, np.zeros(0), np.eye(len(structure.start)) / sd, 0.0)
+
+
+@pytest.mark.parametrize("breakaway, sd, may", [(1.0, 0.03, True), (1.4, 0.03, False), (1.4, 0.3, True)])
+def test_a_law_may_be_the_plainer_one_where_its_intervals_hold_that(breakaway, sd, may):
+    rubbing = {"force": 0.01, "breakaway": breakaway, "speed": 1e-4, "reach": 2e-8}
+    plain = may_be_plainer(fit_of("stribeck", rubbing, sd), 0)
+    assert plain == (Hypothesis("coulomb", "stage:axis", "axis") if may else None)
+
+
+def test_the_interval_is_the_one_that_is_reported(monkeypatch):
+    """Where the residual has a memory, the sandwich is wider than the model's own."""
+    fit = fit_of("stribeck", {"force": 0.01, "breakaway": 1.4, "speed": 1e-4, "reach": 2e-8}, 0.03)
+    assert may_be_plainer(fit, 0) is None
+    monkeypatch.setattr("ctrlgen.estimation.robust_covariance.widening", lambda fit: np.full(len(fit.theta), 10.0))
+    assert may_be_plainer(fit, 0) is not None
+
+
+def test_all_numbers_by_which_two_laws_differ_must_be_neutral():
+    leaning = {"share": 0.1, "reach": 1e-6, "taper": 0.5, "reversible": 0.0, "upper": 0.0, "lower": 0.0, "side": 0.0}
+    for name in ("upper", "lower", "side"):
+        fit = fit_of("asymmetric_displacement_hysteresis", leaning | {name: 0.2}, 0.05)
+        assert may_be_plainer(fit, 0) is None
+    assert may_be_plainer(fit_of("asymmetric_displacement_hysteresis", leaning, 0.05), 0).effect == (
+        "displacement_hysteresis"
+    )
+
+
+def test_what_generalises_nothing_is_what_it_is():
+    assert may_be_plainer(fit_of("creep", {"gain": 0.1, "tau": 1.0, "slow": 0.1}, 1.0), 0) is None
+    number = next(u.path for u in Structure(AXIS).free_parameters)
+    structure = Structure(AXIS).with_cause(Hypothesis("parameter", "stage:axis", path=number), {"value": 1.0})
+    fit = Fit(structure, structure.start, (), 0.0, 9, np.zeros(0), np.eye(len(structure.start)), 0.0)
+    assert may_be_plainer(fit, 0) is None
+
+
+@every_general_law
+def test_what_rubs_or_lags_alike_both_ways_is_named_by_the_plainer_law(law, monkeypatch):
+    """Readings of the plainer law, fitted by the one that generalises it."""
+    cause = Hypothesis(law.kind, "actuator:axis" if law.kind.endswith("drive_hysteresis") else "stage:axis", "axis")
+    model, channel = fitter_of(n=400), cause.channel_on(AXIS)
+    size = channel.si(0.05 if law.amplitude().unit == "channel" else 0.3, law.amplitude())
+    values = at_neutral(law, channel, size)
+    begun = Structure(AXIS).with_cause(cause, values)
+    plain = Hypothesis(law.plainer.kind, cause.location, "axis")
+    start = plainer_start(Fit(begun, begun.start, (), 0.0, 1, np.zeros(0), np.eye(len(begun.start)), 0.0), 0, plain)
+    truth, rng = model.fit(Structure(AXIS).with_cause(plain, start), steps=0), np.random.default_rng(0)
+    records = tuple(
+        r
+        if r.role == "rest"
+        else replace(r, observed=model.predict(truth, r) + NOISE * rng.standard_normal(r.observed.shape))
+        for r in model.recording.records
+    )
+    fitter = replace(model, recording=replace(model.recording, records=records))
+    trials = Trials(fitter, Screen(fitter, [cause, plain]), lambda _: None)
+    general = trials.fit(begun, cause, steps=12)
+    assert may_be_plainer(general.fit, 0) == plain
+    named = simplified(trials, general)
+    assert named.causes == (plain,)
+    monkeypatch.setattr("ctrlgen.diagnosis.selection.rivals.replacements", lambda *_: [])
+    assert [t.cause for t in rivals(trials, general, 0)] == [plain]
+    # nothing that the machine cannot have
+    without = Trials(fitter, Screen(fitter, [cause]), lambda _: None)
+    assert simplified(without, without.fit(begun, cause, steps=12)).causes == (cause,)
