@@ -16,6 +16,7 @@ from ctrlgen.diagnosis.selection.model_selection import ModelSelection
 from ctrlgen.diagnosis.selection.objections import objections
 from ctrlgen.diagnosis.selection.rivals import replace_cause
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
+from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.estimation.error_model import ErrorModel
@@ -78,6 +79,16 @@ def test_a_cause_that_leaves_more_than_noise_is_begun_again_in_another_shape():
     assert not stuck.errors.is_noise and found.errors.is_noise
     assert found.fit.values(0)["frequency"] == pytest.approx(50.0, rel=1e-3)
     assert restart_elsewhere(trials, found, nominal, screened) is found
+
+
+def test_what_explains_better_once_all_is_fitted_takes_the_place_of_a_cause():
+    """Play, for which creep was taken: in the end the better one is the answer, not its alternative."""
+    fitter = fitter_of(played, n=700)
+    searcher = Searcher(fitter, Screen(fitter, [BACKLASH, LATE]), lambda _: None)
+    taken = searcher.trials.fit(Structure(AXIS).with_cause(LATE, {"gain": 1e-3, "tau": 0.01, "decades": 2.0}), LATE)
+    found = searcher._best_settled(taken)
+    assert found.causes == (BACKLASH,) and found.held_out.plain_mean[0] < 0.5 * taken.held_out.plain_mean[0]
+    assert searcher._best_settled(found).causes == (BACKLASH,)
 
 
 def test_a_rival_of_the_same_family_begins_with_the_numbers_they_have_in_common():
