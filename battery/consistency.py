@@ -111,7 +111,8 @@ def _verdict(d: dict[str, Any]) -> Iterator[str]:
     known = all(e["noise_floor"] for e in errors)
     quiet = known and all(e["rms_after"] is not None and e["rms_after"] <= NOISE * e["noise_floor"] for e in errors)
     chance = "which chance allows so few samples" in d["sentence"]
-    if verdict == "explained" and not (quiet or tolerated or chance):
+    little = "too little to name" in d["sentence"] and known and all(map(_little, errors))
+    if verdict == "explained" and not (quiet or tolerated or chance or little):
         yield "explained, and more than noise is left"
     if verdict == "explained" and any(f["role"] == "unseen" for f in d["findings"]):
         yield "explained by what no held-out record shows"
@@ -227,6 +228,12 @@ def _luck(d: dict[str, Any]) -> Iterator[str]:
 def _doubted(finding: dict[str, Any]) -> bool:
     c = finding["chance"]
     return c is not None and (c["by_luck"] is None or c["by_luck"] > LUCK)
+
+
+def _little(e: dict[str, Any]) -> bool:
+    """Whether an error beyond noise is below a hundredth of what it was, in squares, or near the noise."""
+    noise = e["noise_floor"] ** 2
+    return e["rms_after"] ** 2 - noise <= max(LEAST * (e["rms_before"] ** 2 - noise), (NOISE**2 - 1) * noise)
 
 
 def _same(a: float, b: float | None, share: float = 0.006) -> bool:

@@ -29,6 +29,7 @@ from ctrlgen.diagnosis.report.html_report import page
 from ctrlgen.diagnosis.report.narrative import gathered, interval, next_steps
 from ctrlgen.diagnosis.report.plot_uncertainty import draw_rivals
 from ctrlgen.diagnosis.report.writeback import next_text
+from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.estimation.hypothesis import Hypothesis
@@ -323,6 +324,9 @@ def test_the_answer_tells_what_is_left_where_most_is_left(found):
     for after, said in ((0.59, False), (0.61, True)):
         told = answer(replace(found, held_out={"reading.a": errors(2.0, after, 0.5)}))
         assert ("which chance allows" in told[-1]) == said and len(told) == 2 + said
+    little = replace(found, held_out={"reading.a": errors(50.0, 2.0, 1.0)}, residual_tests=failed)
+    assert answer(little)[-1].endswith("; too little to name, 0.1 % of the error.")
+    assert "too little" not in answer(replace(little, verdict=Verdict.PARTLY))[-1]
     (*_, last) = answer(replace(found, held_out={"reading.a": errors(2.0, 0.5, None)}))
     assert last.startswith("Whether more is left cannot be said")
 
@@ -342,6 +346,14 @@ def test_a_verdict_says_what_to_do(found):
     assert "Check wiring, units and clocks" in next_steps(told[Verdict.UNEXPLAINED])[1]
     assert "cannot tell it from thermal_lag at actuator:axis" in sentence(told[Verdict.AMBIGUOUS])
     assert "thermal_lag" not in sentence(told[Verdict.EXPLAINED])
+    # each alternative stands beside the cause that it is one of, where that is large enough to count
+    offset, home = Hypothesis("drive_offset", "actuator:axis", "axis"), Hypothesis("home_offset", "sensor:axis", "axis")
+    for share, says in ((0.4, True), (0.2, False)):
+        small = ShareEntry(value=share * rival.share.value, ci95=(0.0, 1.0))
+        both = replace(rival, effect="drive_offset", cause=offset, alternatives=(home,), share=small)
+        two = sentence(replace(found, verdict=Verdict.AMBIGUOUS, findings=(rival, both)))
+        nor = ", nor drive_offset at actuator:axis from home_offset at sensor:axis"
+        assert ("it from thermal_lag at actuator:axis" + nor * says + ".") in two
     for settles, said in ((True, "Run the next experiment"), (False, "None of the drives considered")):
         assert next_steps(replace(told[Verdict.AMBIGUOUS], next_experiment=proposal(settles)))[0].startswith(said)
     assert "no known effect" in sentence(replace(found, verdict=Verdict.UNEXPLAINED, findings=()))

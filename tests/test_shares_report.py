@@ -184,9 +184,9 @@ def test_the_ceiling_names_what_has_most_first(shares, said):
         (channel({Kind.RECORD: 0.7}, 0.7), "What is left in axis is mostly a constant for each record, 70 %."),
         (
             channel({Kind.SPEED: 0.2}, 0.2, past=0.5),
-            "What is left in axis is mostly a function of none of the signals looked at: its own past predicts 50 % of it, speed 20 %.",
+            "What is left in axis is mostly no function of the signals looked at: its own past predicts 50 % of it, speed 20 %.",
         ),
-        (channel({}, 0.0), "What is left in axis is mostly a function of none of the signals looked at."),
+        (channel({}, 0.0), "What is left in axis is mostly no function of the signals looked at."),
     ],
 )
 def test_what_is_left_is_said_by_its_kind(shares, said):

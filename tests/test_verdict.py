@@ -19,6 +19,7 @@ from ctrlgen.diagnosis.selection.verdict import (
     contradicts_datasheet,
     main_rivals,
     poorly_determined,
+    too_little_to_name,
     unconfirmed,
     verdict,
     within_tolerance,
@@ -148,7 +149,41 @@ def test_a_verdict_says_what_is_known():
 
 @pytest.mark.parametrize("share, says", [(0.75 + JUST, Verdict.PARTLY), (0.75 - JUST, Verdict.UNEXPLAINED)])
 def test_what_takes_away_three_quarters_of_the_mismatch_is_part_of_the_answer(share, says):
-    assert judged(passed=False, share=share) == says and judged(share=share) == Verdict.EXPLAINED
+    assert judged(passed=False, share=share, left_over=1e5) == says and judged(share=share) == Verdict.EXPLAINED
+
+
+@pytest.mark.parametrize(
+    "before, after, little",
+    [
+        # a hundredth of the mismatch, whatever the noise is
+        (1e4, 100.0 - JUST, True),
+        (1e4, 100.0 + JUST, False),
+        # no larger than the noise, and a tenth of the mismatch
+        (20.0, 1.0 - JUST, True),
+        (20.0, 1.0 + JUST, False),
+        (5.0, 0.5 - JUST, True),
+        (5.0, 0.5 + JUST, False),
+        # what the residual tests let pass: 1.1 times the noise
+        (0.3, 0.21 - JUST, True),
+        (0.3, 0.21 + JUST, False),
+    ],
+)
+def test_what_is_left_is_little_beside_the_mismatch_or_the_noise(before, after, little):
+    """Squares beyond the noise, over those of the noise; of the records to fit and of those held out."""
+    quiet, passed = 0.0, ResidualTests((1.0,), {}, False)
+    for fit, held in ((after, quiet), (quiet, after)):
+        found = search(trial(before * N, before * N), trial(fit * N, held * N, causes=(GAIN,)), of=fitter())
+        assert too_little_to_name(found, passed) == little
+        assert not too_little_to_name(found, replace(passed, restless=("reading.axis",)))
+    unknown = search(trial(before * N, before * N), trial(0.0, 0.0, causes=(GAIN,)), of=fitter(known=False))
+    assert not too_little_to_name(unknown, passed)
+    assert not too_little_to_name(search(trial(before * N, before * N), trial(), of=fitter()), passed)
+
+
+def test_little_that_is_left_is_no_reason_against_an_explanation():
+    assert judged(passed=False, left_over=9e3) == Verdict.EXPLAINED and judged(passed=False, left_over=2e4) == "partly"
+    assert judged(passed=False, left_over=9e3, apart=6.0) == Verdict.PARTLY  # at the price of a number that is excluded
+    assert judged(passed=False, left_over=0.0, causes=()) == Verdict.UNEXPLAINED
 
 
 def test_numbers_that_contradict_the_data_sheet_are_no_explanation():

@@ -36,7 +36,7 @@ from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.selection.standing import answer_of, in_standing
 from ctrlgen.diagnosis.selection.trials import FAILURES
-from ctrlgen.diagnosis.selection.verdict import Verdict, in_another_unit, verdict
+from ctrlgen.diagnosis.selection.verdict import Verdict, in_another_unit, verdict, within_tolerance
 from ctrlgen.diagnosis.shares.empirical_terms import EmpiricalTerm, empirical_terms
 from ctrlgen.diagnosis.shares.families import ranking
 from ctrlgen.diagnosis.shares.gather import ResidualShares, residual_shares
@@ -129,7 +129,8 @@ def _diagnose(
         answer = answer_of(answer, found, search.chosen.errors.is_noise)
     found = with_chances(found, search)
     answer = doubted(answer, found)
-    enough = unit_is_wrong or answer in (Verdict.CONSISTENT, Verdict.EXPLAINED)
+    explained = answer == Verdict.EXPLAINED and (tests.passed or within_tolerance(search))
+    enough = unit_is_wrong or explained or answer == Verdict.CONSISTENT
     left, failed = ((), ()) if enough else _empirical_terms(search, shares)
     spikes = find_spikes(search.fitter, search.chosen.fit, known)
     told = (*marking_notes(live.recording, search.fitter.recording), *(s.sentence for s in spikes))

@@ -31,7 +31,8 @@ from ctrlgen.diagnosis.selection.verdict import (
     poorly_determined,
     within_tolerance,
 )
-from ctrlgen.estimation.hypothesis import PARAMETER
+from ctrlgen.diagnosis.settings import VERDICT
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 from ctrlgen.reporting.numbers import number
 
 HEADLINE = {
@@ -43,6 +44,8 @@ HEADLINE = {
 }
 # further findings, and numbers of the main one, that the first sentence holds
 BESIDE, NUMBERS = 2, 2
+# alternatives of a cause that it holds
+LISTED = 3
 # times the noise from which on it is said that chance allows as much
 CHANCE = 1.2
 
@@ -148,11 +151,15 @@ def _end(end: EndEntry, unit: str) -> str:
 
 
 def _rivals(diagnosis: Diagnosis) -> str:
-    """'; this recording cannot tell it from thermal_lag at actuator:axis', for an ambiguous verdict."""
+    """'; this recording cannot tell it from thermal_lag at actuator:axis, nor drive_offset at actuator:axis from home_offset at
+    sensor:axis', for an ambiguous verdict: of the main cause, and of others whose share makes the answer ambiguous."""
     if diagnosis.verdict != Verdict.AMBIGUOUS:
         return ""
-    others = dict.fromkeys(cause_name(h) for f in diagnosis.findings for h in f.alternatives)
-    rivals = f"; this recording cannot tell it from {' or '.join(others)}" if others else ""
+    main = diagnosis.findings[0]
+    least = VERDICT.main_share * (main.share.value if main.share else 0.0)
+    told = [f for f in diagnosis.findings if f.alternatives and (f.share is None or f.share.value >= least)]
+    pairs = [f"{'it' if f is main else cause_name(f.cause)} from {_any(f.alternatives)}" for f in told]
+    rivals = f"; this recording cannot tell {', nor '.join(pairs)}" if pairs else ""
     support = diagnosis.findings[0].support
     if support is None or not support.contradicted:
         return rivals
@@ -160,6 +167,12 @@ def _rivals(diagnosis: Diagnosis) -> str:
         f"{support.leading} ({per_cent(support.leading_share)}), not for {support.family} ({per_cent(support.share)})"
     )
     return f"{rivals}; the model-free shares speak for {told}"
+
+
+def _any(causes: Sequence[Hypothesis]) -> str:
+    """'backlash at stage:axis or creep at stage:axis', the first ones: the table has them all."""
+    more = [f"{len(causes) - LISTED} more"] if len(causes) > LISTED else []
+    return " or ".join([*map(cause_name, causes[:LISTED]), *more])
 
 
 def _left(diagnosis: Diagnosis) -> list[str]:
@@ -180,7 +193,7 @@ def _rest(diagnosis: Diagnosis) -> str:
     ratio = e.rms_after / (e.noise_floor or 1.0)
     size = f"{number(e.rms_after, 3)} {e.unit} in {short(channel)}, {number(ratio, 2)} times the noise"
     if not diagnosis.residual_tests.passed:
-        return f"Left: {size}{rest_kind(diagnosis, channel)}{_within(diagnosis)}."
+        return f"Left: {size}{rest_kind(diagnosis, channel)}{_within(diagnosis)}{_little(diagnosis, e)}."
     if diagnosis.unconfirmed:
         return f"No held-out record shows {' or '.join(map(cause_name, diagnosis.unconfirmed))}."
     if diagnosis.verdict == Verdict.PARTLY and poorly_determined(diagnosis.search):
@@ -208,6 +221,15 @@ def _within(diagnosis: Diagnosis) -> str:
     """', within the stated tolerance', where that and not the noise is why nothing more is asked."""
     tolerated = within_tolerance(diagnosis.search) and not diagnosis.residual_tests.passed
     return ", within the stated tolerance" if tolerated else ""
+
+
+def _little(diagnosis: Diagnosis, e: ChannelErrorEntry) -> str:
+    """'; too little to name, 0.1 % of the error', where that is why the answer is an explanation."""
+    if diagnosis.verdict != Verdict.EXPLAINED or within_tolerance(diagnosis.search):
+        return ""
+    noise = (e.noise_floor or 0.0) ** 2
+    share = (e.rms_after**2 - noise) / max(e.rms_before**2 - noise, 1e-300)
+    return f"; too little to name, {per_cent(max(share, 0.0))} of the error"
 
 
 def _blind(diagnosis: Diagnosis) -> str:

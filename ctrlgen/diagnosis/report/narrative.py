@@ -137,7 +137,7 @@ def _steps(diagnosis: Diagnosis) -> list[str]:
             f"Nothing to correct. Effects smaller than those listed in the report would not have been detected.{rest}"
         ]
     if verdict == Verdict.EXPLAINED:
-        return [use]
+        return [use] if diagnosis.residual_tests.passed else [use, MORE_LEFT]
     if verdict == Verdict.AMBIGUOUS:
         return [
             experiment_sentence(diagnosis.next_experiment),
@@ -148,7 +148,7 @@ def _steps(diagnosis: Diagnosis) -> list[str]:
     if not known:
         steps.append(f"Whether a mismatch remains cannot be said, because the noise is not known.{rest}")
     elif not diagnosis.residual_tests.passed:
-        steps.append("More than noise is left: the report shows where it is and of what it is a function.")
+        steps.append(MORE_LEFT)
     if diagnosis.unconfirmed:
         names = ", ".join(map(cause_name, diagnosis.unconfirmed))
         steps.append(
@@ -159,6 +159,7 @@ def _steps(diagnosis: Diagnosis) -> list[str]:
     return [*steps, *(f"Not taken: {text}." for text in refusals(diagnosis))]
 
 
+MORE_LEFT = "More than noise is left: the report shows where it is and of what it is a function."
 BETTER = (
     "Use device.next.toml in place of the device file, solve and generate the C with it: it predicts the held-out recordings better. Its "
     "numbers hold for the range of travel, speed and temperature that was recorded."

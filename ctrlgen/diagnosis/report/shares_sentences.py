@@ -53,7 +53,11 @@ def shares_sentences(diagnosis: Diagnosis) -> list[str]:
     if not diagnosis.search.chosen.causes:
         return [f"{said}; no law of the library is confirmed for it.", *empirical_sentences(diagnosis)]
     reached = shares.reached(worst.channel)
-    sentences = [f"{said}; the accepted laws reach {with_interval(reached)}."]
+    # a delay, say, is a function of no signal at its own moment
+    laws = (
+        "the accepted laws" if named_parts(worst) else "the accepted laws, which are functions of none of them alone,"
+    )
+    sentences = [f"{said}; {laws} reach {with_interval(reached)}."]
     if not diagnosis.residual_tests.passed:
         sentences.append(rest_sentence(worst_of(diagnosis, shares.after)))
     return [*sentences, *empirical_sentences(diagnosis)]
@@ -98,7 +102,7 @@ def rest_sentence(c: ChannelShares) -> str:
         beside = [] if past is None else [f"{past} of it"]
         beside += [] if part is None else [f"{part_name(c, part)} {per_cent(share)}"]
         told = f": {', '.join(beside)}" if beside else ""
-        return f"{left} is mostly a function of none of the signals looked at{told}."
+        return f"{left} is mostly no function of the signals looked at{told}."
     memory = "" if past is None else f"; {past} more"
     if part in NO_FUNCTION:
         return f"{left} is {_mostly(share)} {part_name(c, part)}, {per_cent(share)}{memory}."
@@ -119,7 +123,7 @@ def rest_kind(diagnosis: Diagnosis, channel: str) -> str:
         return ""
     part, share = next(iter(named_parts(c)), (None, 0.0))
     if part is None or share <= c.rest_own_past:
-        return ", mostly a function of none of the signals looked at"
+        return ", mostly no function of the signals looked at"
     function = "" if part in NO_FUNCTION else "a function of "
     return f", {_mostly(share)} {function}{part_name(c, part)} ({per_cent(share)})"
 

@@ -16,7 +16,7 @@ from ctrlgen.estimation.error_model import ErrorModel
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.residual_tests import ResidualTests
-from ctrlgen.estimation.settings import STATISTICS
+from ctrlgen.estimation.settings import RESIDUAL_TESTS, STATISTICS
 from ctrlgen.estimation.structure import Structure
 
 
@@ -37,7 +37,7 @@ def verdict(
     `another_unit` whether a reading is `in_another_unit`.
 
     consistent: no cause is found, and what is left is noise or within the tolerance. explained: confirmed causes, and what is
-    left is noise or within the tolerance. ambiguous: another cause explains the recording as well as one of the main ones.
+    left is noise, within the tolerance, or too little to name. ambiguous: another cause explains the recording as well as a main one.
     partly: confirmed causes take away most of the mismatch, or all of it with parameters too uncertain to predict, or the noise
     is not known. unexplained: no cause takes away most, the fit agrees only with numbers that contradict the device file, or a
     column's unit is wrong.
@@ -53,7 +53,9 @@ def verdict(
         return Verdict.UNEXPLAINED if contradicted or left_out else Verdict.CONSISTENT
     if main_rivals(search, shares):
         return Verdict.AMBIGUOUS
-    if enough and not contradicted and not unconfirmed(search) and not poorly_determined(search):
+    if (enough or too_little_to_name(search, tests)) and not (
+        contradicted or unconfirmed(search) or poorly_determined(search)
+    ):
         return Verdict.EXPLAINED
     sound = enough or not known or shares.explained >= VERDICT.most
     return Verdict.PARTLY if sound and not (contradicted and shares.explained < VERDICT.most) else Verdict.UNEXPLAINED
@@ -92,6 +94,28 @@ def within_tolerance(search: SearchResult) -> bool:
         left.white_mean <= 1 + STATISTICS.chance_excess * np.sqrt(2 / left.n_white.sum(axis=0))
     )
     return bool(np.all((rms <= wanted) | noisy))
+
+
+def too_little_to_name(search: SearchResult, tests: ResidualTests) -> bool:
+    """Whether causes leave so little beyond the noise that none is worth a name, however sure it is that something is left.
+
+    In every channel, of the records to fit and of those held out: less than `MODEL_SELECTION.least_share` of the mismatch, in squares,
+    below which the search names no cause; or no more than the noise itself, `VERDICT.no_larger`, and less than `VERDICT.unseen_share`
+    of the mismatch. Not where the noise is unknown, nor where a channel moves at rest by itself.
+    """
+    if not search.chosen.causes or not search.fitter.noise.known.all() or tests.restless:
+        return False
+    pairs = [(search.nominal.fitted, search.chosen.fitted), (search.nominal.held_out, search.chosen.held_out)]
+    return all(bool(np.all(_is_little(was.plain_mean, left.plain_mean))) for was, left in pairs)
+
+
+def _is_little(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Whether squares `after` are little beside those `before` (n_y,), both in squares of the noise."""
+    mismatch, left = np.maximum(before - 1, 0.0), after - 1
+    most = MODEL_SELECTION.least_share * mismatch
+    unseen = np.minimum(VERDICT.no_larger - 1, VERDICT.unseen_share * mismatch)
+    # what the residual tests let pass
+    return left <= np.maximum(np.maximum(most, unseen), RESIDUAL_TESTS.error_ratio**2 - 1)
 
 
 def main_rivals(search: SearchResult, shares: Attribution) -> bool:

@@ -358,6 +358,11 @@ class VerdictSettings:
     """Squared correlation of a reading with the device as described from which on they differ by a factor alone. Judgement."""
     same_unit: float = 0.03
     """Distance of that factor from a power of a thousand, in such powers: a fifth of the factor. Judgement."""
+    no_larger: float = 2.0
+    """Mean square of what is left, over that of the noise, up to which it is no larger than the noise, so that no single reading shows
+    it: 1.4 times the noise, root mean square."""
+    unseen_share: float = 0.1
+    """Share of the mismatch, of energy, up to which that is little: a third of the error. Judgement."""
     impossible_p: float = 1e-6
     """p of the device's stated numbers so far off by chance, below which they contradict the data sheet."""
     named_deviation: float = 2.0
