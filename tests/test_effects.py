@@ -11,7 +11,19 @@ import casadi as ca
 import numpy as np
 import pint
 import pytest
-from effect_cases import SAMPLE_TIME, Law, apply, device_of, every_effect, place_of, place_unit, shapes, size, written
+from effect_cases import (
+    SAMPLE_TIME,
+    Law,
+    apply,
+    device_of,
+    every_effect,
+    place_of,
+    place_unit,
+    rich,
+    shapes,
+    size,
+    written,
+)
 from law_inputs import law_inputs
 
 import ctrlgen.effects
@@ -76,18 +88,6 @@ def test_vanishes_exactly_when_off_and_only_then(effect, rng):
 
 
 MOTION = {"stiffness": "m", "damping": "m/s", "inertia": "m/s^2"}  # what a cross term counts per
-
-
-def rich(count: int, h: float) -> np.ndarray:
-    """Signals of many frequencies and about unit size, as a law reads them; the displacement ends where it began."""
-    t = h * np.arange(count)
-    period = h * (count - 1)
-    w = 2 * np.pi / period
-    d = 0.9 * np.sin(3 * w * t) + 0.4 * np.sin(7 * w * t) + 0.2 * np.sin(31 * w * t)
-    v = w * (2.7 * np.cos(3 * w * t) + 2.8 * np.cos(7 * w * t) + 6.2 * np.cos(31 * w * t))
-    every = [np.sin(k * w * t + k) + 0.3 * np.sin(11 * w * t * (1 + k)) for k in range(6)]
-    state, room = 1.3 + np.sin(2 * w * t), np.sin(w * t)
-    return np.column_stack([*every, d, v, d + 0.1 * d**3, state, room, 0 * t])
 
 
 CONSTANT = ("drive_offset", "home_offset", "zero_per_record")

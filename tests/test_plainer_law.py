@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from axis_records import AXIS, NOISE, fitter_of
-from effect_cases import Law, shapes
-from test_effects import rich
+from effect_cases import Law, rich, shapes
 
 from ctrlgen.diagnosis.selection.rivals import rivals, simplified
 from ctrlgen.diagnosis.selection.screen import Screen
