@@ -29,7 +29,6 @@ from ctrlgen.diagnosis.report.html_report import page
 from ctrlgen.diagnosis.report.narrative import gathered, interval, next_steps
 from ctrlgen.diagnosis.report.plot_uncertainty import draw_rivals
 from ctrlgen.diagnosis.report.writeback import next_text
-from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.estimation.hypothesis import Hypothesis
@@ -346,14 +345,6 @@ def test_a_verdict_says_what_to_do(found):
     assert "Check wiring, units and clocks" in next_steps(told[Verdict.UNEXPLAINED])[1]
     assert "cannot tell it from thermal_lag at actuator:axis" in sentence(told[Verdict.AMBIGUOUS])
     assert "thermal_lag" not in sentence(told[Verdict.EXPLAINED])
-    # each alternative stands beside the cause that it is one of, where that is large enough to count
-    offset, home = Hypothesis("drive_offset", "actuator:axis", "axis"), Hypothesis("home_offset", "sensor:axis", "axis")
-    for share, says in ((0.4, True), (0.2, False)):
-        small = ShareEntry(value=share * rival.share.value, ci95=(0.0, 1.0))
-        both = replace(rival, effect="drive_offset", cause=offset, alternatives=(home,), share=small)
-        two = sentence(replace(found, verdict=Verdict.AMBIGUOUS, findings=(rival, both)))
-        nor = ", nor drive_offset at actuator:axis from home_offset at sensor:axis"
-        assert ("it from thermal_lag at actuator:axis" + nor * says + ".") in two
     for settles, said in ((True, "Run the next experiment"), (False, "None of the drives considered")):
         assert next_steps(replace(told[Verdict.AMBIGUOUS], next_experiment=proposal(settles)))[0].startswith(said)
     assert "no known effect" in sentence(replace(found, verdict=Verdict.UNEXPLAINED, findings=()))

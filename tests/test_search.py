@@ -86,9 +86,9 @@ def test_what_explains_better_once_all_is_fitted_takes_the_place_of_a_cause():
     fitter = fitter_of(played, n=700)
     searcher = Searcher(fitter, Screen(fitter, [BACKLASH, LATE]), lambda _: None)
     taken = searcher.trials.fit(Structure(AXIS).with_cause(LATE, {"gain": 1e-3, "tau": 0.01, "decades": 2.0}), LATE)
-    found = searcher._best_settled(taken)
+    found = searcher.best_settled(taken)
     assert found.causes == (BACKLASH,) and found.held_out.plain_mean[0] < 0.5 * taken.held_out.plain_mean[0]
-    assert searcher._best_settled(found).causes == (BACKLASH,)
+    assert searcher.best_settled(found).causes == (BACKLASH,)
 
 
 def test_a_rival_of_the_same_family_begins_with_the_numbers_they_have_in_common():

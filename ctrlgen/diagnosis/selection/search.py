@@ -60,7 +60,7 @@ class Searcher:
             current = self._settled(current)
             if np.allclose(noise.floor, before.floor, rtol=SEARCH.same_noise):
                 break
-        current = acting_instead(trials, simplified(trials, self._best_settled(current)))
+        current = acting_instead(trials, simplified(trials, self.best_settled(current)))
         # its numbers are not bent by the errors of a better model
         nominal = scored(trials.fitter, trials.fitter.described(device)[1])
         current, account = supported(trials, nominal, current, trials.screen.seed)
@@ -82,7 +82,7 @@ class Searcher:
         """The same model fitted to its end under its own errors, without the causes that it then does not need."""
         return without_needless(self.trials, self.trials.with_errors(self.trials.converged(current)))
 
-    def _best_settled(self, current: CandidateModel) -> CandidateModel:
+    def best_settled(self, current: CandidateModel) -> CandidateModel:
         """The model `_settled`, and what then explains better in the place of one of its causes: none of them is an alternative of it.
         In the round that added the cause, a rival had not been fitted to its end, nor weighed by these errors."""
         current = self._settled(current)

@@ -1,0 +1,69 @@
+"""The three sentences of an answer, told of a diagnosis that is made of numbers."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from fitted_causes import CREEP, DRIFT, GAIN, fitted
+
+from ctrlgen.diagnosis.report.answer import answer
+from ctrlgen.diagnosis.selection.attribution import ShareEntry
+from ctrlgen.diagnosis.selection.findings import ChanceEntry, ChannelErrorEntry, Finding
+from ctrlgen.diagnosis.selection.verdict import Verdict
+
+
+def finding(cause, share: float, *alternatives, chance: ChanceEntry | None = None) -> Finding:
+    taken = ShareEntry(value=share, ci95=(share, share))
+    return Finding(cause.effect, cause.location, {}, alternatives, taken, {}, "", cause, chance=chance)
+
+
+def told(verdict: Verdict, *findings: Finding, passed: bool = False, after: float = 2.0) -> list[str]:
+    errors = ChannelErrorEntry(rms_before=50.0, rms_after=after, noise_floor=1.0, unit="um", uncertainty=None)
+    noise = SimpleNamespace(known=np.ones(1, bool))
+    fitter = SimpleNamespace(recording=SimpleNamespace(tolerance=(None,)), noise=noise)
+    return answer(
+        SimpleNamespace(
+            verdict=verdict,
+            findings=findings,
+            held_out={"reading.axis": errors},
+            device=SimpleNamespace(title="an axis"),
+            search=SimpleNamespace(chosen=SimpleNamespace(fit=fitted()), fitter=fitter),
+            residual_tests=SimpleNamespace(passed=passed),
+            shares=None,
+            unconfirmed=(),
+        )
+    )
+
+
+@pytest.mark.parametrize("share, says", [(0.16, True), (0.14, False)])
+def test_an_alternative_stands_beside_the_cause_that_it_is_one_of(share, says):
+    """Where that cause is large enough to make the answer ambiguous: a quarter of the main one."""
+    first = told(Verdict.AMBIGUOUS, finding(GAIN, 0.6, CREEP), finding(DRIFT, share, CREEP))[0]
+    assert "; this recording cannot tell it from creep at stage:axis" in first
+    assert (", nor drift at sensor:axis from creep at stage:axis." in first) == says
+
+
+def test_of_many_alternatives_the_first_are_told():
+    first = told(Verdict.AMBIGUOUS, finding(GAIN, 0.6, *[CREEP, DRIFT] * 3))[0]
+    assert first.endswith("from creep at stage:axis or drift at sensor:axis or creep at stage:axis or 3 more.")
+
+
+def test_an_explanation_tells_how_little_is_left():
+    """(4 - 1)/(2500 - 1) of the squares."""
+    assert told(Verdict.EXPLAINED, finding(GAIN, 0.99))[-1].endswith(
+        "2 times the noise; too little to name, 0.1 % of the error."
+    )
+    assert "too little" not in told(Verdict.PARTLY, finding(GAIN, 0.8), after=20.0)[-1]
+
+
+def test_a_doubt_is_told_in_the_same_words_of_every_cause():
+    """That there are too few stretches is no chance."""
+    few, weak = (
+        ChanceEntry(by_luck=1.0, p=0.1, looks=10.0, stretches=3, against="noise", reason=reason)
+        for reason in ("few", None)
+    )
+    first = told(Verdict.PARTLY, finding(GAIN, 0.6, chance=few), finding(DRIFT, 0.3, chance=few))[0]
+    assert "; luck is not excluded, beside drift at sensor:axis (30 %, luck is not excluded)" in first
+    assert "(30 %, may be luck)" in told(Verdict.PARTLY, finding(GAIN, 0.6), finding(DRIFT, 0.3, chance=weak))[0]
