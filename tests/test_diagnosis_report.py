@@ -238,20 +238,15 @@ def test_a_number_in_a_list_changes_in_place_and_says_what_it_was(tmp_path, layo
 def test_the_page_needs_nothing_from_elsewhere_and_says_it_at_the_top(found):
     text = page(found, Provenance({"flexure_axis.toml": "0" * 64}, 7))
     links = re.findall(r"""(?:src|href)\s*=\s*["']([^"'#][^"']*)""", text) + re.findall(r"url\(([^#)]+)\)", text)
-    assert (
-        all(link.startswith("data:") for link in links)
-        and "<script" not in text
-        and "@import" not in text
-        and "<link" not in text
-    )
+    assert all(link.startswith("data:") for link in links) and "@import" not in text and "<link" not in text
     assert "A flexure or its glue keeps moving" in text and "Explained" in text.split("<h2>")[0]
     assert text.count("<figure>") == 10 and "seed 7" in text and "0" * 64 in text
-    assert text.index("device.next.toml") < text.index("<figure>")
+    assert text.index("device.next.toml") < text.index("<nav")
 
 
 def test_a_title_cannot_write_html(found):
     hostile = replace(found, recording=replace(found.recording, title="<script>alert(1)</script>"))
-    assert "<script>" not in page(hostile, Provenance({}, 0))
+    assert "<script>alert" not in page(hostile, Provenance({}, 0))
 
 
 def proposal(settles: bool) -> Experiment:

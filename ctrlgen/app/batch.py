@@ -25,6 +25,8 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from ctrlgen.app.batch_page import batch_page
+from ctrlgen.app.batch_row import BatchRow
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.escaping import csv_cell
 from ctrlgen.core.files import MARKER, read_toml, validate, whole_folder, write_text
@@ -37,6 +39,7 @@ from ctrlgen.version import code_hash
 
 MADE_FROM = "made_from.json"  # in each result folder: what the result depends on
 TABLE = "results.csv"
+PAGE = "batch.html"
 MOST_WILD = 4  # of * and ? in a pattern, and no **: more walk through whole disks
 
 Progress = Callable[[int, int], None]
@@ -97,25 +100,6 @@ class Task:
             diagnose_into(self.device, list(self.recordings), out, self.seed, replicates=replicates, laws=self.laws)
             paths = sorted(p for p in out.rglob("*") if p.is_file() and p.name != MARKER)
             return {str(p.relative_to(out)): p.read_bytes() for p in paths}
-
-
-@dataclass(frozen=True)
-class BatchRow:
-    """One line of the table: `state` is "done", "done before" or "failed", and then `error` says why.
-
-    `before`, `after`, `noise`: held-out error [`unit`] of the `channel` whose error is largest beside its noise.
-    """
-
-    name: str
-    state: str
-    verdict: str = ""
-    findings: str = ""
-    channel: str = ""
-    before: float | None = None
-    after: float | None = None
-    noise: float | None = None
-    unit: str = ""
-    error: str = ""
 
 
 def load_batch(path: Path | str, seed: int | None = None, replicates: int = 0) -> tuple[Task, ...]:
@@ -192,7 +176,7 @@ def run_batch(
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> tuple[BatchRow, ...]:
-    """Runs every diagnosis into its folder in `out`; results.csv is rewritten after each.
+    """Runs every diagnosis into its folder in `out`; results.csv is rewritten after each, batch.html at the end.
 
     `ctrlgen.core.parallel` decides where they run; only this process writes. A diagnosis that fails gives a row that says
     why. Raises InputError where `out` cannot be written or the scheduler does not answer.
@@ -222,7 +206,9 @@ def run_batch(
         task, made_from = to_do[k]
         rows[task.name] = _kept(task, made_from, result, out)
         _write_table(tasks, rows, out)
-    return tuple(rows[task.name] for task in tasks)
+    told_of = tuple(rows[task.name] for task in tasks)
+    write_text(out / PAGE, batch_page(told_of, out, out.resolve().name))
+    return told_of
 
 
 def _work(task: Task) -> dict[str, bytes]:

@@ -10,7 +10,7 @@ from rich.markup import escape
 from ctrlgen.app.console import Column, out, show_table, table_of
 
 if TYPE_CHECKING:
-    from ctrlgen.app.batch import BatchRow
+    from ctrlgen.app.batch_row import BatchRow
     from ctrlgen.diagnosis.evidence.bootstrap import Bootstrap
     from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
     from ctrlgen.recordings.recording import Recording

@@ -10,8 +10,9 @@ from ctrlgen.app.console import Column, out, show_table, table_of
 from ctrlgen.core.units import difference, from_si, show, show_difference
 
 if TYPE_CHECKING:
-    from ctrlgen.app.scenario_pipeline import Outcome, WorkspaceSummary
+    from ctrlgen.app.scenario_pipeline import Outcome
     from ctrlgen.app.simulated import Simulated
+    from ctrlgen.app.workspace_summary import WorkspaceSummary
     from ctrlgen.trajectory.problem import PathProblem
     from ctrlgen.verification.build_record import Build
 

@@ -8,18 +8,17 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import matplotlib.pyplot as plt
-import numpy as np
 
+from ctrlgen.app.workspace_page import workspace_page
+from ctrlgen.app.workspace_summary import WorkspaceSummary, workspace_numbers
 from ctrlgen.budget.budget_section import budget_section
 from ctrlgen.budget.robust import solve
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.core.files import whole_folder, write_text
 from ctrlgen.core.shown import Shown
 from ctrlgen.core.steps import noted
-from ctrlgen.core.units import from_si
 from ctrlgen.devices import Device
 from ctrlgen.firmware.c.toolchains import find_compilers
 from ctrlgen.firmware.fmi.fmu import Fmus, write_fmus
@@ -32,7 +31,7 @@ from ctrlgen.trajectory.metrics import ExpectationResult, expectations
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import Solution
 from ctrlgen.trajectory.solution_plots import draw_solution, draw_workspace
-from ctrlgen.trajectory.workspace import Ball, Workspace
+from ctrlgen.trajectory.workspace import Workspace
 from ctrlgen.verification.build_page import write_build
 from ctrlgen.verification.build_record import Build
 from ctrlgen.verification.comparison import Comparison, compare
@@ -201,23 +200,8 @@ def compare_only(scenario: Scenario | Path | str, progress: Progress = quiet) ->
     return Outcome(solution, c, comparison, ())
 
 
-@dataclass(frozen=True)
-class WorkspaceSummary:
-    """The workspace of a device: `ranges` at each of the `bases` and the `extent` anywhere, (channels, 2) in SI.
-
-    `translations` and `everything`: the largest balls in the translations and in all channels.
-    """
-
-    workspace: Workspace
-    bases: list[np.ndarray]
-    ranges: list[np.ndarray]
-    extent: np.ndarray
-    translations: Ball
-    everything: Ball
-
-
 def map_workspace(device: Device, poses: list[str], out: Path) -> WorkspaceSummary:
-    """Maps the workspace of a device into the folder `out`: workspace.json and workspace.svg.
+    """Maps the workspace of a device into the folder `out`: workspace.json, workspace.svg and workspace.html.
 
     `poses` such as "delta_x=5um,delta_z=20um", channels left out being zero; without any, those of `Workspace.bases`. The
     balls and the extent are searched from the middle one of the list. Raises InputError.
@@ -242,30 +226,8 @@ def map_workspace(device: Device, poses: list[str], out: Path) -> WorkspaceSumma
     summary = WorkspaceSummary(workspace, bases, ranges, workspace.extent(middle), *balls)
     with whole_folder(out) as draft:
         with plt.rc_context(STYLE):
-            write_text(draft / "workspace.svg", svg(draw_workspace(workspace, bases, balls[0])))
-        write_text(draft / "workspace.json", json.dumps(_workspace_numbers(summary), indent=1) + "\n")
+            drawn = svg(draw_workspace(workspace, bases, balls[0]))
+        write_text(draft / "workspace.svg", drawn)
+        write_text(draft / "workspace.json", json.dumps(workspace_numbers(summary), indent=1) + "\n")
+        write_text(draft / "workspace.html", workspace_page(summary, drawn))
     return summary
-
-
-def _workspace_numbers(summary: WorkspaceSummary) -> dict[str, Any]:
-    """The numbers of workspace.json, in the reader's units."""
-    signal = summary.workspace.model.signals["pose"]
-    named = list(zip(signal.channels, signal.units, strict=True))
-
-    def row(values: np.ndarray) -> dict[str, Any]:
-        return {f"{c} [{u}]": np.asarray(from_si(values[i], u)).tolist() for i, (c, u) in enumerate(named)}
-
-    return {
-        "device": summary.workspace.model.name,
-        "alone": [{"base": row(base), "range": row(r)} for base, r in zip(summary.bases, summary.ranges, strict=True)],
-        "anywhere": row(summary.extent),
-        "largest_ball": [
-            {
-                "channels": [signal.channels[i] for i in ball.channels],
-                "centre": row(ball.centre),
-                "radius_in_typical_sizes": ball.radius,
-            }
-            for ball in (summary.translations, summary.everything)
-        ],
-        "typical_sizes": row(np.array(signal.scale)),
-    }

@@ -8,16 +8,21 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ctrlgen.budget.budget_record import budget_record, safety_sentence
+from ctrlgen.budget.budget_record import BudgetRecord, budget_record, safety_sentence
+from ctrlgen.budget.budget_shares import printed_shares
 from ctrlgen.budget.error_budget import COVERAGE, ErrorBudget
 from ctrlgen.core.files import write_text
 from ctrlgen.core.units import difference, from_si
+from ctrlgen.reporting.chart import Chart, Curve, Panel
 from ctrlgen.reporting.html import render
-from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
+from ctrlgen.reporting.page_figure import FirstScreen, PageFigure, page_figures
+from ctrlgen.reporting.plots import COLOURS, PATTERNS, STYLE, plt, svg
 from ctrlgen.reporting.result_file import json_text
+from ctrlgen.trajectory.solution_charts import abscissa, line_of
 
 MAGNIFIED = (1, 2, 5)  # times a power of ten
 WIDEST = 0.12  # of the path's extent: half the width of the band as it is drawn
+CHART = 170  # pixels of a panel
 SHOWN = 12  # contributors in the figure of shares
 
 
@@ -28,14 +33,56 @@ def write_budget(out: Path, budget: ErrorBudget) -> None:
     write_text(out / "budget.json", json_text(record))
     for name, text in figures.items():
         write_text(out / "figures" / f"{name}.svg", text)
+    words = {
+        "band": ("Along the path", f"Combined standard uncertainty times {record.coverage_factor:.3g}."),
+        "contributors": ("Contributors", "The standard uncertainty that each of the largest causes, and all combined."),
+    }
+    drawn = page_figures(figures, words, {"band": chart_band(budget)}, ("band",))
     page = render(
         Path(__file__).with_name("budget.html.j2"),
         b=record,
-        figures=figures,
+        shares=printed_shares(record),
+        first=first_screen(record, drawn["band"]),
+        figures=drawn,
         device_title=budget.solution.model.device.title,
         sentences=[safety_sentence(s, budget.probability) for s in budget.safeties],
     )
     write_text(out / "budget.html", page)
+
+
+def first_screen(b: BudgetRecord, figure: PageFigure) -> FirstScreen:
+    """How far the device may be off, whether every limit is kept, what to measure or tighten next."""
+    bands = ", ".join(f"± {g.band95:.4g} {g.unit} ({g.name})" for g in b.groups)
+    lost = [row for row in b.limits if not row.kept]
+    likely = f"{100 * b.probability:.10g} %"
+    kept = (
+        f"{len(lost)} of {len(b.limits)} limits are not kept at {likely}"
+        if lost
+        else f"every limit is kept at {likely}"
+    )
+    numbers = [(f"95 % band, {g.name}", f"± {g.band95:.4g} {g.unit}") for g in b.groups]
+    numbers += [(f"rms, {g.name}", f"{g.combined_rms:.4g} {g.unit}") for g in b.groups]
+    steps = []
+    if lost:
+        told = ", ".join(dict.fromkeys(row.label for row in lost))
+        steps.append(
+            f"State `[robust]` in the scenario: the path is then solved so that {told} keeps its bound at a probability."
+        )
+    for c in b.contributors[:1]:
+        numbers.append((f"share of {c.called}", f"{100 * c.share:.3g} %"))
+        halved = ", ".join(
+            f"{e.combined_if_halved * b.coverage_factor:.4g} instead of {g.band95:.4g} {g.unit}"
+            for e, g in zip(c.effects, b.groups, strict=True)
+        )
+        steps.append(f"Measure or tighten `{c.called}` first (sd {c.sd}): with half of it the band is {halved}.")
+    if differ := [a for a in b.agreement if not a.passed]:
+        told = ", ".join(a.group for a in differ)
+        steps.append(f"First order and draws differ for {told}: take the numbers of the draws.")
+    elif not b.draws:
+        steps.append("Draw from the nonlinear model too: `--draws 10000`.")
+    state = "bad" if lost else "ok" if all(a.passed for a in b.agreement) else "so"
+    answer = f"What is not known exactly moves the {b.signal} within {bands}, 95 % where it is widest; {kept}."
+    return FirstScreen((answer,), state, figure, tuple(numbers), tuple(steps))
 
 
 def draw_budget(budget: ErrorBudget) -> dict[str, str]:
@@ -55,9 +102,9 @@ def draw_band(budget: ErrorBudget) -> Figure:
     _draw_path_with_band(left, budget, shown)
     static = solution.scenario.sample_time is None
     at = np.arange(len(command)) if static else solution.trace.time
-    for i, colour in zip(group.channels, (COLOURS[0], COLOURS[2], COLOURS[4]), strict=False):
+    for i, colour, dashes in zip(group.channels, (COLOURS[0], COLOURS[2], COLOURS[4]), PATTERNS, strict=False):
         half = difference(budget.factor * budget.combined[:, i], group.unit)
-        right.plot(at, half, color=colour, lw=1.3, label=signal.channels[i])
+        right.plot(at, half, color=colour, ls=dashes, lw=1.3, label=signal.channels[i])
         if budget.drawn is not None:
             ends = np.quantile(budget.drawn.pose[:, :, i], [0.5 - COVERAGE / 2, 0.5 + COVERAGE / 2], axis=0)
             right.plot(at[budget.drawn.kept], difference((ends[1] - ends[0]) / 2, group.unit), ".", ms=3, color=colour)
@@ -67,6 +114,25 @@ def draw_band(budget: ErrorBudget) -> Figure:
     right.set_title("lines: first order" + ("" if budget.drawn is None else "; points: draws"), fontsize=8)
     right.legend(fontsize=8, ncols=3, loc="best")
     return figure
+
+
+def chart_band(budget: ErrorBudget) -> Chart:
+    """The half width of the 95 % band of each channel along the path, a panel a kind; the draws as points."""
+    solution = budget.solution
+    signal, (label, x) = solution.model.signals[solution.scenario.file.follow], abscissa(solution)
+    panels = []
+    for group in budget.groups:
+        curves = []
+        for k, i in enumerate(group.channels):
+            half = difference(budget.factor * budget.combined[:, i], group.unit)
+            curves.append(Curve(signal.channels[i], half, k, line_of(k)))
+            if budget.drawn is not None:
+                ends = np.quantile(budget.drawn.pose[:, :, i], [0.5 - COVERAGE / 2, 0.5 + COVERAGE / 2], axis=0)
+                drawn = np.full(len(x), np.nan)
+                drawn[budget.drawn.kept] = difference((ends[1] - ends[0]) / 2, group.unit)
+                curves.append(Curve(f"{signal.channels[i]}, draws", drawn, k, "."))
+        panels.append(Panel(f"95 % band, {group.name} [± {group.unit}]", x, tuple(curves), height=CHART))
+    return Chart(label, tuple(panels))
 
 
 def _draw_path_with_band(axes: Axes, budget: ErrorBudget, shown: list[int]) -> None:

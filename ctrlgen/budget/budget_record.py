@@ -33,6 +33,10 @@ class ByGroup(Keys):
     )
     peak: float = Field(description="Largest standard uncertainty that it causes in a channel along the path.")
     rms: float = Field(description="Root mean square along the path, of the channel with the largest.")
+    share: float = Field(
+        description="By how much the variance of the group, its mean along the path over all its channels, falls without it; of "
+        "contributors that are independent the shares of a group add up to 1."
+    )
     combined_if_halved: float = Field(
         description="Largest combined standard uncertainty if its sd and those of all ranks before were half."
     )
@@ -184,6 +188,7 @@ def _contributor(budget: ErrorBudget, line: BudgetLine, rank: int) -> Contributo
             sensitivity=g.shown(line.sensitivity[g.name]),
             peak=g.shown(line.peak[g.name]),
             rms=g.shown(line.rms[g.name]),
+            share=line.shares[g.name],
             combined_if_halved=g.shown(line.halved[g.name]),
             second_order=g.shown(line.alone[g.name]) if budget.draws else None,
         )

@@ -34,9 +34,9 @@ class BudgetLine:
     """One contributor. By group, SI: `sensitivity`, the largest deviation along the path for the step `per`; `peak` and `rms`, its
     standard uncertainty there; `alone`, what its second order adds at one sd.
 
-    `share`: by how much the variance, its mean along the path over all channels of a group, falls without it, of the group in which it
-    counts most; `halved`: the combined peak [SI, by group] if its sd and those of all before it were half. `called` is its name and,
-    of a number in a list of tables, that of its table.
+    `shares`: by how much the variance, its mean along the path over all channels of a group, falls without it, by group; `share`: of the
+    group in which it counts most; `halved`: the combined peak [SI, by group] if its sd and those of all before it were half. `called`
+    is its name and, of a number in a list of tables, that of its table.
     """
 
     name: str
@@ -47,9 +47,14 @@ class BudgetLine:
     sensitivity: dict[str, float]
     peak: dict[str, float]
     rms: dict[str, float]
-    share: float
+    shares: dict[str, float]
     halved: dict[str, float]
     alone: dict[str, float]
+
+    @property
+    def share(self) -> float:
+        """Of the group in which it counts most; never below zero, as it is where two correlated numbers work against each other."""
+        return max([0.0, *self.shares.values()])
 
 
 def groups_of(signal: Signal) -> tuple[Group, ...]:
@@ -94,8 +99,8 @@ def budget_lines(
     combination = _Combination(path, linear)
     whole = combination.of([], 0.0)
     seen = [*_numbers(path, linear, drawn), *_scattering(path, linear)]
-    shares = {one.name: _share(whole, combination.of([one], 0.0), groups) for one in seen}
-    seen.sort(key=lambda one: -shares[one.name])
+    shares = {one.name: _shares(whole, combination.of([one], 0.0), groups) for one in seen}
+    seen.sort(key=lambda one: -max([0.0, *shares[one.name].values()]))
     lines = []
     for rank, one in enumerate(seen, 1):
         half = combination.of(seen[:rank], 0.5)
@@ -105,10 +110,10 @@ def budget_lines(
             "rms": {g.name: rms(one.deviation[:, g.channels]) for g in groups},
             "halved": {g.name: largest(half, g) for g in groups},
             "alone": {g.name: largest(one.bend, g) for g in groups},
+            "shares": shares[one.name],
         }
         sd, per, source = one.texts
-        called, share = path.model.device.called(one.name), shares[one.name]
-        lines.append(BudgetLine(one.name, called, sd, per, source, share=share, **by_group))
+        lines.append(BudgetLine(one.name, path.model.device.called(one.name), sd, per, source, **by_group))
     return tuple(lines)
 
 
@@ -134,14 +139,11 @@ def _scattering(path: UncertainPath, linear: Propagated) -> Iterator[_Seen]:
         yield _Seen(f"drive.{name}", texts, None, name, by_step, deviation, np.zeros_like(deviation))
 
 
-def _share(combined: np.ndarray, without: np.ndarray, groups: tuple[Group, ...]) -> float:
-    """By how much the variance of a group falls without it, of the group in which that is most."""
-    shares = [0.0]
-    for g in groups:
-        total = float(np.sum(combined[:, g.channels] ** 2))
-        if total:
-            shares.append(1 - float(np.sum(without[:, g.channels] ** 2)) / total)
-    return max(shares)
+def _shares(combined: np.ndarray, without: np.ndarray, groups: tuple[Group, ...]) -> dict[str, float]:
+    """By how much the variance of each group falls without it; 0 in a group that nothing moves."""
+    total = {g.name: float(np.sum(combined[:, g.channels] ** 2)) for g in groups}
+    left = {g.name: float(np.sum(without[:, g.channels] ** 2)) for g in groups}
+    return {name: 1 - left[name] / whole if whole else 0.0 for name, whole in total.items()}
 
 
 class _Combination:

@@ -7,12 +7,16 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from ctrlgen.calibration.calibrate import Calibration
-from ctrlgen.calibration.calibration_record import Budgets, calibration_record
+from ctrlgen.calibration.calibration_record import Budgets, CalibrationRecord, calibration_record
 from ctrlgen.calibration.constants_files import write_constants
 from ctrlgen.core.files import write_text
 from ctrlgen.reporting.html import render
+from ctrlgen.reporting.page_figure import FirstScreen, PageFigure
 from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
 from ctrlgen.reporting.result_file import json_text
+
+# numbers beside the figure; every one is in the tables
+SHOWN = 10
 
 
 def write_calibration(out: Path, calibration: Calibration, budgets: Budgets = None) -> None:
@@ -26,9 +30,34 @@ def write_calibration(out: Path, calibration: Calibration, budgets: Budgets = No
     write_text(
         out / "calibration.html",
         render(
-            Path(__file__).with_name("calibration.html.j2"), c=record, figure=figure, title=calibration.device.title
+            Path(__file__).with_name("calibration.html.j2"),
+            c=record,
+            first=first_screen(record, PageFigure(figure, "Constants within their bounds", CAPTION)),
+            title=calibration.device.title,
         ),
     )
+
+
+CAPTION = "Bar: the value of the device file; point: that of this specimen with its 95 % interval."
+
+
+def first_screen(c: CalibrationRecord, figure: PageFigure) -> FirstScreen:
+    """How many constants are determined, how much better the model is with them, how the firmware gets them."""
+    known = sum(k.determined for k in c.constants)
+    worst = max(c.channels, key=lambda e: e.before / (e.noise or 1.0), default=None)
+    better = "" if worst is None else f"; error of {worst.channel} {worst.before:.4g} -> {worst.after:.4g} {worst.unit}"
+    numbers = [(k.path, f"{k.value:.6g} {k.unit}" if k.determined else "not determined") for k in c.constants]
+    numbers += [(f"error of {e.channel}", f"{e.before:.4g} -> {e.after:.4g} {e.unit}") for e in c.channels]
+    numbers += [(f"noise of {e.channel}", f"{e.noise:.3g} {e.unit}") for e in c.channels]
+    numbers += [(f"budget, {g.group}", f"{g.before:.4g} -> {g.after:.4g} {g.unit}") for g in c.budget]
+    steps = ["Give the controller `constants.h` or `constants.bin` when it starts; both belong to this device alone."]
+    if missing := [k.path for k in c.constants if not k.determined]:
+        told = ", ".join(f"`{path}`" for path in missing)
+        steps.append(f"Record what shows {told}, and calibrate again: the default is kept until then.")
+    steps.append("Use `device.calibrated.toml` for `ctrlgen budget`, `fastest` and `learn`.")
+    state = "ok" if known == len(c.constants) else "bad"
+    answer = f"{known} of {len(c.constants)} constants are determined by the recording{better}."
+    return FirstScreen((answer,), state, figure, tuple(numbers[:SHOWN]), tuple(steps))
 
 
 def draw_constants(calibration: Calibration) -> Figure:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,17 +16,29 @@ from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import write_bytes
 from ctrlgen.core.units import difference
 from ctrlgen.model.model import Model
-from ctrlgen.reporting.plots import COLOURS, STYLE, image
+from ctrlgen.reporting.plots import COLOURS, PATTERNS, STYLE, image
 
-LINES = ("-", "--")  # the curves of the X and Y drives of a stage often coincide
 POINTS = 400  # frequencies, beside those of the poles
 DECADES = 2  # below the slowest pole and above it, and at least one above the fastest
 ACROSS = 3  # panels in a row
 DOWN = 1e-4  # of its largest gain, to where a panel shows
 
 
-def draw_bode(model: Model, pose: np.ndarray, path: Path) -> None:
-    """Draws the gain from every drive to every pose component, one panel per component, and the phase of the strongest.
+@dataclass(frozen=True)
+class FrequencyResponse:
+    """From every drive to the pose, linearised at a `pose` [SI]: `hertz` (n,), `response` (channels, drives, n) and the `static` one
+    (channels, drives), in SI; `poles` [rad/s], their absolute values."""
+
+    model: Model
+    pose: np.ndarray
+    hertz: np.ndarray
+    response: np.ndarray
+    static: np.ndarray
+    poles: np.ndarray
+
+
+def frequency_response(model: Model, pose: np.ndarray) -> FrequencyResponse:
+    """The gain from every drive to every pose component over the frequencies that matter.
 
     `pose` (channels,) [rad, m] is where the model is linearised. Raises InputError where it is not an admissible
     equilibrium, or where the device has no dynamics.
@@ -40,17 +53,38 @@ def draw_bode(model: Model, pose: np.ndarray, path: Path) -> None:
     # A resonance is narrower than the points are apart.
     omega = np.unique(np.concatenate([np.logspace(low, high, POINTS), poles]))
     response = control.frequency_response(system, omega, squeeze=False)
-    figure = _figure(model, response, np.atleast_2d(system.dcgain()), omega / (2 * np.pi))
-    write_bytes(path, image(figure, path.suffix))
+    static = np.atleast_2d(system.dcgain())
+    return FrequencyResponse(model, pose, omega / (2 * np.pi), response.complex, static, poles)
 
 
-def _figure(model: Model, response: control.FrequencyResponseData, static: np.ndarray, hertz: np.ndarray) -> Figure:
+def draw_bode(model: Model, pose: np.ndarray, path: Path) -> None:
+    """Draws the gain from every drive to every pose component, one panel per component, and the phase of the strongest.
+
+    `path` ends in .svg or .png. Raises InputError as `frequency_response` does.
+    """
+    write_bytes(path, image(bode_figure(frequency_response(model, pose)), path.suffix))
+
+
+def strongest(found: FrequencyResponse, drive: int) -> int:
+    """The channel that answers most to a drive, in its typical sizes, at rest."""
+    return int(np.argmax(np.abs(found.static[:, drive]) / np.array(found.model.signals["pose"].scale)))
+
+
+def phase(found: FrequencyResponse, channel: int, drive: int) -> np.ndarray:
+    """(n,) phase against the static response [deg], without jumps."""
+    turned = np.unwrap(np.angle(found.response[channel, drive] / found.static[channel, drive]))
+    return np.asarray(np.degrees(turned))
+
+
+def bode_figure(found: FrequencyResponse) -> Figure:
+    """Gain by pose component, and the phase of the strongest component of each drive."""
+    model, hertz, static = found.model, found.hertz, found.static
     signal, drive = model.signals["pose"], model.signals["drive"]
     channels = [str(i) for i in range(len(signal.channels))]
     across = min(ACROSS, len(channels))
     rows = [channels[k : k + across] for k in range(0, len(channels), across)]
     layout: Any = [*[row + ["."] * (across - len(row)) for row in rows], ["phase"] * across]
-    magnitude, values = np.abs(response.complex), response.complex
+    magnitude = np.abs(found.response)
     with plt.rc_context(STYLE):
         figure, grid = plt.subplot_mosaic(layout, figsize=(10, 2.7 * len(layout)))
         for i, channel in enumerate(signal.channels):
@@ -65,15 +99,21 @@ def _figure(model: Model, response: control.FrequencyResponseData, static: np.nd
             for j, axis in enumerate(drive.channels):
                 gain = difference(magnitude[i, j], unit)
                 panel.loglog(
-                    hertz, np.where(gain > 0, gain, np.nan), LINES[j % 2], color=COLOURS[j % 6], lw=1.3, label=axis
+                    hertz,
+                    np.where(gain > 0, gain, np.nan),
+                    ls=PATTERNS[j % 6],
+                    color=COLOURS[j % 6],
+                    lw=1.3,
+                    label=axis,
                 )
             panel.set_ylim(bottom=most * DOWN)
         for j, axis in enumerate(drive.channels):
-            i = int(np.argmax(np.abs(static[:, j]) / np.array(signal.scale)))
+            i = strongest(found, j)
             if static[i, j]:
-                phase = np.degrees(np.unwrap(np.angle(values[i, j] / static[i, j])))
                 what = f"{axis} -> {signal.channels[i]}"
-                grid["phase"].semilogx(hertz, phase, LINES[j % 2], color=COLOURS[j % 6], lw=1.3, label=what)
+                grid["phase"].semilogx(
+                    hertz, phase(found, i, j), ls=PATTERNS[j % 6], color=COLOURS[j % 6], lw=1.3, label=what
+                )
         grid["phase"].set_title(
             "phase against the static response, strongest component of each drive [deg]", fontsize=9
         )

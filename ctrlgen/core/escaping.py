@@ -54,3 +54,10 @@ def toml(text: str) -> str:
 def csv_cell(text: str) -> str:
     """`text` as a cell that no spreadsheet takes for a formula."""
     return f"'{text}" if text.startswith(FORMULA) else text
+
+
+def json_in_html(text: str) -> str:
+    """JSON `text` inside a script element of HTML: no `</script>`, no comment, no character that ends a line of a script."""
+    for character in "<>&\u2028\u2029":
+        text = text.replace(character, f"\\u{ord(character):04x}")
+    return text

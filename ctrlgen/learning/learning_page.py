@@ -9,8 +9,15 @@ from ctrlgen.learning.learn import Learning, RunResult
 from ctrlgen.learning.learning_plots import draw_learning
 from ctrlgen.learning.learning_record import learning_record
 from ctrlgen.reporting.html import render
+from ctrlgen.reporting.page_figure import FirstScreen, PageFigure, page_figures
 from ctrlgen.reporting.result_file import json_text
 from ctrlgen.trajectory.solution_table import table_of_signals
+
+FIGURES = {
+    "runs": ("Error per run", "The error that repeats, with its 95 % interval, what was predicted, and the noise."),
+    "along": ("Error along the path", "Length of the mean error of each run, and that predicted for the next one."),
+    "drives": ("Drives", "Of the best run and of the next one, and their difference."),
+}
 
 
 def write_learning(out: Path, learning: Learning) -> None:
@@ -22,15 +29,43 @@ def write_learning(out: Path, learning: Learning) -> None:
     write_text(out / "drives.csv", table_of_signals(learning.next, ["drive"]))
     for name, text in figures.items():
         write_text(out / "figures" / f"{name}.svg", text)
+    drawn = page_figures(figures, FIGURES)
     page = render(
         Path(__file__).with_name("learning.html.j2"),
         r=record,
-        figures=figures,
+        first=first_screen(learning, drawn["runs"]),
+        figures=drawn,
         device_title=learning.solution.model.device.title,
-        verdict=verdict(learning),
         player=learning.solution.scenario.sample_time is not None,
     )
     write_text(out / "learning.html", page)
+
+
+def first_screen(learning: Learning, figure: PageFigure) -> FirstScreen:
+    """The error of the best run, what the next one will have, and how to do it."""
+    best = learning.runs[learning.base]
+    numbers = [(f"best run, {g.name}", f"{shown_error(learning, best, g.name)} {g.unit}") for g in learning.groups]
+    numbers += [
+        (f"noise of its mean, {g.name}", f"{g.shown(best.noise[g.name]):.3g} {g.unit}") for g in learning.groups
+    ]
+    if not learning.stop:
+        numbers += [
+            (f"predicted for the next, {g.name}", f"{g.shown(learning.predicted[g.name]):.3g} {g.unit}")
+            for g in learning.groups
+        ]
+    if learning.response is not None:
+        numbers.append(("unexplained of the change between runs", f"{100 * learning.response.unexplained:.2g} %"))
+    if learning.stop:
+        steps = [
+            "Keep the drives of the best run (`drives.csv`).",
+            "If that is not enough, diagnose a run: `ctrlgen diagnose`.",
+        ]
+    else:
+        steps = [
+            "Run `drives.csv` on the stage, repeated a few times.",
+            "Record that, and call `ctrlgen learn` with it too.",
+        ]
+    return FirstScreen((verdict(learning),), "ok", figure, tuple(numbers), tuple(steps))
 
 
 def verdict(learning: Learning) -> str:

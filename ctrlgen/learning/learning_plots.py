@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from ctrlgen.core.units import difference, from_si
 from ctrlgen.learning.learn import Learning
-from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
+from ctrlgen.reporting.plots import COLOURS, PATTERNS, STYLE, plt, svg
 
 FAINTEST = 0.35  # of a colour: the oldest run in a figure
 SHOWN_RUNS = 5  # along the path, the last ones
@@ -69,11 +69,12 @@ def draw_along(learning: Learning) -> Figure:
     for axes, g in zip(panels[:, 0], learning.groups, strict=True):
         for (k, run), colour in zip(shown, _shades(len(shown)), strict=True):
             length = np.linalg.norm(run.error[:, g.channels], axis=1)
-            axes.plot(at, difference(length, g.unit), color=colour, lw=1, label=f"run {k}")
+            dashes = PATTERNS[(shown[-1][0] - k) % len(PATTERNS)]
+            axes.plot(at, difference(length, g.unit), color=colour, ls=dashes, lw=1, label=f"run {k}")
         if not learning.stop:
             length = np.linalg.norm(learning.predicted_error[:, g.channels], axis=1)
             label = "predicted for the next, without noise"
-            axes.plot(at, difference(length, g.unit), color=COLOURS[2], lw=1.2, ls="--", label=label)
+            axes.plot(at, difference(length, g.unit), color=COLOURS[2], lw=1.6, label=label)
         axes.set_yscale("log")
         axes.set_ylabel(f"|error|, {g.name} [{g.unit}]")
     panels[-1, 0].set_xlabel("sample" if static else "time [s]")
@@ -90,10 +91,10 @@ def draw_drives(learning: Learning) -> Figure:
     now = learning.runs[learning.base].drive
     figure, (above, below) = plt.subplots(2, 1, figsize=(8.2, 4.6), sharex=True)
     for i, (channel, unit) in enumerate(zip(drive.channels, drive.units, strict=True)):
-        colour = COLOURS[i % len(COLOURS)]
+        colour, dashes = COLOURS[i % len(COLOURS)], PATTERNS[i % len(PATTERNS)]
         above.plot(at, from_si(now[:, i], unit), color=colour, lw=0.8, alpha=0.5)
-        above.plot(at, from_si(learning.next.drive[:, i], unit), color=colour, lw=1.2, label=channel)
-        below.plot(at, difference(learning.next.drive[:, i] - now[:, i], unit), color=colour, lw=1)
+        above.plot(at, from_si(learning.next.drive[:, i], unit), color=colour, ls=dashes, lw=1.2, label=channel)
+        below.plot(at, difference(learning.next.drive[:, i] - now[:, i], unit), color=colour, ls=dashes, lw=1)
     above.set_ylabel(f"{drive.label} [{drive.units[0]}]")
     above.set_title("thin: best run so far; full: next", fontsize=8)
     _legend_above(figure, above, len(drive.channels))

@@ -12,8 +12,14 @@ from ctrlgen.path_timing.fastest_plots import bound_text, draw_fastest
 from ctrlgen.path_timing.fastest_record import fastest_record, small_unit
 from ctrlgen.path_timing.retimed import write_inputs
 from ctrlgen.reporting.html import render
+from ctrlgen.reporting.page_figure import FirstScreen, PageFigure, page_figures
 from ctrlgen.reporting.result_file import json_text
 
+FIGURES = {
+    "path": ("Path and speed", "Coloured where a limit binds; dots are the set-points."),
+    "binding": ("Which limit binds where", "Along the path; a row a limit, in the colours of the path."),
+    "drives": ("Drives", "Held from sample to sample; dashed: their bounds."),
+}
 SHOWN_RUNS = 4  # runs of a limit in a table
 
 
@@ -29,10 +35,12 @@ def write_fastest(out: Path, motion: FastestPath) -> None:
     repeated = motion.repetition.solution if motion.repetition else None
     if repeated is not None:
         write_inputs(out / "at_frequency" / "scenario", repeated.scenario)
+    drawn = page_figures(figures, FIGURES)
     page = render(
         Path(__file__).with_name("fastest.html.j2"),
         f=record,
-        figures=figures,
+        first=first_screen(motion, drawn["path"]),
+        figures=drawn,
         device_title=motion.solution.model.device.title,
         rows=motions(motion),
         bindings=[(b, bound_text(b), runs_text(b)) for b in motion.bindings],
@@ -42,6 +50,31 @@ def write_fastest(out: Path, motion: FastestPath) -> None:
         repeated_file=None if repeated is None else repeated.scenario.path.name,
     )
     write_text(out / "fastest.html", page)
+
+
+def first_screen(motion: FastestPath, figure: PageFigure) -> FirstScreen:
+    """How fast the path can be followed, what bounds it, and where its set-points and their C are."""
+    rows = motions(motion)
+    _, time, times = rows[3]
+    often = f" ({times})" if times and motion.curve.closed else ""
+    bound = [f"{b.side.limit.label} {b.side.name} {bound_text(b)}" for b in motion.bindings[:1]]
+    first = f", bounded longest by {bound[0]}" if bound else ""
+    answer = [f"The fastest set-points take {time}{often}{first}; in continuous time {rows[4][1]}."]
+    if repeated := repetition_sentence(motion):
+        answer.append(f"{repeated[0].upper()}{repeated[1:]}.")
+    numbers = [(what, time) for what, time, _ in rows]
+    numbers += [
+        (f"{b.side.limit.label} {b.side.name} binds", f"{100 * b.share_of_time:.1f} % of the time")
+        for b in motion.bindings[:2]
+    ]
+    scenario = motion.solution.scenario.path.name
+    steps = [
+        f"Play the C in `player/`, or solve `scenario/{scenario}` with `ctrlgen run` for the online controller too.",
+        "Hold it to what is uncertain: `ctrlgen budget` reads the same scenario.",
+    ]
+    if motion.bindings:
+        steps.append(f"To be faster, widen {motion.bindings[0].side.limit.label}: it binds for the longest time.")
+    return FirstScreen(tuple(answer), "ok", figure, tuple(numbers), tuple(steps))
 
 
 def motions(motion: FastestPath) -> list[tuple[str, str, str]]:

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from ctrlgen.core.units import difference, from_si, same_dimension, show
 from ctrlgen.path_timing.binding import Binding
 from ctrlgen.path_timing.fastest import FastestPath
-from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
+from ctrlgen.reporting.plots import COLOURS, PATTERNS, STYLE, plt, svg
 
 SHOWN = 12  # limits
 UNBOUND = "#bbbbbb"
@@ -140,6 +140,7 @@ def _draw_drives(motion: FastestPath) -> Figure:
             edges,
             baseline=None,
             color=COLOURS[i % len(COLOURS)],
+            ls=PATTERNS[i % len(PATTERNS)],
             lw=1,
             label=channel,
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 
 def number(value: float, digits: int = 4) -> str:
@@ -13,3 +14,18 @@ def number(value: float, digits: int = 4) -> str:
         return f"{value:.{digits - 1}e}"
     exact = f"{value:.{digits}g}"
     return f"{float(exact):.0f}" if "e" in exact else exact
+
+
+def shares_text(shares: Sequence[float], decimals: int = 1) -> list[str]:
+    """Shares as '12.3 %', rounded so that what is printed adds up to their sum as printed: 100 % where they are those of a whole.
+
+    Each is rounded down, and the ones that lose most are rounded up (the method of largest remainders), so that each is within one
+    last digit of its value.
+    """
+    unit = 10**decimals
+    exact = [100 * unit * share for share in shares]
+    shown = [math.floor(value) for value in exact]
+    missing = round(math.fsum(exact)) - sum(shown)
+    for i in sorted(range(len(exact)), key=lambda i: shown[i] - exact[i])[:missing]:
+        shown[i] += 1
+    return [f"{value / unit:.{decimals}f} %" for value in shown]

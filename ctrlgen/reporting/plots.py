@@ -11,9 +11,13 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatterMathtext, LogFormatterSciNotation
 
 # safe for the colour-blind, a pair per stage
 COLOURS = ("#0072b2", "#56b4e9", "#d55e00", "#e69f00", "#009e73", "#7fc97f")
+# lines told apart without their colour, in the order of COLOURS
+PATTERNS: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (9, 3)), (0, (6, 1.5, 1, 1.5, 1, 1.5)))
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 STYLE: dict[Any, Any] = {
     "font.size": 9,
     "font.family": "DejaVu Sans",
@@ -31,8 +35,23 @@ STYLE: dict[Any, Any] = {
 }
 
 
+class Powers(LogFormatterSciNotation):
+    """Labels of a logarithmic axis as text, '10⁻³': without mathematics, which stays off (`text.parse_math`)."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """The label of the value `x`."""
+        return plain_powers(super().__call__(x, pos))
+
+
+def plain_powers(label: str) -> str:
+    """'10⁻³' for '$\\mathdefault{10^{-3}}$', '2×10⁻³' for one with a factor."""
+    label = label.replace("$\\mathdefault{", "").replace("}$", "").replace("\\times", "\u00d7")
+    return re.sub(r"\^\{([^}]*)\}", lambda found: found[1].translate(RAISED), label)
+
+
 def svg(figure: Figure) -> str:
     """The figure as SVG text without a date: the same for the same figure, which is closed."""
+    _plain_ticks(figure)
     buffer = io.StringIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": "ctrlgen"})
     plt.close(figure)
@@ -44,7 +63,17 @@ def image(figure: Figure, suffix: str) -> bytes:
     """The figure as a file of .svg or .png; the figure is closed."""
     if suffix == ".svg":
         return svg(figure).encode()
+    _plain_ticks(figure)
     buffer = io.BytesIO()
     figure.savefig(buffer, format=suffix[1:], dpi=150)
     plt.close(figure)
     return buffer.getvalue()
+
+
+def _plain_ticks(figure: Figure) -> None:
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            if isinstance(axis.get_major_formatter(), LogFormatterMathtext):
+                axis.set_major_formatter(Powers())
+            if isinstance(axis.get_minor_formatter(), LogFormatterMathtext):
+                axis.set_minor_formatter(Powers(minor_thresholds=(1, 0.4)))

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
 from ctrlgen.core.units import from_si, show_difference
-from ctrlgen.reporting.plots import COLOURS, STYLE, svg
+from ctrlgen.reporting.plots import COLOURS, PATTERNS, STYLE, svg
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE
 from ctrlgen.trajectory.metrics import force_parts
 from ctrlgen.trajectory.solution import Solution
@@ -69,8 +69,9 @@ def draw_path(solution: Solution) -> Figure:
     left.legend(loc="center" if closed else "best", fontsize=8)
     fine = FINER.get(unit, unit)
     tolerance = from_si(FEASIBILITY_TOLERANCE * signal.scale[most], fine)
-    for i, colour in zip(alike, (COLOURS[0], COLOURS[2], COLOURS[4]), strict=False):
-        right.plot(time, from_si(reached[:, i] - command[:, i], fine), color=colour, lw=1, label=signal.channels[i])
+    for i, colour, dashes in zip(alike, (COLOURS[0], COLOURS[2], COLOURS[4]), PATTERNS, strict=False):
+        off = from_si(reached[:, i] - command[:, i], fine)
+        right.plot(time, off, color=colour, ls=dashes, lw=1, label=signal.channels[i])
     right.axhspan(-tolerance, tolerance, color="#f0f0f0", zorder=0)
     span = max(1.3 * tolerance, 1.1 * max(abs(limit) for limit in right.get_ylim()))
     right.set_ylim(-span, span)
@@ -92,7 +93,8 @@ def draw_signal(solution: Solution, role: str) -> Figure:
         axes.plot(
             horizontal,
             from_si(values[:, i], signal.units[i]),
-            "o" if static else "-",
+            marker="o" if static else "",
+            ls="" if static else PATTERNS[i % 6],
             ms=4,
             lw=1.3,
             color=COLOURS[i % 6],

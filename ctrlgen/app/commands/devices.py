@@ -48,7 +48,9 @@ def check(
 @app.command(rich_help_panel=DEVICE_PANEL)
 def bode(
     device: DevicePath,
-    picture: Annotated[Path, typer.Option("--out", help="The picture to write, .svg or .png.", show_default=False)],
+    picture: Annotated[
+        Path, typer.Option("--out", help="The picture, .svg or .png, or the page, .html, to write.", show_default=False)
+    ],
     at: Annotated[
         str | None,
         typer.Option(
@@ -57,9 +59,9 @@ def bode(
         ),
     ] = None,
 ) -> None:
-    """Draw the frequency response from every drive to the pose, linearised at a pose.
+    """Draw the frequency response from every drive to the pose, linearised at a pose; a page of it zooms and shows its values.
 
-    Example:  ctrlgen bode scenarios/devices/mems_hexapod.toml --out bode.svg --at delta_x=5um,delta_z=20um
+    Example:  ctrlgen bode scenarios/devices/mems_hexapod.toml --out bode.html --at delta_x=5um,delta_z=20um
     """
     from ctrlgen.controller.bode import draw_bode
     from ctrlgen.devices import load_device
@@ -70,7 +72,12 @@ def bode(
     model = build_model(load_device(device))
     signal_ = model.signals["pose"]
     pose = middle_pose(model) if at is None else Frame(signal_.channels, signal_.units).pose(at, "--at")
-    draw_bode(model, pose, as_picture("--out", picture))
+    if picture.suffix == ".html":
+        from ctrlgen.controller.bode_page import write_bode_page
+
+        write_bode_page(model, pose, picture)
+    else:
+        draw_bode(model, pose, as_picture("--out", picture))
     out.print(str(picture), soft_wrap=True, markup=False)
 
 
@@ -88,7 +95,7 @@ def workspace(
 ) -> None:
     """Map the poses a device can hold under all its limits: ranges, slices, the largest ball inside.
 
-    Leaves workspace.svg and workspace.json in --out.
+    Leaves workspace.html, workspace.svg and workspace.json in --out.
 
     Example:  ctrlgen workspace scenarios/devices/mems_hexapod.toml --out out/workspace --at delta_z=20um
     """
@@ -96,7 +103,7 @@ def workspace(
     from ctrlgen.devices import load_device
 
     print_workspace(map_workspace(load_device(device), at or [], out_folder))
-    out.print(str(out_folder / "workspace.svg"), soft_wrap=True, markup=False)
+    out.print(str(out_folder / "workspace.html"), soft_wrap=True, markup=False)
 
 
 @app.command(rich_help_panel=DEVICE_PANEL)

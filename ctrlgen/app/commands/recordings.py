@@ -218,7 +218,9 @@ def batch(
     ],
     out_folder: Annotated[
         Path,
-        typer.Option("--out", help="Folder for one result folder per diagnosis, and results.csv.", show_default=False),
+        typer.Option(
+            "--out", help="Folder for one result folder per diagnosis, results.csv and batch.html.", show_default=False
+        ),
     ],
     seed: Annotated[
         int | None, typer.Option(help="Seed of all random numbers, instead of the list's.", show_default=False)
@@ -256,5 +258,6 @@ def batch(
         raise typer.Exit(2) from None
     print_batch(rows)
     out.print(f"[bold]table[/bold]  {escape(str(out_folder / 'results.csv'))}", soft_wrap=True)
+    out.print(f"[bold]page[/bold]   {escape(str(out_folder / 'batch.html'))}", soft_wrap=True)
     if any(row.state == "failed" for row in rows):
         raise typer.Exit(1)

@@ -26,9 +26,8 @@ SEGMENT = 2048
 BANDS = 20
 
 
-def draw_all(diagnosis: Diagnosis) -> dict[str, str]:
+def draw_all(diagnosis: Diagnosis, residuals: Residuals) -> dict[str, str]:
     """SVG text by name of every plot for which this diagnosis has data."""
-    residuals = Residuals(diagnosis)
     force = diagnosis.unmodelled_force
     with plt.rc_context(STYLE):
         figures: dict[str, Figure | None] = {
@@ -103,33 +102,49 @@ def thinned(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return x[places], y[places]
 
 
-def draw_spectrum(residuals: Residuals) -> Figure | None:
-    """Amplitude spectral density of the residual before and after, and of the noise; None for poses and short records."""
+Densities = tuple[tuple[str, np.ndarray], ...]
+
+
+def spectra(residuals: Residuals) -> list[tuple[int, np.ndarray, Densities]]:
+    """(channel, frequencies [Hz], (label, density)) of the residual before and after and of the noise; nothing of poses and short
+    records."""
     records = [k for k, part in enumerate(residuals.before) if min(len(_judged(y)) for y in part.T) >= 64]
     if residuals.settled or not records:
-        return None
-    n = len(residuals.recording.channels)
-    columns = min(n, 2)
-    rows = -(-n // columns)
-    figure, axes = plt.subplots(rows, columns, figsize=(WIDTH, 0.8 + 2.3 * rows), squeeze=False)
-    for i, channel in enumerate(residuals.recording.channels):
-        panel, unit = axes.flat[i], residuals.recording.units[i]
-        curves = (
-            (residuals.before, BEFORE, "before"),
-            (residuals.after, AFTER, "after" if residuals.changed else "residual"),
-        )
-        for parts, colour, label in curves[not residuals.changed :]:
+        return []
+    sides = ((residuals.before, "before"), (residuals.after, "after" if residuals.changed else "residual"))
+    found = []
+    for i in range(len(residuals.recording.channels)):
+        curves = []
+        for parts, label in sides[not residuals.changed :]:
             f, density = residual_density(residuals, parts, records, i)
-            panel.loglog(f, density, color=colour, lw=1.1, label=label)
-        noise = _noise_density(residuals, i, f)
-        if noise is not None:
-            panel.loglog(f, noise, color="#777777", lw=1.1, ls="--", label="noise")
-        panel.set_ylabel(f"{short(channel)} [{unit}/√Hz]")
+            curves.append((label, density))
+        if (noise := _noise_density(residuals, i, f)) is not None:
+            curves.append(("noise", noise))
+        found.append((i, f, tuple(curves)))
+    return found
+
+
+LINES = {"before": (BEFORE, "-."), "after": (AFTER, "-"), "residual": (AFTER, "-"), "noise": ("#777777", "--")}
+
+
+def draw_spectrum(residuals: Residuals) -> Figure | None:
+    """Amplitude spectral density of the residual before and after, and of the noise; None for poses and short records."""
+    found = spectra(residuals)
+    if not found:
+        return None
+    columns = min(len(found), 2)
+    rows = -(-len(found) // columns)
+    figure, axes = plt.subplots(rows, columns, figsize=(WIDTH, 0.8 + 2.3 * rows), squeeze=False)
+    for panel, (i, f, curves) in zip(axes.flat, found, strict=False):
+        for label, density in curves:
+            colour, dashes = LINES[label]
+            panel.loglog(f, density, color=colour, ls=dashes, lw=1.1, label=label)
+        panel.set_ylabel(f"{short(residuals.recording.channels[i])} [{residuals.recording.units[i]}/√Hz]")
         panel.set_xlabel("frequency [Hz]")
-        lowest = density if noise is None else np.concatenate([density, noise])
+        lowest = np.concatenate([density for label, density in curves if label != "before"])
         panel.set_ylim(bottom=0.4 * np.min(lowest[lowest > 0], initial=np.inf))
         panel.legend(fontsize=8)
-    for panel in axes.flat[n:]:
+    for panel in axes.flat[len(found) :]:
         panel.set_visible(False)
     return figure
 

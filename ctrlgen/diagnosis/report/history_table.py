@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.not_taken import that_matter
@@ -28,6 +30,19 @@ def history_rows(search: SearchResult) -> list[dict[str, str]]:
             rows.append(_row("", added, scores, better, tried.held_out_error, tried.outcome))
         rows.append(_row("", "", "", None, {}, entry.decision))
     return rows
+
+
+def history_rounds(search: SearchResult) -> list[dict[str, Any]]:
+    """The same by rounds: the model before each, its held-out error, the rows of what was tried, what was decided."""
+    rounds: list[dict[str, Any]] = []
+    for row in history_rows(search):
+        if row["round"]:
+            rounds.append({"round": row["round"], "before": row["model"], "held_out": row["held_out"], "rows": []})
+        elif row["model"]:
+            rounds[-1]["rows"].append(row)
+        else:
+            rounds[-1]["decision"] = row["outcome"]
+    return rounds
 
 
 def _row(

@@ -10,12 +10,15 @@ import numpy as np
 from ctrlgen.core.units import show
 from ctrlgen.devices.changed_numbers import written
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
-from ctrlgen.diagnosis.report.answer import answer
+from ctrlgen.diagnosis.report.diagnosis_first_screen import diagnosis_first_screen
 from ctrlgen.diagnosis.report.diagnosis_record import Provenance, location_record, shares_record
+from ctrlgen.diagnosis.report.figure_words import FIGURES
 from ctrlgen.diagnosis.report.figures import draw_all
-from ctrlgen.diagnosis.report.history_table import history_rows, not_taken_rows
+from ctrlgen.diagnosis.report.history_table import history_rounds, not_taken_rows
 from ctrlgen.diagnosis.report.luck_sentences import luck_text
-from ctrlgen.diagnosis.report.narrative import gathered, hard, interval, next_steps, per_cent, plain_name, share_text
+from ctrlgen.diagnosis.report.narrative import gathered, hard, interval, per_cent, plain_name, rest_text, share_text
+from ctrlgen.diagnosis.report.reading_charts import diagnosis_charts
+from ctrlgen.diagnosis.report.residuals import Residuals
 from ctrlgen.diagnosis.report.shares_sentences import family_shares, shares_sentences
 from ctrlgen.diagnosis.selection.findings import Finding
 from ctrlgen.diagnosis.selection.precedence import why_alike
@@ -24,29 +27,10 @@ from ctrlgen.estimation.hypothesis import PARAMETER, numbers
 from ctrlgen.estimation.robust_covariance import robust_deviations
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.numbers import number
+from ctrlgen.reporting.page_figure import page_figures
 from ctrlgen.reporting.result_file import Keys, origin
 
-CAPTIONS = {
-    "readings": "Measured against simulated on the held-out records, zoomed where the error is largest, and the error below (grey: noise, "
-    "± 2 sd). Of more than three readings those with the largest error over their noise are drawn.",
-    "residuals": "Residual on the held-out records. Gaps are samples that were marked as not usable.",
-    "spectrum": "Amplitude spectral density of the same residual. Where a curve meets the noise, this recording holds no more information.",
-    "shares_before": "What the device as described leaves: how much of its energy each kind of signal explains in blocks that were not "
-    "used, with 95 % intervals. Blue: selected in this order, diamonds: what each adds. Dashed: all together, the ceiling of any law "
-    "that is a function of them. Below: the residual over the best ones, and the smoother.",
-    "shares_after": "The same of what the model with the findings leaves.",
-    "where": "Excess of the residual of the device as described over the noise, with 95 % intervals, by part of the recording.",
-    "unknown": "Unknown input that would explain the residual after the correction, with 95 % intervals: its shape hints at the effect.",
-    "intervals": "Where an interval includes zero, the cause may be absent.",
-    "profiles": "Profile likelihood: the objective with one parameter held and the others refitted. The 95 % interval (shaded) lies "
-    "below the dotted line.",
-    "rivals": "Each round fits the hypotheses with the largest scores and keeps the best. The criterion T adds the whitened squares "
-    "on the records to fit, the held-out deviance and a penalty for every parameter. Blue: in the final model; orange: "
-    "explains equally well; grey: worse.",
-    "confusability": "How similar the effects of two hypotheses on the readings are: |cos| of their sensitivities, projected "
-    "off the device's uncertain parameters. At 1 they cannot be told apart, at 0 they cannot be confused. Each has fixed "
-    "shape parameters; fitting those can make two more similar. |z|: score in standard deviations.",
-}
+CERTAINTY = ("intervals", "profiles", "rivals", "confusability")
 # a p-value below is shown as "< 0.0001"
 TINY = 1e-4
 # standard deviations: parameters that moved by less are left out of the table
@@ -55,23 +39,27 @@ NEGLIGIBLE = 1e-3
 
 def page(diagnosis: Diagnosis, provenance: Provenance) -> str:
     """The page as HTML text."""
+    residuals = Residuals(diagnosis)
+    figures = page_figures(draw_all(diagnosis, residuals), FIGURES, diagnosis_charts(residuals))
+    experiment = diagnosis.next_experiment
     return render(
         Path(__file__).with_name("diagnosis.html.j2"),
         d=diagnosis,
         origin=origin(provenance.inputs, provenance.seed),
         trees={name: entry.as_json() for name, entry in _entries(diagnosis).items() if entry is not None},
-        history=history_rows(diagnosis.search),
+        first=diagnosis_first_screen(diagnosis, figures),
+        history=history_rounds(diagnosis.search),
         not_taken=not_taken_rows(diagnosis.search),
         title=diagnosis.recording.title,
         device_title=diagnosis.device.title,
         counts=counts(diagnosis),
         held_out={channel: entry.as_json() for channel, entry in diagnosis.held_out.items()},
-        answer=answer(diagnosis),
         findings=[_row(f) for f in diagnosis.findings],
-        steps=next_steps(diagnosis),
+        rest=rest_text(diagnosis),
+        experiment=None if experiment is None else experiment.record(),
         tested=_tested(diagnosis),
-        figures=draw_all(diagnosis),
-        captions=CAPTIONS,
+        figures=figures,
+        certainty=[figures[name] for name in CERTAINTY if name in figures],
         notes=gathered(diagnosis.notes),
         changed=_changed(diagnosis),
         unknown=[] if diagnosis.unmodelled_force is None else diagnosis.unmodelled_force.sentences(),
@@ -85,12 +73,10 @@ def page(diagnosis: Diagnosis, provenance: Provenance) -> str:
 
 def _entries(diagnosis: Diagnosis) -> dict[str, Keys | None]:
     """What the page shows number by number, as diagnosis.json states it."""
-    experiment = diagnosis.next_experiment
     return {
         "shares": shares_record(diagnosis),
         "residual_location": location_record(diagnosis),
         "detectability": diagnosis.detectability,
-        "next_experiment": None if experiment is None else experiment.record(),
     }
 
 

@@ -104,6 +104,21 @@ def share_text(finding: Finding) -> str:
     return with_ends(finding.share)
 
 
+def rest_text(diagnosis: Diagnosis) -> str:
+    """The share of the mismatch that is left beside those of the findings, so that what the table prints adds up to 100 %; empty where
+    nothing is shared out. Findings of one law at one place have one share."""
+    rest = diagnosis.attribution.rest
+    shares = {(f.effect, f.location): f.share.value for f in diagnosis.findings if f.share is not None}
+    if rest is None or not shares:
+        return ""
+    printed = [per_cent(value) for value in shares.values()]
+    if any(text[0] in "<>" for text in printed):
+        return per_cent(rest.value)
+    decimals = max(len(text.removesuffix(" %").partition(".")[2]) for text in printed)
+    left = 100 - sum(float(text.removesuffix(" %")) for text in printed)
+    return f"{left:.{decimals}f} %"
+
+
 def with_ends(share: ShareEntry) -> str:
     """'82 % (75 ... 88 %)'; without the interval where its ends show as the share itself."""
     value, low, high = (per_cent(v) for v in (share.value, *share.ci95))

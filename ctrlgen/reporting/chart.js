@@ -1,0 +1,207 @@
+"use strict";
+// Draws the data of <script class="chart"> by uPlot, in place of the static drawing beside it. Charts of one group share stretch and cursor.
+(() => {
+  const DASHES = { "-": [], "--": [7, 4], "-.": [8, 3, 2, 3], ":": [2, 3], "---": [14, 5], "-..": [9, 3, 2, 3, 2, 3], ".": [] };
+  const MARKS = { "-": "solid", "--": "dashed", "-.": "dashed", ":": "dotted", "---": "dashed", "-..": "dashed", ".": "dotted" };
+  const FONT = "12px system-ui, sans-serif";
+  const POINT = 5; // pixels across a point
+  const groups = new Map(); // name -> {plots, range, whole}
+
+  const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const colour = (k) => css(`--c${k % 7}`);
+
+  const shown = (value) => {
+    if (value == null) return "–";
+    const size = Math.abs(value);
+    return size && (size < 1e-4 || size >= 1e7) ? value.toExponential(4) : String(+value.toPrecision(6));
+  };
+  const ticks = (u, splits, axis, space, step) =>
+    splits.map((v) => {
+      if (v == null) return "";
+      if (u.scales[u.axes[axis].scale].distr === 3) return v >= 0.01 && v < 1e5 ? String(+v.toPrecision(3)) : v.toExponential(0);
+      const digits = Math.max(0, Math.ceil(-Math.log10(step) - 1e-9));
+      return digits > 6 || Math.abs(v) >= 1e7 ? (v === 0 ? "0" : v.toExponential(2)) : v.toFixed(digits);
+    });
+  const width = (u, values, axis, cycle) => {
+    if (cycle > 1) return u.axes[axis]._size;
+    u.ctx.font = u.axes[axis].font[0];
+    const longest = Math.max(0, ...(values || []).map((v) => u.ctx.measureText(v || "").width));
+    return Math.max(70, Math.ceil(longest / devicePixelRatio + 16));
+  };
+
+  // The stretch that a group shows; every plot of it follows.
+  function show(group, min, max, from) {
+    const [low, high] = group.whole;
+    const span = Math.min(max - min, high - low);
+    min = Math.min(Math.max(min, low), high - span);
+    group.range = [min, min + span];
+    for (const plot of group.plots) if (plot !== from) plot.setScale("x", { min: group.range[0], max: group.range[1] });
+  }
+  // Zooms about `at` (0 … 1 of the stretch) and moves by a share of it; on a logarithmic axis in decades.
+  function move(group, factor, at, by) {
+    const [there, back] = group.log ? [Math.log10, (v) => 10 ** v] : [(v) => v, (v) => v];
+    const [a, b] = group.range.map(there);
+    const [low, high] = group.whole.map(there);
+    const span = Math.min((b - a) * factor, high - low);
+    const first = Math.min(Math.max(a + (b - a) * at - span * at + (b - a) * by, low), high - span);
+    show(group, back(first), back(first + span));
+  }
+
+  function backdrop(panel) {
+    return (u) => {
+      const { left, top, width: w, height: h } = u.bbox;
+      const y = (v) => u.valToPos(v, "y", true);
+      u.ctx.save();
+      u.ctx.beginPath();
+      u.ctx.rect(left, top, w, h);
+      u.ctx.clip();
+      if (panel.band) {
+        u.ctx.fillStyle = css("--noise");
+        u.ctx.fillRect(left, y(panel.band[1]), w, y(panel.band[0]) - y(panel.band[1]));
+      }
+      u.ctx.strokeStyle = u.ctx.fillStyle = css("--soft");
+      u.ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
+      u.ctx.textAlign = "right";
+      for (const [value, what] of panel.rules) {
+        u.ctx.setLineDash([4 * devicePixelRatio, 3 * devicePixelRatio]);
+        u.ctx.beginPath();
+        u.ctx.moveTo(left, y(value));
+        u.ctx.lineTo(left + w, y(value));
+        u.ctx.stroke();
+        u.ctx.fillText(what, left + w - 4, y(value) - 3 * devicePixelRatio);
+      }
+      u.ctx.restore();
+    };
+  }
+
+  function series(curve) {
+    const points = curve.line === ".";
+    const drawn = {
+      label: curve.name,
+      stroke: () => colour(curve.colour),
+      width: curve.width,
+      dash: DASHES[curve.line],
+      value: (u, v) => shown(v),
+      points: { show: points, size: POINT, fill: () => colour(curve.colour) },
+    };
+    if (points) drawn.paths = () => null;
+    return drawn;
+  }
+
+  function options(chart, panel, group, size, last) {
+    const place = chart.places.length ? (v) => (v == null ? "–" : (chart.places[Math.round(v) - 1] || "")) : shown;
+    const axis = { stroke: () => css("--ink"), grid: { stroke: () => css("--line"), width: 1 }, ticks: { stroke: () => css("--line"), width: 1 }, font: FONT, labelFont: FONT };
+    const levels = panel.rules.map((r) => r[0]).concat(panel.band || []);
+    const reach = (u, low, high) => {
+      if (low == null) return panel.log ? [0.1, 1] : [-1, 1];
+      for (const v of levels) [low, high] = [Math.min(low, v), Math.max(high, v)];
+      return uPlot.rangeNum(low, high, { min: { pad: 0.08, soft: 0, mode: 0 }, max: { pad: 0.08, soft: 0, mode: 0 } });
+    };
+    return {
+      width: size,
+      height: panel.height + (last ? 20 : 0),
+      scales: { x: { time: false, distr: chart.logX ? 3 : 1, range: (u, min, max) => [min, max] }, y: panel.log ? { distr: 3 } : { range: reach } },
+      axes: [
+        { ...axis, label: last ? chart.x : undefined, labelSize: last ? 20 : 0, size: 30, values: ticks, incrs: chart.places.length ? [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000] : undefined },
+        { ...axis, label: panel.label, labelSize: 18, size: width, values: ticks },
+      ],
+      series: [{ label: "at", value: (u, v) => place(v) }, ...panel.curves.map(series)],
+      legend: { live: true, markers: { dash: (u, i) => MARKS[panel.curves[i - 1].line] } },
+      cursor: { sync: { key: group.name, scales: ["x", null], filters: { pub: (type) => type === "mousemove" || type === "mouseleave" } }, drag: { x: true, y: false, setScale: true }, bind: { mousedown: (u, t, handler) => (e) => (e.shiftKey ? null : handler(e)), dblclick: () => () => { show(group, ...group.whole); return null; } } },
+      hooks: {
+        drawClear: panel.band || panel.rules.length ? [backdrop(panel)] : [],
+        setScale: [(u, key) => { if (key === "x" && group.ready && u.scales.x.min != null && (u.scales.x.min !== group.range[0] || u.scales.x.max !== group.range[1])) show(group, u.scales.x.min, u.scales.x.max, u); }],
+        ready: [(u) => pan(u, group)],
+      },
+    };
+  }
+
+  // Shift and drag moves; control and wheel zooms.
+  function pan(u, group) {
+    u.over.addEventListener("mousedown", (e) => {
+      if (!e.shiftKey || e.button !== 0) return;
+      e.preventDefault();
+      let last = e.clientX;
+      const drag = (m) => {
+        move(group, 1, 0, (last - m.clientX) / u.over.clientWidth);
+        last = m.clientX;
+      };
+      const end = () => { removeEventListener("mousemove", drag); removeEventListener("mouseup", end); };
+      addEventListener("mousemove", drag);
+      addEventListener("mouseup", end);
+    });
+    u.over.addEventListener("wheel", (e) => {
+      if (!e.ctrlKey) return;
+      e.preventDefault();
+      move(group, e.deltaY < 0 ? 0.8 : 1.25, e.offsetX / u.over.clientWidth, 0);
+    }, { passive: false });
+  }
+
+  const KEYS = { "+": [0.5, 0.5, 0], "-": [2, 0.5, 0], ArrowLeft: [1, 0, -0.25], ArrowRight: [1, 0, 0.25] };
+
+  function bar(group, title) {
+    const row = document.createElement("div");
+    row.className = "bar";
+    const whole = () => show(group, ...group.whole);
+    const buttons = [["+", "zoom in", () => move(group, ...KEYS["+"])], ["−", "zoom out", () => move(group, ...KEYS["-"])], ["◀", "move left", () => move(group, ...KEYS.ArrowLeft)], ["▶", "move right", () => move(group, ...KEYS.ArrowRight)], ["whole", "show the whole", whole]];
+    for (const [text, what, act] of buttons) {
+      const button = document.createElement("button");
+      button.type = "button";
+      button.textContent = text;
+      button.title = what;
+      button.setAttribute("aria-label", `${what}: ${title}`);
+      button.addEventListener("click", act);
+      row.append(button);
+    }
+    return row;
+  }
+
+  function build(holder, box, size) {
+    const chart = JSON.parse(holder.textContent);
+    const at = chart.panels.flatMap((p) => [p.x[0], p.x[p.x.length - 1]]).filter((v) => v != null);
+    const pad = chart.places.length ? 0.5 : 0;
+    const whole = [Math.min(...at) - pad, Math.max(...at) + pad];
+    if (whole[0] === whole[1]) whole[1] += 1;
+    let group = groups.get(chart.group);
+    if (!group) groups.set(chart.group, (group = { name: chart.group, plots: [], range: whole, whole, log: chart.logX, ready: false }));
+    group.ready = false;
+    if (whole[0] < group.whole[0] || whole[1] > group.whole[1]) group.range = group.whole = [Math.min(whole[0], group.whole[0]), Math.max(whole[1], group.whole[1])];
+    box.append(bar(group, box.getAttribute("aria-label")));
+    const plots = chart.panels.map((panel, k) => {
+      const data = [panel.x, ...panel.curves.map((c) => (panel.log ? c.y.map((v) => (v > 0 ? v : null)) : c.y))];
+      return new uPlot(options(chart, panel, group, size, k === chart.panels.length - 1), data, box);
+    });
+    group.plots.push(...plots);
+    show(group, ...group.range);
+    // uPlot sets its scales after this turn: what it sets itself is no wish of the reader's
+    setTimeout(() => { group.ready = true; }, 0);
+    box.addEventListener("keydown", (e) => {
+      if (e.ctrlKey || e.metaKey || e.altKey) return;
+      if (e.key === "0") show(group, ...group.whole);
+      else if (KEYS[e.key]) move(group, ...KEYS[e.key]);
+      else return;
+      e.preventDefault();
+    });
+    return plots;
+  }
+
+  for (const holder of document.querySelectorAll("script.chart")) {
+    const figure = holder.closest("figure");
+    const box = document.createElement("div");
+    box.className = "live";
+    box.tabIndex = 0;
+    box.setAttribute("role", "group");
+    box.setAttribute("aria-label", figure.querySelector("figcaption b").textContent);
+    holder.before(box);
+    figure.classList.add("alive");
+    let plots = null;
+    // A folded section has no width until it is opened.
+    new ResizeObserver(() => {
+      const size = box.clientWidth;
+      if (!size) return;
+      if (!plots) plots = build(holder, box, size);
+      else for (const plot of plots) if (plot.width !== size) plot.setSize({ width: size, height: plot.height });
+    }).observe(box);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { for (const plot of plots || []) plot.redraw(false, true); });
+  }
+})();
