@@ -216,7 +216,7 @@ class Fitter:
             return _fit_at(problem, levenberg_marquardt(problem, problem.to_scaled(start), steps, enough))
         s, noise, corner = problem.structure, self.error.weighted, self.error.corner
         valid = [r.valid for r in self.recording.records]
-        begun = (s.starts, s.expanded_at, sorted(s.nominal_starts.items()), s.free)
+        begun = (s.starts, s.expanded_at, sorted(s.nominal_starts.items()), s.free, s.finer)
         key = key_of(s.causes, *begun, start, steps, enough, noise.sd, corner, *noise.ar, *valid)
         optimum = self.checkpoint.recall(key)
         if optimum is None:

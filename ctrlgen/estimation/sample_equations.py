@@ -41,11 +41,11 @@ class SampleEquations:
 
 
 def build_sample_equations(
-    model: Model, y: ca.SX, sample_time: float, linear: bool, poses: bool = False
+    model: Model, y: ca.SX, sample_time: float, linear: bool, poses: bool = False, finer: int = 1
 ) -> SampleEquations:
-    """The sample equations of `model` with readings `y` (n_y,) for records of one `Timing`."""
+    """The sample equations of `model` with readings `y` (n_y,) for records of one `Timing`, in `finer` times its integrator's steps."""
     expressions = [model.sampled_rates, model.held_value, ca.vertcat(ca.SX(0, 1), *model.stepped.values()), y]
-    sample = None if model.inertial else _one_step(model, sample_time, linear, poses)
+    sample = None if model.inertial else _one_step(model, sample_time, linear, poses, finer)
     if sample is not None:
         following = ca.vertcat(sample.x, sample.z)
         # read at the end of the dwell
@@ -63,17 +63,17 @@ def build_sample_equations(
         stepped = dict(zip(model.stepped, ca.vertsplit(stepped), strict=True))
         nominal = constants(model.p_nominal)[0].full().ravel()
         model = replace(model, p=c, p_nominal=nominal, sampled_rates=rates, held_value=held, stepped=stepped)
-        sample = _one_step(model, sample_time, linear, poses)
+        sample = _one_step(model, sample_time, linear, poses, finer)
         following = ca.vertcat(sample.x, sample.z)
     else:
         following, y = expressions
     # before differentiation: afterwards it takes ten times as long
     following, y = ca.cse([following, y])
     given = [ca.vertcat(model.x, model.z), model.u, sample.u_next, model.ambient_symbol, c]
-    steps = integrator_of(model, sample_time) if model.inertial else None
+    steps = integrator_of(model, sample_time, finer) if model.inertial else None
     return SampleEquations(constants, model, steps, linear, following, y, given)
 
 
-def _one_step(model: Model, sample_time: float, linear: bool, poses: bool) -> Sample:
+def _one_step(model: Model, sample_time: float, linear: bool, poses: bool, finer: int) -> Sample:
     newton_steps = SIMULATION.pose_newton_steps if poses else SIMULATION.newton_steps
-    return one_step_map(model, sample_time, linear, newton_steps, poses)
+    return one_step_map(model, sample_time, linear, newton_steps, poses, finer)

@@ -34,7 +34,7 @@ class Simulator:
     """Simulates the readings `channels` (n_y) of `device`, compiled once for records of one `Timing`.
 
     `free` are the paths of the k parameters p that may change between simulations; the steps of a device with inertia are expanded
-    about their values in `device`. A device with inertia settles in no pose:
+    about their values in `device`, and are `finer` times the integrator's own. A device with inertia settles in no pose:
     its readings are those of the instants at which the drive changes.
     """
 
@@ -46,8 +46,9 @@ class Simulator:
         sample_time: float,
         linear: bool = False,
         poses: bool = False,
+        finer: int = 1,
     ) -> None:
-        self.free, self.channels = tuple(free), tuple(channels)
+        self.finer, self.free, self.channels = finer, tuple(free), tuple(channels)
         self.sample_time, self.linear = sample_time, linear
         self.ambient = ca.SX.sym("ambient")
         look_back = sample_time if np.isfinite(sample_time) else None
@@ -123,7 +124,7 @@ class Simulator:
     @cached_property
     def equations(self) -> SampleEquations:
         """F and H of one sample, symbolically; the readings as they are before they are late."""
-        return build_sample_equations(self.model, self._observed, self.sample_time, self.linear, self.poses)
+        return build_sample_equations(self.model, self._observed, self.sample_time, self.linear, self.poses, self.finer)
 
     @cached_property
     def _with_rates(self) -> SampleEquations:
@@ -131,7 +132,7 @@ class Simulator:
         if not self._rates.numel():
             return self.equations
         y = ca.vertcat(self._observed, self._rates)
-        return build_sample_equations(self.model, y, self.sample_time, self.linear, self.poses)
+        return build_sample_equations(self.model, y, self.sample_time, self.linear, self.poses, self.finer)
 
     def linearise(self, p: np.ndarray, chosen: Sequence[int]) -> Linearised:
         """F_S, F_f, H_S and H_f at `p` (k,) along any motion, f the m `chosen` parameters by their places in `free`."""
@@ -305,9 +306,11 @@ def _spline(record: Record) -> CubicSpline:
 
 
 @lru_cache(maxsize=SIMULATION.kept)
-def compiled_simulator(device: Device, free: tuple[str, ...], channels: tuple[str, ...], timing: Timing) -> Simulator:
+def compiled_simulator(
+    device: Device, free: tuple[str, ...], channels: tuple[str, ...], timing: Timing, finer: int = 1
+) -> Simulator:
     """The simulator of these arguments, by their value: whether one was compiled before changes no result."""
-    return Simulator(device, free, channels, *timing)
+    return Simulator(device, free, channels, *timing, finer)
 
 
 class Linearised:

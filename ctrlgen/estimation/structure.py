@@ -28,6 +28,7 @@ class Structure:
     `expansion`: the values of the causes about which a simulator is expanded, as `starts`, and those where None. They are where each
     cause was first suspected, wherever a later fit of the structure begins.
     `free`: the numbers that are free, None for the device's uncertain ones and the parameters of the causes.
+    `finer`: how many times the integrator's own steps a simulation takes.
     """
 
     device: Device
@@ -36,6 +37,7 @@ class Structure:
     nominal_starts: dict[str, float] = field(default_factory=dict)
     expansion: tuple[dict[str, float], ...] | None = None
     free: tuple[FreeParameter, ...] | None = None
+    finer: int = 1
 
     def __getstate__(self) -> dict[str, Any]:
         """Its fields: what is derived from them need not be sent to another process, and cannot be where a user wrote the device."""
@@ -129,4 +131,4 @@ class Structure:
     def simulator(self, channels: tuple[str, ...], timing: Timing) -> Simulator:
         """The compiled simulator of the readings `channels` for records of one timing."""
         paths = tuple(p.path for p in self.free_parameters)
-        return compiled_simulator(self.expanded_device, paths, channels, timing)
+        return compiled_simulator(self.expanded_device, paths, channels, timing, self.finer)

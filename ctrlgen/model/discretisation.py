@@ -41,9 +41,15 @@ class Sample(NamedTuple):
 
 
 def one_step_map(
-    model: Model, sample_time: float, linear: bool = False, newton_steps: int = NEWTON_STEPS, poses: bool = False
+    model: Model,
+    sample_time: float,
+    linear: bool = False,
+    newton_steps: int = NEWTON_STEPS,
+    poses: bool = False,
+    finer: int = 1,
 ) -> Sample:
-    """x and z one `sample_time` [s] on, with the drive held, or `linear` between samples.
+    """x and z one `sample_time` [s] on, with the drive held, or `linear` between samples; with inertia in `finer` times the steps of
+    its integrator.
 
     With `poses` the drive jumps to the next one first and is held for the sample time, the dwell; memories see the displacement
     of its end, which the actuators reach in a small part of it.
@@ -53,7 +59,7 @@ def one_step_map(
     """
     u_next = ca.SX.sym("u_next", model.u.numel())
     if model.inertial:
-        x, z = _integrate(model, sample_time, u_next, linear)
+        x, z = _integrate(model, sample_time, u_next, linear, finer)
         return Sample(u_next, x, z)
     if not np.isfinite(sample_time):
         x, z = _settle(model, u_next, newton_steps)
@@ -190,10 +196,10 @@ def _coupled_blocks(A: ca.SX) -> list[list[int]]:
     return [block for block in blocks if len(block) > 1 or acts_on[block[0], block[0]]]
 
 
-def _integrate(model: Model, sample_time: float, u_next: ca.SX, linear: bool) -> tuple[ca.SX, ca.SX]:
+def _integrate(model: Model, sample_time: float, u_next: ca.SX, linear: bool, finer: int) -> tuple[ca.SX, ca.SX]:
     """x and z one sample on, with inertia, by the steps of the model's integrator."""
     state = ca.vertcat(model.x, model.z)
-    integrator = integrator_of(model, sample_time)
+    integrator = integrator_of(model, sample_time, finer)
     p, ambient = model.p, model.ambient_symbol
     nonlinear = ca.Function("N", [state, model.u, model.held, p, ambient], [integrator.nonlinear_rates(model)])
 

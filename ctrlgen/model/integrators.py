@@ -30,10 +30,10 @@ VANISHED = 1e-300  # matrix entries below it are structural zeros that underflow
 NonlinearRates = Callable[[ca.SX, ca.SX], ca.SX]  # (y, u) -> the rows `acting` of N
 
 
-def integrator_of(model: Model, sample_time: float) -> ExponentialRungeKutta | ImplicitRadau:
-    """The integrator that suits the model: implicit where dry friction acts on an axis."""
+def integrator_of(model: Model, sample_time: float, finer: int = 1) -> ExponentialRungeKutta | ImplicitRadau:
+    """The integrator that suits the model: implicit where dry friction acts on an axis. It takes `finer` times its usual steps."""
     kind = ImplicitRadau if model.set_valued_axes else ExponentialRungeKutta
-    return kind(model, sample_time)
+    return kind(model, sample_time, finer)
 
 
 class ExponentialIntegrator:
@@ -42,8 +42,9 @@ class ExponentialIntegrator:
 
     LEAST_STEPS = 1
 
-    def __init__(self, model: Model, sample_time: float, A: np.ndarray, longest: float) -> None:
-        self.count = max(substeps(A, sample_time, longest), self.LEAST_STEPS, contact_steps(model, sample_time))
+    def __init__(self, model: Model, sample_time: float, A: np.ndarray, longest: float, finer: int) -> None:
+        usual = max(substeps(A, sample_time, longest), self.LEAST_STEPS, contact_steps(model, sample_time))
+        self.count = finer * usual
         self.h = sample_time / self.count
         self.A = _sparse(A)
         N = self._all_nonlinear_rates(model)
@@ -82,8 +83,8 @@ class ExponentialRungeKutta(ExponentialIntegrator):
     Source: S. M. Cox, P. C. Matthews, J. Comput. Phys. 176 (2002) 430, eqs. (26)-(29).
     """
 
-    def __init__(self, model: Model, sample_time: float) -> None:
-        super().__init__(model, sample_time, slope_at_rest(model), EXPLICIT_STEP)
+    def __init__(self, model: Model, sample_time: float, finer: int = 1) -> None:
+        super().__init__(model, sample_time, slope_at_rest(model), EXPLICIT_STEP, finer)
         h, phi = self.h, self.phi
         half, half_phi_1, *_ = phi_matrices(self.A.full() * h / 2, 3)
         Q = h / 2 * half_phi_1
@@ -118,12 +119,12 @@ class ImplicitRadau(ExponentialIntegrator):
 
     NODE, LEAST_STEPS = 1 / 3, LEAST_IMPLICIT_STEPS
 
-    def __init__(self, model: Model, sample_time: float) -> None:
+    def __init__(self, model: Model, sample_time: float, finer: int = 1) -> None:
         at_rest, sliding = slope_at_rest(model), slope_at_rest(model, speed=1.0)
         A = np.where(np.abs(sliding) < np.abs(at_rest), sliding, at_rest)
         self.bristles = list(model.bristles)  # places in y
         A[self.bristles, :] = A[:, self.bristles] = 0.0  # they bend and slip far faster than anything else: all in N
-        super().__init__(model, sample_time, A, IMPLICIT_STEP)
+        super().__init__(model, sample_time, A, IMPLICIT_STEP, finer)
         h, c, (_, phi_1, phi_2, _) = self.h, self.NODE, self.phi
         E_c, phi_1_c, *_ = phi_matrices(self.A.full() * c * h, 3)
         self.E_c, self.P = _sparse(E_c), self._acting_columns(c * h * phi_1_c)

@@ -27,9 +27,10 @@ from ctrlgen.diagnosis.selection.rivals import acting_instead, rivals, simplifie
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
 from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.selection.supported import supported
-from ctrlgen.diagnosis.selection.trials import Trials
+from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
 from ctrlgen.diagnosis.settings import SEARCH
 from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.integration_error import with_steps_that_suffice
 from ctrlgen.estimation.isolated_outliers import mark_again
 from ctrlgen.estimation.noise_update import update_noise
 from ctrlgen.estimation.settings import FIT
@@ -60,7 +61,8 @@ class Searcher:
             current = self._settled(current)
             if np.allclose(noise.floor, before.floor, rtol=SEARCH.same_noise):
                 break
-        current = acting_instead(trials, simplified(trials, self.best_settled(current)))
+        current = self._finely_stepped(self.best_settled(current))
+        current = acting_instead(trials, simplified(trials, current))
         # its numbers are not bent by the errors of a better model
         nominal = scored(trials.fitter, trials.fitter.described(device)[1])
         current, account = supported(trials, nominal, current, trials.screen.seed)
@@ -88,6 +90,22 @@ class Searcher:
         current = self._settled(current)
         better = swapped(self.trials, current, len(current.causes))
         return current if better is current else self._settled(better)
+
+    def _finely_stepped(self, current: CandidateModel) -> CandidateModel:
+        """The same model fitted and judged with as many steps of its integrator as it needs, where those of the search do not suffice:
+        what they miss of an impact bends the numbers of a stop that is touched, which then foretell no run into it."""
+        trials = self.trials
+        try:
+            structure = with_steps_that_suffice(trials.fitter, current.fit)
+        except FAILURES as error:
+            trials.note_failure(current.cause, error)
+            return current
+        if structure.finer == current.fit.structure.finer:
+            return current
+        trials.step("refit in shorter steps")
+        trials.use(trials.fitter)  # what was fitted in longer ones is no fit of it
+        fitted = trials.tried(structure, current.cause, steps=FIT.max_steps)
+        return self._settled(fitted[0]) if fitted else current
 
     def _learn_mismatch(self, described: CandidateModel) -> None:
         """What the device as described leaves on the held-out records is what causes are measured by."""
