@@ -99,7 +99,8 @@ def exact_step(axis: Axis, h: float) -> tuple[float, ...]:
     M[2, 3] = 1 / h
     E = expm(M * h)
     held, ramp = E[:2, 2], E[:2, 3]  # by the force at the beginning, and by its rise
-    return E[0, 0], E[0, 1], E[1, 0], E[1, 1], held[0], held[1], ramp[0] - held[0] / 2, ramp[1] - held[1] / 2
+    steps = E[0, 0], E[0, 1], E[1, 0], E[1, 1], held[0], held[1], ramp[0] - held[0] / 2, ramp[1] - held[1] / 2
+    return tuple(map(float, steps))  # plain numbers are quick one at a time
 
 
 def fine_drive(drive: Array, linear: bool) -> Array:
@@ -159,7 +160,7 @@ def move(
     for count, (u, rise) in enumerate(zip(fine_drive(given, linear).tolist(), rises, strict=True)):
         if loop is not None:
             if count % SUBSTEPS == 0:  # a digital controller: computed at the sample, held until the next
-                reference = given[count // SUBSTEPS]
+                reference = float(given[count // SUBSTEPS])
                 asked = loop.velocity_gain * (loop.position_gain * (reference - q) - v) + loop.integral_gain * summed
             summed += (u - q) * h
             u = asked

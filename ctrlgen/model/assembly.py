@@ -19,6 +19,7 @@ from ctrlgen.model.effect_terms import EffectTerms
 from ctrlgen.model.equations import NONE, equations_of, named_forces
 from ctrlgen.model.model import Law, Model
 from ctrlgen.model.state_vector import at_nominal, components, memory_places
+from ctrlgen.numerics.batched_evaluation import evaluate
 
 STROKE_POINTS = 65  # points of the stroke, ends included, at which the tangent stiffness is checked
 NO_RISE = ca.SX(0)  # the surroundings as they are described
@@ -211,15 +212,15 @@ def _check_stiffness(model: Model) -> None:
     force."""
     if model.inertial:
         return
-    stiffness = ca.Function(
-        "stiffness", [model.x, model.z, model.u, model.p], [ca.diag(ca.jacobian(model.balance, model.z))]
-    )
     low, high = model.z_bounds
     if not (np.all(np.isfinite(low)) and np.all(np.isfinite(high))):
         return
-    for share in np.linspace(0, 1, STROKE_POINTS):
-        z = low + share * (high - low)
-        value = stiffness(model.rest, z, 0, model.p_nominal).full().ravel()
+    slope = ca.densify(ca.diag(ca.jacobian(model.balance, model.z)))
+    stiffness = ca.Function("stiffness", [model.x, model.z, model.u, model.p], [slope])
+    stroke = low + np.linspace(0, 1, STROKE_POINTS)[:, None] * (high - low)
+    rest, u, p = (np.tile(v, (STROKE_POINTS, 1)) for v in (model.rest, 0 * model.u_scale, model.p_nominal))
+    (values,) = evaluate(stiffness.map(STROKE_POINTS), rest, stroke, u, p)
+    for z, value in zip(stroke, values, strict=True):
         bad = np.flatnonzero(~(value < 0))  # NaN too
         if bad.size:
             axis, displacement = model.axes[bad[0]], show(z[bad[0]], "um")

@@ -12,6 +12,7 @@ number of Newton steps. The operation count is therefore fixed.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
 
 import casadi as ca
 import numpy as np
@@ -46,6 +47,7 @@ class Inverse:
     newton: ca.Function
 
 
+@lru_cache(maxsize=8)  # a path is solved, and its controller made, of one model
 def invert(model: Model, follow: str, sample_time: float | None, symbolic: bool = False) -> Inverse:
     """The inverse of `model` for the signal named `follow`, over one `sample_time` [s]; static where that is None.
 
@@ -179,34 +181,51 @@ class ExpansionPoint:
 
     def at(self, expression: ca.SX, fraction: float) -> np.ndarray:
         """`expression` at base + fraction * scale."""
+        if not ca.symvar(expression):
+            return ca.evalf(expression).full()
         return ca.Function("f", [self.symbols], [expression])(self.base + fraction * self.scale).full()
 
     def base_of(self, unknowns: ca.SX) -> ca.SX | ca.DM:
         """The base of some of the symbols."""
-        base = ca.Function("f", [self.symbols], [unknowns])(self.base)
-        formulas = ca.substitute(unknowns, self.with_formula, self.base_formula)
-        same = [ca.is_equal(formulas[i], unknowns[i]) for i in range(unknowns.numel())]
-        return ca.vertcat(*(base[i] if same[i] else formulas[i] for i in range(unknowns.numel())))
+        own = [symbol.element_hash() for symbol in ca.vertsplit(unknowns)]
+        if not any(symbol in self._formulas for symbol in own):
+            return ca.DM(self.base[[self._places[symbol] for symbol in own]])
+        return ca.vertcat(*(self._formulas.get(symbol, self.base[self._places[symbol]]) for symbol in own))
 
     def typical(self, unknowns: ca.SX) -> ca.DM:
         """A value of some of the symbols at which the device operates: base + scale."""
-        return ca.Function("f", [self.symbols], [unknowns])(self.base + self.scale)
+        places = [self._places[symbol.element_hash()] for symbol in ca.vertsplit(unknowns)]
+        return ca.DM((self.base + self.scale)[places])
+
+    @cached_property
+    def _places(self) -> dict[int, int]:
+        """Where a symbol stands among `symbols`."""
+        return {symbol.element_hash(): i for i, symbol in enumerate(ca.vertsplit(self.symbols))}
+
+    @cached_property
+    def _formulas(self) -> dict[int, ca.SX]:
+        """The base of symbols that have a formula of it."""
+        symbols, formulas = ca.vertsplit(self.with_formula), ca.vertsplit(self.base_formula)
+        return {symbol.element_hash(): formula for symbol, formula in zip(symbols, formulas, strict=True)}
 
 
 def solve_by_blocks(known: ExpansionPoint, equations: ca.SX, unknowns: ca.SX) -> ca.SX:
     """The `unknowns` (n,) as expressions in the other symbols, such that equations (n,) = 0; block by block."""
-    count, rows, columns, row_starts, column_starts, *_ = ca.jacobian(equations, unknowns).sparsity().btf()
-    solution = [ca.SX(0)] * unknowns.numel()
-    solved = values = ca.SX(0, 1)
+    entries = ca.jacobian(equations, unknowns).sparsity()
+    count, rows, columns, row_starts, column_starts, *_ = entries.btf()
+    by_equation = entries.T
+    starts, needs = by_equation.colind(), by_equation.row()
+    residuals, symbols = ca.vertsplit(equations), ca.vertsplit(unknowns)
+    solution: dict[int, ca.SX] = {}
     for block in range(count):
         places = columns[column_starts[block] : column_starts[block + 1]]
-        own_equations = equations[rows[row_starts[block] : row_starts[block + 1]]]
-        v = unknowns[places]
-        root = _solve_block(known, ca.substitute(own_equations, solved, values), v)
-        for k, i in enumerate(places):
-            solution[i] = root[k]
-        solved, values = ca.vertcat(solved, v), ca.vertcat(values, root)
-    return ca.vertcat(*solution)
+        own = rows[row_starts[block] : row_starts[block + 1]]
+        v, r = (ca.vertcat(*those) for those in ([symbols[i] for i in places], [residuals[k] for k in own]))
+        before = sorted({i for k in own for i in needs[starts[k] : starts[k + 1]] if i in solution})
+        if before:
+            r = ca.substitute(r, *(ca.vertcat(*(those[i] for i in before)) for those in (symbols, solution)))
+        solution |= zip(places, ca.vertsplit(_solve_block(known, r, v)), strict=True)
+    return ca.vertcat(*(solution[i] for i in range(len(symbols))))
 
 
 def _solve_block(known: ExpansionPoint, r: ca.SX, v: ca.SX) -> ca.SX:
@@ -228,6 +247,11 @@ def _solve_block(known: ExpansionPoint, r: ca.SX, v: ca.SX) -> ca.SX:
 def _inverse(slope: np.ndarray) -> ca.DM:
     """The inverse (n, n) of a matrix, computed with rows and columns scaled to order one; entries that are only rounding are
     set to zero."""
+    if slope.size == 1 and slope[0, 0] != 0.0:  # the same operations, of numbers
+        number = float(slope[0, 0])
+        row = 1 / abs(number)
+        column = 1 / abs(row * number)
+        return ca.DM(column * (1 / (row * number * column)) * row)
     rows = 1 / np.abs(slope).max(axis=1)
     columns = 1 / np.abs(rows[:, None] * slope).max(axis=0)
     scaled = np.linalg.inv(rows[:, None] * slope * columns)

@@ -10,6 +10,7 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatterMathtext, LogFormatterSciNotation
 
@@ -53,7 +54,8 @@ def svg(figure: Figure) -> str:
     """The figure as SVG text without a date: the same for the same figure, which is closed."""
     _plain_ticks(figure)
     buffer = io.StringIO()
-    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": "ctrlgen"})
+    # what savefig does, without its drawing once more before
+    FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None, "Creator": "ctrlgen"})
     plt.close(figure)
     text = buffer.getvalue()
     return re.sub(r"<\?xml.*?<svg", "<svg", text, count=1, flags=re.DOTALL)

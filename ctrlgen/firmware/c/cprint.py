@@ -87,6 +87,7 @@ class Printer:
         self._constants = Constants(self.real)
         self._constants.reserve(*(law.name for law in self.laws))
         self._law_texts: dict[str, str] = {}
+        self._law_rows: dict[tuple[str, tuple[str, ...]], list[Node]] = {}
 
     @property
     def derived(self) -> list[Derived]:
@@ -133,7 +134,9 @@ class Printer:
             ]
             for chosen in product(*standing):
                 renamed = dict(zip(names, chosen, strict=True))
-                nodes = self._rows(law.function, law.named, renamed)
+                if (law.name, chosen) not in self._law_rows:
+                    self._law_rows[law.name, chosen] = self._rows(law.function, law.named, renamed)
+                nodes = self._law_rows[law.name, chosen]
                 if any(node.number in needed for node in nodes):
                     calls |= self._called(law, nodes)
         return calls

@@ -14,6 +14,7 @@ import operator
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import accumulate
 from typing import Any
 
@@ -30,6 +31,7 @@ SAME_NUMBER = 1e-6  # relative difference of a number computed in two orders, di
 PRODUCT = {ca.OP_MUL: product_of, ca.OP_DIV: quotient_of}
 GIVEN = "given"  # the array of the numbers that the program is given when it starts
 TWICE_PRINTED = (ca.OP_SIGN, ca.OP_FABS, ca.OP_FMIN, ca.OP_FMAX)  # their operands appear twice in C
+WHOLE_WORD = re.compile(r"[\w.\[\]]+")  # a number or the path of a parameter
 _FORMULA = {
     ca.OP_ADD: "{0} + {1}",
     ca.OP_SUB: "{0} - {1}",
@@ -376,10 +378,17 @@ _EXACT: Mapping[int, Callable[..., float]] = {
 
 def _term(node: Node) -> str:
     """A number's formula as a part of another."""
-    text = node.formula or f"{node.value:.9g}"
+    return _as_term(node.formula or f"{node.value:.9g}")
+
+
+@lru_cache(maxsize=4096)
+def _as_term(text: str) -> str:
+    """A formula in brackets where it needs them."""
+    if WHOLE_WORD.fullmatch(text):
+        return text
     depth = list(accumulate((character == "(") - (character == ")") for character in text))
     call = re.match(r"\w*\(", text) is not None and all(depth[k] > 0 for k in range(text.index("("), len(text) - 1))
-    return text if call or re.fullmatch(r"[\w.\[\]]+", text) else f"({text})"
+    return text if call else f"({text})"
 
 
 def _short(formula: str) -> str:

@@ -36,6 +36,12 @@ def words_of_c() -> frozenset[str]:
 
 def render(template: str, context: dict[str, Any]) -> str:
     """`template` of `codegen/templates/` with `context`. A name that the template asks for and does not get is an error."""
+    return _environment().get_template(f"{template}.j2").render(context)
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    """Where the templates are read, each of them once."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(codegen_folder() / "templates"),
         undefined=jinja2.StrictUndefined,
@@ -52,7 +58,7 @@ def render(template: str, context: dict[str, Any]) -> str:
         "markdown_code": markdown_code,
         "one_line": one_line,
     }
-    return environment.get_template(f"{template}.j2").render(context)
+    return environment
 
 
 def hertz(rate: float | None, real: Real | None = None) -> str:
