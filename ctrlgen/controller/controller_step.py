@@ -8,6 +8,8 @@ from enum import IntFlag
 import casadi as ca
 import numpy as np
 
+from ctrlgen.numerics.batched_evaluation import quick
+
 State = tuple[np.ndarray, ...]  # x, z, and of a device whose drives have rate limits the last drive
 
 
@@ -37,9 +39,9 @@ class ControllerStep:
     state: State
 
 
-def row(value: ca.DM) -> np.ndarray:
-    """A vector of CasADi as an array (n,)."""
-    return value.full().ravel()
+def answer(kernel: ca.Function, *arguments: object) -> np.ndarray:
+    """The only result (n,) of a `kernel`."""
+    return quick(kernel)(*arguments)
 
 
 def clamp(wanted: np.ndarray, low: np.ndarray, high: np.ndarray, slack: np.ndarray) -> tuple[np.ndarray, bool]:

@@ -13,7 +13,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from ctrlgen.controller.controller_step import ControllerStatus, ControllerStep, State, clamp, row
+from ctrlgen.controller.controller_step import ControllerStatus, ControllerStep, State, answer, clamp
 from ctrlgen.controller.drive_rate import FREE, RateLimiter
 from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.controller.limit_reach import Slacks
@@ -112,9 +112,9 @@ class Controller:
 
     def _answer(self, what: str, kernel: ca.Function, *arguments: object) -> np.ndarray:
         """The answer of a kernel on which a decision is taken."""
-        answer = row(kernel(*arguments))
-        self.observe(what, answer)
-        return answer
+        found = answer(kernel, *arguments)
+        self.observe(what, found)
+        return found
 
     def step(self, state: State, target: np.ndarray, *, settle: bool = False) -> ControllerStep:
         """Drives that bring the followed signal to `target` (channels,) [SI] at the next sample, from `state` (as `rest`).
@@ -142,11 +142,11 @@ class Controller:
             beyond = wanted
             wanted, hit = clamp(beyond, *m.z_bounds, z_slack)
             if hit:
-                wanted = row(kernels.nearest(beyond))
+                wanted = answer(kernels.nearest, beyond)
                 status |= ControllerStatus.DISPLACEMENT
         state_wanted, hit = self._limited_state(k, x, z, wanted)
         if hit:
-            wanted = row(k.settle(np.concatenate([state_wanted, x[n:]]), wanted, kernels.safe_drive))
+            wanted = answer(k.settle, np.concatenate([state_wanted, x[n:]]), wanted, kernels.safe_drive)
             status |= ControllerStatus.STATE
         wanted, worst = self._limit_composite(x, z, wanted)
         if worst > 1:
@@ -173,8 +173,8 @@ class Controller:
             status, limited, wanted = status | ControllerStatus.RATE, True, z + share * (wanted - z)
         if not limited and len(x) == n:  # only actuators have memory: their state is what the drive was computed for
             return ControllerStep(status, wanted, state_wanted, u, (state_wanted, wanted, *last))
-        x_next = row(k.advance(x, wanted if static else z, u))
-        z_next = row(k.settle(x_next, wanted, u)) if limited else wanted
+        x_next = answer(k.advance, x, wanted if static else z, u)
+        z_next = answer(k.settle, x_next, wanted, u) if limited else wanted
         if held:
             status |= self._passed(x_next, z_next) if kernels.limits_can_be_passed else status
             state_wanted = x_next[:n]
@@ -203,8 +203,8 @@ class Controller:
         if self.rate is not None:
             u = np.clip(self._toward(self.rate, last[0], u)[0], *m.u_bounds)
             last = [u]
-        x_next = row(k.advance(x, z, u))
-        z_next = row(k.settle(x_next, z, u))
+        x_next = answer(k.advance, x, z, u)
+        z_next = answer(k.settle, x_next, z, u)
         return ControllerStep(ControllerStatus.INPUT, z, x[: m.n_states], u, (x_next, z_next, *last))
 
     def _limited_state(self, k: Inverse, x: np.ndarray, z: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, bool]:
@@ -234,11 +234,11 @@ class Controller:
         """
         (low, high), slack = self.kernels.nominal.u_bounds, self.slacks[2]
 
-        def answer(displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        def needed(displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             state, _ = self._limited_state(k, now[0], now[1], displacement)
             return state, self.drive(k, now, displacement, state)
 
-        state, at_start = answer(origin)
+        state, at_start = needed(origin)
         if clamp(at_start, low, high, slack)[1]:
             return origin, state, at_start
         direction, accepted, rejected = target - origin, 0.0, 1.0
@@ -248,7 +248,7 @@ class Controller:
                 limit = high[i] if at_target[i] > high[i] else low[i]
                 share = min(share, (limit - at_start[i]) / (at_target[i] - at_start[i]))
             fraction = accepted + SECANT_FRACTION * max(share, 0.0) * (rejected - accepted)
-            trial_state, drive = answer(origin + fraction * direction)
+            trial_state, drive = needed(origin + fraction * direction)
             if clamp(drive, low, high, slack)[1]:
                 rejected, at_target = fraction, drive
             else:

@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.controller.composite_bound import composite_bound, worst_in_range
-from ctrlgen.controller.controller_step import row
+from ctrlgen.controller.controller_step import answer
 from ctrlgen.controller.limit_reach import Slacks, drive_beyond, state_beyond
 from ctrlgen.controller.lost_state import Groups, plausible_sums
 from ctrlgen.controller.named_inverse import NamedInverses, given_inverses, named_inverses
@@ -212,7 +212,7 @@ class ControllerKernels:
         z_slack, state_slack = share * m.z_scale, share * m.x_scale[:n]
         x, z = self.model.rest, np.zeros(len(self.model.axes))
         kernel = (self.moving or self.static).drive
-        drives = [row(kernel(x, z, z + side * z_slack, x[:n] + side * state_slack)) for side in (-1, 0, 1)]
+        drives = [answer(kernel, x, z, z + side * z_slack, x[:n] + side * state_slack) for side in (-1, 0, 1)]
         return z_slack, state_slack, np.max(np.abs(np.diff(drives, axis=0)), axis=0)
 
     def plausible(self, with_drive: bool) -> Groups:

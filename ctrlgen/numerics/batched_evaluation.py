@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import time
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -38,6 +39,37 @@ def evaluate(batched: ca.Function, *given: np.ndarray) -> list[np.ndarray]:
             buffer.set_res(i, value.ravel().data)
     run()
     return results
+
+
+class QuickCall:
+    """A function with one result (n,), called for one set of arguments: they are written to memory that it keeps, which takes a tenth
+    of the time of `Function.__call__` where a function is short."""
+
+    def __init__(self, function: ca.Function) -> None:
+        if function.nnz_out(0) < function.numel_out(0):
+            symbols = [ca.SX.sym(name, *function.size_in(name)) for name in function.name_in()]
+            function = ca.Function(function.name(), symbols, [ca.densify(function(*symbols))])
+        self._buffer, self._run = function.buffer()
+        self._given = [np.zeros(function.nnz_in(i)) for i in range(function.n_in())]
+        self._result = np.zeros(function.nnz_out(0))
+        for i, value in enumerate(self._given):
+            if value.size:
+                self._buffer.set_arg(i, value.data)
+        if self._result.size:
+            self._buffer.set_res(0, self._result.data)
+
+    def __call__(self, *arguments: object) -> np.ndarray:
+        """The result (n,) at `arguments`, each a number for all of its elements or an array of them."""
+        for own, value in zip(self._given, arguments, strict=True):
+            own[:] = value
+        self._run()
+        return self._result.copy()
+
+
+@lru_cache(maxsize=128)  # the kernels of some controllers
+def quick(function: ca.Function) -> QuickCall:
+    """`QuickCall` of a function, made once."""
+    return QuickCall(function)
 
 
 class Recursion:

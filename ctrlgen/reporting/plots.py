@@ -55,7 +55,8 @@ def svg(figure: Figure) -> str:
     _plain_ticks(figure)
     buffer = io.StringIO()
     # what savefig does, without its drawing once more before
-    FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None, "Creator": "ctrlgen"})
+    canvas: Any = FigureCanvasSVG(figure)
+    canvas.print_svg(buffer, metadata={"Date": None, "Creator": "ctrlgen"})
     plt.close(figure)
     text = buffer.getvalue()
     return re.sub(r"<\?xml.*?<svg", "<svg", text, count=1, flags=re.DOTALL)
