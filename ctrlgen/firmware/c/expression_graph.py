@@ -68,9 +68,8 @@ class Node:
     formula: str = ""
     array: str = ""
     index: int = 0
-    source: Node | None = (
-        None  # of a number that is known when the program starts: its expression in the numbers given then
-    )
+    # Of a number that is known when the program starts: its expression in the numbers given then
+    source: Node | None = None
 
     @property
     def constant(self) -> bool:
@@ -124,11 +123,8 @@ class Graph:
         at = dict[int, Node]()
         values = [self.constant(0.0)] * function.size1_out(0)
         for k in range(function.n_instructions()):
-            op, inputs, outputs = (
-                function.instruction_id(k),
-                function.instruction_input(k),
-                function.instruction_output(k),
-            )
+            op, inputs = function.instruction_id(k), function.instruction_input(k)
+            outputs = function.instruction_output(k)
             if op == ca.OP_OUTPUT:
                 values[function.sparsity_out(0).row()[outputs[1]]] = at[inputs[0]]
             elif op == ca.OP_CONST:
@@ -395,11 +391,8 @@ def _short(formula: str) -> str:
     """What a long formula depends on: the parameters, or the sections of the device that they stand in."""
     paths = list(dict.fromkeys(re.findall(r"[a-z_][\w\[\]]*(?:\.[\w\[\]]+)*(?![\w.(])", formula)))
     text = f"f({', '.join(paths)})"
-    return (
-        text
-        if len(text) <= LONGEST_FORMULA
-        else f"f({', '.join(dict.fromkeys(path.partition('.')[0] for path in paths))})"
-    )
+    sections = dict.fromkeys(path.partition(".")[0] for path in paths)
+    return text if len(text) <= LONGEST_FORMULA else f"f({', '.join(sections)})"
 
 
 def _by_products(exponent: float) -> bool:
