@@ -42,6 +42,7 @@ def with_values(device):
 def blade(name: str, x: float) -> str:
     return f"""[[element]]
 kind = "blade"
+slender = true
 name = "{name}"
 from = "ground"
 to = "stage"
@@ -164,7 +165,8 @@ def mems_hexapod_text(device) -> str:
     for i in range(6):
         span = dm(g.platform[i] - g.base[i]).ravel()
         lines.append(
-            f'[[element]]\nkind = "strut"\nname = "strut{i + 1}"\nfrom = "stage{hexapod.STAGE_OF_STRUT[i] + 1}"\nto = "platform"\n'
+            f'[[element]]\nkind = "strut"\nname = "strut{i + 1}"\nslender = true\n'
+            f'from = "stage{hexapod.STAGE_OF_STRUT[i] + 1}"\nto = "platform"\n'
             f"at = {place(dm(g.platform[i]))}\nalong = {vector(span)}\nacross = [0, 0, 1]\nlength = {number(np.linalg.norm(span), 'm')}\n"
             f"wire_length = {number(h.wire_length, 'm')}\nwire_diameter = {number(h.wire_diameter, 'm')}\n"
             f'rod_diameter = {number(h.rod_diameter, "m")}\nmaterial = "tungsten"\n'

@@ -25,7 +25,7 @@ def dense(text: str) -> str:
 def wire(name: str, first: str, to: str, x: float, length: float, diameter: float) -> str:
     """Along x, from x - length to x [mm]."""
     return (
-        f'[[element]]\nkind = "wire"\nname = "{name}"\nfrom = "{first}"\nto = "{to}"\nat = ["{x} mm", "0 mm", "0 mm"]\n'
+        f'[[element]]\nkind = "wire"\nslender = true\nname = "{name}"\nfrom = "{first}"\nto = "{to}"\nat = ["{x} mm", "0 mm", "0 mm"]\n'
         f'along = [1, 0, 0]\nlength = "{length} mm"\ndiameter = "{diameter} mm"\nmaterial = "silicon"\n'
     )
 
@@ -44,8 +44,8 @@ def bodies(*names: str, more: str = "") -> str:
 
 
 STRUT = (
-    '[[element]]\nkind = "strut"\nname = "strut"\nfrom = "ground"\nto = "tip"\nat = ["30 mm", "0 mm", "0 mm"]\nalong = [1, 0, 0]\n'
-    'length = "30 mm"\nwire_length = "5 mm"\nwire_diameter = "0.5 mm"\nrod_diameter = "3 mm"\nmaterial = "silicon"\n'
+    '[[element]]\nkind = "strut"\nslender = true\nname = "strut"\nfrom = "ground"\nto = "tip"\nat = ["30 mm", "0 mm", "0 mm"]\n'
+    'along = [1, 0, 0]\nlength = "30 mm"\nwire_length = "5 mm"\nwire_diameter = "0.5 mm"\nrod_diameter = "3 mm"\nmaterial = "silicon"\n'
 )
 TIP = 'mass = "2 g"\ncentre = ["30 mm", "0 mm", "0 mm"]\ninertia = ["20 g*mm^2", "20 g*mm^2", "20 g*mm^2"]\n'
 

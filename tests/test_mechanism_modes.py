@@ -23,9 +23,7 @@ def test_the_first_natural_frequency_of_a_parallelogram_is_that_of_its_mass_on_i
     assert modes[1] > 4 * modes[0]
 
 
-WIRE = (
-    '[[element]]\nkind = "wire"\nname = "{name}"\nfrom = "ground"\nto = "plate"\nat = ["{x} mm", "{y} mm", "{z} mm"]\n'
-)
+WIRE = '[[element]]\nkind = "wire"\nslender = true\nname = "{name}"\nfrom = "ground"\nto = "plate"\nat = ["{x} mm", "{y} mm", "{z} mm"]\n'
 WIRE += 'along = [{along}]\nlength = "10 mm"\ndiameter = "0.2 mm"\nmaterial = "silicon"\n'
 SIX = [
     (0, 0, 0, "1, 0, 0"),
@@ -78,8 +76,8 @@ def test_a_mass_beside_the_end_of_a_beam_has_the_frequencies_of_deflection_and_t
     """K of the cantilever's end in its plane, M = [[m, m e], [m e, I + m e^2]] with the centre of mass e ahead of the end."""
     E, l, d, m, inertia, e = 130e9, 20e-3, 0.5e-3, 0.03, 4e-6, ahead * 1e-3
     wire = (
-        '[[element]]\nkind = "wire"\nname = "w"\nfrom = "ground"\nto = "tip"\nat = ["20 mm", "0 mm", "0 mm"]\nlength = "20 mm"\n'
-        'diameter = "0.5 mm"\nmaterial = "silicon"\n'
+        '[[element]]\nkind = "wire"\nslender = true\nname = "w"\nfrom = "ground"\nto = "tip"\nat = ["20 mm", "0 mm", "0 mm"]\n'
+        'length = "20 mm"\ndiameter = "0.5 mm"\nmaterial = "silicon"\n'
     )
     body = f'[[body]]\nname = "tip"\nmass = "30 g"\ncentre = ["{20 + ahead} mm", "0 mm", "0 mm"]\n'
     body += 'inertia = ["4 kg*mm^2", "4 kg*mm^2", "4 kg*mm^2"]\n'

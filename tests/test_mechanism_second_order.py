@@ -179,7 +179,7 @@ def test_a_point_flexure_is_the_same_from_both_of_its_ends(tmp_path):
 
 def test_a_beam_in_pieces_is_the_same_beam():
     """Of every two loads: each piece goes on from the rotation in which the one before it ends."""
-    whole = Segment(20e-3, 2e5, 0.8, 0.3, 0.5)
+    whole = Segment(20e-3, 1e-6, 1e-12, 1e-12, 2e5, 0.8, 0.3, 0.5, 4e-6, 7e-6)
     pieces = [replace(whole, length=share * whole.length) for share in (0.2, 0.5, 0.3)]
     a, b = [i for i in range(6) for _ in range(6)], list(range(6)) * 6
     one, three = (ca.DM(beam(s, ca.DM.eye(6), a, b)).full() for s in ([whole], pieces))

@@ -89,7 +89,7 @@ def test_a_stage_whose_blades_may_come_nearer_does_not_stiffen(tmp_path):
     assert float(force_law(device)(y)) == pytest.approx(24 * EI / L**3 * y, rel=0.1 * (y / L) ** 2)
 
 
-WIRE = 'kind = "wire"\ndiameter = "0.2 mm"\n'
+WIRE = 'kind = "wire"\nslender = true\ndiameter = "0.2 mm"\n'
 
 
 def column(wires: int, flexure: str = WIRE, across: str = "[1, 0, 0]") -> str:
@@ -129,8 +129,18 @@ def test_an_axial_load_stiffens_and_softens_as_a_beam_column(tmp_path, wires, ex
     ("flexure", "across", "bending", "area"),
     [
         (WIRE, "[1, 0, 0.7]", np.pi * T**4 / 64, np.pi * T**2 / 4),
-        ('kind = "blade"\nthickness = "0.2 mm"\nwidth = "0.4 mm"\n', "[1, 0, 0]", 2 * T**4 / 12, 2 * T**2),
-        ('kind = "blade"\nthickness = "0.2 mm"\nwidth = "0.4 mm"\n', "[0, 0, 1]", 8 * T**4 / 12, 2 * T**2),
+        (
+            'kind = "blade"\nslender = true\nthickness = "0.2 mm"\nwidth = "0.4 mm"\n',
+            "[1, 0, 0]",
+            2 * T**4 / 12,
+            2 * T**2,
+        ),
+        (
+            'kind = "blade"\nslender = true\nthickness = "0.2 mm"\nwidth = "0.4 mm"\n',
+            "[0, 0, 1]",
+            8 * T**4 / 12,
+            2 * T**2,
+        ),
     ],
 )
 def test_an_axial_load_stiffens_in_both_planes_of_a_flexure(tmp_path, flexure, across, bending, area):
@@ -146,7 +156,7 @@ def test_an_axial_load_stiffens_in_both_planes_of_a_flexure(tmp_path, flexure, a
 def test_an_axial_load_bends_the_length_that_it_stretches_to(tmp_path):
     """Of an extensible beam P and F act on (1 + e) l, e = P/EA: F l^3/(EI y) = 3 + (6/5 - 6 EI/(EA l^2)) p + ..., 1.12 for a blade that is
     pushed in its plane, w = 0.4 l. Source: E. Reissner, Z. Angew. Math. Phys. 23 (1972) 795, without shear."""
-    flexure = 'kind = "blade"\nthickness = "0.2 mm"\nwidth = "8 mm"\n'
+    flexure = 'kind = "blade"\nslender = true\nthickness = "0.2 mm"\nwidth = "8 mm"\n'
     device, d = loaded(tmp_path, column(1, flexure, "[0, 0, 1]")), ca.SX.sym("d", 2)
     K = ca.Function("K", [d], [ca.jacobian(force_law(device)(d), d)])
     share = W**2 / (12 * L**2)  # EI/(EA l^2)

@@ -15,9 +15,11 @@ from ctrlgen.model.simulation import simulate
 TRIPOD = load_device(DEVICE.parent / "tripod.toml")
 E, NU, L, D, R, R_SPRING, K_SPRING, MASS, INERTIA = 205e9, 0.3, 20e-3, 0.6e-3, 30e-3, 20e-3, 400.0, 0.12, 27e-6
 I = np.pi * D**4 / 64
-ACROSS = 12 * E * I / L**3
+KAPPA = 6 * (1 + NU) / (7 + 6 * NU)  # of a round section (Cowper 1966)
+BENDING, SHEAR = L**3 / (12 * E * I), L * 2 * (1 + NU) / (KAPPA * E * np.pi * D**2 / 4)
+ACROSS = 1 / (BENDING + SHEAR)
 PISTON = 3 * (ACROSS + K_SPRING)
-TILT = 1.5 * (ACROSS * R**2 + 4 * E * I / L + E / (2 * (1 + NU)) * 2 * I / L + K_SPRING * R_SPRING**2)
+TILT = 1.5 * (ACROSS * R**2 + E * I / L + ACROSS * L**2 / 4 + E / (2 * (1 + NU)) * 2 * I / L + K_SPRING * R_SPRING**2)
 
 
 def test_the_tripod_has_the_stiffness_and_the_modes_of_its_wires_and_springs():

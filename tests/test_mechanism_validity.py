@@ -92,7 +92,7 @@ def many(count: int) -> str:
             (f"on{k}", f"b{k - 1}" if k else "ground", f'["{5 * k} mm", "0 mm", "1 mm"]', "[1, 0, 0]"),
         ):
             text += (
-                f'[[element]]\nkind = "wire"\nname = "{name}"\nfrom = "{first}"\nto = "b{k}"\nat = {at}\nalong = {along}\n'
+                f'[[element]]\nkind = "wire"\nslender = true\nname = "{name}"\nfrom = "{first}"\nto = "b{k}"\nat = {at}\nalong = {along}\n'
                 'length = "4 mm"\ndiameter = "0.3 mm"\nmaterial = "silicon"\n'
             )
     for k, axis in enumerate(("[1, 0, 0]", "[0, 0, 1]")):

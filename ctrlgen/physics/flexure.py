@@ -1,10 +1,34 @@
-"""Compliances of the elementary flexures, each about its free end, x along the flexure."""
+"""Compliances of the elementary flexures, each about its free end, x along the flexure, as slender as the papers take them.
+
+What shear and held ends change of a blade or wire of a mechanism is in `held_flexure.py`.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
 import casadi as ca
 
-from ctrlgen.physics.screw import Matrix, Scalar
+from ctrlgen.physics.screw import Matrix, Scalar, move, series
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A straight, uniform piece of a flexure: length [m], area [m^2] and second moments I_y, I_z [m^4] of its section, rigidities EA [N],
+    EI_y, EI_z, GJ [N m^2], and how far it shears, 1/(kappa G A) along y and z [1/N]."""
+
+    length: Any
+    area: Any
+    I_y: Any
+    I_z: Any
+    EA: Any
+    EI_y: Any
+    EI_z: Any
+    GJ: Any
+    shear_y: Any = 0.0
+    shear_z: Any = 0.0
 
 
 def shear_ratio(poisson: Scalar) -> Scalar:
@@ -41,19 +65,39 @@ def beam_compliance(l: Scalar, EA: Scalar, EI_y: Scalar, EI_z: Scalar, GJ: Scala
     return ca.vertcat(*(ca.horzcat(*row) for row in rows))
 
 
+def segment_compliance(s: Segment, length: Any = None) -> Matrix:
+    """(6, 6): a segment, or so much of it from its fixed end, about its free end: `beam_compliance`, and by shear delta_y/F_y and
+    delta_z/F_z greater by length/(kappa G A). Source: S. P. Timoshenko, Phil. Mag. 41 (1921) 744."""
+    x = s.length if length is None else length
+    C = beam_compliance(x, s.EA, s.EI_y, s.EI_z, s.GJ)
+    C[4, 1] += x * s.shear_y
+    C[5, 2] += x * s.shear_z
+    return C
+
+
+def segments_compliance(segments: Sequence[Segment]) -> Matrix:
+    """(6, 6): segments in line, the first one fixed, about the free end of the last."""
+    left: Any = 0.0
+    parts = []
+    for s in reversed(segments):
+        parts.append(move(segment_compliance(s), None, (-left, 0, 0)))
+        left = left + s.length
+    return series(tuple(parts))
+
+
 def blade_compliance(l: Scalar, t: Scalar, w: Scalar, E: Scalar, nu: Scalar) -> Matrix:
     """[C^b]: blade of length l, thickness t (along y), width w (along z), t <= w, shape (6, 6).
 
     EA = E t w, EI_z = E w t^3/12, EI_y = E t w^3/12, GJ = chi beta EI_z.
     Source: S1 eq. (21)-(23). `l`, `t`, `w` [m], `E` [Pa], `nu` [1].
     """
-    return beam_compliance(l, *blade_rigidity(t, w, E, nu))
+    return segment_compliance(blade_segment(l, t, w, E, nu))
 
 
-def blade_rigidity(t: Scalar, w: Scalar, E: Scalar, nu: Scalar) -> tuple[Scalar, Scalar, Scalar, Scalar]:
-    """EA [N], EI_y, EI_z, GJ [N m^2] of `blade_compliance`."""
-    EI_z = E * w * t**3 / 12
-    return E * t * w, E * t * w**3 / 12, EI_z, shear_ratio(nu) * torsion_ratio(t, w) * EI_z
+def blade_segment(l: Scalar, t: Scalar, w: Scalar, E: Scalar, nu: Scalar) -> Segment:
+    """The blade of `blade_compliance`."""
+    A, I_y, I_z = t * w, t * w**3 / 12, w * t**3 / 12
+    return Segment(l, A, I_y, I_z, E * A, E * I_y, E * I_z, shear_ratio(nu) * torsion_ratio(t, w) * E * I_z)
 
 
 def wire_compliance(l: Scalar, d: Scalar, E: Scalar, nu: Scalar) -> Matrix:
@@ -62,13 +106,13 @@ def wire_compliance(l: Scalar, d: Scalar, E: Scalar, nu: Scalar) -> Matrix:
     EA = pi E d^2/4, EI = pi E d^4/64, GJ = 2 chi EI.
     Source: S1 eq. (24). `l`, `d` [m], `E` [Pa], `nu` [1].
     """
-    return beam_compliance(l, *wire_rigidity(d, E, nu))
+    return segment_compliance(wire_segment(l, d, E, nu))
 
 
-def wire_rigidity(d: Scalar, E: Scalar, nu: Scalar) -> tuple[Scalar, Scalar, Scalar, Scalar]:
-    """EA [N], EI_y, EI_z, GJ [N m^2] of `wire_compliance`."""
-    EI = E * ca.pi * d**4 / 64
-    return E * ca.pi * d**2 / 4, EI, EI, 2 * shear_ratio(nu) * EI
+def wire_segment(l: Scalar, d: Scalar, E: Scalar, nu: Scalar) -> Segment:
+    """The wire of `wire_compliance`."""
+    A, I = ca.pi * d**2 / 4, ca.pi * d**4 / 64
+    return Segment(l, A, I, I, E * A, E * I, E * I, 2 * shear_ratio(nu) * E * I)
 
 
 def round_section(d: Scalar) -> tuple[Scalar, Scalar, Scalar]:

@@ -20,16 +20,15 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from ctrlgen.physics.flexure import beam_compliance
+from ctrlgen.physics.flexure import Segment, segment_compliance
 from ctrlgen.physics.screw import Matrix, Scalar, inverse_adjoint, move
-from ctrlgen.physics.second_order_flexure import Segment
 
 # Exact to the seventh degree; squared cubic shapes are of the sixth.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 
 def flexure_mass(
-    segments: Sequence[Segment], density: Scalar, young: Scalar, R: Matrix, end: Matrix, first: Matrix, load: Matrix
+    segments: Sequence[Segment], density: Scalar, R: Matrix, end: Matrix, first: Matrix, load: Matrix
 ) -> Matrix:
     """(m, m): twice the kinetic energy per motions of a flexure of `segments` from its fixed end, density [kg/m^3] and Young's modulus
     [Pa] given, with frame `R` (3, 3) at its free `end` [m]; `first` (6, m) the twist of its fixed end and `load` (6, m) the wrench on its
@@ -39,16 +38,15 @@ def flexure_mass(
     passed: list[tuple[Scalar, Matrix]] = []  # where each piece before ends, and its compliance there
     M = ca.SX.zeros(first.shape[1], first.shape[1])
     for s in segments:
-        rigidity = (s.EA, s.EI_y, s.EI_z, s.GJ)
-        inertia = ca.vertcat(s.EI_y + s.EI_z, s.EI_y, s.EI_z, s.EA, s.EA, s.EA) * density / young  # per length
+        inertia = ca.vertcat(s.I_y + s.I_z, s.I_y, s.I_z, s.area, s.area, s.area) * density  # per length
         for node, weight in zip(NODES, WEIGHTS, strict=True):
             within = s.length * (1 + node) / 2
             x = begun + within
-            C = beam_compliance(within, *rigidity)
+            C = segment_compliance(s, within)
             C += sum((move(compliance, None, (at - x, 0, 0)) for at, compliance in passed), ca.DM.zeros(6, 6))
             here = inverse_adjoint(R, end - (length - x) * R[:, 0])
             T = ca.mtimes(here, first) + ca.mtimes([C, here, load])
             M += ca.mtimes([T.T, ca.diag(inertia * s.length * weight / 2), T])
         begun = begun + s.length
-        passed.append((begun, beam_compliance(s.length, *rigidity)))
+        passed.append((begun, segment_compliance(s)))
     return M

@@ -13,29 +13,18 @@ for a straight beam in a plane, the coefficients 6/5, -1/10 and 2/15 of S. Awtar
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from ctrlgen.physics.flexure import Segment
 from ctrlgen.physics.screw import Matrix
 
 AXIS = ca.DM([1, 0, 0])
 # Exact to the fifth degree; the strains are of the fourth along a segment.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(3)
 AWTAR_2 = ca.DM([[-1 / 700, 1 / 1400], [1 / 1400, -11 / 6300]])  # of (displacement/l, rotation): p^2 in a beam-column
-
-
-@dataclass(frozen=True)
-class Segment:
-    """A straight, uniform piece of a flexure: length [m] and rigidities EA [N], EI_y, EI_z, GJ [N m^2]."""
-
-    length: Any
-    EA: Any
-    EI_y: Any
-    EI_z: Any
-    GJ: Any
 
 
 def dot(load: Matrix, deformation: Matrix) -> Matrix:
@@ -81,9 +70,9 @@ def point_flexure(twist: Matrix, a: Sequence[int], b: Sequence[int]) -> Matrix:
 def beam(segments: Sequence[Segment], load: Matrix, a: Sequence[int], b: Sequence[int]) -> Matrix:
     """i (6, m) of segments in line, from the fixed to the free end, x along them, from the `load` (6, k) on the free end.
 
-    With kappa = the curvatures, psi their integral, the rotation of the section, and u' = psi x e_x + eps e_x, the second order of the
-    strains is Gamma_2 = -psi x u' + psi x (psi x e_x)/2 and K_2 = -psi x kappa/2; i is what the free end does where those are strains
-    without a load: the integral of K_2, and of Gamma_2 + K_2 x (l - s) e_x.
+    With kappa = the curvatures, psi their integral, the rotation of the section, Gamma_1 = stretch and shear, and
+    u' = psi x e_x + Gamma_1, the second order of the strains is Gamma_2 = -psi x u' + psi x (psi x e_x)/2 and K_2 = -psi x kappa/2; i is
+    what the free end does where those are strains without a load: the integral of K_2, and of Gamma_2 + K_2 x (l - s) e_x.
     """
     return (_beam(segments, load, a, b) + _beam(segments, load, b, a)) / 2
 
@@ -101,14 +90,14 @@ def _beam(segments: Sequence[Segment], load: Matrix, a: Sequence[int], b: Sequen
             lever = x * (left - x / 2)
             return ca.mtimes(ca.diag(by), x * load[3:, :] + lever * across)
 
-        stretch = load[0, :] / s.EA
+        strain = ca.vertcat(load[0, :] / s.EA, load[1, :] * s.shear_y, load[2, :] * s.shear_z)
         for node, weight in zip(NODES, WEIGHTS, strict=True):
             x = s.length * (1 + node) / 2
             rest = left - x
             kappa = ca.mtimes(ca.diag(flexibility), load[3:, :] + rest * across)
             R = psi + bent(x)
             slope = cross(R[:, b], along)
-            Gamma = -cross(R[:, a], slope) / 2 - cross(R[:, a], along) * ca.repmat(stretch[:, b], 3, 1)
+            Gamma = -cross(R[:, a], slope) / 2 - cross(R[:, a], strain[:, b])
             K = -cross(R[:, a], kappa[:, b]) / 2
             turn += weight * s.length / 2 * K
             shift += weight * s.length / 2 * (Gamma + rest * cross(K, along))

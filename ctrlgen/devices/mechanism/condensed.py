@@ -179,7 +179,7 @@ class Condensed:
         )
         if not segments:
             return None
-        return flexure_mass(segments, material.density, material.young, self.frames[k], self.ends[k], first, load)
+        return flexure_mass(segments, material.density, self.frames[k], self.ends[k], first, load)
 
     @property
     def mass(self) -> Matrix:

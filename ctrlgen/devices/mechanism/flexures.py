@@ -13,9 +13,9 @@ from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.hinge import Hinge
 from ctrlgen.devices.mechanism.joining import Joining, Length
 from ctrlgen.devices.mechanism.stated_compliances import compliance_of_entries
-from ctrlgen.physics import circular_hinge, flexure
-from ctrlgen.physics.screw import Matrix, move, series
-from ctrlgen.physics.second_order_flexure import Segment
+from ctrlgen.physics import circular_hinge, flexure, held_flexure
+from ctrlgen.physics.flexure import Segment
+from ctrlgen.physics.screw import Matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +58,12 @@ class Beam(Flexible):
     """Length between its ends."""
     geometric_stiffening: StrictBool = False
     """Whether it stretches where its ends are held as it bends, and an axial load makes it stiffer or softer across."""
+    slender: StrictBool = False
+    """Whether it is taken as slender, S1 eq. (21)-(24): no shear, and ends that may contract, curve across and warp."""
+
+    def compliance(self, p: SimpleNamespace, m: SimpleNamespace) -> Matrix:
+        """[C] about the free end (6, 6): that of its segments."""
+        return flexure.segments_compliance(self.segments(p, m))
 
     def reach(self, p: SimpleNamespace) -> Any:
         """The length between its ends [m]."""
@@ -94,13 +100,10 @@ class Blade(Beam):
             )
         return self
 
-    def compliance(self, p: SimpleNamespace, m: SimpleNamespace) -> Matrix:
-        """[C] about the free end (6, 6). Source: S1 eq. (21)-(23)."""
-        return flexure.blade_compliance(p.length, p.thickness, p.width, m.young, m.poisson)
-
     def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
-        """One piece of rectangular section."""
-        return (Segment(p.length, *flexure.blade_rigidity(p.thickness, p.width, m.young, m.poisson)),)
+        """One piece of rectangular section. Source: `held_flexure`; slender, S1 eq. (21)-(23)."""
+        segment = flexure.blade_segment if self.slender else held_flexure.held_blade
+        return (segment(p.length, p.thickness, p.width, m.young, m.poisson),)
 
     def section(self, p: SimpleNamespace) -> Sequence[Any]:
         """Area and section moduli of the rectangle."""
@@ -118,13 +121,10 @@ class Wire(Beam):
     diameter: Length
     """Of the section."""
 
-    def compliance(self, p: SimpleNamespace, m: SimpleNamespace) -> Matrix:
-        """[C] about the free end (6, 6). Source: S1 eq. (24)."""
-        return flexure.wire_compliance(p.length, p.diameter, m.young, m.poisson)
-
     def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
-        """One piece of round section."""
-        return (Segment(p.length, *flexure.wire_rigidity(p.diameter, m.young, m.poisson)),)
+        """One piece of round section. Source: S1 eq. (24), with shear where it is not slender."""
+        segment = flexure.wire_segment if self.slender else held_flexure.timoshenko_wire
+        return (segment(p.length, p.diameter, m.young, m.poisson),)
 
     def section(self, p: SimpleNamespace) -> Sequence[Any]:
         """Area and section moduli of the round section."""
@@ -153,18 +153,11 @@ class Strut(Beam):
             raise ValueError("wire_length: two wires must fit in the length of the strut")
         return self
 
-    def compliance(self, p: SimpleNamespace, m: SimpleNamespace) -> Matrix:
-        """[C] about the free end (6, 6). Source: S1 section 5.2."""
-        wire = flexure.wire_compliance(p.wire_length, p.wire_diameter, m.young, m.poisson)
-        rod = flexure.wire_compliance(p.length - 2 * p.wire_length, p.rod_diameter, m.young, m.poisson)
-        lower = move(wire, None, (p.wire_length - p.length, 0, 0))
-        return series((lower, move(rod, None, (-p.wire_length, 0, 0)), wire))
-
     def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
-        """Three pieces: wire, rod, wire."""
-        wire = Segment(p.wire_length, *flexure.wire_rigidity(p.wire_diameter, m.young, m.poisson))
-        rod = flexure.wire_rigidity(p.rod_diameter, m.young, m.poisson)
-        return wire, Segment(p.length - 2 * p.wire_length, *rod), wire
+        """Three pieces, wire, rod, wire. Source: S1 section 5.2, with shear where it is not slender."""
+        segment = flexure.wire_segment if self.slender else held_flexure.timoshenko_wire
+        wire = segment(p.wire_length, p.wire_diameter, m.young, m.poisson)
+        return wire, segment(p.length - 2 * p.wire_length, p.rod_diameter, m.young, m.poisson), wire
 
     def section(self, p: SimpleNamespace) -> Sequence[Any]:
         """Area and section moduli of its wires."""

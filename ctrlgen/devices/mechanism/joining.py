@@ -13,8 +13,8 @@ from ctrlgen.core.names import Name
 from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.section import Section
 from ctrlgen.physics import rigid_bodies as mechanism
+from ctrlgen.physics.flexure import Segment
 from ctrlgen.physics.screw import Matrix, inverse
-from ctrlgen.physics.second_order_flexure import Segment
 
 Length = Annotated[Quantity, In("mm", positive=True)]
 Coordinate = Annotated[Quantity, In("mm")]
