@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
 from conftest import DEVICE
+from mechanism_files import loaded
 
 from ctrlgen import load_device
 from ctrlgen.devices.mechanism.modes import condensed_modes, natural_frequencies
@@ -212,3 +214,26 @@ def test_the_modes_of_a_parallelogram_are_those_of_its_leaf_springs_as_plates():
     q, r, nu = 0.4, 0.03, 0.33
     assert modes[0].frequency == pytest.approx(42.35 / np.sqrt(factors(q, r, nu)["delta_y"]), rel=1e-3)
     assert natural_frequencies(device)[2] == pytest.approx(1241, rel=0.015)  # plates of finite elements
+
+
+@pytest.mark.parametrize(
+    "change, says",
+    [
+        ({}, None),
+        (
+            {"width": "130 mm"},
+            "it is 5.2 times as wide as it is long; its equations were compared with finite elements up to 5",
+        ),
+        ({"thickness": "13 mm", "width": "20 mm"}, "it is 0.52 times as thick as it is long"),
+        ({"slender": "true"}, "shear and held ends are left out"),
+        ({"slender": "true", "width": "2 mm"}, None),
+    ],
+)
+def test_a_blade_outside_of_its_range_is_told(tmp_path, change, says):
+    text = (DEVICE.parent / "parallelogram.toml").read_text()
+    if "slender" in change:
+        text = text.replace('kind = "blade"', 'kind = "blade"\nslender = true')
+    for key, value in change.items():
+        text = re.sub(rf'(?m)^{key} = (\{{[^}}]*\}}|".*")$', f'{key} = "{value}"', text)
+    told = [remark for remark in loaded(tmp_path, text).remarks() if remark.startswith("left: ")]
+    assert (not told) if says is None else says in told[0]

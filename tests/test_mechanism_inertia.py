@@ -166,11 +166,11 @@ def test_masses_stiffness_and_damping_may_all_be_free(tmp_path):
 
 def test_check_says_how_far_the_condensed_modes_are(tmp_path):
     said = run_command("check", DEVICE.parent / "parallelogram.toml").stdout
-    assert "42.35 Hz (+0.0091 % of 42.34 Hz); first mode left out: 380.4 Hz" in said
+    assert "43.84 Hz (+0.0096 % of 43.83 Hz); first mode left out: 376.3 Hz" in said
     mirror = loaded(tmp_path, (DEVICE.parent / "tip_tilt_mirror.toml").read_text() + DYNAMICS)
     # Its wires are softer than its stacks
     assert any("do not move as at rest" in remark for remark in mirror.remarks())
-    assert not loaded(tmp_path, moving()).remarks()
+    assert not [remark for remark in loaded(tmp_path, moving()).remarks() if "slender" not in remark]
 
 
 @pytest.mark.parametrize(

@@ -97,7 +97,8 @@ def blade_compliance(l: Scalar, t: Scalar, w: Scalar, E: Scalar, nu: Scalar) -> 
 def blade_segment(l: Scalar, t: Scalar, w: Scalar, E: Scalar, nu: Scalar) -> Segment:
     """The blade of `blade_compliance`."""
     A, I_y, I_z = t * w, t * w**3 / 12, w * t**3 / 12
-    return Segment(l, A, I_y, I_z, E * A, E * I_y, E * I_z, shear_ratio(nu) * torsion_ratio(t, w) * E * I_z)
+    EI_z = E * w * t**3 / 12
+    return Segment(l, A, I_y, I_z, E * t * w, E * t * w**3 / 12, EI_z, shear_ratio(nu) * torsion_ratio(t, w) * EI_z)
 
 
 def wire_compliance(l: Scalar, d: Scalar, E: Scalar, nu: Scalar) -> Matrix:
@@ -112,7 +113,8 @@ def wire_compliance(l: Scalar, d: Scalar, E: Scalar, nu: Scalar) -> Matrix:
 def wire_segment(l: Scalar, d: Scalar, E: Scalar, nu: Scalar) -> Segment:
     """The wire of `wire_compliance`."""
     A, I = ca.pi * d**2 / 4, ca.pi * d**4 / 64
-    return Segment(l, A, I, I, E * A, E * I, E * I, 2 * shear_ratio(nu) * E * I)
+    EI = E * ca.pi * d**4 / 64
+    return Segment(l, A, I, I, E * ca.pi * d**2 / 4, EI, EI, 2 * shear_ratio(nu) * EI)
 
 
 def round_section(d: Scalar) -> tuple[Scalar, Scalar, Scalar]:

@@ -15,7 +15,10 @@ from ctrlgen.devices.mechanism.joining import Joining, Length
 from ctrlgen.devices.mechanism.stated_compliances import compliance_of_entries
 from ctrlgen.physics import circular_hinge, flexure, held_flexure
 from ctrlgen.physics.flexure import Segment
+from ctrlgen.physics.held_flexure import THICKEST, WIDEST
 from ctrlgen.physics.screw import Matrix
+
+SLENDEST = 0.1  # of the width over the length: beyond it a slender blade is off by more than 2 % in bending and shear
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +102,20 @@ class Blade(Beam):
                 f"thickness = {self.thickness.text!r} is above width = {self.width.text!r}; turn the blade by across"
             )
         return self
+
+    def notes(self) -> list[str]:
+        """Width and thickness against the length; of a slender blade what its held ends would change, from a tenth of the length on."""
+        wide, thick = self.width.si / self.length.si, self.thickness.si / self.length.si
+        if self.slender:
+            changed = "shear and held ends are left out (slender = true), which change its stiffness by more than 2 %"
+            return [f"it is {wide:.2g} times as wide as it is long: {changed}"] if wide > SLENDEST else []
+        notes = []
+        for ratio, most, word in ((wide, WIDEST, "wide"), (thick, THICKEST, "thick")):
+            if ratio > most:
+                notes.append(
+                    f"it is {ratio:.2g} times as {word} as it is long; its equations were compared with finite elements up to {most:g}"
+                )
+        return notes
 
     def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
         """One piece of rectangular section. Source: `held_flexure`; slender, S1 eq. (21)-(23)."""
@@ -202,6 +219,10 @@ class CircularHinge(Flexible):
         return compliance_of_entries(
             (twist, turn, plane[2, 2]), (plane[0, 0], plane[1, 1], across), plane[2, 1], coupled
         )
+
+    def notes(self) -> list[str]:
+        """Where its equations leave their range of t/R."""
+        return self.hinge.notes()
 
     def reach(self, p: SimpleNamespace) -> Any:
         """The length 2 R [m]."""

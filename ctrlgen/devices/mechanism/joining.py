@@ -72,6 +72,10 @@ class Joining(Section):
         """The uniform pieces that it consists of, from its fixed end; none where it yields at one point, its pivot."""
         return ()
 
+    def notes(self) -> list[str]:
+        """Where its sizes leave the range of its equations."""
+        return []
+
     def pivot(self, p: SimpleNamespace) -> Any:
         """Distance from its free end, toward the fixed one, of the point at which it holds its ideal directions [m]."""
         return 0.0

@@ -384,15 +384,14 @@ class Mechanism(Device):
         return [Element(e.first, e.second, ca.DM.eye(6)) for e in self.placed_elements]
 
     def remarks(self) -> list[str]:
-        """Remarks on hinge equations used outside their t/R range, and on inertia that the condensed model does not show."""
-        hinges = [e for e in self.element if isinstance(e, CircularHinge)]
+        """Remarks on flexures outside of the range of their equations, and on inertia that the condensed model does not show."""
         dense = {m.name for m in self.material if m.density is not None}
         light = [
             f"{e.name}: a hinge has no mass of its own; count it to the bodies that it joins"
-            for e in hinges
-            if e.material in dense
+            for e in self.element
+            if isinstance(e, CircularHinge) and e.material in dense
         ]
-        return [f"{e.name}: {note}" for e in hinges for note in e.hinge.notes()] + light + inertia_remarks(self)
+        return [f"{e.name}: {note}" for e in self.element for note in e.notes()] + light + inertia_remarks(self)
 
     def physics(self, p: SimpleNamespace) -> DevicePhysics:
         """The condensed mechanism with the values `p`."""
