@@ -7,10 +7,13 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Annotated, Any, Literal
 
+import casadi as ca
+import numpy as np
 from pydantic import StrictBool, model_validator
 
 from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.hinge import Hinge
+from ctrlgen.devices.mechanism.copies import Placed
 from ctrlgen.devices.mechanism.joining import Joining, Length
 from ctrlgen.devices.mechanism.stated_compliances import compliance_of_entries
 from ctrlgen.physics import circular_hinge, flexure, held_flexure
@@ -18,6 +21,7 @@ from ctrlgen.physics.flexure import Segment
 from ctrlgen.physics.held_flexure import THICKEST, WIDEST
 from ctrlgen.physics.screw import Matrix
 
+SAME = 1e-6  # of the size of a mechanism: two places are one
 SLENDEST = 0.1  # of the width over the length: beyond it a slender blade is off by more than 2 % in bending and shear
 
 
@@ -240,3 +244,21 @@ class CircularHinge(Flexible):
         R, t = p.hinge.R, p.hinge.t
         area, about_y, about_z, torsion = flexure.rectangular_section(t, p.hinge.b)
         return (FlexureSection("neck", R, area, about_y, about_z / (1 + t / (2 * R)) ** 0.45, torsion),)
+
+
+def flexures_in_one_place(placed: Sequence[Placed], size: float) -> list[str]:
+    """Flexures of a material, or copies of one, of which two join the same bodies with their ends in one place of a mechanism of a
+    `size` [m] and go the same way: two pieces of material cannot be there."""
+    faults, seen = [], list[tuple[str, frozenset[int], np.ndarray]]()
+    for e in placed:
+        if not isinstance(e.section, Flexible):
+            continue
+        at, along = (ca.DM(e.turn) @ ca.DM(v) for v in ([x.si for x in e.section.at], e.section.along))
+        where = np.concatenate(
+            [ca.DM(at).full().ravel() / size, ca.DM(along).full().ravel() / np.linalg.norm(e.section.along)]
+        )
+        for name, bodies, other in seen:
+            if bodies == {e.first, e.second} and np.abs(where - other).max() < SAME:
+                faults.append(f"element: {e.name} lies where {name} lies; move one, or give its width to the other")
+        seen.append((e.name, frozenset({e.first, e.second}), where))
+    return faults

@@ -46,6 +46,10 @@ class Joining(Section):
 
     @model_validator(mode="after")
     def _has_a_frame(self) -> Joining:
+        if self.from_ == self.to:
+            raise ValueError(f"from and to are both {self.to!r}; an element joins two bodies, or one and the ground")
+        if not (np.isfinite(self.along).all() and np.any(self.along)):
+            raise ValueError(f"along: {list(self.along)} is no direction; give one, such as [0, 1, 0]")
         if np.linalg.norm(np.cross(self.along, self.thin)) < 1e-6 * np.linalg.norm(self.along) * np.linalg.norm(
             self.thin
         ):

@@ -20,7 +20,7 @@ from ctrlgen.devices.device_physics import DevicePhysics
 from ctrlgen.devices.mechanism.bent_beams import BentBeam, ThermalActuator
 from ctrlgen.devices.mechanism.condensed import MOST_STEPS, SPARE_STEPS, Condensed
 from ctrlgen.devices.mechanism.copies import Copied, Placed
-from ctrlgen.devices.mechanism.flexures import Blade, CircularHinge, Flexible, Strut, Wire
+from ctrlgen.devices.mechanism.flexures import Blade, CircularHinge, Flexible, Strut, Wire, flexures_in_one_place
 from ctrlgen.devices.mechanism.joining import TWIST
 from ctrlgen.devices.mechanism.mechanism_physics import mechanism_physics
 from ctrlgen.devices.mechanism.modes import guyan_modes, inertia_remarks
@@ -131,6 +131,7 @@ class Mechanism(Device):
         if not faults and len(self.output.channels) != len(self.placed_actuators):
             counts = f"{len(self.output.channels)} channels, {len(self.placed_actuators)} actuators"
             faults.append(f"output.channels: {counts}; follow as many channels as there are actuators")
+        faults += [] if faults else flexures_in_one_place(self.placed_elements, self.size)
         if not faults and (loose := mechanism.loose_bodies(len(self.bodies), self._joints)):
             faults.append(f"body: nothing joins {', '.join(self.bodies[i] for i in loose)} to the ground")
         if not faults and (free := self._held_by_springs_alone()):
@@ -150,11 +151,7 @@ class Mechanism(Device):
         if faults:
             raise ValueError("; ".join(faults))
         # Those of the file: a copy with other numbers keeps them
-        _ = (
-            self.channel_scale,
-            self.reading_scale,
-            self.cubic_steps,
-        )
+        _ = (self.channel_scale, self.reading_scale, self.cubic_steps)
         return self
 
     def _without_inertia(self) -> list[str]:

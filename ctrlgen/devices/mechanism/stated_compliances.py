@@ -14,6 +14,9 @@ from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.mechanism.joining import Joining
 from ctrlgen.physics.screw import Matrix
 
+MOST_ASYMMETRY = 0.01  # two numbers of three printed digits, such as those of a paper, may differ by so much
+ROUNDING = 1e-9
+
 
 class Compliance(Joining):
     """A flexure by its compliance about its free end, such as one from finite elements or a notch by its equations."""
@@ -70,17 +73,31 @@ class ComplianceMatrix(Joining):
     def _stores_energy(self) -> ComplianceMatrix:
         C = np.array(self.compliance_si)[[3, 4, 5, 0, 1, 2]]  # deflection per load, symmetric by reciprocity
         size = np.sqrt(np.abs(np.outer(np.diag(C), np.diag(C))))
-        if (
-            np.any(np.diag(C) <= 0)
-            or np.abs((C - C.T) / size).max() > 1e-6
-            or np.linalg.eigvalsh((C + C.T) / size).min() <= 0
-        ):
-            raise ValueError("compliance_si: is not symmetric and positive: a load would gain energy from it")
+        if np.any(np.diag(C) <= 0) or np.linalg.eigvalsh((C + C.T) / size).min() <= 0:
+            raise ValueError("compliance_si: is not positive: a load would gain energy from it")
+        if self.asymmetry > MOST_ASYMMETRY:
+            raise ValueError(
+                f"compliance_si: what stands across the diagonal differs by {100 * self.asymmetry:.2g} %, and by reciprocity is equal; "
+                "check the order of rows (theta, delta) and columns (F, M)"
+            )
         return self
 
+    @property
+    def asymmetry(self) -> float:
+        """How far C is from reciprocal, the largest |C_ij - C_ji|/sqrt(C_ii C_jj) of deflections per load."""
+        C = np.array(self.compliance_si)[[3, 4, 5, 0, 1, 2]]
+        return float((np.abs(C - C.T) / np.sqrt(np.outer(np.diag(C), np.diag(C)))).max())
+
+    def notes(self) -> list[str]:
+        """That it was made symmetric."""
+        if self.asymmetry <= ROUNDING:
+            return []
+        return [f"compliance_si is not symmetric by {100 * self.asymmetry:.2g} %: the mean of both halves is taken"]
+
     def compliance(self, p: SimpleNamespace, m: SimpleNamespace) -> Matrix:
-        """[C] about the free end (6, 6), as the file states it."""
-        return ca.DM(np.array(self.compliance_si))
+        """[C] about the free end (6, 6): the symmetric part of what the file states."""
+        C = np.array(self.compliance_si)[[3, 4, 5, 0, 1, 2]]
+        return ca.DM(((C + C.T) / 2)[[3, 4, 5, 0, 1, 2]])
 
 
 def compliance_of_entries(turns: Sequence[Any], shifts: Sequence[Any], z: Any, y: Any, x: Any = 0.0) -> Matrix:

@@ -17,6 +17,7 @@ from ctrlgen.physics.screw import Matrix, rotation_z
 PerDrive = Annotated[Quantity, In(None)]
 Inertia = Annotated[Quantity, In("kg*mm^2", positive=True)]
 GROUND_NAME = "ground"
+FLAT = 0.01  # a flat plate has the sum; its numbers are rounded
 
 
 class Material(Section):
@@ -96,6 +97,12 @@ class Body(Section):
     def _turns_as_it_moves(self) -> Body:
         if (self.mass is None) != (self.inertia is None):
             raise ValueError("mass and inertia belong together; give both or none")
+        if self.inertia is not None:
+            I = sorted((q.si, axis) for q, axis in zip(self.inertia, "xyz", strict=True))
+            if I[2][0] > (I[0][0] + I[1][0]) * (1 + FLAT):
+                raise ValueError(
+                    f"inertia: that about {I[2][1]} is above the sum of the other two, which no body has; check the order and the units"
+                )
         return self
 
 
