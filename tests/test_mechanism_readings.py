@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from command_line import ctrlgen as run_command
@@ -11,6 +13,7 @@ from mechanism_files import PARALLELOGRAM, chain, dm, loaded, with_values
 import ctrlgen
 from ctrlgen import InputError, build_model, run
 from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.devices.mechanism.modes import summary
 from ctrlgen.model.simulation import simulate
 
 TILT = '[[reading]]\nname = "tilt"\nbody = "stage"\nabout = [0, 0, 1]\n'
@@ -122,3 +125,17 @@ def test_a_reading_that_cannot_be_is_refused(tmp_path, reading, says):
     with pytest.raises(InputError) as caught:
         loaded(tmp_path, PARALLELOGRAM + reading)
     assert says in str(caught.value)
+
+
+def test_a_reading_may_move_in_second_order_alone(tmp_path):
+    """-0.6 y^2/l of leaf springs that bend, seen along them: refused of the linear mechanism, where nothing moves it."""
+    along = '[[reading]]\nname = "parasitic"\nbody = "stage"\nat = ["0 mm", "0 mm", "0 mm"]\nalong = [0, 1, 0]\n'
+    with pytest.raises(InputError, match="no actuator moves what parasitic reads"):
+        loaded(tmp_path, PARALLELOGRAM + along)
+    device = loaded(
+        tmp_path, PARALLELOGRAM.replace("[[material]]", 'kinematics = "second_order"\n[[material]]', 1) + along
+    )
+    trace = simulate(build_model(device), np.full((2, 1), 0.2), 1e-3)
+    y, nearer = trace.signals["reading"][-1]
+    assert nearer == pytest.approx(-0.6 * y**2 / 20e-3, rel=1e-3)
+    assert any(re.search(r"parasitic 2\.7\d* um", line) for line in summary(device))  # at 300 um

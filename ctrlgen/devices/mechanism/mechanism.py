@@ -24,6 +24,7 @@ from ctrlgen.devices.mechanism.flexures import Blade, CircularHinge, Flexible, S
 from ctrlgen.devices.mechanism.joining import TWIST
 from ctrlgen.devices.mechanism.mechanism_physics import mechanism_physics
 from ctrlgen.devices.mechanism.modes import guyan_modes, inertia_remarks
+from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.devices.mechanism.springs import Spring
 from ctrlgen.devices.mechanism.stated_compliances import Compliance, ComplianceMatrix
 from ctrlgen.devices.mechanism.tables import GROUND_NAME, Actuator, Body, Dynamics, Material, Output, Pattern, Reading
@@ -144,10 +145,8 @@ class Mechanism(Device):
                 "until nothing holds them); lower their k_3, or the travel"
             )
         faults += self._beyond_second_order()
-        if not faults:
-            faults += self._unmoved()
-        if not faults and self.dynamics is not None:
-            faults += self._without_inertia()
+        faults += [] if faults else self._unmoved()
+        faults += [] if faults or self.dynamics is None else self._without_inertia()
         if faults:
             raise ValueError("; ".join(faults))
         # Those of the file: a copy with other numbers keeps them
@@ -364,10 +363,16 @@ class Mechanism(Device):
 
     @_as_described
     def reading_scale(self) -> tuple[float, ...]:
-        """A typical size [rad, m] of each reading, as `channel_scale`."""
-        travel, n = max(a.travel.si for a in self.actuator), len(self.placed_actuators)
-        moved = ca.DM(ca.evalf(ca.SX(Condensed(self, self.values()).reading_motion))).full()[:, :n]
-        return tuple(float(x) for x in np.abs(moved).sum(axis=1) * travel)
+        """A typical size [rad, m] of each reading, as `channel_scale`; or what it is of second order where that is more."""
+        travel, n, c = (
+            max(a.travel.si for a in self.actuator),
+            len(self.placed_actuators),
+            Condensed(self, self.values()),
+        )
+        reach = np.abs(ca.DM(ca.evalf(ca.SX(c.reading_motion))).full()[:, :n]).sum(axis=1) * travel
+        if self.second_order and len(reach):
+            reach = np.maximum(reach, SecondOrder(c).sensed_reach())
+        return tuple(float(x) for x in reach)
 
     @property
     def _output_motion(self) -> np.ndarray:

@@ -183,18 +183,21 @@ def summary(device: Drawing) -> list[str]:
         parts = ", ".join(
             f"{show(v, unit)} per {a.name}" for a, v in zip(device.placed_actuators, row, strict=True) if abs(v) > STILL
         )
-        lines.append(f"{channel}: {parts or 'not moved'}")
+        lines.append(f"{channel}: {parts or 'not moved to first order'}")
     return lines + (_second_order_lines(c) if device.second_order else [])
 
 
 def _second_order_lines(c: Condensed) -> list[str]:
     """What the second order adds to the channels that are followed, at the largest travels, whatever their signs."""
-    output = np.abs(ca.DM(ca.evalf(ca.SX(SecondOrder(c).output))).full())
+    second = SecondOrder(c)
+    output = np.abs(ca.DM(ca.evalf(ca.SX(second.output))).full())
     travel = np.array([a.section.travel.si for a in c.device.placed_actuators])
-    reach = np.abs(ca.DM(SecondOrder(c).products(ca.DM(travel))).full()).ravel()
+    reach = np.abs(ca.DM(second.products(ca.DM(travel))).full()).ravel()
+    turns = {r.name: r.section.about is not None for r in c.device.placed_readings}
+    names = (*c.device.output.channels, *turns)
     shown = (
-        f"{name} {show(value, 'urad' if name.startswith('theta') else 'um')}"
-        for name, value in zip(c.device.output.channels, output @ reach, strict=True)
+        f"{name} {show(value, 'urad' if turns.get(name, name.startswith('theta')) else 'um')}"
+        for name, value in zip(names, (*(output @ reach), *second.sensed_reach()), strict=True)
     )
     return [f"second order at the largest travels, at most: {', '.join(shown)}"]
 

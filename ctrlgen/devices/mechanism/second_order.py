@@ -124,6 +124,15 @@ class SecondOrder:
     @cached_property
     def readings(self) -> Matrix:
         """(readings, m): second order of what the readings see per product, from the body on which each sensor stands."""
+        return self._without_rounding(self._sensed_products, self.c.device.reading_scale)
+
+    def sensed_reach(self) -> np.ndarray:
+        """(readings,): the size of `sensed` at the largest travels [rad, m]."""
+        seen = np.abs(ca.DM(ca.evalf(ca.SX(self._sensed_products))).full())
+        return seen @ (self.weight.full().ravel() * np.abs(self._reach()))
+
+    @cached_property
+    def _sensed_products(self) -> Matrix:
         rows = [ca.SX(0, len(self.pairs))]
         for r, row in zip(self.c.device.placed_readings, self.c.reading_rows, strict=True):
             at = self.c.p.reading[r.index].at
@@ -131,7 +140,7 @@ class SecondOrder:
             direction = row[:, :3] if at is None else row[:, 3:]
             seen = self.seen(r.first, r.second, point)
             rows.append(ca.mtimes(direction, seen[:3, :] if at is None else seen[3:, :]))
-        return self._without_rounding(ca.vertcat(*rows), self.c.device.reading_scale)
+        return ca.vertcat(*rows)
 
     @cached_property
     def cubic(self) -> Matrix:
