@@ -11,6 +11,7 @@ from mechanism_files import HEAD, PARALLELOGRAM, TWO_BODIES, dm, loaded, with_va
 from numpy.polynomial import Polynomial
 
 from ctrlgen import InputError, build_model, load_scenario, run, solve
+from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.devices.mechanism.modes import condensed_modes, natural_frequencies
 from ctrlgen.model.assembly import movable
@@ -192,3 +193,13 @@ def test_dynamics_that_cannot_be_is_refused(tmp_path, text, says):
     with pytest.raises(InputError) as caught:
         loaded(tmp_path, text)
     assert says in str(caught.value)
+
+
+def test_one_axis_with_mass_has_a_stress_limit_that_binds(tmp_path):
+    """Its state is one velocity: of no state before it there is nothing to stack. sigma = 3 E t y/l^2 of a guided blade."""
+    text = moving().replace('stress_limit = "300 MPa"', 'stress_limit = "50 MPa"')
+    model = build_model(loaded(tmp_path, text))
+    kernels = controller_of(model, "pose", 1e-3).kernels
+    y = 100e-6
+    ratio = float(kernels.composite_ratio(model.rest, np.zeros(1), y))
+    assert ratio == pytest.approx(3 * 130e9 * 0.2e-3 * y / 20e-3**2 / 50e6, rel=0.01)

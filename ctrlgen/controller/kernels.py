@@ -108,7 +108,7 @@ class ControllerKernels:
         """(x, z, wanted) -> the square of each guarded limit's value over its bound at displacement `wanted`; above 1 it is broken."""
         m = self.nominal
         wanted = ca.SX.sym("wanted", m.z.numel())
-        x_then = ca.vertcat(m.x[: m.n_states], (self.moving or self.static).memory(m.x, m.z, wanted))
+        x_then = ca.vertcat(m.x[: m.n_states, :], (self.moving or self.static).memory(m.x, m.z, wanted))
         squares = [
             ca.substitute(limit.expr, ca.vertcat(m.x, m.z), ca.vertcat(x_then, wanted)) ** 2 * (1 / limit.upper**2)
             for limit in self.guarded_limits

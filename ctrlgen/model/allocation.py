@@ -52,7 +52,7 @@ def why_not_ganged(model: Model) -> str | None:
         return "has forces that are not linear in the drives"
     if model.inertial and ca.depends_on(slope, model.z):
         return "has inertia and forces whose slope by the drives changes with the displacement, while drives are held"
-    memories = ca.vertcat(model.rates[: model.x.numel() - model.v.numel()], *model.stepped.values())
+    memories = ca.vertcat(model.rates[: model.x.numel() - model.v.numel(), :], *model.stepped.values())
     if ca.depends_on(memories, model.u):
         return "has effects that remember the drives"
     return None

@@ -80,7 +80,7 @@ def inverse_dynamics(model: Model, follow: str) -> InverseDynamics:
     equations = ca.substitute(equations, model.p, ca.DM(model.p_nominal))
     states, last = range(model.n_states), model.x.numel() - model.v.numel()
     orders = ca.vertcat(NONE, *(symbol for symbol, _ in accelerations))
-    candidates = ca.vertcat(u, z, x[last:], orders, x[list(states)], x[model.n_states : last])
+    candidates = ca.vertcat(u, z, x[last:, :], orders, x[list(states)], x[model.n_states : last, :])
     chosen = _determined(equations, candidates)
     if len(chosen) < equations.numel() or not set(range(model.u.numel())) <= set(chosen):
         what = f"does not move the channels of the {follow} independently of one another"
@@ -145,7 +145,7 @@ def _implicit(
     if model.mass.sparsity().is_diag() or len(set(degrees)) > 1:
         return None
     n, degree = len(model.axes), degrees[0]
-    state_rates = model.rates[: model.x.numel() - n]
+    state_rates = model.rates[: model.x.numel() - n, :]
     force = ca.substitute(model.balance, model.heat, model.heat_of_drive)
     symbols = [ca.SX.sym(f"a{k}", n) for k in range(degree)]
     y, F = ca.vertcat(model.x, model.z, *symbols[:-1]), ca.vertcat(state_rates, symbols[0], model.v, *symbols[1:])

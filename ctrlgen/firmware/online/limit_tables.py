@@ -78,7 +78,7 @@ def _u_bounds(m: Model) -> tuple[ca.SX, ca.SX]:
 
 def _s_bounds(m: Model) -> tuple[ca.SX, ca.SX]:
     """Low and high of the actuators' states, `UNLIMITED` where there is no bound."""
-    low, high = m.bounds_formula(m.x[: m.n_states])
+    low, high = m.bounds_formula(m.x[: m.n_states, :])
     return ca.fmax(low, -UNLIMITED), ca.fmin(high, UNLIMITED)
 
 
