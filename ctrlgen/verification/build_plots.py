@@ -12,7 +12,7 @@ from ctrlgen.reporting.plots import COLOURS, PATTERNS, STYLE, plt, svg
 from ctrlgen.trajectory import playback
 from ctrlgen.trajectory.inverse.clock import Settled
 from ctrlgen.verification.build_record import BUDGET_CORE, BUDGETS, Build
-from ctrlgen.verification.tolerances import ANGLE_LIMIT, LENGTH_LIMIT
+from ctrlgen.verification.tolerances import ANGLE_LIMIT, LENGTH_LIMIT, rounded
 from ctrlgen.verification.tracking import Piece
 
 SHOWN = {
@@ -44,7 +44,8 @@ def draw_errors(build: Build, unit: str) -> Figure:
         1, len(panels), figsize=(2.3 * len(panels) + 0.6, 3.4), sharey=True, squeeze=False, sharex=True
     )
     for panel, (what, real) in zip(axes[0], panels, strict=True):
-        limit = (online[real] if what is Piece.ONLINE else player) * SCALES[shown]
+        largest = build.solution.trace.signals[build.solution.scenario.file.follow][:, channels]
+        limit = ((online[real] if what is Piece.ONLINE else player) + rounded(real, largest)) * SCALES[shown]
         error = np.abs(build.errors[what][real]) * SCALES[shown]
         time = np.arange(len(error)) if isinstance(clock, Settled) else clock.times(len(error))
         for k, i in enumerate(channels):

@@ -14,6 +14,7 @@ from ctrlgen.firmware.c.real import Real
 from ctrlgen.verification.comparison_entry import ComparisonEntry, ComparisonKind, entry_of
 from ctrlgen.verification.host import HostBuild, run_host
 from ctrlgen.verification.reference import ReferenceAnswers
+from ctrlgen.verification.tolerances import rounded
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,10 @@ class ComparedProgram:
                 yield unit, slice(channels[0], channels[-1] + 1)
 
     def off_command(self, what: ComparisonKind, off: np.ndarray, angle: float, length: float) -> list[ComparisonEntry]:
-        """Of the followed signal from its command, (n, channels) [SI], with what rotations and translations may be off."""
+        """Of the followed signal from its command, (n, channels) [SI], with what rotations and translations may be off; of large ones
+        more by the roundings of the arithmetic."""
         role, limits = self.reference.scenario.file.follow, {"rad": angle, "um": length}
-        return [self.row(what, role, off, limits[unit], span) for unit, span in self.followed_channels()]
+        return [
+            self.row(what, role, off, limits[unit] + rounded(self.real, self.reference.path[:, span]), span)
+            for unit, span in self.followed_channels()
+        ]

@@ -20,9 +20,9 @@ from ctrlgen.verification.tolerances import (
     EXCESS_LIMIT,
     EXCESS_LIMIT_WITH_MEMORY,
     LENGTH_LIMIT,
-    ROUNDINGS,
     controller_limit,
     float_limit,
+    rounded,
 )
 from ctrlgen.verification.tracking import reached
 
@@ -109,10 +109,7 @@ def _equilibrium_rows(program: ComparedProgram, settled: np.ndarray) -> list[Com
     wanted = ref.positions[plain]
     off = _equilibria(ref, settled[plain]) - wanted
     for unit, span in program.followed_channels():
-        limit = (ANGLE_LIMIT if unit == "rad" else LENGTH_LIMIT)[real]
-        if unit == "rad" and real is Real.FLOAT:
-            # an axis that turns by degrees has more to round than a platform's tilt
-            limit = max(limit, ROUNDINGS * real.epsilon * np.abs(wanted[:, span]).max())
+        limit = (ANGLE_LIMIT if unit == "rad" else LENGTH_LIMIT)[real] + rounded(real, wanted[:, span])
         rows.append(program.row(ComparisonKind.EQUILIBRIA, ref.scenario.file.follow, off, limit, span))
     return rows
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.verification.reference import ReferenceAnswers
 
@@ -17,6 +19,11 @@ EXCESS_LIMIT = {Real.DOUBLE: 1e-9, Real.FLOAT: 1e-5}
 EXCESS_LIMIT_WITH_MEMORY = 1e-3
 # float C against CasADi: of the largest value, accumulated over one evaluation
 ROUNDINGS = 16
+
+
+def rounded(real: Real, poses: np.ndarray) -> float:
+    """What the roundings of one evaluation leave in `poses` [SI]: an axis that moves by millimetres has more to round."""
+    return ROUNDINGS * real.epsilon * float(np.abs(poses).max(initial=0.0))
 
 
 def float_limit(role: str, size: float, ref: ReferenceAnswers) -> float:

@@ -28,7 +28,7 @@ def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str
     """Targets with the drives and the status that the model answers, and the tolerance of the drives.
 
     The tolerance is the change of drive that four roundings of displacement and actuator state cause, or one of a number of a target
-    that a limit on stress or rotation scales.
+    that a limit scales.
     """
     controller = controller if real is Real.DOUBLE else replace(controller, slack=FLOAT_SLACK)
     rng = np.random.default_rng(0)
@@ -52,7 +52,7 @@ def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str
         if exact and not step.status & ControllerStatus.INPUT:
             tolerance = max(tolerance, controller.drive_rounding(before, target, step, call.settle, rounding))
             # Scaled from far away, it moves by the rounding of what it was scaled from.
-            if step.status & ControllerStatus.COMPOSITE:
+            if step.status:
                 for unit in np.eye(len(target)):
                     near = controller.step(before, target * (1 + rounding / 4 * unit), settle=call.settle)
                     if near.status == step.status:
