@@ -88,3 +88,23 @@ def test_a_mass_beside_the_end_of_a_beam_has_the_frequencies_of_deflection_and_t
     wanted = np.sqrt(np.linalg.eigvals(np.linalg.solve(M, K)).real) / (2 * np.pi)
     for f in wanted:
         assert np.abs(modes / f - 1).min() < 1e-9
+
+
+@pytest.mark.parametrize("count", [3, 60])
+def test_the_freedoms_of_a_long_chain_are_counted(tmp_path, count):
+    """Each stage is guided by two leaf springs from the one below: one motion and one redundant constraint a stage."""
+    text = HEAD + SILICON
+    for k in range(count):
+        below = f"s{k - 1}" if k else "ground"
+        text += f'[[body]]\nname = "s{k}"\n'
+        for side in (-10, 10):
+            text += (
+                blade(f"b{k}_{'l' if side < 0 else 'r'}", side)
+                .replace('from = "ground"', f'from = "{below}"')
+                .replace('to = "stage"', f'to = "s{k}"')
+                .replace('"0 mm", "0 mm"]', f'"{20 * k} mm", "0 mm"]', 1)
+            )
+    device = loaded(
+        tmp_path, text + REST.replace("plate", "s0").replace('channels = ["delta_z"]', 'channels = ["delta_x"]')
+    )
+    assert freedoms(device) == (count, count)

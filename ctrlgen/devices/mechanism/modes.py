@@ -15,6 +15,7 @@ from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.physics.rigid_bodies import GROUND
 from ctrlgen.physics.screw import inverse_adjoint
 
+SHORT_CHAIN = 10  # bodies: of a chain of n the weakest independent constraint has a singular value of 1.5/n^2
 INDEPENDENT = 1e-3  # singular value of unit rows below which a constraint adds nothing: no drawing is more exact
 INERT = 1e-9  # of the largest mass of an axis, below which rounding moves it and no body
 FAR = 0.1  # of a frequency: as far as mass and stiffness of a drawing are from the built one's, roughly
@@ -52,7 +53,7 @@ def freedoms(device: Drawing) -> tuple[int, int]:
         rows.append(A)
     A = np.vstack([np.zeros((0, 6 * count)), *rows]) * np.tile([1 / device.size] * 3 + [1.0] * 3, count)
     A /= np.linalg.norm(A, axis=1, keepdims=True)
-    rank = int(np.linalg.matrix_rank(A, tol=INDEPENDENT))
+    rank = int(np.linalg.matrix_rank(A, tol=INDEPENDENT * min(1.0, (SHORT_CHAIN / count) ** 2)))
     return 6 * count - rank, len(A) - rank
 
 
