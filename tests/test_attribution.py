@@ -27,7 +27,7 @@ def shared(
     """Shares of `causes` causes where those of a set S leave energy(S) on the records to fit; held out `held` times as much."""
 
     def misfit_of(present, times=1.0):
-        return left(times * energy(frozenset(present)), blocks=blocks)
+        return left(times * energy(frozenset(present)), blocks=blocks(set(present)) if callable(blocks) else blocks)
 
     def of_records(records):
         return held if records == ["held"] else 1.0
@@ -114,6 +114,20 @@ def test_a_cause_that_takes_nothing_away_has_no_share_and_says_whom_it_serves(mo
     first, second, third = found.shares
     assert first is None and found.serves[0] == 1
     assert (second.value, third.value, found.rest.value) == pytest.approx((0.2, 0.05, 0.75))
+
+
+def test_of_two_causes_that_make_up_for_one_another_one_has_what_both_take(monkeypatch):
+    """In every second block the first adds as much as the second takes, and the other way round in those between: neither takes
+    anything away for certain, and both together 40 beside the 50 of a third."""
+    side = 1.5 * (-1.0) ** np.arange(BLOCKS)
+
+    def by_block(S):
+        return (1.0 - side * ((0 in S) - float(1 in S)) - 0.4 * ({0, 1} <= S) - 0.5 * (2 in S)) / BLOCKS
+
+    found = shared(monkeypatch, lambda S: 1e5 * by_block(S).sum(), 3, blocks=lambda S: by_block(S) / by_block(S).sum())
+    told = [s for s in found.shares[:2] if s is not None]
+    assert [s.value for s in (*told, found.shares[2], found.rest)] == pytest.approx([0.4, 0.5, 0.1])
+    assert found.serves[:2] == (1, 0)
 
 
 def test_sets_of_causes_begin_and_end_where_the_tables_do():

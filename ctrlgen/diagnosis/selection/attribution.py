@@ -113,18 +113,24 @@ def _counted(
     parts: np.ndarray, before: np.ndarray, after: np.ndarray, serves: list[int | None], seed: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """What each of n causes takes away (n, b, n_y), that of causes whose share may be zero with the cause that they serve; and which
-    have a share, (n,). None has one where that of each may be zero."""
+    have a share, (n,). None has one where that of each may be zero.
+
+    The least of them goes first: of two that serve each other, and of which neither takes anything away for certain, the larger one
+    then has what both do.
+    """
     parts, told = parts.copy(), np.ones(len(parts), bool)
     while True:
         zero = told & (_with_intervals(parts, before, after, seed)[:-1, 1] <= 0)
-        told &= ~zero
-        if not zero.any() or not told.any():
+        if not zero.any():
             return parts, told
-        for g in np.flatnonzero(zero):
-            served = serves[g]
-            if served is not None and told[served]:
-                parts[served] += parts[g]
-            parts[g] = 0.0
+        least = min(np.flatnonzero(zero), key=lambda g: parts[g].sum())
+        told[least] = False
+        if not told.any():
+            return parts, told
+        served = serves[least]
+        if served is not None and told[served]:
+            parts[served] += parts[least]
+        parts[least] = 0.0
 
 
 def _with_intervals(parts: np.ndarray, before: np.ndarray, after: np.ndarray, seed: int) -> np.ndarray:
