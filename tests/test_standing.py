@@ -6,7 +6,7 @@ import pytest
 
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.findings import Finding, Role
-from ctrlgen.diagnosis.selection.standing import answer_of, in_standing
+from ctrlgen.diagnosis.selection.standing import answer_of, in_standing, possible
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.diagnosis.shares.families import Family
 from ctrlgen.estimation.hypothesis import Hypothesis
@@ -53,3 +53,8 @@ def test_alone_it_makes_the_answer_ambiguous_unless_noise_alone_is_left(verdict)
     assert answer_of(verdict, found, exact=False) == (Verdict.AMBIGUOUS if doubted else verdict)
     assert answer_of(verdict, found, exact=True) == verdict
     assert answer_of(verdict, in_standing([finding("coulomb")], shares(0.9, 0.0)), exact=False) == verdict
+
+
+def test_a_family_of_which_the_device_can_have_no_law_is_not_spoken_for():
+    offered = [Hypothesis(effect, "sensor:axis", "axis") for effect in ("creep", "bow", "parameter")]
+    assert possible(shares(0.9, 0.5), offered) == [(Family.CREEP, 0.5)]

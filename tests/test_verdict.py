@@ -19,6 +19,7 @@ from ctrlgen.diagnosis.selection.verdict import (
     contradicts_datasheet,
     main_rivals,
     poorly_determined,
+    terms_of_findings,
     too_little_to_name,
     unconfirmed,
     verdict,
@@ -215,6 +216,24 @@ def test_a_rival_of_a_small_cause_does_not_make_the_answer_ambiguous(small, ambi
     found = search(None, trial(causes=(GAIN, CREEP)), rivals=((), (trial(cause=DRIFT),)))
     assert main_rivals(found, shares_of(0.64, small)) == ambiguous
     assert main_rivals(found, shares_of(None, None, rest=None))  # where nothing tells which is the main one
+
+
+@pytest.mark.parametrize("first", [0, 1])
+def test_a_rival_of_a_small_harmonic_is_none_of_the_law(first, monkeypatch):
+    """Of two terms the one without which most is left decides, and its alternatives are those of the finding."""
+    pitch = Hypothesis("cyclic", "sensor:axis", "axis")
+    left_without = [trial(held=3.0 * N), trial(held=3.0 * N)]
+    left_without[first] = trial(held=8.0 * N)
+    for k in (0, 1):
+        rivals = tuple((trial(cause=DRIFT),) if j == k else () for j in (0, 1))
+        chosen = trial(causes=(pitch, replace(pitch, count=1)))
+        found = search(trial(held=15.0 * N), chosen, tuple(left_without), rivals)
+        assert main_rivals(found, shares_of(0.9, 0.9)) == (k == first)
+        assert terms_of_findings(found) == [[first, 1 - first]]
+        for name, told in (("nominal_physics", None), ("title", ""), ("estimated_values", {})):
+            monkeypatch.setattr(f"ctrlgen.diagnosis.selection.findings.{name}", lambda *_, told=told: told)
+        (row,) = findings(found, shares_of(0.9, 0.9, rest=0.1))
+        assert row.alternatives == ((DRIFT,) if k == first else ())
 
 
 @pytest.mark.parametrize("gone, ambiguous", [(0.0, True), (1e5, False)])

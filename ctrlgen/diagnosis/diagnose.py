@@ -34,7 +34,7 @@ from ctrlgen.diagnosis.selection.findings import findings, held_out_errors
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.search_result import SearchResult
-from ctrlgen.diagnosis.selection.standing import answer_of, in_standing
+from ctrlgen.diagnosis.selection.standing import answer_of, in_standing, possible
 from ctrlgen.diagnosis.selection.trials import FAILURES
 from ctrlgen.diagnosis.selection.verdict import Verdict, in_another_unit, verdict, within_tolerance
 from ctrlgen.diagnosis.shares.empirical_terms import EmpiricalTerm, empirical_terms
@@ -125,7 +125,8 @@ def _diagnose(
     found = (*findings(search, attribution, likelihoods), *detected)
     if shares is not None:
         noise = dict(zip(search.fitter.recording.channels, search.fitter.noise.floor.tolist(), strict=True))
-        found = in_standing(found, ranking(shares.before, noise))
+        spoken_for = ranking(shares.before, noise)
+        found = in_standing(found, spoken_for if laws is not None else possible(spoken_for, suspected))
         answer = answer_of(answer, found, search.chosen.errors.is_noise)
     found = with_chances(found, search)
     answer = doubted(answer, found)

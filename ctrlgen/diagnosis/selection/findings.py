@@ -9,12 +9,11 @@ import numpy as np
 from pydantic import Field
 
 from ctrlgen.core.units import difference, from_si
-from ctrlgen.diagnosis.selection.attribution import Attribution, ShareEntry, one_finding
-from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
+from ctrlgen.diagnosis.selection.attribution import Attribution, ShareEntry
 from ctrlgen.diagnosis.selection.finding_region import RegionEntry, region_of
 from ctrlgen.diagnosis.selection.law_titles import title
 from ctrlgen.diagnosis.selection.search_result import SearchResult
-from ctrlgen.diagnosis.selection.verdict import unconfirmed
+from ctrlgen.diagnosis.selection.verdict import terms_of_findings, unconfirmed
 from ctrlgen.diagnosis.settings import ATTRIBUTION, LUCK
 from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, nominal_physics
@@ -197,21 +196,17 @@ def estimated_values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, 
 def findings(search: SearchResult, shares: Attribution, profiles: tuple[Profile, ...] = ()) -> tuple[Finding, ...]:
     """The causes of the chosen model with intervals, shares and alternatives, that with the largest share first.
 
-    Causes of one law at one place, such as harmonics, are one finding, with the numbers of the largest first.
+    Causes of one law at one place, such as harmonics, are one finding, with the numbers of the largest first, and its alternatives.
     """
     causes = search.chosen.causes
     estimates = estimated_values(search.chosen.fit, profiles)
     unseen = set(unconfirmed(search))
-    groups: dict[tuple[str | None, ...], list[int]] = {}
-    for k, cause in enumerate(causes):
-        groups.setdefault(one_finding(cause), []).append(k)
     rows = []
-    for members in groups.values():
-        first, *others = sorted(members, key=lambda k: -_held_out_energy(search.without_cause[k]))
+    for first, *others in terms_of_findings(search):
         cause, share = causes[first], shares.shares[first]
         served = shares.serves[first] if shares.serves else None
         role = _role(share, cause in unseen, shares.rest is None, served is not None)
-        rivals = dict.fromkeys(t.cause for k in members for t in search.rivals[k] if t.cause)
+        rivals = dict.fromkeys(t.cause for t in search.rivals[first] if t.cause)
         rows.append(
             Finding(
                 cause.effect,
@@ -245,10 +240,6 @@ def _role(share: ShareEntry | None, unseen: bool, nothing_to_share: bool, is_ser
     if share is None:
         return Role.CAUSE if nothing_to_share else Role.PART if is_served else Role.MINOR
     return Role.CAUSE if share.value >= ATTRIBUTION.least_share else Role.MINOR
-
-
-def _held_out_energy(candidate: CandidateModel) -> float:
-    return float(candidate.held_out.plain.sum())
 
 
 def _numbers_of(search: SearchResult, k: int, estimates: dict[str, Estimate]) -> dict[str, Estimate]:

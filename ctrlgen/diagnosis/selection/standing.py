@@ -14,12 +14,19 @@ from ctrlgen.diagnosis.selection.findings import Finding, Role, SupportEntry
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.diagnosis.settings import STANDING
 from ctrlgen.diagnosis.shares.families import FAMILY_OF, Family
+from ctrlgen.estimation.hypothesis import Hypothesis
 
 
 def in_standing(findings: Sequence[Finding], shares: Sequence[tuple[Family, float]]) -> tuple[Finding, ...]:
     """The findings with what the `shares` by family (the largest first) say of each; those that they contradict after the others."""
     told = [replace(f, support=_support(f, shares)) for f in findings]
     return tuple(sorted(told, key=lambda f: (f.role is not Role.CAUSE, f.contradicted)))
+
+
+def possible(shares: Sequence[tuple[Family, float]], offered: Sequence[Hypothesis]) -> list[tuple[Family, float]]:
+    """The `shares` without families of which such a device has no law, as an axis without a spring has no nonlinear one."""
+    families = {FAMILY_OF.get(h.effect) for h in offered}
+    return [(family, share) for family, share in shares if family in families]
 
 
 def answer_of(verdict: Verdict, findings: Sequence[Finding], exact: bool) -> Verdict:

@@ -7,7 +7,7 @@ from enum import StrEnum
 import numpy as np
 from scipy import stats
 
-from ctrlgen.diagnosis.selection.attribution import Attribution
+from ctrlgen.diagnosis.selection.attribution import Attribution, one_finding
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection
 from ctrlgen.diagnosis.selection.search_result import SearchResult
@@ -122,15 +122,30 @@ def main_rivals(search: SearchResult, shares: Attribution) -> bool:
     """Whether a cause with a share near the largest has a rival of other physics.
 
     Where more than noise is left, laws of one family at one place are one answer: a discrepancy of any model hides which of them
-    it is.
+    it is. Of several terms of one law, as harmonics are, the largest counts: what else a small one may be does not change the law.
     """
+    first = {terms[0] for terms in terms_of_findings(search)}
     largest = max((s.value for s in shares.shares if s), default=0.0)
     exact = search.chosen.errors.is_noise
     return any(
         any(exact or not _one_family(cause, r.cause) for r in rivals)
         and (shares.rest is None or (share is not None and share.value >= VERDICT.main_share * largest))
-        for cause, rivals, share in zip(search.chosen.causes, search.rivals, shares.shares, strict=True)
+        for k, (cause, rivals, share) in enumerate(zip(search.chosen.causes, search.rivals, shares.shares, strict=True))
+        if k in first
     )
+
+
+def terms_of_findings(search: SearchResult) -> list[list[int]]:
+    """By finding its causes, which are terms of one law at one place, the one first without which the held-out records are foretold
+    worst."""
+    groups: dict[tuple[str | None, ...], list[int]] = {}
+    for k, cause in enumerate(search.chosen.causes):
+        groups.setdefault(one_finding(cause), []).append(k)
+
+    def left_without(k: int) -> float:
+        return float(search.without_cause[k].held_out.plain.sum())
+
+    return [sorted(terms, key=left_without, reverse=True) if len(terms) > 1 else terms for terms in groups.values()]
 
 
 def _one_family(cause: Hypothesis, rival: Hypothesis | None) -> bool:

@@ -40,8 +40,8 @@ SPEAKS_FOR: dict[Kind, tuple[tuple[Family, ...], str]] = {
         "a wrong stiffness, gain or lever; a turned frame, where several axes move a reading",
     ),
     Kind.POSITION: (
-        (Family.ELASTIC, Family.GEOMETRY),
-        "a force that does not rise in proportion, a stop, the bow of a sensor are functions of the place alone",
+        (Family.ELASTIC, Family.GEOMETRY, Family.PERIODIC),
+        "a force that does not rise in proportion, a stop, the bow of a sensor, a few periods of a pitch are functions of the place alone",
     ),
     Kind.SPEED: (
         (Family.DYNAMICS, Family.TIMING, Family.FRICTION),
