@@ -199,6 +199,26 @@ def test_what_moves_at_rest_is_no_noise():
         assert found.restless == restless and found.passed == (not restless)
 
 
+def test_a_number_that_only_rest_tells_makes_no_stage_restless():
+    """The room warms by a kelvin at rest and hardly afterwards: a slope two deviations off its value leaves a ramp at rest, no motion."""
+    plain = fitter_of()
+    records = [
+        replace(r, ambient=a, observed=r.observed + 1e-7 * a[:, None])
+        for r in plain.recording.records
+        for a in [np.linspace(0.0, 1.0 if r.role == "rest" else 0.02, len(r.time))]
+    ]
+    recording = replace(plain.recording, records=tuple(records))
+    fitter = Fitter(recording, estimate_noise(recording, SETTLING))
+    law = Hypothesis("temperature_sensitivity", "sensor:axis", "axis")
+    fit = fitter.fit(Structure(AXIS).with_cause(law, {"slope": 1e-7, "reference": 0.0}))
+    slope = [u.name for u in fit.structure.free_parameters].index("slope")
+    theta = fit.theta.copy()
+    theta[slope] = 1e-7 + 2 * np.sqrt(fit.covariance[slope, slope])
+    assert run_residual_tests(fitter, replace(fit, theta=theta)).restless == ()
+    theta[slope] = 1e-7 + 20 * np.sqrt(fit.covariance[slope, slope])
+    assert run_residual_tests(fitter, replace(fit, theta=theta)).restless == ("reading.axis",)
+
+
 @pytest.mark.parametrize("poles, said", [((0.5,), False), ((0.9, 0.9), True)])
 def test_noise_so_slow_that_the_stage_may_move_is_said(poles, said):
     """One pole is a sensor's filter; what a mass does with a random force has two."""
