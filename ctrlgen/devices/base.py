@@ -101,6 +101,11 @@ class Device(Shown, Section):
         """What it is made of: as stated, else as its `physics` and its kind tell."""
         return machine_parts(self.machine, physics, self.works_by, self.on_flexures, self.excluded_actuators())
 
+    def with_unstated_inertia(self) -> tuple[Device, float] | None:
+        """The same device with the inertia that its file states and its model leaves out, and the damping ratio that is assumed; None
+        where there is no such inertia."""
+        return None
+
     def remarks(self) -> list[str]:
         """Remarks on the description for the reader, such as an equation that is used outside its range."""
         return []

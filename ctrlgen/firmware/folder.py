@@ -90,6 +90,8 @@ def generate(
         piece: {real: f"{owner}_{piece}_{real.suffix}" for real in Real} for piece, owner in owners(scenario).items()
     }
     compression = compress(played) if played else {}
+    inertia = None if solution is None else solution.unstated_inertia
+    left_out = "" if inertia is None else inertia.sentence()
     contexts, written = {}, []
     for real in Real:
         of: dict[str, Any] = {piece: names[piece][real] for piece in PIECES} | ({} if played else {"player": None})
@@ -98,7 +100,7 @@ def generate(
         reference = vectors(controller, targets, real) | played_vectors(
             compression.get(real), len(command), scenario.clock
         )
-        contexts[real] = samples | online | of | reference | {"solved": solution is not None}
+        contexts[real] = samples | online | of | reference | {"solved": solution is not None, "left_out": left_out}
         by_template = {"online": online, "selftest": contexts[real], "vectors": contexts[real]}
         if played:
             by_template["player"] = online | samples

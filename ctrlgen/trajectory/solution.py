@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import Trace
 from ctrlgen.trajectory.inverse.violations import Before, limited_values
 from ctrlgen.trajectory.scenario import Scenario
+from ctrlgen.trajectory.unstated_inertia import UnstatedInertia, unstated_inertia
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,11 @@ class Solution(Shown):
             "tightest limit": f"{self.tightest.limit.label} of {self.tightest.channel}, {100 * (self.tightest.share or 0):.3g} % left",
             "solved by": f"{self.solver}, {self.iterations} iterations",
         }
+
+    @cached_property
+    def unstated_inertia(self) -> UnstatedInertia | None:
+        """What masses of the file that the model leaves out do along the path; None where there are none."""
+        return unstated_inertia(self.scenario, self.model, self.command, self.trace, self.drive)
 
     @property
     def solver(self) -> str:

@@ -45,7 +45,7 @@ def draw_errors(build: Build, unit: str) -> Figure:
     )
     for panel, (what, real) in zip(axes[0], panels, strict=True):
         largest = build.solution.trace.signals[build.solution.scenario.file.follow][:, channels]
-        limit = ((online[real] if what is Piece.ONLINE else player) + rounded(real, largest)) * SCALES[shown]
+        limit = max(online[real] if what is Piece.ONLINE else player, rounded(real, largest)) * SCALES[shown]
         error = np.abs(build.errors[what][real]) * SCALES[shown]
         time = np.arange(len(error)) if isinstance(clock, Settled) else clock.times(len(error))
         for k, i in enumerate(channels):

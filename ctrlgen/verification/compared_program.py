@@ -63,6 +63,6 @@ class ComparedProgram:
         more by the roundings of the arithmetic."""
         role, limits = self.reference.scenario.file.follow, {"rad": angle, "um": length}
         return [
-            self.row(what, role, off, limits[unit] + rounded(self.real, self.reference.path[:, span]), span)
+            self.row(what, role, off, max(limits[unit], rounded(self.real, self.reference.path[:, span])), span)
             for unit, span in self.followed_channels()
         ]

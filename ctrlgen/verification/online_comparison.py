@@ -109,7 +109,7 @@ def _equilibrium_rows(program: ComparedProgram, settled: np.ndarray) -> list[Com
     wanted = ref.positions[plain]
     off = _equilibria(ref, settled[plain]) - wanted
     for unit, span in program.followed_channels():
-        limit = (ANGLE_LIMIT if unit == "rad" else LENGTH_LIMIT)[real] + rounded(real, wanted[:, span])
+        limit = max((ANGLE_LIMIT if unit == "rad" else LENGTH_LIMIT)[real], rounded(real, wanted[:, span]))
         rows.append(program.row(ComparisonKind.EQUILIBRIA, ref.scenario.file.follow, off, limit, span))
     return rows
 

@@ -15,6 +15,7 @@ import casadi as ca
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
+from ctrlgen.core.units import Quantity
 from ctrlgen.devices.base import Device
 from ctrlgen.devices.device_physics import DevicePhysics
 from ctrlgen.devices.mechanism.bent_beams import BentBeam, ThermalActuator
@@ -23,20 +24,20 @@ from ctrlgen.devices.mechanism.copies import Copied, Placed
 from ctrlgen.devices.mechanism.flexures import Blade, CircularHinge, Flexible, Strut, Wire, flexures_in_one_place
 from ctrlgen.devices.mechanism.joining import TWIST
 from ctrlgen.devices.mechanism.mechanism_physics import mechanism_physics
-from ctrlgen.devices.mechanism.modes import guyan_modes, inertia_remarks
+from ctrlgen.devices.mechanism.modes import free_between_springs, guyan_modes, inertia_remarks
 from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.devices.mechanism.springs import Spring
 from ctrlgen.devices.mechanism.stated_compliances import Compliance, ComplianceMatrix
 from ctrlgen.devices.mechanism.tables import GROUND_NAME, Actuator, Body, Dynamics, Material, Output, Pattern, Reading
 from ctrlgen.physics import rigid_bodies as mechanism
 from ctrlgen.physics.rigid_bodies import GROUND, Element
-from ctrlgen.physics.screw import inverse_adjoint
 
 AnyElement = Annotated[
     Blade | Wire | Strut | CircularHinge | Compliance | ComplianceMatrix | Spring | BentBeam,
     Field(discriminator="kind"),
 ]
 AnyActuator = Annotated[Actuator | ThermalActuator, Field(discriminator="kind")]
+ASSUMED_DAMPING = Quantity(0.01, "1 %")  # of a stage on flexures in air, where a file states none
 MOVED = 1e-6  # of the largest motion, below which a channel is not moved on purpose: symmetry leaves rounding, 1e-9
 
 T = TypeVar("T")
@@ -135,7 +136,7 @@ class Mechanism(Device):
         faults += [] if faults else flexures_in_one_place(self.placed_elements, self.size)
         if not faults and (loose := mechanism.loose_bodies(len(self.bodies), self._joints)):
             faults.append(f"body: nothing joins {', '.join(self.bodies[i] for i in loose)} to the ground")
-        if not faults and (free := self._held_by_springs_alone()):
+        if not faults and (free := free_between_springs(self)):
             faults.append(
                 f"body: springs leave {', '.join(free)} free in some direction; add a spring or a flexure there"
             )
@@ -337,25 +338,6 @@ class Mechanism(Device):
         steps = Condensed(self, self.values()).cubic_steps()
         return MOST_STEPS + 1 if steps is None else steps + SPARE_STEPS if steps else 0
 
-    def _held_by_springs_alone(self) -> list[str]:
-        """Bodies that can move without a force, because what joins them are springs."""
-        if not any(isinstance(e, Spring) for e in self.element):
-            return []
-        count, c = len(self.bodies), Condensed(self, self.values())
-        size = np.array([1 / self.size] * 3 + [1.0] * 3)  # turns as displacements
-        rows = []
-        for e, R, end in zip(self.placed_elements, c.frames, c.ends, strict=True):
-            held = e.section.directions if isinstance(e.section, Spring) else range(6)
-            local = ca.DM(inverse_adjoint(R, end)).full()[list(held)] * size / size[list(held), None]
-            row = np.zeros((len(local), 6 * count))
-            for body, sign in ((e.second, 1), (e.first, -1)):
-                if body != GROUND:
-                    row[:, 6 * body : 6 * body + 6] = sign * local
-            rows.append(row)
-        _, values, motions = np.linalg.svd(np.vstack([*rows, np.zeros((6 * count, 6 * count))]))
-        free = motions[values < MOVED * values.max()]
-        return [name for i, name in enumerate(self.bodies) if np.abs(free[:, 6 * i : 6 * i + 6]).max(initial=0) > MOVED]
-
     @cached_property
     def placed_readings(self) -> tuple[Placed, ...]:
         """Every copy of every reading."""
@@ -384,6 +366,12 @@ class Mechanism(Device):
     def _joints(self) -> list[Element]:
         """The pairs of bodies that elements join."""
         return [Element(e.first, e.second, ca.DM.eye(6)) for e in self.placed_elements]
+
+    def with_unstated_inertia(self) -> tuple[Mechanism, float] | None:
+        """With a table [dynamics], where actuators push and move mass in every direction."""
+        if self.dynamics is not None or not len(guyan_modes(self).frequencies):
+            return None
+        return self.model_copy(update={"dynamics": Dynamics(damping_ratio=ASSUMED_DAMPING)}), ASSUMED_DAMPING.si
 
     def remarks(self) -> list[str]:
         """Remarks on flexures outside of the range of their equations, and on inertia that the condensed model does not show."""

@@ -12,11 +12,13 @@ from ctrlgen.core.units import show
 from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.devices.mechanism.drawing import Drawing
 from ctrlgen.devices.mechanism.second_order import SecondOrder
+from ctrlgen.devices.mechanism.springs import Spring
 from ctrlgen.physics.rigid_bodies import GROUND
 from ctrlgen.physics.screw import inverse_adjoint
 
 SHORT_CHAIN = 10  # bodies: of a chain of n the weakest independent constraint has a singular value of 1.5/n^2
 INDEPENDENT = 1e-3  # singular value of unit rows below which a constraint adds nothing: no drawing is more exact
+FREE = 1e-6  # of the largest singular value, below which springs hold nothing: symmetry leaves rounding, 1e-9
 INERT = 1e-9  # of the largest mass of an axis, below which rounding moves it and no body
 FAR = 0.1  # of a frequency: as far as mass and stiffness of a drawing are from the built one's, roughly
 LIKE = 0.5  # of the modal assurance criterion: below it a condensed mode is no single mode
@@ -55,6 +57,26 @@ def freedoms(device: Drawing) -> tuple[int, int]:
     A /= np.linalg.norm(A, axis=1, keepdims=True)
     rank = int(np.linalg.matrix_rank(A, tol=INDEPENDENT * min(1.0, (SHORT_CHAIN / count) ** 2)))
     return 6 * count - rank, len(A) - rank
+
+
+def free_between_springs(device: Drawing) -> list[str]:
+    """Bodies that can move without a force, because what joins them are springs."""
+    if not any(isinstance(e.section, Spring) for e in device.placed_elements):
+        return []
+    count, c = len(device.bodies), Condensed(device, device.values())
+    size = np.array([1 / device.size] * 3 + [1.0] * 3)  # turns as displacements
+    rows = []
+    for e, R, end in zip(device.placed_elements, c.frames, c.ends, strict=True):
+        held = e.section.directions if isinstance(e.section, Spring) else range(6)
+        local = ca.DM(inverse_adjoint(R, end)).full()[list(held)] * size / size[list(held), None]
+        row = np.zeros((len(local), 6 * count))
+        for body, sign in ((e.second, 1), (e.first, -1)):
+            if body != GROUND:
+                row[:, 6 * body : 6 * body + 6] = sign * local
+        rows.append(row)
+    _, values, motions = np.linalg.svd(np.vstack([*rows, np.zeros((6 * count, 6 * count))]))
+    free = motions[values < FREE * values.max()]
+    return [name for i, name in enumerate(device.bodies) if np.abs(free[:, 6 * i : 6 * i + 6]).max(initial=0) > FREE]
 
 
 @dataclass(frozen=True, eq=False)
