@@ -13,7 +13,9 @@ from ctrlgen.budget.robust import solve
 from ctrlgen.core.files import write_text
 from ctrlgen.model.assembly import build_model
 from ctrlgen.reporting.html import render
+from ctrlgen.reporting.page_figure import FirstScreen, PageFigure, page_figures
 from ctrlgen.reporting.plots import STYLE, svg
+from ctrlgen.reporting.result_file import origin
 from ctrlgen.trajectory.scenario import load_scenario
 from ctrlgen.trajectory.solution_plots import draw_path, draw_signal, draw_stage_force
 
@@ -93,13 +95,30 @@ def counts(rows: list[PrintedNumber]) -> Counter[tuple[str, str]]:
 def write_page(rows: list[PrintedNumber], path: Path) -> None:
     """Writes one self-contained HTML page: counts, the figures redrawn from our own results, and every row."""
     sources = list(dict.fromkeys(row.source for row in rows))
-    figures = {source: FIGURES[source]() for source in sources if source in FIGURES}
+    figures = {source: page_figures(FIGURES[source](), {}) for source in sources if source in FIGURES}
+    first = next((drawn for group in figures.values() for drawn in group.values()), None)
     page = render(
         Path(__file__).with_name("reproduce.html.j2"),
         rows=as_json(rows),
         sources=sources,
         titles=TITLES,
         counts=counts(rows),
+        first=_first_screen(rows, first),
         figures=figures,
+        marks={"reproduced": "ok", "differs": "bad", "not computable": "idle"},
+        origin=origin({}),
     )
     write_text(path, page)
+
+
+def _first_screen(rows: list[PrintedNumber], figure: PageFigure | None) -> FirstScreen:
+    """How many printed numbers are reproduced, and why the others are not is told with each."""
+    of = Counter(row.status.value for row in rows)
+    others = f"{of['differs']} differ, {of['not computable']} cannot be computed"
+    answer = f"{of['reproduced']} of {len(rows)} printed numbers are reproduced; {others}."
+    numbers = tuple((status, str(k)) for status, k in of.most_common())
+    steps = (
+        "Read the reason of each number that differs, in the table of its paper.",
+        "One paper alone: `ctrlgen reproduce S1`.",
+    )
+    return FirstScreen((answer,), "so" if of["differs"] else "ok", figure, numbers, steps)

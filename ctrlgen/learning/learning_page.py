@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ctrlgen.core.files import write_text
 from ctrlgen.learning.learn import Learning, RunResult
-from ctrlgen.learning.learning_plots import draw_learning
+from ctrlgen.learning.learning_plots import draw_learning, learning_charts
 from ctrlgen.learning.learning_record import learning_record
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.page_figure import FirstScreen, PageFigure, page_figures
@@ -29,7 +29,7 @@ def write_learning(out: Path, learning: Learning) -> None:
     write_text(out / "drives.csv", table_of_signals(learning.next, ["drive"]))
     for name, text in figures.items():
         write_text(out / "figures" / f"{name}.svg", text)
-    drawn = page_figures(figures, FIGURES)
+    drawn = page_figures(figures, FIGURES, learning_charts(learning))
     page = render(
         Path(__file__).with_name("learning.html.j2"),
         r=record,

@@ -8,7 +8,9 @@ from matplotlib.figure import Figure
 
 from ctrlgen.core.units import difference, from_si
 from ctrlgen.learning.learn import Learning
+from ctrlgen.reporting.chart import Chart, Curve, Panel
 from ctrlgen.reporting.plots import COLOURS, PATTERNS, STYLE, plt, svg
+from ctrlgen.trajectory.solution_charts import abscissa, line_of
 
 FAINTEST = 0.35  # of a colour: the oldest run in a figure
 SHOWN_RUNS = 5  # along the path, the last ones
@@ -112,3 +114,29 @@ def _shades(count: int) -> list[tuple[float, float, float, float]]:
     """Shades of one colour, the last one full."""
     red, green, blue = (int(COLOURS[0][i : i + 2], 16) / 255 for i in (1, 3, 5))
     return [(red, green, blue, float(a)) for a in np.linspace(FAINTEST if count > 1 else 1.0, 1.0, count)]
+
+
+def learning_charts(learning: Learning) -> dict[str, Chart]:
+    """What zooms: the error along the path of each run, and the drives of the best run and the next."""
+    solution = learning.solution
+    label, at = abscissa(solution)
+    shown = list(enumerate(learning.runs, 1))[-SHOWN_RUNS:]
+    along = []
+    for g in learning.groups:
+        rows = [(f"run {k}", run.error) for k, run in shown]
+        rows += [] if learning.stop else [("predicted for the next, without noise", learning.predicted_error)]
+        curves = tuple(
+            Curve(name, difference(np.linalg.norm(error[:, g.channels], axis=1), g.unit), k, line_of(k))
+            for k, (name, error) in enumerate(rows)
+        )
+        along.append(Panel(f"|error|, {g.name} [{g.unit}]", at, curves, log=True))
+    drive, now = solution.model.signals["drive"], learning.runs[learning.base].drive
+    named = list(enumerate(zip(drive.channels, drive.units, strict=True)))
+    following = tuple(Curve(c, from_si(learning.next.drive[:, i], u), i, line_of(i), held=True) for i, (c, u) in named)
+    changes = tuple(
+        Curve(f"change of {c}", difference(learning.next.drive[:, i] - now[:, i], u), i, line_of(i), held=True)
+        for i, (c, u) in named
+    )
+    unit = drive.units[0]
+    drives = (Panel(f"next [{unit}]", at, following), Panel(f"next - best [{unit}]", at, changes))
+    return {"along": Chart(label, tuple(along)), "drives": Chart(label, drives)}

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from ctrlgen.core.files import write_text
-from ctrlgen.core.units import show
+from ctrlgen.core.units import from_si, show
 from ctrlgen.path_timing.binding import Binding
 from ctrlgen.path_timing.fastest import FastestPath
 from ctrlgen.path_timing.fastest_plots import bound_text, draw_fastest
 from ctrlgen.path_timing.fastest_record import fastest_record, small_unit
 from ctrlgen.path_timing.retimed import write_inputs
+from ctrlgen.reporting.chart import Chart, Curve, Panel
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.page_figure import FirstScreen, PageFigure, page_figures
 from ctrlgen.reporting.result_file import json_text
+from ctrlgen.trajectory.solution_charts import line_of
 
 FIGURES = {
     "path": ("Path and speed", "Coloured where a limit binds; dots are the set-points."),
@@ -35,7 +39,7 @@ def write_fastest(out: Path, motion: FastestPath) -> None:
     repeated = motion.repetition.solution if motion.repetition else None
     if repeated is not None:
         write_inputs(out / "at_frequency" / "scenario", repeated.scenario)
-    drawn = page_figures(figures, FIGURES)
+    drawn = page_figures(figures, FIGURES, {"drives": drives_chart(motion)})
     page = render(
         Path(__file__).with_name("fastest.html.j2"),
         f=record,
@@ -50,6 +54,20 @@ def write_fastest(out: Path, motion: FastestPath) -> None:
         repeated_file=None if repeated is None else repeated.scenario.path.name,
     )
     write_text(out / "fastest.html", page)
+
+
+def drives_chart(motion: FastestPath) -> Chart:
+    """The drives, held from sample to sample, beside their bounds."""
+    signal, (low, high) = motion.solution.model.signals["drive"], motion.solution.model.u_bounds
+    values, unit = motion.solution.drive, signal.units[0]
+    curves = tuple(
+        Curve(channel, from_si(values[:, i], its), i, line_of(i), held=True)
+        for i, (channel, its) in enumerate(zip(signal.channels, signal.units, strict=True))
+    )
+    bounds = sorted({float(from_si(b, unit)) for b in (*low, *high) if np.isfinite(b)})
+    rules = tuple((b, "bound") for b in bounds)
+    at = 1e3 * np.asarray(motion.solution.trace.time[: len(values)])
+    return Chart("time [ms]", (Panel(f"drive [{unit}]", at, curves, rules=rules),))
 
 
 def first_screen(motion: FastestPath, figure: PageFigure) -> FirstScreen:

@@ -85,6 +85,7 @@
       points: { show: points, size: POINT, fill: () => colour(curve.colour) },
     };
     if (points) drawn.paths = () => null;
+    else if (curve.held) drawn.paths = uPlot.paths.stepped({ align: 1 });
     return drawn;
   }
 

@@ -30,6 +30,7 @@ class Curve:
     """One curve or row of points: its `values` (n,), NaN where there is none; `line` is one of
     `DASHES`, or "." for points.
 
+    `held`: from each place to the next, as a drive is.
     `colour`: the place in the palette of the page, whose colours differ in the dark.
     """
 
@@ -38,6 +39,7 @@ class Curve:
     colour: int = 0
     line: str = "-"
     width: float = 1.3
+    held: bool = False
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,14 @@ def kept_places(panel: Panel) -> np.ndarray:
 
 def _panel(panel: Panel, kept: np.ndarray) -> dict[str, Any]:
     curves = [
-        {"name": c.name, "colour": c.colour, "line": c.line, "width": c.width, "y": _rounded(c.values[kept], DIGITS)}
+        {
+            "name": c.name,
+            "colour": c.colour,
+            "line": c.line,
+            "width": c.width,
+            "held": c.held,
+            "y": _rounded(c.values[kept], DIGITS),
+        }
         for c in panel.curves
     ]
     x = _rounded(np.asarray(panel.x, float)[kept], PLACE_DIGITS)

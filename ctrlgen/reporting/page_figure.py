@@ -58,8 +58,3 @@ class FirstScreen:
     figure: PageFigure | None
     numbers: tuple[tuple[str, str], ...] = ()
     steps: tuple[str, ...] = ()
-
-    @property
-    def told(self) -> bool:
-        """Whether anything stands beside the figure."""
-        return bool(self.numbers or self.steps)

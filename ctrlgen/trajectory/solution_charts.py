@@ -41,7 +41,7 @@ def _signal(solution: Solution, role: str) -> Chart:
     values = solution.trace.signals[role][: len(x)]
     points = solution.scenario.sample_time is None
     curves = tuple(
-        Curve(channel, from_si(values[:, i], unit), i, "." if points else line_of(i))
+        Curve(channel, from_si(values[:, i], unit), i, "." if points else line_of(i), held=role == "drive")
         for i, (channel, unit) in enumerate(zip(signal.channels, signal.units, strict=True))
     )
     return Chart(label, (Panel(f"{signal.label} [{signal.units[0]}]", x[: len(values)], curves, height=240),))
@@ -63,6 +63,6 @@ def _path(solution: Solution) -> Chart:
     )
     panels = (
         Panel(f"modelled [{unit}]", x, shown, height=LOW),
-        Panel(f"modelled - commanded [{fine}]", x, error, band=(-tolerance, tolerance), height=LOW),
+        Panel(f"error [{fine}]", x, error, band=(-tolerance, tolerance), height=LOW),
     )
     return Chart(label, panels)

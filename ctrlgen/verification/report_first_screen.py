@@ -90,8 +90,10 @@ def _steps(s: Summary, budget: BudgetSection | None, record: BudgetRecord | None
         )
     if record is not None and record.contributors:
         first = record.contributors[0]
+        most = max(first.effects, key=lambda effect: effect.share)
         steps.append(
-            f"Measure or tighten `{first.name}` first: it makes up {100 * first.share:.0f} % of what is uncertain (`ctrlgen budget`)."
+            f"Measure or tighten `{first.name}` first: it makes up {100 * most.share:.3g} % of the variance in {most.group} "
+            "(`ctrlgen budget`)."
         )
     elif budget is None:
         steps.append(

@@ -118,7 +118,7 @@ KINDS = (  # the first that a folder has is what the folder is
     ResultKind("fastest motion", "fastest.json", "fastest.html", _fastest),
     ResultKind("learning", "learning.json", "learning.html", _learning),
     ResultKind("calibration", "constants.json", "calibration.html", _constants),
-    ResultKind("workspace", "workspace.json", "workspace.svg", _workspace),
+    ResultKind("workspace", "workspace.json", "workspace.html", _workspace),
     ResultKind("batch", BATCH, "batch.html", _batch),
     ResultKind(GENERATED, "manifest.json", "README.md", _generated),
 )
