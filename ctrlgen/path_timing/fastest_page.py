@@ -91,7 +91,7 @@ def first_screen(motion: FastestPath, figure: PageFigure) -> FirstScreen:
         "Hold it to what is uncertain: `ctrlgen budget` reads the same scenario.",
     ]
     if motion.bindings:
-        steps.append(f"To be faster, widen {motion.bindings[0].side.limit.label}: it binds for the longest time.")
+        steps.append(f"Only more room in {bound[0]} makes it faster: no other limit binds for as long.")
     return FirstScreen(tuple(answer), "ok", figure, tuple(numbers), tuple(steps))
 
 
