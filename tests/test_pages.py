@@ -52,7 +52,7 @@ def test_the_frame_lists_its_sections_once_each_and_ids_are_unique(tmp_path):
     assert re.findall(r'<a href="#([^"]+)">Whole', text) == ["whole", "whole-2"]
     # clip paths and markers are named by what they are: the same in two drawings
     named = [one for one in ids if not re.fullmatch(r"[a-z][0-9a-f]{10}", one)]
-    assert len(named) == len(set(named)) == 2
+    assert len(named) == len(set(named)) == 3
     assert text.count("<details") == text.count("</details>") == 2 and "<code>code</code>" in text
     assert 'aria-label="Whole. what it shows"' in text and "10⁻²" in text and "mathdefault" not in text
 

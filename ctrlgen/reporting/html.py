@@ -32,7 +32,7 @@ class PageParts:
     def section(self, title: str, id_: str | None = None) -> str:
         """Lists a section; its id, which is unique on the page."""
         wanted = id_ or re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-") or "section"
-        taken, name, k = {known for known, _ in self.sections}, wanted, 2
+        taken, name, k = {"contents", *(known for known, _ in self.sections)}, wanted, 2
         while name in taken:
             name, k = f"{wanted}-{k}", k + 1
         self.sections.append((name, title))
