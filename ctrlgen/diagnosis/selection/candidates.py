@@ -12,7 +12,7 @@ from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.diagnosis.selection.shifts import best_shift
 from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
-from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
+from ctrlgen.diagnosis.settings import MODEL_SELECTION, REGIONS, SEARCH
 from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 from ctrlgen.estimation.settings import FIT
@@ -26,6 +26,7 @@ def fit_candidates(trials: Trials, current: CandidateModel, screened: Screened) 
         return t if current.errors.is_noise else restart_elsewhere(branch, t, current, screened)
 
     candidates = fit_each(trials, current.fit, significant(trials, current, screened), in_other_shapes)
+    candidates = (*candidates, *fit_in_regions(trials, current, screened, candidates))
     candidates = (*candidates, *finer_forms(trials, current))
     candidates = (*candidates, *fit_other_clocks(trials, current, candidates))
     if trials.selection.parameters_may_mask_cause(current.fit):
@@ -69,6 +70,22 @@ def fit_each(
         ]
 
     return tuple(t for fitted in trials.each(one, suspects, lambda s: trying(s.hypothesis)) for t in fitted)
+
+
+def fit_in_regions(
+    trials: Trials, current: CandidateModel, screened: Screened, singles: Sequence[CandidateModel]
+) -> tuple[CandidateModel, ...]:
+    """The first cause as a law in a region that no test showed, where it promises about as much as a law everywhere does and none of the
+    `singles` leaves noise alone: friction that drags in half of the travel makes the rest ring, and is left over everywhere."""
+    everywhere = [s for s in screened.suspects if not s.hypothesis.prior.in_a_region]
+    enough = any(t.errors.is_noise for t in (current, *singles))
+    if current.causes or enough or trials.fitter.recording.kind == "poses" or not everywhere:
+        return ()
+    most = everywhere[0].z ** 2
+    loud = {s.hypothesis.location for s in everywhere if s.z**2 >= SEARCH.smallest_score * most}
+    seen = trials.screen.in_regions(current.fit, loud)
+    suspects = [s for s in seen.suspects if s.z**2 >= REGIONS.score * most][: SEARCH.regional_per_round]
+    return fit_each(trials, current.fit, suspects, lambda branch, t: restart_elsewhere(branch, t, current, seen))
 
 
 def finer_forms(trials: Trials, current: CandidateModel) -> tuple[CandidateModel, ...]:

@@ -42,6 +42,21 @@ def motion_of(
     return along
 
 
+def on_either_side(motion: Mapping[Along, np.ndarray]) -> dict[Along, tuple[Region, ...]]:
+    """By quantity of `motion` what lies beyond each of a few quantiles of it, on either side: where an edge may be that no residual
+    shows, since a law which acts nearly everywhere, or leaves motion that rings on, is loud everywhere."""
+    return {
+        key: tuple(
+            Region(low, high, 0.0)
+            for edge in np.unique(np.quantile(x, REGIONS.edges)).tolist()
+            for low, high in ((edge, np.inf), (-np.inf, edge))
+        )
+        for key, x in motion.items()
+        # a stretch has two ends
+        if key[1] is not Place.SENSOR and np.ptp(x) > 0
+    }
+
+
 def _moved(place: Place) -> Place:
     """The place whose axis moves as that of a law at `place`."""
     return Place.FORCE if place is Place.DISPLACEMENT else place

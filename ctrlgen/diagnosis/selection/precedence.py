@@ -13,8 +13,9 @@ import numpy as np
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.confusable import explains_alike
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection
+from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
-from ctrlgen.diagnosis.settings import CONFUSABLE, PRECEDENCE, SEARCH
+from ctrlgen.diagnosis.settings import CONFUSABLE, PRECEDENCE, REGIONS, SEARCH
 from ctrlgen.diagnosis.shares.families import FAMILY_OF, Family
 from ctrlgen.effects import Place
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis
@@ -37,6 +38,29 @@ def acting_first(
     for t in compare.ranked([t for t in ends if not trials.objections(t, current.causes)]):
         nearly = not best.errors.is_noise and _share_of(current, best, t) >= PRECEDENCE.nearly_as_much
         if explains_alike(compare, t, best) or nearly:
+            return t
+    return best
+
+
+def everywhere_first(
+    trials: Trials,
+    current: CandidateModel,
+    best: CandidateModel,
+    candidates: Sequence[CandidateModel],
+    screened: Screened,
+) -> CandidateModel:
+    """The best candidate; where it acts in a region that no test showed, rather the best law everywhere, unless that leaves several times
+    as much on either kind of records: an edge more follows the error of any law's form."""
+    shown = {s.hypothesis for s in screened.suspects}
+    if not any(c.prior.in_a_region and c not in shown for c in best.causes if c not in current.causes):
+        return best
+    compare = trials.selection
+    others = [t for t in candidates if not any(c.prior.in_a_region and c not in shown for c in t.causes)]
+    first = compare.ranked([t for t in others if compare.improves_enough(current, t)])[: SEARCH.converged_candidates]
+    ends = trials.each(lambda branch, t: branch.converged(t), first)
+    for t in compare.ranked([t for t in ends if not trials.objections(t, current.causes)]):
+        pairs = ((best.fitted, t.fitted), (best.held_out, t.held_out))
+        if any(a.plain.sum() > REGIONS.share * b.plain.sum() for a, b in pairs):
             return t
     return best
 

@@ -11,14 +11,14 @@ largest |z| is judged against simulations of that. |cos| near one says what this
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ctrlgen.diagnosis.selection.candidate_terms import CandidateTerm, Peaks, signal_peaks, signals_along
 from ctrlgen.diagnosis.selection.law_terms import LawTerms
-from ctrlgen.diagnosis.selection.motion_regions import Along, motion_of, suggested
+from ctrlgen.diagnosis.selection.motion_regions import Along, motion_of, on_either_side, suggested
 from ctrlgen.diagnosis.selection.regions import Leftover, Region, find_regions
 from ctrlgen.diagnosis.selection.score_gradient import ScoreGradient, Sums, law_terms
 from ctrlgen.diagnosis.selection.spatial_periods import (
@@ -66,16 +66,30 @@ class Screen:
         self.motion: dict[Along, np.ndarray] = {}
         self.laws: dict[Timing, LawTerms] = {}
 
-    def run(self, fit: Fit, dropped: dict[Hypothesis, str] | None = None) -> Screened:
+    def in_regions(self, fit: Fit, locations: Collection[str]) -> Screened:
+        """The laws in a region at `locations`, their edges at quantiles of the motion, whether or not a region stands out there."""
+        self._follow(fit)
+        regional = [h for h in self.hypotheses if h.prior.in_a_region and h.location in locations]
+        part = Screen(self.fitter, regional, self.seed)
+        part.peaks, part.motion = self.peaks, self.motion
+        return part.run(fit, regions=on_either_side(self.motion))
+
+    def run(
+        self,
+        fit: Fit,
+        dropped: dict[Hypothesis, str] | None = None,
+        regions: dict[Along, tuple[Region, ...]] | None = None,
+    ) -> Screened:
         """All hypotheses that the fit does not contain yet, without those `dropped`, any whose law cannot be evaluated, and offsets
-        of the recorders' clocks, which no term of the model shows."""
+        of the recorders' clocks, which no term of the model shows; laws in a region begun in the `regions`, those of what is left
+        unless given."""
         beside, dropped = (h.beside(fit.structure.causes) for h in self.hypotheses), dropped or {}
         shown = (h for h in beside if h is not None and (h.effect == PARAMETER or not h.law.shifts_drive))
         open_ = [h for h in shown if h not in dropped]
         sums: Sums | None = None
         columns: list[CandidateTerm] = []
         U, back = _directions(fit.J)
-        regions = self._regions(fit)
+        regions = self._regions(fit) if regions is None else regions
         first, seen = 0, self.data_hints(fit, regions)
         for record, start in zip(
             self.fitter.fit_records, fit.initial_states or [None] * len(self.fitter.fit_records), strict=True
@@ -83,7 +97,7 @@ class Screen:
             slopes = ScoreGradient(self.fitter, fit, record, open_, seen, self._laws(fit, record.timing))
             # the columns must be the same on every record
             if slopes.laws.unusable:
-                return self.run(fit, dropped | slopes.laws.unusable)
+                return self.run(fit, dropped | slopes.laws.unusable, regions)
             columns = slopes.columns
             n = record.valid.size
             white = fit.residual[first : first + n].reshape(record.valid.shape)

@@ -21,7 +21,7 @@ from ctrlgen.diagnosis.selection.candidates import fit_candidates, restart_elsew
 from ctrlgen.diagnosis.selection.confusable import explains_alike
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.not_taken import not_taken
-from ctrlgen.diagnosis.selection.precedence import acting_first, one_loop_first
+from ctrlgen.diagnosis.selection.precedence import acting_first, everywhere_first, one_loop_first
 from ctrlgen.diagnosis.selection.pruning import all_pruned, no_worse, without_needless
 from ctrlgen.diagnosis.selection.rivals import acting_instead, rivals, simplified, swapped
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
@@ -140,6 +140,7 @@ class Searcher:
             candidates = trials.selection.ranked(candidates)
             better = [t for t in candidates if trials.selection.improves_enough(current, t)]
             best = self._most_parsimonious(current, better, screened) if better else current
+            best = everywhere_first(trials, current, best, candidates, screened)
             best = acting_first(trials, current, one_loop_first(trials, current, best, candidates), candidates)
             rounds.append(self._round(screened, candidates, current, best))
             if not better:

@@ -16,6 +16,7 @@ from ctrlgen.diagnosis.settings.evidence import (
     SPECTRAL_LINES,
     UNKNOWN_INPUT,
 )
+from ctrlgen.diagnosis.settings.regional_laws import REGIONS
 from ctrlgen.diagnosis.settings.selection import (
     ATTRIBUTION,
     CONFUSABLE,
@@ -23,7 +24,6 @@ from ctrlgen.diagnosis.settings.selection import (
     MODEL_SELECTION,
     OBJECTIONS,
     PRECEDENCE,
-    REGIONS,
     SCREEN,
     SEARCH,
     SPATIAL_PERIODS,
