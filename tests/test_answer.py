@@ -14,8 +14,8 @@ from ctrlgen.diagnosis.selection.findings import ChanceEntry, ChannelErrorEntry,
 from ctrlgen.diagnosis.selection.verdict import Verdict
 
 
-def finding(cause, share: float, *alternatives, chance: ChanceEntry | None = None) -> Finding:
-    taken = ShareEntry(value=share, ci95=(share, share))
+def finding(cause, share: float | None, *alternatives, chance: ChanceEntry | None = None) -> Finding:
+    taken = None if share is None else ShareEntry(value=share, ci95=(share, share))
     return Finding(cause.effect, cause.location, {}, alternatives, taken, {}, "", cause, chance=chance)
 
 
@@ -37,9 +37,9 @@ def told(verdict: Verdict, *findings: Finding, passed: bool = False, after: floa
     )
 
 
-@pytest.mark.parametrize("share, says", [(0.16, True), (0.14, False)])
+@pytest.mark.parametrize("share, says", [(0.16, True), (0.14, False), (None, False)])
 def test_an_alternative_stands_beside_the_cause_that_it_is_one_of(share, says):
-    """Where that cause is large enough to make the answer ambiguous: a quarter of the main one."""
+    """Where that cause is large enough to make the answer ambiguous, a quarter of the main one, and no part of another."""
     first = told(Verdict.AMBIGUOUS, finding(GAIN, 0.6, CREEP), finding(DRIFT, share, CREEP))[0]
     assert "; this recording cannot tell it from creep at stage:axis" in first
     assert (", nor drift at sensor:axis from creep at stage:axis." in first) == says

@@ -157,7 +157,8 @@ def _rivals(diagnosis: Diagnosis) -> str:
         return ""
     main = diagnosis.findings[0]
     least = VERDICT.main_share * (main.share.value if main.share else 0.0)
-    alike = [f for f in diagnosis.findings if f.alternatives and (f.share is None or f.share.value >= least)]
+    counts = [f for f in diagnosis.findings if main.share is None or (f.share is not None and f.share.value >= least)]
+    alike = [f for f in counts if f.alternatives]
     pairs = [f"{'it' if f is main else cause_name(f.cause)} from {_any(f.alternatives)}" for f in alike]
     rivals = f"; this recording cannot tell {', nor '.join(pairs)}" if pairs else ""
     support = diagnosis.findings[0].support
