@@ -205,6 +205,19 @@ def test_instants_and_waveforms_of_tdms(tmp_path):
         table.numbers("g/t")
 
 
+def test_the_rasters_of_mdf_are_tables_to_choose_from(tmp_path):
+    asammdf = pytest.importorskip("asammdf", reason="asammdf is not installed: MDF was not read")
+    slow = T[::10]
+    with asammdf.MDF(version="4.10") as file:
+        file.append([asammdf.Signal(U, T, name="u", unit="V"), asammdf.Signal(X, T, name="x", unit="um")])
+        file.append([asammdf.Signal(X[::10], slow, name="x", unit="um")])
+        file.save(tmp_path / "rasters.mf4")
+    with pytest.raises(InputError, match=r"holds 2 tables \(1: u, x every .* s, 2: x every .* s\); write table = 1"):
+        read_table(tmp_path / "rasters.mf4")
+    assert len(read_table(tmp_path / "rasters.mf4", 1).reading("u").values) == len(T)
+    assert len(read_table(tmp_path / "rasters.mf4", 2).reading("x").values) == len(slow)
+
+
 def test_readings_of_mdf_that_are_marked_invalid_are_left_out(tmp_path):
     asammdf = pytest.importorskip("asammdf", reason="asammdf is not installed: MDF was not read")
     invalid = np.zeros(40, dtype=bool)

@@ -121,6 +121,37 @@ def test_a_reading_before_its_drive_is_told():
     assert early(np.roll(u, 7), y) == 7
 
 
+def test_files_of_one_bench_are_alike_between_samples(axis, tmp_path):
+    """A smooth drive does not tell; one that steps does, for the other too."""
+    t = 1e-3 * np.arange(1000)
+    drives = {"fit": np.random.default_rng(0).normal(size=1000), "held_out": np.sin(6 * t)}
+    for name, drive in drives.items():
+        rows = "".join(f"{a:.3f},{b:.6f},{c:.6f}\n" for a, b, c in zip(t, drive, 40 * drive, strict=True))
+        (tmp_path / f"{name}.csv").write_text("time [s],drive [V],position [um]\n" + rows)
+    tables = {name: table_facts(read_table(tmp_path / f"{name}.csv")) for name in drives}
+    both = recording_toml(propose([tables["fit"], tables["held_out"]], axis), tmp_path, "t")
+    assert both.count('between_samples = "held"') == 2 and "linear" not in both
+    alone = recording_toml(propose([tables["held_out"]], axis), tmp_path, "t")
+    assert 'between_samples = "linear" # assumed: every drive is a smooth curve' in alone
+
+
+def test_new_recording_writes_what_look_proposes(tmp_path):
+    t = 1e-3 * np.arange(1000)
+    rows = "".join(f"{a:.3f},{np.sin(6 * a):.6f},{40 * np.sin(6 * a):.6f}\n" for a in t)
+    (tmp_path / "log.csv").write_text("time [s],drive [V],position [um]\n" + rows)
+    made = ctrlgen("new", "recording", tmp_path / "log.csv", "--device", AXIS_FILE)
+    assert made.returncode == 0, made.stderr
+    assert ctrlgen("check", tmp_path / "recording.toml", "--device", AXIS_FILE).returncode == 0
+    again = ctrlgen("new", "recording", tmp_path / "log.csv", "--device", AXIS_FILE)
+    assert again.returncode == 1 and "exists" in again.stderr
+
+
+def test_a_log_of_one_row_says_so(tmp_path):
+    (tmp_path / "log.csv").write_text("time [s],drive [V]\n0,1\n")
+    with pytest.raises(InputError, match="single row of numbers, line 2; is the file complete"):
+        read_table(tmp_path / "log.csv")
+
+
 def test_steps_are_held_and_curves_are_linear():
     t = np.arange(3000) / RATE
     assert between_samples(np.sin(2 * np.pi * 3 * t)) == "linear"

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
+from importlib import import_module
+
+from conftest import ROOT
 
 import ctrlgen
 
@@ -12,6 +16,13 @@ def test_every_public_name_is_listed_and_is_what_its_stub_names():
     assert set(ctrlgen.__all__) == set(dir(ctrlgen)) and {"run", "load_device", "__version__"} <= set(dir(ctrlgen))
     for name in ctrlgen.__all__:
         assert getattr(getattr(ctrlgen, name), "__name__", name) == name
+
+
+def test_every_public_name_is_in_the_reference(monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "_ext"))
+    page = import_module("reference_pages").python_page()
+    told = set(re.findall(r"^\.\. auto\w+:: [\w.]*?(\w+)$", page, re.MULTILINE))
+    assert told == set(ctrlgen.__all__) - {"__version__"}
 
 
 def test_importing_ctrlgen_imports_nothing_that_takes_long():

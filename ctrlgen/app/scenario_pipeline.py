@@ -17,8 +17,8 @@ from ctrlgen.budget.budget_section import budget_section
 from ctrlgen.budget.robust import solve
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.core.files import whole_folder, write_text
-from ctrlgen.core.shown import Shown
 from ctrlgen.core.steps import noted
+from ctrlgen.core.tabular import Reported
 from ctrlgen.devices import Device
 from ctrlgen.firmware.c.toolchains import find_compilers
 from ctrlgen.firmware.fmi.fmu import Fmus, write_fmus
@@ -50,7 +50,7 @@ VERIFY_STEPS = 27  # in `verify` with every tool installed: also reference, erro
 
 
 @dataclass(frozen=True, repr=False)
-class Outcome(Shown):
+class Outcome(Reported):
     """The results of a run; `c` and `comparison` are None where they were not asked for."""
 
     solution: Solution
@@ -107,7 +107,7 @@ def run(scenario: Scenario | Path | str, out: Path | str, progress: Progress = q
         comparison = compare(c, solution, lambda build: progress(f"compared: {build}"))
         progress("report")
         write_report(draft, solution, comparison, expected, c, drawn, budget_section(solution))
-        return Outcome(solution, c, comparison, expected)
+    return Outcome(solution, replace(c, path=Path(out) / "c"), comparison, expected)
 
 
 def verify(scenario: Scenario | Path | str, out: Path | str, progress: Progress = quiet, quick: bool = False) -> Build:

@@ -23,7 +23,7 @@ from ctrlgen.budget.robust import solve
 from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.budget.uncertainty import Uncertainties, load_uncertainties
 from ctrlgen.core.errors import Fault, InputError, SolverError
-from ctrlgen.core.shown import Shown
+from ctrlgen.core.tabular import Column, Reported, Tabular
 from ctrlgen.devices import Device
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import Solution
@@ -63,7 +63,7 @@ class Agreement:
 
 
 @dataclass(frozen=True, repr=False)
-class ErrorBudget(Shown):
+class ErrorBudget(Tabular, Reported):
     """The error budget of a path. `combined` (n, channels) is the standard uncertainty u_c of the followed signal [SI], `lines` come in
     the order of what to measure or tighten next; `safeties` of the limits at `probability`. Without draws `drawn` is None, without a finer
     model `model_difference`."""
@@ -92,6 +92,19 @@ class ErrorBudget(Shown):
             "first to measure": self.lines[0].name if self.lines else "nothing",
             "draws": self.draws,
         }
+
+    def columns(self) -> tuple[Column, ...]:
+        """The contributors, what to measure or tighten first before the others: standard uncertainty of the path by each, and how much of
+        the variance is gone without it."""
+        lines = self.lines
+        by_group = (
+            Column(f"{what} {g.name}", g.unit, [g.shown(getattr(line, what)[g.name]) for line in lines])
+            for g in self.groups
+            for what in ("peak", "rms")
+        )
+        share = Column("share", "%", [100 * line.share for line in lines])
+        stated = (Column(what, "", [getattr(line, what) for line in lines]) for what in ("sd", "source"))
+        return (Column("contributor", "", [line.name for line in lines]), *by_group, share, *stated)
 
     @property
     def factor(self) -> float:

@@ -20,7 +20,8 @@ from threadpoolctl import threadpool_limits
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text
-from ctrlgen.core.shown import Shown
+from ctrlgen.core.tabular import Column, Reported, Tabular
+from ctrlgen.core.units import difference, from_si
 from ctrlgen.devices import Device, files_of, load_device
 from ctrlgen.devices.changed_numbers import changed
 from ctrlgen.devices.run_time import RunTimeConstant
@@ -99,7 +100,7 @@ class ReadingError:
 
 
 @dataclass(frozen=True, repr=False)
-class Calibration(Shown):
+class Calibration(Tabular, Reported):
     """The constants of a specimen of `device`, described by `inputs`, from `recording`. `covariance` (k, k) [SI] of the constants in
     their order; that of one which is not determined is what its bounds say."""
 
@@ -118,6 +119,17 @@ class Calibration(Shown):
             "recording": self.recording.title,
             "constants": f"{sum(c.determined for c in self.constants)} of {len(self.constants)} determined",
         }
+
+    def columns(self) -> tuple[Column, ...]:
+        """A row a constant: its value and standard deviation in the `unit` of the row, and what the recording says of it."""
+        every = self.constants
+        return (
+            Column("constant", "", [c.constant.path for c in every]),
+            Column("value", "", [from_si(c.value, c.constant.unit) for c in every]),
+            Column("sd", "", [difference(c.sd, c.constant.unit) for c in every]),
+            Column("unit", "", [c.constant.unit for c in every]),
+            Column("remark", "", [c.remark for c in every]),
+        )
 
     @property
     def calibrated(self) -> Device:

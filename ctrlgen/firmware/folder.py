@@ -71,7 +71,7 @@ class CFolder(Shown):
 def generate(
     scenario: Scenario,
     model: Model,
-    out: Path,
+    out: Path | str,
     solution: Solution | None = None,
     figures: Mapping[str, str] | None = None,
 ) -> CFolder:
@@ -79,6 +79,7 @@ def generate(
 
     `figures` (name -> SVG text, as `ctrlgen.trajectory.solution_plots.draw_solution` gives) are put beside the README.
     """
+    out = Path(out)
     check_tightened(scenario, model)
     check_online(scenario, model)
     controller = controller_of(model, scenario.file.follow, scenario.sample_time)

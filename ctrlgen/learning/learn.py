@@ -17,7 +17,7 @@ import numpy as np
 from ctrlgen.budget.contributors import Group, groups_of
 from ctrlgen.budget.robust import solve
 from ctrlgen.core.errors import Fault, InputError, SolverError
-from ctrlgen.core.shown import Shown
+from ctrlgen.core.tabular import Column, Reported, Tabular
 from ctrlgen.learning.learning_options import LearningOptions
 from ctrlgen.learning.lifted import Lifted
 from ctrlgen.learning.norm_optimal import Wanted, next_drives
@@ -55,7 +55,7 @@ class RunResult:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Learning(Shown):
+class Learning(Tabular, Reported):
     """The runs so far and the next one. `solution` is of the scenario as described. `base`, the run that is gone on from; `step`, the
     share of the full step that is taken; `stop`, why there is nothing more to learn, empty where there is: then `next` plays the drives of
     the base run. `repeating` (n, n_y) [SI] is what repeats beyond the model, `kept` (n, n_y) the factor of each of its coefficients over
@@ -85,6 +85,15 @@ class Learning(Shown):
             "runs": len(self.runs),
             "next": self.stop or f"a step of {100 * self.step:.3g} %",
         }
+
+    def columns(self) -> tuple[Column, ...]:
+        """A row a run: its error along the path, that of noise, and what of it repeats, root mean square by group."""
+        by_group = (
+            Column(f"{what} {g.name}", g.unit, [g.shown(getattr(run, what)[g.name]) for run in self.runs])
+            for g in self.groups
+            for what in ("rms", "noise", "repeating")
+        )
+        return (Column("run", "", [run.name for run in self.runs]), *by_group)
 
 
 def learn(

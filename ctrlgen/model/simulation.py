@@ -4,28 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError, SolverError
-from ctrlgen.core.shown import Shown
+from ctrlgen.core.tabular import Column, Drawn, Tabular
 from ctrlgen.core.units import from_si
 from ctrlgen.devices import Signal
 from ctrlgen.model.discretisation import held_step, one_step_map
 from ctrlgen.model.model import Model
 from ctrlgen.numerics.newton import newton_solver
 
-if TYPE_CHECKING:
-    import pandas
-
 PERIODIC = 1e-9  # typical sizes by which a period may end elsewhere than it began
 MOST_NEWTON_STEPS = 50  # from a displacement far off; the sample before needs three
 
 
 @dataclass(frozen=True, repr=False)
-class Trace(Shown):
+class Trace(Tabular, Drawn):
     """Signals of a model at sample times, SI: `time` (n,) [s]; `signals` name -> (n, channels); `x` (n, n_x); `z` (n, n_axes).
     `described`: the channels and units of the signals by their names."""
 
@@ -43,16 +39,16 @@ class Trace(Shown):
             "signals": ", ".join(self.signals),
         }
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """The signals over time [s], a column a channel, named role.channel [unit], in that unit."""
-        import pandas  # takes half a second to import
-
-        columns = {
-            f"{role}.{channel} [{unit}]": from_si(self.signals[role][:, i], unit)
-            for role, signal in self.described.items()
-            for i, (channel, unit) in enumerate(zip(signal.channels, signal.units, strict=True))
-        }
-        return pandas.DataFrame(columns, index=pandas.Index(self.time, name="time [s]"))
+    def columns(self) -> tuple[Column, ...]:
+        """Time, then a column a channel, named role.channel, in the unit of its signal."""
+        return (
+            Column("time", "s", self.time),
+            *(
+                Column(f"{role}.{channel}", unit, from_si(self.signals[role][:, i], unit))
+                for role, signal in self.described.items()
+                for i, (channel, unit) in enumerate(zip(signal.channels, signal.units, strict=True))
+            ),
+        )
 
 
 def trace(model: Model, time: np.ndarray, x: np.ndarray, z: np.ndarray, u: np.ndarray) -> Trace:

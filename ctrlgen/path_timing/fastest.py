@@ -16,7 +16,7 @@ import numpy as np
 
 from ctrlgen.budget.robust import solve
 from ctrlgen.core.errors import Fault, InputError, SolverError
-from ctrlgen.core.shown import Shown
+from ctrlgen.core.tabular import Column, Reported, Tabular
 from ctrlgen.core.units import ExampleGiven, Quantity, read_quantity, show
 from ctrlgen.model.model import Model
 from ctrlgen.path_timing.binding import Binding, bindings
@@ -40,7 +40,7 @@ HELD_POINTS = 400  # at which it is looked at whether a path can be held
 
 
 @dataclass(frozen=True, repr=False)
-class FastestPath(Shown):
+class FastestPath(Tabular, Reported):
     """The fastest motion along the path of a `scenario`.
 
     `optimum` in continuous time; `share` (N + 1,) of the path behind at each sample, of a closed one at its end too; `solution` of the
@@ -68,6 +68,10 @@ class FastestPath(Shown):
             "as stated": "not stated" if self.given is None else f"{self.given:.6g} s",
             "set-points": len(self.share),
         }
+
+    def columns(self) -> tuple[Column, ...]:
+        """Those of its set-points, as `Solution` has them."""
+        return self.solution.columns()
 
     @property
     def sample_time(self) -> float:

@@ -88,6 +88,7 @@ def load_recordings(paths: Sequence[Path | str], model: Model, *, hold_out: bool
         ),
         tolerance=tolerance,
         drive_units=names.drive_units,
+        drives=names.drives,
     )
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ctrlgen.core.shown import Shown
+from ctrlgen.core.tabular import Column, Drawn, Tabular
+from ctrlgen.core.units import from_si
 
 
 class Timing(NamedTuple):
@@ -72,13 +74,14 @@ class Record(Shown):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Recording(Shown):
+class Recording(Tabular, Drawn):
     """Records of one device.
 
     `kind`: "series" or "poses". `channels` observed, such as 'reading.delta_x', with the reader's `units` and the stated
     standard deviation of their `noise` in SI, None where none is stated. `notes`: what validation marked or could not do.
     `tolerance`: error of each channel in SI that does not matter to the reader, None where none is stated. `drive_units`: the reader's
-    unit of each drive of the model, empty where they are the model's.
+    unit of each drive of the model, empty where they are the model's. `drives`: their names, such as 'drive.1X',
+    empty where they were not told.
     """
 
     title: str
@@ -91,6 +94,7 @@ class Recording(Shown):
     notes: tuple[str, ...]
     tolerance: tuple[float | None, ...] = ()
     drive_units: tuple[str, ...] = ()
+    drives: tuple[str, ...] = ()
 
     def facts(self) -> dict[str, object]:
         """What it is, in a few words."""
@@ -100,6 +104,33 @@ class Recording(Shown):
             "readings": ", ".join(f"{c} [{u}]" for c, u in zip(self.channels, self.units, strict=True)),
             "records": ", ".join(f"{len(r.time)} {r.role}" for r in self.records),
         }
+
+    def columns(self) -> tuple[Column, ...]:
+        """Time, the record and its role, drives and readings in the reader's units, of all records one after the other; NaN where a
+        reading is not valid."""
+        tables = [self.columns_of(record) for record in self.records]
+        names, roles = (
+            np.repeat([getattr(r, n) for r in self.records], [len(r.time) for r in self.records])
+            for n in ("name", "role")
+        )
+        joined = [replace(c[0], values=np.concatenate([each.values for each in c])) for c in zip(*tables, strict=True)]
+        return (joined[0], Column("record", "", names), Column("role", "", roles), *joined[1:])
+
+    def columns_of(self, record: Record) -> tuple[Column, ...]:
+        """Those of one record."""
+        observed = np.where(record.valid, record.observed, np.nan)
+        index = Column("pose", "", record.time) if self.kind == "poses" else Column("time", "s", record.time)
+        return (
+            index,
+            *(
+                Column(n, u, from_si(record.drive[:, i], u))
+                for i, (n, u) in enumerate(zip(self.drives, self.drive_units, strict=False))
+            ),
+            *(
+                Column(n, u, from_si(observed[:, i], u))
+                for i, (n, u) in enumerate(zip(self.channels, self.units, strict=True))
+            ),
+        )
 
     def __post_init__(self) -> None:
         if not self.tolerance:  # none stated

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import io
+import os
 import re
+import sys
 from typing import Any
 
 import matplotlib
 
-matplotlib.use("Agg")
+# Without a window, but a notebook or a script that has chosen how it shows its own figures keeps that
+if "MPLBACKEND" not in os.environ and "matplotlib.pyplot" not in sys.modules:
+    matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure

@@ -7,7 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ctrlgen.core.shown import Shown
+from ctrlgen.core.tabular import Column, Reported, Tabular
+from ctrlgen.core.units import from_si
 from ctrlgen.devices import Limit
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import Trace
@@ -39,7 +40,7 @@ class Margin:
 
 
 @dataclass(frozen=True, repr=False)
-class Solution(Shown):
+class Solution(Tabular, Reported):
     """A solved scenario, SI. `trace` holds the samples; `drive` (n, axes) acts from sample k to k + 1. `iterations` of IPOPT, or with
     inertia of Newton's method; `between_samples` (channels,) is the largest distance from the path between samples, with inertia."""
 
@@ -66,6 +67,15 @@ class Solution(Shown):
     def unstated_inertia(self) -> UnstatedInertia | None:
         """What masses of the file that the model leaves out do along the path; None where there are none."""
         return unstated_inertia(self.scenario, self.model, self.command, self.trace, self.drive)
+
+    def columns(self) -> tuple[Column, ...]:
+        """Those of its trace, and the commanded signal as command.channel."""
+        signal = self.model.signals[self.scenario.file.follow]
+        commanded = (
+            Column(f"command.{channel}", unit, from_si(self.command[:, i], unit))
+            for i, (channel, unit) in enumerate(zip(signal.channels, signal.units, strict=True))
+        )
+        return (*self.trace.columns(), *commanded)
 
     @property
     def solver(self) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.core.errors import Fault, InputError
-from ctrlgen.core.shown import Shown
+from ctrlgen.core.tabular import Drawn
 from ctrlgen.core.units import same_dimension
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import simulate
@@ -66,7 +66,7 @@ def _raised(model: Model, height: float) -> np.ndarray:
 
 
 @dataclass(frozen=True, repr=False)
-class Workspace(Shown):
+class Workspace(Drawn):
     """The poses in which one model can be held in equilibrium; poses are rows (n, channels) in SI. Raises InputError for more drives
     than axes: the limits of the drives then bound what they push together, and not one drive each."""
 

@@ -14,7 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from ctrlgen.core.shown import Shown
+from ctrlgen.core.tabular import Column, Tabular
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.toolchains import COMPILERS, find_compilers
 from ctrlgen.firmware.folder import CFolder, write_harness
@@ -28,7 +28,7 @@ from ctrlgen.verification.reference import ReferenceAnswers
 
 
 @dataclass(frozen=True, repr=False)
-class Comparison(Shown):
+class Comparison(Tabular):
     """All rows; `compilers`: name -> version line; `missing`: compilers that were not found."""
 
     rows: tuple[ComparisonEntry, ...]
@@ -44,6 +44,12 @@ class Comparison(Shown):
             "missing": ", ".join(self.missing) or "none",
         }
 
+    def columns(self) -> tuple[Column, ...]:
+        """A row a comparison; deviations in the `unit` of the row."""
+        names = ("what", "signal", "worst", "rms", "limit", "unit", "samples", "passed")
+        builds = Column("build", "", [str(row.build) for row in self.rows])
+        return (builds, *(Column(name, "", [_plain(getattr(row, name)) for row in self.rows]) for name in names))
+
     @property
     def passed(self) -> bool:
         """Whether something ran and everything that ran is within its limit."""
@@ -56,6 +62,10 @@ class Comparison(Shown):
         for row in self.rows:
             groups[(row.build.real, row.what, row.signal, row.unit)].append(row)
         return tuple(max(rows, key=lambda row: (not row.passed, row.worst)) for rows in groups.values())
+
+
+def _plain(value: object) -> object:
+    return str(value) if isinstance(value, str) else value
 
 
 def compare(

@@ -1,4 +1,4 @@
-"""Files to begin with: new device, new scenario. The work is imported by the command that does it."""
+"""Files to begin with: new device, new scenario, new recording. The work is imported by the command that does it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ from ctrlgen.app.commands.app import DEVICE_PANEL, app
 from ctrlgen.app.console import out
 from ctrlgen.core.errors import Fault, InputError
 
-new = typer.Typer(no_args_is_help=True, help="Begin a device or a scenario: a commented file that passes check.")
+new = typer.Typer(
+    no_args_is_help=True, help="Begin a device, a scenario or a recording: a commented file that passes check."
+)
 app.add_typer(new, name="new", rich_help_panel=DEVICE_PANEL)
 
 
@@ -85,6 +87,26 @@ def scenario(
     write_scenario(folder, device_path, path or None)
     out.print(str(folder / "scenario.toml"), soft_wrap=True, markup=False)
     out.print(f"next:  ctrlgen run {folder} --out out/{folder.name}", soft_wrap=True, markup=False)
+
+
+@new.command()
+def recording(
+    logs: Annotated[
+        list[Path], typer.Argument(help="Measurement files; the last of several is held out.", show_default=False)
+    ],
+    device_path: Annotated[Path, typer.Option("--device", help="The device file.", show_default=False)],
+    to: Annotated[
+        Path | None, typer.Option("--to", help="The file to write.", show_default="recording.toml beside the first log")
+    ] = None,
+) -> None:
+    """Begin a recording.toml for logs of a device: which column is which signal, as ctrlgen look finds them, with a comment where
+    something is assumed.
+
+    Example:  ctrlgen new recording scenarios/lever_runs/run_a.csv --device scenarios/devices/xy_lever_stage.toml --to run.toml
+    """
+    from ctrlgen.app.look_console import look
+
+    look(logs, device_path, to or logs[0].with_name("recording.toml"), None)
 
 
 def _pair(text: str) -> tuple[str, str]:

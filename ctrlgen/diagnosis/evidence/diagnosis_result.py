@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from ctrlgen.core.shown import Shown
+from ctrlgen.core.tabular import Column, Reported, Tabular
 from ctrlgen.core.units import to_si
 from ctrlgen.devices import Device
 from ctrlgen.devices.changed_numbers import changed, written
@@ -30,7 +30,7 @@ from ctrlgen.recordings.recording import Recording
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Diagnosis(Shown):
+class Diagnosis(Tabular, Reported):
     """The answer: verdict, findings and supporting analyses, each in the recording's units; `search` and `fitter` hold how it came about.
 
     attribution: shares of the causes and of the rest. shares: of what the residual is a function, whatever the law, before and
@@ -78,6 +78,19 @@ class Diagnosis(Shown):
         A device written in Python has no file: this is what to put into its code.
         """
         return estimated_values(self.search.chosen.fit, self.profiles)
+
+    def columns(self) -> tuple[Column, ...]:
+        """A row a number of each cause: its value with the ends of its 95 % interval, in the `unit` of the row."""
+        rows = [(f, name, e) for f in self.findings for name, e in f.parameters.items()]
+        return (
+            Column("cause", "", [f"{f.effect} at {f.location}" for f, _, _ in rows]),
+            Column("parameter", "", [name for _, name, _ in rows]),
+            Column("value", "", [e.value for _, _, e in rows]),
+            Column("low", "", [e.ci95[0] for _, _, e in rows]),
+            Column("high", "", [e.ci95[1] for _, _, e in rows]),
+            Column("unit", "", [e.unit for _, _, e in rows]),
+            Column("role", "", [str(f.role) for f, _, _ in rows]),
+        )
 
     @property
     def unconfirmed(self) -> tuple[Hypothesis, ...]:

@@ -13,7 +13,7 @@ from ctrlgen.recordings.formats import number_cells
 from ctrlgen.recordings.formats.checked_files import fault
 from ctrlgen.recordings.formats.measurement_table import Clock, MeasurementTable
 from ctrlgen.recordings.formats.number_cells import Ambiguous, NumberStyle
-from ctrlgen.recordings.formats.text_blocks import MOST_LISTED, Block, blocks_of
+from ctrlgen.recordings.formats.text_blocks import MOST_LISTED, Block, blocks_of, kind_of
 from ctrlgen.recordings.formats.text_cells import cells_of, separator_of, stray_quotes
 from ctrlgen.recordings.formats.text_encoding import decoded
 from ctrlgen.recordings.formats.text_header import header_of
@@ -61,6 +61,9 @@ def tables_of_text(path: Path, text: str, layout: Layout, notes: Sequence[str] =
         separator = separator_of(lines, layout)
         blocks = _blocks(lines, separator, layout)
         if not blocks:
+            rows = [k for k, line in enumerate(lines, 1) if kind_of(line, separator) == "row"]
+            if len(rows) == 1 and len(cells_of(lines[rows[0] - 1], separator)) > 1:
+                raise fault(path, f"holds a single row of numbers, line {rows[0]}; is the file complete? Record longer")
             what = f"holds no rows of numbers (cells separated by {NAMES.get(separator, repr(separator))})"
             raise Ambiguous(
                 f'{what}; write the separator, such as layout = {{ separator = ";" }}, or export the numbers as text'

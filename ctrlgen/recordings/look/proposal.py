@@ -97,6 +97,18 @@ class Proposal:
             *self.missing,
         )
 
+    def drives_of(self, facts: TableFacts) -> list[np.ndarray]:
+        """The columns of drives in one table."""
+        names = {m.column for m in self.matches if m.signal.startswith("drive.")}
+        return [c.values for c in facts.columns if c.name in names and c.values is not None]
+
+    @property
+    def between_samples(self) -> str:
+        """What the drive does between samples, as TOML: of all files together, for they come from one bench. A drive that steps in one of
+        them is held; curves do not tell."""
+        ways = {between_samples(values) for facts in self.tables for values in self.drives_of(facts)}
+        return '"linear" # assumed: every drive is a smooth curve' if ways == {"linear"} else '"held"'
+
     @property
     def certain(self) -> bool:
         """Whether it can be used as it stands."""
@@ -273,13 +285,10 @@ def _record(proposal: Proposal, facts: TableFacts, folder: Path, role: str) -> l
         head.append('sample_rate = "1 kHz" # assumed: no column is a time')
     else:
         head.append(f'time = {{ column = {toml(facts.time.column)}, unit = "{facts.time.unit}" }}')
-    names = [m.column for m in proposal.matches if m.signal.startswith("drive.")]
-    drives = [facts.column(name).values for name in names if any(c.name == name for c in facts.columns)]
-    known = [values for values in drives if values is not None]
+    known = proposal.drives_of(facts)
     if not known:
         return ["[[record]]", *head, f'role = "{role}"', ""]
-    ways = {between_samples(values) for values in known}
-    head.append(f'between_samples = "{"linear" if ways == {"linear"} else "held"}"')
+    head.append(f"between_samples = {proposal.between_samples}")
     n = len(known[0])
     ends = [(a, b) for a, b in rests(np.column_stack(known)) if (a == 0) != (b == n)]
     begin, end = max((b for a, b in ends if a == 0), default=0), min((a for a, b in ends if b == n), default=n)
