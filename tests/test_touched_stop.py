@@ -8,6 +8,7 @@ from axis_records import AXIS, KF, C, K, M, drive, record
 
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.rivals import simplified
+from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
@@ -84,7 +85,7 @@ def test_a_shape_that_the_fit_leaves_open_is_the_usual_one(touched):
     fitter, gap = touched
     start = {"stiffness": 1.9e6, "gap": gap - 3e-8, "power": 1.64}
     open_ = scored(fitter, fitter.fit(Structure(AXIS).with_cause(STOP, start)), STOP)
-    plain = simplified(Trials(fitter, None, lambda _: None), open_)
+    plain = simplified(Trials(fitter, Screen(fitter, [STOP]), lambda _: None), open_)
 
     def missed(t):
         return [np.std(r.observed - fitter.predict(t.fit, r)) for r in fitter.recording.records]
