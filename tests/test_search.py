@@ -10,6 +10,7 @@ from axis_records import AXIS, BACKLASH, LATE, LIMIT, NOISE, H, fitter_of, move,
 from misfits import errors_of, left, weighed_by
 from scipy.signal import lfilter
 
+from ctrlgen.diagnosis.selection import search
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, linearised_optimum
 from ctrlgen.diagnosis.selection.candidates import fit_subsets, restart_elsewhere
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection
@@ -53,6 +54,20 @@ def test_what_a_model_leaves_without_a_cause_is_screened_once_under_the_same_err
     trials.use(fitter)
     trials.screened_without(fit, 0)
     assert len(screens) == 2
+
+
+def test_a_model_to_which_nothing_is_added_is_not_screened(monkeypatch):
+    fitter = fitter_of(n=300)
+    screen = Screen(fitter, [BACKLASH])
+
+    def rounds_end(trials, current):
+        raise InterruptedError
+
+    monkeypatch.setattr(screen, "run", lambda fit: pytest.fail("screened"))
+    monkeypatch.setattr(search, "simplified", rounds_end)
+    monkeypatch.setattr(ModelSelection, "residual_within_model_form_error", lambda self, model: True)
+    with pytest.raises(InterruptedError):
+        search.Searcher(fitter, screen, lambda _: None).run(AXIS)
 
 
 def test_a_structure_is_fitted_again_from_a_better_start_only():

@@ -133,9 +133,9 @@ class Searcher:
             trials.step(f"screening, {len(current.causes)} causes so far")
             trials.new_round(len(rounds) + 1)
             current = self._marked_again(current)
-            screened = trials.screened(current)
             if len(current.causes) >= most or trials.selection.residual_within_model_form_error(current):
                 return current
+            screened = trials.screened(current)
             candidates = all_pruned(trials, current, fit_candidates(trials, current, screened), screened)
             candidates = trials.selection.ranked(candidates)
             better = [t for t in candidates if trials.selection.improves_enough(current, t)]
