@@ -124,16 +124,20 @@ def test_recordings_in_a_list_of_their_own_are_joined(jobs, tmp_path):
 
 
 @pytest.mark.long
-def test_a_batch_that_is_stopped_goes_on_where_it_was(jobs, tmp_path):
+@pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGKILL])
+def test_a_batch_that_is_stopped_goes_on_where_it_was(jobs, tmp_path, by):
     out = tmp_path / "out"
     command = [sys.executable, "-m", "ctrlgen", "batch", str(jobs), "--out", str(out), "--jobs", "1"]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     end = time.monotonic() + 60
     while not list(out.glob("*/diagnosis.json")) and time.monotonic() < end:
         time.sleep(0.02)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(by)
     message = process.communicate(timeout=60)[1]
-    assert process.returncode == 130 and "nothing was written that was not finished" in message
+    if by == signal.SIGINT:
+        assert process.returncode == 130 and "nothing was written that was not finished" in message
+        told = json.loads((out / "batch.json").read_text())
+        assert (told["total"], told["done"], told["failed"], sum(told["verdicts"].values())) == (3, 1, 0, 1)
     first = {p.parent.name for p in out.glob("*/diagnosis.json")}
     assert first == {"table--run0"} and not list(out.glob(".*"))
     rows = {row.name: row.state for row in run_batch(load_batch(jobs), out, jobs=0)}

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import time
+from collections import Counter
 
 import pytest
 
@@ -55,6 +58,31 @@ def test_results_are_the_same_wherever_they_are_made(jobs):
     told = []
     found = dict(run_all(square, ITEMS, jobs=jobs, progress=lambda done, of: told.append((done, of))))
     assert found == {k: k * k for k in ITEMS} and told == [(k + 1, 8) for k in ITEMS]
+
+
+def process_of(_: int) -> int:
+    return os.getpid()
+
+
+def test_processes_are_begun_anew_so_that_what_they_leave_in_memory_goes(monkeypatch):
+    monkeypatch.setattr("ctrlgen.core.parallel.RENEWED", 3)
+    found = dict(run_all(process_of, ITEMS, jobs=1))
+    assert sorted(found) == ITEMS and sorted(Counter(found.values()).values()) == [2, 3, 3]
+
+
+def test_a_process_that_is_killed_takes_its_workers_with_it(tmp_path):
+    """They hold its standard output open as long as they live."""
+    code = f"from test_parallel import *\nif __name__ == '__main__': dict(run_all(Slow({str(tmp_path)!r}), ITEMS * 99, jobs=1))"
+    (tmp_path / "long_work.py").write_text(code)
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([os.path.dirname(__file__), *sys.path])}
+    command = [sys.executable, str(tmp_path / "long_work.py")]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, env=environment)
+    end = time.monotonic() + 60
+    while not (started := list(tmp_path.glob("?.*"))) and time.monotonic() < end:
+        time.sleep(0.02)
+    assert started
+    process.kill()
+    process.communicate(timeout=20)
 
 
 def test_nothing_to_do_is_done_at_once():

@@ -13,13 +13,11 @@ kept: a batch that was stopped continues where it was.
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import re
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -27,8 +25,8 @@ from pydantic import Field
 
 from ctrlgen.app.batch_page import batch_page
 from ctrlgen.app.batch_row import BatchRow
+from ctrlgen.app.batch_tables import BatchTables, write_parquet
 from ctrlgen.core.errors import Fault, InputError
-from ctrlgen.core.escaping import csv_cell
 from ctrlgen.core.files import MARKER, read_toml, validate, whole_folder, write_text
 from ctrlgen.core.parallel import Failure, run_all
 from ctrlgen.devices.section import Section
@@ -38,7 +36,6 @@ from ctrlgen.estimation.hypothesis import selected_laws
 from ctrlgen.version import code_hash
 
 MADE_FROM = "made_from.json"  # in each result folder: what the result depends on
-TABLE = "results.csv"
 PAGE = "batch.html"
 MOST_WILD = 4  # of * and ? in a pattern, and no **: more walk through whole disks
 
@@ -176,7 +173,7 @@ def run_batch(
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> tuple[BatchRow, ...]:
-    """Runs every diagnosis into its folder in `out`; results.csv is rewritten after each, batch.html at the end.
+    """Runs every diagnosis into its folder in `out`; results.csv and batch.json follow, and at the end Parquet (`batch_tables`) and batch.html.
 
     `ctrlgen.core.parallel` decides where they run; only this process writes. A diagnosis that fails gives a row that says
     why. Raises InputError where `out` cannot be written or the scheduler does not answer.
@@ -194,7 +191,8 @@ def run_batch(
         else:
             to_do.append((task, made_from))
     before = len(tasks) - len(to_do)
-    _write_table(tasks, rows, out)
+    tables = BatchTables([task.name for task in tasks], out)
+    tables.write(rows)
 
     def told(done: int, _: int) -> None:
         if progress is not None:
@@ -202,13 +200,17 @@ def run_batch(
 
     if progress is not None:
         progress(before, len(tasks))
-    for k, result in run_all(_work, [task for task, _ in to_do], scheduler, jobs, told):
-        task, made_from = to_do[k]
-        rows[task.name] = _kept(task, made_from, result, out)
-        _write_table(tasks, rows, out)
-    told_of = tuple(rows[task.name] for task in tasks)
-    write_text(out / PAGE, batch_page(told_of, out, out.resolve().name))
-    return told_of
+    try:
+        for k, result in run_all(_work, [task for task, _ in to_do], scheduler, jobs, told):
+            task, made_from = to_do[k]
+            rows[task.name] = _kept(task, made_from, result, out)
+            tables.told(rows)
+    finally:
+        tables.write(rows)
+    in_order = tuple(rows[task.name] for task in tasks)
+    write_parquet(in_order, out)
+    write_text(out / PAGE, batch_page(in_order, out, out.resolve().name))
+    return in_order
 
 
 def _work(task: Task) -> dict[str, bytes]:
@@ -257,19 +259,3 @@ def _row(name: str, state: str, content: bytes) -> BatchRow:
 
 def _one_line(text: str) -> str:
     return " ".join(text.split())
-
-
-def _write_table(tasks: Sequence[Task], rows: dict[str, BatchRow], out: Path) -> None:
-    """Writes results.csv: a line for every diagnosis that is done, was done before or failed."""
-    text = io.StringIO()
-    table = csv.DictWriter(
-        text, [f for f in BatchRow.__dataclass_fields__ if f != "state"], lineterminator="\n", extrasaction="ignore"
-    )
-    table.writeheader()
-    for row in (rows[task.name] for task in tasks if task.name in rows):
-        table.writerow({key: csv_cell(v) if isinstance(v, str) else v for key, v in asdict(row).items()})
-    try:
-        write_text(out / TABLE, text.getvalue())
-    except OSError as error:
-        what = f"cannot be written ({error.strerror}); name a folder you may write"
-        raise InputError(out, [Fault("--out", what)]) from None

@@ -8,6 +8,8 @@ A result depends on its item alone, not on the order, the number of workers or t
 
 from __future__ import annotations
 
+import itertools
+import logging
 import os
 import pickle
 import signal
@@ -15,19 +17,26 @@ import threading
 import traceback
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from typing import Any
 
 from ctrlgen.core.errors import Fault, InputError
 
 _ONE_ITEM = threading.Lock()  # one item at a time in a process: the caches of a diagnosis are not shared
+RENEWED = (
+    50  # items of a process, after which all are begun anew: a diagnosis leaves 0.7 MB behind, and an import takes 2 s
+)
 MOST_DEATHS = 3  # of the worker that runs an item, before the item is given up
 THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 NO_DASK = "dask[distributed] is not installed; pip install 'ctrlgen[dask]', or leave --scheduler out"
 SCHEDULER_TIMEOUT = "10 s"  # for its first answer
+SCHEDULER_GONE = "is gone; what is finished stays, and the same command goes on with the rest when it is there again"
+AHEAD = (
+    256  # items that a scheduler has at a time: enough for as many workers, and a million items wait here, not there
+)
 
 Progress = Callable[[int, int], None]
 
@@ -52,7 +61,7 @@ def run_all(
     `scheduler` is the address of a dask.distributed scheduler, whose workers need ctrlgen installed and see the same
     files. Without it `jobs` processes of this computer run the items, one per core unless given; 0 runs them in this
     process. `progress` is called with the number of finished items and of all. Raises InputError where the scheduler
-    does not answer or the function cannot be sent to another process.
+    does not answer, is lost, or the function cannot be sent to another process.
     """
     items = list(items)
     if scheduler is not None:
@@ -97,10 +106,18 @@ def _check_sendable(function: Callable[[Any], Any], items: list[Any]) -> None:
 
 
 def _begin_worker() -> None:
-    """Gives a worker one BLAS thread, and leaves Ctrl-C to its parent."""
+    """Gives a worker one BLAS thread, leaves Ctrl-C to its parent, and ends it with that: one that was killed tells its workers nothing."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     for name in THREAD_VARIABLES:
         os.environ[name] = "1"
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 class _Pool:
@@ -133,12 +150,17 @@ def _on_processes(function: Callable[[Any], Any], items: list[Any], jobs: int) -
     waiting, alone = deque(range(len(items))), deque[int]()
     deaths: Counter[int] = Counter()
     running: dict[Future[Any], int] = {}
-    pool = _Pool(jobs)
+    pool, begun = _Pool(jobs), 0
     try:
         while waiting or alone or running:
-            most = 1 if alone else jobs
+            if begun >= RENEWED * jobs and not running:
+                pool.end()
+                pool.begin()
+                begun = 0
+            most = 0 if begun >= RENEWED * jobs else 1 if alone else jobs
             while (alone or waiting) and len(running) < most:
                 k = alone.popleft() if alone else waiting.popleft()
+                begun += 1
                 try:
                     running[pool.processes.submit(guarded, function, items[k])] = k
                 except BrokenProcessPool as error:  # a process died while it had nothing to do
@@ -201,18 +223,30 @@ def _on_dask(function: Callable[[Any], Any], items: list[Any], address: str) -> 
     except (OSError, ValueError, TypeError) as error:
         lines = str(error).strip().splitlines() or ["no answer"]
         raise InputError("--scheduler", [Fault(address, f"does not answer ({lines[0]})")]) from None
+    # what it tells of a lost scheduler is said below
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     with client:
         shared = client.submit(_identity, function, pure=False)  # sent once; sent again where its worker dies
-        futures = {
-            client.submit(guarded, shared, item, pure=False, retries=0, key=f"ctrlgen-{os.urandom(6).hex()}-{k}"): k
-            for k, item in enumerate(items)
-        }
+        waiting, futures = iter(enumerate(items)), {}
+
+        def submitted(most: int) -> list[Any]:
+            """The futures of the next items."""
+            new = {
+                client.submit(guarded, shared, item, pure=False, retries=0, key=f"ctrlgen-{os.urandom(6).hex()}-{k}"): k
+                for k, item in itertools.islice(waiting, most)
+            }
+            futures.update(new)
+            return list(new)
+
         try:
             with client.as_current():
-                finished = as_completed(list(futures))
+                finished = as_completed(submitted(AHEAD))
             for future in finished:
                 k = futures.pop(future)
                 fault = future.exception()
                 yield k, future.result() if fault is None else Failure(str(fault) or type(fault).__name__)
+                finished.update(submitted(1))
+        except CancelledError:  # of every future, once the connection is lost
+            raise InputError("--scheduler", [Fault(address, SCHEDULER_GONE)]) from None
         finally:
             client.cancel(list(futures))

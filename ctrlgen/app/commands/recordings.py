@@ -241,7 +241,10 @@ def batch(
 
     It can be stopped at any time: every finished diagnosis stays, and the same
     command continues with the rest. The exit status is 1 when a diagnosis
-    failed, and 2 for a list that cannot be used.
+    failed, and 2 for a list that cannot be used or a scheduler that is gone.
+
+    Beside results.csv: results.parquet, and numbers.parquet with every number
+    of every diagnosis, where pyarrow is installed.
 
     On a cluster add the address of its dask.distributed scheduler, --scheduler
     tcp://HOST:8786.
