@@ -173,7 +173,7 @@ def run_batch(
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> tuple[BatchRow, ...]:
-    """Runs every diagnosis into its folder in `out`; results.csv and batch.json follow, and at the end Parquet (`batch_tables`) and batch.html.
+    """Runs every diagnosis into its folder in `out`; results.csv and batch.json follow, at the end Parquet files and batch.html.
 
     `ctrlgen.core.parallel` decides where they run; only this process writes. A diagnosis that fails gives a row that says
     why. Raises InputError where `out` cannot be written or the scheduler does not answer.
