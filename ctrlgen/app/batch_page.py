@@ -140,7 +140,9 @@ def _first_screen(
     failed = [row.name for row in rows if row.state == "failed"]
     far = [m.name for m in machines if m.deviates]
     parts = [
-        f"{len(unusual)} stand out ({_named([name for name, _ in unusual])})" if unusual else "none stands out",
+        f"{len(unusual)} {'stands' if len(unusual) == 1 else 'stand'} out ({_named([name for name, _ in unusual])})"
+        if unusual
+        else "none stands out",
         f"{len(far)} of {len(machines)} machines {'deviates' if len(far) == 1 else 'deviate'} ({_named(far)})"
         if far
         else "",
