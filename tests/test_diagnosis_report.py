@@ -26,10 +26,9 @@ from ctrlgen.diagnosis.report.answer import answer, sentence
 from ctrlgen.diagnosis.report.diagnosis_record import Provenance, diagnosis_record
 from ctrlgen.diagnosis.report.figures import POINTS, residual_density, thinned
 from ctrlgen.diagnosis.report.html_report import page
-from ctrlgen.diagnosis.report.narrative import gathered, interval, next_steps, rest_text
+from ctrlgen.diagnosis.report.narrative import gathered, interval, next_steps
 from ctrlgen.diagnosis.report.plot_uncertainty import draw_rivals
 from ctrlgen.diagnosis.report.writeback import next_text
-from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.estimation.hypothesis import Hypothesis
@@ -243,21 +242,6 @@ def test_the_page_needs_nothing_from_elsewhere_and_says_it_at_the_top(found):
     assert "A flexure or its glue keeps moving" in text and "Explained" in text.split("<h2>")[0]
     assert text.count("<figure>") == 10 and "seed 7" in text and "0" * 64 in text
     assert text.index("device.next.toml") < text.index("<nav")
-
-
-@pytest.mark.parametrize(
-    ("shares", "rest"), [((0.614, 0.254), "14 %"), ((0.614, 0.0046), "38.5 %"), ((0.9996,), "< 0.1 %")]
-)
-def test_the_shares_of_the_findings_and_what_is_left_add_up_as_they_are_printed(found, shares, rest):
-    """Each is rounded by itself, as the sentences have it; what is left makes the whole of them."""
-    rows = tuple(
-        replace(found.findings[0], effect=f"law{k}", share=ShareEntry(value=v, ci95=(v, v)))
-        for k, v in enumerate(shares)
-    )
-    left = replace(found.attribution, rest=ShareEntry(value=1 - sum(shares), ci95=(0.0, 1.0)))
-    told = rest_text(replace(found, findings=rows, attribution=left))
-    assert told == rest
-    assert rest_text(replace(found, findings=())) == ""
 
 
 def test_a_title_cannot_write_html(found):

@@ -14,6 +14,7 @@ from conftest import ROOT
 
 from ctrlgen.budget.budget_shares import printed_shares
 from ctrlgen.core.escaping import json_in_html
+from ctrlgen.diagnosis.report.narrative import rest_text
 from ctrlgen.reporting.chart import MOST_NUMBERS, Chart, Curve, Panel, kept_places
 from ctrlgen.reporting.html import coded, render
 from ctrlgen.reporting.numbers import shares_text
@@ -125,3 +126,15 @@ def test_vendored_files_are_those_that_are_named():
     assert files == set(listed)
     for name, digest in listed.items():
         assert hashlib.sha256((VENDOR / name).read_bytes()).hexdigest() == digest
+
+
+@pytest.mark.parametrize(
+    ("shares", "rest"), [((0.614, 0.254), "14 %"), ((0.614, 0.0046), "38.5 %"), ((0.9996,), "< 0.1 %"), ((), "")]
+)
+def test_the_shares_of_findings_and_what_is_left_add_up_as_they_are_printed(shares, rest):
+    """Each is rounded by itself, as the sentences have it; what is left makes the whole of them."""
+    findings = [
+        SimpleNamespace(effect=f"law{k}", location="a", share=SimpleNamespace(value=v)) for k, v in enumerate(shares)
+    ]
+    left = SimpleNamespace(rest=SimpleNamespace(value=1 - sum(shares)))
+    assert rest_text(SimpleNamespace(findings=findings, attribution=left)) == rest
