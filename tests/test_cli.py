@@ -201,8 +201,13 @@ def test_an_interruption_that_a_callback_swallows_ends_the_work_too():
     assert done.returncode == 130 and "Traceback" not in done.stderr and "interrupted" in done.stderr
 
 
-@pytest.mark.parametrize("after", [0.05, *(pytest.param(s, marks=pytest.mark.long) for s in (0.6, 1.4, 3.0)), 2.2])
-@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+MOMENTS = [(stop, after) for stop in (signal.SIGINT, signal.SIGTERM) for after in (0.05, 0.6, 1.4, 2.2, 3.0)]
+QUICK = ((signal.SIGINT, 0.05), (signal.SIGTERM, 2.2))
+
+
+@pytest.mark.parametrize(
+    ("stop", "after"), [m if m in QUICK else pytest.param(*m, marks=pytest.mark.long) for m in MOMENTS]
+)
 def test_an_interruption_at_any_moment_leaves_nothing_behind(tmp_path, stop, after):
     """As a terminal does it: the signal goes to the whole process group, compilers included."""
     out = tmp_path / "out"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ctrlgen.numerics import batched_evaluation, compiled
-from ctrlgen.numerics.batched_evaluation import Recursion, evaluate
+from ctrlgen.numerics.batched_evaluation import BLOCK, Recursion, evaluate, in_blocks, quick
 from ctrlgen.numerics.compiled import Compilable
 
 LONG = 1e6  # seconds that would pay for any compilation
@@ -27,6 +27,26 @@ def friction():
     z, v, p = ca.SX.sym("z"), ca.SX.sym("v"), ca.SX.sym("p", 2)
     after = z + p[0] * (v - z * ca.fabs(v) / p[1])
     return ca.Function("one", [z, v, p], [after, ca.vertcat(ca.tanh(after), ca.exp(-after) * v)])
+
+
+def test_steps_in_blocks_are_those_of_one_call_after_the_other():
+    state, given = ca.MX.sym("state", 2), ca.MX.sym("given")
+    one = ca.Function("one", [state, given], [ca.vertcat(ca.cos(state[1]) + given, state[0] * given)])
+    drive = np.random.default_rng(2).standard_normal((2 * BLOCK + 3, 1))
+    found, now = in_blocks(one, np.array([0.1, 0.2]), drive), np.array([0.1, 0.2])
+    for value, row in zip(drive, found, strict=True):
+        now = one(now, value).full().ravel()
+        assert np.array_equal(now, row)
+
+
+def test_a_quick_call_gives_the_numbers_of_an_ordinary_one_and_keeps_none():
+    x, y = ca.SX.sym("x", 2), ca.SX.sym("y")
+    f = ca.Function("f", [x, y], [ca.vertcat(x[1] / y, ca.SX(1, 1), ca.sin(x[0]))])  # with a structural zero
+    first = quick(f)(np.array([0.3, 0.7]), 3.0)
+    second = quick(f)(np.array([1.0, 2.0]), np.array([5.0]))
+    assert np.array_equal(first, f([0.3, 0.7], 3.0).full().ravel()) and np.array_equal(
+        second, f([1, 2], 5).full().ravel()
+    )
 
 
 def test_library_gives_the_numbers_of_the_virtual_machine_to_the_last_bit(cache):

@@ -62,11 +62,14 @@ def test_what_can_be_followed_is_what_a_linear_programme_says(tmp_path):
     assert set(said) == {True, False}
 
 
+FEW = 'sample_rate = "1 kHz"\nduration = "0.04 s"\n'
+
+
 def test_with_a_margin_the_drives_stay_as_far_inside_of_their_ranges(tmp_path):
     """A linear programme with each range narrowed by a tenth of itself at either end, for circles that it takes or not."""
     said, wanted = [], []
     for size, x, y in [(d, x, y) for d in (10, 20, 30, 46) for x in (0, 10) for y in (-10, 0, 10)]:
-        scenario, model = loaded(tmp_path, stage(), circle(size, x, y))
+        scenario, model = loaded(tmp_path, stage(), circle(size, x, y), FEW)
         problem = scenario.bind(model)
         samples = problem.samples
         said.append([problem.inverse.keeps_limits(problem.motion, margin=margin) for margin in (0.0, 0.1)])

@@ -46,7 +46,16 @@ def poses_of(parts, kind) -> Fitter:
     return fitter_of(hexapod(), channels, units, sds, kind, parts)
 
 
-@pytest.mark.parametrize("law", ON_AXIS | IN_A_REGION, ids=lambda law: law.__name__)
+def quick_but(laws, *mirrored):
+    """The laws as parameters; those that are others seen in a mirror are long."""
+    return [pytest.param(law, marks=pytest.mark.long) if law.__name__ in mirrored else law for law in laws]
+
+
+@pytest.mark.parametrize(
+    "law",
+    quick_but(ON_AXIS | IN_A_REGION, "coulomb_below", "viscous_below", "backlash_below", "stiffness_below"),
+    ids=lambda law: law.__name__,
+)
 def test_of_an_axis(law):
     rng, t = np.random.default_rng(3), H * np.arange(N)
     parts = [

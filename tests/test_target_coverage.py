@@ -32,6 +32,7 @@ LEAST = {
     "meso_circle": 0.7,
     "tilt_platform": 0.9,
 }
+QUICK = ("circle20", "flexure_axis_line", "tilt_platform")  # heaters, inertia, and more drives than axes
 NOT_ENTERED = (
     r"^const (float|double) t\d+ = ",  # which of two numbers is the larger, in a kernel of the physics
     r"^if \(worst > 1\.0\d+f?\)|^if \(scaled > 1\)",  # a stress within the slack of its limit
@@ -76,9 +77,7 @@ def branches(folder: CFolder, real: Real) -> tuple[list[str], dict[str, list[tup
     return never, found
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.long) if n == "mirror_spiral" else n for n in LEAST]
-)
+@pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.long) for n in LEAST])
 def test_the_shipped_test_enters_every_function_and_the_branches_that_can_be(name, tmp_path):
     for program in ("gcc", "gcov"):
         if not shutil.which(program):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -14,6 +15,7 @@ from ctrlgen.core.units import from_si
 from ctrlgen.devices import Signal
 from ctrlgen.model.discretisation import held_step, one_step_map
 from ctrlgen.model.model import Model
+from ctrlgen.numerics.batched_evaluation import in_blocks
 from ctrlgen.numerics.newton import newton_solver
 
 PERIODIC = 1e-9  # typical sizes by which a period may end elsewhere than it began
@@ -80,28 +82,34 @@ def simulate(
     u = _checked(model, u, sample_time)
     if model.inertial:
         return _simulate_inertial(model, u, sample_time, x_0, z_0)
-    steps = len(u)
-    x, z, u_k = (ca.MX.sym(n, s.numel()) for n, s in (("x", model.x), ("z", model.z), ("u", model.u)))
-    p = ca.DM(model.p_nominal)
-    balance = balance_solver(model)
-    step = ca.Function("step", [model.x, model.z, model.u, model.p], [held_step(model, sample_time)])
-    x_next = step(x, z, u_k, p)
-    z_next = balance(z, x_next, u_k, p)
-    one = ca.Function("one", [ca.vertcat(x, z), u_k], [ca.vertcat(x_next, z_next)])
+    steps, p = len(u), ca.DM(model.p_nominal)
+    balance, one = _balanced_step(model, sample_time)
     start_x = model.rest if x_0 is None else x_0
     try:
         start_z = balance(model.z_scale, start_x, u[0], p) if z_0 is None else ca.DM(z_0)
-        states = one.mapaccum(steps)(ca.vertcat(start_x, start_z), u.T).full()
+        start = ca.vertcat(start_x, start_z).full().ravel()
+        states = in_blocks(one, start, u)
     except RuntimeError as error:
         raise SolverError(
             "no stage displacement balances the actuator force; check the drive and the stiffness"
         ) from error
     if not np.all(np.isfinite(states)):
         raise SolverError("the simulated states are not finite; check the drive against the device's limits")
-    states = np.hstack([ca.vertcat(start_x, start_z).full(), states]).T
+    states = np.vstack([start, states])
     drives = np.vstack([u, u[-1:]])
     n = model.x.numel()
     return trace(model, sample_time * np.arange(steps + 1), states[:, :n], states[:, n:], drives)
+
+
+@lru_cache(maxsize=16)  # a player is measured, and a budget drawn, on one model many times
+def _balanced_step(model: Model, sample_time: float) -> tuple[ca.Function, ca.Function]:
+    """`balance_solver`, and (x and z, u) -> x and z one sample later, in balance."""
+    x, z, u = (ca.MX.sym(n, s.numel()) for n, s in (("x", model.x), ("z", model.z), ("u", model.u)))
+    p, balance = ca.DM(model.p_nominal), balance_solver(model)
+    step = ca.Function("step", [model.x, model.z, model.u, model.p], [held_step(model, sample_time)])
+    x_next = step(x, z, u, p)
+    z_next = balance(z, x_next, u, p)
+    return balance, ca.Function("one", [ca.vertcat(x, z), u], [ca.vertcat(x_next, z_next)])
 
 
 def _checked(model: Model, u: np.ndarray, sample_time: float) -> np.ndarray:
@@ -128,12 +136,13 @@ def _simulate_inertial(
     n = model.x.numel()
     start = np.concatenate([model.rest if x_0 is None else x_0, 0 * model.z_scale if z_0 is None else z_0])
     after = one_step_map(model, sample_time)
-    state = ca.vertcat(model.x, model.z)
-    one = ca.Function("one", [state, model.u, model.p], [ca.vertcat(after.x, after.z)])
-    states = one.mapaccum(len(u))(start, u.T, np.tile(model.p_nominal[:, None], (1, len(u)))).full()
+    step = ca.Function("step", [ca.vertcat(model.x, model.z), model.u, model.p], [ca.vertcat(after.x, after.z)])
+    state, u_k = (ca.MX.sym(n, step.numel_in(i)) for i, n in enumerate(("state", "u")))
+    one = ca.Function("one", [state, u_k], [step(state, u_k, ca.DM(model.p_nominal))])
+    states = in_blocks(one, start, u)
     if not np.all(np.isfinite(states)):
         raise SolverError("the simulated motion is not finite; check the drive, and the device's damping")
-    states = np.hstack([start[:, None], states]).T
+    states = np.vstack([start, states])
     return trace(model, sample_time * np.arange(len(u) + 1), states[:, :n], states[:, n:], np.vstack([u, u[-1:]]))
 
 

@@ -107,6 +107,19 @@ class Recursion:
         return states, results
 
 
+def in_blocks(one: ca.Function, state: np.ndarray, given: np.ndarray) -> np.ndarray:
+    """The states (n, n_s) after each of n steps of `one` (state, given) -> state, from `state` (n_s,) under `given` (n, .).
+
+    By CasADi's virtual machine, in unrolled blocks, so that the memory that it takes does not grow with n; raises what `one` raises.
+    """
+    states = np.empty((len(given), len(state)))
+    for a in range(0, len(given), BLOCK):
+        block = given[a : a + BLOCK]
+        states[a : a + BLOCK] = one.mapaccum(len(block))(state, block.T).full().T
+        state = states[a + len(block) - 1]
+    return states
+
+
 def _block(x: np.ndarray, a: int, b: int, size: int) -> np.ndarray:
     """Rows a to b of x, or the one row of what is constant, filled up to `size` rows with the last."""
     if len(x) == 1:
