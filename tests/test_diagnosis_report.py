@@ -244,6 +244,12 @@ def test_the_page_needs_nothing_from_elsewhere_and_says_it_at_the_top(found):
     assert text.index("device.next.toml") < text.index("<nav")
 
 
+def test_a_diagnosis_draws_and_pages_itself(found, tmp_path):
+    """What a notebook asks of it: one figure, all of them, the page."""
+    assert found.plot("residuals").figures["residuals"].startswith("<svg") and len(found.plot().figures) > 5
+    assert found.report.save(tmp_path / "out") and (tmp_path / "out" / "report.html").stat().st_size > 1e5
+
+
 def test_a_title_cannot_write_html(found):
     hostile = replace(found, recording=replace(found.recording, title="<script>alert(1)</script>"))
     assert "<script>alert" not in page(hostile, Provenance({}, 0))

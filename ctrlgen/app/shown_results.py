@@ -19,6 +19,7 @@ from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.diagnosis_record import Provenance, diagnosis_record
 from ctrlgen.diagnosis.report.figures import draw_all
 from ctrlgen.diagnosis.report.html_report import page
+from ctrlgen.diagnosis.report.residuals import Residuals
 from ctrlgen.learning.learn import Learning
 from ctrlgen.learning.learning_page import write_learning
 from ctrlgen.learning.learning_plots import draw_learning
@@ -46,7 +47,11 @@ figures_of.register(Solution, draw_solution)
 figures_of.register(ErrorBudget, draw_budget)
 figures_of.register(FastestPath, draw_fastest)
 figures_of.register(Learning, draw_learning)
-figures_of.register(Diagnosis, draw_all)
+
+
+@figures_of.register
+def _(result: Diagnosis) -> dict[str, str]:
+    return draw_all(result, Residuals(result))
 
 
 @figures_of.register
