@@ -5,8 +5,6 @@ import casadi as ca
 from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, Plainer
 from ctrlgen.effects._play_operators import kept_between, play_states, radii, weighted_lag
 
-ALIKE = {"upper": 0.0, "lower": 0.0, "side": 0.0}  # edges that do not lean
-
 
 class AsymmetricLag(Effect, listed=False):
     """Delta s = g (sum_j w_j P_j - s + k s), P_j within s - a_j ... s + b_j, r_j = r j/8, w_j ~ j^-q, sum w_j = 1, j = 1..8.
@@ -16,16 +14,14 @@ class AsymmetricLag(Effect, listed=False):
     """
 
     order = 1
-    source = (
-        "M. Al Janaideh, S. Rakheja, C.-Y. Su, IEEE/ASME Trans. Mechatron. 16 (2011) 734: generalised play operators"
-    )
+    source = "M. Al Janaideh, S. Rakheja, C.-Y. Su, IEEE/ASME Trans. Mechatron. 16 (2011) 734: generalised plays"
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.share * (weighted_lag(s, s.value, p.reach, p.taper) - p.reversible * s.value)
 
     def update(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
-        widening, widths = p.side * s.value, radii(p.reach)
-        shares = (1 + (rise * ca.fabs(s.value) + widening) / p.reach for rise in (p.lower, p.upper))
+        widths = radii(p.reach)
+        shares = (1 + (rise * ca.fabs(s.value) + p.side * s.value) / p.reach for rise in (p.lower, p.upper))
         low, high = ([ca.fmax(share, 0.0) * r for r in widths] for share in shares)
         return kept_between(s, [s.value - a for a in low], [s.value + b for b in high], widths)
 
@@ -48,7 +44,7 @@ class AsymmetricDisplacementHysteresis(AsymmetricLag):
     place = Place.DISPLACEMENT
     requires = frozenset({"actuator"})
     params = (Param("share", "1", (-0.999, 0.999), "share of the displacement that lags", off=0.0), *_shape("travel"))
-    plainer = Plainer("displacement_hysteresis", ALIKE)
+    plainer = Plainer("displacement_hysteresis", dict.fromkeys(("upper", "lower", "side"), 0.0))
     states = play_states("travel")
 
 
@@ -59,5 +55,5 @@ class AsymmetricDriveHysteresis(AsymmetricLag):
     place = Place.DRIVE
     requires = frozenset({"actuator", "force"})
     params = (Param("share", "1", (-0.999, 0.999), "share of the drive that lags", off=0.0), *_shape("channel"))
-    plainer = Plainer("drive_hysteresis", {**ALIKE, "reversible": 0.0})
+    plainer = Plainer("drive_hysteresis", dict.fromkeys(("upper", "lower", "side", "reversible"), 0.0))
     states = play_states("channel")
