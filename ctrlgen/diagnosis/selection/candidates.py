@@ -84,7 +84,8 @@ def fit_in_regions(
     most = everywhere[0].z ** 2
     loud = {s.hypothesis.location for s in everywhere if s.z**2 >= SEARCH.smallest_score * most}
     seen = trials.screen.in_regions(current.fit, loud)
-    suspects = [s for s in seen.suspects if s.z**2 >= REGIONS.score * most][: SEARCH.regional_per_round]
+    regional = [s for s in seen.suspects if s.hypothesis.prior.in_a_region and s.z**2 >= REGIONS.score * most]
+    suspects = regional[: SEARCH.regional_per_round]
     return fit_each(trials, current.fit, suspects, lambda branch, t: restart_elsewhere(branch, t, current, seen))
 
 
