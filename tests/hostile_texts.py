@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import pytest
+
 from ctrlgen.core.escaping import kconfig, markdown, one_line
 
 FOREIGN = "injected"
@@ -75,6 +77,9 @@ def skeleton(name: str, content: bytes, title: str) -> Any:
         return {entry: skeleton(entry, archive.read(entry), title) for entry in archive.namelist()}
     if kind in (".so", ".bin", ".png"):
         return None
+    if kind == ".parquet":
+        table = pytest.importorskip("pandas").read_parquet(io.BytesIO(content))
+        return list(table.columns), len(table)
     text = content.decode()
     if kind in (".c", ".h", ".ino"):
         spliced = text.replace("??/", "\\").replace("\\\n", "")
