@@ -206,13 +206,12 @@ def findings(search: SearchResult, shares: Attribution, profiles: tuple[Profile,
         cause, share = causes[first], shares.shares[first]
         served = shares.serves[first] if shares.serves else None
         role = _role(share, cause in unseen, shares.rest is None, served is not None)
-        rivals = dict.fromkeys(t.cause for t in search.rivals[first] if t.cause)
         rows.append(
             Finding(
                 cause.effect,
                 cause.location,
                 _numbers_of(search, first, estimates),
-                tuple(rivals),
+                _alternatives(search, first),
                 share,
                 _worth(search, first, shares),
                 "parameter of the device file" if cause.effect == PARAMETER else cause.law.source,
@@ -224,6 +223,17 @@ def findings(search: SearchResult, shares: Attribution, profiles: tuple[Profile,
             )
         )
     return tuple(sorted(rows, key=lambda f: (f.role is not Role.CAUSE, -(f.share.value if f.share else 0.0))))
+
+
+def _alternatives(search: SearchResult, k: int) -> tuple[Hypothesis, ...]:
+    """What explains as well as cause `k`, each name once: a rival may be the cause itself, begun from elsewhere, or one of another term."""
+
+    def name(h: Hypothesis) -> tuple[str, str, str | None]:
+        return h.effect, h.location, h.of
+
+    named = {name(t.cause): t.cause for t in reversed(search.rivals[k]) if t.cause}
+    own = name(search.chosen.causes[k])
+    return tuple(h for key, h in reversed(named.items()) if key != own)
 
 
 def _title(search: SearchResult, cause: Hypothesis) -> str:
