@@ -41,7 +41,9 @@ def page_figures(
     """The figures of a page by name; `words`: title and caption of each, a name without any is its own title; `kept`: drawings that stay
     above their charts."""
     charts = charts or {}
-    told = {name: words.get(name, (name.replace("_", " ").capitalize(), "")) for name in svgs}
+    # underscores stand for spaces in the names of files alone, not in those of symbols
+    titles = {name: name if " " in name else name.replace("_", " ") for name in svgs}
+    told = {name: words.get(name, (title[:1].upper() + title[1:], "")) for name, title in titles.items()}
     return {name: PageFigure(text, *told[name], charts.get(name), name in kept) for name, text in svgs.items()}
 
 
