@@ -26,7 +26,7 @@ def test_the_page_of_s2_shows_its_measuring_chain_and_the_hinge_errors(tmp_path,
         "Fig. 4, delta_y/F_y",
         "Fig. 5, delta_x/F_x",
     ):
-        assert len(re.findall(rf"<figcaption>(?:<b>[^<]*</b>)?{re.escape(figure)}", text)) == 1
+        assert text.count(f"<figcaption><b>{figure}") == 1
     for name, sensor in SENSORS.items():
         drawn = float(re.search(rf"{name}: ([\d.]+) um/V", text)[1])
         assert drawn == pytest.approx(sensor.sensitivity * 1e6, rel=5e-4)  # of one recording of 12 s

@@ -24,7 +24,7 @@ from ctrlgen.recordings.gaps import SHORTEST
 from ctrlgen.recordings.plausible_rate import rate_notes
 from ctrlgen.recordings.recorded_columns import RecordedColumns
 from ctrlgen.recordings.recording import Record, Recording
-from ctrlgen.recordings.schema import FILE, Column, RecordingFile, RecordTable, check, deviation, fits
+from ctrlgen.recordings.schema import FILE, Column, RecordingFile, RecordTable, check, deviation, fits, stated_noise
 from ctrlgen.recordings.units_of_columns import channel_names
 
 
@@ -164,7 +164,7 @@ class _File:
             if record is None:
                 continue
             record = replace(record, name=f"{self.path.resolve().parent.name}/{record.name}") if self.prefix else record
-            noise = {n: deviation(c.noise, c.unit) for n, c in sound.items() if c.noise}
+            noise = stated_noise(sound)
             result = validation.validate_record(record, self.written.kind, self.model, names, where, table.gap, noise)
             records += result.records
             places += [where] * len(result.records)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -159,6 +161,16 @@ def deviation(text: str, unit: str) -> float:
     if value < 0:
         raise ValueError(f"{text!r} is negative")
     return value
+
+
+def stated_noise(columns: Mapping[str, Column]) -> dict[str, float]:
+    """The noise of columns that state it, in SI; without what is no deviation, which `check` tells."""
+    noise = {}
+    for name, column in columns.items():
+        with suppress(ValueError):
+            if column.noise:
+                noise[name] = deviation(column.noise, column.unit)
+    return noise
 
 
 def check(written: RecordingFile, model: Model) -> list[Fault]:
