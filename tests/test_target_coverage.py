@@ -26,7 +26,7 @@ from ctrlgen.firmware.online.vectors import vectors
 # Share of the branches taken. What is left, by what stands in its line, cannot be entered or not for certain in float:
 LEAST = {
     "circle20": 0.95,
-    "mirror_spiral": 0.95,
+    "mirror_spiral": 0.94,
     "rrr_circle": 0.95,
     "flexure_axis_line": 0.9,
     "meso_circle": 0.7,
