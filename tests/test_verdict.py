@@ -27,6 +27,7 @@ from ctrlgen.diagnosis.selection.verdict import (
 )
 from ctrlgen.estimation.free_parameters import FreeParameter
 from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.noise import NoiseSource
 from ctrlgen.estimation.residual_tests import ResidualTests
 
 N, JUST = 1000, 1e-6
@@ -178,6 +179,11 @@ def test_what_is_left_is_little_beside_the_mismatch_or_the_noise(before, after, 
         assert not too_little_to_name(found, replace(passed, restless=("reading.axis",)))
     unknown = search(trial(before * N, before * N), trial(0.0, 0.0, causes=(GAIN,)), of=fitter(known=False))
     assert not too_little_to_name(unknown, passed)
+    guessed = fitter()
+    guessed.noise = replace(guessed.noise, sources=(NoiseSource.FASTEST_PART,))
+    assert not too_little_to_name(
+        search(trial(before * N, before * N), trial(0.0, 0.0, causes=(GAIN,)), of=guessed), passed
+    )
     assert not too_little_to_name(search(trial(before * N, before * N), trial(), of=fitter()), passed)
 
 

@@ -78,6 +78,11 @@ class Noise:
         """(n_y,), True where only the fastest part of the readings tells the noise, until a residual does."""
         return self.from_source(NoiseSource.FASTEST_PART)
 
+    @property
+    def measured(self) -> np.ndarray:
+        """(n_y,), True where rest, repetition or the author tells the noise, not the motion that is to be explained."""
+        return self.known & ~self.guessed & ~self.from_source(NoiseSource.RESIDUAL)
+
     def whiten(self, values: np.ndarray, valid: np.ndarray) -> np.ndarray:
         """`values` (n, n_y, ...) [SI] filtered so that the noise in them becomes white with unit variance.
 
