@@ -8,7 +8,7 @@ sandbox: their scripts run, with no origin, so that they can read neither these 
 from __future__ import annotations
 
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, MutableMapping
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote, urlencode
@@ -60,7 +60,7 @@ STATIC = {"view.css": "text/css; charset=utf-8", "view.js": "text/javascript; ch
 MOST_SHOWN = 500  # results in a list, files of a result
 
 Answer = Callable[[Request], Response]
-Scope = dict[str, Any]
+Scope = MutableMapping[str, Any]
 
 
 def pages(folders: ViewedFolders) -> Callable[..., Awaitable[None]]:
@@ -81,7 +81,7 @@ def pages(folders: ViewedFolders) -> Callable[..., Awaitable[None]]:
     )
 
     async def application(scope: Scope, receive: Any, send: Any) -> None:
-        async def with_headers(message: dict[str, Any]) -> None:
+        async def with_headers(message: MutableMapping[str, Any]) -> None:
             if message["type"] == "http.response.start":
                 there = {name for name, _ in message["headers"]}
                 more = {"content-security-policy": POLICY} | HEADERS
