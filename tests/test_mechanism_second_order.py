@@ -24,6 +24,8 @@ from mechanism_files import (
     spring,
     with_values,
 )
+from scipy.integrate import trapezoid
+from scipy.spatial.transform import Rotation
 
 from ctrlgen import InputError, build_model, load_device, load_scenario, run, solve
 from ctrlgen.devices.mechanism.condensed import Condensed
@@ -280,3 +282,29 @@ def test_what_has_no_second_order_is_refused(tmp_path, key, says):
     with pytest.raises(InputError) as caught:
         loaded(tmp_path, key + TWO_BODIES + spring('F_x_per_delta_x3 = "1e-3 N/um^3"', to="a") + push)
     assert says in str(caught.value)
+
+
+def test_the_second_order_of_a_beam_that_shears_is_that_of_the_strains_of_a_finite_rotation():
+    """Gamma = R'(e_x + u') - e_x and K = axis of R'R' of the linear shape, R = exp(psi), their even part in the load: bending, twist,
+    stretch and shear together."""
+    s = Segment(0.7, 1.0, 1.0, 1.0, 90.0, 3.0, 5.0, 2.0, 0.04, 0.09)
+    load, n, h, size = np.array([2.0, 1.0, -1.5, 0.4, 0.3, -0.2]), 4001, 1e-5, 1e-3
+    x, e = np.linspace(0, s.length, n), np.array([1.0, 0.0, 0.0])
+    F, M = load[:3], load[3:]
+
+    def strains(scale: float) -> np.ndarray:
+        def psi(at: np.ndarray) -> np.ndarray:
+            lever = at * (s.length - at / 2)
+            bent = np.outer(at, M) + np.outer(lever, np.cross(e, F))
+            return scale * bent / np.array([s.GJ, s.EI_y, s.EI_z])
+
+        strain = scale * F * np.array([1 / s.EA, s.shear_y, s.shear_z])
+        turned, back = Rotation.from_rotvec(psi(x)), Rotation.from_rotvec(psi(x - h))
+        Gamma = turned.inv().apply(e + np.cross(psi(x), e) + strain) - e
+        K = (back.inv() * Rotation.from_rotvec(psi(x + h))).as_rotvec() / (2 * h)
+        return np.hstack([K, Gamma + np.cross(K, np.outer(s.length - x, e))])
+
+    even = (strains(size) + strains(-size)) / 2 / size**2
+    wanted = trapezoid(even, x, axis=0)
+    found = ca.DM(beam([s], ca.DM(load), [0], [0])).full().ravel()
+    assert found == pytest.approx(wanted, rel=1e-4, abs=1e-5 * np.abs(wanted).max()) and np.all(found != 0)

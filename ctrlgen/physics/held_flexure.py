@@ -18,7 +18,7 @@ with f of each rising from 0 to 1, f(x) = (a x + b x^2)/(1 + c x + b x^2), g(r) 
     T = tanh(m)/m,  m^2 = 6 (1 - nu) (1 + 0.12 nu^2) (J/J_0) / (q^2 C),  C = ((1 - r^2)/(1 + r^2))^3.5,  J_0 = w t^3/3.
 
 The forms are those of the theories: Timoshenko's shear; of a plate one term in the width (L. V. Kantorovich, V. I. Krylov, Approximate
-Methods of Higher Analysis (1958), chapter 4), which gives f within 2 % and T exactly where nu = 0; the warping of thin sections, S. P.
+Methods of Higher Analysis (1958), chapter 4), which gives the compliances within 3 %; the warping of thin sections, S. P.
 Timoshenko, J. N. Goodier, Theory of Elasticity (1970), section 109, and for wide leaf springs D. M. Brouwer, J. P. Meijaard, J. B. Jonker,
 Precis. Eng. 37 (2013) 73. The coefficients are least squares to Kirchhoff plates, plane stress and solids of finite elements,
 0.03 <= q <= 5, 0 <= r <= 1, s <= 0.5, nu from 0.2 to 0.4 (solids: 0.33), and hold them to 0.7 %, torsion of solids to 2 %

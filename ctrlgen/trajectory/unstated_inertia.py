@@ -39,8 +39,8 @@ class UnstatedInertia:
         """What is left out, by how much, and what to do."""
         return (
             f"inertia is left out: the file has masses (first mode {show(self.frequency, 'Hz')}) and no [dynamics]; with a damping ratio "
-            f"of {100 * self.damping_ratio:g} % these drives leave {show(self.along, self.unit)} of {self.channel} along the path and "
-            f"{show(self.after, self.unit)} after it. Add [dynamics] to the device, or move slower"
+            f"of {100 * self.damping_ratio:g} % these drives, begun at rest, leave {show(self.along, self.unit)} of {self.channel} "
+            f"along the path and {show(self.after, self.unit)} after it. Add [dynamics] to the device, or move slower"
         )
 
 
