@@ -20,7 +20,7 @@ from ctrlgen.trajectory.scenario import load_scenario
 from ctrlgen.trajectory.solution_plots import draw_path, draw_signal, draw_stage_force
 
 from . import s0, s0_figures, s1, s2, s2_figures, s3, s3_hinges
-from .row import PrintedNumber
+from .row import PrintedNumber, ReproductionStatus
 from .s0_data import SCENARIOS
 
 
@@ -34,6 +34,14 @@ TITLES = {
     "S1": "MEMS hexapod: stiffness model and control",
     "S2": "hinge equations and the measuring chain",
     "S3": "3-RRR stage: kinetostatic model",
+}
+
+
+MARKS = {
+    ReproductionStatus.REPRODUCED.value: "ok",
+    ReproductionStatus.CORRECTED.value: "idle",
+    ReproductionStatus.DIFFERS.value: "bad",
+    ReproductionStatus.NOT_COMPUTABLE.value: "idle",
 }
 
 
@@ -71,7 +79,7 @@ def reproduce(sources: list[str]) -> list[PrintedNumber]:
 
 
 def as_json(rows: list[PrintedNumber]) -> list[dict[str, Any]]:
-    """The rows as plain dicts: source, where, printed, ours, difference, unit, status, reason."""
+    """The rows as plain dicts: source, where, printed, ours, difference, taken literally, implied, unit, status, reason."""
     return [
         {
             "source": row.source,
@@ -79,6 +87,8 @@ def as_json(rows: list[PrintedNumber]) -> list[dict[str, Any]]:
             "printed": row.printed,
             "ours": row.ours,
             "difference": row.difference,
+            "taken_literally": row.taken_literally,
+            "implied": row.implied,
             "unit": row.unit,
             "status": row.status.value,
             "reason": row.reason,
@@ -105,7 +115,8 @@ def write_page(rows: list[PrintedNumber], path: Path) -> None:
         counts=counts(rows),
         first=_first_screen(rows, first),
         figures=figures,
-        marks={"reproduced": "ok", "differs": "bad", "not computable": "idle"},
+        statuses=[status.value for status in ReproductionStatus],
+        marks=MARKS,
         origin=origin({}),
     )
     write_text(path, page)
@@ -115,7 +126,8 @@ def _first_screen(rows: list[PrintedNumber], figure: PageFigure | None) -> First
     """How many printed numbers are reproduced, and why the others are not is told with each."""
     of = Counter(row.status.value for row in rows)
     others = f"{of['differs']} differ, {of['not computable']} cannot be computed"
-    answer = f"{of['reproduced']} of {len(rows)} printed numbers are reproduced; {others}."
+    follow = f"{of['reproduced']} of {len(rows)} printed numbers are reproduced, {of['corrected']} more once others are corrected"
+    answer = f"{follow}; {others}."
     numbers = tuple((status, str(k)) for status, k in of.most_common())
     steps = (
         "Read the reason of each number that differs, in the table of its paper.",

@@ -70,8 +70,10 @@ def read_jacobian(path: Path, axes: tuple[str, ...]) -> np.ndarray:
     return np.array(values)
 
 
-def load_s0(scenarios: Path = SCENARIOS) -> tuple[MesoHexapod, PaperRecordings]:
-    """The device as printed and the paper's data."""
-    device = load_device(scenarios / "devices" / "meso_hexapod.toml")
-    assert isinstance(device, MesoHexapod)
-    return device, load_paper_recordings(device, scenarios / "nist_hexapod")
+def load_s0(scenarios: Path = SCENARIOS) -> tuple[MesoHexapod, MesoHexapod, PaperRecordings]:
+    """The device as printed, the device as the authors calculated, and the paper's data."""
+    printed, calculated = (
+        load_device(scenarios / "devices" / f"{name}.toml") for name in ("meso_hexapod", "meso_hexapod_as_calculated")
+    )
+    assert isinstance(printed, MesoHexapod) and isinstance(calculated, MesoHexapod)
+    return printed, calculated, load_paper_recordings(printed, scenarios / "nist_hexapod")

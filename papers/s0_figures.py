@@ -19,7 +19,7 @@ PARTS = {"rotation": (slice(0, 3), "deg"), "translation": (slice(3, 6), "um")}
 
 def figures(recordings: PaperRecordings | None = None) -> dict[str, str]:
     """Name -> SVG text. The calibrated model expects the command, the kinematic one its line of Table 4."""
-    data = recordings or load_s0()[1]
+    data = recordings or load_s0()[-1]
     model = pose_errors(data.measured, data.kinematic)
     calibrated = pose_errors(data.measured, data.commanded)
     alone = parasitic(data.commanded, data.measured)

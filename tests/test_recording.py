@@ -296,7 +296,7 @@ def test_poses_with_a_dwell_have_a_clock(tmp_path, meso):
 
 def test_the_poses_of_nist_are_a_recording(meso):
     recording = load_recordings([SCENARIOS / "nist_hexapod"], meso)
-    device, s0 = load_s0()
+    device, _, s0 = load_s0()
     fit, held = recording.records
     single = (s0.commanded != 0).sum(1) == 1
     assert single[:24].all() and not single[24:].any() and (len(fit.time), len(held.time)) == (24, 30)

@@ -50,7 +50,7 @@ def main() -> None:
     """Diagnoses and prints."""
     device = ctrlgen.load_device(HERE.parent / "devices" / "meso_hexapod.toml")
     found = ctrlgen.diagnose(device, load_recordings([HERE], build_model(device)))
-    _, data = S0.load_s0()
+    *_, data = S0.load_s0()
     paper = PoseErrors(data.measured - data.commanded)  # commanded through its calibrated Jacobian
     unseen = PoseErrors(paper.errors[TWO_COMPONENTS])
     fit = found.search.chosen.fit
