@@ -213,8 +213,8 @@ def _luck(d: dict[str, Any]) -> Iterator[str]:
             yield f"{name}: {c['stretches']} stretches have no p of {c['p']}"
         if not min(c["p"] * c["looks"], 1) * (1 - SUM) <= c["by_luck"] <= 1:
             yield f"{name}: p {c['p']} times {c['looks']} answers is not {c['by_luck']}"
-        if c["reason"] and c["by_luck"] <= LUCK:
-            yield f"{name}: luck is excluded, and {c['reason']}"
+        if c["reason"]:
+            yield f"{name}: by luck {c['by_luck']}, and it cannot be judged: {c['reason']}"
     main = d["findings"][0] if d["findings"] else None
     if main is None or main["role"] == "unseen" or d["verdict"] == "consistent":
         return

@@ -61,8 +61,8 @@ def test_an_explanation_tells_how_little_is_left():
 def test_a_doubt_is_told_in_the_same_words_of_every_cause():
     """That there are too few stretches is no chance."""
     few, weak = (
-        ChanceEntry(by_luck=1.0, p=0.1, looks=10.0, stretches=3, against="noise", reason=reason)
-        for reason in ("few", None)
+        ChanceEntry(by_luck=p, p=p, looks=1.0 if p else None, stretches=3, against="noise", reason=reason)
+        for p, reason in ((None, "few"), (1.0, None))
     )
     first = told(Verdict.PARTLY, finding(GAIN, 0.6, chance=few), finding(DRIFT, 0.3, chance=few))[0]
     assert "; luck is not excluded, beside drift at sensor:axis (30 %, luck is not excluded)" in first

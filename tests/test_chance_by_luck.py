@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import combinations, pairwise, product
-from math import comb
+from math import ceil, comb, log2
 from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
@@ -25,7 +25,7 @@ from ctrlgen.diagnosis.evidence.independent_stretches import (
     stretches,
 )
 from ctrlgen.diagnosis.evidence.matched_parts import change_by, matched_parts, without_causes
-from ctrlgen.diagnosis.report.luck_sentences import doubt_of_luck, luck_steps, luck_text
+from ctrlgen.diagnosis.report.luck_sentences import chance_text, doubt_of_luck, luck_steps, luck_text
 from ctrlgen.diagnosis.selection.findings import ChanceEntry, Finding, Role
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.diagnosis.settings import LUCK
@@ -267,20 +267,21 @@ def test_a_small_cause_that_another_one_hides_is_judged_beside_that(monkeypatch)
 def test_of_two_causes_each_of_which_could_be_all_neither_is_certain(monkeypatch):
     """One of them is there, and nothing tells which."""
     found = chances(monkeypatch, lambda S, k: 1 if S else 60, (CREEP, DRIFT))
-    assert [c.by_luck for c in found] == [1.0, 1.0]
+    assert [c.by_luck for c in found] == [None, None]
 
 
 def test_of_many_causes_no_sets_are_fitted(monkeypatch):
     causes = tuple(Hypothesis("coulomb", f"stage:{k}") for k in range(LUCK.most_causes + 1))
     first = chances(monkeypatch, lambda S, k: 20 if len(S) == LUCK.most_causes else 0, causes)[0]
-    assert first.looks == 2 * looks(61, 3, 5) and first.by_luck == 1.0
+    assert first.reason == chance_by_luck.FEW.format(20, ceil(log2(2 * looks(61, 3, 5) / LUCK.certain)))
 
 
 def test_what_too_few_stretches_cannot_show_is_said_with_how_many_could(monkeypatch):
     (chance,) = chances(monkeypatch, lambda S, k: 9, (CREEP,))
-    assert (
-        not chance.certain and not chance.weak and chance.reason.startswith("9 independent") and " 12 " in chance.reason
-    )
+    assert not chance.certain and not chance.weak
+    assert chance.reason.startswith("9 independent") and chance.reason.endswith(" 12")
+    # 36 %, beside whatever size of a cause, would only say how few they are
+    assert chance.by_luck is chance.p is chance.looks is None and chance.stretches == 9
     assert 183 * 2.0**-12 < LUCK.certain < 183 * 2.0**-11
 
 
@@ -298,11 +299,12 @@ def test_a_model_that_cannot_stand_is_no_evidence(monkeypatch):
 
 
 def entry(by_luck: float | None, reason: str | None = None) -> ChanceEntry:
-    return ChanceEntry(by_luck=by_luck, p=by_luck, looks=1.0, stretches=50, against="noise", reason=reason)
+    looks_ = None if by_luck is None else 1.0
+    return ChanceEntry(by_luck=by_luck, p=by_luck, looks=looks_, stretches=50, against="noise", reason=reason)
 
 
 def test_an_answer_whose_first_cause_may_be_luck_is_no_explanation():
-    weak, sure, few = (finding(CREEP, c) for c in (entry(0.12), entry(1e-9), entry(0.12, "few")))
+    weak, sure, few = (finding(CREEP, c) for c in (entry(0.12), entry(1e-9), entry(None, "few")))
     assert doubted(Verdict.EXPLAINED, [weak, sure]) == Verdict.PARTLY
     assert doubted(Verdict.EXPLAINED, [sure, weak]) == doubted(Verdict.EXPLAINED, [few]) == Verdict.EXPLAINED
     assert doubted(Verdict.AMBIGUOUS, [weak]) == Verdict.AMBIGUOUS and doubted(Verdict.CONSISTENT, []) == "consistent"
@@ -310,14 +312,15 @@ def test_an_answer_whose_first_cause_may_be_luck_is_no_explanation():
 
 def test_luck_in_words():
     assert doubt_of_luck(finding(CREEP, entry(0.12))) == "it may be luck (12 %)"
-    assert doubt_of_luck(finding(CREEP, entry(0.12, "few"))) == "luck is not excluded"
+    assert doubt_of_luck(finding(CREEP, entry(None, "few"))) == "luck is not excluded"
     assert doubt_of_luck(finding(CREEP, entry(0.04))) == doubt_of_luck(finding(CREEP)) == ""
-    assert doubt_of_luck(finding(CREEP, entry(1.0, "unseen"), Role.UNSEEN)) == ""
+    assert doubt_of_luck(finding(CREEP, entry(None, "unseen"), Role.UNSEEN)) == ""
     assert luck_text(finding(CREEP, entry(1e-9))).startswith("< 1e-06: p < 1e-06 over all signs of 50 stretches")
-    assert (
-        luck_text(finding(CREEP, entry(0.12, "few"))).endswith("; few")
-        and luck_text(finding(CREEP)) == "read from the data"
-    )
-    assert luck_steps([finding(CREEP, entry(1e-9)), finding(DRIFT, entry(0.2, "few"))]) == [
-        "Luck is not excluded for drift at sensor:axis: few."
+    assert luck_text(finding(CREEP, entry(None, "few"))) == "cannot be judged by luck: few"
+    assert chance_text(finding(CREEP, entry(None, "few"))) == "cannot be judged" and chance_text(finding(CREEP)) == "-"
+    assert luck_text(finding(CREEP)) == "read from the data"
+    assert luck_steps([finding(CREEP, entry(1e-9)), finding(DRIFT, entry(None, "few"))]) == [
+        "drift at sensor:axis cannot be judged by luck: few."
     ]
+    (step,) = luck_steps([finding(DRIFT, entry(0.2))])
+    assert step.startswith("Luck is not excluded for drift at sensor:axis: its chance is 20 %")

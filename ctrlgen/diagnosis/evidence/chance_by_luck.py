@@ -51,7 +51,7 @@ Causes = frozenset[int]
 NO_MODEL = "without it no such device can be simulated"
 UNSEEN = "the held-out records do not show it"
 IN_THE_FILE = "the readings alone hardly show it: without it numbers of the device would contradict its file"
-FEW = "{} independent stretches of the held-out records show it, and {} would show a chance of 5 %"
+FEW = "{} independent stretches of the held-out records, and no chance below 5 % with fewer than {}"
 NOISE = "noise"
 REST = "what no law reaches"
 
@@ -151,16 +151,18 @@ def doubted(verdict: Verdict, findings: Sequence[Finding]) -> Verdict:
 
 
 def _entry(search: SearchResult, finding: Finding, members: Causes, look: Look, memory: Memory) -> ChanceEntry:
-    against, reason = REST if memory.repeats else NOISE, None
-    if not look.known:
-        return ChanceEntry(by_luck=None, p=None, looks=None, stretches=0, against=against, reason=NO_MODEL)
-    if look.by_luck > LUCK.certain:
+    """The chance of a finding; without a number where no answer of these records could be below `LUCK.certain`, which would only say so."""
+    against = REST if memory.repeats else NOISE
+    reason = NO_MODEL if not look.known else None
+    if look.known and look.by_luck > LUCK.certain:
         if finding.role is Role.UNSEEN:
             reason = UNSEEN
         elif any(hides_in_device(search, k) for k in members):
             reason = IN_THE_FILE
         elif look.looks * 0.5**look.parts > LUCK.certain:
             reason = FEW.format(look.parts, ceil(log2(look.looks / LUCK.certain)))
+    if reason is not None:
+        return ChanceEntry(by_luck=None, p=None, looks=None, stretches=look.parts, against=against, reason=reason)
     return ChanceEntry(
-        by_luck=look.by_luck, p=look.p, looks=look.looks, stretches=look.parts, against=against, reason=reason
+        by_luck=look.by_luck, p=look.p, looks=look.looks, stretches=look.parts, against=against, reason=None
     )

@@ -10,14 +10,15 @@ from ctrlgen.reporting.numbers import number
 
 MAY_BE_LUCK = "may be luck"
 NOT_EXCLUDED = "luck is not excluded"
+NOT_JUDGED = "cannot be judged"
 # a smaller chance is not shown: more depends on what the test assumes of the noise
 SMALLEST = 1e-6
 
 
 def chance_text(finding: Finding) -> str:
-    """'< 1e-6', '12 %', '?' where it cannot be tested, '-' for what was read from the data."""
+    """'< 1e-6', '12 %', that it cannot be judged, '-' for what was read from the data."""
     chance = finding.chance
-    return "-" if chance is None else "?" if chance.by_luck is None else _size(chance.by_luck)
+    return "-" if chance is None else NOT_JUDGED if chance.by_luck is None else _size(chance.by_luck)
 
 
 def luck_text(finding: Finding) -> str:
@@ -26,11 +27,11 @@ def luck_text(finding: Finding) -> str:
     if chance is None:
         return "read from the data"
     if chance.p is None or chance.looks is None:
-        return f"not tested: {chance.reason}"
+        return f"{NOT_JUDGED} by luck: {chance.reason}"
     of = (
         f"p {_equals(chance.p)} over all signs of {chance.stretches} stretches, times {number(chance.looks, 2)} answers"
     )
-    return f"{chance_text(finding)}: {of}" + (f"; {chance.reason}" if chance.reason else "")
+    return f"{chance_text(finding)}: {of}"
 
 
 def doubt_of_luck(finding: Finding) -> str:
@@ -39,7 +40,7 @@ def doubt_of_luck(finding: Finding) -> str:
     chance = finding.chance
     if chance is None or chance.certain or finding.role is Role.UNSEEN:
         return ""
-    return f"it {MAY_BE_LUCK} ({_size(chance.by_luck or 0.0)})" if chance.weak else NOT_EXCLUDED
+    return f"it {MAY_BE_LUCK} ({chance_text(finding)})" if chance.weak else NOT_EXCLUDED
 
 
 def short_doubt(finding: Finding) -> str:
@@ -50,11 +51,13 @@ def short_doubt(finding: Finding) -> str:
 def luck_steps(findings: Sequence[Finding]) -> list[str]:
     """What to record where luck is not excluded, by cause."""
     doubted = [(f, f.chance) for f in findings if f.chance is not None and f.role is Role.CAUSE and doubt_of_luck(f)]
-    return [f"Luck is not excluded for {cause_name(f.cause)}: {_why(chance)}." for f, chance in doubted]
+    return [f"{_why(cause_name(f.cause), chance)}." for f, chance in doubted]
 
 
-def _why(chance: ChanceEntry) -> str:
-    return chance.reason or f"its chance is {_size(chance.by_luck or 0.0)}; hold out more of what shows it"
+def _why(cause: str, chance: ChanceEntry) -> str:
+    if chance.by_luck is None:
+        return f"{cause} {NOT_JUDGED} by luck: {chance.reason}"
+    return f"Luck is not excluded for {cause}: its chance is {_size(chance.by_luck)}; hold out more of what shows it"
 
 
 def _equals(p: float) -> str:

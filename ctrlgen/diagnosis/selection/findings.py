@@ -67,8 +67,8 @@ class ChanceEntry(Keys):
     """The chance that luck found a cause, by an exact test of signs on the held-out records."""
 
     by_luck: Number = Field(
-        description="Chance of such a finding by luck in the whole search, at most: p times looks, at most 1. Null where it cannot be "
-        "tested."
+        description="Chance of such a finding by luck in the whole search, at most: p times looks, at most 1. Null, as p and looks, where "
+        "it cannot be judged, for the reason given."
     )
     p: Number = Field(
         description="Chance, over all signs, that noise agrees as well with what the cause changes beside all others; or, where sets of "
@@ -82,7 +82,9 @@ class ChanceEntry(Keys):
         description="noise: what is left were the set without the cause right. what no law reaches: more than noise is left, and the "
         "test takes it, too, for independent from stretch to stretch and as likely of either sign."
     )
-    reason: str | None = Field(description="Why the records cannot show a chance below 5 %; null where they can.")
+    reason: str | None = Field(
+        description="Why luck cannot be judged: what p could not show below 5 %; null where it can."
+    )
 
     @property
     def certain(self) -> bool:
