@@ -199,6 +199,7 @@ def test_replicates_agree_with_the_slopes_where_the_noise_is_white(creeping):
     assert found.values.keys() == creeping.values.keys()
 
 
+@pytest.mark.long
 def test_replicates_are_the_same_in_other_processes(creeping):
     a, b = (bootstrap(creeping.search, 4, seed=3, jobs=jobs) for jobs in (0, 2))
     assert a == b

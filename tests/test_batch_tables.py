@@ -77,6 +77,7 @@ def test_the_progress_is_counted_and_not_written_all_the_time(tmp_path):
     assert [line.split(",")[0] for line in (tmp_path / "results.csv").read_text().splitlines()] == ["name", "a", "b"]
 
 
+@pytest.mark.long
 def test_the_results_of_a_batch_are_not_kept_in_memory(tmp_path, monkeypatch):
     """240 results of 100 kB: what grows is the line of each in the table."""
     folder = servo_poses(tmp_path / "run", 0.0, 0)

@@ -18,6 +18,7 @@ from ctrlgen.budget.uncertainty import load_uncertainties
 from ctrlgen.devices.changed_numbers import changed
 
 
+@pytest.mark.long
 def test_a_number_that_moves_a_bound_is_found_wherever_it_stands(circle, tmp_path):
     """The coldest that a heater can be is its surroundings: that bound rises as they do, and with no other of these numbers."""
     others = ["actuator.young", "actuator.expansion", "actuator.thickness"]

@@ -46,6 +46,7 @@ def alone(fitter, structure: Structure, steps: int) -> list[np.ndarray]:
     return [read, fit.theta, fit.residual, fit.J, fitter.predict(fit, fitter.held_out_records[0])]
 
 
+@pytest.mark.long
 def test_any_order_of_any_fits_gives_the_same_bits():
     fitter, every = axis_fitter(n=150), structures()
     wanted = {}

@@ -46,6 +46,7 @@ def test_at_limits_the_drives_are_the_best_admissible_ones(tmp_path, weights):
         assert np.sum(w * (solution.drive[k] / RANGE) ** 2) <= np.sum(w * (best / RANGE) ** 2) + 1e-9
 
 
+@pytest.mark.long
 def test_what_can_be_followed_is_what_a_linear_programme_says(tmp_path):
     sizes = [circle(d, x, y) for d in (20, 50, 60) for x in (0, 10) for y in (-12, 0, 12)]
     said, wanted = [], []
@@ -65,6 +66,7 @@ def test_what_can_be_followed_is_what_a_linear_programme_says(tmp_path):
 FEW = 'sample_rate = "1 kHz"\nduration = "0.04 s"\n'
 
 
+@pytest.mark.long
 def test_with_a_margin_the_drives_stay_as_far_inside_of_their_ranges(tmp_path):
     """A linear programme with each range narrowed by a tenth of itself at either end, for circles that it takes or not."""
     said, wanted = [], []

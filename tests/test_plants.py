@@ -259,6 +259,7 @@ def test_recording_repeats_and_its_noise_is_the_given_one(whole):
         whole.record(-powers, 1e3)
 
 
+@pytest.mark.long
 def test_coupled_poses(whole):
     """S1 Table 3 with ctrlgen's forces. The paper: 2.34 ... 4.69 %."""
     case = coupled_poses(whole)

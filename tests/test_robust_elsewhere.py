@@ -28,6 +28,7 @@ def robust(tmp_path) -> Path:
     return folder
 
 
+@pytest.mark.long
 def test_the_next_drives_of_a_robust_path_are_learnt_within_its_tightened_limits(robust, tmp_path):
     solution = solved(robust)
     bench = Bench(solution, tmp_path)
@@ -46,6 +47,7 @@ def test_the_next_drives_of_a_robust_path_are_learnt_within_its_tightened_limits
     }
 
 
+@pytest.mark.long
 def test_the_budgets_of_a_calibration_are_those_of_a_robust_path(robust):
     device = load_device(RUN_TIME)
     rows = tuple(CalibratedConstant(c, c.default, 1e-3 * abs(c.default), True) for c in device.given_at_start)

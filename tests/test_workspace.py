@@ -71,6 +71,7 @@ def test_the_largest_ball_is_inside_and_touches_on_all_sides(workspace, model, c
         assert workspace.excess(moved + 1.002 * ball.radius * directions * scale).max() > 0
 
 
+@pytest.mark.long
 def test_no_pose_lies_beyond_the_ends(workspace, model, rng):
     """Boundary points in many directions stay inside the extent; the ends of each channel alone do not go as far."""
     extent = workspace.extent(at(20))
