@@ -63,7 +63,7 @@ class Expanded:
         seen = self.s.seen(-1, device.bodies.index(device.output.body), point)
         self.K, self.J = dm(self.c.stiffness), dm(self.c.output_motion)
         self.second = ca.Function("second", [x], [ca.mtimes(seen, self.s.products(x))])
-        self.force = ca.Function("force", [x], [self.s.restoring_force(x, stiffening=False)])
+        self.force = ca.Function("force", [x], [self.s.restoring_force(x)])
 
     def pose(self, d) -> np.ndarray:
         return self.second(d).full().ravel()

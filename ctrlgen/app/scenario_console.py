@@ -46,8 +46,8 @@ def print_solution(outcome: Outcome) -> None:
             signal.channels, signal.units, error, solution.between_samples, strict=True
         ):
             out.print(f"error of {channel}: {show(at, unit)} at the samples, {show(between, unit)} between them")
-    if solution.unstated_inertia is not None:
-        out.print(f"[yellow]{escape(solution.unstated_inertia.sentence())}[/yellow]", soft_wrap=True)
+    for left_out in solution.left_out:
+        out.print(f"[yellow]{escape(left_out)}[/yellow]", soft_wrap=True)
     if sentence := robust_sentence(solution):
         out.print(sentence, markup=False, soft_wrap=True)
     robust: tuple[Column, ...] = (("reserved", "right"),) if sentence else ()

@@ -106,6 +106,10 @@ class Device(Shown, Section):
         where there is no such inertia."""
         return None
 
+    def with_unstated_stretching(self) -> Device | None:
+        """The same device with flexures that stretch where its model leaves that out; None where there are none."""
+        return None
+
     def remarks(self) -> list[str]:
         """Remarks on the description for the reader, such as an equation that is used outside its range."""
         return []

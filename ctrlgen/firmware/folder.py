@@ -91,8 +91,7 @@ def generate(
         piece: {real: f"{owner}_{piece}_{real.suffix}" for real in Real} for piece, owner in owners(scenario).items()
     }
     compression = compress(played) if played else {}
-    inertia = None if solution is None else solution.unstated_inertia
-    left_out = "" if inertia is None else inertia.sentence()
+    left_out = () if solution is None else solution.left_out
     contexts, written = {}, []
     for real in Real:
         of: dict[str, Any] = {piece: names[piece][real] for piece in PIECES} | ({} if played else {"player": None})

@@ -18,8 +18,8 @@ def report_first_screen(
     s: Summary, figures: Mapping[str, PageFigure], budget: BudgetSection | None, budget_record: BudgetRecord | None
 ) -> FirstScreen:
     """Whether the path is followed within all limits and the C follows the model, how far the device may be off, and what to do next."""
-    inertia = [f"{s.inertia_left_out[0].upper()}{s.inertia_left_out[1:]}."] if s.inertia_left_out else []
-    answer = (_held(s), *inertia, *_uncertain(budget, budget_record))
+    left_out = (f"{sentence[0].upper()}{sentence[1:]}." for sentence in s.left_out)
+    answer = (_held(s), *left_out, *_uncertain(budget, budget_record))
     figure = next((figures[name] for name in MAIN if name in figures), next(iter(figures.values()), None))
     return FirstScreen(
         answer, "ok" if s.passed else "bad", figure, _numbers(s, budget_record), _steps(s, budget, budget_record)

@@ -84,8 +84,8 @@ class Summary(Origin):
     error_between_samples: dict[str, float] | None = Field(
         description="The same between samples, under held drives; null for a device without inertia."
     )
-    inertia_left_out: str | None = Field(
-        description="What masses of the device file do that the model leaves out, as it has no [dynamics]; null where nothing."
+    left_out: tuple[str, ...] = Field(
+        description="What the device file states and the model leaves out, where the path notices: masses without [dynamics], stretching."
     )
     robust: RobustPath | None = Field(description="Null where the limits hold for the device as described.")
     margins: list[MarginRow] = Field(description="One row a limit.")
@@ -123,7 +123,7 @@ def summary_keys(
         "limits_added": list(solution.rows_added),
         "tracking_error": by_channel(signal, error),
         "error_between_samples": None if (between := solution.between_samples) is None else by_channel(signal, between),
-        "inertia_left_out": None if (left := solution.unstated_inertia) is None else left.sentence(),
+        "left_out": solution.left_out,
         "robust": _robust(solution),
         "margins": [_margin(m, solution) for m in solution.margins],
         "tightest": solution.tightest.limit.name,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -288,9 +289,12 @@ class Condensed:
         """(1, n + m) rotation of element k about its z axis per q [rad/m, rad/N]."""
         return ca.mtimes(self.frames[k][:, 2].T, self.relative_twist(k)[:3, :])
 
-    def stress(self, material: str, d: Matrix, floor: float) -> tuple[tuple[str, ...], Matrix]:
+    def stress(
+        self, material: str, d: Matrix, floor: float, extra_load: Callable[[int, Any, Matrix], Matrix] | None = None
+    ) -> tuple[tuple[str, ...], Matrix]:
         """Of the flexures of a material: the names of the sections that are stressed most, and the largest stress there (m,) [Pa] with
-        the axes displaced by `d` (n,) [m]; `floor` [Pa] as in `flexure.round_stress`."""
+        the axes displaced by `d` (n,) [m]; `floor` [Pa] as in `flexure.round_stress`, `extra_load` beside the linear one as in
+        `stretching.Stretching`."""
         names, stresses, q = [], [], self.loads(d)
         for k, e in enumerate(self.device.placed_elements):
             if getattr(e.section, "material", None) != material:
@@ -298,10 +302,11 @@ class Condensed:
             numbers = self.p.element[e.index]
             for section in e.section.sections(numbers):
                 place = self.ends[k] - section.back * self.frames[k][:, 0]
-                load = ca.mtimes(inverse_adjoint(self.frames[k], place), self.wrench(k))
-                parts = (ca.mtimes(part, q) for part in section.stresses(load))
+                load = ca.mtimes(ca.mtimes(inverse_adjoint(self.frames[k], place), self.wrench(k)), q)
+                if extra_load is not None:
+                    load += extra_load(k, section.back, d)
                 names.append(f"{e.name}_{section.name}")
-                stresses.append(e.section.largest_stress(*parts, floor))
+                stresses.append(e.section.largest_stress(*section.stresses(load), floor))
         return tuple(names), ca.vertcat(*stresses)
 
 

@@ -23,6 +23,7 @@ from ctrlgen.devices.mechanism.condensed import MOST_STEPS, SPARE_STEPS, Condens
 from ctrlgen.devices.mechanism.copies import Copied, Placed
 from ctrlgen.devices.mechanism.flexures import Blade, CircularHinge, Flexible, Strut, Wire, flexures_in_one_place
 from ctrlgen.devices.mechanism.joining import TWIST
+from ctrlgen.devices.mechanism.linear_range import stiffened
 from ctrlgen.devices.mechanism.mechanism_physics import mechanism_physics
 from ctrlgen.devices.mechanism.modes import free_between_springs, guyan_modes, inertia_remarks
 from ctrlgen.devices.mechanism.second_order import SecondOrder
@@ -372,6 +373,11 @@ class Mechanism(Device):
         if self.dynamics is not None or not len(guyan_modes(self).frequencies):
             return None
         return self.model_copy(update={"dynamics": Dynamics(damping_ratio=ASSUMED_DAMPING)}), ASSUMED_DAMPING.si
+
+    def with_unstated_stretching(self) -> Mechanism | None:
+        """With `geometric_stiffening`, where actuators push and a beam has none."""
+        elements = None if self.actuator[0].kind == "displacement" else stiffened(self.element)
+        return None if elements is None else self.model_copy(update={"element": elements})
 
     def remarks(self) -> list[str]:
         """Remarks on flexures outside of the range of their equations, and on inertia that the condensed model does not show."""

@@ -13,6 +13,7 @@ from ctrlgen.devices.limit import Limit, rate_limit
 from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.devices.mechanism.drives import transduction
 from ctrlgen.devices.mechanism.second_order import SecondOrder
+from ctrlgen.devices.mechanism.stretching import Stretching
 from ctrlgen.physics.damping import modal_damping
 
 
@@ -32,14 +33,14 @@ def mechanism_physics(c: Condensed) -> DevicePhysics:
         for i, (axis, s) in enumerate(zip(axes, sections, strict=True)):
             d, reach = signal.displacement[i], s.travel.si
             limited.append(Limit(f"travel_{axis}", f"travel of {axis}", (axis,), "um", d, -reach, reach))
-        return limited + _flexure_limits(c, signal.mechanism_displacement)
+        return limited + _flexure_limits(c, signal.mechanism_displacement, stretching)
 
     J, channels, second = c.jacobian, device.output.channels, SecondOrder(c)
-    bent = device.second_order
+    bent, stretching = device.second_order, Stretching(second) if device.geometric_stiffening else None
 
     def restoring_force(d: ca.SX) -> ca.SX:
-        force = c.restoring_force(d)
-        return force + second.restoring_force(d, device.geometric_stiffening) if bent and c.pushes else force
+        force, more = c.restoring_force(d), None if stretching is None else stretching.energy
+        return force + second.restoring_force(d, more) if bent and c.pushes else force
 
     def pose(d: ca.SX) -> ca.SX:
         linear = ca.mtimes(J, c.loads(d))
@@ -101,8 +102,9 @@ def _sensed(c: Condensed, second: SecondOrder | None) -> SensedPoints | None:
     return SensedPoints(names, units, c.device.reading_scale, at)
 
 
-def _flexure_limits(c: Condensed, d: ca.SX) -> list[Limit]:
+def _flexure_limits(c: Condensed, d: ca.SX, stretching: Stretching | None) -> list[Limit]:
     """Rotations and stresses of the flexures with the axes displaced by `d` (n,), as they are at rest there."""
+    extra_load = None if stretching is None else stretching.extra_load
     limits = []
     for k, e in enumerate(c.device.placed_elements):
         most = getattr(e.section, "rotation_limit", None)
@@ -111,7 +113,7 @@ def _flexure_limits(c: Condensed, d: ca.SX) -> list[Limit]:
             limits.append(Limit(f"rotation_{e.name}", f"rotation of {e.name}", (e.name,), "deg", angle, None, most.si))
     for m in c.device.material:
         if m.stress_limit is not None:
-            names, stress = c.stress(m.name, d, 1e-9 * m.stress_limit.si)
+            names, stress = c.stress(m.name, d, 1e-9 * m.stress_limit.si, extra_load)
             if names:
                 label = f"stress of {m.name}"
                 limits.append(Limit(f"stress_{m.name}", label, names, "MPa", stress, None, m.stress_limit.si))

@@ -11,6 +11,7 @@ import scipy
 from ctrlgen.core.units import show
 from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.devices.mechanism.drawing import Drawing
+from ctrlgen.devices.mechanism.linear_range import range_lines
 from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.devices.mechanism.springs import Spring
 from ctrlgen.physics.rigid_bodies import GROUND
@@ -207,7 +208,7 @@ def summary(device: Drawing) -> list[str]:
             f"{show(v, unit)} per {a.name}" for a, v in zip(device.placed_actuators, row, strict=True) if abs(v) > STILL
         )
         lines.append(f"{channel}: {parts or 'not moved to first order'}")
-    return lines + (_second_order_lines(c) if device.second_order else [])
+    return lines + (_second_order_lines(c) if device.second_order else []) + range_lines(device)
 
 
 def _second_order_lines(c: Condensed) -> list[str]:

@@ -3,7 +3,7 @@ that this makes where they are held."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import SimpleNamespace
@@ -105,12 +105,12 @@ class SecondOrder:
         """(readings,): second order of the readings beside those of the output."""
         return ca.mtimes(self.readings, self.products(d))
 
-    def restoring_force(self, d: Matrix, stiffening: bool) -> Matrix:
-        """(n,): what the axes are pulled home with beside K d: dV_3/dd, and dV_4/dd where flexures stiffen."""
+    def restoring_force(self, d: Matrix, more: Callable[[Matrix], Matrix] | None = None) -> Matrix:
+        """(n,): what the axes are pulled home with beside K d: dV_3/dd, and that of the energy that there is `more`, of d."""
         x = ca.SX.sym("d", self.n)
         V = ca.mtimes([x.T, self.cubic, self.products(x)])
-        if stiffening:
-            V += ca.mtimes([self.products(x).T, self.quartic, self.products(x)])
+        if more is not None:
+            V += more(x)
         return ca.substitute(ca.gradient(V, x), x, d)
 
     @cached_property
@@ -151,7 +151,7 @@ class SecondOrder:
             else ca.SX(self.n, len(self.pairs))
         )
         for k in range(len(self.parts)):
-            e = self._motions(k)
+            e = self.motions(k)
             for p, deformed in enumerate(ca.horzsplit(e.deformation(self.I, self.J))):
                 cubic[:, p] += dot(e.load, ca.repmat(deformed, 1, self.n)).T
         return self._without_rounding(cubic, self._energies(1))
@@ -161,20 +161,15 @@ class SecondOrder:
         """(m, m): V_4 = products' [quartic] products: half the load on the deformations of second order, T_2 included, and the work of
         the loads of first order on what both orders together make; of uniform beams the square of their axial load."""
         m, n = len(self.pairs), self.n
-        quartic = ca.SX(m, m)
+        quartic = self._second_work
         columns = [(i, j, p) for p in range(m) for i in range(n) for j in range(n)]
         a, b = [i for i, _, _ in columns], [n + p for _, _, p in columns]
         turned = ca.SX(1, len(columns))
         for k in range(len(self.parts)):
-            e = self._motions(k, self.twists)
-            E = e.relative[:, n:] + e.deformation(self.I, self.J)
-            load = self._local(k, ca.mtimes(plain(self.c.elements[k].stiffness), self._global(k, E)))
-            for p, deformed in enumerate(ca.horzsplit(E)):
-                quartic[:, p] += dot(load, ca.repmat(deformed, 1, m)).T / 2
-            strained = replace(e, relative=ca.horzcat(e.relative[:, :n], E), load=ca.horzcat(e.load[:, :n], load))
-            turned += 2 * dot(e.load[:, a], strained.deformation([j for _, j, _ in columns], b))
+            strained = self.strained[k]
+            turned += 2 * dot(strained.load[:, a], strained.deformation([j for _, j, _ in columns], b))
             if len(segments := self.parts[k][1]) == 1:
-                quartic += self._beam_column(segments[0], e)
+                quartic += self._beam_column(segments[0], strained)
         if self.c.pushes:
             moved = self._travel([j for _, j, _ in columns], b, self.twists)
             turned -= 2 * ca.sum1(self.c.stiffness[:, a] * moved)
@@ -182,6 +177,33 @@ class SecondOrder:
             q = self.pairs.index((min(i, j), max(i, j)))
             quartic[q, p] += value / self.weight[q]
         return self._without_rounding((quartic + quartic.T) / 2, self._energies(2))
+
+    @cached_property
+    def strained(self) -> list[Motions]:
+        """Every element in the n motions of first order and, behind them, the m of second: deformation and load of both orders."""
+        found = []
+        for k in range(len(self.parts)):
+            e = self.motions(k, self.twists)
+            E = e.relative[:, self.n :] + e.deformation(self.I, self.J)
+            load = ca.mtimes(self.local_stiffness(k), E)
+            relative = ca.horzcat(e.relative[:, : self.n], E)
+            found.append(replace(e, relative=relative, load=ca.horzcat(e.load[:, : self.n], load)))
+        return found
+
+    @cached_property
+    def stretching(self) -> Matrix:
+        """(m, m): the part of V_4 that is stored in the deformations of second order, half the load on them."""
+        return self._without_rounding(self._second_work, self._energies(2))
+
+    @property
+    def _second_work(self) -> Matrix:
+        m = len(self.pairs)
+        work = ca.SX(m, m)
+        for e in self.strained:
+            E, load = e.relative[:, self.n :], e.load[:, self.n :]
+            for p, deformed in enumerate(ca.horzsplit(E)):
+                work[:, p] += dot(load, ca.repmat(deformed, 1, m)).T / 2
+        return (work + work.T) / 2
 
     @cached_property
     def twists(self) -> list[Matrix]:
@@ -202,7 +224,7 @@ class SecondOrder:
                     loads[body] = loads.get(body, ca.SX(6, m)) - ca.vertcat(part[3:, :], part[:3, :])
 
         for k, placed in enumerate(c.elements):
-            e = self._motions(k, between=unit)
+            e = self.motions(k, between=unit)
             W, E, mixed = e.load, e.deformation(self.I, self.J), e.deformation(axis, turned)
             push(
                 placed.first,
@@ -221,7 +243,7 @@ class SecondOrder:
         travelled = ca.vertcat(*(c.travel(i, free) for i in range(n)))
         return [T - ca.mtimes(T_1, travelled + moved) for T, T_1 in zip(free, self.first_order, strict=True)]
 
-    def _motions(self, k: int, more: list[Matrix] | None = None, between: list[Matrix] | None = None) -> Motions:
+    def motions(self, k: int, more: list[Matrix] | None = None, between: list[Matrix] | None = None) -> Motions:
         """The twists of element k in the n motions of first order, and behind them in `more` (of every body) or in those
         `between` (of its two)."""
         c, e, n = self.c, self.c.elements[k], self.n
@@ -236,9 +258,13 @@ class SecondOrder:
             deformed = ca.horzcat(deformed, added[1] - added[0])
         load, (place, _, shape) = ca.mtimes(plain(e.stiffness), plain(deformed)), self.parts[k]
         first, second = bodies
-        return Motions(c.frames[k], place, shape, first, second, self._local(k, plain(deformed)), self._local(k, load))
+        return Motions(c.frames[k], place, shape, first, second, self.local(k, plain(deformed)), self.local(k, load))
 
-    def _local(self, k: int, twist: Matrix) -> Matrix:
+    def local_stiffness(self, k: int) -> Matrix:
+        """(6, 6) wrench on the free end of element k per twist of it, where the element is looked at, in its frame."""
+        return plain(self.local(k, ca.mtimes(plain(self.c.elements[k].stiffness), self._global(k, ca.DM.eye(6)))))
+
+    def local(self, k: int, twist: Matrix) -> Matrix:
         """A twist or wrench at the global origin as it is at element k, in its frame."""
         return ca.mtimes(inverse_adjoint(self.c.frames[k], self.parts[k][0]), twist)
 

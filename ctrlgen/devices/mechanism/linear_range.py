@@ -1,0 +1,79 @@
+"""How far the force of a mechanism is linear: flexures that are held stretch as they bend, and turn with the bodies that they join.
+
+What a travel takes beside K d is told by the energy to fourth order and beyond (`second_order`, `stretching`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from scipy.optimize import brentq
+
+from ctrlgen.core.units import show
+from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.devices.mechanism.drawing import Drawing
+from ctrlgen.devices.mechanism.flexures import Beam
+from ctrlgen.devices.mechanism.second_order import SecondOrder
+from ctrlgen.devices.mechanism.stretching import Stretching
+
+LEVELS = (0.01, 0.05, 0.2)  # of the linear force
+FARTHEST = 10.0  # times the largest travel: beyond it nothing is said
+STEPS = 200  # between a thousandth of the travel and the farthest: the deviation may have a turning point
+
+
+def stiffened(elements: Sequence[Any]) -> tuple[Any, ...] | None:
+    """The elements, all beams with `geometric_stiffening`; None where no beam is among them, one has it, or a spring is cubic."""
+    beams = [e for e in elements if isinstance(e, Beam)]
+    if not beams or any(e.geometric_stiffening for e in beams) or any(getattr(e, "cubic", False) for e in elements):
+        return None
+    return tuple(e.model_copy(update={"geometric_stiffening": True}) if isinstance(e, Beam) else e for e in elements)
+
+
+def linear_ranges(c: Condensed) -> list[tuple[float | None, ...]]:
+    """Of each axis moved alone, to the side where that is sooner, the travel [m] from which on the linear force is off by each of
+    `LEVELS`; None where that is not within `FARTHEST` of the largest travel."""
+    second, ranges = SecondOrder(c), []
+    d = ca.SX.sym("d", second.n)
+    extra = ca.Function("extra", [d], [second.restoring_force(d, Stretching(second).energy)])
+    K = ca.DM(ca.evalf(ca.SX(c.held_stiffness))).full()
+    for i, a in enumerate(c.device.placed_actuators):
+        travel = a.section.travel.si
+        grid = travel * np.geomspace(1e-3, FARTHEST, STEPS)
+
+        def off(x: float, i: int = i) -> float:
+            sides = [extra(sign * x * np.eye(second.n)[i]).full()[i, 0] for sign in (1, -1)]
+            return max(map(abs, sides)) / (K[i, i] * x)
+
+        shares = np.array([off(x) for x in grid])
+        found: list[float | None] = []
+        for level in LEVELS:
+            k = int(np.argmax(shares > level))
+            beyond = shares[k] > level
+            found.append(
+                None
+                if not beyond
+                else grid[0]
+                if k == 0
+                else brentq(lambda x, s=level: off(x) - s, *grid[k - 1 : k + 1])
+            )
+        ranges.append(tuple(found))
+    return ranges
+
+
+def range_lines(device: Drawing) -> list[str]:
+    """What `ctrlgen check` prints of it: of each actuator that does not stay linear to 1 % within its travel ten times over."""
+    c = Condensed(device, device.values())
+    if not c.pushes or c.cubics or not any(isinstance(e.section, Beam) for e in device.placed_elements):
+        return []
+    held = "" if device.geometric_stiffening else "; geometric_stiffening = true holds that"
+    levels = ", ".join(f"{100 * level:g}" for level in LEVELS)
+    return [
+        f"linear force of {a.name} off by {levels} % from a travel of "
+        + ", ".join(f"over {show(FARTHEST * a.section.travel.si, 'um')}" if x is None else show(x, "um") for x in found)
+        + held
+        for a, found in zip(device.placed_actuators, linear_ranges(c), strict=True)
+        if found[0] is not None
+    ]
