@@ -23,6 +23,7 @@ S_LOW, S_HIGH = np.full(N, 0.0), np.full(N, 1.0)
 U_LOW, U_HIGH = np.full(N, 0.0), np.full(N, 1.0)
 FALL, RISE = np.array([-0.25, -0.125, -np.inf]), np.array([0.125, 0.25, np.inf])  # of the drives, in one sample
 TARGET_LIMIT = np.full(N, 64.0)
+NO_DRIVE = 2.0  # of the first displacement: within what a state may be, beyond what a sample leads to
 OUTCOMES = ("inside", "edge", "beyond")
 TRIALS = tuple("".join(outcome) for outcome in product("+-", repeat=3))  # "+": the drives of a trial are admissible
 PLAIN = ("inside", "inside", "kept", "inside")
@@ -134,7 +135,8 @@ def scripted(device: Device) -> Controller:
     def inverse(own: float) -> Inverse:
         """`own` differs between equilibrium and next sample, so that taking the other's kernel shows."""
         phase = 5 * wanted + (state if device.states else 0) + 61 * z[1] * np.arange(1, N + 1) + own
-        drive = 0.5 + z[2] * (phase - ca.floor(phase) - 0.5)
+        # Beyond NO_DRIVE no drive is a number, as where a root has none.
+        drive = 0.5 + z[2] * (phase - ca.floor(phase) - 0.5) + ca.floor(ca.sqrt(NO_DRIVE**2 - z[0] ** 2) / 8)
         return Inverse(
             kernel("displacement", [x, z, target], ["x", "z", "target"], target + own * z),
             kernel("state", [x, z, wanted], ["x", "z", "wanted"], x[: device.n_s] + 2**-8 * wanted[: device.n_s]),
@@ -291,6 +293,10 @@ def odd_cases(rng: np.random.Generator, device: Device) -> list[tuple[str, np.nd
             x, z, target = sample(rng, device, (mode, *PLAIN))
             x[i] = bad
             cases.append((mode, x, z, target))
+        x, z, target = sample(rng, device, (mode, *PLAIN))
+        target[0] -= 0.25 * (3 - z[0]) if mode == "step" else 0
+        z[0] = 3
+        cases.append((mode, x, z, target))
         x, z, target = sample(rng, device, (mode, *PLAIN))
         cases.append((mode, np.full_like(x, np.nan), np.full_like(z, np.nan), target))  # in C: never initialised
         for i, drive, command in product(range(device.n_x + N), ("edge", "origin"), (None, np.nan, 1.0)):  # absurd

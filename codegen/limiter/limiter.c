@@ -26,11 +26,12 @@ static int limit_all(real value[], const real low[], const real high[], const re
     int hit = 0;
     int i;
     for (i = 0; i < count; i++) {
-        const real wanted = value[i];
+        const int unknown = is_nan(&value[i]);
+        const real wanted = (unknown != 0) ? low[i] : value[i];
         const real raised = (wanted > low[i]) ? wanted : low[i];
         const real limited = (raised < high[i]) ? raised : high[i];
         const real moved = limited - wanted;
-        if (!((moved <= slack[i]) && (moved >= -slack[i]))) {
+        if ((unknown != 0) || (moved > slack[i]) || (moved < -slack[i])) {
             hit = 1;
         }
         value[i] = limited;
@@ -71,7 +72,7 @@ static int drives_admissible(const limiter_state *state, const real drive[NU])
     int i;
     (void)state;
     for (i = 0; i < NU; i++) {
-        if (!((drive[i] <= U_MOST[i]) && (drive[i] >= U_LEAST[i]))) {
+        if ((is_nan(&drive[i]) != 0) || (drive[i] > U_MOST[i]) || (drive[i] < U_LEAST[i])) {
             admissible = 0;
         }
     }
@@ -79,20 +80,6 @@ static int drives_admissible(const limiter_state *state, const real drive[NU])
 }
 
 #endif
-/* 1 if every component is a number of a plausible size. */
-static int is_usable(const real target[M])
-{
-    static const real TARGET_LIMIT[M] = INPUT_LIMITS_TABLE; /* SI */
-    int usable = 1;
-    int i;
-    for (i = 0; i < M; i++) {
-        if (!((target[i] <= TARGET_LIMIT[i]) && (target[i] >= -TARGET_LIMIT[i]))) {
-            usable = 0;
-        }
-    }
-    return usable;
-}
-
 #if RATED
 /* Goes from the last drives toward drive by the largest common share that every rate allows: 0 untouched, 1 changed, 2 by more than the
  * slack. */

@@ -6,7 +6,7 @@ static int all_within(const real value[], const real low[], const real high[], c
     int within = 1;
     int i;
     for (i = 0; i < count; i++) {
-        if (!((value[i] <= (high[i] + slack[i])) && (value[i] >= (low[i] - slack[i])))) {
+        if ((is_nan(&value[i]) != 0) || (value[i] > (high[i] + slack[i])) || (value[i] < (low[i] - slack[i]))) {
             within = 0;
         }
     }
@@ -29,7 +29,7 @@ static uint32_t motion_broken(const limiter_state *at)
         int i;
         COMPOSITE_SHARES(at, at->z, share);
         for (i = 0; i < SHARES; i++) {
-            if (!(share[i] <= COMPOSITE_SLACK_SQUARED)) {
+            if ((is_nan(&share[i]) != 0) || (share[i] > COMPOSITE_SLACK_SQUARED)) {
                 status = LIMITER_COMPOSITE;
             }
         }

@@ -40,11 +40,6 @@
 #define KEEP_DRIVES (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, NU);
 #define GO_ON PROCEED(state, out);
 #endif
-#if MOTION
-#define CAN_BE_REACHED (displacement_inside(out->displacement) != 0) && (is_usable(target) != 0)
-#else
-#define CAN_BE_REACHED displacement_inside(out->displacement) != 0
-#endif
 #define KEEP_STATE(k) state->x[k] = out->state[k];
 #define TELL_STATE(k) out->state[k] = state->x[k];
 #define KEEP_DISPLACEMENT(k) state->z[k] = out->displacement[k];
@@ -246,11 +241,11 @@ uint32_t SAMPLE(limiter_state *state, const real target[M], limiter_output *out)
         /* nothing is written */
     } else if (CANNOT_BE_USED) {
         status = set_lost(state, out);
-    } else {
+    } else if (is_usable(target) != 0) {
         DISPLACEMENT(state, target, out->displacement);
-        if (CAN_BE_REACHED) {
+        if (displacement_inside(out->displacement) != 0) {
             status = WITHIN(state, out);
-        } else if (is_usable(target) != 0) {
+        } else {
             int hit;
 #if COUPLED
             real beyond[N];
@@ -269,17 +264,17 @@ uint32_t SAMPLE(limiter_state *state, const real target[M], limiter_output *out)
             if (WAS_BEYOND) {
                 status |= LIMITER_DISPLACEMENT;
             }
-        } else {
-#if EXAMINED_FIRST
-            SAFE(state, out);
-#else
-            if (is_lost(state) != 0) {
-                status = set_lost(state, out);
-            } else {
-                SAFE(state, out);
-            }
-#endif
         }
+    } else {
+#if EXAMINED_FIRST
+        SAFE(state, out);
+#else
+        if (is_lost(state) != 0) {
+            status = set_lost(state, out);
+        } else {
+            SAFE(state, out);
+        }
+#endif
     }
     return status;
 }
@@ -298,7 +293,6 @@ uint32_t SAMPLE(limiter_state *state, const real target[M], limiter_output *out)
 #undef KEEP_DRIVES
 #undef GO_ON
 #undef CANNOT_BE_USED
-#undef CAN_BE_REACHED
 #undef WAS_BEYOND
 #undef KEEP_STATE
 #undef TELL_STATE

@@ -79,6 +79,19 @@ static uint32_t word_at(const uint8_t *bytes, uint32_t k)
     return (uint32_t)bytes[k] | ((uint32_t)bytes[k + 1U] << 8U) | ((uint32_t)bytes[k + 2U] << 16U) | ((uint32_t)bytes[k + 3U] << 24U);
 }
 
+/* 1 if none of the words from 12 on, but the last, is the bits of a float that is infinite or no number. */
+static int numbers_finite(const uint8_t *bytes, uint32_t size)
+{
+    int finite = 1;
+    uint32_t k;
+    for (k = 12U; k < (size - 4U); k = k + 4U) {
+        if ((word_at(bytes, k) & 0x7F800000U) == 0x7F800000U) {
+            finite = 0;
+        }
+    }
+    return finite;
+}
+
 /* The IEEE 754 float of the word that begins there. */
 static real number_at(const uint8_t *bytes, uint32_t k)
 {
@@ -101,12 +114,14 @@ uint32_t limiter_load(limiter_constants *constants, const uint8_t *bytes, uint32
     } else if ((word_at(bytes, 8U) != LIMITER_DEVICE_HASH) || (word_at(bytes, size - 4U) != checksum(bytes, size - 4U))) {
         status = LIMITER_CONSTANTS;
     } else {
-        limiter_constants read;
-        READ_CONSTANTS
         status = LIMITER_CONSTANTS;
-        if (constants_within(&read) != 0) {
-            *constants = read;
-            status = 0U;
+        if (numbers_finite(bytes, size) != 0) {
+            limiter_constants read;
+            READ_CONSTANTS
+            if (constants_within(&read) != 0) {
+                *constants = read;
+                status = 0U;
+            }
         }
     }
     return status;
@@ -120,7 +135,7 @@ uint32_t SET_INPUT(limiter_state *state, real input)
         /* nothing is written */
     } else if (state->ready != READY) {
         status = LIMITER_LOST;
-    } else if (!((input >= INPUT_LEAST) && (input <= INPUT_MOST))) {
+    } else if (!(INPUT_WITHIN)) {
         status = LIMITER_CONSTANTS;
     } else {
         const real given[GIVEN] = CHANGED_VALUES;

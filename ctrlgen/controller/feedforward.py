@@ -17,7 +17,7 @@ from ctrlgen.controller.controller_step import ControllerStatus, ControllerStep,
 from ctrlgen.controller.drive_rate import FREE, RateLimiter
 from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.controller.limit_reach import Slacks
-from ctrlgen.controller.lost_state import Groups, is_beyond
+from ctrlgen.controller.lost_state import is_beyond
 from ctrlgen.controller.null_motion import of_least_effort
 from ctrlgen.model.inverse import Inverse
 
@@ -69,8 +69,8 @@ class Controller:
         return RateLimiter(fall, rise, self.slacks[2])
 
     @cached_property
-    def plausible(self) -> Groups:
-        """The sums of squares by which a state is judged lost, see `lost_state`."""
+    def plausible(self) -> np.ndarray:
+        """The largest magnitudes of the numbers of a state that is not lost, see `lost_state`."""
         return self.kernels.plausible(self.rate is not None)
 
     def is_lost(self, *state: np.ndarray) -> bool:
@@ -133,12 +133,11 @@ class Controller:
         if np.all(np.isnan(np.concatenate(state))) or (first and self.is_lost(*state)):
             return self._without_state()
         z_slack, _, u_slack = self.slacks
+        if not np.all(np.abs(target) <= kernels.input_limits[: len(target)]):  # nor is a NaN
+            lost = not first and self.is_lost(*state)
+            return self._without_state() if lost else self._without_target(k, state)
         wanted, status = self._answer("displacement", k.displacement, x, z, target), ControllerStatus(0)
         if not np.all((wanted >= m.z_bounds[0]) & (wanted <= m.z_bounds[1])):  # a NaN is not inside either
-            usable = np.all(np.abs(target) <= kernels.input_limits[: len(target)])
-            if not usable:
-                lost = not first and self.is_lost(*state)
-                return self._without_state() if lost else self._without_target(k, state)
             beyond = wanted
             wanted, hit = clamp(beyond, *m.z_bounds, z_slack)
             if hit:

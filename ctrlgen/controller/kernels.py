@@ -15,7 +15,7 @@ import numpy as np
 from ctrlgen.controller.composite_bound import composite_bound, worst_in_range
 from ctrlgen.controller.controller_step import answer
 from ctrlgen.controller.limit_reach import Slacks, drive_beyond, state_beyond
-from ctrlgen.controller.lost_state import Groups, plausible_sums
+from ctrlgen.controller.lost_state import plausible_magnitudes
 from ctrlgen.controller.named_inverse import NamedInverses, given_inverses, named_inverses
 from ctrlgen.controller.nearest_displacement import coupling, nearest_displacement
 from ctrlgen.controller.null_motion import NullMotion, null_motion
@@ -215,11 +215,9 @@ class ControllerKernels:
         drives = [answer(kernel, x, z, z + side * z_slack, x[:n] + side * state_slack) for side in (-1, 0, 1)]
         return z_slack, state_slack, np.max(np.abs(np.diff(drives, axis=0)), axis=0)
 
-    def plausible(self, with_drive: bool) -> Groups:
-        """What a state is judged by, which holds the last drive or not, see `plausible_sums`."""
-        nominal, *others = (plausible_sums(k.nominal, with_drive) for k in (self, *self.variants))
-        wider = [{those: most for those, most in sums} for sums in others]
-        return tuple((those, max(most, *(w.get(those, most) for w in wider), most)) for those, most in nominal)
+    def plausible(self, with_drive: bool) -> np.ndarray:
+        """What a state is judged by, which holds the last drive or not, see `plausible_magnitudes`."""
+        return np.max([plausible_magnitudes(k.nominal, with_drive) for k in (self, *self.variants)], axis=0)
 
     @cached_property
     def examined_first(self) -> tuple[bool, bool]:

@@ -14,6 +14,21 @@ static const float U_SAFE[1] = { 0.0f }; /* V */
 
 #define READY (0xA500A500U) /* in a state that was initialised; zeros and most other bytes are not this word */
 
+/* The bits of a number in memory. Whether a number is one, and how large, is asked of these: a compiler that is told that no number is NaN
+ * may leave comparisons of numbers out, never those of integers. */
+static uint32_t bits_of(const float *number)
+{
+    union { float number; uint32_t bits; } v;
+    v.number = *number;
+    return v.bits;
+}
+
+/* 1 if a number in memory is NaN. */
+static int is_nan(const float *number)
+{
+    return ((bits_of(number) & 0x7FFFFFFFU) > 0x7F800000U) ? 1 : 0;
+}
+
 #define FORCE_CONSTANT_STIFFNESS_1 (20000.0f) /* (1 / actuator.force_constant) * mechanics.stiffness */
 #define FORCE_CONSTANT (10.0f) /* actuator.force_constant */
 #define STIFFNESS (200000.0f) /* mechanics.stiffness */
@@ -63,28 +78,33 @@ static void balance_displacement(const float x[1], const float z[1], const float
     result[0] = z[0] + (STIFFNESS_1 * t1);
 }
 
-/* 1 if every displacement is inside its limits: distance from the middle squared, no more than the half width squared. 0 for NaN. */
+/* 1 if every displacement is inside its limits; 0 for NaN. */
 static int displacement_inside(const float value[1])
 {
-    const float d0 = value[0];
-    return (((d0 * d0) <= 9.99999e-09f)) ? 1 : 0;
+    return (((bits_of(&value[0]) & 0x7FFFFFFFU) <= 0x38D1B717U) /* 1e-04f */) ? 1 : 0;
 }
 
-/* 1 if every drive is inside its limits: distance from the middle squared, no more than the half width squared. 0 for NaN. */
+/* 1 if every drive is inside its limits; 0 for NaN. */
 static int drive_inside(const float value[1])
 {
-    const float d0 = value[0];
-    return (((d0 * d0) <= 15.999985f)) ? 1 : 0;
+    return (((bits_of(&value[0]) & 0x7FFFFFFFU) <= 0x40800000U) /* 4.0f */) ? 1 : 0;
 }
 
-/* 1 if a number of the state is NaN, infinite or far beyond its range. Asked first where displacements depend on the state or effects
- * remember, else where a limit is met: until then it would show in the drives, or is written anew. Numbers with one range are judged
- * together: the sum of their squares is at most their count times (4 times the largest magnitude of the range) squared. */
+/* 1 if every component is a number of a plausible size. */
+static int is_usable(const float target[3])
+{
+    return (((bits_of(&target[0]) & 0x7FFFFFFFU) <= 0x41200000U) /* 10.0f */ &&
+        ((bits_of(&target[1]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */ &&
+        ((bits_of(&target[2]) & 0x7FFFFFFFU) <= 0x47C35000U) /* 100000.0f */) ? 1 : 0;
+}
+
+/* 1 if a number of the state is NaN, infinite or far beyond its range: 4 times the largest magnitude of it. Asked first where
+ * displacements depend on the state or effects remember, else where a limit is met: until then it would show in the drives, or is
+ * written anew. */
 static int is_lost(const flexure_axis_online_f32_state *state)
 {
-    const float squares0 = (state->x[0] * state->x[0]);
-    const float squares1 = (state->z[0] * state->z[0]);
-    return ((squares0 <= 1.6e+31f) && (squares1 <= 1.6e-07f)) ? 0 : 1;
+    return (((bits_of(&state->x[0]) & 0x7FFFFFFFU) <= 0x59635FA9U) /* 4e+15f */ &&
+        ((bits_of(&state->z[0]) & 0x7FFFFFFFU) <= 0x39D1B717U) /* 0.0004f */) ? 0 : 1;
 }
 
 /* Clips value to low ... high; 1 if a component changed by more than its slack or was NaN. */
@@ -93,11 +113,12 @@ static int limit_all(float value[], const float low[], const float high[], const
     int hit = 0;
     int i;
     for (i = 0; i < count; i++) {
-        const float wanted = value[i];
+        const int unknown = is_nan(&value[i]);
+        const float wanted = (unknown != 0) ? low[i] : value[i];
         const float raised = (wanted > low[i]) ? wanted : low[i];
         const float limited = (raised < high[i]) ? raised : high[i];
         const float moved = limited - wanted;
-        if (!((moved <= slack[i]) && (moved >= -slack[i]))) {
+        if ((unknown != 0) || (moved > slack[i]) || (moved < -slack[i])) {
             hit = 1;
         }
         value[i] = limited;
@@ -112,20 +133,6 @@ static int limit_displacement(float value[1])
     static const float HIGH[1] = { 1e-04f }; /* m */
     static const float SLACK[1] = { 4e-10f }; /* m */
     return limit_all(value, LOW, HIGH, SLACK, 1);
-}
-
-/* 1 if every component is a number of a plausible size. */
-static int is_usable(const float target[3])
-{
-    static const float TARGET_LIMIT[3] = { 10.0f, 1000.0f, 100000.0f }; /* SI */
-    int usable = 1;
-    int i;
-    for (i = 0; i < 3; i++) {
-        if (!((target[i] <= TARGET_LIMIT[i]) && (target[i] >= -TARGET_LIMIT[i]))) {
-            usable = 0;
-        }
-    }
-    return usable;
 }
 
 void flexure_axis_online_f32_init(flexure_axis_online_f32_state *state)
@@ -197,20 +204,20 @@ uint32_t flexure_axis_online_f32_settle(flexure_axis_online_f32_state *state, co
         /* nothing is written */
     } else if ((state->ready != READY) || (is_lost(state) != 0)) {
         status = set_lost(state, out);
-    } else {
+    } else if (is_usable(target) != 0) {
         wanted_displacement(target, out->displacement);
-        if ((displacement_inside(out->displacement) != 0) && (is_usable(target) != 0)) {
+        if (displacement_inside(out->displacement) != 0) {
             status = settle_within(state, out);
-        } else if (is_usable(target) != 0) {
+        } else {
             int hit;
             hit = limit_displacement(out->displacement);
             status = settle_within(state, out);
             if (hit != 0) {
                 status |= FLEXURE_AXIS_ONLINE_F32_DISPLACEMENT;
             }
-        } else {
-            settle_safe(state, out);
         }
+    } else {
+        settle_safe(state, out);
     }
     return status;
 }
@@ -221,7 +228,7 @@ static int all_within(const float value[], const float low[], const float high[]
     int within = 1;
     int i;
     for (i = 0; i < count; i++) {
-        if (!((value[i] <= (high[i] + slack[i])) && (value[i] >= (low[i] - slack[i])))) {
+        if ((is_nan(&value[i]) != 0) || (value[i] > (high[i] + slack[i])) || (value[i] < (low[i] - slack[i]))) {
             within = 0;
         }
     }

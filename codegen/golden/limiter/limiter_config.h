@@ -64,7 +64,6 @@ typedef float real;
 #define U_HIGH_TABLE { 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f }
 #define U_SLACK_TABLE { 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f }
 #define REST_TABLE { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }
-#define INPUT_LIMITS_TABLE { 63.61323f, 63.61323f, 63.61323f, 0.1f, 0.1f, 0.1f }
 #define HOME_TABLE { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }
 #define COMPOSITE_SLACK 1.000004f
 #define COMPOSITE_SLACK_SQUARED 1.000008f
@@ -105,6 +104,21 @@ static const float U_SAFE[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
 static const float X_REST[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
 
 #define READY (0xA500A500U) /* in a state that was initialised; zeros and most other bytes are not this word */
+
+/* The bits of a number in memory. Whether a number is one, and how large, is asked of these: a compiler that is told that no number is NaN
+ * may leave comparisons of numbers out, never those of integers. */
+static uint32_t bits_of(const float *number)
+{
+    union { float number; uint32_t bits; } v;
+    v.number = *number;
+    return v.bits;
+}
+
+/* 1 if a number in memory is NaN. */
+static int is_nan(const float *number)
+{
+    return ((bits_of(number) & 0x7FFFFFFFU) > 0x7F800000U) ? 1 : 0;
+}
 
 /* Square root as IEEE 754 has it: rounded correctly, not a number for a negative one. The core's own instruction where it has one, or
    the caller's CTRLGEN_SQRT(a), which must be rounded correctly too. Elsewhere, and with CTRLGEN_PORTABLE_SQRT, Newton steps and a
@@ -401,36 +415,54 @@ static float composite_bound(const float wanted[6])
     return t9 + 1e-06f;
 }
 
-/* 1 if every displacement is inside its limits: distance from the middle squared, no more than the half width squared. 0 for NaN. */
+/* 1 if every displacement is inside its limits; 0 for NaN. */
 static int displacement_inside(const float value[6])
 {
-    const float d0 = value[0] - 2.75e-05f;
-    const float d1 = value[1] - 2.75e-05f;
-    const float d2 = value[2] - 2.75e-05f;
-    const float d3 = value[3] - 2.75e-05f;
-    const float d4 = value[4] - 2.75e-05f;
-    const float d5 = value[5] - 2.75e-05f;
-    return (((d0 * d0) <= 7.5624856e-10f) && ((d1 * d1) <= 7.5624856e-10f) && ((d2 * d2) <= 7.5624856e-10f) && ((d3 * d3) <= 7.5624856e-10f) && ((d4 * d4) <= 7.5624856e-10f) && ((d5 * d5) <= 7.5624856e-10f)) ? 1 : 0;
+    return ((bits_of(&value[0]) <= 0x3866AFCDU) /* 5.5e-05f */ &&
+        (bits_of(&value[1]) <= 0x3866AFCDU) /* 5.5e-05f */ &&
+        (bits_of(&value[2]) <= 0x3866AFCDU) /* 5.5e-05f */ &&
+        (bits_of(&value[3]) <= 0x3866AFCDU) /* 5.5e-05f */ &&
+        (bits_of(&value[4]) <= 0x3866AFCDU) /* 5.5e-05f */ &&
+        (bits_of(&value[5]) <= 0x3866AFCDU) /* 5.5e-05f */) ? 1 : 0;
 }
 
-/* 1 if every heater power is inside its limits: distance from the middle squared, no more than the half width squared. 0 for NaN. */
+/* 1 if every heater power is inside its limits; 0 for NaN. */
 static int drive_inside(const float value[6])
 {
-    const float d0 = value[0] - 0.5f;
-    const float d1 = value[1] - 0.5f;
-    const float d2 = value[2] - 0.5f;
-    const float d3 = value[3] - 0.5f;
-    const float d4 = value[4] - 0.5f;
-    const float d5 = value[5] - 0.5f;
-    return (((d0 * d0) <= 0.24999952f) && ((d1 * d1) <= 0.24999952f) && ((d2 * d2) <= 0.24999952f) && ((d3 * d3) <= 0.24999952f) && ((d4 * d4) <= 0.24999952f) && ((d5 * d5) <= 0.24999952f)) ? 1 : 0;
+    return ((bits_of(&value[0]) <= 0x3F800000U) /* 1.0f */ &&
+        (bits_of(&value[1]) <= 0x3F800000U) /* 1.0f */ &&
+        (bits_of(&value[2]) <= 0x3F800000U) /* 1.0f */ &&
+        (bits_of(&value[3]) <= 0x3F800000U) /* 1.0f */ &&
+        (bits_of(&value[4]) <= 0x3F800000U) /* 1.0f */ &&
+        (bits_of(&value[5]) <= 0x3F800000U) /* 1.0f */) ? 1 : 0;
 }
 
-/* 1 if a number of the state is NaN, infinite or far beyond its range. Asked first where displacements depend on the state or effects
- * remember, else where a limit is met: until then it would show in the drives, or is written anew. Numbers with one range are judged
- * together: the sum of their squares is at most their count times (4 times the largest magnitude of the range) squared. */
+/* 1 if every component is a number of a plausible size. */
+static int is_usable(const float target[6])
+{
+    return (((bits_of(&target[0]) & 0x7FFFFFFFU) <= 0x427E73F3U) /* 63.61323f */ &&
+        ((bits_of(&target[1]) & 0x7FFFFFFFU) <= 0x427E73F3U) /* 63.61323f */ &&
+        ((bits_of(&target[2]) & 0x7FFFFFFFU) <= 0x427E73F3U) /* 63.61323f */ &&
+        ((bits_of(&target[3]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ &&
+        ((bits_of(&target[4]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ &&
+        ((bits_of(&target[5]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */) ? 1 : 0;
+}
+
+/* 1 if a number of the state is NaN, infinite or far beyond its range: 4 times the largest magnitude of it. Asked first where
+ * displacements depend on the state or effects remember, else where a limit is met: until then it would show in the drives, or is
+ * written anew. */
 static int is_lost(const limiter_state *state)
 {
-    const float squares0 = (((((state->x[0] * state->x[0]) + (state->x[1] * state->x[1])) + (state->x[2] * state->x[2])) + (state->x[3] * state->x[3])) + (state->x[4] * state->x[4])) + (state->x[5] * state->x[5]);
-    const float squares1 = (((((state->z[0] * state->z[0]) + (state->z[1] * state->z[1])) + (state->z[2] * state->z[2])) + (state->z[3] * state->z[3])) + (state->z[4] * state->z[4])) + (state->z[5] * state->z[5]);
-    return ((squares0 <= 6.504729e+07f) && (squares1 <= 2.904e-07f)) ? 0 : 1;
+    return (((bits_of(&state->x[0]) & 0x7FFFFFFFU) <= 0x454DC99AU) /* 3292.6f */ &&
+        ((bits_of(&state->x[1]) & 0x7FFFFFFFU) <= 0x454DC99AU) /* 3292.6f */ &&
+        ((bits_of(&state->x[2]) & 0x7FFFFFFFU) <= 0x454DC99AU) /* 3292.6f */ &&
+        ((bits_of(&state->x[3]) & 0x7FFFFFFFU) <= 0x454DC99AU) /* 3292.6f */ &&
+        ((bits_of(&state->x[4]) & 0x7FFFFFFFU) <= 0x454DC99AU) /* 3292.6f */ &&
+        ((bits_of(&state->x[5]) & 0x7FFFFFFFU) <= 0x454DC99AU) /* 3292.6f */ &&
+        ((bits_of(&state->z[0]) & 0x7FFFFFFFU) <= 0x3966AFCDU) /* 0.00022f */ &&
+        ((bits_of(&state->z[1]) & 0x7FFFFFFFU) <= 0x3966AFCDU) /* 0.00022f */ &&
+        ((bits_of(&state->z[2]) & 0x7FFFFFFFU) <= 0x3966AFCDU) /* 0.00022f */ &&
+        ((bits_of(&state->z[3]) & 0x7FFFFFFFU) <= 0x3966AFCDU) /* 0.00022f */ &&
+        ((bits_of(&state->z[4]) & 0x7FFFFFFFU) <= 0x3966AFCDU) /* 0.00022f */ &&
+        ((bits_of(&state->z[5]) & 0x7FFFFFFFU) <= 0x3966AFCDU) /* 0.00022f */) ? 0 : 1;
 }

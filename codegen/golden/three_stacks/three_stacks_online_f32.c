@@ -18,6 +18,27 @@ static const float RISE[3] = { 5.0f, 1e+18f, 1e+18f }; /* V a sample */
 
 #define READY (0xA500A500U) /* in a state that was initialised; zeros and most other bytes are not this word */
 
+/* The bits of a number in memory. Whether a number is one, and how large, is asked of these: a compiler that is told that no number is NaN
+ * may leave comparisons of numbers out, never those of integers. */
+static uint32_t bits_of(const float *number)
+{
+    union { float number; uint32_t bits; } v;
+    v.number = *number;
+    return v.bits;
+}
+
+/* The bits of a number so that they are ordered as numbers are, the negative ones too. */
+static uint32_t ordered(uint32_t bits)
+{
+    return ((bits & 0x80000000U) != 0U) ? ~bits : (bits | 0x80000000U);
+}
+
+/* 1 if a number in memory is NaN. */
+static int is_nan(const float *number)
+{
+    return ((bits_of(number) & 0x7FFFFFFFU) > 0x7F800000U) ? 1 : 0;
+}
+
 /* Displacement at which the platform pose is `target`, x [m], y [m]. */
 static void wanted_displacement(const float target[2], float result[2])
 {
@@ -77,33 +98,38 @@ static void balance_displacement(const float z[2], const float drive[3], float r
     }
 }
 
-/* 1 if every displacement is inside its limits: distance from the middle squared, no more than the half width squared. 0 for NaN. */
+/* 1 if every displacement is inside its limits; 0 for NaN. */
 static int displacement_inside(const float value[2])
 {
-    const float d0 = value[0];
-    const float d1 = value[1];
-    return (((d0 * d0) <= 2.4999975e-09f) && ((d1 * d1) <= 2.4999975e-09f)) ? 1 : 0;
+    return (((bits_of(&value[0]) & 0x7FFFFFFFU) <= 0x3851B717U) /* 5e-05f */ &&
+        ((bits_of(&value[1]) & 0x7FFFFFFFU) <= 0x3851B717U) /* 5e-05f */) ? 1 : 0;
 }
 
-/* 1 if every drive is inside its limits: distance from the middle squared, no more than the half width squared. 0 for NaN. */
+/* 1 if every drive is inside its limits; 0 for NaN. */
 static int drive_inside(const float value[3])
 {
-    const float d0 = value[0];
-    const float d1 = value[1] - 75.0f;
-    const float d2 = value[2] - 55.0f;
-    return (((d0 * d0) <= 9999.99f) && ((d1 * d1) <= 5624.9893f) && ((d2 * d2) <= 5624.9907f)) ? 1 : 0;
+    return (((bits_of(&value[0]) & 0x7FFFFFFFU) <= 0x42C80000U) /* 100.0f */ &&
+        (bits_of(&value[1]) <= 0x43160000U) /* 150.0f */ &&
+        ((ordered(bits_of(&value[2])) - 0x3E5FFFFFU) <= 0x84A20001U) /* -20.0f ... 130.0f */) ? 1 : 0;
 }
 
-/* 1 if a number of the state is NaN, infinite or far beyond its range. Asked first where displacements depend on the state or effects
- * remember, else where a limit is met: until then it would show in the drives, or is written anew. Numbers with one range are judged
- * together: the sum of their squares is at most their count times (4 times the largest magnitude of the range) squared. */
+/* 1 if every component is a number of a plausible size. */
+static int is_usable(const float target[2])
+{
+    return (((bits_of(&target[0]) & 0x7FFFFFFFU) <= 0x40A00000U) /* 5.0f */ &&
+        ((bits_of(&target[1]) & 0x7FFFFFFFU) <= 0x40A00000U) /* 5.0f */) ? 1 : 0;
+}
+
+/* 1 if a number of the state is NaN, infinite or far beyond its range: 4 times the largest magnitude of it. Asked first where
+ * displacements depend on the state or effects remember, else where a limit is met: until then it would show in the drives, or is
+ * written anew. */
 static int is_lost(const three_stacks_online_f32_state *state)
 {
-    const float squares0 = (state->z[0] * state->z[0]) + (state->z[1] * state->z[1]);
-    const float squares1 = (state->u[0] * state->u[0]);
-    const float squares2 = (state->u[1] * state->u[1]);
-    const float squares3 = (state->u[2] * state->u[2]);
-    return ((squares0 <= 8e-08f) && (squares1 <= 160000.0f) && (squares2 <= 360000.0f) && (squares3 <= 270400.0f)) ? 0 : 1;
+    return (((bits_of(&state->z[0]) & 0x7FFFFFFFU) <= 0x3951B717U) /* 0.0002f */ &&
+        ((bits_of(&state->z[1]) & 0x7FFFFFFFU) <= 0x3951B717U) /* 0.0002f */ &&
+        ((bits_of(&state->u[0]) & 0x7FFFFFFFU) <= 0x43C80000U) /* 400.0f */ &&
+        ((bits_of(&state->u[1]) & 0x7FFFFFFFU) <= 0x44160000U) /* 600.0f */ &&
+        ((bits_of(&state->u[2]) & 0x7FFFFFFFU) <= 0x44020000U) /* 520.0f */) ? 0 : 1;
 }
 
 /* Clips value to low ... high; 1 if a component changed by more than its slack or was NaN. */
@@ -112,11 +138,12 @@ static int limit_all(float value[], const float low[], const float high[], const
     int hit = 0;
     int i;
     for (i = 0; i < count; i++) {
-        const float wanted = value[i];
+        const int unknown = is_nan(&value[i]);
+        const float wanted = (unknown != 0) ? low[i] : value[i];
         const float raised = (wanted > low[i]) ? wanted : low[i];
         const float limited = (raised < high[i]) ? raised : high[i];
         const float moved = limited - wanted;
-        if (!((moved <= slack[i]) && (moved >= -slack[i]))) {
+        if ((unknown != 0) || (moved > slack[i]) || (moved < -slack[i])) {
             hit = 1;
         }
         value[i] = limited;
@@ -140,25 +167,11 @@ static int drives_admissible(const three_stacks_online_f32_state *state, const f
     int i;
     (void)state;
     for (i = 0; i < 3; i++) {
-        if (!((drive[i] <= U_MOST[i]) && (drive[i] >= U_LEAST[i]))) {
+        if ((is_nan(&drive[i]) != 0) || (drive[i] > U_MOST[i]) || (drive[i] < U_LEAST[i])) {
             admissible = 0;
         }
     }
     return admissible;
-}
-
-/* 1 if every component is a number of a plausible size. */
-static int is_usable(const float target[2])
-{
-    static const float TARGET_LIMIT[2] = { 5.0f, 5.0f }; /* SI */
-    int usable = 1;
-    int i;
-    for (i = 0; i < 2; i++) {
-        if (!((target[i] <= TARGET_LIMIT[i]) && (target[i] >= -TARGET_LIMIT[i]))) {
-            usable = 0;
-        }
-    }
-    return usable;
 }
 
 /* Goes from the last drives toward drive by the largest common share that every rate allows: 0 untouched, 1 changed, 2 by more than the
@@ -456,23 +469,23 @@ uint32_t three_stacks_online_f32_settle(three_stacks_online_f32_state *state, co
         /* nothing is written */
     } else if (state->ready != READY) {
         status = set_lost(state, out);
-    } else {
+    } else if (is_usable(target) != 0) {
         wanted_displacement(target, out->displacement);
         if (displacement_inside(out->displacement) != 0) {
             status = settle_within(state, out);
-        } else if (is_usable(target) != 0) {
+        } else {
             int hit;
             hit = limit_displacement(out->displacement);
             status = settle_within(state, out);
             if ((hit != 0) && (status != THREE_STACKS_ONLINE_F32_LOST)) {
                 status |= THREE_STACKS_ONLINE_F32_DISPLACEMENT;
             }
+        }
+    } else {
+        if (is_lost(state) != 0) {
+            status = set_lost(state, out);
         } else {
-            if (is_lost(state) != 0) {
-                status = set_lost(state, out);
-            } else {
-                settle_safe(state, out);
-            }
+            settle_safe(state, out);
         }
     }
     return status;
@@ -572,23 +585,23 @@ uint32_t three_stacks_online_f32_step(three_stacks_online_f32_state *state, cons
         /* nothing is written */
     } else if (state->ready != READY) {
         status = set_lost(state, out);
-    } else {
+    } else if (is_usable(target) != 0) {
         wanted_displacement(target, out->displacement);
         if (displacement_inside(out->displacement) != 0) {
             status = step_within(state, out);
-        } else if (is_usable(target) != 0) {
+        } else {
             int hit;
             hit = limit_displacement(out->displacement);
             status = step_within(state, out);
             if ((hit != 0) && (status != THREE_STACKS_ONLINE_F32_LOST)) {
                 status |= THREE_STACKS_ONLINE_F32_DISPLACEMENT;
             }
+        }
+    } else {
+        if (is_lost(state) != 0) {
+            status = set_lost(state, out);
         } else {
-            if (is_lost(state) != 0) {
-                status = set_lost(state, out);
-            } else {
-                step_safe(state, out);
-            }
+            step_safe(state, out);
         }
     }
     return status;

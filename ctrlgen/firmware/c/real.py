@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from enum import Enum
 
 import numpy as np
@@ -30,6 +31,41 @@ class Real(Enum):
     def epsilon(self) -> float:
         """Distance from one to the next number."""
         return float(np.finfo(np.float64 if self is Real.DOUBLE else np.float32).eps)
+
+    @property
+    def word(self) -> str:
+        """The unsigned integer of C that holds the bits of a number."""
+        return f"uint{8 * self.bytes}_t"
+
+    def bits(self, value: float) -> int:
+        """The bits of a number, as an unsigned integer. Those of numbers that are not negative are ordered as the numbers are; those of
+        infinity and of what is no number are above them."""
+        number = np.float64(value) if self is Real.DOUBLE else np.float32(value)
+        return int.from_bytes(number.tobytes(), sys.byteorder)
+
+    def bits_literal(self, bits: int) -> str:
+        """These bits as a constant of C."""
+        return f"0x{bits:0{2 * self.bytes}X}{'ULL' if self is Real.DOUBLE else 'U'}"
+
+    def ordered(self, bits: int) -> int:
+        """The bits of a number so that they are ordered as numbers are, the negative ones too; the C has the same as `ordered`."""
+        sign = self.bits(-0.0)
+        return 2 * sign - 1 - bits if bits & sign else bits | sign
+
+    @property
+    def sign(self) -> str:
+        """The bit of the sign, as a constant of C."""
+        return self.bits_literal(self.bits(-0.0))
+
+    @property
+    def magnitude(self) -> str:
+        """All bits but the sign, as a constant of C."""
+        return self.bits_literal(self.bits(-0.0) - 1)
+
+    @property
+    def infinity(self) -> str:
+        """The bits of infinity, as a constant of C: those of every finite magnitude are below."""
+        return self.bits_literal(self.bits(math.inf))
 
     def literal(self, value: float) -> str:
         """The shortest decimal that reads back as the same number of this type."""

@@ -262,6 +262,7 @@ def _write_unit(
     context = unit.more | {
         "identifier": identifier,
         "fmi": f"{fmi}.0",
+        "real": Real.DOUBLE,
         "core": unit.core,
         "title": unit.title,
         "unit": unit.kind,

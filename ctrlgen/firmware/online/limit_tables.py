@@ -38,7 +38,8 @@ def limit_context(controller: Controller, printer: Printer) -> dict[str, Any]:
         "u_safe": kernels.safe_drive,
         "input_limits": kernels.input_limits,
         "unlimited": UNLIMITED,
-        "plausible": [([_member(i, m) for i in those], most) for those, most in controller.plausible],
+        "lost_tests": [_magnitude_test(_member(i, m), most, real) for i, most in enumerate(controller.plausible)],
+        "usable_tests": [_magnitude_test(f"target[{i}]", most, real) for i, most in enumerate(kernels.input_limits)],
         **rates_in_c(controller),
         **_limits_in_c(controller, printer, real, u_slack),
     }
@@ -60,14 +61,31 @@ def _member(i: int, model: Model) -> str:
     return f"state->u[{i}]"
 
 
-def _middles(low: np.ndarray, high: np.ndarray, real: Real) -> tuple[np.ndarray, np.ndarray]:
-    """Middle and squared half width of ranges; the width is four roundings smaller, so that the test with it is on the safe side."""
-    centre, half = (low + high) / 2, (high - low) / 2
-    return centre, np.maximum(half - 4 * real.epsilon * (np.abs(centre) + half), 0.0) ** 2
+def _magnitude_test(number: str, most: float, real: Real) -> str:
+    """C that holds where the magnitude of a `number` is at most `most`; not for NaN."""
+    return (
+        f"((bits_of(&{number}) & {real.magnitude}) <= {real.bits_literal(real.bits(most))}) /* {real.literal(most)} */"
+    )
+
+
+def within_test(number: str, low: float, high: float, real: Real) -> str:
+    """C that holds where a `number` in memory is within low ... high; not for NaN. It compares bits, which no option of a compiler makes
+    a NaN pass; numbers of one sign are ordered as their bits are, others by `ordered`."""
+    if low == -high:
+        return _magnitude_test(number, high, real)
+    bits = f"bits_of(&{number})"
+    first, last = real.bits(low + 0.0), real.bits(high + 0.0)  # of a negative zero, zero
+    if low < 0.0:
+        bits, first, last = f"ordered({bits})", real.ordered(first), real.ordered(last)
+    if first == 0:
+        return f"({bits} <= {real.bits_literal(last)}) /* {real.literal(high)} */"
+    between = f"{real.literal(low)} ... {real.literal(high)}"
+    return f"(({bits} - {real.bits_literal(first)}) <= {real.bits_literal(last - first)}) /* {between} */"
 
 
 def _middle_formulas(low: ca.SX, high: ca.SX, real: Real) -> tuple[ca.SX, ca.SX]:
-    """Middle and squared half width as in `_middles`, of ranges that are formulas."""
+    """Middle and squared half width of ranges that are formulas; the width is four roundings smaller, so that a test with it is on the
+    safe side."""
     centre, half = (low + high) / 2, (high - low) / 2
     return centre, ca.fmax(half - 4 * real.epsilon * (ca.fabs(centre) + half), 0.0) ** 2
 
@@ -83,7 +101,7 @@ def _s_bounds(m: Model) -> tuple[ca.SX, ca.SX]:
 
 
 def _limits_in_c(controller: Controller, printer: Printer, real: Real, u_slack: np.ndarray) -> dict[str, Any]:
-    """Middles and squared half widths as C, by "z_middle", ..., and where each table of limits is found, by its name in "arrays"."""
+    """Tests of a `value` against ranges as C, by "z_tests", ..., and where each table of limits is found, by its name in "arrays"."""
     model, tables, limited = (
         controller.kernels.nominal,
         Tables(controller.kernels, printer),
@@ -102,26 +120,36 @@ def _limits_in_c(controller: Controller, printer: Printer, real: Real, u_slack: 
             "U_LEAST": tables.array("U_LEAST", lambda m: _u_bounds(m)[0] - ca.DM(u_slack), u_low - u_slack),
             "U_MOST": tables.array("U_MOST", lambda m: _u_bounds(m)[1] + ca.DM(u_slack), u_high + u_slack),
         }
-    middles = {
-        "z_middle": [[real.literal(v) if v else "" for v in row] for row in _middles(*model.z_bounds, real)],
-        "u_middle": _middle_texts(tables, _u_bounds, u_low, u_high, real),
-        "s_middle": [],
+    tests = {
+        "z_tests": [
+            within_test(f"value[{i}]", low, high, real)
+            for i, (low, high) in enumerate(zip(*model.z_bounds, strict=True))
+        ],
+        "u_tests": _range_tests(tables, _u_bounds, u_low, u_high, real),
+        "s_tests": [],
     }
     if controller.state_can_be_limited:
         arrays |= {
             "S_LOW": tables.array("S_LOW", lambda m: _s_bounds(m)[0], s_low),
             "S_HIGH": tables.array("S_HIGH", lambda m: _s_bounds(m)[1], s_high),
         }
-        middles["s_middle"] = _middle_texts(tables, _s_bounds, s_low, s_high, real)
+        tests["s_tests"] = _range_tests(tables, _s_bounds, s_low, s_high, real)
     rest = tables.each("X_REST", lambda m: m.rest_formula, model.rest)
-    return {"arrays": arrays, "rest_given": rest, **middles}
+    return {"arrays": arrays, "rest_given": rest, **tests}
 
 
-def _middle_texts(
+def _range_tests(
     tables: Tables, bounds: Callable[[Model], tuple[ca.SX, ca.SX]], low: np.ndarray, high: np.ndarray, real: Real
-) -> list[list[str]]:
-    centre, square = _middles(low, high, real)
-    return [
-        tables.texts(lambda m: _middle_formulas(*bounds(m), real)[0], centre),
-        tables.texts(lambda m: _middle_formulas(*bounds(m), real)[1], square),
-    ]
+) -> list[str]:
+    """For each number of `value` C that holds where it is within its range. Where a range follows from the constants of the start: the
+    distance from its middle squared is at most its half width squared, of what is a number."""
+    members = [f"value[{i}]" for i in range(len(low))]
+    if tables.rows(lambda m: ca.vertcat(*bounds(m)), low) is None:
+        return [within_test(*each, real) for each in zip(members, low, high, strict=True)]
+    middles = tables.texts(lambda m: _middle_formulas(*bounds(m), real)[0], (low + high) / 2)
+    squares = tables.texts(lambda m: _middle_formulas(*bounds(m), real)[1], (high - low) ** 2 / 4)
+    tests = []
+    for number, middle, square in zip(members, middles, squares, strict=True):
+        apart = f"({number} - {middle})" if middle else number
+        tests.append(f"((is_nan(&{number}) == 0) && (({apart} * {apart}) <= {square or real.literal(0.0)}))")
+    return tests

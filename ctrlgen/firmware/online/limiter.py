@@ -13,10 +13,11 @@ from ctrlgen.controller.nearest_displacement import SWEEPS
 from ctrlgen.firmware.c.preprocessor import Macro, resolved
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.templates import codegen_folder
+from ctrlgen.firmware.online.limit_tables import within_test
 
 CONFIGURATION = "limiter_config.h"  # what the macros are defined in, where the files are compiled as they are
 # Arrays of numbers of the context of online.c.j2: Z_LOW_TABLE is what stands in braces for "z_low".
-TABLES = "z_low z_high z_slack s_low s_high s_slack u_low u_high u_slack fall rise rest input_limits"
+TABLES = "z_low z_high z_slack s_low s_high s_slack u_low u_high u_slack fall rise rest"
 # Parameters of the macros that call kernels, and what the kernels take for their arguments.
 CALLS = {
     "balance": ("state x z drive result", {"x": "x", "z": "z", "drive": "drive"}),
@@ -150,11 +151,11 @@ def _texts(context: Mapping[str, Any]) -> dict[str, str]:
 
 def _start_texts(context: Mapping[str, Any]) -> dict[str, str]:
     """What the macros of start_constants.c stand for."""
-    given, changing, literal = context["given"], context["changing"], context["real"].literal
+    given, changing = context["given"], context["changing"]
     if not given:
         return {}
     of_state = {c["name"]: f"state->constants.{c['name']}" for c in given}
-    within = (f"((constants->{c['name']} >= {c['low']}) && (constants->{c['name']} <= {c['high']}))" for c in given)
+    within = (within_test(f"constants->{c['name']}", c["low"], c["high"], context["real"]) for c in given)
     texts = {name.upper(): f"0x{context[name]:08X}U" for name in ("crc_polynomial", "magic", "layout")}
     texts |= {
         "GIVEN_VALUES": _braces(of_state.values()),
@@ -172,8 +173,7 @@ def _start_texts(context: Mapping[str, Any]) -> dict[str, str]:
         texts |= {
             "INPUT_NAME": constant.name,
             "SET_INPUT": f"{context['prefix']}_set_{constant.name}",
-            "INPUT_LEAST": literal(constant.low),
-            "INPUT_MOST": literal(constant.high),
+            "INPUT_WITHIN": within_test("input", constant.low, constant.high, context["real"]),
             "CHANGED_VALUES": _braces((of_state | {constant.name: "input"}).values()),
             "CHANGED_DERIVED": str(len(changing["assigned"])),
             "SET_CHANGED": _assignments(changing["assigned"]),
@@ -202,7 +202,7 @@ def _calls(context: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
     }
     if context["bound"]:
         calls["COMPOSITE_BOUND"] = "wanted", context["bound"].value(wanted="wanted")
-    for name, middle in (("state_inside", context["s_middle"]), ("drive_inside", context["u_middle"])):
-        follows = any("derived" in text for texts in middle for text in texts)
+    for name, tests in (("state_inside", context["s_tests"]), ("drive_inside", context["u_tests"])):
+        follows = any("derived" in test for test in tests)
         calls[name.upper()] = "state value", f"{name}({'&state->derived, ' if follows else ''}value)"
     return calls

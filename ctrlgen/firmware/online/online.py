@@ -64,8 +64,16 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     context["blocks"] = [text.strip("\n") for text in texts if text]
     context["tables"] = _tables(context)
     context["macros"] = limiter_macros(context)
+    context["bits_wanted"] = _bits_wanted(context)
     context["limiter"] = limiter_text(prefix, real, context["macros"])
     return context
+
+
+def _bits_wanted(context: Mapping[str, Any]) -> set[str]:
+    """The functions by which the C asks for the bits of numbers: those that it calls."""
+    tests = [test for name in ("z", "s", "u") for test in context[f"{name}_tests"]]
+    tests += [macro.body for macro in context["macros"].values()]
+    return {"bits_of", "is_nan"} | ({"ordered"} if "ordered(" in " ".join(tests) else set())
 
 
 def _header(scenario: Scenario, controller: Controller) -> dict[str, Any]:

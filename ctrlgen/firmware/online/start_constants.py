@@ -97,10 +97,10 @@ def start_context(kernels: ControllerKernels, printer: Printer) -> dict[str, Any
     }
 
 
-def _described(c: RunTimeConstant, real: Real) -> dict[str, str]:
-    low, default, high = (real.literal(v) for v in (c.low, c.default, c.high))
+def _described(c: RunTimeConstant, real: Real) -> dict[str, Any]:
+    default = real.literal(c.default)
     about = f"{c.base_unit}, {c.low:.7g} ... {c.high:.7g}: {c.path}, {c.shown(c.default)} in the file"
-    return {"name": c.name, "low": low, "default": default, "high": high, "about": about}
+    return {"name": c.name, "low": c.low, "high": c.high, "default": default, "about": about}
 
 
 def _assigned(members: Sequence[Derived]) -> list[tuple[str, int]]:
