@@ -319,8 +319,20 @@ def test_reproduce_prints_rows_as_a_table_and_as_json(tmp_path):
     assert done.returncode == 0 and "reciprocity" in done.stdout
     assert re.search(r"eq\. \(5\) \(1,4\) +8\.70e-2 N, um +0\.0869\d+ +reproduced", done.stdout)
     assert (tmp_path / "page.html").read_text().count("<tr>") > 30
-    rows = json.loads(ctrlgen("reproduce", "S1", "--json").stdout)
-    assert {"source", "where", "printed", "ours", "difference", "unit", "status", "reason"} == set(rows[0])
+    rows = json.loads(ctrlgen("reproduce", "S2", "--json").stdout)
+    names = {
+        "source",
+        "where",
+        "printed",
+        "ours",
+        "difference",
+        "taken_literally",
+        "implied",
+        "unit",
+        "status",
+        "reason",
+    }
+    assert names == set(rows[0])
     refused(ctrlgen("reproduce", "S9"), "S9", "S0, S1, S2, S3")
 
 

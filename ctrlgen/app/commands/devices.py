@@ -163,7 +163,9 @@ def reproduce(
     page: Annotated[
         Path | None, typer.Option("--out", help="Also write a page (.html) with the figures.", show_default=False)
     ] = None,
-    differing: Annotated[bool, typer.Option("--differing", help="Show only rows that are not reproduced.")] = False,
+    differing: Annotated[
+        bool, typer.Option("--differing", help="Show only rows that differ or cannot be computed.")
+    ] = False,
 ) -> None:
     """Compare every number that the papers print with the program's own: printed, ours, difference, status, reason.
 
@@ -191,10 +193,11 @@ def reproduce(
     if json_:
         print(json.dumps(everything.as_json(rows), indent=1))
         return
-    console.print_reproduced([r for r in rows if not (differing and r.status is row.ReproductionStatus.REPRODUCED)])
+    agreeing = (row.ReproductionStatus.REPRODUCED, row.ReproductionStatus.CORRECTED)
+    console.print_reproduced([r for r in rows if not (differing and r.status in agreeing)])
     counts = everything.counts(rows)
     for name in chosen:
         numbers = ", ".join(f"{counts[(name, status.value)]} {status.value}" for status in row.ReproductionStatus)
         out.print(f"{name}, {everything.TITLES[name]}: {numbers}", soft_wrap=True)
-    if lacking := sum(r.reason == hinges.NEEDS_FEM for r in rows):
-        err.print(f"{lacking} rows of S3: {hinges.NEEDS_FEM}", style="yellow", markup=False, soft_wrap=True)
+    if lacking := sum(r.reason.startswith(hinges.NEEDS_FEM) for r in rows):
+        err.print(f"{lacking} rows: {hinges.NEEDS_FEM}", style="yellow", markup=False, soft_wrap=True)

@@ -211,8 +211,9 @@ class CircularHinge(Flexible):
         """[C] about the free end (6, 6): in the plane by S2's equations, out of it by beam theory.
 
         Torsion by Saint-Venant's stiffness with the neck's J/I_z, and beside it, of a hinge deeper than its neck is long, by strips
-        across the depth that bend with their ends held, b^2/(12 C), C their deflection per force: an estimate, not compared with
-        finite elements.
+        across the depth that bend with their ends held, b^2/(12 C), C their deflection per force: an estimate, 9 % stiffer than
+        solid finite elements at t/R = 0.175 and b/t = 4.3 (S1 eq. (7), `ctrlgen reproduce S1`), where bending and extension out of the
+        plane are 8 to 9 % stiffer and those in it 2 % softer.
         """
         h = self.hinge.geometry(p.hinge, E=m.young, nu=m.poisson)
         plane = self.hinge.planar(p.hinge, E=m.young, nu=m.poisson)
