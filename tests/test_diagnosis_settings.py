@@ -14,7 +14,7 @@ from ctrlgen.estimation import settings as estimation
 ROOMS = (ROOT / "ctrlgen" / "diagnosis", ROOT / "ctrlgen" / "estimation")
 HELD = {**vars(settings), **vars(estimation)}
 GROUPS = {name: value for name, value in HELD.items() if name.isupper() and dataclasses.is_dataclass(value)}
-FILES = [*(ROOMS[0] / "settings").glob("*.py"), ROOMS[1] / "settings.py"]
+FILES = [*(ROOMS[0] / "settings").glob("*.py"), *ROOMS[1].glob("settings*.py")]
 MODULES = [path for room in ROOMS for path in sorted(room.rglob("*.py")) if path not in FILES]
 
 

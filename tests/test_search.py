@@ -96,6 +96,27 @@ def test_a_cause_that_leaves_more_than_noise_is_begun_again_in_another_shape():
     assert restart_elsewhere(trials, found, nominal, screened) is found
 
 
+def test_what_a_set_does_not_need_is_dropped_before_its_causes_are_swapped(monkeypatch):
+    """A play, beside a bend of the reading that nothing shows: swaps would screen what is left without either."""
+    fitter, given = fitter_of(played), []
+    bend = Hypothesis("cubic_sensor", "sensor:axis", "axis")
+
+    def both(trials, current, screened):
+        structure = current.fit.restarted.with_cause(BACKLASH, {"gap": 5e-8}).with_cause(bend, {"curvature": 1e3})
+        return tuple(trials.tried(structure, bend, current.fit))
+
+    def swaps(trials, current, before):
+        given.append((current.causes, before))
+        raise InterruptedError
+
+    monkeypatch.setattr(search, "fit_candidates", both)
+    monkeypatch.setattr(search, "swapped", swaps)
+    monkeypatch.setattr(search, "all_pruned", lambda trials, current, candidates, screened: list(candidates))
+    with pytest.raises(InterruptedError):
+        search.Searcher(fitter, Screen(fitter, [BACKLASH, bend]), lambda _: None).run(AXIS)
+    assert given == [((BACKLASH,), 0)]
+
+
 def test_what_explains_better_once_all_is_fitted_takes_the_place_of_a_cause():
     """Play, for which creep was taken: in the end the better one is the answer, not its alternative."""
     fitter = fitter_of(played, n=700)

@@ -16,9 +16,10 @@ from ctrlgen.devices import Device
 from ctrlgen.estimation.checkpoint import Checkpoint, key_of
 from ctrlgen.estimation.error_model import ErrorModel, error_model
 from ctrlgen.estimation.initial_memory import begins_worse, turning_point_before
+from ctrlgen.estimation.leading_part import leading_part
 from ctrlgen.estimation.least_squares import LeastSquaresProblem, initial_state_sd, limited, whiten_residual
 from ctrlgen.estimation.noise import Noise
-from ctrlgen.estimation.settings import DISCREPANCY, FIT, HELD_OUT_REFIT, SIMULATION
+from ctrlgen.estimation.settings import DISCREPANCY, FIT, HELD_OUT_REFIT, LEADING_PART, SIMULATION
 from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
@@ -210,19 +211,38 @@ class Fitter:
         residual = problem.residual(problem.to_scaled(start))
         return float(residual @ residual)
 
+    def rough_objective(self, structure: Structure) -> float:
+        """The objective at the structure's starting values, of the leading part of the records where there is one: a comparison of
+        starts of one structure."""
+        part = leading_part(self.recording)
+        return (self if part is None else replace(self, recording=part)).initial_objective(structure)
+
     def _optimum(self, problem: LeastSquaresProblem, start: np.ndarray, steps: int, enough: float = np.inf) -> Fit:
         """The optimum from `start` [SI], taken from the checkpoint where it was found before."""
         if self.checkpoint is None:
-            return _fit_at(problem, levenberg_marquardt(problem, problem.to_scaled(start), steps, enough))
+            return _fit_at(problem, self._descended(problem, problem.to_scaled(start), steps, enough))
         s, noise, corner = problem.structure, self.error.weighted, self.error.corner
         valid = [r.valid for r in self.recording.records]
         begun = (s.starts, s.expanded_at, sorted(s.nominal_starts.items()), s.free, s.finer)
         key = key_of(s.causes, *begun, start, steps, enough, noise.sd, corner, *noise.ar, *valid)
         optimum = self.checkpoint.recall(key)
         if optimum is None:
-            optimum = levenberg_marquardt(problem, problem.to_scaled(start), steps, enough)
+            optimum = self._descended(problem, problem.to_scaled(start), steps, enough)
             self.checkpoint.keep(key, optimum)
         return _fit_at(problem, optimum)
+
+    def _descended(self, problem: LeastSquaresProblem, x: np.ndarray, steps: int, enough: float) -> np.ndarray:
+        """The scaled variables where a descent from x ends. It begins on the leading part of the records, where there is one, as far as
+        that tells the way, and goes on from there if that is better on all samples: with half of the steps then."""
+        part = leading_part(self.recording) if steps else None
+        if part is not None:
+            rough = LeastSquaresProblem(problem.structure, part, self.error)
+            near = levenberg_marquardt(rough, x, steps, negligible=LEADING_PART.negligible * len(x))
+            if not np.array_equal(near, x):
+                here, there = problem.residual(x), problem.evaluate(near)[0]
+                if there @ there < here @ here:
+                    x, steps = near, (steps + 1) // 2
+        return levenberg_marquardt(problem, x, steps, enough)
 
     def predict(self, fit: Fit, record: Record) -> np.ndarray:
         """Readings (n, n_y) [SI] of a fitted structure on any record, with the initial state that suits this record best."""

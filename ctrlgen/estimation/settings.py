@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ctrlgen.estimation.settings_of_parts import LeadingPartSettings
+
 
 @dataclass(frozen=True)
 class StatisticsSettings:
@@ -343,8 +345,7 @@ class DiscrepancySettings:
     same: float = 0.05
     """Relative change of the errors' deviation below which they count as unchanged."""
     blocks: int = 20
-    """Blocks of a record in which squares of two models are compared: enough for a bootstrap, long beside most memories.
-    Judgement."""
+    """Blocks of a record in which squares of two models are compared: enough for a bootstrap, long beside most memories. Judgement."""
     huber_corner: float = 3.0
     """Standard deviations from which on a sample counts by its size, no longer by its square. Normal noise exceeds 3 once in
     370 samples and loses 0.5 % of the efficiency (P. J. Huber)."""
@@ -390,6 +391,7 @@ HELD = HeldSettings()
 INITIAL_MEMORY = InitialMemorySettings()
 SIMULATION = SimulationSettings()
 FIT = FitSettings()
+LEADING_PART = LeadingPartSettings()
 HELD_OUT_REFIT = HeldOutRefitSettings()
 RESIDUAL_TESTS = ResidualTestsSettings()
 PROFILE = ProfileSettings()

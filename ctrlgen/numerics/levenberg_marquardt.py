@@ -42,13 +42,15 @@ class Problem(Protocol):
         """What stands for half the Hessian (n, n) of the objective where `J`, one of the last two, was evaluated: J'J, or more of it."""
 
 
-def levenberg_marquardt(problem: Problem, x: np.ndarray, steps: int, enough: float = np.inf) -> np.ndarray:
+def levenberg_marquardt(
+    problem: Problem, x: np.ndarray, steps: int, enough: float = np.inf, negligible: float = NEGLIGIBLE
+) -> np.ndarray:
     """The x (n,) of least |residual|^2 within the bounds, from a starting `x`, in at most so many steps.
 
     Marquardt's damping (D. W. Marquardt, J. SIAM 11 (1963) 431). A step that does not lower the objective is tried again:
     first along the curved valley of the objective; then with the nuisance variables fixed, along which the residual may have
     a kink; then, when the damping has already grown, without the parameter that promises most, for the derivative by the
-    moment of an event between two samples may be wrong. Ends when a step promises less than `NEGLIGIBLE`, and where all that are left,
+    moment of an event between two samples may be wrong. Ends when a step promises less than is `negligible`, and where all that are left,
     each with `GENEROUS` times what the next one promises, would not bring |residual|^2 down to what is `enough`.
     """
     low, high = problem.bounds
@@ -61,7 +63,7 @@ def levenberg_marquardt(problem: Problem, x: np.ndarray, steps: int, enough: flo
         least, most = np.maximum(low - x, -problem.step_limit), np.minimum(high - x, problem.step_limit)
         step = _damped_step(H, gradient, least, most, damping)
         promised = -(gradient @ step + 0.5 * step @ H @ step)
-        if promised < NEGLIGIBLE or (at_once and r @ r - left * GENEROUS * promised > enough):
+        if promised < negligible or (at_once and r @ r - left * GENEROUS * promised > enough):
             break
         # its derivatives are needed next where it is good, as it mostly is after a good one
         better = _if_better(problem, r, np.clip(x + step, low, high), with_slopes=at_once)

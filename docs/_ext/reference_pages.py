@@ -378,7 +378,7 @@ def settings_page() -> str:
         "",
     ]
     files = sorted(path for path in Path(inspect.getfile(settings)).parent.glob("*.py") if path.stem != "__init__")
-    files = [Path(inspect.getfile(estimation)).with_name("settings.py"), *files]
+    files = [*sorted(Path(inspect.getfile(estimation)).parent.glob("settings*.py")), *files]
     for path in files:
         lines += [f"## {'estimation' if path.stem == 'settings' else path.stem}", ""]
         for record in ast.parse(path.read_text(encoding="utf-8")).body:

@@ -132,7 +132,7 @@ def restart_elsewhere(
                 start
                 for group, most in ((begins, SEARCH.restarts), (near, SEARCH.near_restarts))
                 for start in sorted(
-                    (structure.restarted(k, begin) for begin in group), key=trials.fitter.initial_objective
+                    (structure.restarted(k, begin) for begin in group), key=trials.fitter.rough_objective
                 )[:most]
             ]
             best = candidate.fit
@@ -167,7 +167,7 @@ def fit_other_clocks(
                 p = cause.law.amplitude()
                 shift = best_shift(branch.fitter, beside.fit, cause, h)
                 structure = beside.fit.restarted.with_cause(cause, {p.name: shift})
-                begun.append((branch.fitter.initial_objective(structure), cause, structure))
+                begun.append((branch.fitter.rough_objective(structure), cause, structure))
             except FAILURES as error:
                 branch.note_failure(cause, error)
         if not begun:

@@ -121,7 +121,7 @@ def counterparts(trials: Trials, model: CandidateModel, k: int) -> list[Candidat
             continue
         try:
             begun = [others.with_cause(h, start) for start in _starts(model, k, h, speed)]
-            start = min(begun, key=trials.fitter.initial_objective)
+            start = min(begun, key=trials.fitter.rough_objective)
         except FAILURES as error:
             trials.note_failure(h, error)
             continue

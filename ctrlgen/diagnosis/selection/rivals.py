@@ -71,7 +71,7 @@ def _coarser(trials: Trials, current: CandidateModel, k: int) -> CandidateModel:
         common = {p.name for p in plain.law.params} & current.fit.values(k).keys()
         numbers = {name: current.fit.values(k)[name] for name in common}
         starts = [others.with_cause(plain, shape | numbers) for shape in plain.shapes(channel, DataHints())]
-        begun = min(starts, key=trials.fitter.initial_objective)
+        begun = min(starts, key=trials.fitter.rough_objective)
         fits += [trials.converged(t) for t in trials.tried(begun, plain)]
     sound = [t for t in fits if not trials.selection.improves_enough(t, current) and not trials.objections(t)]
     return trials.selection.ranked(sound)[0] if sound else current
@@ -212,7 +212,7 @@ def replace_cause(trials: Trials, fit: Fit, k: int, others: Structure, suspect: 
         return structure
     common = {name: value for name, value in fit.values(k).items() if name in suspect.start}
     kin = (structure.restarted(len(others.causes), s | common) for s in (suspect.start, *suspect.other_starts))
-    return min((structure, *kin), key=trials.fitter.initial_objective)
+    return min((structure, *kin), key=trials.fitter.rough_objective)
 
 
 def _contains(rival: CandidateModel, cause: Hypothesis) -> bool:
