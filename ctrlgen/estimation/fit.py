@@ -165,6 +165,25 @@ class Fitter:
             best = min(best, self._optimum(problem, x, steps, best.objective), key=lambda fit: fit.objective)
         return best
 
+    def better_of(self, best: Fit, structure: Structure, steps: int) -> Fit:
+        """`best`, or the optimum reached in so many steps from other starting values of the same causes where that is better.
+
+        The leading part of the records decides first whether it can be: fitted to that alone, it must leave less of it than `best`
+        does, which is fitted to all. What depends on the time at which it acts may not act there, and is fitted to all at once.
+        """
+        theta, part = None, leading_part(self.recording)
+        if part is not None and not any(c.prior.in_time for c in structure.causes):
+            rough, same = (LeastSquaresProblem(s, part, self.error) for s in (structure, best.structure))
+            start = rough.to_scaled(np.concatenate([structure.start, np.zeros(rough.n_initial)]))
+            x = levenberg_marquardt(rough, start, steps, negligible=LEADING_PART.negligible * len(start))
+            r = rough.residual(x)
+            own = same.residual(same.to_scaled(np.concatenate([best.theta, *best.initial_states])))
+            if r @ r >= own @ own:
+                return best
+            theta = rough.to_si(x)[: rough.k]
+        again = self.fit(structure, theta, steps, enough=best.objective)
+        return min(best, again, key=lambda fit: fit.objective)
+
     def _from_turning_points(self, problem: LeastSquaresProblem, fit: Fit, steps: int) -> Fit:
         """The fit, or the one reached with its plays at the turning points before the records that begin worse than they go on."""
         states, first = list(fit.initial_states), 0

@@ -95,6 +95,11 @@ class LawPrior:
         """Whether the law repeats along a path."""
         return any(p.start_from_data == "spatial_periods" for p in self.parameters.values())
 
+    @property
+    def in_time(self) -> bool:
+        """Whether what the law does depends on the time at which it does it: a function of time, or one that begins at a moment."""
+        return self.of_time or any(p.start_from_data in ("moments", "since") for p in self.parameters.values())
+
     def of(self, parameter: Param) -> ParameterPrior:
         """The row of one parameter of the law, or its default."""
         return self.parameters.get(parameter.name) or ParameterPrior(default_starts(parameter))

@@ -208,6 +208,7 @@ class Simulator:
         Without the derivatives by the parameters where `by_free` is False.
         """
         clock = self._clock[1] if by_free else None
+        asked, by_free = by_free, by_free or self._compiled_by_free
         by_clock = None if clock is None else self._by_clock(record, p, start, clock)
         record = self.aligned(record, p)
         c, c_p = self._with_rates.constants(p)
@@ -231,7 +232,14 @@ class Simulator:
             y[:, late.row], slopes[:, late.row] = _with_unknown(read, record, late, age), of_read
         if by_clock is not None:
             slopes[:, :, clock] = by_clock
-        return y, slopes
+        return y, slopes if asked else slopes[:, :, k:]
+
+    @property
+    def _compiled_by_free(self) -> bool:
+        """Whether the recursion with all derivatives is compiled already: compiling that without those by the parameters would take
+        longer than the whole one does more."""
+        recursion = self._with_sensitivities.get(True)
+        return recursion is not None and recursion.one.is_compiled
 
     def _by_clock(self, record: Record, p: np.ndarray, start: np.ndarray | None, clock: int) -> np.ndarray:
         """Derivative (n, n_y) of the readings by the offset of the clocks: a central difference over one sample."""

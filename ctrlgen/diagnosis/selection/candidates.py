@@ -22,17 +22,41 @@ from ctrlgen.estimation.structure import Structure
 def fit_candidates(trials: Trials, current: CandidateModel, screened: Screened) -> tuple[CandidateModel, ...]:
     """All that is tried beside `current`, the promising ones fitted to their end."""
 
-    def in_other_shapes(branch: Trials, t: CandidateModel) -> CandidateModel:
-        return t if current.errors.is_noise else restart_elsewhere(branch, t, current, screened)
-
-    candidates = fit_each(trials, current.fit, significant(trials, current, screened), in_other_shapes)
-    candidates = (*candidates, *fit_in_regions(trials, current, screened, candidates))
+    candidates = fit_each(trials, current.fit, significant(trials, current, screened))
+    alone = leaves_noise_alone(trials, current, candidates)
+    if not current.errors.is_noise:
+        begun = [t for t in candidates if not alone or takes_away_much(t, current)]
+        ends = trials.each(lambda branch, t: restart_elsewhere(branch, t, current, screened), begun)
+        after = dict(zip(map(id, begun), ends, strict=True))
+        candidates = tuple(after.get(id(t), t) for t in candidates)
+        alone = alone or leaves_noise_alone(trials, current, candidates)
+    if not alone:
+        candidates = (*candidates, *fit_in_regions(trials, current, screened, candidates))
     candidates = (*candidates, *finer_forms(trials, current))
-    candidates = (*candidates, *fit_other_clocks(trials, current, candidates))
+    candidates = (*candidates, *fit_other_clocks(trials, current, () if alone else candidates))
     if trials.selection.parameters_may_mask_cause(current.fit):
         candidates = (*candidates, *_as_stated(trials, current))
-    candidates = (*candidates, *fit_subsets(trials, current, screened, candidates))
+    if not alone:
+        candidates = (*candidates, *fit_subsets(trials, current, screened, candidates))
     return _converge_promising(trials, current, candidates)
+
+
+def leaves_noise_alone(trials: Trials, current: CandidateModel, singles: Sequence[CandidateModel]) -> bool:
+    """Whether the best of the `singles` leaves noise alone, and nothing speaks against it: sets, regions and shifts beside it have
+    nothing left to explain. It may do so only under the discrepancy that it leaves itself: under that of `current`, what the device's
+    file states of its numbers holds them."""
+    compare = trials.selection
+    if current.errors.is_noise or not singles or not trials.fitter.noise.known.all():
+        return False
+    best = compare.ranked(singles)[0]
+    if not takes_away_much(best, current) or not trials.leaves_noise_alone(best):
+        return False
+    return compare.improves_enough(current, best) and not trials.objections(best, current.causes)
+
+
+def takes_away_much(t: CandidateModel, current: CandidateModel) -> bool:
+    """Whether a candidate takes away so much of what `current` leaves beyond noise that it may be the cause."""
+    return t.fitted.excess <= (1 - SEARCH.rival_share) * current.fitted.excess
 
 
 def significant(trials: Trials, current: CandidateModel, screened: Screened, most: int | None = None) -> list[Suspect]:
@@ -137,8 +161,7 @@ def restart_elsewhere(
             ]
             best = candidate.fit
             for s in promising:
-                again = trials.fitter.fit(s, steps=SEARCH.candidate_steps, enough=best.objective)
-                best = min(best, again, key=lambda fit: fit.objective)
+                best = trials.fitter.better_of(best, s, SEARCH.candidate_steps)
             if best is not candidate.fit:
                 candidate = trials.converged(trials.scored(best.structure, best, candidate.cause))
         except FAILURES as error:

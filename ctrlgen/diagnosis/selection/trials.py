@@ -47,6 +47,7 @@ class Trials:
         self.fitter, self.screen, self.step, self.jobs = fitter, screen, step, jobs
         self.fitted: dict[frozenset[Any], tuple[CandidateModel, int]] = {}
         self.screens: dict[frozenset[Any], tuple[Fit, Screened]] = {}
+        self.latest: tuple[Fitter, Fit, Screened] | None = None
         self.bare: dict[tuple[int, int], tuple[Fit, Fit, Screened]] = {}
         self.mismatch: np.ndarray | None = None
         self.refused: list[Refusal] = []
@@ -181,10 +182,28 @@ class Trials:
         key = frozenset(candidate.causes)
         fit, screened = self.screens.get(key, (None, None))
         if screened is None or fit is not candidate.fit:
-            screened = self.screen.run(candidate.fit)
-            self.failed += [f"{cause_name(h)}: {why}" for h, why in screened.dropped.items()]
+            screened = self._screened_before(candidate.fit)
+            if screened is None:
+                screened = self.screen.run(candidate.fit)
+                self.latest = self.fitter, candidate.fit, screened
+                self.failed += [f"{cause_name(h)}: {why}" for h, why in screened.dropped.items()]
             self.screens[key] = candidate.fit, screened
         return screened
+
+    def _screened_before(self, fit: Fit) -> Screened | None:
+        """The latest screen, if it was of the same causes on the same samples, and errors and numbers have moved since by less than shows
+        in a score; else None."""
+        if self.latest is None:
+            return None
+        fitter, before, screened = self.latest
+        now, then = self.fitter.error.weighted, fitter.error.weighted
+        if fitter.recording is not self.fitter.recording or before.structure.causes != fit.structure.causes:
+            return None
+        if before.structure.finer != fit.structure.finer or len(before.theta) != len(fit.theta):
+            return None
+        close = np.allclose(now.sd, then.sd, SEARCH.same_screen, 0.0) and all(map(np.array_equal, now.ar, then.ar))
+        moved = np.abs(fit.theta - before.theta) <= SEARCH.same_numbers * np.sqrt(fit.covariance.diagonal())
+        return screened if close and bool(np.all(moved)) else None
 
     def screened_without(self, fit: Fit, k: int) -> tuple[Fit, Screened]:
         """The fit without cause k, its other numbers as they are, and the screen of what that leaves."""
@@ -219,6 +238,21 @@ class Trials:
                 break
             candidate = fitted[0]
         return candidate
+
+    def leaves_noise_alone(self, candidate: CandidateModel) -> bool:
+        """Whether the structure of a candidate, fitted under the discrepancy that it leaves itself as in `with_errors`, leaves noise
+        alone. Nothing is kept of these fits."""
+        errors, structure = candidate.errors, candidate.fit.restarted
+        try:
+            for _ in range(DISCREPANCY.updates):
+                if errors.is_noise:
+                    break
+                fitter = replace(self.fitter, errors=errors)
+                fit = fitter.fit(structure, steps=FIT.max_steps)
+                errors, structure = fitter.with_errors_of(fit).error, fit.restarted
+        except FAILURES:
+            return False
+        return errors.is_noise
 
     def with_noise_update(self, candidate: CandidateModel) -> CandidateModel:
         """The same structure under the noise that it leaves, where nothing else tells the noise."""

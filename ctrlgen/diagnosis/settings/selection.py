@@ -100,6 +100,11 @@ class SearchSettings:
     usual_amplitudes: tuple[float, ...] = (1.0, 1.5, 2.0, 3.0)
     """Amplitudes, over that of the fit, at which a law in its usual shape is begun: amplitude and shape stand for one another, and
     samples that just touch a threshold make several optima. Judgement."""
+    same_screen: float = 0.01
+    """Relative change of the errors up to which a screen stays: scores change by as much. Judgement."""
+    same_numbers: float = 0.1
+    """Change of the free numbers, in standard deviations, up to which it does: scores are projected off the slopes of these numbers, and
+    only change to second order. Judgement."""
     same_noise: float = 0.05
     """Relative change of the noise below which it counts as unchanged."""
     same_noise_size: float = 0.02

@@ -1,0 +1,138 @@
+"""Trials that cannot win any more end: a part of the records tells, or noise alone is left already."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from axis_records import AXIS, BACKLASH, NOISE, H, axis_fitter, drive, fitter_of, played, record
+
+from ctrlgen.diagnosis.selection import candidates
+from ctrlgen.diagnosis.selection.screen import Screen, Screened
+from ctrlgen.diagnosis.selection.trials import Trials
+from ctrlgen.estimation import simulator
+from ctrlgen.estimation.error_model import ErrorModel
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.least_squares import LeastSquaresProblem
+from ctrlgen.estimation.noise import NoiseSource
+from ctrlgen.estimation.settings import FIT, LEADING_PART
+from ctrlgen.estimation.structure import Structure
+from ctrlgen.numerics import compiled
+
+LONG = 4 * LEADING_PART.shortest
+CYCLIC = Hypothesis("cyclic", "sensor:axis", "axis")
+EVENT = Hypothesis("sensor_step", "disturbance:axis", "axis")
+CLOCK = Hypothesis("delay", "sensor:axis", "axis")
+PITCH = 20e-6
+
+
+def seen_samples(monkeypatch) -> list[int]:
+    """On how many samples slopes are taken from now on."""
+    samples, real = [], LeastSquaresProblem.evaluate
+    monkeypatch.setattr(
+        LeastSquaresProblem, "evaluate", lambda self, x: samples.append(len(self.records[0].time)) or real(self, x)
+    )
+    return samples
+
+
+def test_another_start_is_fitted_to_all_samples_only_where_it_is_better_on_their_leading_part(monkeypatch):
+    fitter = axis_fitter(n=LONG, change=lambda y, u: y + 20 * NOISE * np.sin(2 * np.pi * y / PITCH))
+
+    def begun(period: float) -> Structure:
+        return Structure(AXIS).with_cause(CYCLIC, {"amplitude": 10 * NOISE, "period": period, "phase": 0.0})
+
+    right, wrong = (fitter.fit(begun(p), steps=8) for p in (PITCH, 0.37 * PITCH))
+    assert right.objective < 0.5 * wrong.objective
+    samples = seen_samples(monkeypatch)
+    assert fitter.better_of(right, begun(0.37 * PITCH), 8) is right
+    assert set(samples) == {LONG // 4}
+    found = fitter.better_of(wrong, begun(PITCH), 8)
+    assert found.objective == pytest.approx(right.objective, abs=0.05) and LONG in samples
+
+
+def test_an_event_behind_the_part_is_sought_in_all_samples():
+    """A small step within the first quarter, a large one behind it: that part alone wants the small one."""
+    moments, sizes = np.array([0.1, 0.61]) * LONG, (10 * NOISE, 40 * NOISE)
+
+    def change(y: np.ndarray, u: np.ndarray) -> np.ndarray:
+        return y + sum(size * (np.arange(LONG) > moment) for moment, size in zip(moments, sizes, strict=True))
+
+    fitter = axis_fitter(n=LONG, change=change)
+    small, large = (
+        Structure(AXIS).with_cause(EVENT, {"offset": size / 2, "moment": moment * H, "rise": 0.01})
+        for moment, size in zip(moments, sizes, strict=True)
+    )
+    early = fitter.fit(small, steps=0)
+    assert fitter.better_of(early, large, 16).objective < 0.5 * early.objective
+
+
+def test_slopes_by_initial_states_are_read_off_all_slopes_where_those_are_compiled(monkeypatch):
+    if compiled.compiler() is None:
+        pytest.skip("no C compiler")
+    made, real = [], simulator.Recursion
+    monkeypatch.setattr(compiled, "SECONDS_PER_CHARACTER", 0.0)
+    monkeypatch.setattr(simulator, "Recursion", lambda one: made.append(one) or real(one))
+    structure, u = Structure(AXIS), drive(20_000)
+    moved = record(u, u, "fit")
+    free, p = tuple(number.path for number in structure.free_parameters), structure.start
+    alone, whole = (simulator.Simulator(AXIS, free, ("reading.axis",), *moved.timing) for _ in range(2))
+    wanted = alone.sensitivities(moved, p, by_free=False)
+    slopes = whole.sensitivities(moved, p)[1]
+    assert len(made) == 2
+    found = whole.sensitivities(moved, p, by_free=False)
+    assert len(made) == 2 and np.array_equal(found[1], slopes[:, :, len(p) :])
+    assert all(np.array_equal(a, b) for a, b in zip(found, wanted, strict=True))
+
+
+def trials_beside(fitter, hypotheses) -> tuple[Trials, candidates.CandidateModel]:
+    trials = Trials(fitter, Screen(fitter, hypotheses), lambda _: None)
+    weighed, described = fitter.described(AXIS)
+    trials.use(weighed)
+    return trials, trials.fit(described.restarted, steps=FIT.max_steps)
+
+
+def test_beside_a_cause_that_leaves_noise_alone_no_regions_sets_or_shifts_are_tried(monkeypatch):
+    trials, current = trials_beside(fitter_of(played), [BACKLASH, CLOCK])
+    real, beside = candidates.fit_other_clocks, []
+    monkeypatch.setattr(
+        candidates, "fit_other_clocks", lambda t, c, singles: beside.append(tuple(singles)) or real(t, c, singles)
+    )
+    for name in ("fit_in_regions", "fit_subsets"):
+        monkeypatch.setattr(candidates, name, lambda *_: pytest.fail("tried"))
+    found = candidates.fit_candidates(trials, current, trials.screened(current))
+    assert beside == [()] and {t.causes for t in found} == {(BACKLASH,), (CLOCK,)}
+
+
+def test_a_cause_is_asked_what_it_leaves_once_it_is_fitted_under_its_own_errors():
+    trials, current = trials_beside(fitter_of(played), [BACKLASH])
+    held = trials.tried(current.fit.restarted.with_cause(BACKLASH, {"gap": 5e-8}), BACKLASH, current.fit)[0]
+    # as where numbers that the file states are held by the weight of what others leave
+    coarse = replace(held, errors=ErrorModel(trials.fitter.noise, np.array([3 * NOISE]), np.array([2.0])))
+    assert trials.leaves_noise_alone(held) and trials.leaves_noise_alone(coarse)
+    assert candidates.leaves_noise_alone(trials, current, [coarse])
+    assert not trials.leaves_noise_alone(current) and not candidates.leaves_noise_alone(trials, current, [current])
+    little = replace(coarse, fitted=current.fitted)
+    assert not candidates.leaves_noise_alone(trials, current, [little])
+    unknown = replace(trials.fitter.noise, sources=(NoiseSource.MISFIT,))
+    trials.use(replace(trials.fitter, noise=unknown))
+    assert not candidates.leaves_noise_alone(trials, current, [coarse])
+
+
+def test_a_model_is_screened_again_where_errors_numbers_or_samples_have_changed(monkeypatch):
+    trials, current = trials_beside(fitter_of(played), [BACKLASH])
+    runs = []
+    monkeypatch.setattr(trials.screen, "run", lambda fit: runs.append(fit) or Screened((), np.zeros((0, 0)), 1, {}))
+    first, fitter = trials.screened(current), trials.fitter
+    sd = np.sqrt(current.fit.covariance.diagonal())
+
+    def again(by: float = 0.0, fit_by: float = 1.0, recording=fitter.recording) -> bool:
+        rms = fitter.errors.rms * fit_by
+        trials.use(replace(fitter, errors=replace(fitter.errors, rms=rms), recording=recording))
+        trials.latest = fitter, current.fit, first
+        moved = replace(current, fit=replace(current.fit, theta=current.fit.theta + by * sd))
+        return trials.screened(moved) is first
+
+    assert again(0.05, 1.005) and len(runs) == 1
+    assert not again(0.2) and not again(fit_by=1.05) and not again(recording=replace(fitter.recording, notes=()))
+    assert len(runs) == 4
