@@ -34,7 +34,7 @@ def print_solution(outcome: Outcome) -> None:
     scenario = solution.scenario
     rate = f"at {1 / scenario.sample_time:g} Hz" if scenario.sample_time else "as equilibria"
     out.print(f"[bold]{escape(scenario.file.title)}[/bold]", soft_wrap=True)
-    solved = f"{solution.solver} {solution.iterations} iterations"
+    solved = solution.solved_by
     out.print(
         f"{len(solution.command)} samples {rate}, {escape(solution.model.device.title)}, {solved}", soft_wrap=True
     )

@@ -24,7 +24,7 @@ from ctrlgen.trajectory.intersample import between_samples
 from ctrlgen.trajectory.inverse.clock import in_time
 from ctrlgen.trajectory.inverse.path_inverse import InverseTrajectory
 from ctrlgen.trajectory.inverse.violations import violations
-from ctrlgen.trajectory.optimisation import OptimisationResult, TrajectoryProgramme
+from ctrlgen.trajectory.optimisation import MOST_CONFIRMED, SATISFIED, OptimisationResult, TrajectoryProgramme
 from ctrlgen.trajectory.problem import PathProblem
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.trajectory.scenario_file import MOST_SAMPLES
@@ -141,8 +141,11 @@ def _exact(scenario: Scenario, problem: PathProblem, needed: InverseTrajectory) 
 
 
 def _optimal(scenario: Scenario, problem: PathProblem, needed: InverseTrajectory, progress: Progress) -> Solution:
-    """The solution by IPOPT, begun at the inverse of the path."""
+    """The solution by IPOPT, begun at the inverse of the path; of long paths the inverse itself where it satisfies all equations, which
+    makes it the optimum."""
     programme = _programme(problem)
+    if needed.exact and len(problem.motion) > MOST_CONFIRMED and (off := programme.residual(needed)) <= SATISFIED:
+        return replace(_from_result(scenario, problem, programme.exact(needed)), residual=off)
 
     def step(rows: Sequence[Limit]) -> None:
         added = f", with {', '.join(r.label for r in rows)}" if rows else ""

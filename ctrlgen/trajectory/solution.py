@@ -43,7 +43,8 @@ class Margin:
 @dataclass(frozen=True, repr=False)
 class Solution(Tabular, Reported):
     """A solved scenario, SI. `trace` holds the samples; `drive` (n, axes) acts from sample k to k + 1. `iterations` of IPOPT, or with
-    inertia of Newton's method; `between_samples` (channels,) is the largest distance from the path between samples, with inertia."""
+    inertia of Newton's method; `between_samples` (channels,) is the largest distance from the path between samples, with inertia.
+    `residual`: of a path that is solved sample by sample without IPOPT, the largest of all equations [typical sizes]."""
 
     scenario: Scenario
     model: Model
@@ -54,6 +55,7 @@ class Solution(Tabular, Reported):
     iterations: int
     rows_added: tuple[str, ...]
     between_samples: np.ndarray | None = None
+    residual: float | None = None
 
     def facts(self) -> dict[str, object]:
         """What it is, in a few words."""
@@ -61,7 +63,7 @@ class Solution(Tabular, Reported):
             "scenario": self.scenario.file.title,
             "samples": len(self.command),
             "tightest limit": f"{self.tightest.limit.label} of {self.tightest.channel}, {100 * (self.tightest.share or 0):.3g} % left",
-            "solved by": f"{self.solver}, {self.iterations} iterations",
+            "solved by": self.solved_by,
         }
 
     @cached_property
@@ -90,9 +92,12 @@ class Solution(Tabular, Reported):
         return (*self.trace.columns(), *commanded)
 
     @property
-    def solver(self) -> str:
-        """The method whose iterations `iterations` counts."""
-        return "Newton's method" if self.model.inertial else "IPOPT"
+    def solved_by(self) -> str:
+        """The method, with its iterations, or by how much its equations are off."""
+        if self.residual is not None:
+            return f"the inverse sample by sample, all equations within {self.residual:.1g} of typical sizes"
+        method = "Newton's method" if self.model.inertial else "IPOPT"
+        return f"{method}, {self.iterations} iterations"
 
     @property
     def tightest(self) -> Margin:

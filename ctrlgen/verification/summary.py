@@ -79,6 +79,7 @@ class Summary(Origin):
     sample_rate_Hz: Number = Field(description="Samples a second [Hz]; null for settled poses.")
     closed: bool = Field(description="Whether the trajectory ends where it begins.")
     ipopt_iterations: int = Field(description="Iterations of IPOPT; of Newton's method for a device with inertia.")
+    solved_by: str = Field(description="The method, with its iterations or by how much its equations are off.")
     limits_added: list[str] = Field(description="Composite limits that were added because a first solution broke them.")
     tracking_error: dict[str, float] = Field(description="Largest distance from the command, by 'channel [unit]'.")
     error_between_samples: dict[str, float] | None = Field(
@@ -120,6 +121,7 @@ def summary_keys(
         "sample_rate_Hz": 1 / scenario.sample_time if scenario.sample_time else None,
         "closed": scenario.closed,
         "ipopt_iterations": solution.iterations,
+        "solved_by": solution.solved_by,
         "limits_added": list(solution.rows_added),
         "tracking_error": by_channel(signal, error),
         "error_between_samples": None if (between := solution.between_samples) is None else by_channel(signal, between),

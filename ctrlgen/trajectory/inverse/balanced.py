@@ -19,6 +19,7 @@ from ctrlgen.model.allocation import ganged_as
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.inverse import Inverse, invert
 from ctrlgen.model.model import Model
+from ctrlgen.numerics.batched_evaluation import Recursion
 from ctrlgen.trajectory.inverse.clock import Clock, Sampled
 from ctrlgen.trajectory.inverse.motion import Motion
 from ctrlgen.trajectory.inverse.path_inverse import PERIODS, InverseTrajectory, PathInverse
@@ -126,8 +127,8 @@ class BalancedInverse(PathInverse):
         return ca.Function("equilibria", [target], [x, z, k.drive(rest, home, z, state)])
 
     @cached_property
-    def _step(self) -> ca.Function:
-        """((x, z), next target) -> ((x, z) then, x, z now, u between)."""
+    def _step(self) -> Recursion:
+        """((x, z), next target) -> ((x, z) then, (x, z) now and u between)."""
         m, k = self.model, self.moving
         assert k is not None  # `_carried` is for motions
         now, target = (
@@ -137,26 +138,27 @@ class BalancedInverse(PathInverse):
         x, z = ca.vertsplit(now, [0, m.x.numel(), now.numel()])
         wanted = k.displacement(x, z, target)
         u = k.drive(x, z, wanted, k.state(x, z, wanted))
-        return ca.Function("step", [now, target], [ca.vertcat(k.advance(x, z, u), wanted), now, u])
+        step = ca.Function("step", [now, target], [ca.vertcat(k.advance(x, z, u), wanted), ca.vertcat(now, u)])
+        return Recursion(step)
 
     def _carried(self, motion: Motion, periods: int) -> InverseTrajectory:
         """With the effects' memories, from rest at the first sample; of a closed path the first period that repeats, or that at
         which it is seen not to within `periods`."""
-        m, n, command, closed = self.model, len(motion), motion.position, motion.closed
+        m, command, closed = self.model, motion.position, motion.closed
         x, z, u_start = self.at_rest(command[0])
         if closed:  # slow memories are soon where they stay
             x[m.n_states :] = self.at_rest(command.mean(axis=0))[0][m.n_states :]
         ahead = np.vstack([command[1:], command[:1] if closed else command[-1:]])
-        along, now, scale = self._step.mapaccum(n), np.concatenate([x, z]), np.concatenate([m.x_scale, m.z_scale])
+        now, scale = np.concatenate([x, z]), np.concatenate([m.x_scale, m.z_scale])
         changes: list[float] = []
         for _ in range(periods if closed else 1):
-            after, before, u = (v.full().T for v in along(now, ahead.T))
+            after, along = self._step.run(now, ahead)
             changes.append(float(np.max(np.abs(after[-1] - now) / scale)))
             now = after[-1]
             settles = changes[-1] * _shrinks(changes) ** (periods - len(changes)) <= REPEATS
             if changes[-1] <= REPEATS or (len(changes) >= JUDGED and not settles):
                 break
-        x, z = np.split(before, [m.x.numel()], axis=1)
+        x, z, u = np.split(along, np.cumsum([len(x), len(z)]), axis=1)
         unsettled = _left(changes) if closed and changes[-1] > REPEATS else 0.0
         return self._checked(motion, InverseTrajectory(x, z, u, u_start, self.clock, closed, False, unsettled))
 
