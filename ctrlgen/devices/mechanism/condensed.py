@@ -155,17 +155,18 @@ class Condensed:
         return linear + ca.mtimes(self.beside, self.loads(d)[n:, :]) if self.cubics else linear
 
     def body_mass(self, number: int) -> Matrix | None:
-        """(6, 6) of a body, twist -> (angular momentum; momentum) at the global origin; None of one without a mass."""
+        """(6, 6) of a body and what stands on it, twist -> (angular momentum; momentum) at the global origin; None without a mass."""
         placed = self.device.placed_bodies[number]
         numbers = self.p.body[placed.index]
         if numbers.mass is None:
             return None
         R, centre = placed.turn, ca.DM.zeros(3) if numbers.centre is None else ca.vertcat(*numbers.centre)
-        S = ca.skew(ca.mtimes(R, centre))
-        about = ca.mtimes([R, ca.diag(ca.vertcat(*numbers.inertia)), R.T]) - numbers.mass * ca.mtimes(S, S)
-        return ca.vertcat(
-            ca.horzcat(about, numbers.mass * S), ca.horzcat(-numbers.mass * S, numbers.mass * ca.DM.eye(3))
-        )
+        total = _inertia(numbers.mass, ca.mtimes(R, centre), ca.mtimes([R, ca.diag(ca.vertcat(*numbers.inertia)), R.T]))
+        for load in self.device.placed_loads:
+            carried = self.p.load[load.index]
+            if load.second == number and carried.mass is not None:
+                total += _inertia(carried.mass, ca.mtimes(load.turn, ca.vertcat(*carried.at)), ca.DM(3, 3))
+        return total
 
     def flexure_mass(self, k: int, first: Matrix, second: Matrix) -> Matrix | None:
         """(m, m) of element k whose ends move by the twists `first` and `second` (6, m); None of one without a mass: those that are not
@@ -231,7 +232,12 @@ class Condensed:
     @property
     def jacobian(self) -> Matrix:
         """(channels, n + m): the components of `output_motion` that are followed."""
-        return self.output_motion[[TWIST.index(c) for c in self.device.output.channels], :]
+        return self.output_motion[self.channel_rows, :]
+
+    @property
+    def channel_rows(self) -> list[int]:
+        """The places in a twist of the components that are followed."""
+        return [TWIST.index(name) for name in self.device.output.channels]
 
     @property
     def reading_rows(self) -> list[Matrix]:
@@ -290,11 +296,16 @@ class Condensed:
         return ca.mtimes(self.frames[k][:, 2].T, self.relative_twist(k)[:3, :])
 
     def stress(
-        self, material: str, d: Matrix, floor: float, extra_load: Callable[[int, Any, Matrix], Matrix] | None = None
+        self,
+        material: str,
+        d: Matrix,
+        floor: float,
+        extra_load: Callable[[int, Any, Matrix], Matrix] | None = None,
+        constant: Callable[[int], Matrix] | None = None,
     ) -> tuple[tuple[str, ...], Matrix]:
         """Of the flexures of a material: the names of the sections that are stressed most, and the largest stress there (m,) [Pa] with
         the axes displaced by `d` (n,) [m]; `floor` [Pa] as in `flexure.round_stress`, `extra_load` beside the linear one as in
-        `stretching.Stretching`."""
+        `stretching.Stretching`, `constant` wrench on the free end of an element, at the global origin, as in `loads.Loads`."""
         names, stresses, q = [], [], self.loads(d)
         for k, e in enumerate(self.device.placed_elements):
             if getattr(e.section, "material", None) != material:
@@ -302,12 +313,22 @@ class Condensed:
             numbers = self.p.element[e.index]
             for section in e.section.sections(numbers):
                 place = self.ends[k] - section.back * self.frames[k][:, 0]
-                load = ca.mtimes(ca.mtimes(inverse_adjoint(self.frames[k], place), self.wrench(k)), q)
+                to_place = inverse_adjoint(self.frames[k], place)
+                load = ca.mtimes(ca.mtimes(to_place, self.wrench(k)), q)
+                if constant is not None:
+                    load += ca.mtimes(to_place, constant(k))
                 if extra_load is not None:
                     load += extra_load(k, section.back, d)
                 names.append(f"{e.name}_{section.name}")
                 stresses.append(e.section.largest_stress(*section.stresses(load), floor))
         return tuple(names), ca.vertcat(*stresses)
+
+
+def _inertia(mass: Any, at: Matrix, about_centre: Matrix) -> Matrix:
+    """(6, 6) of a mass with its centre at `at`, twist -> (angular momentum; momentum) at the global origin."""
+    S = ca.skew(at)
+    about = about_centre - mass * ca.mtimes(S, S)
+    return ca.vertcat(ca.horzcat(about, mass * S), ca.horzcat(-mass * S, mass * ca.DM.eye(3)))
 
 
 def _right_handed(frame: Matrix) -> Matrix:

@@ -16,6 +16,9 @@ class Drawing(Protocol):
     element: tuple[Any, ...]
     output: Any
     dynamics: Any
+    load: tuple[Any, ...]
+    gravity: Any
+    kinematics: Any
 
     @property
     def second_order(self) -> bool:
@@ -25,6 +28,11 @@ class Drawing(Protocol):
     @property
     def geometric_stiffening(self) -> bool:
         """Whether the energy is of fourth order, as an element states."""
+        ...
+
+    @property
+    def model_fields_set(self) -> set[str]:
+        """What the file states."""
         ...
 
     @property
@@ -45,6 +53,11 @@ class Drawing(Protocol):
     @property
     def placed_actuators(self) -> tuple[Placed, ...]:
         """Every copy of every actuator."""
+        ...
+
+    @property
+    def placed_loads(self) -> tuple[Placed, ...]:
+        """Every copy of every load."""
         ...
 
     @property

@@ -17,6 +17,7 @@ from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.devices.mechanism.drawing import Drawing
 from ctrlgen.devices.mechanism.flexures import Beam
 from ctrlgen.devices.mechanism.second_order import SecondOrder
+from ctrlgen.devices.mechanism.springs import Spring
 from ctrlgen.devices.mechanism.stretching import Stretching
 
 LEVELS = (0.01, 0.05, 0.2)  # of the linear force
@@ -30,6 +31,24 @@ def stiffened(elements: Sequence[Any]) -> tuple[Any, ...] | None:
     if not beams or any(e.geometric_stiffening for e in beams) or any(getattr(e, "cubic", False) for e in elements):
         return None
     return tuple(e.model_copy(update={"geometric_stiffening": True}) if isinstance(e, Beam) else e for e in elements)
+
+
+def second_order_faults(device: Drawing) -> list[str]:
+    """What the expansion of the equilibrium does not hold."""
+    stiffens = [e.name for e in device.element if getattr(e, "geometric_stiffening", False)]
+    faults, asked = [], "geometric_stiffening" if stiffens else "kinematics" if device.second_order else ""
+    if asked and any(isinstance(e, Spring) and e.cubic for e in device.element):
+        faults.append(f"{asked}: the second order is that of linear flexures; leave it out, or the springs' k_3")
+    if stiffens and device.kinematics == "first_order" and "kinematics" in device.model_fields_set:
+        faults.append(
+            f'kinematics: geometric_stiffening of {", ".join(stiffens)} is of second order, not of "first_order"; leave out one of them'
+        )
+    if stiffens and device.actuator and device.actuator[0].kind == "displacement":
+        faults.append(
+            f"geometric_stiffening: of {', '.join(stiffens)} has no effect where actuators prescribe displacements; leave it out, "
+            'and write kinematics = "second_order"'
+        )
+    return faults
 
 
 def linear_ranges(c: Condensed) -> list[tuple[float | None, ...]]:

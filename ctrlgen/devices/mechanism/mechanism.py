@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
-from ctrlgen.core.units import Quantity
+from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.base import Device
 from ctrlgen.devices.device_physics import DevicePhysics
 from ctrlgen.devices.mechanism.bent_beams import BentBeam, ThermalActuator
@@ -23,13 +23,24 @@ from ctrlgen.devices.mechanism.condensed import MOST_STEPS, SPARE_STEPS, Condens
 from ctrlgen.devices.mechanism.copies import Copied, Placed
 from ctrlgen.devices.mechanism.flexures import Blade, CircularHinge, Flexible, Strut, Wire, flexures_in_one_place
 from ctrlgen.devices.mechanism.joining import TWIST
-from ctrlgen.devices.mechanism.linear_range import stiffened
+from ctrlgen.devices.mechanism.linear_range import second_order_faults, stiffened
+from ctrlgen.devices.mechanism.load_effects import load_faults
 from ctrlgen.devices.mechanism.mechanism_physics import mechanism_physics
-from ctrlgen.devices.mechanism.modes import free_between_springs, guyan_modes, inertia_remarks
+from ctrlgen.devices.mechanism.modes import free_between_springs, guyan_modes, inertia_faults, inertia_remarks
 from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.devices.mechanism.springs import Spring
 from ctrlgen.devices.mechanism.stated_compliances import Compliance, ComplianceMatrix
-from ctrlgen.devices.mechanism.tables import GROUND_NAME, Actuator, Body, Dynamics, Material, Output, Pattern, Reading
+from ctrlgen.devices.mechanism.tables import (
+    GROUND_NAME,
+    Actuator,
+    Body,
+    Dynamics,
+    Load,
+    Material,
+    Output,
+    Pattern,
+    Reading,
+)
 from ctrlgen.physics import rigid_bodies as mechanism
 from ctrlgen.physics.rigid_bodies import GROUND, Element
 
@@ -37,6 +48,7 @@ AnyElement = Annotated[
     Blade | Wire | Strut | CircularHinge | Compliance | ComplianceMatrix | Spring | BentBeam,
     Field(discriminator="kind"),
 ]
+Acceleration = Annotated[Quantity, In("m/s^2")]
 AnyActuator = Annotated[Actuator | ThermalActuator, Field(discriminator="kind")]
 ASSUMED_DAMPING = Quantity(0.01, "1 %")  # of a stage on flexures in air, where a file states none
 MOVED = 1e-6  # of the largest motion, below which a channel is not moved on purpose: symmetry leaves rounding, 1e-9
@@ -75,6 +87,10 @@ class Mechanism(Device):
     """`[output]`: what is followed."""
     reading: tuple[Reading, ...] = ()
     """`[[reading]]` tables: what is read beside the output."""
+    load: tuple[Load, ...] = ()
+    """`[[load]]` tables: what acts all the time. The pose counts from where the mechanism is drawn, without them."""
+    gravity: tuple[Acceleration, Acceleration, Acceleration] | None = None
+    """Acceleration of what falls, such as ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]: bodies, flexures and payloads then weigh."""
     dynamics: Dynamics | None = None
     """`[dynamics]`: where inertia counts."""
     kinematics: Literal["first_order", "second_order"] = "first_order"
@@ -104,6 +120,7 @@ class Mechanism(Device):
             "body": list(self.bodies),
             "element": [e.name for e in self.element],
             "actuator": [a.name for a in self.actuator],
+            "load": [x.name for x in self.load],
             "reading": [*self.output.channels, *(r.name for r in self._copies(self.reading))],
         }.items():
             faults += [f"{what}: {name!r} is named twice" for name in dict.fromkeys(names) if names.count(name) > 1]
@@ -115,6 +132,7 @@ class Mechanism(Device):
             ("element", self.element),
             ("actuator", self.actuator),
             ("reading", self.reading),
+            ("load", self.load),
         ):
             for k, section in enumerate(sections):
                 if section.pattern not in known:
@@ -146,47 +164,15 @@ class Mechanism(Device):
                 "element: at the largest travel the cubic springs push harder than the flexures beside them can hold (or soften "
                 "until nothing holds them); lower their k_3, or the travel"
             )
-        faults += self._beyond_second_order()
+        faults += second_order_faults(self)
         faults += [] if faults else self._unmoved()
-        faults += [] if faults or self.dynamics is None else self._without_inertia()
+        faults += [] if faults or self.dynamics is None else inertia_faults(self)
+        faults += [] if faults else load_faults(self)
         if faults:
             raise ValueError("; ".join(faults))
         # Those of the file: a copy with other numbers keeps them
         _ = (self.channel_scale, self.reading_scale, self.cubic_steps)
         return self
-
-    def _without_inertia(self) -> list[str]:
-        """What keeps the table `dynamics` from being of use."""
-        if self.actuator[0].kind == "thermal":
-            return [
-                "dynamics: belongs to actuators that push by force; a heater is far slower than its mechanism rings"
-            ]
-        if self.actuator[0].kind == "displacement":
-            return [
-                "dynamics: inertia needs actuators that push; one that prescribes a displacement takes whatever force it needs"
-            ]
-        if not len(guyan_modes(self).frequencies):
-            return [
-                "dynamics: the actuators move no mass in some direction; give mass and inertia to the bodies that they move"
-            ]
-        return []
-
-    def _beyond_second_order(self) -> list[str]:
-        """What the expansion of the equilibrium does not hold."""
-        stiffens = [e.name for e in self.element if getattr(e, "geometric_stiffening", False)]
-        faults, asked = [], "geometric_stiffening" if stiffens else "kinematics" if self.second_order else ""
-        if asked and any(isinstance(e, Spring) and e.cubic for e in self.element):
-            faults.append(f"{asked}: the second order is that of linear flexures; leave it out, or the springs' k_3")
-        if stiffens and self.kinematics == "first_order" and "kinematics" in self.model_fields_set:
-            faults.append(
-                f'kinematics: geometric_stiffening of {", ".join(stiffens)} is of second order, not of "first_order"; leave out one of them'
-            )
-        if stiffens and self.actuator and self.actuator[0].kind == "displacement":
-            faults.append(
-                f"geometric_stiffening: of {', '.join(stiffens)} has no effect where actuators prescribe displacements; leave it out, "
-                'and write kinematics = "second_order"'
-            )
-        return faults
 
     def _unmoved(self) -> list[str]:
         """Channels that no actuator moves, or that move only together."""
@@ -244,6 +230,12 @@ class Mechanism(Device):
                 f"actuator[{k}].{key}: {name!r} is no body"
                 for key, name in (("on", a.on), ("against", a.against))
                 if self._number(name, a.pattern, 1) is None
+            ]
+        for k, x in enumerate(self.load):
+            faults += [
+                f"load[{k}].{key}: {name!r} is no body" + (f" with the pattern {x.pattern!r}" if x.pattern else "")
+                for key, name in (("on", x.on), ("against", x.against))
+                if self._number(name, x.pattern, 1) is None
             ]
         for k, r in enumerate(self.reading):
             faults += [
@@ -343,6 +335,11 @@ class Mechanism(Device):
     def placed_readings(self) -> tuple[Placed, ...]:
         """Every copy of every reading."""
         return tuple(self._between(c, c.section.against, c.section.body) for c in self._copies(self.reading))
+
+    @cached_property
+    def placed_loads(self) -> tuple[Placed, ...]:
+        """Every copy of every load."""
+        return tuple(self._between(c, c.section.against, c.section.on) for c in self._copies(self.load))
 
     @_as_described
     def reading_scale(self) -> tuple[float, ...]:

@@ -12,6 +12,7 @@ from ctrlgen.devices.device_physics import BalancedPhysics, DevicePhysics, Inert
 from ctrlgen.devices.limit import Limit, rate_limit
 from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.devices.mechanism.drives import transduction
+from ctrlgen.devices.mechanism.loads import Loads
 from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.devices.mechanism.stretching import Stretching
 from ctrlgen.physics.damping import modal_damping
@@ -24,26 +25,30 @@ def mechanism_physics(c: Condensed) -> DevicePhysics:
 
     def restoring_force_parts(d: ca.SX) -> dict[str, ca.SX]:
         linear, springs = ca.mtimes(c.held_stiffness, d), c.restoring_force(d)
+        loaded = {"loads": loads.restoring_force(d)} if loads.there else {}
         if bent and c.pushes:
-            return {"linear": linear, "geometric": restoring_force(d) - springs}
-        return {"linear": linear, "cubic": springs - linear} if c.cubics else {}
+            return {"linear": linear, "geometric": restoring_force(d) - springs - sum(loaded.values()), **loaded}
+        cubic = {"cubic": springs - linear} if c.cubics else {}
+        return {"linear": linear, **cubic, **loaded} if cubic or loaded else {}
 
     def limits(signal: SimpleNamespace) -> list[Limit]:
         limited = acting.limits(signal)
         for i, (axis, s) in enumerate(zip(axes, sections, strict=True)):
             d, reach = signal.displacement[i], s.travel.si
             limited.append(Limit(f"travel_{axis}", f"travel of {axis}", (axis,), "um", d, -reach, reach))
-        return limited + _flexure_limits(c, signal.mechanism_displacement, stretching)
+        return limited + _flexure_limits(c, signal.mechanism_displacement, stretching, loads)
 
     J, channels, second = c.jacobian, device.output.channels, SecondOrder(c)
+    loads = Loads(c, second)
     bent, stretching = device.second_order, Stretching(second) if device.geometric_stiffening else None
 
     def restoring_force(d: ca.SX) -> ca.SX:
         force, more = c.restoring_force(d), None if stretching is None else stretching.energy
+        force += loads.restoring_force(d) if loads.there else 0
         return force + second.restoring_force(d, more) if bent and c.pushes else force
 
     def pose(d: ca.SX) -> ca.SX:
-        linear = ca.mtimes(J, c.loads(d))
+        linear = ca.mtimes(J, c.loads(d)) + (loads.pose if loads.there else 0)
         return linear + second.pose(d) if bent else linear
 
     common: dict[str, Any] = dict(
@@ -62,7 +67,7 @@ def mechanism_physics(c: Condensed) -> DevicePhysics:
         restoring_force_parts=restoring_force_parts,
         pose=pose,
         limits=limits,
-        sensed=_sensed(c, second if bent else None),
+        sensed=_sensed(c, second if bent else None, loads),
         second_order_kinematics=None if bent or c.cubics else second.pose,
         rate_limits=tuple(
             rate_limit(acting.drive, i, s.rate[0].si, s.rate[1].si, written_unit(s.rate[1].text))
@@ -78,7 +83,7 @@ def mechanism_physics(c: Condensed) -> DevicePhysics:
             heating_power=acting.heat,
             power=acting.power,
         )
-    D = modal_damping(c.mass, c.held_stiffness, p.dynamics.damping_ratio)
+    D = modal_damping(c.mass, c.held_stiffness + loads.stiffness, p.dynamics.damping_ratio)
     return InertialPhysics(
         **common,
         mass=c.mass,
@@ -87,7 +92,7 @@ def mechanism_physics(c: Condensed) -> DevicePhysics:
     )
 
 
-def _sensed(c: Condensed, second: SecondOrder | None) -> SensedPoints | None:
+def _sensed(c: Condensed, second: SecondOrder | None, loads: Loads) -> SensedPoints | None:
     """The readings beside those of the output, to first order or to second."""
     readings, rows = c.device.placed_readings, c.reading_motion
     if not readings:
@@ -96,24 +101,27 @@ def _sensed(c: Condensed, second: SecondOrder | None) -> SensedPoints | None:
     names = tuple(r.name for r in readings)
 
     def at(d: ca.SX) -> ca.SX:
-        linear = ca.mtimes(rows, c.loads(d))
+        linear = ca.mtimes(rows, c.loads(d)) + (loads.sensed if loads.there else 0)
         return linear if second is None else linear + second.sensed(d)
 
     return SensedPoints(names, units, c.device.reading_scale, at)
 
 
-def _flexure_limits(c: Condensed, d: ca.SX, stretching: Stretching | None) -> list[Limit]:
+def _flexure_limits(c: Condensed, d: ca.SX, stretching: Stretching | None, loads: Loads) -> list[Limit]:
     """Rotations and stresses of the flexures with the axes displaced by `d` (n,), as they are at rest there."""
     extra_load = None if stretching is None else stretching.extra_load
     limits = []
     for k, e in enumerate(c.device.placed_elements):
         most = getattr(e.section, "rotation_limit", None)
         if most is not None:
-            angle = ca.fabs(ca.mtimes(c.rotation(k), c.loads(d)))
+            turned = ca.mtimes(c.frames[k][:, 2].T, loads.relative(k)[:3, :]) if loads.there else 0
+            angle = ca.fabs(ca.mtimes(c.rotation(k), c.loads(d)) + turned)
             limits.append(Limit(f"rotation_{e.name}", f"rotation of {e.name}", (e.name,), "deg", angle, None, most.si))
     for m in c.device.material:
         if m.stress_limit is not None:
-            names, stress = c.stress(m.name, d, 1e-9 * m.stress_limit.si, extra_load)
+            names, stress = c.stress(
+                m.name, d, 1e-9 * m.stress_limit.si, extra_load, loads.wrench if loads.there else None
+            )
             if names:
                 label = f"stress of {m.name}"
                 limits.append(Limit(f"stress_{m.name}", label, names, "MPa", stress, None, m.stress_limit.si))

@@ -12,6 +12,7 @@ from ctrlgen.core.units import show
 from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.devices.mechanism.drawing import Drawing
 from ctrlgen.devices.mechanism.linear_range import range_lines
+from ctrlgen.devices.mechanism.load_effects import load_lines
 from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.devices.mechanism.springs import Spring
 from ctrlgen.physics.rigid_bodies import GROUND
@@ -208,7 +209,7 @@ def summary(device: Drawing) -> list[str]:
             f"{show(v, unit)} per {a.name}" for a, v in zip(device.placed_actuators, row, strict=True) if abs(v) > STILL
         )
         lines.append(f"{channel}: {parts or 'not moved to first order'}")
-    return lines + (_second_order_lines(c) if device.second_order else []) + range_lines(device)
+    return lines + (_second_order_lines(c) if device.second_order else []) + load_lines(device) + range_lines(device)
 
 
 def _second_order_lines(c: Condensed) -> list[str]:
@@ -259,3 +260,18 @@ def inertia_remarks(device: Drawing) -> list[str]:
     modes, _ = condensed_modes(device) if device.dynamics is not None else ((), None)
     far = [str(m) for m in modes if m.whole is None or abs(m.frequency / m.whole - 1) > FAR]
     return [f"the bodies do not move as at rest in the modes {', '.join(far)}: drive them far slower"] if far else []
+
+
+def inertia_faults(device: Drawing) -> list[str]:
+    """What keeps the table `dynamics` from being of use."""
+    if device.actuator[0].kind == "thermal":
+        return ["dynamics: belongs to actuators that push by force; a heater is far slower than its mechanism rings"]
+    if device.actuator[0].kind == "displacement":
+        return [
+            "dynamics: inertia needs actuators that push; one that prescribes a displacement takes whatever force it needs"
+        ]
+    if not len(guyan_modes(device).frequencies):
+        return [
+            "dynamics: the actuators move no mass in some direction; give mass and inertia to the bodies that they move"
+        ]
+    return []

@@ -146,7 +146,7 @@ class SecondOrder:
     def cubic(self) -> Matrix:
         """(n, m): V_3 = d' [cubic] products, the work of the loads of first order on the deformations of second."""
         cubic = (
-            -ca.mtimes(self.c.stiffness.T, self._travel(self.I, self.J))
+            -ca.mtimes(self.c.stiffness.T, self.travels(self.I, self.J))
             if self.c.pushes
             else ca.SX(self.n, len(self.pairs))
         )
@@ -171,7 +171,7 @@ class SecondOrder:
             if len(segments := self.parts[k][1]) == 1:
                 quartic += self._beam_column(segments[0], strained)
         if self.c.pushes:
-            moved = self._travel([j for _, j, _ in columns], b, self.twists)
+            moved = self.travels([j for _, j, _ in columns], b, self.twists)
             turned -= 2 * ca.sum1(self.c.stiffness[:, a] * moved)
         for (i, j, p), value in zip(columns, ca.horzsplit(turned), strict=True):
             q = self.pairs.index((min(i, j), max(i, j)))
@@ -233,7 +233,7 @@ class SecondOrder:
             )
         moved = ca.SX(n, m)
         if c.pushes:
-            moved = self._travel(self.I, self.J)
+            moved = self.travels(self.I, self.J)
             for i, a in enumerate(c.device.placed_actuators):
                 row = self._travel_of(i, a, axis, turned, between=unit)
                 push(a.first, a.second, -c.stiffness[i, I] * row[:, with_J] - c.stiffness[i, J] * row[:, with_I])
@@ -301,7 +301,7 @@ class SecondOrder:
             bodies.append(T)
         return relative_motion(point, bodies[0], bodies[1], a, b)
 
-    def _travel(self, a: Sequence[int], b: Sequence[int], more: list[Matrix] | None = None) -> Matrix:
+    def travels(self, a: Sequence[int], b: Sequence[int], more: list[Matrix] | None = None) -> Matrix:
         """(n, m): what the rotations of bodies add to the travels of the actuators."""
         return ca.vertcat(*(self._travel_of(i, x, a, b, more) for i, x in enumerate(self.c.device.placed_actuators)))
 

@@ -177,6 +177,33 @@ class Actuator(Section):
         return self
 
 
+class Load(Section):
+    """`[[load]]`: what acts on a body all the time: a force, such as of a preload or on a platform, or a mass that stands on it."""
+
+    name: Name
+    """In messages and reports."""
+    on: str
+    """The body that it acts on."""
+    against: str = GROUND_NAME
+    """The body that a force pushes against, as a spring between both does."""
+    at: Place
+    """Where it acts, in the global frame; it moves with the body."""
+    force: tuple[Annotated[Quantity, In("N")], Annotated[Quantity, In("N")], Annotated[Quantity, In("N")]] | None = None
+    """Its components along x, y and z, which keep their directions."""
+    mass: Annotated[Quantity, In("g", positive=True)] | None = None
+    """Of a payload at a point, in place of a force: it is moved with the body, and weighs where the file states `gravity`."""
+    pattern: str = ""
+    """The pattern by which it is copied."""
+
+    @model_validator(mode="after")
+    def _is_one_thing(self) -> Load:
+        if (self.force is None) == (self.mass is None):
+            raise ValueError("give either force or mass")
+        if self.mass is not None and self.against != GROUND_NAME:
+            raise ValueError("against: belongs to a force; a mass pushes against nothing")
+        return self
+
+
 class Output(Section):
     """`[output]`: the point that is followed and read."""
 

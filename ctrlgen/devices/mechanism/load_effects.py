@@ -1,0 +1,78 @@
+"""What constant loads do to a mechanism, for the reader: faults, and the lines of `ctrlgen check`."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen.core.units import show
+from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.devices.mechanism.drawing import Drawing
+from ctrlgen.devices.mechanism.joining import TWIST
+from ctrlgen.devices.mechanism.loads import Loads
+from ctrlgen.devices.mechanism.second_order import SecondOrder
+from ctrlgen.physics.screw import inverse_adjoint
+
+STILL = 1e-6  # of the largest component of a motion, below which it is rounding of a symmetric drawing
+
+
+def load_faults(device: Drawing) -> list[str]:
+    """Loads that the model cannot hold: beside cubic springs, masses on bodies without one, and those that buckle the mechanism."""
+    if not (device.load or device.gravity):
+        return []
+    heavy = [
+        x.name
+        for x in device.placed_loads
+        if x.section.mass is not None and device.placed_bodies[x.second].section.mass is None
+    ]
+    if heavy:
+        return [f"load: {', '.join(heavy)}: give mass and inertia to the body that carries it"]
+    c = Condensed(device, device.values())
+    if c.cubics:
+        return ["load: constant loads beside cubic springs are not held by the model; leave out one of them"]
+    loads = Loads(c, SecondOrder(c))
+    K = ca.DM(ca.evalf(ca.SX(c.held_stiffness))).full()
+    if np.linalg.eigvalsh(K + ca.DM(loads.stiffness).full()).min() <= 0:
+        return ["load: the loads buckle the mechanism: make it stiffer, or load it less"]
+    return []
+
+
+def load_lines(device: Drawing) -> list[str]:
+    """What `ctrlgen check` prints of them: forces, where the output goes, what they do to the stiffness of the axes."""
+    c = Condensed(device, device.values())
+    loads = Loads(c, SecondOrder(c))
+    if not loads.there:
+        return []
+    at, body = inverse_adjoint(None, c.output_point), device.bodies.index(device.output.body)
+    added = np.zeros((len(loads.sag), 1)) if not c.pushes else _with_stacks(c, loads)
+    free = ca.DM(loads.held[body]).full() + ca.DM(loads.s.first_order[body]).full() @ added
+    lines = [f"loads move the output point, drives at zero: {_motion(ca.DM(at).full() @ free)}"]
+    if not c.pushes:
+        return lines
+    lines[0] += f"; the axes held: {_motion(ca.DM(at).full() @ ca.DM(loads.held[body]).full())}"
+    K, K_F = (ca.DM(ca.evalf(ca.SX(x))).full() for x in (c.held_stiffness, loads.stiffness))
+    for i, a in enumerate(device.placed_actuators):
+        share = 100 * K_F[i, i] / K[i, i]
+        lines.append(
+            f"loads push {a.name} by {show(float(loads.force[i]), 'N')} and change its stiffness by {share:+.2g} %"
+        )
+    return lines
+
+
+def _with_stacks(c: Condensed, loads: Loads) -> np.ndarray:
+    """(n, 1) how far the axes go, held by the stiffness of their actuators too."""
+    K, K_F, f = (ca.DM(ca.evalf(ca.SX(x))).full() for x in (c.held_stiffness, loads.stiffness, loads.force))
+    return np.linalg.solve(K + K_F, f)
+
+
+def _motion(twist: np.ndarray) -> str:
+    """A twist (6, 1) in words, without what is rounding."""
+    parts = []
+    for rows, unit in ((slice(0, 3), "urad"), (slice(3, 6), "um")):
+        values, names = twist[rows, 0], TWIST[rows]
+        parts += [
+            f"{n} {show(float(v), unit)}"
+            for n, v in zip(names, values, strict=True)
+            if abs(v) > STILL * np.abs(values).max()
+        ]
+    return ", ".join(parts)
