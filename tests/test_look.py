@@ -17,8 +17,9 @@ from ctrlgen.app.look_console import described, look
 from ctrlgen.core.errors import InputError
 from ctrlgen.recordings.formats import read_table
 from ctrlgen.recordings.look.column_facts import between_samples, rests, table_facts
-from ctrlgen.recordings.look.oddities import early, table_oddities
+from ctrlgen.recordings.look.oddities import table_oddities
 from ctrlgen.recordings.look.proposal import propose, recording_toml
+from ctrlgen.recordings.plausibility import early
 from ctrlgen.recordings.reader import load_recordings
 
 RATE = 1000.0
@@ -110,7 +111,7 @@ def test_the_last_of_several_files_is_held_out_and_rests_give_the_noise(axis, tm
 def test_a_unit_that_cannot_be_is_told_with_the_one_that_can(axis, tmp_path):
     (tmp_path / "log.csv").write_text("time (s),drive (V),position (m)\n" + rows(T, U, Y))
     proposal = propose([table_facts(read_table(tmp_path / "log.csv"))], axis)
-    assert 'if the numbers are in um, write unit = "um"' in " ".join(proposal.remarks)
+    assert len(proposal.remarks) == 1 and 'if its numbers are in um, write unit = "um"' in proposal.remarks[0]
     (tmp_path / "good.csv").write_text("time (s),drive (V),position (um)\n" + rows(T, U, Y))
     assert not propose([table_facts(read_table(tmp_path / "good.csv"))], axis).remarks
 

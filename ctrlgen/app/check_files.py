@@ -43,9 +43,11 @@ def check(file: Path, device: Path | None = None, figure: Path | None = None) ->
 
 
 def _check_recording(file: Path, device: Path) -> None:
+    from ctrlgen.recordings.plausibility import with_plausibility
     from ctrlgen.recordings.reader import load_recordings  # the libraries of file formats take a moment to import
 
-    print_recording(load_recordings([file], build_model(load_device(device))))
+    model = build_model(load_device(device))
+    print_recording(with_plausibility(load_recordings([file], model), model))
 
 
 def _check_scenario(file: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import casadi as ca
 import control
 import numpy as np
 
@@ -10,6 +9,7 @@ from ctrlgen.controller.controller_step import ControllerStatus
 from ctrlgen.controller.feedforward import Controller
 from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.model.linear_system import linear_system
 from ctrlgen.model.model import Model
 
 
@@ -42,32 +42,16 @@ def linearise(model: Model, pose: np.ndarray) -> control.StateSpace:
     """
     x, z, u = equilibrium(model, pose)
     outputs, drive = model.signals["pose"], model.signals["drive"]
-    names = list(model.x_names)
-    if model.inertial:
-        state = ca.vertcat(model.x, model.z)
-        A, B, C, D = _slopes(
-            model, (model.closed(ca.vertcat(model.rates, model.v)), outputs.expr), (state, model.u), x, z, u
-        )
-        names += [f"displacement_{axis}" for axis in model.axes]
-    else:
-        f_x, f_z, f_u, g_x, g_z, g_u, y_x, y_z, y_u = _slopes(
-            model, (model.rates, model.balance, outputs.expr), (model.x, model.z, model.u), x, z, u
-        )
-        z_x, z_u = -np.linalg.solve(g_z, g_x), -np.linalg.solve(g_z, g_u)
-        A, B, C, D = f_x + f_z @ z_x, f_u + f_z @ z_u, y_x + y_z @ z_x, y_u + y_z @ z_u
+    system = linear_system(model, outputs.expr, x, z, u)
+    names = [*model.x_names, *(f"displacement_{axis}" for axis in model.axes if model.inertial)]
     inputs = [f"{drive.column}{c}" for c in drive.channels]
-    return control.ss(A, B, C, D, states=names, inputs=inputs, outputs=list(outputs.channels), name=model.name)
-
-
-def _slopes(
-    model: Model,
-    expressions: tuple[ca.SX, ...],
-    arguments: tuple[ca.SX, ...],
-    x: np.ndarray,
-    z: np.ndarray,
-    u: np.ndarray,
-) -> list[np.ndarray]:
-    """The derivatives of each expression by each argument at x, z, u, in the order of both."""
-    blocks = [ca.jacobian(model.closed(e), s) for e in expressions for s in arguments]
-    function = ca.Function("jacobians", [model.x, model.z, model.u, model.p, model.ambient_symbol], blocks)
-    return [block.full() for block in function(x, z, u, model.p_nominal, 0)]
+    return control.ss(
+        system.A,
+        system.B,
+        system.C,
+        system.D,
+        states=names,
+        inputs=inputs,
+        outputs=list(outputs.channels),
+        name=model.name,
+    )

@@ -20,6 +20,7 @@ from ctrlgen.effects import installed
 from ctrlgen.estimation.checkpoint import Checkpoint
 from ctrlgen.estimation.simulator import compiled_simulator
 from ctrlgen.model.assembly import build_model
+from ctrlgen.recordings.plausibility import with_plausibility
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recorded_files import recording_files, sha256
 from ctrlgen.recordings.recording import Recording
@@ -68,7 +69,8 @@ def diagnose(
         if progress:
             progress("reading")
         paths = [recording] if isinstance(recording, (str, Path)) else list(recording)
-        recording = load_recordings(paths, build_model(device))
+        model = build_model(device)
+        recording = with_plausibility(load_recordings(paths, model), model)
     return diagnose_recording(device, recording, seed, progress, checkpoint, laws, jobs)
 
 
@@ -91,7 +93,7 @@ def diagnose_into(
         step = noted(draft, progress)
         model = build_model(load_device(device))
         step("reading")
-        recording = load_recordings(list(recordings), model)
+        recording = with_plausibility(load_recordings(list(recordings), model), model)
         checkpoint = _checkpoint(Path(out), device, recordings, seed, laws)
         if checkpoint.reused:
             step(f"continuing after {checkpoint.reused} fits")

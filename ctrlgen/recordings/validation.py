@@ -21,6 +21,7 @@ from ctrlgen.core.units import from_si, show
 from ctrlgen.devices.limit import spans
 from ctrlgen.model.model import Model
 from ctrlgen.recordings.after_gaps import Described
+from ctrlgen.recordings.alike_units import unit_within
 from ctrlgen.recordings.gaps import BREAK, SHORTEST, Gap, rows_between, stretches
 from ctrlgen.recordings.outliers import outliers, stuck_samples
 from ctrlgen.recordings.recording import Record
@@ -140,9 +141,13 @@ def _beyond_limits(record: Record, kind: str, model: Model, names: ChannelNames,
         k = int(np.nanargmax(excess))
         row = f"{record.time[k]:.6g} s" if kind == "series" and np.isfinite(record.time[k]) else f"row {k}"
         limits = " to ".join("no limit" if not np.isfinite(b) else show(b, unit) for b in (low, high))
+        other = (
+            unit_within(float(np.nanmax(np.abs(u))), max(abs(low), abs(high)), unit) if count > len(u) // 2 else None
+        )
+        mend = f'if its numbers are in {other}, write unit = "{other}"; else ' if other else ""
         what = (
             f"reaches {show(u[k], unit)} at {row}, the device allows {limits} ({count} of {len(u)} samples beyond); "
-            "check the column's unit and sign, or the limit in the device file"
+            f"{mend}check the column's unit and sign, or the limit in the device file"
         )
         faults.append(Fault(f"{where}.columns.{names.drives[i]!r}", what))
     return faults

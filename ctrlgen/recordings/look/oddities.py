@@ -4,22 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ctrlgen.core.units import from_si, same_dimension, to_si
+from ctrlgen.core.units import from_si, to_si
 from ctrlgen.model.model import Model
+from ctrlgen.recordings.alike_units import alike
 from ctrlgen.recordings.look.column_facts import TableFacts
 
 WIDE = 5.0  # times the device's own size: no reading of it is as large
 NARROW = 1e-4  # of it: nothing moved, or the unit is another
 FITTING = (0.02, 2.5)  # of the device's size: a reading of it usually spans so much
-MULTIPLES = {
-    "m": ("nm", "um", "mm", "m"),
-    "rad": ("urad", "mrad", "rad", "deg"),
-    "V": ("mV", "V"),
-    "A": ("mA", "A"),
-    "N": ("mN", "N"),
-}
-LAGS = 50  # rows within which a reading is sought before and after its drive
-EARLY = 0.3  # of the correlation at best: as much better an earlier reading must fit
 
 
 def table_oddities(facts: TableFacts) -> list[str]:
@@ -86,24 +78,9 @@ def fitting_units(name: str, values: np.ndarray, unit: str, model: Model) -> lis
 
     if fits(unit):
         return []
-    return [
-        o for base, others in MULTIPLES.items() if same_dimension(unit, base) for o in others if o != unit and fits(o)
-    ]
+    return [other for other in alike(unit) if fits(other)]
 
 
 def _drive_size(model: Model, i: int) -> float:
     low, high = model.u_bounds
     return float(high[i] - low[i]) if np.isfinite(high[i] - low[i]) else float(model.signals["drive"].scale[i])
-
-
-def early(drive: np.ndarray, reading: np.ndarray) -> int | None:
-    """Rows by which a reading comes before its drive: None where it does not. By the correlation of their differences."""
-    u, y = np.diff(np.nan_to_num(drive)), np.diff(np.nan_to_num(reading))
-    n = len(u)
-    if n < 10 * LAGS or not u.any() or not y.any():
-        return None
-    size = np.sqrt(np.sum(u**2) * np.sum(y**2))
-    after = [abs(float(u[: n - k] @ y[k:])) / size for k in range(LAGS)]
-    before = [abs(float(u[k:] @ y[: n - k])) / size for k in range(LAGS)]
-    best = int(np.argmax(before))
-    return best if best > 0 and before[best] - max(after) > EARLY * before[best] else None

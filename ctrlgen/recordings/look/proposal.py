@@ -16,8 +16,11 @@ import numpy as np
 from ctrlgen.core.escaping import toml
 from ctrlgen.core.units import same_dimension, to_si
 from ctrlgen.model.model import Model
+from ctrlgen.recordings.alike_units import size_of
 from ctrlgen.recordings.look.column_facts import ColumnFacts, TableFacts, between_samples, rests
-from ctrlgen.recordings.look.oddities import early, fitting_units, implausible_range
+from ctrlgen.recordings.look.oddities import fitting_units, implausible_range
+from ctrlgen.recordings.moved import Stretch, moved_of
+from ctrlgen.recordings.plausibility import implausible
 from ctrlgen.recordings.schema import signal_units
 
 # words of columns' names, in the languages of loggers; letters are whole words
@@ -86,8 +89,7 @@ class Proposal:
     @property
     def kind(self) -> str:
         """Few rows without a time are poses."""
-        few = self.tables[0].time is None and self.tables[0].rows <= MOST_POSES
-        return "poses" if few else "series"
+        return kind_of(self.tables[0])
 
     @property
     def asked(self) -> tuple[str, ...]:
@@ -115,6 +117,11 @@ class Proposal:
         return not self.asked
 
 
+def kind_of(facts: TableFacts) -> str:
+    """ "poses" or "series": few rows without a time are poses."""
+    return "poses" if facts.time is None and facts.rows <= MOST_POSES else "series"
+
+
 def propose(tables: Sequence[TableFacts], model: Model) -> Proposal:
     """The recording that files with the same columns are of a device. Its first file decides which column is what."""
     first = tables[0]
@@ -132,31 +139,30 @@ def propose(tables: Sequence[TableFacts], model: Model) -> Proposal:
         asked.append("no column was recognised as a reading")
     if first.time is None:
         asked.append('no column is a time: state sample_rate, or kind = "poses"')
-    remarks = [] if first.time is None else list(_remarks(model, first, matches))
+    remarks = _remarks(model, first, matches, kind_of(first))
     left = tuple(c.name for c in columns if c.name not in {m.column for m in matches})
     return Proposal(model, tuple(tables), tuple(matches), left, tuple(asked), tuple(remarks))
 
 
-def _remarks(model: Model, facts: TableFacts, matches: Sequence[Match]) -> list[str]:
-    said = []
-    for match in matches:
-        values = facts.column(match.column).values
-        if values is not None and (odd := implausible_range(match.signal, values, match.unit, model)):
-            said.append(odd)
-    drives = [m for m in matches if m.signal.startswith("drive.")]
-    for match in (m for m in matches if m.signal.startswith("reading.")):
-        rows = [early(_values(facts, d), _values(facts, match)) for d in drives]
-        if len(drives) == 1 and rows[0]:
-            said.append(
-                f"{match.signal} comes before its drive by {rows[0]} rows: are the columns those of one clock? `later` shifts one"
-            )
-    return said
+def _remarks(model: Model, facts: TableFacts, matches: Sequence[Match], kind: str) -> list[str]:
+    """What is not plausible: beside what the model makes of the drives, or where not every drive is known beside the device's size."""
+    of = {role: [m for m in matches if m.signal.startswith(role)] for role in ("drive.", "reading.")}
+    drives, readings = (tuple((m.signal, m.unit) for m in found) for found in of.values())
+    u, y = (np.reshape([_si(facts, m) for m in found], (len(found), facts.rows)).T for found in of.values())
+    step = facts.time.step if facts.time is not None else np.inf
+    known = facts.time is not None or kind == "poses"
+    linear = {between_samples(column) for column in u.T} == {"linear"}
+    seen = moved_of(model, drives, readings, [Stretch(u, y, step, linear)]) if known and readings else None
+    if seen is not None:
+        return implausible(seen)
+    values = ((m, facts.column(m.column).values) for m in matches)
+    return [odd for m, v in values if v is not None and (odd := implausible_range(m.signal, v, m.unit, model))]
 
 
-def _values(facts: TableFacts, match: Match) -> np.ndarray:
+def _si(facts: TableFacts, match: Match) -> np.ndarray:
     values = facts.column(match.column).values
     assert values is not None  # only columns of numbers are matched
-    return values
+    return values * size_of(match.unit) + to_si(0.0, match.unit)
 
 
 def _matched(model: Model, signals: Sequence[str], columns: Sequence[ColumnFacts]) -> list[Match]:

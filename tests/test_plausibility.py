@@ -1,0 +1,226 @@
+"""A wrong unit, range or rate of a recording is told with its mend; a right one never is."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from conftest import DEVICES, RECORDINGS, SCENARIOS
+
+from ctrlgen import build_model, load_device, simulate
+from ctrlgen.app.check_files import check
+from ctrlgen.core.errors import InputError
+from ctrlgen.core.units import from_si
+from ctrlgen.recordings.formats import read_table
+from ctrlgen.recordings.look.column_facts import table_facts
+from ctrlgen.recordings.look.proposal import propose
+from ctrlgen.recordings.moved import moved
+from ctrlgen.recordings.plausibility import implausible, with_plausibility
+from ctrlgen.recordings.reader import load_recordings
+
+N = 1200
+
+
+@dataclass(frozen=True)
+class Log:
+    """A device, how often it is sampled [s], infinite for poses, and the units in which its log is written, by role and channel."""
+
+    file: str
+    step: float
+    drive: str
+    readings: dict[str, str]
+
+
+HEXAPOD = {c: "um" if c.startswith("d") else "urad" for c in ("theta_x", "theta_y", "delta_x", "delta_y", "delta_z")}
+LOGS = {
+    "axis": Log("flexure_axis.toml", 1e-3, "V", {"axis": "um"}),
+    "heaters": Log("mems_hexapod.toml", 1e-3, "W", HEXAPOD),
+    "levers": Log("xy_lever_stage.toml", 5e-4, "V", {"delta_x": "um", "delta_y": "um"}),
+    "mirror": Log("tip_tilt_mirror.toml", 1e-4, "V", {"theta_x": "mrad", "theta_y": "mrad"}),
+    "poses": Log("meso_hexapod.toml", np.inf, "um", {"theta_x": "deg", "theta_z": "deg", "delta_x": "um"}),
+    "guide": Log("parallelogram.toml", 1e-3, "A", {"delta_x": "um"}),
+}
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """By the name of a log: its folder, its model, the lines of its recording.toml."""
+    kept = {}
+
+    def write(name):
+        if name not in kept:
+            kept[name] = _written(LOGS[name], tmp_path_factory.mktemp(name))
+        return kept[name]
+
+    return write
+
+
+def _written(log: Log, folder):
+    """Steps of every drive over the middle of its range, each a hundredth of the record long or a pose, and what the model reads."""
+    model, rng = build_model(load_device(DEVICES / log.file)), np.random.default_rng(3)
+    low, high = model.u_bounds
+    poses, n = np.isinf(log.step), 60 if np.isinf(log.step) else N
+    levels = rng.uniform(0.3, 0.7, (n if poses else N // 12, len(low)))
+    u = low + (high - low) * (levels if poses else np.repeat(levels, 12, axis=0))
+    signal, drives = model.signals["reading"], model.signals["drive"]
+    seen = simulate(model, u, 1e3 if poses else log.step).signals["reading"]
+    y = seen[1:] if poses else seen[:-1]
+    places = [signal.channels.index(c) for c in log.readings]
+    columns = [from_si(u[:, j], log.drive) for j in range(len(low))]
+    columns += [from_si(y[:, i], unit) for i, unit in zip(places, log.readings.values(), strict=True)]
+    names = [f"u{j}" for j in range(len(low))] + list(log.readings)
+    rows = "\n".join(",".join(f"{v:.9g}" for v in row) for row in zip(*columns, strict=True))
+    (folder / "log.csv").write_text(",".join(names) + "\n" + rows + "\n")
+    kind = "poses" if poses else "series"
+    lines = ['title = "t"', f'device = "{model.device.name}"', f'kind = "{kind}"']
+    lines += [
+        "[[record]]",
+        'file = "log.csv"',
+        'role = "fit"',
+        *([] if poses else [f'sample_rate = "{1 / log.step:g} Hz"']),
+    ]
+    lines += ["[columns]"]
+    lines += [f'"drive.{c}" = {{ column = "u{j}", unit = "{log.drive}" }}' for j, c in enumerate(drives.channels)]
+    lines += [f'"reading.{c}" = {{ column = "{c}", unit = "{unit}" }}' for c, unit in log.readings.items()]
+    return folder, model, "\n".join(lines) + "\n"
+
+
+def said_of(text: str, folder, model) -> list[str]:
+    (folder / "recording.toml").write_text(text)
+    try:
+        seen = moved(load_recordings([folder / "recording.toml"], model, hold_out=False), model)
+    except InputError as error:  # a drive that the device's limits exclude
+        return [f"{fault.where}: {fault.what}" for fault in error.faults]
+    assert seen is not None
+    return implausible(seen)
+
+
+def restated(text: str, names: str, unit: str) -> str:
+    """The lines of the signals that match with another unit than their numbers are in."""
+    return re.sub(rf'^("(?:{names})".*unit = )"[^"]*"', rf'\1"{unit}"', text, flags=re.MULTILINE)
+
+
+WRONG = [  # a log, which signals, the unit that is stated, the one that they are in
+    ("axis", "reading.axis", "mm", "um"), ("axis", "reading.axis", "nm", "um"), ("axis", "reading.axis", "m", "um"),
+    ("axis", "drive.axis", "mV", "V"), ("axis", "drive.axis", "kV", "V"),
+    ("levers", "reading.*", "mm", "um"), ("levers", "reading.*", "nm", "um"), ("levers", "reading.delta_x", "mm", "um"),
+    ("levers", "reading.delta_y", "nm", "um"), ("levers", "drive.*", "mV", "V"), ("levers", "drive.x", "mV", "V"),
+    ("levers", "drive.*", "kV", "V"), ("levers", "drive.y", "kV", "V"),
+    ("guide", "reading.delta_x", "nm", "um"), ("guide", "reading.delta_x", "mm", "um"), ("guide", "reading.delta_x", "in", "um"),
+    ("guide", "drive.*", "mA", "A"),
+    ("mirror", "reading.*", "rad", "mrad"), ("mirror", "reading.theta_x", "urad", "mrad"), ("mirror", "reading.*", "deg", "mrad"),
+    ("mirror", "drive.*", "mV", "V"), ("mirror", "reading.theta_y", "rad", "mrad"),
+    ("poses", "reading.theta.*", "rad", "deg"), ("poses", "reading.theta_x", "mrad", "deg"), ("poses", "reading.theta_z", "rad", "deg"),
+    ("poses", "reading.delta_x", "mm", "um"), ("poses", "reading.delta_x", "nm", "um"), ("poses", "drive.*", "mm", "um"),
+    ("poses", "drive.1x", "nm", "um"), ("poses", "drive.*", "nm", "um"),
+    ("heaters", "reading.theta.*", "deg", "urad"), ("heaters", "reading.theta.*", "mrad", "urad"), 
+    ("heaters", "reading.delta_.", "nm", "um"),
+    ("heaters", "reading.delta_x", "mm", "um"), ("heaters", "drive.*", "mW", "W"), ("heaters", "drive.1X", "mW", "W"),
+]  # fmt: skip
+QUICK = [
+    ("axis", "drive.axis", "mV", "V"),
+    ("levers", "reading.delta_x", "mm", "um"),
+    ("poses", "reading.theta.*", "rad", "deg"),
+]
+
+
+@pytest.mark.parametrize("cases", [QUICK, pytest.param(WRONG, marks=pytest.mark.long)], ids=["few", "all"])
+def test_a_wrong_unit_is_told_with_the_right_one_and_a_right_one_is_not(written, cases):
+    missed = []
+    for name in dict.fromkeys(case[0] for case in cases):
+        folder, model, text = written(name)
+        assert said_of(text, folder, model) == [], name
+        for _, names, stated, right in (case for case in cases if case[0] == name):
+            wrong = restated(text, names, stated)
+            assert wrong != text
+            said = said_of(wrong, folder, model)
+            first = said[0].partition(" or if ")[0] if said else ""
+            several = names == "drive.*" and all("reaches" in s for s in said)
+            mended = all(re.search(names, s) and f'write unit = "{right}"' in s for s in (first, *said))
+            if not said or not mended or not (several or len(said) == 1):
+                missed.append((name, names, stated, said))
+    assert not missed, f"{len(missed)} of {len(cases)}: {missed}"
+    assert cases is QUICK or len(cases) >= 30
+
+
+@pytest.mark.parametrize(
+    ("name", "rate", "what"),
+    [
+        ("axis", "100 Hz", "a tenth"),
+        ("axis", "10 kHz", "ten times"),
+        ("axis", "1 Hz", "ms where s"),
+        pytest.param("levers", "20 kHz", "ten times", marks=pytest.mark.long),
+        pytest.param("heaters", "10 kHz", "ten times", marks=pytest.mark.long),
+        pytest.param("heaters", "1 MHz", "Hz where kHz", marks=pytest.mark.long),
+    ],
+)
+def test_a_wrong_rate_is_told_where_the_readings_show_the_dynamics(written, name, rate, what):
+    folder, model, text = written(name)
+    said = said_of(re.sub('sample_rate = "[^"]*"', f'sample_rate = "{rate}"', text), folder, model)
+    assert any(what in s for s in said), said
+
+
+def test_a_speed_that_is_no_slope_of_its_position_is_told(tmp_path):
+    model, t = build_model(load_device(SCENARIOS / "servo_motor" / "device.toml")), 0.01 * np.arange(1000)
+    x, v, f = np.sin(t), np.cos(t), 1e-4 * np.cos(t)
+    rows = "".join(f"{a:.9g},{b:.9g},{-a:.9g},{c:.9g}\n" for a, b, c in zip(x, v, f, strict=True))
+    (tmp_path / "log.csv").write_text("x,v,a,f\n" + rows)
+    text = f"""title = "t"
+device = "{model.device.name}"
+kind = "series"
+[[record]]
+file = "log.csv"
+role = "fit"
+sample_rate = "100 Hz"
+[columns]
+"drive.position" = {{ column = "x", unit = "rad" }}
+"drive.velocity" = {{ column = "v", unit = "rad/s" }}
+"drive.acceleration" = {{ column = "a", unit = "rad/s^2" }}
+"reading.force" = {{ column = "f", unit = "N*m" }}
+"""
+    assert not [s for s in said_of(text, tmp_path, model) if "slope" in s]
+    said = [s for s in said_of(restated(text, "drive.position", "mrad"), tmp_path, model) if "slope" in s]
+    assert len(said) == 1 and 'write unit = "rad"' in said[0]
+
+
+def test_check_and_look_tell_it(written, capsys):
+    folder, model, text = written("axis")
+    (folder / "recording.toml").write_text(restated(text, "reading.axis", "mm"))
+    check(folder / "recording.toml", DEVICES / LOGS["axis"].file)
+    assert 'if its numbers are in um, write unit = "um"' in capsys.readouterr().out
+    rows = (folder / "log.csv").read_text().splitlines()[1:]
+    lines = "\n".join(f"{k / 1000},{row}" for k, row in enumerate(rows))
+    (folder / "named.csv").write_text("time [s],drive [V],position [mm]\n" + lines + "\n")
+    said = propose([table_facts(read_table(folder / "named.csv"))], model).remarks
+    assert len(said) == 1 and 'write unit = "um"' in said[0]
+
+
+def recorded():
+    """Every recording.toml that is shipped or lies beside the repository, with its device."""
+    devices = {d.name: d for d in map(load_device, [*DEVICES.glob("*.toml"), *SCENARIOS.glob("*/device.toml")])}
+    for file in sorted([*SCENARIOS.glob("*/*.toml"), *(RECORDINGS.parent).glob("*/*/recording.toml")]):
+        table = tomllib.loads(file.read_text())
+        if "record" not in table:
+            continue
+        beside = next(
+            (p for p in (file.parent / "device.toml", file.parent.parent / "stage.toml") if p.is_file()), None
+        )
+        yield file, devices[table["device"]] if beside is None else load_device(beside)
+
+
+@pytest.mark.long
+def test_nothing_is_told_of_a_recording_that_is_right():
+    said, read = {}, 0
+    for file, device in recorded():
+        model = build_model(device)
+        try:
+            recording = load_recordings([file], model)
+        except InputError:
+            continue
+        read += 1
+        notes = with_plausibility(recording, model).notes[len(recording.notes) :]
+        said |= {str(file): notes} if notes else {}
+    assert read >= 4 and not said
