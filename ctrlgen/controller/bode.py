@@ -6,15 +6,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import casadi as ca
 import control
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from ctrlgen.controller.linearisation import linearise
+from ctrlgen.controller.linearisation import equilibrium, linearise
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import write_bytes
 from ctrlgen.core.units import difference
+from ctrlgen.devices.structural_model import StructuralModel
 from ctrlgen.model.model import Model
 from ctrlgen.reporting.plots import COLOURS, PATTERNS, STYLE, image
 
@@ -27,7 +29,8 @@ DOWN = 1e-4  # of its largest gain, to where a panel shows
 @dataclass(frozen=True)
 class FrequencyResponse:
     """From every drive to the pose, linearised at a `pose` [SI]: `hertz` (n,), `response` (channels, drives, n) and the `static` one
-    (channels, drives), in SI; `poles` [rad/s], their absolute values."""
+    (channels, drives), in SI; `poles` [rad/s], their absolute values; `structure`: the modes beside those of the model, where its device
+    has them."""
 
     model: Model
     pose: np.ndarray
@@ -35,6 +38,7 @@ class FrequencyResponse:
     response: np.ndarray
     static: np.ndarray
     poles: np.ndarray
+    structure: StructuralModel | None = None
 
 
 def frequency_response(model: Model, pose: np.ndarray) -> FrequencyResponse:
@@ -43,9 +47,13 @@ def frequency_response(model: Model, pose: np.ndarray) -> FrequencyResponse:
     `pose` (channels,) [rad, m] is where the model is linearised. Raises InputError where it is not an admissible
     equilibrium, or where the device has no dynamics.
     """
-    system = linearise(model, pose)
+    system, structure = linearise(model, pose), structure_at(model, pose)
     poles = np.abs(system.poles())
     poles = poles[poles > 0]
+    if structure is not None:
+        forced = linearise(model, pose, "force")
+        lags = np.abs(np.linalg.eigvals(forced.A[: model.n_states, : model.n_states]))
+        poles = np.concatenate([lags[lags > 0], 2 * np.pi * structure.frequencies])
     if not len(poles):
         what = "the device has none: the pose follows the drive without delay at every frequency, so there is nothing to draw"
         raise InputError(model.name, [Fault("dynamics", what)])
@@ -54,7 +62,21 @@ def frequency_response(model: Model, pose: np.ndarray) -> FrequencyResponse:
     omega = np.unique(np.concatenate([np.logspace(low, high, POINTS), poles]))
     response = control.frequency_response(system, omega, squeeze=False)
     static = np.atleast_2d(system.dcgain())
-    return FrequencyResponse(model, pose, omega / (2 * np.pi), response.complex, static, poles)
+    if structure is None:
+        return FrequencyResponse(model, pose, omega / (2 * np.pi), response.complex, static, poles)
+    force = control.frequency_response(forced, omega, squeeze=False).complex
+    whole = np.einsum("ijk,jlk->ilk", structure.receptance(omega), force)
+    return FrequencyResponse(model, pose, omega / (2 * np.pi), whole, static, poles, structure)
+
+
+def structure_at(model: Model, pose: np.ndarray) -> StructuralModel | None:
+    """The device with the modes that its model leaves out, as stiff as at `pose`; None where it has none, or effects act on it."""
+    structure = None if model.device.effect or not model.inertial else model.device.structural_model()
+    if structure is None:
+        return None
+    _, z, _ = equilibrium(model, pose)
+    d, physics = ca.SX.sym("d", len(z)), model.device.physics(model.device.values())
+    return structure.at(ca.Function("K", [d], [ca.jacobian(physics.restoring_force(d), d)])(z).full())
 
 
 def draw_bode(model: Model, pose: np.ndarray, path: Path) -> None:

@@ -126,9 +126,12 @@ def _first_screen(found: FrequencyResponse, rows: list[dict[str, str]], figure: 
     numbers = [(f"{row['drive']} to {row['channel']}, static", row["gain"]) for row in rows[:SHOWN]]
     numbers += [("slowest pole", f"{number(slow, 4)} Hz"), ("fastest pole", f"{number(fast, 4)} Hz")]
     numbers += [(f"peak of {row['drive']}", row["peak"]) for row in rows[:SHOWN] if row["peak"] != "none"]
+    told = [f"{answer}."]
+    if found.structure is not None:
+        told.append(found.structure.sentence())
     steps = (
         "Take another pose with `--at`: the response changes with it where the device is not linear.",
         "Record the same response on the stage (a chirp within its limits), and `ctrlgen diagnose` holds the model to it.",
         "In Python `ctrlgen.controller.linearisation.linearise` gives the state space for the design of a loop.",
     )
-    return FirstScreen((f"{answer}.",), "ok" if rows else "so", figure, tuple(numbers), steps)
+    return FirstScreen(tuple(told), "ok" if rows else "so", figure, tuple(numbers), steps)

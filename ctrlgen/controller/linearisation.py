@@ -32,8 +32,9 @@ def equilibrium(model: Model, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray,
     return step.state[0], step.displacement, step.drive
 
 
-def linearise(model: Model, pose: np.ndarray) -> control.StateSpace:
-    """The state space dx' = A dx + B du, dpose = C dx + D du about the equilibrium at `pose` (n_components,), all SI.
+def linearise(model: Model, pose: np.ndarray, output: str = "pose") -> control.StateSpace:
+    """The state space dx' = A dx + B du, dpose = C dx + D du about the equilibrium at `pose` (n_components,), all SI; another `output`
+    signal in place of the pose.
 
     Inputs are the drives, outputs the pose components, each by its name. Without inertia the states are the temperatures and the
     effects' states, and the force balance g(x, z, u) = 0 is eliminated: dz = -g_z^-1 (g_x dx + g_u du). With inertia velocities and
@@ -41,7 +42,7 @@ def linearise(model: Model, pose: np.ndarray) -> control.StateSpace:
     where `pose` is no equilibrium within the device's limits.
     """
     x, z, u = equilibrium(model, pose)
-    outputs, drive = model.signals["pose"], model.signals["drive"]
+    outputs, drive = model.signals[output], model.signals["drive"]
     system = linear_system(model, outputs.expr, x, z, u)
     names = [*model.x_names, *(f"displacement_{axis}" for axis in model.axes if model.inertial)]
     inputs = [f"{drive.column}{c}" for c in drive.channels]

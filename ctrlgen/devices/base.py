@@ -20,6 +20,7 @@ from ctrlgen.devices.reported_units import in_units_of
 from ctrlgen.devices.run_time import RunTime, RunTimeConstant, run_time_constants
 from ctrlgen.devices.section import Section
 from ctrlgen.devices.sensor import AnySensor
+from ctrlgen.devices.structural_model import StructuralModel
 from ctrlgen.effects import EffectTable
 
 
@@ -104,6 +105,10 @@ class Device(Shown, Section):
     def with_unstated_inertia(self) -> tuple[Device, float] | None:
         """The same device with the inertia that its file states and its model leaves out, and the damping ratio that is assumed; None
         where there is no such inertia."""
+        return None
+
+    def structural_model(self) -> StructuralModel | None:
+        """The device with modes that its model leaves out, linear at home; None where it has none."""
         return None
 
     def with_unstated_stretching(self) -> Device | None:

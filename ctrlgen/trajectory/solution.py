@@ -15,6 +15,7 @@ from ctrlgen.model.simulation import Trace
 from ctrlgen.trajectory.inverse.violations import Before, limited_values
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.trajectory.unstated_inertia import UnstatedInertia, unstated_inertia
+from ctrlgen.trajectory.unstated_modes import UnstatedModes, unstated_modes
 from ctrlgen.trajectory.unstated_stretching import UnstatedStretching, unstated_stretching
 
 
@@ -72,6 +73,11 @@ class Solution(Tabular, Reported):
         return unstated_inertia(self.scenario, self.model, self.command, self.trace, self.drive)
 
     @cached_property
+    def unstated_modes(self) -> UnstatedModes | None:
+        """What modes of the device that the model is condensed without do along the path; None where that is nothing."""
+        return unstated_modes(self.scenario, self.model, self.command, self.trace, self.drive)
+
+    @cached_property
     def unstated_stretching(self) -> UnstatedStretching | None:
         """What flexures do along the path whose stretching the model leaves out; None where that is nothing."""
         return unstated_stretching(self.model, self.trace, self.drive)
@@ -79,7 +85,7 @@ class Solution(Tabular, Reported):
     @property
     def left_out(self) -> tuple[str, ...]:
         """In sentences what the device's file states and the model leaves out, where the path notices."""
-        told = (self.unstated_inertia, self.unstated_stretching)
+        told = (self.unstated_inertia, self.unstated_modes, self.unstated_stretching)
         return tuple(each.sentence() for each in told if each is not None)
 
     def columns(self) -> tuple[Column, ...]:

@@ -22,6 +22,7 @@ from ctrlgen.devices.mechanism.bent_beams import BentBeam, ThermalActuator
 from ctrlgen.devices.mechanism.condensed import MOST_STEPS, SPARE_STEPS, Condensed
 from ctrlgen.devices.mechanism.copies import Copied, Placed
 from ctrlgen.devices.mechanism.flexures import Blade, CircularHinge, Flexible, Strut, Wire, flexures_in_one_place
+from ctrlgen.devices.mechanism.internal_modes import structural_model
 from ctrlgen.devices.mechanism.joining import TWIST
 from ctrlgen.devices.mechanism.linear_range import second_order_faults, stiffened
 from ctrlgen.devices.mechanism.load_effects import load_faults
@@ -41,6 +42,7 @@ from ctrlgen.devices.mechanism.tables import (
     Pattern,
     Reading,
 )
+from ctrlgen.devices.structural_model import StructuralModel
 from ctrlgen.physics import rigid_bodies as mechanism
 from ctrlgen.physics.rigid_bodies import GROUND, Element
 
@@ -370,6 +372,10 @@ class Mechanism(Device):
         if self.dynamics is not None or not len(guyan_modes(self).frequencies):
             return None
         return self.model_copy(update={"dynamics": Dynamics(damping_ratio=ASSUMED_DAMPING)}), ASSUMED_DAMPING.si
+
+    def structural_model(self) -> StructuralModel | None:
+        """With the modes of the bodies while the axes are held."""
+        return structural_model(self)
 
     def with_unstated_stretching(self) -> Mechanism | None:
         """With `geometric_stiffening`, where actuators push and a beam has none."""

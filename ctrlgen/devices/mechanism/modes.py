@@ -110,23 +110,9 @@ def free_modes(device: Drawing) -> Modes:
     """
     c = Condensed(device, device.values())
     count = len(device.bodies)
-    K = np.zeros((6 * count, 6 * count))
-    M, heavy = _mass(c)
-    swap = np.r_[3:6, 0:3]  # a wrench as (moment; force) beside a twist: the stiffness is then symmetric
-    for e in c.held_elements():
-        k = ca.DM(ca.evalf(ca.SX(e.stiffness))).full()[swap]
-        for i, j, sign in (
-            (e.first, e.first, 1),
-            (e.second, e.second, 1),
-            (e.first, e.second, -1),
-            (e.second, e.first, -1),
-        ):
-            if GROUND not in (i, j):
-                K[6 * i : 6 * i + 6, 6 * j : 6 * j + 6] += sign * k
+    K, M, heavy = body_matrices(c)
     if not heavy:
         return Modes(np.zeros(0), np.zeros((6 * count, 0)), M)
-    scale = _as_displacements(device)
-    K = K * np.outer(scale, scale)
     light = [i for i in range(6 * count) if i not in heavy]
     follows = -np.linalg.solve(K[np.ix_(light, light)], K[np.ix_(light, heavy)])
     K_h = K[np.ix_(heavy, heavy)] + K[np.ix_(heavy, light)] @ follows
@@ -142,7 +128,7 @@ def guyan_modes(device: Drawing) -> Modes:
     c = Condensed(device, device.values())
     M, heavy = _mass(c)
     n = len(device.placed_actuators)
-    moved = np.vstack([ca.DM(ca.evalf(ca.SX(T[:, :n]))).full() for T in c.twists]) / _as_displacements(device)[:, None]
+    moved = np.vstack([ca.DM(ca.evalf(ca.SX(T[:, :n]))).full() for T in c.twists]) / as_displacements(device)[:, None]
     inert = moved.T @ M @ moved
     if not (c.pushes and heavy) or np.linalg.eigvalsh(inert).min() <= INERT * np.linalg.eigvalsh(inert).max():
         return Modes(np.zeros(0), moved[:, :0], M)
@@ -151,7 +137,27 @@ def guyan_modes(device: Drawing) -> Modes:
     return Modes(np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi), moved @ shapes, M)
 
 
-def _as_displacements(device: Drawing) -> np.ndarray:
+def body_matrices(c: Condensed) -> tuple[np.ndarray, np.ndarray, list[int]]:
+    """Stiffness with the drives held and mass (6 bodies, 6 bodies) of all bodies, turns counted as displacements; rows with mass."""
+    count = len(c.device.bodies)
+    K = np.zeros((6 * count, 6 * count))
+    M, heavy = _mass(c)
+    swap = np.r_[3:6, 0:3]  # a wrench as (moment; force) beside a twist: the stiffness is then symmetric
+    for e in c.held_elements():
+        k = ca.DM(ca.evalf(ca.SX(e.stiffness))).full()[swap]
+        for i, j, sign in (
+            (e.first, e.first, 1),
+            (e.second, e.second, 1),
+            (e.first, e.second, -1),
+            (e.second, e.first, -1),
+        ):
+            if GROUND not in (i, j):
+                K[6 * i : 6 * i + 6, 6 * j : 6 * j + 6] += sign * k
+    scale = as_displacements(c.device)
+    return K * np.outer(scale, scale), M, heavy
+
+
+def as_displacements(device: Drawing) -> np.ndarray:
     """(6 bodies,) by which a twist is multiplied where turns are counted as displacements at the mechanism's size."""
     return np.tile([1 / device.size] * 3 + [1.0] * 3, len(device.bodies))
 
@@ -173,7 +179,7 @@ def _mass(c: Condensed) -> tuple[np.ndarray, list[int]]:
                 for j, column in ends:
                     M[6 * i : 6 * i + 6, 6 * j : 6 * j + 6] += both[row, column]
             heavy |= {i for i, _ in ends}
-    scale = _as_displacements(c.device)
+    scale = as_displacements(c.device)
     return M * np.outer(scale, scale), [6 * i + n for i in sorted(heavy) for n in range(6)]
 
 

@@ -1,0 +1,45 @@
+"""Modes of a mechanism's bodies while its axes are held, beside the motions at rest to which its model is condensed."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import scipy.linalg
+
+from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.devices.mechanism.drawing import Drawing
+from ctrlgen.devices.mechanism.modes import as_displacements, body_matrices, guyan_modes
+from ctrlgen.devices.structural_model import StructuralModel
+from ctrlgen.physics.screw import inverse_adjoint
+
+REACH = 5.0  # times the fastest condensed mode: the modes that are kept where a file states no `modes_below`
+MOVES = 1e-9  # of the softest mode with mass: below it a motion of bodies has no mass
+
+
+def structural_model(device: Drawing) -> StructuralModel | None:
+    """The mechanism with its inertia and the modes of its bodies below `modes_below`, at home; None without a table [dynamics]."""
+    condensed = guyan_modes(device)
+    if device.dynamics is None or not len(condensed.frequencies):
+        return None
+    stated = device.dynamics.modes_below
+    highest = REACH * float(condensed.frequencies[-1]) if stated is None else stated.si
+    c, n = Condensed(device, device.values()), len(device.placed_actuators)
+    K, M, _ = body_matrices(c)
+    size = as_displacements(device)
+    at_rest = np.vstack([_numbers(T[:, :n]) for T in c.twists]) / size[:, None]
+    bodies = [np.eye(6 * len(device.bodies))[6 * i : 6 * i + 6] * size for i in range(len(device.bodies))]
+    travel = np.vstack([_numbers(c.travel(i, [ca.DM(b) for b in bodies])) for i in range(n)])
+    free = scipy.linalg.null_space(travel)  # the axes held
+    slow, shapes = scipy.linalg.eigh(free.T @ M @ free, free.T @ K @ free)  # 1/w^2: bodies without a mass have none
+    keep = slow > max(MOVES * slow.max(), 1 / (2 * np.pi * highest) ** 2)
+    basis = np.hstack([at_rest, free @ shapes[:, keep] / np.sqrt(slow[keep])])
+    seen = _numbers(inverse_adjoint(None, c.output_point)) @ bodies[device.bodies.index(device.output.body)]
+    output = seen[c.channel_rows] @ basis
+    mass, stiffness = (basis.T @ X @ basis for X in (M, K))
+    return StructuralModel(
+        (mass + mass.T) / 2, (stiffness + stiffness.T) / 2, output, n, device.dynamics.damping_ratio.si
+    )
+
+
+def _numbers(matrix: ca.SX | ca.DM) -> np.ndarray:
+    return np.asarray(ca.DM(ca.evalf(ca.SX(matrix))).full())

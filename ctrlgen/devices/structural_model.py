@@ -1,0 +1,85 @@
+"""A structure with more modes than axes as a linear model: what a device's own model, condensed to its axes, leaves out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+import scipy.linalg
+
+from ctrlgen.core.units import show
+
+TOLD = 4  # modes in a sentence
+
+
+@dataclass(frozen=True, eq=False)
+class StructuralModel:
+    """M q'' + D q' + K q = (f, 0), q = (d, eta): displacements of the n axes, on which the forces f act, and amplitudes of modes with
+    the axes held (n + m, n + m); pose = `output` (channels, n + m) q. Without eta it is the device's own model. SI, `damping_ratio` of
+    every mode.
+
+    Source: R. R. Craig, M. C. C. Bampton, AIAA J. 6 (1968) 1313.
+    """
+
+    mass: np.ndarray
+    stiffness: np.ndarray
+    output: np.ndarray
+    axes: int
+    damping_ratio: float
+
+    @cached_property
+    def frequencies(self) -> np.ndarray:
+        """Natural frequencies [Hz], ascending."""
+        return np.sqrt(scipy.linalg.eigh(self.stiffness, self.mass, eigvals_only=True)) / (2 * np.pi)
+
+    def at(self, stiffness: np.ndarray) -> StructuralModel:
+        """The same with that `stiffness` (n, n) of the axes, as at another pose."""
+        K = self.stiffness.copy()
+        K[: self.axes, : self.axes] = stiffness
+        return replace(self, stiffness=K)
+
+    @property
+    def condensed(self) -> StructuralModel:
+        """The same without eta."""
+        n = self.axes
+        return StructuralModel(self.mass[:n, :n], self.stiffness[:n, :n], self.output[:, :n], n, self.damping_ratio)
+
+    def sentence(self) -> str:
+        """Its first modes beside those of the device's own model."""
+        first, own = (", ".join(show(f, "Hz") for f in m.frequencies[:TOLD]) for m in (self, self.condensed))
+        return f"The first modes of the bodies are {first}; the model that trajectories and the C follow, condensed to the axes, has {own}."
+
+    @cached_property
+    def damping(self) -> np.ndarray:
+        """D (n + m, n + m) of one damping ratio."""
+        squares, V = scipy.linalg.eigh(self.stiffness, self.mass)
+        return np.asarray(self.mass @ V @ np.diag(2 * self.damping_ratio * np.sqrt(squares)) @ V.T @ self.mass)
+
+    def receptance(self, omega: np.ndarray) -> np.ndarray:
+        """(channels, n, k) pose per force at the angular frequencies `omega` (k,)."""
+        s = 1j * omega[:, None, None]
+        q = np.linalg.solve(
+            self.mass * s**2 + self.damping * s + self.stiffness, np.eye(len(self.mass))[:, : self.axes]
+        )
+        return np.moveaxis(self.output @ q, 0, -1)
+
+    def response(self, force: np.ndarray, step: float, held: bool) -> np.ndarray:
+        """(k, channels) pose under the forces (k, n), `step` [s] apart, which are `held` or linear between, from rest under the first."""
+        k, n = len(self.mass), self.axes
+        inverse = np.linalg.inv(self.mass)
+        A = np.block([[np.zeros((k, k)), np.eye(k)], [-inverse @ self.stiffness, -inverse @ self.damping]])
+        B = np.vstack([np.zeros((k, n)), inverse[:, :n]])
+        size = 2 * k + 2 * n
+        whole = np.zeros((size, size))
+        whole[: 2 * k, : 2 * k + n] = np.hstack([A, B])
+        whole[2 * k : 2 * k + n, 2 * k + n :] = np.eye(n) / step
+        moved = scipy.linalg.expm(whole * step)
+        Phi, now, slope = moved[: 2 * k, : 2 * k], moved[: 2 * k, 2 * k : 2 * k + n], moved[: 2 * k, 2 * k + n :]
+        x = np.concatenate([np.linalg.solve(self.stiffness, np.eye(k)[:, :n] @ force[0]), np.zeros(k)])
+        poses = [self.output @ x[:k]]
+        for before, after in pairwise(force):
+            x = Phi @ x + now @ before + (0 if held else slope @ (after - before))
+            poses.append(self.output @ x[:k])
+        return np.array(poses)

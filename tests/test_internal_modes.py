@@ -1,0 +1,97 @@
+"""Modes that a mechanism condensed to its axes leaves out: two masses in a row, whose equations are known, in Bode and along a path."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mechanism_files import HEAD, loaded
+from scipy.integrate import solve_ivp
+
+from ctrlgen import build_model, load_scenario, solve
+from ctrlgen.app.commands.devices import bode
+from ctrlgen.controller.bode import frequency_response
+
+M1, M2, K1, K2, ZETA = 0.2, 0.1, 2e4, 3e4, 0.01  # kg, N/m
+
+
+def two_masses(more: str = "") -> str:
+    """Ground, spring K1, mass M1 that is pushed, spring K2, mass M2 that is followed, along x."""
+    text = HEAD
+    for name, mass in (("first", M1), ("second", M2)):
+        text += f'[[body]]\nname = "{name}"\nmass = "{mass} kg"\ninertia = ["90 kg*mm^2", "90 kg*mm^2", "90 kg*mm^2"]\n'
+    stiff = "".join(f'theta_{x}_per_M_{x} = "1e-6 rad/(N*m)"\n' for x in "xyz")
+    stiff += "".join(f'delta_{x}_per_F_{x} = "1e-6 um/N"\n' for x in "yz")
+    for name, ends, k in (("a", ("ground", "first"), K1), ("b", ("first", "second"), K2)):
+        text += f'[[element]]\nkind = "compliance"\nname = "{name}"\nfrom = "{ends[0]}"\nto = "{ends[1]}"\n'
+        text += f'at = ["0 mm", "0 mm", "0 mm"]\n{stiff}delta_x_per_F_x = "{1 / k} m/N"\n'
+    text += (
+        '[[actuator]]\nname = "coil"\nkind = "force"\non = "first"\nat = ["0 mm", "0 mm", "0 mm"]\nalong = [1, 0, 0]\n'
+    )
+    text += 'gain = "1 N/A"\nlow = "-20 A"\nhigh = "20 A"\ntravel = "900 um"\n'
+    text += '[output]\nbody = "second"\nat = ["0 mm", "0 mm", "0 mm"]\nchannels = ["delta_x"]\n'
+    return text + f'[dynamics]\ndamping_ratio = "{100 * ZETA} %"\n{more}'
+
+
+MASS, STIFFNESS = np.diag([M1, M2]), np.array([[K1 + K2, -K2], [-K2, K2]])
+
+
+def damping() -> np.ndarray:
+    squares, V = np.linalg.eig(np.linalg.solve(MASS, STIFFNESS))
+    return MASS @ V @ np.diag(2 * ZETA * np.sqrt(squares)) @ np.linalg.inv(V)
+
+
+def test_the_structure_has_the_modes_and_the_response_of_two_masses(tmp_path):
+    """(-w^2 M + i w D + K)^-1 from the first mass to the second, all modes kept; with `modes_below` under the second mode the condensed."""
+    model = build_model(loaded(tmp_path, two_masses()))
+    found = frequency_response(model, np.zeros(1))
+    w = 2 * np.pi * found.hertz
+    exact = np.array([np.linalg.inv(STIFFNESS + 1j * x * damping() - x**2 * MASS)[1, 0] for x in w])
+    assert found.response[0, 0] == pytest.approx(exact, rel=1e-4)
+    modes = np.sqrt(np.sort(np.linalg.eigvals(np.linalg.solve(MASS, STIFFNESS)))) / (2 * np.pi)
+    assert found.structure.frequencies[:2] == pytest.approx(modes, rel=1e-5)
+    few = loaded(tmp_path, two_masses('modes_below = "80 Hz"\n')).structural_model()
+    assert few.frequencies == pytest.approx([np.sqrt(K1 / (M1 + M2)) / (2 * np.pi)], rel=1e-5)
+
+
+def test_the_page_of_the_response_tells_both(tmp_path):
+    loaded(tmp_path, two_masses())
+    bode(tmp_path / "device.toml", tmp_path / "bode.html", "delta_x=0um")
+    assert "The first modes of the bodies are 39.44" in (tmp_path / "bode.html").read_text()
+
+
+def test_what_internal_modes_leave_along_a_path_is_that_of_two_masses(tmp_path):
+    """The same drives on both, held from sample to sample, by a variable-step integrator; the condensed model rings at 41.09 Hz."""
+    loaded(tmp_path, two_masses())
+    (tmp_path / "s.toml").write_text(
+        'title = "t"\ndevice = "device.toml"\nsample_rate = "2 kHz"\nduration = "50 ms"\n[path]\nkind = "line"\n'
+        'start = { delta_x = "0 um" }\nend = { delta_x = "100 um" }\n'
+    )
+    scenario = load_scenario(tmp_path / "s.toml")
+    solution = solve(scenario, build_model(scenario.device))
+    told, h = solution.unstated_modes, 5e-4
+    force = np.concatenate([solution.drive[:, 0], np.full(60, solution.drive[-1, 0])])
+    wrong = []
+    for M, K, D in ((MASS, STIFFNESS, damping()), (None, None, None)):
+        if M is None:
+            M, K = np.eye(1) * (M1 + M2), np.eye(1) * K1
+            D = 2 * ZETA * np.sqrt(K * M)
+        n, x, seen = len(M), np.zeros(2 * len(M)), []
+        for f in force:
+            seen.append(x[n - 1])
+            push = np.eye(n)[0] * f
+            x = solve_ivp(
+                lambda _, s, n=n, M=M, K=K, D=D, push=push: np.r_[
+                    s[n:], np.linalg.solve(M, push - K @ s[:n] - D @ s[n:])
+                ],
+                (0, h),
+                x,
+                rtol=1e-9,
+                atol=1e-15,
+                method="DOP853",
+            ).y[:, -1]
+        wrong.append(np.array(seen))
+    off, n = np.abs(wrong[0] - wrong[1]), len(solution.command)
+    assert told.along == pytest.approx(off[:n].max(), rel=1e-3) and told.after == pytest.approx(
+        off[n : n + 52].max(), rel=1e-2
+    )
+    assert "first mode of the bodies is 39.44" in solution.left_out[0]
