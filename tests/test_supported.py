@@ -21,6 +21,7 @@ BEFORE = 1e4
 @pytest.fixture(autouse=True)
 def known_deviations(monkeypatch):
     monkeypatch.setattr(module, "robust_deviations", lambda fit: [DEVIATION] * len(fit.theta))
+    monkeypatch.setattr(module, "outside_its_range", lambda fit, k: False)
 
 
 def share(value: float) -> ShareEntry:
@@ -108,6 +109,14 @@ def test_it_stays_where_noise_alone_is_left_with_it_or_the_held_out_records_cann
     given = {"noise": noise, "unseen": unseen}
     assert CREEP in Search(monkeypatch, 0.009, left=1e3, improves=True, **given).left()
     assert CREEP not in Search(monkeypatch, 0.009, left=1e3, improves=False, **given).left()
+
+
+def test_noise_keeps_no_small_law_that_may_be_off_or_lies_at_a_bound(monkeypatch):
+    given = {"noise": True, "improves": True}
+    assert CREEP not in Search(monkeypatch, 0.009, left=1e3, vague=True, **given).left()
+    monkeypatch.setattr(module, "outside_its_range", lambda fit, k: k == 1)
+    assert CREEP not in Search(monkeypatch, 0.009, left=1e3, **given).left()
+    assert CREEP in Search(monkeypatch, 0.011, left=1e3, **given).left()
 
 
 def test_of_two_weak_causes_the_weaker_goes_first(monkeypatch):

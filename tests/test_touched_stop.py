@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from axis_records import AXIS, KF, C, K, M, drive, record
 
+from ctrlgen.diagnosis.diagnose import clock_note
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.rivals import simplified
 from ctrlgen.diagnosis.selection.screen import Screen
+from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.trials import Trials
+from ctrlgen.estimation.drive_clock import drive_clock, with_drive_clock
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.integration_error import LARGEST, with_steps_that_suffice
@@ -40,17 +46,56 @@ def stopped(u: np.ndarray, gap: float, fine: int = 40) -> np.ndarray:
     return np.array(out)
 
 
-@pytest.fixture(scope="module")
-def touched() -> tuple[Fitter, float]:
+def recorded(early: float = 0.0) -> tuple[Fitter, float]:
+    """A stop touched in the record to fit and run into in the other, where the drive comes so many samples before its time stamps."""
     rng, t = np.random.default_rng(0), H * np.arange(N)
     fit, held = 0.55 * drive(N), 0.68 * (1.6 * np.sin(2 * np.pi * 1.7 * t) + 0.4 * np.sin(2 * np.pi * 7.3 * t))
     gap = float(stopped(fit, np.inf).max()) - 4e-7
     parts = []
     for k, (u, role) in enumerate(((fit, "fit"), (held, "hold_out"))):
-        y = stopped(u, gap) + NOISE * rng.standard_normal(N)
+        y = stopped(np.interp(t + early * H, t, u), gap) + NOISE * rng.standard_normal(N)
         parts.append(record(u, y, role, first=k * N * H, h=H))
     recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("nm",), (NOISE,), tuple(parts), ())
     return Fitter(recording, estimate_noise(recording, 0.5)), gap
+
+
+@pytest.fixture(scope="module")
+def touched() -> tuple[Fitter, float]:
+    return recorded()
+
+
+def model(fitter: Fitter, gap: float) -> tuple[Fitter, CandidateModel]:
+    """The stop fitted from its true numbers, and the fitter with the errors that it leaves."""
+    begun = Structure(AXIS).with_cause(STOP, {"stiffness": STIFFNESS, "gap": gap, "power": 1.0})
+    weighed = fitter.with_errors_of(fitter.fit(replace(begun, finer=2)))
+    return weighed, scored(weighed, weighed.fit(replace(begun, finer=2)), STOP)
+
+
+def test_a_drive_that_comes_before_its_time_stamps_bends_no_stop():
+    """By a hundredth of a sample, 5 us: seven times the noise, where the stage is fast, that no other number takes away."""
+    fitter, bent = model(*recorded(early=0.01))
+    searcher = Searcher(fitter, Screen(fitter, [STOP]), lambda _: None)
+    right = searcher.clocked(bent)
+    clock = searcher.trials.fitter.clock
+    assert clock == pytest.approx(0.01 * H, rel=0.02)
+    left = [np.sqrt(t.fitted.plain_mean[0]) for t in (bent, right)]
+    assert left[0] > 5 and left[1] < 1.1
+    # told where stamps are not so far off, and only there
+    assert clock_note(searcher.trials.fitter) == []
+    (note,) = clock_note(replace(fitter, clock=-0.024 * H))
+    assert "1.2e-05 s behind" in note and "0.024 of a sample" in note
+
+
+def test_a_drive_that_is_in_time_stays_so(touched):
+    """And one that is so late that it has a name: a twentieth of a sample."""
+    fitter, true = model(*touched)
+    same, fit = with_drive_clock(fitter, true.fit)
+    assert same is fitter and fit is true.fit
+    late, bent = model(*recorded(early=-0.05))
+    assert with_drive_clock(late, bent.fit)[0] is late
+    # what is said to shift in time says it alone
+    delayed = bent.fit.restarted.with_cause(Hypothesis("delay", "sensor:axis", "axis"), {"delay": 1e-4})
+    assert drive_clock(late, late.fit(delayed, steps=0)) is None
 
 
 def test_the_law_is_that_of_the_stop_at_the_depth_at_which_it_is_touched(touched):

@@ -42,6 +42,7 @@ from ctrlgen.diagnosis.shares.families import ranking
 from ctrlgen.diagnosis.shares.gather import ResidualShares, residual_shares
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.checkpoint import Checkpoint
+from ctrlgen.estimation.drive_clock import STAMPS, TOLD, stamp_deviation
 from ctrlgen.estimation.fit import Fitter, forget_predictions
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, hypotheses, nominal_physics, selected_laws
 from ctrlgen.estimation.isolated_outliers import mark_outliers
@@ -56,11 +57,16 @@ from ctrlgen.estimation.spikes import find_spikes, marking_notes
 from ctrlgen.model.assembly import build_model, movable
 from ctrlgen.model.discretisation import settling_time
 from ctrlgen.recordings.recording import Recording
+from ctrlgen.reporting.numbers import number
 
 Progress = Callable[[str], None]
 RESTLESS = "{}: at rest the residual jumps or has memory, so it is not noise; something acts there that the device file does not describe"
 NOT_OFFERED = "not offered: {}"
 WITHDRAWN = "{} is not confirmed: with it the held-out records are predicted worse than by the device as described"
+OFF_ITS_STAMPS = (
+    "the drive is taken to come {} s {} its time stamps, {} of a sample: with that the held-out records are predicted better; it is a "
+    "number of the recording and not written to the device"
+)
 RESTRICTED = "only these effects were considered, beside the device's own parameters: {}"
 
 
@@ -233,11 +239,21 @@ def _notes(
         *search.fitter.noise.notes,
         *marks,
         *map(RESTLESS.format, restless),
+        *clock_note(search.fitter),
         *told_of_machine,
         *([] if laws is None else [RESTRICTED.format(", ".join(law.kind for law in effects) or "none")]),
         *(WITHDRAWN.format(cause_name(c)) for c in search.withdrawn),
         *(f"could not be tried: {text}" for text in failed),
     )
+
+
+def clock_note(fitter: Fitter) -> list[str]:
+    """By how much the drive is off its time stamps, where that is more than stamps usually are."""
+    stamps = stamp_deviation(fitter.recording)
+    if abs(fitter.clock) <= TOLD * stamps:
+        return []
+    side = "before" if fitter.clock > 0 else "behind"
+    return [OFF_ITS_STAMPS.format(number(abs(fitter.clock), 2), side, number(STAMPS * abs(fitter.clock) / stamps, 2))]
 
 
 def _hypotheses(device: Device, recording: Recording, effects: Sequence[type[Effect]]) -> list[Hypothesis]:

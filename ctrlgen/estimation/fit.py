@@ -18,6 +18,7 @@ from ctrlgen.estimation.error_model import ErrorModel, error_model
 from ctrlgen.estimation.initial_memory import begins_worse, turning_point_before
 from ctrlgen.estimation.leading_part import leading_part
 from ctrlgen.estimation.least_squares import LeastSquaresProblem, initial_state_sd, limited, whiten_residual
+from ctrlgen.estimation.moved_drive import with_drive_at
 from ctrlgen.estimation.noise import Noise
 from ctrlgen.estimation.settings import DISCREPANCY, FIT, HELD_OUT_REFIT, LEADING_PART, SIMULATION
 from ctrlgen.estimation.simulator import Simulator
@@ -90,13 +91,15 @@ class Fit:
 class Fitter:
     """Fits structures to one recording under the noise of its channels and the discrepancy `errors` of the models fitted.
 
-    Without `errors` there is noise alone. Optima are kept in the `checkpoint` where there is one.
+    Without `errors` there is noise alone. Optima are kept in the `checkpoint` where there is one. `clock` [s]: by how much the drive of
+    the records is taken to be off its time stamps.
     """
 
     recording: Recording
     noise: Noise
     checkpoint: Checkpoint | None = None
     errors: ErrorModel | None = None
+    clock: float = 0.0
 
     @property
     def error(self) -> ErrorModel:
@@ -106,6 +109,11 @@ class Fitter:
     def with_noise(self, noise: Noise) -> Fitter:
         """The same under another noise, without discrepancy."""
         return replace(self, noise=noise, errors=None)
+
+    def with_clock(self, clock: float) -> Fitter:
+        """The same with the drive of all records at t + `clock` [s]."""
+        records = tuple(with_drive_at(r, clock - self.clock) for r in self.recording.records)
+        return replace(self, recording=replace(self.recording, records=records), clock=clock)
 
     def with_errors_of(self, fit: Fit) -> Fitter:
         """The same with the discrepancy that `fit` leaves on the records to fit."""
@@ -242,7 +250,7 @@ class Fitter:
             return _fit_at(problem, self._descended(problem, problem.to_scaled(start), steps, enough))
         s, noise, corner = problem.structure, self.error.weighted, self.error.corner
         valid = [r.valid for r in self.recording.records]
-        begun = (s.starts, s.expanded_at, sorted(s.nominal_starts.items()), s.free, s.finer)
+        begun = (s.starts, s.expanded_at, sorted(s.nominal_starts.items()), s.free, s.finer, self.clock)
         key = key_of(s.causes, *begun, start, steps, enough, noise.sd, corner, *noise.ar, *valid)
         optimum = self.checkpoint.recall(key)
         if optimum is None:

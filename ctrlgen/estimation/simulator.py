@@ -9,18 +9,17 @@ State S = (x, z), drive u, ambient e, free parameters p:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import cached_property, lru_cache
 from typing import Any
 
 import casadi as ca
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from ctrlgen.devices import Device
 from ctrlgen.estimation.forward_sensitivities import forward_sensitivities, written_out
 from ctrlgen.estimation.hypothesis import nominal_physics
 from ctrlgen.estimation.late_readings import LateReading, effects_apart, late_readings, read_late, unknown_samples
+from ctrlgen.estimation.moved_drive import with_drive_at
 from ctrlgen.estimation.sample_equations import SampleEquations, build_sample_equations
 from ctrlgen.estimation.settings import SIMULATION
 from ctrlgen.model.assembly import build_model
@@ -74,18 +73,10 @@ class Simulator:
         return fixed, place
 
     def aligned(self, record: Record, p: np.ndarray) -> Record:
-        """The record with its drive at t + tau in place of t, tau the offset of the recorders' clocks; held at its ends.
-
-        Between samples a drive that is linear is interpolated by a cubic spline, a held one by its mean over a sample.
-        """
+        """The record with its drive at t + tau in place of t, tau the offset of the recorders' clocks: `with_drive_at`."""
         fixed, place = self._clock
         tau = fixed + (p[place] if place is not None else 0.0)
-        if tau == 0 or self.poses or len(record.time) < SIMULATION.shortest_spline:
-            return record
-        at = np.clip(record.time + tau, record.time[0], record.time[-1])
-        if not record.linear:
-            return replace(record, drive=np.column_stack([np.interp(at, record.time, u) for u in record.drive.T]))
-        return replace(record, drive=_spline(record)(at))
+        return record if self.poses else with_drive_at(record, tau)
 
     @cached_property
     def free_initial_states(self) -> tuple[int, ...]:
@@ -305,12 +296,6 @@ def _with_unknown(read: np.ndarray, record: Record, late: LateReading, age: floa
     wrong = np.where(valid[behind], observed[behind] - read[behind], 0.0)
     read[unknown] = np.where(valid[unknown], observed[unknown] - wrong, read[behind])
     return read
-
-
-@lru_cache(maxsize=SIMULATION.kept_splines)
-def _spline(record: Record) -> CubicSpline:
-    """The drive of a record as a function of time."""
-    return CubicSpline(record.time, record.drive)
 
 
 @lru_cache(maxsize=SIMULATION.kept)

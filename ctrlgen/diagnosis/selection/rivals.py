@@ -91,7 +91,7 @@ def acting_instead(trials: Trials, current: CandidateModel) -> CandidateModel:
 
 
 def _in_usual_shape(trials: Trials, current: CandidateModel, k: int) -> CandidateModel:
-    """The model with the shapes of cause k at their usual values, or as near as a fit from there stays, where it fits alike and
+    """The model with the shapes of cause k at their usual values, else as near as a fit from there stays, where it fits alike and
     foretells the held-out records no worse. A stop that is only touched may be a spring or a ball, and they part once it is run into."""
     cause, fit = current.causes[k], current.fit
     if cause.effect == PARAMETER:
@@ -106,19 +106,23 @@ def _in_usual_shape(trials: Trials, current: CandidateModel, k: int) -> Candidat
         off = abs(float(fit.theta[i]) - usual)
         if off == 0:
             continue
+        fitter = trials.fitter
         try:
             begun, theta = _begun_usual(trials, fit, k, i, usual)
-            again = scored(trials.fitter, trials.fitter.fit(begun, theta, steps=FIT.max_steps), current.cause)
+            # as it is, and as near as a fit from there stays
+            tried = [scored(fitter, fitter.fit(begun, theta, steps), current.cause) for steps in (0, FIT.max_steps)]
         except FAILURES as error:
             trials.note_failure(cause, error)
             continue
-        fitter = trials.fitter
-        alike = again.fit.objective <= fit.objective + MODEL_SELECTION.tie
-        # as fitted: where the shape is open, held-out records bend it to themselves
-        foretells = fitter.held_out_squares(again.fit) <= fitter.held_out_squares(fit)
-        if abs(float(again.fit.theta[i]) - usual) < off and alike and foretells:
-            trials.fitted[frozenset(again.causes)] = (again, FIT.max_steps)
-            current, fit = again, again.fit
+        left = fitter.held_out_squares(fit)
+        for again in tried:
+            alike = again.fit.objective <= fit.objective + MODEL_SELECTION.tie
+            # as fitted: where the shape is open, held-out records bend it to themselves
+            foretells = fitter.held_out_squares(again.fit) <= left
+            if abs(float(again.fit.theta[i]) - usual) < off and alike and foretells:
+                trials.fitted[frozenset(again.causes)] = (again, FIT.max_steps)
+                current, fit = again, again.fit
+                break
     return current
 
 

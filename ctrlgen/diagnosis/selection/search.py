@@ -29,6 +29,7 @@ from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.selection.supported import supported
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
 from ctrlgen.diagnosis.settings import SEARCH
+from ctrlgen.estimation.drive_clock import with_drive_clock
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.integration_error import with_steps_that_suffice
 from ctrlgen.estimation.isolated_outliers import mark_again
@@ -61,7 +62,7 @@ class Searcher:
             current = self._settled(current)
             if np.allclose(noise.floor, before.floor, rtol=SEARCH.same_noise):
                 break
-        current = self._finely_stepped(self.best_settled(current))
+        current = self.clocked(self._finely_stepped(self.best_settled(current)))
         current = acting_instead(trials, simplified(trials, current))
         # its numbers are not bent by the errors of a better model
         nominal = scored(trials.fitter, trials.fitter.described(device)[1])
@@ -106,6 +107,22 @@ class Searcher:
         trials.use(trials.fitter)  # what was fitted in longer ones is no fit of it
         fitted = trials.tried(structure, current.cause, steps=FIT.max_steps)
         return self._settled(fitted[0]) if fitted else current
+
+    def clocked(self, current: CandidateModel) -> CandidateModel:
+        """The same model with the drive as far off its time stamps as both kinds of records tell: that bends the numbers of what is
+        touched, and is no cause."""
+        trials = self.trials
+        try:
+            fitter, fit = with_drive_clock(trials.fitter, current.fit)
+        except FAILURES as error:
+            trials.note_failure(current.cause, error)
+            return current
+        if fitter is trials.fitter:
+            return current
+        trials.step("refit with the drive off its time stamps")
+        trials.use(fitter)
+        # a shape that was bent by the clock, and stays so from where it stands, would be refuted by noise alone
+        return self._settled(simplified(trials, scored(fitter, fit, current.cause)))
 
     def _learn_mismatch(self, described: CandidateModel) -> None:
         """What the device as described leaves on the held-out records is what causes are measured by."""

@@ -2,14 +2,15 @@
 
 A search adds what improves a criterion. The account is stricter: a cause that takes away less than a hundredth of the mismatch, or
 whose share or amplitude may be zero, is taken out and the rest fitted again. It stays where noise alone is left with it and more
-without it, where it takes away much of what is left, where only the records to fit could show it, and where the others need it: then
-it is part of them, not a cause.
+without it, unless its amplitude may be zero or lies at a bound, so that it stands in for something else; where it takes away much of what
+is left, where only the records to fit could show it, and where the others need it: then it is part of them, not a cause.
 """
 
 from __future__ import annotations
 
 from ctrlgen.diagnosis.selection.attribution import Attribution, attribute
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
+from ctrlgen.diagnosis.selection.objections import outside_its_range
 from ctrlgen.diagnosis.selection.pruning import held_out_energy
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import ATTRIBUTION
@@ -25,7 +26,9 @@ def supported(
     while True:
         account = attribute(trials.fitter, nominal, current, seed, trials.jobs)
         weak = sorted(_weak(account, current), key=lambda k: _share(account, k))
-        without = next((bare for k in weak if (bare := _without(trials, nominal, current, k)) is not None), None)
+        without = next(
+            (bare for k in weak if (bare := _without(trials, nominal, current, k, account)) is not None), None
+        )
         if without is None:
             return current, account
         current = without
@@ -53,17 +56,21 @@ def _share(account: Attribution, k: int) -> float:
     return 0.0 if share is None else share.value
 
 
-def _without(trials: Trials, nominal: CandidateModel, current: CandidateModel, k: int) -> CandidateModel | None:
+def _without(
+    trials: Trials, nominal: CandidateModel, current: CandidateModel, k: int, account: Attribution
+) -> CandidateModel | None:
     """The model without cause k, fitted to its end; None where it is needed."""
     fitted = trials.tried(current.fit.restarted.without(k), None)
     if not fitted:
         return None
     bare, compare = trials.converged(fitted[0]), trials.selection
-    if compare.improves_enough(bare, current) and (current.errors.is_noise or compare.unseen_in_held_out(bare)):
+    vague = amplitude_may_be_zero(current.fit, k)
+    stands_in = vague or (not is_shown(account, k) and outside_its_range(current.fit, k))
+    kept = current.errors.is_noise and not stands_in
+    if compare.improves_enough(bare, current) and (kept or compare.unseen_in_held_out(bare)):
         return None
     if not current.errors.is_noise and compare.takes_much(bare, current):
         return None
     energy = [held_out_energy(trials, t) for t in (bare, current, nominal)]
-    vague = amplitude_may_be_zero(current.fit, k)
     least = ATTRIBUTION.vague_share if vague else ATTRIBUTION.least_share
     return bare if energy[0] - energy[1] < least * energy[2] else None
