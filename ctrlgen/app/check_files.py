@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from ctrlgen.app.console import out
 from ctrlgen.app.diagnosis_console import print_recording
 from ctrlgen.app.scenario_console import print_shaper
 from ctrlgen.core.errors import Fault, InputError, Unreachable
 from ctrlgen.core.files import read_toml
-from ctrlgen.devices import load_device
+from ctrlgen.core.units import parse
+from ctrlgen.devices import Device, load_device
 from ctrlgen.devices.mechanism.mechanism import Mechanism
 from ctrlgen.devices.mechanism.modes import summary
+from ctrlgen.devices.mechanism.point_compliance import point_compliance
 from ctrlgen.devices.sensor import describe
 from ctrlgen.effects import laws
 from ctrlgen.estimation.law_needs import not_offered, refusals, usual
@@ -23,8 +27,9 @@ from ctrlgen.trajectory.infeasibility import check_feasible
 from ctrlgen.trajectory.scenario import load_scenario, model_of
 
 
-def check(file: Path, device: Path | None = None, figure: Path | None = None) -> None:
-    """Prints a summary of `file`; a recording needs the `device` that it was made on. `figure` also draws a mechanism.
+def check(file: Path, device: Path | None = None, figure: Path | None = None, point: str | None = None) -> None:
+    """Prints a summary of `file`; a recording needs the `device` that it was made on. `figure` also draws a mechanism; `point`, such as
+    "0 mm, 5 mm, 0 mm", is where its compliance and stiffness are printed in full.
 
     Raises InputError with every fault of the file, and Unreachable for a scenario whose path cannot be followed.
     """
@@ -39,7 +44,7 @@ def check(file: Path, device: Path | None = None, figure: Path | None = None) ->
     elif file.is_dir() or (file.suffix != ".py" and "kind" not in read_toml(file)):
         _check_scenario(file)
     else:
-        _check_device(file, figure)
+        _check_device(file, figure, point)
 
 
 def _check_recording(file: Path, device: Path) -> None:
@@ -77,8 +82,23 @@ def _check_scenario(file: Path) -> None:
     out.print(verdict, markup=False, soft_wrap=True)
 
 
-def _check_device(file: Path, figure: Path | None) -> None:
+def _point_of(device: Device, text: str) -> np.ndarray:
+    """The place (3,) [m] that was asked for."""
+    parts = text.split(",")
+    if not isinstance(device, Mechanism):
+        raise InputError("--point", [Fault(device.name, 'is no mechanism; only kind = "mechanism" has points')])
+    try:
+        place = np.array([parse(part.strip(), "m") for part in parts])
+    except ValueError as error:
+        raise InputError("--point", [Fault(text, str(error))]) from None
+    if place.shape != (3,):
+        raise InputError("--point", [Fault(text, 'is no point; give x, y and z, such as "0 mm, 5 mm, 0 mm"')])
+    return place
+
+
+def _check_device(file: Path, figure: Path | None, point: str | None) -> None:
     device = load_device(file)
+    asked = None if point is None else _point_of(device, point)
     model = build_model(device)
     if figure is not None:
         from ctrlgen.devices.mechanism.figure import draw_mechanism  # matplotlib takes a moment to import
@@ -100,6 +120,9 @@ def _check_device(file: Path, figure: Path | None) -> None:
         )
     for line in summary(device) if isinstance(device, Mechanism) else ():
         out.print(f"  {line}", markup=False, soft_wrap=True)
+    if asked is not None and isinstance(device, Mechanism):
+        for line in point_compliance(device, asked).lines():
+            out.print(f"  {line}", markup=False, soft_wrap=True)
     for limit in (*model.limits, *model.rate_limits):
         out.print(f"  {limit.text}")
     units = dict(zip(model.signals["reading"].channels, model.signals["reading"].units, strict=True))

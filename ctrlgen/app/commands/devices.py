@@ -32,6 +32,14 @@ def check(
         Path | None,
         typer.Option("--figure", help="Also draw a mechanism into this file, .svg or .png.", show_default=False),
     ] = None,
+    point: Annotated[
+        str | None,
+        typer.Option(
+            "--point",
+            help='Of a mechanism: all of compliance and stiffness at this point of its output body, "0 mm, 5 mm, 0 mm".',
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Read a device, scenario or recording and list every fault, or summarise what it describes.
 
@@ -42,7 +50,7 @@ def check(
     """
     from ctrlgen.app.check_files import check as checked
 
-    checked(file, device_path, as_picture("--figure", figure) if figure is not None else None)
+    checked(file, device_path, as_picture("--figure", figure) if figure is not None else None, point)
 
 
 @app.command(rich_help_panel=DEVICE_PANEL)

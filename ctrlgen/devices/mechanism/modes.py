@@ -13,6 +13,7 @@ from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.devices.mechanism.drawing import Drawing
 from ctrlgen.devices.mechanism.linear_range import range_lines
 from ctrlgen.devices.mechanism.load_effects import load_lines
+from ctrlgen.devices.mechanism.point_compliance import point_compliance
 from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.devices.mechanism.springs import Spring
 from ctrlgen.physics.rigid_bodies import GROUND
@@ -24,6 +25,7 @@ FREE = 1e-6  # of the largest singular value, below which springs hold nothing: 
 INERT = 1e-9  # of the largest mass of an axis, below which rounding moves it and no body
 FAR = 0.1  # of a frequency: as far as mass and stiffness of a drawing are from the built one's, roughly
 LIKE = 0.5  # of the modal assurance criterion: below it a condensed mode is no single mode
+NAMED = 8  # elements in a line
 STILL = 1e-9  # m/m or rad/m: of the motion per actuator, below which it is rounding
 
 
@@ -33,6 +35,34 @@ def freedoms(device: Drawing) -> tuple[int, int]:
     Each flexure holds its stiff directions ideally, a blade three and a wire one: c rows A of relative twists of all bodies,
     6 n - rank(A) and c - rank(A). Source: J. B. Hopkins, M. L. Culpepper, Precis. Eng. 34 (2010) 259 (ideal constraints).
     """
+    A, _ = constraints(device)
+    rank = int(np.linalg.matrix_rank(A, tol=_independent(device)))
+    return 6 * len(device.bodies) - rank, len(A) - rank
+
+
+def redundant_constraints(device: Drawing) -> dict[str, list[str]]:
+    """Of each element the directions that could be left out without another freedom: those that take part in a set of forces in balance
+    without a load. Those with a direction of their own, as of a stated compliance, are counted: "constraint 1"."""
+    A, names = constraints(device)
+    if not len(A):
+        return {}
+    U, values, _ = np.linalg.svd(A)
+    stressed = U[:, int((values > _independent(device)).sum()) :]  # forces in balance
+    found: dict[str, list[str]] = {}
+    for (element, direction), row in zip(names, stressed, strict=True):
+        if np.linalg.norm(row) > INDEPENDENT:
+            found.setdefault(element, []).append(direction)
+    return found
+
+
+def _independent(device: Drawing) -> float:
+    return INDEPENDENT * min(1.0, (SHORT_CHAIN / len(device.bodies)) ** 2)
+
+
+def constraints(device: Drawing) -> tuple[np.ndarray, list[tuple[str, str]]]:
+    """(c, 6 bodies) unit rows of what the flexures hold of the twists of all bodies, turns counted as displacements, and (element,
+    direction) of each."""
+    names: list[tuple[str, str]] = []
     c = Condensed(device, device.values())
     count, rows = len(device.bodies), []
     turn = np.array([device.size] * 3 + [1.0] * 3)  # twists (theta; delta) as displacements, wrenches (M; F) as forces
@@ -55,10 +85,10 @@ def freedoms(device: Drawing) -> tuple[int, int]:
             if body != GROUND:
                 A[:, 6 * body : 6 * body + 6] = sign * held
         rows.append(A)
+        held_by = e.section.ideal or [f"constraint {i + 1}" for i in range(len(A))]
+        names += [(e.name, direction) for direction in held_by]
     A = np.vstack([np.zeros((0, 6 * count)), *rows]) * np.tile([1 / device.size] * 3 + [1.0] * 3, count)
-    A /= np.linalg.norm(A, axis=1, keepdims=True)
-    rank = int(np.linalg.matrix_rank(A, tol=INDEPENDENT * min(1.0, (SHORT_CHAIN / count) ** 2)))
-    return 6 * count - rank, len(A) - rank
+    return A / np.linalg.norm(A, axis=1, keepdims=True), names
 
 
 def free_between_springs(device: Drawing) -> list[str]:
@@ -195,9 +225,15 @@ def summary(device: Drawing) -> list[str]:
     ]
     free, over = freedoms(device)
     lines.append(f"degrees of freedom without actuators: {free}; redundant constraints: {over}")
+    if over:
+        named = [f"{name} {', '.join(held)}" for name, held in redundant_constraints(device).items()]
+        more = f"; and of {len(named) - NAMED} more" if len(named) > NAMED else ""
+        lines.append(f"{over} among these are redundant: {'; '.join(named[:NAMED])}{more}")
     forces = ", ".join(f"{name} {show(1 / C[3 + i, i], 'N/um')}" for i, name in enumerate("xyz"))
     moments = ", ".join(f"{name} {show(1 / C[i, 3 + i], 'N*m/rad')}" for i, name in enumerate("xyz"))
     lines.append(f"stiffness at the output point: {forces}; about {moments}")
+    centre = point_compliance(device).centre_of_compliance
+    lines.append(f"centre of compliance: ({', '.join(show(x, 'mm') for x in centre)})")
     if len(modes := natural_frequencies(device)):
         lines.append(f"natural frequencies with the drives held: {', '.join(show(f, 'Hz') for f in modes[:6])}")
     condensed, left_out = condensed_modes(device)
