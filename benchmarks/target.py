@@ -60,7 +60,7 @@ def _ours(samples: Samples, c: CFolder, core: Core, real: Real, scratch: Path) -
     """Instructions of the longest step on the circle, and on the jumps."""
     name, n = c.online[real], samples.axes
     program = scratch / f"{name}.elf"
-    cross_compile(COMPILER, core, [c.path / f"{name}.c"], c.path, f"{name}_init", program)
+    cross_compile(COMPILER, core, [c.path / f"{name}.c"], c.path, c.init[real], program)
     machine = Machine(core, program)
     numbers = (2 * n + 1, samples.command.shape[1], 3 * n)  # of the state also the word that says it was initialised
     state, target, out = (machine.reserve(count, real) for count in numbers)
@@ -69,7 +69,7 @@ def _ours(samples: Samples, c: CFolder, core: Core, real: Real, scratch: Path) -
         machine.write(target, wanted, real)
         return machine.call(f"{name}_{function}", state, target, out)
 
-    machine.call(f"{name}_init", state)
+    machine.call(c.init[real], state)
     circle = [call("settle", samples.command[-1]), *(call("step", t) for t in samples.command)]
     jumps = [call("step", t) for t in samples.jumps()]
     lost = ControllerStatus.LOST | ControllerStatus.INPUT

@@ -151,12 +151,12 @@ def test_counting_by_block_is_counting_every_instruction(cross, folder, referenc
 
     name = folder.online[Real.FLOAT]
     program = tmp_path / "online.elf"
-    cross_compile(cross, M4F, [folder.path / f"{name}.c"], folder.path, f"{name}_init", program)
+    cross_compile(cross, M4F, [folder.path / f"{name}.c"], folder.path, folder.init[Real.FLOAT], program)
     machine = Machine(M4F, program)
     single = Single()
     machine.emulator.hook_add(unicorn.UC_HOOK_CODE, single)
     state, target, out = (machine.reserve(count, Real.FLOAT) for count in (13, 6, 18))
-    machine.call(f"{name}_init", state)
+    machine.call(folder.init[Real.FLOAT], state)
     counts = []
     for wanted in [*reference.command[:5], *reference.random[-15:]]:
         machine.write(target, wanted, Real.FLOAT)

@@ -77,6 +77,7 @@ class Library:
     folder: Path
     real: Real
     name: str
+    start: str  # the symbol that the header's init calls
 
     def __post_init__(self) -> None:
         library = self.folder / f"lib_{self.real.suffix}.so"
@@ -89,11 +90,11 @@ class Library:
     def init(self, values: dict[str, float] | None = None) -> int:
         """Starts with constants [SI, by path]; those left out, and all for None, as in the file."""
         if values is None:
-            self._calls[f"{self.name}_init"](self.state)
+            self._calls[self.start](self.state)
             return 0
         stated = self.scenario.device.given_at_start
         constants = (self.number * len(stated))(*(values.get(c.path, c.default) for c in stated))
-        return self._calls[f"{self.name}_init_with"](self.state, constants)
+        return self._calls[self.start.replace("_init_", "_init_with_")](self.state, constants)
 
     def load(self, data: bytes) -> tuple[int, np.ndarray]:
         """Status of the loader of constants.bin, and what it wrote, NaN where it wrote nothing."""
@@ -132,7 +133,7 @@ def volts(tmp_path_factory) -> Scenario:
 def libraries(volts, tmp_path_factory):
     scenario = volts
     made = generate(scenario, build_model(scenario.device), tmp_path_factory.mktemp("volts_c") / "c")
-    return {real: Library(scenario, made.path, real, made.online[real]) for real in Real}
+    return {real: Library(scenario, made.path, real, made.online[real], made.init[real]) for real in Real}
 
 
 @pytest.fixture(scope="module")
@@ -353,7 +354,7 @@ def test_the_c_of_a_robust_path_keeps_its_reserves_whatever_constants_it_is_give
     model = build_model(scenario.device).tightened({"temperature": (0.0, 60.0), "stroke": (0.0, 15e-6)}, 0.999)
     made = generate(scenario, model, tmp_path / "c")
     library, controller = (
-        Library(scenario, made.path, Real.DOUBLE, made.online[Real.DOUBLE]),
+        Library(scenario, made.path, Real.DOUBLE, made.online[Real.DOUBLE], made.init[Real.DOUBLE]),
         controller_of(model, "pose", 1e-3),
     )
     size = float(np.abs(controller.kernels.nominal.u_bounds[1]).max())

@@ -433,7 +433,7 @@ static int line_search(const limiter_state *state, int settling, const real orig
 #if GIVEN
 #include "start_constants.c"
 #else
-void limiter_init(limiter_state *state)
+void INIT(limiter_state *state)
 {
 #if NX && !NS
     static const real X_REST[NX] = REST_TABLE; /* SI */
@@ -453,7 +453,7 @@ void limiter_init(limiter_state *state)
             state->u[i] = U_SAFE[i];
         }
 #endif
-        state->ready = READY;
+        state->ready = LIMITER_BUILD;
     }
 }
 

@@ -80,7 +80,7 @@ static uint32_t motion_drives(limiter_state *at, const limiter_state *state, con
         out->state[i] = at->x[i];
     }
 #endif
-    at->ready = READY;
+    at->ready = LIMITER_BUILD;
     return status;
 }
 
@@ -89,7 +89,7 @@ uint32_t limiter_step(limiter_state *state, const real target[M], limiter_output
     uint32_t status = LIMITER_INPUT;
     if ((state == NULL) || (target == NULL) || (out == NULL)) {
         /* nothing is written */
-    } else if ((state->ready != READY) || (is_lost(state) != 0)) {
+    } else if ((state->ready != LIMITER_BUILD) || (is_lost(state) != 0)) {
         status = set_lost(state, out);
     } else if (is_usable(target) == 0) {
         settle_safe(state, out);

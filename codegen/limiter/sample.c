@@ -27,10 +27,10 @@
 #define EXAMINED_FIRST STEP_EXAMINED_FIRST
 #endif
 #if EXAMINED_FIRST
-#define CANNOT_BE_USED (state->ready != READY) || (is_lost(state) != 0)
+#define CANNOT_BE_USED (state->ready != LIMITER_BUILD) || (is_lost(state) != 0)
 #define WAS_BEYOND hit != 0
 #else
-#define CANNOT_BE_USED state->ready != READY
+#define CANNOT_BE_USED state->ready != LIMITER_BUILD
 #define WAS_BEYOND (hit != 0) && (status != LIMITER_LOST)
 #endif
 #if DRIVE_LIMITED

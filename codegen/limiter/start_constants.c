@@ -17,7 +17,7 @@ static int constants_within(const limiter_constants *constants)
 
 const limiter_constants limiter_defaults = DEFAULTS;
 
-uint32_t limiter_init_with(limiter_state *state, const limiter_constants *constants)
+uint32_t INIT_WITH(limiter_state *state, const limiter_constants *constants)
 {
 #if NX && !NS && !REST_GIVEN
     static const real X_REST[NX] = REST_TABLE; /* SI */
@@ -47,15 +47,15 @@ uint32_t limiter_init_with(limiter_state *state, const limiter_constants *consta
             state->u[i] = U_SAFE[i];
         }
 #endif
-        state->ready = READY;
+        state->ready = LIMITER_BUILD;
         status = 0U;
     }
     return status;
 }
 
-void limiter_init(limiter_state *state)
+void INIT(limiter_state *state)
 {
-    (void)limiter_init_with(state, &limiter_defaults);
+    (void)INIT_WITH(state, &limiter_defaults);
 }
 
 /* CRC-32 of IEEE 802.3, as of zlib. */
@@ -133,7 +133,7 @@ uint32_t SET_INPUT(limiter_state *state, real input)
     uint32_t status = LIMITER_INPUT;
     if (state == NULL) {
         /* nothing is written */
-    } else if (state->ready != READY) {
+    } else if (state->ready != LIMITER_BUILD) {
         status = LIMITER_LOST;
     } else if (!(INPUT_WITHIN)) {
         status = LIMITER_CONSTANTS;

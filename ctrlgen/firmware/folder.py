@@ -42,6 +42,8 @@ class CFolder(Shown):
     player: dict[Real, str]
     selftest: dict[Real, str]
     vectors: dict[Real, str]
+    # The symbol that the header's `..._init` calls
+    init: dict[Real, str]
     compression: dict[Real, Compression]
     operations: int
     worst_operations: int
@@ -120,6 +122,7 @@ def generate(
         pieces["player"],
         pieces["selftest"],
         pieces["vectors"],
+        {real: f"{names['online'][real]}_init_{contexts[real]['build']}" for real in Real},
         compression,
         operations=cost["step"],
         worst_operations=cost["worst"],

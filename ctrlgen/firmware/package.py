@@ -137,6 +137,7 @@ def _context(
         "title": scenario.file.title,
         "device": scenario.device.name,
         "owners": owners(scenario),
+        "builds": {real.suffix: contexts[real]["build"] for real in Real},
         "pieces": ["online", *(["player"] if c["player"] else []), "selftest", "vectors"],
         "arrays": arrays,
         "elements": lambda signal: [

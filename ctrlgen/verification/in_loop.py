@@ -71,7 +71,7 @@ def _run(
     for piece, names in (("online", folder.online), ("player", folder.player)):
         if names:
             program = scratch / f"{piece}_{core.name}_{compiler}_{real.suffix}.elf"
-            entry = f"{names[real]}_init" if piece == "online" else f"{names[real]}_sample"
+            entry = folder.init[real] if piece == "online" else f"{names[real]}_sample"
             cross_compile(compiler, core, [folder.path / f"{names[real]}.c"], folder.path, entry, program)
             machines[piece] = Machine(core, program)
     costs, compared = [], _Compared(real)
@@ -122,7 +122,7 @@ def _sequences(
 
     random = ref.random[:: max(1, len(ref.random) // RANDOM)]
     if ref.scenario.sample_time is not None:
-        machine.call(f"{online}_init", state)
+        machine.call(folder.init[real], state)
         machine.write(state, np.concatenate(ref.start), real)
         yield CallKind.STEP_SCENARIO, answers("step", ref.command), host.followed(ref.command, ref.start)
         rest = ref.controller.rest()
@@ -130,9 +130,9 @@ def _sequences(
             machine.write(state, np.concatenate(rest), real)
             yield what, answers("step", targets), host.followed(targets, rest)
     else:  # nothing but equilibria
-        machine.call(f"{online}_init", state)
+        machine.call(folder.init[real], state)
         yield CallKind.SETTLE_SCENARIO, answers("settle", ref.command), host.settled(ref.command)
-    machine.call(f"{online}_init", state)
+    machine.call(folder.init[real], state)
     yield CallKind.SETTLE_RANDOM, answers("settle", random), host.settled(random)
     if "player" in machines:
         player, drive = machines["player"], machines["player"].reserve(nu, real)

@@ -12,8 +12,6 @@ static const float U_HIGH[1] = { 4.0f }; /* V */
 static const float U_SLACK[1] = { 8e-06f }; /* V */
 static const float U_SAFE[1] = { 0.0f }; /* V */
 
-#define READY (0xA500A500U) /* in a state that was initialised; zeros and most other bytes are not this word */
-
 /* The bits of a number in memory. Whether a number is one, and how large, is asked of these: a compiler that is told that no number is NaN
  * may leave comparisons of numbers out, never those of integers. */
 static uint32_t bits_of(const float *number)
@@ -135,7 +133,7 @@ static int limit_displacement(float value[1])
     return limit_all(value, LOW, HIGH, SLACK, 1);
 }
 
-void flexure_axis_online_f32_init(flexure_axis_online_f32_state *state)
+void flexure_axis_online_f32_init_20000hz_e8b80b62(flexure_axis_online_f32_state *state)
 {
     static const float X_REST[1] = { 0.0f }; /* SI */
     if (state != NULL) {
@@ -146,7 +144,7 @@ void flexure_axis_online_f32_init(flexure_axis_online_f32_state *state)
         for (i = 0; i < 1; i++) {
             state->z[i] = 0.0f;
         }
-        state->ready = READY;
+        state->ready = FLEXURE_AXIS_ONLINE_F32_BUILD;
     }
 }
 
@@ -202,7 +200,7 @@ uint32_t flexure_axis_online_f32_settle(flexure_axis_online_f32_state *state, co
     uint32_t status = FLEXURE_AXIS_ONLINE_F32_INPUT;
     if ((state == NULL) || (target == NULL) || (out == NULL)) {
         /* nothing is written */
-    } else if ((state->ready != READY) || (is_lost(state) != 0)) {
+    } else if ((state->ready != FLEXURE_AXIS_ONLINE_F32_BUILD) || (is_lost(state) != 0)) {
         status = set_lost(state, out);
     } else if (is_usable(target) != 0) {
         wanted_displacement(target, out->displacement);
@@ -261,7 +259,7 @@ static uint32_t motion_drives(flexure_axis_online_f32_state *at, const flexure_a
     for (i = 0; i < 1; i++) {
         out->displacement[i] = at->z[i];
     }
-    at->ready = READY;
+    at->ready = FLEXURE_AXIS_ONLINE_F32_BUILD;
     return status;
 }
 
@@ -270,7 +268,7 @@ uint32_t flexure_axis_online_f32_step(flexure_axis_online_f32_state *state, cons
     uint32_t status = FLEXURE_AXIS_ONLINE_F32_INPUT;
     if ((state == NULL) || (target == NULL) || (out == NULL)) {
         /* nothing is written */
-    } else if ((state->ready != READY) || (is_lost(state) != 0)) {
+    } else if ((state->ready != FLEXURE_AXIS_ONLINE_F32_BUILD) || (is_lost(state) != 0)) {
         status = set_lost(state, out);
     } else if (is_usable(target) == 0) {
         settle_safe(state, out);

@@ -31,6 +31,7 @@ extern "C" {
 #define FLEXURE_AXIS_ONLINE_F32_VERSION "0.1.0" /* of ctrlgen */
 #define FLEXURE_AXIS_ONLINE_F32_DEVICE_HASH (0x5f641b21U) /* the first 32 bits of the SHA-256 of the device's description */
 #define FLEXURE_AXIS_ONLINE_F32_RATE_HZ (20000U) /* samples a second */
+#define FLEXURE_AXIS_ONLINE_F32_BUILD (0xE8B80B62U) /* of device, followed signal, rate, limits and arithmetic; the mark of an initialised state */
 #define FLEXURE_AXIS_ONLINE_F32_TARGET_SIZE (3U)
 #define FLEXURE_AXIS_ONLINE_F32_DRIVE_SIZE (1U)
 #define FLEXURE_AXIS_ONLINE_F32_DISPLACEMENT_SIZE (1U)
@@ -40,12 +41,12 @@ extern "C" {
 #define FLEXURE_AXIS_ONLINE_F32_DISPLACEMENT (1U) /* target beyond the displacement range: the nearest target inside was taken */
 #define FLEXURE_AXIS_ONLINE_F32_DRIVE (8U)        /* drive at its limit: the motion is left */
 #define FLEXURE_AXIS_ONLINE_F32_INPUT (16U)       /* NaN, infinite or absurdly large target, or NULL pointer: drives at zero or the nearest admissible value */
-#define FLEXURE_AXIS_ONLINE_F32_LOST (32U)        /* the state was not initialised, or a number of it is NaN, infinite or absurd: drives as with INPUT, state kept, until flexure_axis_online_f32_init */
+#define FLEXURE_AXIS_ONLINE_F32_LOST (32U)        /* the state was not initialised, is that of another build, or a number of it is NaN, infinite or absurd: drives as with INPUT, state kept, until flexure_axis_online_f32_init */
 
 typedef struct {
     float x[1]; /* velocity_axis [m / s] */
     float z[FLEXURE_AXIS_ONLINE_F32_DISPLACEMENT_SIZE]; /* displacement_axis [m] */
-    uint32_t ready; /* set by flexure_axis_online_f32_init */
+    uint32_t ready; /* FLEXURE_AXIS_ONLINE_F32_BUILD once flexure_axis_online_f32_init was called */
 } flexure_axis_online_f32_state;
 
 typedef struct {
@@ -53,8 +54,15 @@ typedef struct {
     float displacement[FLEXURE_AXIS_ONLINE_F32_DISPLACEMENT_SIZE]; /* m */
 } flexure_axis_online_f32_output;
 
+/* What flexure_axis_online_f32_init calls. It is linked by a name of this build, rate and hash of device, signal and limits: a program that was
+ * compiled with this header and is linked with another build of the same prefix is told so by the linker. */
+void flexure_axis_online_f32_init_20000hz_e8b80b62(flexure_axis_online_f32_state *state);
+
 /* A cold device at rest. Also the way out of status LOST: hold the safe drive until the device has settled, then call it. */
-void flexure_axis_online_f32_init(flexure_axis_online_f32_state *state);
+static inline void flexure_axis_online_f32_init(flexure_axis_online_f32_state *state)
+{
+    flexure_axis_online_f32_init_20000hz_e8b80b62(state);
+}
 
 /* Drive of the equilibrium at the position of target; the state becomes that equilibrium. Hold the drive until the device has settled. */
 uint32_t flexure_axis_online_f32_settle(flexure_axis_online_f32_state *state, const float target[FLEXURE_AXIS_ONLINE_F32_TARGET_SIZE], flexure_axis_online_f32_output *out);

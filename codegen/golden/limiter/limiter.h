@@ -35,6 +35,7 @@ extern "C" {
 #define LIMITER_VERSION "0.1.0" /* of ctrlgen */
 #define LIMITER_DEVICE_HASH (0x39f6d797U) /* the first 32 bits of the SHA-256 of the device's description */
 #define LIMITER_RATE_HZ (1000U) /* samples a second */
+#define LIMITER_BUILD (0x1088D91CU) /* of device, followed signal, rate, limits and arithmetic; the mark of an initialised state */
 #define LIMITER_TARGET_SIZE (6U)
 #define LIMITER_DRIVE_SIZE (6U)
 #define LIMITER_DISPLACEMENT_SIZE (6U)
@@ -45,12 +46,12 @@ extern "C" {
 #define LIMITER_COMPOSITE (2U)    /* wire flexure stress: displacement scaled toward home */
 #define LIMITER_DRIVE (8U)        /* heater power at its limit: the target is approached as far as one sample allows */
 #define LIMITER_INPUT (16U)       /* NaN, infinite or absurdly large target, or NULL pointer: drives at zero or the nearest admissible value */
-#define LIMITER_LOST (32U)        /* the state was not initialised, or a number of it is NaN, infinite or absurd: drives as with INPUT, state kept, until limiter_init */
+#define LIMITER_LOST (32U)        /* the state was not initialised, is that of another build, or a number of it is NaN, infinite or absurd: drives as with INPUT, state kept, until limiter_init */
 
 typedef struct {
     float x[6]; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
     float z[LIMITER_DISPLACEMENT_SIZE]; /* displacement_1X, displacement_1Y, displacement_2X, displacement_2Y, displacement_3X, displacement_3Y [m] */
-    uint32_t ready; /* set by limiter_init */
+    uint32_t ready; /* LIMITER_BUILD once limiter_init was called */
 } limiter_state;
 
 typedef struct {
@@ -59,8 +60,15 @@ typedef struct {
     float state[LIMITER_STATE_SIZE]; /* 1X [K], 1Y [K], 2X [K], 2Y [K], 3X [K], 3Y [K] */
 } limiter_output;
 
+/* What limiter_init calls. It is linked by a name of this build, rate and hash of device, signal and limits: a program that was
+ * compiled with this header and is linked with another build of the same prefix is told so by the linker. */
+void limiter_init_1000hz_1088d91c(limiter_state *state);
+
 /* A cold device at rest. Also the way out of status LOST: hold the safe drive until the device has settled, then call it. */
-void limiter_init(limiter_state *state);
+static inline void limiter_init(limiter_state *state)
+{
+    limiter_init_1000hz_1088d91c(state);
+}
 
 /* Drive of the equilibrium at target; the state becomes that equilibrium. Hold the drive until the device has settled. */
 uint32_t limiter_settle(limiter_state *state, const float target[LIMITER_TARGET_SIZE], limiter_output *out);

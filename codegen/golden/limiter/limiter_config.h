@@ -54,6 +54,8 @@ typedef float real;
 #define SECANT_STEPS 3
 #define GROUPS 0
 #define GIVEN 0
+#define INIT limiter_init_1000hz_1088d91c
+#define INIT_WITH limiter_init_with_1000hz_1088d91c
 #define Z_LOW_TABLE { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }
 #define Z_HIGH_TABLE { 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f }
 #define Z_SLACK_TABLE { 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f }
@@ -102,8 +104,6 @@ static const float U_LEAST[6] = { -4.012113e-06f, -4.012113e-06f, -4.012113e-06f
 static const float U_MOST[6] = { 1.000004f, 1.000004f, 1.000004f, 1.000004f, 1.000004f, 1.000004f }; /* admissible, W */
 static const float U_SAFE[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
 static const float X_REST[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
-
-#define READY (0xA500A500U) /* in a state that was initialised; zeros and most other bytes are not this word */
 
 /* The bits of a number in memory. Whether a number is one, and how large, is asked of these: a compiler that is told that no number is NaN
  * may leave comparisons of numbers out, never those of integers. */

@@ -15,8 +15,6 @@ static const float U_MOST[6] = { 1.000004f, 1.000004f, 1.000004f, 1.000004f, 1.0
 static const float U_SAFE[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
 static const float X_REST[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
 
-#define READY (0xA500A500U) /* in a state that was initialised; zeros and most other bytes are not this word */
-
 /* The bits of a number in memory. Whether a number is one, and how large, is asked of these: a compiler that is told that no number is NaN
  * may leave comparisons of numbers out, never those of integers. */
 static uint32_t bits_of(const float *number)
@@ -600,7 +598,7 @@ static int line_search(const mems_hexapod_online_f32_state *state, int settling,
     return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, 6);
 }
 
-void mems_hexapod_online_f32_init(mems_hexapod_online_f32_state *state)
+void mems_hexapod_online_f32_init_1000hz_1088d91c(mems_hexapod_online_f32_state *state)
 {
     if (state != NULL) {
         int i;
@@ -610,7 +608,7 @@ void mems_hexapod_online_f32_init(mems_hexapod_online_f32_state *state)
         for (i = 0; i < 6; i++) {
             state->z[i] = 0.0f;
         }
-        state->ready = READY;
+        state->ready = MEMS_HEXAPOD_ONLINE_F32_BUILD;
     }
 }
 
@@ -700,7 +698,7 @@ uint32_t mems_hexapod_online_f32_settle(mems_hexapod_online_f32_state *state, co
     uint32_t status = MEMS_HEXAPOD_ONLINE_F32_INPUT;
     if ((state == NULL) || (target == NULL) || (out == NULL)) {
         /* nothing is written */
-    } else if (state->ready != READY) {
+    } else if (state->ready != MEMS_HEXAPOD_ONLINE_F32_BUILD) {
         status = set_lost(state, out);
     } else if (is_usable(target) != 0) {
         wanted_displacement(target, out->displacement);
@@ -822,7 +820,7 @@ uint32_t mems_hexapod_online_f32_step(mems_hexapod_online_f32_state *state, cons
     uint32_t status = MEMS_HEXAPOD_ONLINE_F32_INPUT;
     if ((state == NULL) || (target == NULL) || (out == NULL)) {
         /* nothing is written */
-    } else if (state->ready != READY) {
+    } else if (state->ready != MEMS_HEXAPOD_ONLINE_F32_BUILD) {
         status = set_lost(state, out);
     } else if (is_usable(target) != 0) {
         wanted_displacement(target, out->displacement);

@@ -35,6 +35,7 @@ extern "C" {
 #define MEMS_HEXAPOD_ONLINE_F32_VERSION "0.1.0" /* of ctrlgen */
 #define MEMS_HEXAPOD_ONLINE_F32_DEVICE_HASH (0x39f6d797U) /* the first 32 bits of the SHA-256 of the device's description */
 #define MEMS_HEXAPOD_ONLINE_F32_RATE_HZ (1000U) /* samples a second */
+#define MEMS_HEXAPOD_ONLINE_F32_BUILD (0x1088D91CU) /* of device, followed signal, rate, limits and arithmetic; the mark of an initialised state */
 #define MEMS_HEXAPOD_ONLINE_F32_TARGET_SIZE (6U)
 #define MEMS_HEXAPOD_ONLINE_F32_DRIVE_SIZE (6U)
 #define MEMS_HEXAPOD_ONLINE_F32_DISPLACEMENT_SIZE (6U)
@@ -45,12 +46,12 @@ extern "C" {
 #define MEMS_HEXAPOD_ONLINE_F32_COMPOSITE (2U)    /* wire flexure stress: displacement scaled toward home */
 #define MEMS_HEXAPOD_ONLINE_F32_DRIVE (8U)        /* heater power at its limit: the target is approached as far as one sample allows */
 #define MEMS_HEXAPOD_ONLINE_F32_INPUT (16U)       /* NaN, infinite or absurdly large target, or NULL pointer: drives at zero or the nearest admissible value */
-#define MEMS_HEXAPOD_ONLINE_F32_LOST (32U)        /* the state was not initialised, or a number of it is NaN, infinite or absurd: drives as with INPUT, state kept, until mems_hexapod_online_f32_init */
+#define MEMS_HEXAPOD_ONLINE_F32_LOST (32U)        /* the state was not initialised, is that of another build, or a number of it is NaN, infinite or absurd: drives as with INPUT, state kept, until mems_hexapod_online_f32_init */
 
 typedef struct {
     float x[6]; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
     float z[MEMS_HEXAPOD_ONLINE_F32_DISPLACEMENT_SIZE]; /* displacement_1X, displacement_1Y, displacement_2X, displacement_2Y, displacement_3X, displacement_3Y [m] */
-    uint32_t ready; /* set by mems_hexapod_online_f32_init */
+    uint32_t ready; /* MEMS_HEXAPOD_ONLINE_F32_BUILD once mems_hexapod_online_f32_init was called */
 } mems_hexapod_online_f32_state;
 
 typedef struct {
@@ -59,8 +60,15 @@ typedef struct {
     float state[MEMS_HEXAPOD_ONLINE_F32_STATE_SIZE]; /* 1X [K], 1Y [K], 2X [K], 2Y [K], 3X [K], 3Y [K] */
 } mems_hexapod_online_f32_output;
 
+/* What mems_hexapod_online_f32_init calls. It is linked by a name of this build, rate and hash of device, signal and limits: a program that was
+ * compiled with this header and is linked with another build of the same prefix is told so by the linker. */
+void mems_hexapod_online_f32_init_1000hz_1088d91c(mems_hexapod_online_f32_state *state);
+
 /* A cold device at rest. Also the way out of status LOST: hold the safe drive until the device has settled, then call it. */
-void mems_hexapod_online_f32_init(mems_hexapod_online_f32_state *state);
+static inline void mems_hexapod_online_f32_init(mems_hexapod_online_f32_state *state)
+{
+    mems_hexapod_online_f32_init_1000hz_1088d91c(state);
+}
 
 /* Drive of the equilibrium at target; the state becomes that equilibrium. Hold the drive until the device has settled. */
 uint32_t mems_hexapod_online_f32_settle(mems_hexapod_online_f32_state *state, const float target[MEMS_HEXAPOD_ONLINE_F32_TARGET_SIZE], mems_hexapod_online_f32_output *out);

@@ -16,8 +16,6 @@ static const float U_SAFE[3] = { 0.0f, 0.0f, 0.0f }; /* V */
 static const float FALL[3] = { -5.0f, -1e+18f, -1e+18f }; /* V a sample */
 static const float RISE[3] = { 5.0f, 1e+18f, 1e+18f }; /* V a sample */
 
-#define READY (0xA500A500U) /* in a state that was initialised; zeros and most other bytes are not this word */
-
 /* The bits of a number in memory. Whether a number is one, and how large, is asked of these: a compiler that is told that no number is NaN
  * may leave comparisons of numbers out, never those of integers. */
 static uint32_t bits_of(const float *number)
@@ -346,7 +344,7 @@ static int line_search(const three_stacks_online_f32_state *state, int settling,
     return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, 3);
 }
 
-void three_stacks_online_f32_init(three_stacks_online_f32_state *state)
+void three_stacks_online_f32_init_1000hz_b11068ba(three_stacks_online_f32_state *state)
 {
     if (state != NULL) {
         int i;
@@ -356,7 +354,7 @@ void three_stacks_online_f32_init(three_stacks_online_f32_state *state)
         for (i = 0; i < 3; i++) {
             state->u[i] = U_SAFE[i];
         }
-        state->ready = READY;
+        state->ready = THREE_STACKS_ONLINE_F32_BUILD;
     }
 }
 
@@ -467,7 +465,7 @@ uint32_t three_stacks_online_f32_settle(three_stacks_online_f32_state *state, co
     uint32_t status = THREE_STACKS_ONLINE_F32_INPUT;
     if ((state == NULL) || (target == NULL) || (out == NULL)) {
         /* nothing is written */
-    } else if (state->ready != READY) {
+    } else if (state->ready != THREE_STACKS_ONLINE_F32_BUILD) {
         status = set_lost(state, out);
     } else if (is_usable(target) != 0) {
         wanted_displacement(target, out->displacement);
@@ -583,7 +581,7 @@ uint32_t three_stacks_online_f32_step(three_stacks_online_f32_state *state, cons
     uint32_t status = THREE_STACKS_ONLINE_F32_INPUT;
     if ((state == NULL) || (target == NULL) || (out == NULL)) {
         /* nothing is written */
-    } else if (state->ready != READY) {
+    } else if (state->ready != THREE_STACKS_ONLINE_F32_BUILD) {
         status = set_lost(state, out);
     } else if (is_usable(target) != 0) {
         wanted_displacement(target, out->displacement);

@@ -34,6 +34,7 @@ extern "C" {
 #define THREE_STACKS_ONLINE_F32_VERSION "0.1.0" /* of ctrlgen */
 #define THREE_STACKS_ONLINE_F32_DEVICE_HASH (0x75df1da7U) /* the first 32 bits of the SHA-256 of the device's description */
 #define THREE_STACKS_ONLINE_F32_RATE_HZ (1000U) /* samples a second */
+#define THREE_STACKS_ONLINE_F32_BUILD (0xB11068BAU) /* of device, followed signal, rate, limits and arithmetic; the mark of an initialised state */
 #define THREE_STACKS_ONLINE_F32_TARGET_SIZE (2U)
 #define THREE_STACKS_ONLINE_F32_DRIVE_SIZE (3U)
 #define THREE_STACKS_ONLINE_F32_DISPLACEMENT_SIZE (2U)
@@ -43,13 +44,13 @@ extern "C" {
 #define THREE_STACKS_ONLINE_F32_DISPLACEMENT (1U) /* target beyond the displacement range: the nearest target inside was taken */
 #define THREE_STACKS_ONLINE_F32_DRIVE (8U)        /* drive at its limit: the target is approached as far as one sample allows */
 #define THREE_STACKS_ONLINE_F32_INPUT (16U)       /* NaN, infinite or absurdly large target, or NULL pointer: drives at zero or the nearest admissible value */
-#define THREE_STACKS_ONLINE_F32_LOST (32U)        /* the state was not initialised, or a number of it is NaN, infinite or absurd: drives as with INPUT, state kept, until three_stacks_online_f32_init */
+#define THREE_STACKS_ONLINE_F32_LOST (32U)        /* the state was not initialised, is that of another build, or a number of it is NaN, infinite or absurd: drives as with INPUT, state kept, until three_stacks_online_f32_init */
 #define THREE_STACKS_ONLINE_F32_RATE (128U)       /* drive changes as fast as it may: the target is reached later. Bits of limits beside it: also those that the device passes, because no drive can turn back faster */
 
 typedef struct {
     float z[THREE_STACKS_ONLINE_F32_DISPLACEMENT_SIZE]; /* displacement_x, displacement_y [m] */
     float u[THREE_STACKS_ONLINE_F32_DRIVE_SIZE]; /* last drive: a [V], b [V], c [V] */
-    uint32_t ready; /* set by three_stacks_online_f32_init */
+    uint32_t ready; /* THREE_STACKS_ONLINE_F32_BUILD once three_stacks_online_f32_init was called */
 } three_stacks_online_f32_state;
 
 typedef struct {
@@ -57,8 +58,15 @@ typedef struct {
     float displacement[THREE_STACKS_ONLINE_F32_DISPLACEMENT_SIZE]; /* m */
 } three_stacks_online_f32_output;
 
+/* What three_stacks_online_f32_init calls. It is linked by a name of this build, rate and hash of device, signal and limits: a program that was
+ * compiled with this header and is linked with another build of the same prefix is told so by the linker. */
+void three_stacks_online_f32_init_1000hz_b11068ba(three_stacks_online_f32_state *state);
+
 /* A cold device at rest, its drives off. Also the way out of status LOST: hold the safe drive until the device has settled, then call it. */
-void three_stacks_online_f32_init(three_stacks_online_f32_state *state);
+static inline void three_stacks_online_f32_init(three_stacks_online_f32_state *state)
+{
+    three_stacks_online_f32_init_1000hz_b11068ba(state);
+}
 
 /* Drive of the equilibrium at target; the state becomes that equilibrium. Call it once a sample
  * while its status has the bit RATE: until then drive and state are on the way there. Hold the drive until the device has settled. */

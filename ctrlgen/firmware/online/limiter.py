@@ -119,7 +119,8 @@ def _texts(context: Mapping[str, Any]) -> dict[str, str]:
     def table(values: Iterable[float]) -> str:
         return _braces(literal(v) for v in values)
 
-    texts = {f"{name}_table".upper(): table(context[name]) for name in TABLES.split() if name in context}
+    texts = {name.upper(): f"{context['prefix']}_{name}_{context['build']}" for name in ("init", "init_with")}
+    texts |= {f"{name}_table".upper(): table(context[name]) for name in TABLES.split() if name in context}
     texts |= {
         "HOME_TABLE": table(np.zeros(context["n"])),
         "COMPOSITE_SLACK": literal(1.0 + context["relative_slack"]),

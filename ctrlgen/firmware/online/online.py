@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,14 +17,13 @@ from ctrlgen.core.units import show, show_difference
 from ctrlgen.devices import Limit
 from ctrlgen.firmware.c.elementary import elementary_text
 from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.templates import ABI, hertz
 from ctrlgen.firmware.online.limit_tables import limit_context
 from ctrlgen.firmware.online.limiter import bounds_once, limited_modes, limiter_macros, limiter_text
 from ctrlgen.firmware.online.printed_kernels import PrintedKernels, kernel_printer, printed_kernels, si_text
 from ctrlgen.firmware.online.start_constants import start_calls, start_context
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.version import __version__, program
-
-READY = 0xA500A500  # marks an initialised state: an immediate operand of a Cortex-M, and no repeated byte, as memory set to one value has
 
 
 def online_context(scenario: Scenario, controller: Controller, real: Real, prefix: str) -> dict[str, Any]:
@@ -35,6 +36,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     start = start_context(kernels, printer)
     context = (
         _header(scenario, controller)
+        | build_of(scenario, controller, real)
         | limits
         | start
         | {
@@ -53,7 +55,6 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
             "redundancy": kernels.redundancy,
             "state_limited": controller.state_can_be_limited,
             "rest": kernels.nominal.rest,
-            "ready": READY,
             "far": FAR,
         }
     )
@@ -67,6 +68,25 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     context["bits_wanted"] = _bits_wanted(context)
     context["limiter"] = limiter_text(prefix, real, context["macros"])
     return context
+
+
+def build_of(scenario: Scenario, controller: Controller, real: Real) -> dict[str, Any]:
+    """What tells this controller from others of the same name: the word "ready", by which it marks its states, and "build", which with the
+    rate is part of a symbol: of device, followed signal, rate, limits and arithmetic."""
+    kernels = controller.kernels
+    rate = hertz(1 / kernels.sample_time) if kernels.sample_time else "0"
+    about = (
+        ABI,
+        scenario.device_sha256,
+        kernels.follow,
+        rate,
+        [limit.text for limit in kernels.nominal.limits],
+        real.value,
+    )
+    ready = int(hashlib.sha256(repr(about).encode()).hexdigest()[:8], 16)
+    if len(set(ready.to_bytes(4, "big"))) == 1:  # as memory set to one value is
+        ready ^= 1
+    return {"ready": ready, "build": f"{re.sub(r'[^0-9]', '_', rate)}hz_{ready:08x}"}
 
 
 def _bits_wanted(context: Mapping[str, Any]) -> set[str]:

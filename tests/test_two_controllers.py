@@ -1,0 +1,130 @@
+"""Two controllers in one firmware: of one device at two rates under two names, and what is said where they have one name."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from conftest import SCENARIOS
+from package_programs import run
+
+from ctrlgen import build_model, generate, load_scenario
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.folder import CFolder
+
+USE = """
+#include "{online}.h"
+uint32_t {name}(void);
+uint32_t {name}(void)
+{{
+    static {online}_state state;
+    {online}_output out;
+    const float target[{online_upper}_TARGET_SIZE] = {{ 1e-5f }};
+    {online}_init(&state);
+    return {online}_step(&state, target, &out);
+}}
+"""
+MAIN = """
+#include <stdint.h>
+uint32_t slow(void);
+uint32_t fast(void);
+int main(void) { return (int)(slow() | fast()); }
+"""
+
+
+def folder(scratch: Path, name: str, rate: str, controller: str = "") -> CFolder:
+    """The C of the flexure axis at a rate, its controller with a name of its own where one is given."""
+    text = (SCENARIOS / "flexure_axis_line" / "scenario.toml").read_text()
+    text = text.replace('"20 kHz"', f'"{rate}"').replace("../devices", str(SCENARIOS / "devices"))
+    home = scratch / name
+    home.mkdir()
+    own = f'controller = "{controller}"\n' if controller else ""
+    (home / "scenario.toml").write_text(own + text)
+    scenario = load_scenario(home / "scenario.toml")
+    return generate(scenario, build_model(scenario.device), scratch / f"{name}_c")
+
+
+def archive(compiler: str, scratch: Path, name: str, c: CFolder) -> Path:
+    """A static library of the controller in float."""
+    run(compiler, "-std=c99", "-c", c.path / f"{c.online[Real.FLOAT]}.c", "-o", scratch / f"{name}.o")
+    run("ar", "rcs", scratch / f"lib{name}.a", scratch / f"{name}.o")
+    return scratch / f"lib{name}.a"
+
+
+def used(compiler: str, scratch: Path, name: str, c: CFolder) -> Path:
+    """An object of a firmware that calls the controller by its header."""
+    online = c.online[Real.FLOAT]
+    (scratch / f"{name}_use.c").write_text(USE.format(name=name, online=online, online_upper=online.upper()))
+    run(compiler, "-std=c99", f"-I{c.path}", "-c", scratch / f"{name}_use.c", "-o", scratch / f"{name}_use.o")
+    return scratch / f"{name}_use.o"
+
+
+def linked(compiler: str, scratch: Path, *words: object) -> subprocess.CompletedProcess[str]:
+    (scratch / "main.c").write_text(MAIN)
+    command = [compiler, scratch / "main.c", *words, "-o", scratch / "firmware"]
+    return subprocess.run(list(map(str, command)), capture_output=True, text=True)
+
+
+@pytest.fixture(scope="module")
+def built(compiler, tmp_path_factory):
+    """(objects that use them, libraries) of the slow and the fast controller, which have one name, and of the slow one under another."""
+    scratch = tmp_path_factory.mktemp("two")
+    folders = {
+        "slow": folder(scratch, "slow", "10 kHz"),
+        "fast": folder(scratch, "fast", "20 kHz"),
+        "named": folder(scratch, "named", "10 kHz", "slow_axis"),
+    }
+    libraries = {name: archive(compiler, scratch, name, c) for name, c in folders.items()}
+    return folders, libraries, scratch
+
+
+def test_two_rates_under_two_names_are_one_firmware_also_from_whole_archives(built, compiler):
+    folders, libraries, scratch = built
+    objects = used(compiler, scratch, "slow", folders["named"]), used(compiler, scratch, "fast", folders["fast"])
+    for words in ([], ["-Wl,--whole-archive"]):
+        ends = ["-Wl,--no-whole-archive"] if words else []
+        done = linked(compiler, scratch, *objects, *words, libraries["named"], libraries["fast"], *ends)
+        assert done.returncode == 0, done.stderr
+        assert subprocess.run([scratch / "firmware"]).returncode == 0
+
+
+def test_two_rates_under_one_name_do_not_link(built, compiler):
+    folders, libraries, scratch = built
+    objects = used(compiler, scratch, "slow", folders["slow"]), used(compiler, scratch, "fast", folders["fast"])
+    both = linked(compiler, scratch, *objects, libraries["slow"], libraries["fast"])
+    assert both.returncode != 0 and "multiple definition of `flexure_axis_online_f32_step'" in both.stderr
+    one = linked(compiler, scratch, *objects, libraries["slow"])
+    assert one.returncode != 0 and "flexure_axis_online_f32_init_20000hz_" in one.stderr
+
+
+def test_a_state_of_another_build_is_lost(built, compiler):
+    """Of two names, through a pointer that says nothing."""
+    folders, libraries, scratch = built
+    fast, slow = folders["fast"].online[Real.FLOAT], folders["named"].online[Real.FLOAT]
+    (scratch / "mixed.c").write_text(
+        f'#include "{fast}.h"\n#include "{slow}.h"\nint main(void)\n{{\n    static {fast}_state state;\n    {slow}_output out;\n'
+        f"    const float target[{slow.upper()}_TARGET_SIZE] = {{ 0.0f }};\n    {fast}_init(&state);\n"
+        f"    return {slow}_step(({slow}_state *)(void *)&state, target, &out) == {slow.upper()}_LOST ? 0 : 1;\n}}\n"
+    )
+    include = [f"-I{folders[name].path}" for name in ("fast", "named")]
+    run(compiler, *include, scratch / "mixed.c", libraries["fast"], libraries["named"], "-o", scratch / "mixed")
+    run(scratch / "mixed")
+
+
+@pytest.mark.long
+def test_cmake_takes_two_names_and_refuses_two_controllers_of_one(built, tmp_path):
+    if not shutil.which("cmake"):
+        pytest.skip("cmake is missing: the projects were not configured; apt-get install cmake")
+    folders, _, _ = built
+
+    def configured(*names: str) -> subprocess.CompletedProcess[str]:
+        lines = "".join(f'add_subdirectory("{folders[name].path}" {name})\n' for name in names)
+        home = tmp_path / "_".join(names)
+        home.mkdir()
+        (home / "CMakeLists.txt").write_text(f"cmake_minimum_required(VERSION 3.16)\nproject(two LANGUAGES C)\n{lines}")
+        return subprocess.run(["cmake", "-S", home, "-B", home / "build"], capture_output=True, text=True)
+
+    refused = configured("slow", "fast")
+    assert refused.returncode != 0 and "two controllers of one name" in refused.stderr
