@@ -21,7 +21,7 @@ COMMANDS = {command.callback.__name__: command.help for command in app.registere
     for group in app.registered_groups
     for command in group.typer_instance.registered_commands
 }
-QUICK = {"check", "example", "laws", "look", "new device", "new recording", "new scenario", "simulate"}
+QUICK = {"check", "example", "laws", "look", "new device", "new recording", "new scenario", "schema", "simulate"}
 ELSEWHERE = {"verify"}  # .ci/run runs it as printed
 ENDLESS = {"view"}  # test_view_server.py runs it as printed, and ends it
 

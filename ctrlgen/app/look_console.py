@@ -9,6 +9,7 @@ import numpy as np
 from rich.markup import escape
 
 from ctrlgen.app.console import out, show_table, table_of
+from ctrlgen.app.editor_schemas import schema_line
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import write_text
 from ctrlgen.devices import load_device
@@ -46,7 +47,7 @@ def look(files: Sequence[Path], device: Path | None, to: Path | None, figure: Pa
         out.print("recording.toml to begin with:\n", markup=False)
         out.print(text, markup=False, soft_wrap=True)
     else:
-        write_text(to, text)
+        write_text(to, schema_line("recording", to) + text)
         print_proposal(proposal)
         out.print(str(to), soft_wrap=True, markup=False)
         out.print(f"next:  ctrlgen check {to} --device {device}", soft_wrap=True, markup=False)

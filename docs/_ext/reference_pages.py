@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from conventions_figure import draw_conventions
-from described_schema import DescribedSchema
 from pydantic import BaseModel
+
+from ctrlgen.reporting.described_schema import DescribedSchema
 
 OUT = Path(__file__).resolve().parents[1] / "reference" / "generated"
 PASSED_OVER = ("effect", "sensor", "machine")  # tables that every device file may have: on their own page

@@ -18,6 +18,7 @@ from ctrlgen.app.commands import (  # noqa: F401, they register their commands
     learning,
     new,
     recordings,
+    schemas,
     viewing,
 )
 from ctrlgen.app.commands.app import PANELS, app

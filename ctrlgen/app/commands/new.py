@@ -49,6 +49,7 @@ def device(
 
     Example:  ctrlgen new device stage.toml --kind piezo --set voltage=150V --set free_stroke=30um
     """
+    from ctrlgen.app.editor_schemas import name_schema
     from ctrlgen.app.new_files.questions import KINDS, read
     from ctrlgen.app.new_files.write import write_device
 
@@ -65,6 +66,7 @@ def device(
                     given |= {question.key: answer} if answer != question.answer else {}
                     break
     write_device(file, kind, name, given)
+    name_schema("device", file)
     out.print(str(file), soft_wrap=True, markup=False)
     out.print(f"next:  ctrlgen check {file}", soft_wrap=True, markup=False)
     out.print(f"then:  ctrlgen new scenario circle --device {file}", soft_wrap=True, markup=False)
@@ -82,9 +84,11 @@ def scenario(
 
     Example:  ctrlgen new scenario circle --device scenarios/devices/xy_lever_stage.toml
     """
+    from ctrlgen.app.editor_schemas import name_schema
     from ctrlgen.app.new_files.write import write_scenario
 
     write_scenario(folder, device_path, path or None)
+    name_schema("scenario", folder / "scenario.toml")
     out.print(str(folder / "scenario.toml"), soft_wrap=True, markup=False)
     out.print(f"next:  ctrlgen run {folder} --out out/{folder.name}", soft_wrap=True, markup=False)
 
