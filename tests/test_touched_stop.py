@@ -10,6 +10,7 @@ from axis_records import AXIS, KF, C, K, M, drive, record
 
 from ctrlgen.diagnosis.diagnose import clock_note
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
+from ctrlgen.diagnosis.selection.candidates import as_meant
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.rivals import simplified
 from ctrlgen.diagnosis.selection.screen import Screen
@@ -86,6 +87,7 @@ def test_a_drive_that_comes_before_its_time_stamps_bends_no_stop():
     assert "1.2e-05 s behind" in note and "0.024 of a sample" in note
 
 
+@pytest.mark.long
 def test_a_drive_that_is_in_time_stays_so(touched):
     """And one that is so late that it has a name: a twentieth of a sample."""
     fitter, true = model(*touched)
@@ -123,6 +125,22 @@ def test_a_touch_is_simulated_in_as_many_steps_as_the_noise_asks_for(touched):
     # half the steps tell the error to a third: where in a step the corner lies changes it
     assert missed(fine) < 1.33 * LARGEST
     assert with_steps_that_suffice(fitter, fitter.fit(Structure(AXIS), steps=0)).finer == 1
+
+
+def test_a_spring_beyond_an_edge_that_is_refused_shows_where_the_stop_stands(touched):
+    """The valley of a stop that is touched is as narrow as the depth, 0.4 um of 65, and no start of its own lies in it."""
+    fitter, gap = touched
+    spring = Hypothesis("stiffness_above", "stage:axis", "axis")
+    trials = Trials(fitter, Screen(fitter, [STOP, spring]), lambda _: None)
+    bare = trials.fit(Structure(AXIS), steps=0)
+    refused = trials.fit(Structure(AXIS).with_cause(spring, {"stiffness": 2e6, "edge": gap - 1e-7}), spring)
+    assert trials.objections(refused) == {0: "a spring that is touched from a place on is a stop"}
+    (stop,) = as_meant(trials, bare, [refused])
+    assert stop.causes == (STOP,) and stop.fit.values(0)["gap"] == pytest.approx(gap, abs=5e-8)
+    # a spring that lets go outwards is what it is called, and so is a cause that was there before
+    softer = Structure(AXIS).with_cause(spring, {"stiffness": -1e4, "edge": gap - 1e-6})
+    inward = scored(fitter, fitter.fit(softer, steps=0), spring)
+    assert as_meant(trials, bare, [inward]) == as_meant(trials, refused, [refused]) == ()
 
 
 @pytest.mark.long

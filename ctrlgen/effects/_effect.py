@@ -121,6 +121,12 @@ class Effect:
         return ""
 
     @classmethod
+    def meant(cls, numbers: dict[str, float]) -> tuple[str, dict[str, float]] | None:
+        """The kind and the numbers [SI] of the law that these `numbers` are, where they contradict this one's name; None where no other
+        law of the library is the same."""
+        return None
+
+    @classmethod
     def as_plainer(cls, numbers: dict[str, float]) -> dict[str, float]:
         """The numbers [SI] of the law `plainer` where this one, with these `numbers`, is that law; those of other names are not read."""
         return numbers

@@ -21,6 +21,12 @@ class RegionalStiffness(Effect, listed=False):
         stop = p["stiffness"] > 0 and cls.outward * p["edge"] > 0
         return "a spring that is touched from a place on is a stop" if stop else ""
 
+    @classmethod
+    def meant(cls, numbers: dict[str, float]) -> tuple[str, dict[str, float]] | None:
+        if not cls.contradiction(numbers):
+            return None
+        return "end_stop", {"stiffness": numbers["stiffness"], "gap": numbers["edge"], "power": 1.0}
+
 
 class StiffnessAbove(RegionalStiffness):
     """Delta F = -k x^2/(x + e), x = d - d_0 where positive: another stiffness above the displacement d_0; e, a millionth of the

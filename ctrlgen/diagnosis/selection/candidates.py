@@ -32,6 +32,7 @@ def fit_candidates(trials: Trials, current: CandidateModel, screened: Screened) 
         alone = alone or leaves_noise_alone(trials, current, candidates)
     if not alone:
         candidates = (*candidates, *fit_in_regions(trials, current, screened, candidates))
+    candidates = (*candidates, *as_meant(trials, current, candidates))
     candidates = (*candidates, *finer_forms(trials, current))
     candidates = (*candidates, *fit_other_clocks(trials, current, () if alone else candidates))
     if trials.selection.parameters_may_mask_cause(current.fit):
@@ -111,6 +112,29 @@ def fit_in_regions(
     regional = [s for s in seen.suspects if s.hypothesis.prior.in_a_region and s.z**2 >= REGIONS.score * most]
     suspects = regional[: SEARCH.regional_per_round]
     return fit_each(trials, current.fit, suspects, lambda branch, t: restart_elsewhere(branch, t, current, seen))
+
+
+def as_meant(
+    trials: Trials, current: CandidateModel, candidates: Sequence[CandidateModel]
+) -> tuple[CandidateModel, ...]:
+    """The law that a new cause of a candidate is with the numbers that it has reached, begun with them in its place. A stop that is
+    touched at the end of the travel has a narrow valley, which a spring beyond an edge finds and is refused for."""
+    named = [
+        (t, k, meant)
+        for t in candidates
+        for k, c in enumerate(t.causes)
+        if c not in current.causes and c.effect != PARAMETER and (meant := c.law.meant(t.fit.values(k)))
+    ]
+
+    def one(branch: Trials, found: tuple[CandidateModel, int, tuple[str, dict[str, float]]]) -> list[CandidateModel]:
+        t, k, (kind, numbers) = found
+        other = replace(t.causes[k], effect=kind)
+        if other not in branch.screen.hypotheses or other in t.causes:
+            return []
+        return branch.tried(t.fit.restarted.without(k).with_cause(other, numbers), other)
+
+    fits = trials.each(one, named, lambda found: f"{trying(replace(found[0].causes[found[1]], effect=found[2][0]))}")
+    return tuple(t for fitted in fits for t in fitted)
 
 
 def finer_forms(trials: Trials, current: CandidateModel) -> tuple[CandidateModel, ...]:
