@@ -18,7 +18,8 @@ from ctrlgen.core.errors import InputError
 from ctrlgen.recordings.formats import read_table
 from ctrlgen.recordings.look.column_facts import between_samples, rests, table_facts
 from ctrlgen.recordings.look.oddities import table_oddities
-from ctrlgen.recordings.look.proposal import propose, recording_toml
+from ctrlgen.recordings.look.proposal import propose
+from ctrlgen.recordings.look.proposed_file import recording_toml
 from ctrlgen.recordings.plausibility import early
 from ctrlgen.recordings.reader import load_recordings
 

@@ -15,22 +15,27 @@ from ctrlgen.core.files import write_text
 from ctrlgen.devices import load_device
 from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.formats import READERS, read_table
+from ctrlgen.recordings.look.answers import NOTHING, Answers
 from ctrlgen.recordings.look.column_facts import ColumnFacts, TableFacts, rests, table_facts
 from ctrlgen.recordings.look.oddities import table_oddities
-from ctrlgen.recordings.look.proposal import Proposal, propose, recording_toml
+from ctrlgen.recordings.look.proposal import Proposal, propose
+from ctrlgen.recordings.look.proposed_file import recording_toml
 from ctrlgen.reporting.numbers import number
 
 MOST_GAPS = 3  # that are listed
 
 
-def look(files: Sequence[Path], device: Path | None, to: Path | None, figure: Path | None) -> None:
+def look(
+    files: Sequence[Path], device: Path | None, to: Path | None, figure: Path | None, answers: Answers = NOTHING
+) -> None:
     """Prints what the files hold; with a `device` also which column is which signal, written as recording.toml to `to` or printed.
+    `answers` say what the files leave open.
 
     Raises InputError where a file cannot be read, and where `to` exists.
     """
     if to is not None and to.exists():
         raise InputError("--to", [Fault(str(to), "exists; name another file, or move it away")])
-    tables = [table_facts(read_table(file)) for file in files]
+    tables = [table_facts(read_table(file, answers.table, answers.layout), answers) for file in files]
     for facts in tables:
         print_table(facts)
     if figure is not None:
@@ -40,7 +45,7 @@ def look(files: Sequence[Path], device: Path | None, to: Path | None, figure: Pa
         out.print(str(figure), soft_wrap=True, markup=False)
     if device is None:
         return
-    proposal = propose(tables, build_model(load_device(device)))
+    proposal = propose(tables, build_model(load_device(device)), answers)
     folder = files[0].parent if to is None else to.parent
     text = recording_toml(proposal, folder, files[0].stem)
     if to is None:

@@ -41,19 +41,39 @@ def look(
     figure: Annotated[
         Path | None, typer.Option(help="Also draw the columns into this file, .svg or .png.", show_default=False)
     ] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option(metavar="SIGNAL=COLUMN", help="Which column a signal is; repeat for more.", show_default=False),
+    ] = None,
+    unit: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=UNIT", help="Unit of a signal or column; repeat for more.", show_default=False),
+    ] = None,
+    time: Annotated[str | None, typer.Option(help="The column that is the time.", show_default=False)] = None,
+    rate: Annotated[str | None, typer.Option(help="Rows a second, such as 1kHz.", show_default=False)] = None,
+    poses: Annotated[bool, typer.Option("--poses", help="The rows are settled poses.")] = False,
+    table: Annotated[
+        str | None, typer.Option(help="Which table or sheet, from 1 or by name.", show_default=False)
+    ] = None,
+    layout: Annotated[
+        str | None,
+        typer.Option(help="How the file is written, as in recording.toml: 'decimal = \",\"'.", show_default=False),
+    ] = None,
 ) -> None:
     """Say what measurement files hold, what is odd, and with --device which column is which signal, as a recording.toml to begin with.
 
-    Columns are matched by unit, name and range. What the files do not say is asked: a line "to be answered", and a comment in
-    the recording.toml.
+    Columns are matched by unit, name and range. What the files do not say is asked: a line "to be answered" with the option that
+    answers it, and a comment in the recording.toml.
 
     Example:  ctrlgen look scenarios/nist_hexapod/measured.csv
     """
     from ctrlgen.app.look_console import look as looked
+    from ctrlgen.recordings.look.answers import read_answers
 
     if to is not None and device is None:
         raise typer.BadParameter("--to writes a recording of a device; add --device stage.toml")
-    looked(files, device, to, None if figure is None else as_picture("--figure", figure))
+    answers = read_answers(table, layout, column or [], unit or [], time, rate, poses)
+    looked(files, device, to, None if figure is None else as_picture("--figure", figure), answers)
 
 
 @app.command(rich_help_panel=RECORDING_PANEL)

@@ -115,7 +115,7 @@ def _chosen(path: Path, tables: dict[str, MeasurementTable], which: int | str | 
         return tables[names[0]]
     each = ", ".join(f"{k}: {name}" for k, name in enumerate(names, 1))
     if which is None:
-        raise fault(path, f"holds {len(tables)} tables ({each}); write table = 1 or another")
+        raise fault(path, f"holds {len(tables)} tables ({each}); write table = 1 or another (ctrlgen look: --table 1)")
     if isinstance(which, str) and which in tables:
         return tables[which]
     if isinstance(which, int) and 1 <= which <= len(tables):

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ctrlgen.core.errors import InputError
+from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import same_dimension, to_si
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
 from ctrlgen.recordings.formats.unit_texts import BASES, NAMES, bare_name, unit_of
+from ctrlgen.recordings.look.answers import NOTHING, Answers
 
 TIME_NAME = re.compile(
     r"^(t|time|zeit|tijd|temps|tempo|timestamp|time.?stamp|clock|datetime|date|elapsed.*|sekunden|seconds?|secs?)(?![a-z])",
@@ -104,10 +105,22 @@ class TableFacts:
         return next(c for c in self.columns if c.name == name)
 
 
-def table_facts(table: MeasurementTable) -> TableFacts:
-    """What a table holds."""
+def table_facts(table: MeasurementTable, answers: Answers = NOTHING) -> TableFacts:
+    """What a table holds, with the units and the time of `answers`. Raises InputError for a time that is none."""
     columns = tuple(_facts(table, name) for name in table.columns)
-    return TableFacts(table, columns, _time(table, columns))
+    columns = tuple(replace(c, unit=answers.unit(c.name, c.bare) or c.unit) for c in columns)
+    if answers.time is None:
+        return TableFacts(table, columns, None if answers.rate or answers.poses else _time(table, columns))
+    name = named(table, answers.time)
+    time = _time(table, tuple(c for c in columns if c.name == name), name)
+    if time is None:
+        raise InputError("--time", [Fault(name, "does not rise, or its unit is none of a time")])
+    return TableFacts(table, columns, time)
+
+
+def named(table: MeasurementTable, column: str) -> str:
+    """The column of a name or, where none has that name, of a number from 0. Raises InputError where there is none."""
+    return table.find(int(column) if column.isdecimal() and column not in table.columns else column)
 
 
 def _facts(table: MeasurementTable, name: str) -> ColumnFacts:
@@ -129,12 +142,12 @@ def _suffix(name: str) -> str | None:
     return unit if unit is not None and any(same_dimension(unit, base) for base in BASES) else None
 
 
-def _time(table: MeasurementTable, columns: tuple[ColumnFacts, ...]) -> TimeFacts | None:
-    """The column that is named as the time, or else holds dates, or else has the unit of a time and rises."""
+def _time(table: MeasurementTable, columns: tuple[ColumnFacts, ...], chosen: str = "") -> TimeFacts | None:
+    """The column that is `chosen`, named as the time, or else holds dates, or else has the unit of a time and rises."""
     named = [c for c in columns if TIME_NAME.match(c.bare)]
     dated = [c for c in columns if c.values is None]
     of_unit = [c for c in columns if c.unit is not None and same_dimension(c.unit, "s")]
-    for column in dict.fromkeys(c.name for c in (*named, *dated, *of_unit)):
+    for column in dict.fromkeys(chosen or c.name for c in (*named, *dated, *of_unit, *columns[: bool(chosen)])):
         unit = next(c.unit for c in columns if c.name == column) or "s"
         if not same_dimension(unit, "s"):
             continue

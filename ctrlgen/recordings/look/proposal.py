@@ -5,19 +5,19 @@ Signals and columns are matched by the assignment of the largest total likeness 
 
 from __future__ import annotations
 
-import os
 import re
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-from ctrlgen.core.escaping import toml
-from ctrlgen.core.units import same_dimension, to_si
+from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.units import parse, same_dimension, to_si
 from ctrlgen.model.model import Model
 from ctrlgen.recordings.alike_units import size_of
-from ctrlgen.recordings.look.column_facts import ColumnFacts, TableFacts, between_samples, rests
+from ctrlgen.recordings.look.answers import NOTHING, Answers
+from ctrlgen.recordings.look.column_facts import ColumnFacts, TableFacts, between_samples, named
 from ctrlgen.recordings.look.oddities import fitting_units, implausible_range
 from ctrlgen.recordings.moved import Stretch, moved_of
 from ctrlgen.recordings.plausibility import implausible
@@ -73,6 +73,12 @@ class Match:
     stated: bool
     why: tuple[str, ...] = ()
 
+    @property
+    def option(self) -> str:
+        """What says on the command line that it is so."""
+        column = shlex.quote(f"{self.signal}={self.column}")
+        return f"--column {column}" + ("" if self.stated else f" --unit {self.signal}={self.unit}")
+
 
 @dataclass(frozen=True)
 class Proposal:
@@ -85,17 +91,23 @@ class Proposal:
     left: tuple[str, ...]
     missing: tuple[str, ...]
     remarks: tuple[str, ...]
+    answers: Answers = NOTHING
 
     @property
     def kind(self) -> str:
         """Few rows without a time are poses."""
-        return kind_of(self.tables[0])
+        return kind_of(self.tables[0], self.answers)
+
+    @property
+    def timed(self) -> bool:
+        """Whether it is known when the rows were taken, or that it does not matter."""
+        return self.tables[0].time is not None or self.answers.rate is not None or self.answers.poses
 
     @property
     def asked(self) -> tuple[str, ...]:
         """Every question that the files leave open."""
         return (
-            *(f"{m.signal} = column {m.column!r}: {'; '.join(m.why)}" for m in self.matches if m.why),
+            *(f"{m.signal} = column {m.column!r}: {'; '.join(m.why)} ({m.option})" for m in self.matches if m.why),
             *self.missing,
         )
 
@@ -117,40 +129,76 @@ class Proposal:
         return not self.asked
 
 
-def kind_of(facts: TableFacts) -> str:
-    """ "poses" or "series": few rows without a time are poses."""
-    return "poses" if facts.time is None and facts.rows <= MOST_POSES else "series"
+def kind_of(facts: TableFacts, answers: Answers = NOTHING) -> str:
+    """The kind of a recording: few rows without a time or a rate are poses."""
+    few = facts.time is None and answers.rate is None and facts.rows <= MOST_POSES
+    return "poses" if answers.poses or few else "series"
 
 
-def propose(tables: Sequence[TableFacts], model: Model) -> Proposal:
-    """The recording that files with the same columns are of a device. Its first file decides which column is what."""
+def propose(tables: Sequence[TableFacts], model: Model, answers: Answers = NOTHING) -> Proposal:
+    """The recording that files with the same columns are of a device. Its first file decides which column is what, where `answers` do
+    not; they name what `tables` were read with. Raises InputError for an answer that names no signal or column."""
     first = tables[0]
     taken = {first.time.column} if first.time is not None else set()
     columns = [c for c in first.columns if c.moves and c.name not in taken]
     signals = [name for name in signal_units(model) if name.partition(".")[0] in ("drive", "reading")]
-    matches = _matched(model, signals, columns)
+    chosen = _chosen(model, first, signals, answers)
+    free = [c for c in columns if c.name not in {m.column for m in chosen}]
+    matches = chosen + _matched(model, [n for n in signals if n not in {m.signal for m in chosen}], free, answers)
+    matches.sort(key=lambda match: signals.index(match.signal))
     found = {match.signal for match in matches}
+    left = [c.name for c in columns if c.name not in {m.column for m in matches}]
     asked = [
-        f"{name}: which column? Free are {', '.join(c.name for c in columns if c.name not in {m.column for m in matches}) or 'none'}"
+        f"{name}: which column? Free are {', '.join(left) or 'none'} (--column {name}=COLUMN)"
         for name in signals
         if name.startswith("drive.") and name not in found
     ]
     if not any(name.startswith("reading.") for name in found):
-        asked.append("no column was recognised as a reading")
-    if first.time is None:
-        asked.append('no column is a time: state sample_rate, or kind = "poses"')
-    remarks = _remarks(model, first, matches, kind_of(first))
-    left = tuple(c.name for c in columns if c.name not in {m.column for m in matches})
-    return Proposal(model, tuple(tables), tuple(matches), left, tuple(asked), tuple(remarks))
+        known = next(name for name in signals if name.startswith("reading."))
+        asked.append(f"no column was recognised as a reading (--column {known}=COLUMN)")
+    if first.time is None and answers.rate is None and not answers.poses:
+        asked.append(
+            'no column is a time: state sample_rate, or kind = "poses" (--time COLUMN, --rate 1kHz or --poses)'
+        )
+    remarks = _remarks(model, first, matches, answers)
+    left = [c.name for c in first.columns if c.moves and c.name not in {*taken, *(m.column for m in matches)}]
+    return Proposal(model, tuple(tables), tuple(matches), tuple(left), tuple(asked), tuple(remarks), answers)
 
 
-def _remarks(model: Model, facts: TableFacts, matches: Sequence[Match], kind: str) -> list[str]:
+def _chosen(model: Model, facts: TableFacts, signals: Sequence[str], answers: Answers) -> list[Match]:
+    """The matches that were answered."""
+    matches, units = [], signal_units(model)
+    for signal, name in answers.columns.items():
+        if signal not in signals:
+            raise InputError("--column", [Fault(signal, f"is no signal of {model.name}; its are {', '.join(signals)}")])
+        column = facts.column(named(facts.table, name))
+        if not column.moves:
+            raise InputError("--column", [Fault(name, "holds no numbers that differ")])
+        unit = answers.unit(signal) or column.unit
+        if unit is not None and not same_dimension(unit, units[signal]):
+            what = f"{name} is in {unit}, and {signal} in {units[signal]} or a multiple of it"
+            raise InputError("--column", [Fault(signal, what)])
+        matches.append(_match(model, signal, column, unit, []))
+    return matches
+
+
+def _match(model: Model, signal: str, column: ColumnFacts, unit: str | None, why: list[str]) -> Match:
+    """One match; a `unit` that nobody states is assumed, and asked."""
+    if unit is not None:
+        return Match(signal, column.name, unit, True, tuple(why))
+    assumed = _plausible(model, signal, column, signal_units(model)[signal])
+    why = [*why, f"the file states no unit, {assumed} is assumed: {_range(column)}"]
+    return Match(signal, column.name, assumed, False, tuple(why))
+
+
+def _remarks(model: Model, facts: TableFacts, matches: Sequence[Match], answers: Answers) -> list[str]:
     """What is not plausible: beside what the model makes of the drives, or where not every drive is known beside the device's size."""
     of = {role: [m for m in matches if m.signal.startswith(role)] for role in ("drive.", "reading.")}
     drives, readings = (tuple((m.signal, m.unit) for m in found) for found in of.values())
     u, y = (np.reshape([_si(facts, m) for m in found], (len(found), facts.rows)).T for found in of.values())
     step = facts.time.step if facts.time is not None else np.inf
-    known = facts.time is not None or kind == "poses"
+    step = 1 / parse(answers.rate, "Hz") if answers.rate is not None else step
+    known = np.isfinite(step) or kind_of(facts, answers) == "poses"
     linear = {between_samples(column) for column in u.T} == {"linear"}
     seen = moved_of(model, drives, readings, [Stretch(u, y, step, linear)]) if known and readings else None
     if seen is not None:
@@ -165,11 +213,11 @@ def _si(facts: TableFacts, match: Match) -> np.ndarray:
     return values * size_of(match.unit) + to_si(0.0, match.unit)
 
 
-def _matched(model: Model, signals: Sequence[str], columns: Sequence[ColumnFacts]) -> list[Match]:
+def _matched(model: Model, signals: Sequence[str], columns: Sequence[ColumnFacts], answers: Answers) -> list[Match]:
     """The best assignment of columns to signals; a column that is like none stays free."""
     from scipy.optimize import linear_sum_assignment  # a quarter of a second to import
 
-    if not columns:
+    if not columns or not signals:
         return []
     likeness = np.array([[_likeness(model, name, column) for column in columns] for name in signals])
     likeness += PLACE * _in_order(signals, len(columns)) * (likeness > 0)
@@ -178,17 +226,15 @@ def _matched(model: Model, signals: Sequence[str], columns: Sequence[ColumnFacts
     for i, k in zip(rows, chosen, strict=True):
         if likeness[i, k] < POSSIBLE:
             continue
-        column, unit = columns[k], columns[k].unit or signal_units(model)[signals[i]]
+        column = columns[k]
         rivals = [
             columns[j].name for j in range(len(columns)) if j not in chosen and likeness[i, j] > likeness[i, k] - CLEAR
         ]
         why = [f"could be column {' or '.join(map(repr, rivals))} as well"] if rivals else []
         if likeness[i, k] < NAMED:
             why.append("nothing but its place speaks for it")
-        if column.unit is None:
-            unit = _plausible(model, signals[i], column, unit)
-            why.append(f"the file states no unit, {unit} is assumed: {_range(column)}")
-        matches.append(Match(signals[i], column.name, unit, column.unit is not None, tuple(why)))
+        unit = answers.unit(signals[i]) or column.unit
+        matches.append(_match(model, signals[i], column, unit, why))
     return matches
 
 
@@ -255,63 +301,3 @@ def _within(model: Model, channel: str, column: ColumnFacts) -> bool:
     scale, offset = to_si(1.0, column.unit or "1") - to_si(0.0, column.unit or "1"), to_si(0.0, column.unit or "1")
     values, room = column.finite * scale + offset, 1e-3 * (high - low)
     return not np.isfinite(room) or bool(values.min() >= low - room and values.max() <= high + room)
-
-
-def recording_toml(proposal: Proposal, folder: Path, title: str) -> str:
-    """The text of a recording.toml in `folder`, with comments where something is assumed."""
-    lines = [
-        "# Begun by ctrlgen look. Lines that end in a comment hold what the files do not say: correct what is wrong.",
-        f"title  = {toml(title)}",
-        f"device = {toml(proposal.model.device.name)}",
-        f'kind   = "{proposal.kind}"' + ("" if proposal.tables[0].time else " # assumed: no column is a time"),
-        "",
-    ]
-    several = len(proposal.tables) > 1
-    for k, facts in enumerate(proposal.tables):
-        last = several and k == len(proposal.tables) - 1
-        lines += _record(proposal, facts, folder, "hold_out" if last else "fit")
-    lines.append("[columns]")
-    for match in proposal.matches:
-        why = f" # {'; '.join(match.why)}" if match.why else ""
-        lines.append(f'"{match.signal}" = {{ column = {toml(match.column)}, unit = "{match.unit}" }}{why}')
-    lines += [f"# not used: {', '.join(proposal.left)}"] if proposal.left else []
-    lines += [f"# to be answered: {question}" for question in proposal.missing]
-    lines += [f"# odd: {remark}" for remark in proposal.remarks]
-    # names of columns stand in comments, too, where nothing escapes what is not shown
-    return "\n".join("".join(c if c.isprintable() else " " for c in line) for line in lines) + "\n"
-
-
-def _record(proposal: Proposal, facts: TableFacts, folder: Path, role: str) -> list[str]:
-    """The [[record]] tables of one file: what moves, and the rests before or after, which give the noise."""
-    path = Path(os.path.relpath(facts.table.path.resolve(), folder.resolve())).as_posix()
-    head = [f"file = {toml(path)}"]
-    if proposal.kind == "poses":
-        return ["[[record]]", *head, f'role = "{role}"', ""]
-    if facts.time is None:
-        head.append('sample_rate = "1 kHz" # assumed: no column is a time')
-    else:
-        head.append(f'time = {{ column = {toml(facts.time.column)}, unit = "{facts.time.unit}" }}')
-    known = proposal.drives_of(facts)
-    if not known:
-        return ["[[record]]", *head, f'role = "{role}"', ""]
-    head.append(f"between_samples = {proposal.between_samples}")
-    n = len(known[0])
-    ends = [(a, b) for a, b in rests(np.column_stack(known)) if (a == 0) != (b == n)]
-    begin, end = max((b for a, b in ends if a == 0), default=0), min((a for a, b in ends if b == n), default=n)
-    lines = [
-        "[[record]]",
-        *head,
-        f'role = "{role}"',
-        *([f"rows = [{begin}, {end}]"] if (begin, end) != (0, n) else []),
-        "",
-    ]
-    for a, b in ((0, begin), (end, n)):
-        if b > a:
-            lines += [
-                "[[record]] # nothing moves: it gives the noise",
-                *head,
-                'role = "rest"',
-                f"rows = [{a}, {b}]",
-                "",
-            ]
-    return lines

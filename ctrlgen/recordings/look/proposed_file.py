@@ -1,0 +1,77 @@
+"""The recording.toml that a proposal is, with comments where something is assumed."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from ctrlgen.core.escaping import toml
+from ctrlgen.recordings.look.column_facts import TableFacts, rests
+from ctrlgen.recordings.look.proposal import Proposal
+
+
+def recording_toml(proposal: Proposal, folder: Path, title: str) -> str:
+    """The text of a recording.toml in `folder`, with comments where something is assumed."""
+    lines = [
+        "# Begun by ctrlgen look. Lines that end in a comment hold what the files do not say: correct what is wrong.",
+        f"title  = {toml(title)}",
+        f"device = {toml(proposal.model.device.name)}",
+        f'kind   = "{proposal.kind}"' + ("" if proposal.timed else " # assumed: no column is a time"),
+        *([f"layout = {{ {proposal.answers.layout_text} }}"] if proposal.answers.layout_text else []),
+        "",
+    ]
+    several = len(proposal.tables) > 1
+    for k, facts in enumerate(proposal.tables):
+        last = several and k == len(proposal.tables) - 1
+        lines += _record(proposal, facts, folder, "hold_out" if last else "fit")
+    lines.append("[columns]")
+    for match in proposal.matches:
+        why = f" # {'; '.join(match.why)}" if match.why else ""
+        lines.append(f'"{match.signal}" = {{ column = {toml(match.column)}, unit = "{match.unit}" }}{why}')
+    lines += [f"# not used: {', '.join(proposal.left)}"] if proposal.left else []
+    lines += [f"# to be answered: {question}" for question in proposal.missing]
+    lines += [f"# odd: {remark}" for remark in proposal.remarks]
+    # names of columns stand in comments, too, where nothing escapes what is not shown
+    return "\n".join("".join(c if c.isprintable() else " " for c in line) for line in lines) + "\n"
+
+
+def _record(proposal: Proposal, facts: TableFacts, folder: Path, role: str) -> list[str]:
+    """The [[record]] tables of one file: what moves, and the rests before or after, which give the noise."""
+    path = Path(os.path.relpath(facts.table.path.resolve(), folder.resolve())).as_posix()
+    head, answers = [f"file = {toml(path)}"], proposal.answers
+    if answers.table is not None:
+        head.append(f"table = {answers.table if isinstance(answers.table, int) else toml(answers.table)}")
+    if proposal.kind == "poses":
+        return ["[[record]]", *head, f'role = "{role}"', ""]
+    if answers.rate is not None:
+        head.append(f"sample_rate = {toml(answers.rate)}")
+    elif facts.time is None:
+        head.append('sample_rate = "1 kHz" # assumed: no column is a time')
+    else:
+        head.append(f'time = {{ column = {toml(facts.time.column)}, unit = "{facts.time.unit}" }}')
+    known = proposal.drives_of(facts)
+    if not known:
+        return ["[[record]]", *head, f'role = "{role}"', ""]
+    head.append(f"between_samples = {proposal.between_samples}")
+    n = len(known[0])
+    ends = [(a, b) for a, b in rests(np.column_stack(known)) if (a == 0) != (b == n)]
+    begin, end = max((b for a, b in ends if a == 0), default=0), min((a for a, b in ends if b == n), default=n)
+    lines = [
+        "[[record]]",
+        *head,
+        f'role = "{role}"',
+        *([f"rows = [{begin}, {end}]"] if (begin, end) != (0, n) else []),
+        "",
+    ]
+    for a, b in ((0, begin), (end, n)):
+        if b > a:
+            lines += [
+                "[[record]] # nothing moves: it gives the noise",
+                *head,
+                'role = "rest"',
+                f"rows = [{a}, {b}]",
+                "",
+            ]
+    return lines
