@@ -185,7 +185,7 @@ def test_what_a_path_needs_is_what_ipopt_finds(circle):
     assert np.abs(needed.u - circle.drive).max() < 1e-7
 
 
-@pytest.mark.parametrize(("effects", "settles"), [(BACKLASH, True), (CREEP, False)])
+@pytest.mark.parametrize(("effects", "settles"), [(BACKLASH, True), (CREEP, True)])
 def test_memories_are_carried_until_a_closed_path_repeats_or_is_seen_not_to(tmp_path, effects, settles):
     scenario = written(tmp_path, "mems_hexapod", effects, 200, 0.5, CIRCLE.format("20 um") + ABOVE)
     model = build_model(scenario.device)

@@ -26,6 +26,22 @@ SECANT_STEPS = 3  # of the line search toward a target that the drives cannot re
 SECANT_FRACTION = 1 - 2**-8  # of the secant estimate is taken, because the drive is not linear along the line
 
 
+@dataclass(frozen=True)
+class Rounding:
+    """Changes [SI] of displacement (n_axes,), actuator state (n_states,) and drive (n_u,)."""
+
+    displacement: np.ndarray
+    state: np.ndarray
+    drive: np.ndarray
+
+
+def _moved(f: Callable[[np.ndarray], np.ndarray], at: np.ndarray, by: np.ndarray) -> np.ndarray:
+    """The sum of what f changes by where each number of `at` is moved `by` so much, alone."""
+    home = f(at)
+    changes = [np.abs(f(at + step) - home) for step in np.diag(by)]
+    return np.sum([np.where(np.isfinite(c), c, 0.0) for c in changes], axis=0) if changes else np.zeros_like(home)
+
+
 def unobserved(what: str, answer: np.ndarray) -> None:
     """The observer that does nothing with an answer."""
 
@@ -91,15 +107,27 @@ class Controller:
         """Gives, of all drives (n_u,) that push as `drive`, those of least effort within limits."""
         return of_least_effort(drive, self.kernels.redundancy, self.rate, *state[2:])
 
-    def drive_rounding(
-        self, before: State, target: np.ndarray, step: ControllerStep, settle: bool, share: float
-    ) -> float:
-        """By how much the drives of a `step` from the state `before` to `target` change where displacement and actuator state do
-        by this `share` of themselves."""
-        k = self._inverse(settle)
-        reached = (step.displacement, step.actuator_state)
-        off = self.drive(k, before, *(value * (1 + share) for value in reached)) - self.drive(k, before, *reached)
-        return float(np.max(np.abs(off)))
+    def rounding(
+        self, before: State, target: np.ndarray, reached: tuple[np.ndarray, np.ndarray], settle: bool, share: float
+    ) -> Rounding:
+        """By how much displacement, actuator state and drive change where all that each is computed from does by this `share` of itself.
+
+        The numbers of a target, then the displacements, then the states, each number alone: what cancels between them does not cancel in
+        their roundings. `reached` are displacement and actuator state of a step from `before` to `target`.
+        """
+        k, (x, z), (d, state) = self._inverse(settle), before[:2], reached
+
+        def off_target(t: np.ndarray) -> np.ndarray:
+            return answer(k.displacement, x, z, t)
+
+        def off_displacement(d: np.ndarray) -> np.ndarray:
+            return np.concatenate([answer(k.state, x, z, d), self.drive(k, before, d, state)])
+
+        d_off = np.maximum(_moved(off_target, target, share * target), share * np.abs(d))
+        moved = _moved(off_displacement, d, d_off)
+        state_off = np.maximum(moved[: len(state)], share * np.abs(state))
+        drive_off = moved[len(state) :] + _moved(lambda s: self.drive(k, before, d, s), state, state_off)
+        return Rounding(d_off, state_off, drive_off)
 
     def _inverse(self, settle: bool) -> Inverse:
         return self.kernels.modes[not settle]

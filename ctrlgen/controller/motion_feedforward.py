@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.controller.controller_step import ControllerStatus, ControllerStep, State
-from ctrlgen.controller.feedforward import Controller
+from ctrlgen.controller.feedforward import Controller, Rounding
 from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.devices import Signal
@@ -71,14 +71,26 @@ class MotionKernels(ControllerKernels):
         n = self.nominal.n_states
         return bool(np.any(np.isfinite([bound[:n] for bound in self.nominal.x_bounds])))
 
-    def drive_sensitivity(self, target: np.ndarray) -> float:
-        """The largest change of a drive where each number of the target changes by as much as it is."""
-        return float(np.max(np.abs(self._drive_slope(target).full()) @ np.abs(target)))
+    def sensitivity(self, target: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The largest changes of displacement, state and drive where each number of the target, and of the displacements and their
+        derivatives by time that follow from it, changes by as much as it is."""
+        slopes = [slope(target).full() for slope in self._slopes]
+        parts = np.split(np.abs(target), self.dynamics.order + 1)
+        per_target = slopes[0][:, : len(parts[0])]
+        d_parts = [np.abs(per_target) @ part for part in parts]
+        moved = np.linalg.inv(per_target) if per_target.shape[0] == per_target.shape[1] else np.linalg.pinv(per_target)
+        blocks = [np.split(slope, self.dynamics.order + 1, axis=1) for slope in slopes[1:]]
+        of_state, of_drive = (
+            np.sum([np.abs(b @ moved) @ d for b, d in zip(of, d_parts, strict=True)], axis=0) for of in blocks
+        )
+        return d_parts[0], of_state[: self.nominal.n_states], of_drive
 
     @cached_property
-    def _drive_slope(self) -> ca.Function:
+    def _slopes(self) -> list[ca.Function]:
+        """target -> derivatives of displacement, state and drive by the target."""
         target = ca.SX.sym("target", len(self.target.channels))
-        return ca.Function("slope", [target], [ca.jacobian(self.motion["drive"](target), target)])
+        names = ("displacement", "state", "drive")
+        return [ca.Function(name, [target], [ca.jacobian(self.motion[name](target), target)]) for name in names]
 
 
 @dataclass(frozen=True)
@@ -128,13 +140,14 @@ class MotionController(Controller):
             broken |= ControllerStatus.STATE
         return broken
 
-    def drive_rounding(
-        self, before: State, target: np.ndarray, step: ControllerStep, settle: bool, share: float
-    ) -> float:
-        """By how much the drives change where the target does by this `share` of itself, each number of it alone."""
+    def rounding(
+        self, before: State, target: np.ndarray, reached: tuple[np.ndarray, np.ndarray], settle: bool, share: float
+    ) -> Rounding:
+        """As of a controller without inertia; of a motion by `MotionKernels.sensitivity`."""
         if settle:
-            return super().drive_rounding(before, target, step, settle, share)
-        return self.kernels.drive_sensitivity(target) * share
+            position = target[: len(self.kernels.model.signals[self.kernels.follow].channels)]
+            return super().rounding(before, position, reached, True, share)
+        return Rounding(*(share * part for part in self.kernels.sensitivity(target)))
 
 
 @lru_cache(maxsize=4)  # generation and each check of what was generated ask for the same one; its kernels take long

@@ -69,6 +69,8 @@ def _controller_rows(
     rows = [entry_of(program.build, what, "status", "1", _status_difference(ref, real, answer, expected), 0.0)]
     if real is Real.FLOAT:  # in float the line search may accept another trial, an equally good answer
         plain = (expected[:, 0].astype(int) & ControllerStatus.DRIVE) == 0
+        if not plain.any():
+            return rows
         answer, expected = answer[plain], expected[plain]
     off = {role: answer[:, columns] - expected[:, columns] for role, columns in ref.columns.items()}
     sizes = {

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.controller.controller_step import State
-from ctrlgen.controller.motion_feedforward import MotionKernels, controller_of
+from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.model.simulation import simulate, trace
 from ctrlgen.trajectory.solution import Solution
 
@@ -78,20 +78,20 @@ class ReferenceAnswers:
         size = np.abs(ca.Function("slope", [target], [slope])(0).full())
         return float(np.max(np.abs(self.positions) @ size.T))
 
-    def moved_drive(self, share: float) -> float:
-        """[SI] by how much a drive changes where all that it follows from is off by this share."""
-        kernels = self.controller.kernels
-        if isinstance(kernels, MotionKernels):
-            return max(kernels.drive_sensitivity(target) for target in self.command[::37]) * share
-        controller, rest = self.controller, self.model.rest[self.model.n_states :]
-        inverse, worst, factor = kernels.moving or kernels.static, 0.0, 1 + share
+    def moved(self, share: float) -> dict[str, float]:
+        """[SI] by how much displacement, actuator state and drive change along the command where all that they follow from is off by
+        this share (`Controller.rounding`)."""
+        worst = dict.fromkeys(("displacement", "state", "drive"), 0.0)
+        settle = self.scenario.sample_time is None
+        rest = self.model.rest[self.model.n_states :]
         drive, displacement = self.columns["drive"], self.columns["displacement"]
         state = slice(displacement.stop, None)
-        for before, row in zip(self.followed[:-1:37], self.followed[1::37], strict=False):
+        followed = zip(self.followed[:-1:37], self.followed[1::37], self.command[1::37], strict=False)
+        for before, row, target in followed:
             now = (np.concatenate([before[state], rest]), before[displacement], before[drive])
-            moved = controller.drive(inverse, now, row[displacement] * factor, row[state] * factor)
-            moved = moved - controller.drive(inverse, now, row[displacement], row[state])
-            worst = max(worst, float(np.max(np.abs(moved))))
+            off = self.controller.rounding(now, target, (row[displacement], row[state]), settle, share)
+            for role in worst:
+                worst[role] = max(worst[role], float(np.max(getattr(off, role), initial=0.0)))
         return worst
 
     def _random_targets(self) -> np.ndarray:

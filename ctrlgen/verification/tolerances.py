@@ -27,9 +27,8 @@ def rounded(real: Real, poses: np.ndarray) -> float:
 
 
 def float_limit(role: str, size: float, ref: ReferenceAnswers) -> float:
-    """What `ROUNDINGS` float roundings of the largest value amount to; for the drive, of what it follows from."""
-    limit = ROUNDINGS * Real.FLOAT.epsilon * size
-    return max(limit, ref.moved_drive(ROUNDINGS / 2 * Real.FLOAT.epsilon)) if role == "drive" else limit
+    """What `ROUNDINGS` float roundings of the largest value amount to, or half as many of all that it follows from."""
+    return max(ROUNDINGS * Real.FLOAT.epsilon * size, ref.moved(ROUNDINGS / 2 * Real.FLOAT.epsilon)[role])
 
 
 def controller_limit(role: str, size: float, ref: ReferenceAnswers, real: Real, wider: float = 1.0) -> float:

@@ -57,9 +57,11 @@ def limiter_calls(controller: Controller, epsilon: float, count: int) -> list[Ca
         if decisions <= known or len(kept) + len(case) > count:
             continue
         if all(
-            controller.step(state, call.target * (1 + off), settle=call.settle).status == status
+            controller.step(state, call.target * (1 + side * STEADY * epsilon * off), settle=call.settle).status
+            == status
             for state, call, status in zip(states, case, statuses, strict=False)
-            for off in (-STEADY * epsilon, STEADY * epsilon)
+            for off in (np.ones(len(call.target)), *np.eye(len(call.target)))  # where numbers cancel, roundings do not
+            for side in (-1, 1)
         ):
             known |= decisions
             kept += case

@@ -27,8 +27,8 @@ UNUSABLE = 3  # NaN, infinity, minus infinity: each in every channel of the targ
 def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str, Any]:
     """Targets with the drives and the status that the model answers, and the tolerance of the drives.
 
-    The tolerance is the change of drive that four roundings of displacement and actuator state cause, or one of a number of a target
-    that a limit scales.
+    The tolerance is the change of drive that four roundings of target, displacement and actuator state cause, or one of a number of a
+    target that a limit scales.
     """
     controller = controller if real is Real.DOUBLE else replace(controller, slack=FLOAT_SLACK)
     rng = np.random.default_rng(0)
@@ -41,16 +41,26 @@ def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str
     rows, tolerance, state = [], 0.0, controller.rest()
     rounding = 4 * real.epsilon
     for call in calls:
-        target = np.array(call.target, dtype=np.float32).astype(float) if real is Real.FLOAT else call.target
+        target = _representable(call.target, real)
         before = controller.rest() if call.fresh else state
         step = controller.step(before, target, settle=call.settle)
         state = step.state
         # rounding may make the line search accept another trial in float: only the status is compared there
         exact = not step.status & ControllerStatus.DRIVE
         how = SETTLE * call.settle + FRESH * call.fresh
-        rows.append({"target": target, "drive": step.drive, "status": int(step.status), "how": how, "exact": exact})
+        rows.append(
+            {
+                "target": target,
+                "drive": _representable(step.drive, real),
+                "status": int(step.status),
+                "how": how,
+                "exact": exact,
+            }
+        )
         if exact and not step.status & ControllerStatus.INPUT:
-            tolerance = max(tolerance, controller.drive_rounding(before, target, step, call.settle, rounding))
+            reached = step.displacement, step.actuator_state
+            off = controller.rounding(before, target, reached, call.settle, rounding).drive
+            tolerance = max(tolerance, float(off.max()))
             # Scaled from far away, it moves by the rounding of what it was scaled from.
             if step.status:
                 for unit in np.eye(len(target)):
@@ -78,7 +88,10 @@ def played_vectors(compression: Compression | None, samples: int, clock: Clock) 
     drives = compression.drives(indices)
     rounding = 16 * compression.real.epsilon * float(np.max(np.abs(drives)))
     return {
-        "played": [{"index": int(k), "drive": drive} for k, drive in zip(indices, drives, strict=True)],
+        "played": [
+            {"index": int(k), "drive": _representable(drive, compression.real)}
+            for k, drive in zip(indices, drives, strict=True)
+        ],
         "played_unusable": UNUSABLE,
         "played_tolerance": max(rounding, float(np.finfo(np.float32).tiny)),
         "timed": _timed(compression, indices, samples, 1 / in_time(clock).sample_time),
@@ -97,4 +110,16 @@ def _timed(compression: Compression, indices: np.ndarray, samples: int, rate: fl
     fraction = (place - whole.astype(number)).astype(float)
     fraction = np.where(compression.closed | (whole < samples - 1), fraction, 0.0)
     drives = compression.drives(whole % samples, fraction)
-    return [{"time": float(t), "drive": drive} for t, drive in zip(times, drives, strict=True)]
+    return [
+        {"time": float(t), "drive": _representable(drive, compression.real)}
+        for t, drive in zip(times, drives, strict=True)
+    ]
+
+
+def _representable(values: np.ndarray, real: Real) -> np.ndarray:
+    """`values` as the arithmetic holds them: in float rounded, and those of a drive at home that rounding left, far below one, as zero."""
+    if real is Real.DOUBLE:
+        return values
+    with np.errstate(over="ignore", under="ignore"):
+        single = np.array(values, dtype=np.float32).astype(float)
+    return np.where(np.abs(single) < float(np.finfo(np.float32).tiny), 0.0, single)

@@ -19,6 +19,7 @@ from ctrlgen.model.allocation import ganged_as
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.inverse import Inverse, invert
 from ctrlgen.model.model import Model
+from ctrlgen.numerics.accelerated_periods import repeating_state
 from ctrlgen.numerics.batched_evaluation import Recursion
 from ctrlgen.trajectory.inverse.clock import Clock, Sampled
 from ctrlgen.trajectory.inverse.motion import Motion
@@ -142,8 +143,8 @@ class BalancedInverse(PathInverse):
         return Recursion(step)
 
     def _carried(self, motion: Motion, periods: int) -> InverseTrajectory:
-        """With the effects' memories, from rest at the first sample; of a closed path the first period that repeats, or that at
-        which it is seen not to within `periods`."""
+        """With the effects' memories, from rest at the first sample; of a closed path the first period that repeats, by itself or as
+        extrapolated from those before, or that at which it is seen not to within `periods`."""
         m, command, closed = self.model, motion.position, motion.closed
         x, z, u_start = self.at_rest(command[0])
         if closed:  # slow memories are soon where they stay
@@ -151,13 +152,25 @@ class BalancedInverse(PathInverse):
         ahead = np.vstack([command[1:], command[:1] if closed else command[-1:]])
         now, scale = np.concatenate([x, z]), np.concatenate([m.x_scale, m.z_scale])
         changes: list[float] = []
+        starts = [now]
+
+        def period(start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            after, along = self._step.run(start, ahead)
+            return after[-1], along
+
         for _ in range(periods if closed else 1):
-            after, along = self._step.run(now, ahead)
-            changes.append(float(np.max(np.abs(after[-1] - now) / scale)))
-            now = after[-1]
+            now, along = period(starts[-1])
+            changes.append(float(np.max(np.abs(now - starts[-1]) / scale)))
+            starts.append(now)
             settles = changes[-1] * _shrinks(changes) ** (periods - len(changes)) <= REPEATS
             if changes[-1] <= REPEATS or (len(changes) >= JUDGED and not settles):
                 break
+        if closed and changes[-1] > REPEATS:  # the first period is that in which kinks settle
+            left = periods - len(changes)
+            found = repeating_state(lambda start: period(start)[0], starts[1:], scale, left, REPEATS)
+            if found is not None:
+                _, along = period(found)
+                changes = [0.0]
         x, z, u = np.split(along, np.cumsum([len(x), len(z)]), axis=1)
         unsettled = _left(changes) if closed and changes[-1] > REPEATS else 0.0
         return self._checked(motion, InverseTrajectory(x, z, u, u_start, self.clock, closed, False, unsettled))
