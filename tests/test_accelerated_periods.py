@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from conftest import DEVICES
+from mechanism_files import loaded
 
+from ctrlgen import build_model, load_scenario
 from ctrlgen.numerics.accelerated_periods import repeating_state
 
 
@@ -49,3 +52,32 @@ def test_a_play_that_a_slow_memory_moves_repeats_too():
 def test_what_drifts_has_no_state_that_repeats():
     assert repeating_state(lambda y: y + 1.0, [np.zeros(1), np.ones(1)], np.ones(1), 17, 1e-9) is None
     assert repeating_state(lambda y: y * np.nan, [np.zeros(1), np.ones(1)], np.ones(1), 17, 1e-9) is None
+
+
+EFFECTS = """
+[[effect]]
+kind = "drive_hysteresis"
+at = "{axis}"
+share = "0.15"
+reach = "60 V"
+taper = "0.5"
+[[effect]]
+kind = "log_creep"
+at = "{axis}"
+gain = "0.01"
+tau = "0.1 s"
+decades = "3"
+"""
+
+
+def test_a_circle_of_stacks_with_hysteresis_and_creep_repeats(tmp_path):
+    """Relaxation times up to 1000 s along a circle of 0.1 s: single periods would take days."""
+    text = (DEVICES / "xy_lever_stage.toml").read_text()
+    loaded(tmp_path, text + "".join(EFFECTS.format(axis=axis) for axis in "xy"))
+    (tmp_path / "scenario.toml").write_text(
+        'title = "t"\ndevice = "device.toml"\nsample_rate = "1 kHz"\nduration = "0.1 s"\n'
+        '[path]\nkind = "circle"\ndiameter = "40 um"\ncentre = { delta_x = "-40 um", delta_y = "-40 um" }\n'
+    )
+    scenario = load_scenario(tmp_path)
+    problem = scenario.bind(build_model(scenario.device))
+    assert problem.inverse.trajectory(problem.motion).exact

@@ -77,7 +77,8 @@ def _controller_rows(
         role: np.abs(expected[:, columns]).max() or ref.model.signals[role].scale[0]
         for role, columns in ref.columns.items()
     }
-    limits = {role: controller_limit(role, size, ref, real, wider) for role, size in sizes.items()}
+    scaled = 1.0 if what is ComparisonKind.FOLLOWED else ref.condition  # by limits, which other targets meet
+    limits = {role: controller_limit(role, scaled * size, ref, real, wider) for role, size in sizes.items()}
     differs = np.any([np.abs(off[role]).max(axis=1) > limit for role, limit in limits.items()], axis=0)
     if ties and differs.any() and int(expected[np.argmax(differs), 0]) & ControllerStatus.DRIVE:
         limits = {role: max(limit, _last_trial(ref.model, role)) for role, limit in limits.items()}

@@ -78,6 +78,16 @@ class ReferenceAnswers:
         size = np.abs(ca.Function("slope", [target], [slope])(0).full())
         return float(np.max(np.abs(self.positions) @ size.T))
 
+    @cached_property
+    def condition(self) -> float:
+        """The largest share of itself by which displacement, actuator state or drive change along the command per share of what they
+        follow from, 1 or more: so far an answer is off that a limit scales by another one."""
+        share, shares = 1e-9, [1.0]
+        for role, change in self.moved(share).items():
+            if role in self.columns and (size := np.abs(self.followed[:, self.columns[role]]).max(initial=0.0)):
+                shares.append(change / share / size)
+        return float(max(shares))
+
     def moved(self, share: float) -> dict[str, float]:
         """[SI] by how much displacement, actuator state and drive change along the command where all that they follow from is off by
         this share (`Controller.rounding`)."""

@@ -11,7 +11,7 @@ from ctrlgen.verification.reference import ReferenceAnswers
 LENGTH_LIMIT = {Real.DOUBLE: 1e-11, Real.FLOAT: 1e-10}
 # rad: 1e-8 rad moves the platform's rim by 0.02 nm
 ANGLE_LIMIT = {Real.DOUBLE: 1e-12, Real.FLOAT: 1e-8}
-# double C against CasADi: about 4500 roundings
+# double C against CasADi: about 4500 roundings of the largest value, or of what it follows from
 RELATIVE_LIMIT = 1e-12
 # of a limit's bound: rounding
 EXCESS_LIMIT = {Real.DOUBLE: 1e-9, Real.FLOAT: 1e-5}
@@ -34,6 +34,6 @@ def float_limit(role: str, size: float, ref: ReferenceAnswers) -> float:
 def controller_limit(role: str, size: float, ref: ReferenceAnswers, real: Real, wider: float = 1.0) -> float:
     """Of the C against the controller evaluated by CasADi, for answers up to `size` [SI]; in float `wider` times as much."""
     if real is Real.DOUBLE:
-        return RELATIVE_LIMIT * size
+        return max(RELATIVE_LIMIT * size, ref.moved(RELATIVE_LIMIT)[role])
     limit = float_limit(role, size, ref)
     return wider * (max(limit, LENGTH_LIMIT[real]) if role == "displacement" else limit)
