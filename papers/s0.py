@@ -14,7 +14,7 @@ from ctrlgen.recordings.pose_errors import CHANNELS, parasitic, pose_errors
 
 from . import s0_geometry, s0_jacobians
 from .rounding import half_units, propagated_rounding
-from .row import PrintedNumber, beside_literal
+from .row import PrintedNumber, beside_literal, no_number
 from .s0_data import PaperRecordings, load_s0
 from .s0_tables import DIGITS, EXTREMES, NORMS, SCALE, TABLE_3, UNITS, s0_row
 
@@ -22,6 +22,23 @@ ROUNDED = "computed from Table 4, which is rounded to three digits"
 CALCULATED = (
     "follows with r_a = 64.291 mm, r_b = 138.924 mm, the angles from c_1 ... c_4 unrounded, eq. (9), and actuators 2y, 3x and "
     "3y reversed"
+)
+
+
+SET_UP = "photograph or scheme of the set-up"
+REDRAWN = "redrawn on the page from our own errors; its numbers are those of Table 3 and section 5.2"
+INSTRUMENT = "a property of the instrument, of which the paper prints no data"
+WITHOUT_NUMBER = (
+    ("Fig. 1", SET_UP),
+    ("Fig. 2", "scheme of eq. (1) and (2)"),
+    ("Fig. 3", "scheme of Table 1"),
+    ("Fig. 4", SET_UP),
+    ("Fig. 5", SET_UP),
+    *((f"Fig. {k}", REDRAWN) for k in range(6, 11)),
+    ("Section 3, faces of the cube, 1.4E-3 deg", INSTRUMENT),
+    ("Section 3.1, alignment of the beams, 2E-5 deg", INSTRUMENT),
+    ("Section 3.1, 40 readings in 30 s", INSTRUMENT),
+    ("Section 3.2, autocollimator, 7e-5 deg of 0.55 deg", INSTRUMENT),
 )
 
 
@@ -36,8 +53,17 @@ def rows(device: MesoHexapod | None = None) -> list[PrintedNumber]:
         *s0_jacobians.table_2(printed, recordings),
         *s0_jacobians.equation_16(recordings),
         *_counts(recordings),
+        *_workspace(recordings),
         *_section_5(recordings),
+        *(no_number("S0", what, reason) for what, reason in WITHOUT_NUMBER),
     ]
+
+
+def _workspace(data: PaperRecordings) -> list[PrintedNumber]:
+    """The workspace that the abstract states: what Table 4 commands."""
+    most = np.abs(data.commanded / SCALE).max(0)
+    named = (("rotation", "0.2", "deg", most[:3]), ("translation", "200", "um", most[3:]))
+    return [s0_row(f"Abstract, workspace, {what}", text, unit, values.max()) for what, text, unit, values in named]
 
 
 def _of_device(device: MesoHexapod, recordings: PaperRecordings) -> list[PrintedNumber]:

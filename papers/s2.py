@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from math import pi
 
-from ctrlgen.core.units import parse, to_si
-from ctrlgen.physics.sensor_models import SENSORS, Sensor
+import numpy as np
 
-from .row import PrintedNumber
-from .sensor_calibration import max_deviation
+from ctrlgen.core.units import parse, to_si
+from ctrlgen.physics.sensor_models import SENSORS, Interferometer, Sensor
+
+from . import s2_hinges
+from .row import PrintedNumber, no_number
+from .sensor_calibration import find_fringes, max_deviation, record
 
 UNPUBLISHED = "measured; the recordings behind it are not published"
 NM, UM = 1e9, 1e6
@@ -30,12 +33,27 @@ RESOLUTIONS = {
 OFFSETS = {"3316": "89", "3317": "82", "3338": "159"}  # mV per degC
 NOISE = {"3316": ("1.8", "5"), "3317": ("1.0", "3.5"), "3338": ("1.5", "5"), "fibre": ("0.3", "4")}  # mV
 
+SET_UP = "scheme or photograph of the set-up"
+REDRAWN = "redrawn on the page from simulated recordings; its numbers are those of Table A.1"
+FIGURES = (
+    ("Fig. A.1", SET_UP),
+    ("Fig. A.2", "left out of the source, which refers to the print copy"),
+    ("Fig. A.3", REDRAWN),
+    ("Fig. A.4", SET_UP),
+    ("Fig. A.5", SET_UP),
+    ("Fig. A.6", UNPUBLISHED),
+    ("Fig. A.7", UNPUBLISHED),
+    ("Fig. A.8", REDRAWN),
+    ("Fig. A.9", REDRAWN),
+    ("Fig. A.10", "redrawn on the page from the printed offset rates"),
+    ("Appendix B", "left out of the source, which refers to the print copy"),
+)
 WRONG_DIGIT = "10.184 um/V times 20 V/2^16 is 3.108 nm; the print has cut the digit off"
 
 
 def rows() -> list[PrintedNumber]:
     """Every printed number of S2 beside ours."""
-    return [*_adc_and_noise(), *_statistics(), *_ranges(), *_coefficients()]
+    return [*_adc_and_noise(), *_statistics(), *_ranges(), _fringes(), *s2_hinges.rows(), *_coefficients(), *_figures()]
 
 
 def _adc_and_noise() -> list[PrintedNumber]:
@@ -97,6 +115,19 @@ def _ranges() -> list[PrintedNumber]:
             PrintedNumber("S2", f"A.1, 100 um before the amplifier, {name}", "1", "V", volts, about, tolerance=0.5)
         )
     return found
+
+
+def _fringes() -> PrintedNumber:
+    """Eq. (A.1) on a simulated record: counted in fringes, less what the target moved; its ends fall between two extrema."""
+    laser, distance = Interferometer(), 20e-6
+    run = record(SENSORS["3316"], laser, distance, 10e-6, np.random.default_rng(0))
+    counted = find_fringes(run.photodiode).distance(laser.wavelength)
+    reason = "20 um counted in fringes of a simulated record; allowed: a quarter wave at each end and one for the first crossing"
+    return PrintedNumber("S2", "eq. (A.1)", "20", "um", counted * UM, reason, 3 * laser.wavelength / 4 * UM)
+
+
+def _figures() -> list[PrintedNumber]:
+    return [no_number("S2", figure, reason) for figure, reason in FIGURES]
 
 
 def _bare_voltage(sensor: Sensor) -> float:

@@ -13,7 +13,8 @@ from ctrlgen.core.units import from_si
 from ctrlgen.devices.rrr_stage import stage
 from ctrlgen.physics.rrr_kinetostatics import Kinetostatics
 
-from .row import PrintedNumber, half_unit
+from . import s3_shear
+from .row import PrintedNumber, half_unit, identity, no_number
 from .s3_lengths import corrected, diagnosis, fit, printed_device
 from .s3_tables import (
     CASES,
@@ -33,12 +34,36 @@ COMPLETE = {
     "C_inFin": "input_compliance",
     "J": "complete_J",
 }
+LENGTHS_FITTED = "follows with l1 = 47.900 mm and l2 = 22.170 mm (printed 17.9 and 22.2), as fitted to Table 4"
 STRUCTURAL = "zero by the threefold symmetry; allowed: rounding of the model"
+
+
+SCHEME = "scheme of the hinge or of appendix B; the model's equations are tested one by one against it"
+FIGURES = (
+    ("Fig. 1", SCHEME),
+    ("Fig. 2", SCHEME),
+    ("Fig. 3", "redrawn on the page from our own finite elements; its errors are those of Table 3, alpha_z/M_z"),
+    ("Fig. 4", "redrawn on the page from our own finite elements; its errors are those of Table 3, delta_y/F_y"),
+    ("Fig. 5", "redrawn on the page from our own finite elements; its errors are those of Table 3, delta_x/F_x"),
+    *((f"Fig. {k}", SCHEME) for k in range(6, 12)),
+    ("Fig. 12", "drawing of the stage; its lengths are those of Table 1"),
+    ("Fig. 13", "the paper's finite-element mesh; its results are Table 5"),
+)
 
 
 def rows() -> list[PrintedNumber]:
     """The printed numbers of S3, in the order of the paper."""
-    return [*_table_1(), *_text_on_coupling(), *_table_4(), *_table_5(), *_table_6(), *_text_on_agreement()]
+    return [
+        *_table_1(),
+        *s3_shear.rows(),
+        *_equations(),
+        *_text_on_coupling(),
+        *_table_4(),
+        *_table_5(),
+        *_table_6(),
+        *_text_on_agreement(),
+        *_figures(),
+    ]
 
 
 @cache
@@ -53,13 +78,19 @@ def computed(case: int, symbol: str, i: int, j: int, k: Kinetostatics | None = N
     return float(from_si(matrix[i - 1, j - 1], unit(symbol, i, j)))
 
 
+@cache
+def stage_as_printed(case: int) -> Kinetostatics:
+    """Compliances and Jacobian of the stage of case 1 or 2, with the lengths of Table 1."""
+    return stage(printed_device(case))
+
+
 def _entry_row(where: str, case: int, symbol: str, i: int, j: int, text: str, reason: str) -> PrintedNumber:
-    ours = computed(case, symbol, i, j)
+    ours, literal = computed(case, symbol, i, j), computed(case, symbol, i, j, stage_as_printed(case))
     place, u = f"{where}, {symbol} ({i},{j})", unit(symbol, i, j)
     if text == "0":
         rounding = 1e-9 * float(from_si(np.abs(ca.DM(getattr(stage_of_case(case), symbol)).full()).max(), u))
         return PrintedNumber("S3", place, text, u, ours, STRUCTURAL, rounding)
-    return PrintedNumber("S3", place, text, u, ours, reason)
+    return PrintedNumber("S3", place, text, u, ours, reason, taken_literally=literal)
 
 
 def _table_1() -> Iterator[PrintedNumber]:
@@ -96,7 +127,7 @@ def _text_on_coupling() -> Iterator[PrintedNumber]:
 def _table_4() -> Iterator[PrintedNumber]:
     for case in CASES:
         for symbol, i, j, text in entries(TABLE_4[case]):
-            reason = "lengths from the fit to this table (Table 1, l1 and l2)"
+            reason = LENGTHS_FITTED
             if (case, symbol, i, j) in SIGN_LOST_4:
                 reason = "printed without its minus sign: the entries of this row are equal by symmetry"
             yield _entry_row(f"Table 4, case {case}", case, symbol, i, j, text, reason)
@@ -164,7 +195,9 @@ def _table_6() -> Iterator[PrintedNumber]:
                 "; ".join(part for part in ("printed without its minus sign" if lost else "", fea.reason) if part)
                 or "0.1 percentage point: Table 5 is rounded"
             )
-            yield PrintedNumber("S3", f"Table 6, case {case}, {symbol} ({i},{j})", text, "%", ours, reason, POINT)
+            literal = 100 * (computed(case, symbol, i, j, stage_as_printed(case)) / fea.value - 1)
+            where = f"Table 6, case {case}, {symbol} ({i},{j})"
+            yield PrintedNumber("S3", where, text, "%", ours, f"{reason}; {LENGTHS_FITTED}", POINT, literal)
 
 
 def _text_on_agreement() -> Iterator[PrintedNumber]:
@@ -176,3 +209,27 @@ def _text_on_agreement() -> Iterator[PrintedNumber]:
             if s == symbol
         )
         yield PrintedNumber("S3", f"section 5.1.1, largest difference of {place}, case 2", text, "%", worst)
+
+
+def _equations() -> Iterator[PrintedNumber]:
+    """Eq. (1) to (7): loads on platform and inputs, and the Jacobian, by the matrices of case 2."""
+    k = stage_of_case(2)
+    C_oFin, C_inFo, C_in, J = (ca.DM(m).full() for m in (k.C_oFin, k.C_inFo, k.C_inFin, k.J))
+    F_o, F_in = np.array([1.0, -2.0, 0.03]), np.array([5.0, 7.0, -3.0])  # N, N m
+    work = F_o @ (C_oFin @ F_in) - F_in @ (C_inFo @ F_o)
+    size = abs(F_in @ (C_inFo @ F_o))
+    free = C_oFin @ F_in - J @ (C_in @ F_in)
+    scale = np.abs(C_oFin @ F_in).max()
+    yield identity(
+        "S3",
+        "eq. (1), reciprocity",
+        work / size,
+        1e-9,
+        "work of the platform's load on the inputs' motion, less the other",
+    )
+    what = "U_o of three input forces by eq. (3), less J U_in by eq. (5): no load on the platform"
+    yield identity("S3", "eq. (2) to (7)", float(np.abs(free).max() / scale), 1e-9, what)
+
+
+def _figures() -> list[PrintedNumber]:
+    return [no_number("S3", figure, reason) for figure, reason in FIGURES]

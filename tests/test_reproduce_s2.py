@@ -41,6 +41,7 @@ def found() -> dict[str, PrintedNumber]:
     return by_place
 
 
+@pytest.mark.long
 def test_what_is_not_reproduced_has_a_reason(found):
     silent = [
         place for place, row in found.items() if row.status is not ReproductionStatus.REPRODUCED and not row.reason
@@ -48,13 +49,15 @@ def test_what_is_not_reproduced_has_a_reason(found):
     assert not silent
 
 
-def test_every_computable_number_of_s2_is_reproduced_but_two(found):
+@pytest.mark.long
+def test_every_computable_number_of_s2_is_reproduced_but_three(found):
     listed = [row for row in found.values() if row.source == "S2" and row.ours is not None]
     differing = {row.where for row in listed if row.status is ReproductionStatus.DIFFERS}
-    assert differing == {"A.5.1.1, eq. (A.2), 3338", "below C.15, coefficient, Tseytlin"}
-    assert len(listed) >= 30
+    assert differing == {"A.5.1.1, eq. (A.2), 3338", "below C.15, coefficient, Tseytlin", "C.24"}
+    assert len(listed) >= 55
 
 
+@pytest.mark.long
 def test_the_hinge_errors_of_s3_table_3_agree_where_the_reading_does_not_matter(found):
     bending = [row for place, row in found.items() if "delta_y_per_F_y" in place and row.ours is not None]
     assert len(bending) == 12 and Counter(row.status for row in bending)[ReproductionStatus.REPRODUCED] >= 8

@@ -12,6 +12,7 @@ from ctrlgen.core.units import difference
 if TYPE_CHECKING:
     from ctrlgen.budget.error_budget import ErrorBudget
     from ctrlgen.calibration.calibrate import Calibration
+    from ctrlgen.calibration.measured_jacobian import MeasuredJacobian
 
 
 def print_calibration(calibration: Calibration, budgets: tuple[ErrorBudget, ErrorBudget] | None) -> None:
@@ -42,3 +43,26 @@ def print_calibration(calibration: Calibration, budgets: tuple[ErrorBudget, Erro
             out.print(f"budget of {title}: {what}: {both}", markup=False, soft_wrap=True)
     for note in calibration.notes:
         out.print(note, markup=False, soft_wrap=True, style="yellow")
+
+
+def print_jacobian(found: MeasuredJacobian) -> None:
+    """How many numbers were fitted, the few where it is few, and the norms of the errors of the poses before and after."""
+    from ctrlgen.calibration.jacobian_record import jacobian_record
+
+    record = jacobian_record(found)
+    told = (
+        f"{found.numbers} numbers fitted to {record.poses_fitted} poses, condition of the drives {found.condition:.3g}"
+    )
+    out.print(f"[bold]measured Jacobian: {escape(found.recording.title)}[/bold]", soft_wrap=True)
+    out.print(told, markup=False, soft_wrap=True)
+    if found.few:
+        table = table_of(("fitted", "left"), ("value", "right"), ("sd", "right"))
+        for n in found.few:
+            unit = "" if n.unit == "1" else f" {n.unit}"
+            table.add_row(escape(n.name), f"{n.value:.6g}{unit}", f"{n.sd:.2g}{unit}")
+        show_table(table)
+    table = table_of(("error", "left"), ("mean, as described", "right"), ("mean", "right"), ("largest", "right"))
+    for n in record.norms:
+        cells = [f"{v:.4g} {n.unit}" for v in (n.mean_before, n.mean_after, n.max_after)]
+        table.add_row(f"{n.part}, {n.poses}", *cells)
+    show_table(table)

@@ -8,6 +8,7 @@ from pydantic import BaseModel
 
 from ctrlgen.budget.budget_record import BudgetRecord
 from ctrlgen.calibration.calibration_record import CalibrationRecord
+from ctrlgen.calibration.jacobian_record import JacobianRecord
 from ctrlgen.core.files import write_text
 from ctrlgen.diagnosis.report.diagnosis_record import DiagnosisRecord
 from ctrlgen.learning.learning_record import LearningRecord
@@ -22,6 +23,7 @@ RESULTS: dict[str, type[BaseModel]] = {
     "constants": CalibrationRecord,
     "diagnosis": DiagnosisRecord,
     "fastest": FastestRecord,
+    "jacobian": JacobianRecord,
     "learning": LearningRecord,
     "summary": Summary,
 }

@@ -20,7 +20,7 @@ from ctrlgen.app.commands.app import (
 )
 from ctrlgen.app.console import complain, counted, err, out, progress
 from ctrlgen.app.diagnosis_console import print_batch, print_bootstrap, print_diagnosis, print_explanation
-from ctrlgen.core.errors import InputError
+from ctrlgen.core.errors import Fault, InputError
 
 
 @app.command(rich_help_panel=RECORDING_PANEL)
@@ -189,6 +189,13 @@ def calibrate(
             help="A scenario whose error budget is drawn up before and after; its device is DEVICE.", show_default=False
         ),
     ] = None,
+    jacobian: Annotated[
+        str | None,
+        typer.Option(
+            help="Fit the Jacobian to settled poses instead: `all` its numbers, or the `few` by which the described one can differ.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Fit the constants of one specimen to a short recording of it, for the C that is given them when it starts.
 
@@ -206,6 +213,10 @@ def calibrate(
     device.calibrated.toml, the device file with these numbers. Where the readings disagree whatever
     the constants, ctrlgen diagnose says what the device file leaves out.
 
+    With --jacobian the poses of a recording give the Jacobian, with its error analysis: jacobian.csv, jacobian.json,
+    calibration.html, and device.calibrated.py, a device that follows it. `few` are gain and sense of each drive, turn of the
+    frame and place of the point that is read, turns per length.
+
     Example:  ctrlgen calibrate scenarios/devices/mems_hexapod_run_time.toml scenarios/hexapod_specimen --out out/specimen
     """
     from ctrlgen.app.calibration_console import print_calibration
@@ -216,6 +227,9 @@ def calibrate(
 
     if out_folder is not None:
         check_folder(out_folder)
+    if jacobian is not None:
+        _calibrate_jacobian(device, recording, jacobian, scenario, out_folder)
+        return
     with progress() as advance:
         result = calibrated(device, recording, advance)
         both = None if scenario is None else budgets(result, scenario, device, advance)
@@ -227,6 +241,29 @@ def calibrate(
                 write_calibration(draft, result, both)
                 write_calibrated_device(result, device, draft / NAME)
     print_calibration(result, both)
+    if out_folder is not None:
+        out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'calibration.html'))}", soft_wrap=True)
+
+
+def _calibrate_jacobian(
+    device: Path, recordings: list[Path], numbers: str, scenario: Path | None, out_folder: Path | None
+) -> None:
+    from ctrlgen.app.calibration_console import print_jacobian
+    from ctrlgen.calibration.jacobian_page import write_jacobian
+    from ctrlgen.calibration.measured_jacobian import JacobianNumbers, calibrate_poses
+    from ctrlgen.core.files import whole_folder
+
+    known = [kind.value for kind in JacobianNumbers]
+    if numbers not in known or scenario is not None:
+        what = f"{numbers!r} must be one of {', '.join(known)}" if numbers not in known else "goes without --scenario"
+        raise InputError("calibrate", [Fault("--jacobian", what)])
+    with progress() as advance:
+        advance("poses")
+        found = calibrate_poses(device, recordings, JacobianNumbers(numbers))
+        if out_folder is not None:
+            with whole_folder(out_folder) as draft:
+                write_jacobian(draft, found)
+    print_jacobian(found)
     if out_folder is not None:
         out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'calibration.html'))}", soft_wrap=True)
 
