@@ -110,7 +110,7 @@ def _numbers(h: SimpleNamespace) -> np.ndarray:
     return np.array([h.platform_radius, h.base_radius, *angles, h.platform_thickness, h.height])
 
 
-def _jacobian(x: ca.SX, directions: Sequence[float]) -> ca.SX:
+def _jacobian(x: ca.SX, directions: Sequence[float] | np.ndarray) -> ca.SX:
     """[J^k] of NUMBERS, with the threefold and mirror symmetry of Table 1."""
     r_a, r_b, phi_1, psi_4, t, H = ca.vertsplit(x)
     phi = phi_1 - radians(180)
@@ -124,7 +124,7 @@ def _jacobian(x: ca.SX, directions: Sequence[float]) -> ca.SX:
         platform_angles=[centre + side * phi for centre, side in platform],
         base_angles=[centre + side * psi_4 for centre, side in base],
     )
-    return meso_hexapod.kinematic_jacobian(h, directions)
+    return meso_hexapod.kinematic_jacobian(h, list(directions))
 
 
 def _rounded(ours: ca.SX, printed: np.ndarray) -> ca.SX:

@@ -62,7 +62,7 @@ def print_jacobian(found: MeasuredJacobian) -> None:
             table.add_row(escape(n.name), f"{n.value:.6g}{unit}", f"{n.sd:.2g}{unit}")
         show_table(table)
     table = table_of(("error", "left"), ("mean, as described", "right"), ("mean", "right"), ("largest", "right"))
-    for n in record.norms:
-        cells = [f"{v:.4g} {n.unit}" for v in (n.mean_before, n.mean_after, n.max_after)]
-        table.add_row(f"{n.part}, {n.poses}", *cells)
+    for e in record.norms:
+        cells = [f"{v:.4g} {e.unit}" for v in (e.mean_before, e.mean_after, e.max_after)]
+        table.add_row(f"{e.part}, {e.poses}", *cells)
     show_table(table)

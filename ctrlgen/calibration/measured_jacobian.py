@@ -103,7 +103,8 @@ def calibrate_poses(
     held_out = np.concatenate([np.full(len(r.drive), r.role == "hold_out") for r in records])
     fitted = ~held_out
     every = calibrate_jacobian(drive[fitted], observed[fitted], offset=True)
-    jacobian, sd, offset, few = every.jacobian, every.sd, every.offset, ()
+    jacobian, sd, offset = every.jacobian, every.sd, every.offset
+    few: tuple[FittedNumber, ...] = ()
     if numbers is JacobianNumbers.FEW:
         described_jacobian = np.linalg.lstsq(drive, expected, rcond=None)[0].T
         jacobian, sd, offset, few = _few(described, described_jacobian, drive[fitted], observed[fitted])
