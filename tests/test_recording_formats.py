@@ -31,6 +31,10 @@ def write_as(ending: str, path, columns: dict[str, np.ndarray]) -> None:
     elif ending == ".npy":
         table = np.array(list(zip(*columns.values(), strict=True)), dtype=[(name, float) for name in columns])
         np.save(path, table)
+    elif ending in (".jsonl", ".ndjson"):
+        rows = zip(*columns.values(), strict=True)
+        rows = [dict(zip(columns, (None if math.isnan(x) else float(x) for x in row), strict=True)) for row in rows]
+        path.write_text("\n".join(map(json.dumps, rows)) + "\n")
     elif ending == ".json":
         path.write_text(json.dumps({k: [None if math.isnan(x) else x for x in v] for k, v in columns.items()}))
     elif ending == ".mat":

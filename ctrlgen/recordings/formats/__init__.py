@@ -12,6 +12,7 @@ from pathlib import Path
 
 from ctrlgen.core.errors import InputError
 from ctrlgen.recordings.formats.checked_files import check_size, fault
+from ctrlgen.recordings.formats.long_form import widened
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
 from ctrlgen.recordings.formats.written_layout import Layout
 
@@ -35,6 +36,8 @@ READERS: dict[str, str] = {
     ".mf4": MDF,
     ".mdf": MDF,
     ".json": JSON,
+    ".jsonl": JSON,
+    ".ndjson": JSON,
     ".xlsx": EXCEL,
     ".xlsm": EXCEL,
     ".parquet": PARQUET,
@@ -52,6 +55,8 @@ BEGINNINGS = (
     (b"\x93NUMPY", NUMPY),
 )
 """First bytes of files of one kind, whatever their ending."""
+OBJECTS = (b'{"', b"[{", b"{\n", b"{\r")
+"""First characters of JSON that a logger has written under the ending of a text."""
 FOREIGN = {
     b"\xd0\xcf\x11\xe0": "is a workbook of Excel before 2007; save it as .xlsx or .csv",
     b"\x1f\x8b": "is compressed by gzip; unpack it",
@@ -76,7 +81,7 @@ def read_table(path: Path, which: int | str | None = None, layout: Layout | None
     try:
         check_size(path, path.stat().st_size)
         reader: Reader = import_module(f"ctrlgen.recordings.formats.{module}").read
-        return _chosen(path, reader(path, layout or Layout()), which)
+        return widened(_chosen(path, reader(path, layout or Layout()), which))
     except InputError:
         raise
     except RecursionError:
@@ -100,7 +105,7 @@ def _module(path: Path) -> str:
     known = READERS.get(path.suffix.lower())
     if known is None and b"\0" in head:
         raise fault(path, _unknown(path))
-    return known or TEXT
+    return JSON if known in (TEXT, None) and head.lstrip()[:2] in OBJECTS else known or TEXT
 
 
 def _unknown(path: Path) -> str:

@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import Literal
 
 from ctrlgen.recordings.formats.number_cells import OVER, Ambiguous, is_number, is_reading
-from ctrlgen.recordings.formats.text_cells import cells_of, is_comment, width_of
+from ctrlgen.recordings.formats.text_cells import cells_of, is_comment, width_of, without_mark
 
 FEWEST_ROWS = 2  # of a table among other text
 FOOTED = 20  # rows before a footer that must begin with a number
@@ -64,7 +64,7 @@ def blocks_of(lines: Sequence[str], separator: str) -> list[Block]:
     for k, kind in enumerate([*kinds, "text"]):
         if kind == "row" or (kind == "mixed" and run and _belongs(lines[k], lines[run[-1]], separator)):
             run.append(k)
-        elif kind != "blank" and not (run and kind == "remark"):
+        elif kind != "blank" and not (run and kind == "remark" and not _begins_again(lines, k, run, above, separator)):
             if len(run) >= FEWEST_ROWS or (run and _is_lost(lines[run[0]], blocks, separator)):
                 blocks.append(_block(lines, run, above, separator))
                 above = []
@@ -73,6 +73,15 @@ def blocks_of(lines: Sequence[str], separator: str) -> list[Block]:
             run = []
             above.append(k)
     return _of_several_columns(blocks)
+
+
+def _begins_again(lines: Sequence[str], k: int, run: Sequence[int], above: Sequence[int], separator: str) -> bool:
+    """Whether a remark below rows names columns again: it stands above them too, with as many names as they have cells."""
+    if not any(lines[k] == lines[j] for j in above):
+        return False
+    width, text = width_of(lines[run[-1]], separator), without_mark(lines[k]).strip()
+    names = [cells_of(text, separator), re.split(r"\s{2,}|\t", text)]
+    return any(len(cells) == width and not any(map(is_number, cells)) for cells in names)
 
 
 def _is_lost(line: str, blocks: Sequence[Block], separator: str) -> bool:

@@ -13,6 +13,7 @@ from ctrlgen.recordings.formats import number_cells
 from ctrlgen.recordings.formats.checked_files import fault
 from ctrlgen.recordings.formats.measurement_table import Clock, MeasurementTable
 from ctrlgen.recordings.formats.number_cells import Ambiguous, NumberStyle
+from ctrlgen.recordings.formats.rows_of_signals import lies_on_its_side, on_its_side
 from ctrlgen.recordings.formats.text_blocks import MOST_LISTED, Block, blocks_of, kind_of
 from ctrlgen.recordings.formats.text_cells import cells_of, separator_of, stray_quotes
 from ctrlgen.recordings.formats.text_encoding import decoded
@@ -91,6 +92,8 @@ def _table(
     style, notes = number_cells.style_of(cells, layout, separator)
     dated = " " in cells[0][0] and not lines[rows[0]].lstrip().startswith('"')
     columns = _columns("\n".join(lines[k] for k in rows), block, separator, style, dated)
+    if not any(header.names) and lies_on_its_side(columns):
+        return on_its_side(path, columns, (*said, *header.notes, *notes), layout, style)
     names, units = list(header.names), dict(header.units)
     unique = _unique(names)
     cut = [f"line {block.cut + 1}, the last, ends before its last cell; left out"] if block.cut is not None else []
@@ -209,4 +212,4 @@ def _unique(names: Sequence[str]) -> list[str]:
 def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
     """The tables of a text file, by the lines that they stand in."""
     tables = read_text_tables(path, layout)
-    return {f"from line {table.lines[0]}, {len(table.lines)} rows": table for table in tables}
+    return {f"from line {t.lines[0]}, {len(t.lines)} rows" if t.lines else "on its side": t for t in tables}

@@ -94,6 +94,8 @@ def _fitting(line: str, width: int, separator: str) -> list[str] | None:
             [c.strip() for c in text.split(",")],
         )
         cells = next((c for c in split if len(c) == width), cells)
+        if is_comment(line) and len(cells) == width and text.startswith("L "):  # the key of names in files of SPEC
+            cells[0] = cells[0].removeprefix("L ").strip()
     return cells if len(cells) == width and any(cells) else None
 
 

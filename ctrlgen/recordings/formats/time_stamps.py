@@ -194,6 +194,11 @@ def from_first(column: np.ndarray, unit: str, scale: float) -> tuple[np.ndarray,
     return values, (f"time is {unit} since 1970; from {instant}",) if unit in fitting else ()
 
 
+def epoch_unit(values: np.ndarray) -> str | None:
+    """The unit in which numbers are times since 1970, of the years 2000 to 2049; None where they are not."""
+    return next((unit for unit in EPOCHS if len(values) and _in_epoch(float(values[0]), unit)), None)
+
+
 def _in_epoch(size: float, unit: str) -> bool:
     low, high = SINCE_1970
     return low <= size / EPOCHS[unit] <= high

@@ -10,6 +10,7 @@ import numpy as np
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import same_dimension, to_si
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
+from ctrlgen.recordings.formats.time_stamps import epoch_unit
 from ctrlgen.recordings.formats.unit_texts import BASES, NAMES, bare_name, unit_of
 from ctrlgen.recordings.look.answers import NOTHING, Answers
 
@@ -148,10 +149,10 @@ def _time(table: MeasurementTable, columns: tuple[ColumnFacts, ...], chosen: str
     dated = [c for c in columns if c.values is None]
     of_unit = [c for c in columns if c.unit is not None and same_dimension(c.unit, "s")]
     for column in dict.fromkeys(chosen or c.name for c in (*named, *dated, *of_unit, *columns[: bool(chosen)])):
-        unit = next(c.unit for c in columns if c.name == column) or "s"
+        facts = next(c for c in columns if c.name == column)
+        unit, stamps = facts.unit or epoch_unit(facts.finite) or "s", facts.values is None
         if not same_dimension(unit, "s"):
             continue
-        stamps = next(c.values is None for c in columns if c.name == column)
         try:
             seconds = table.time(column, "s" if stamps else unit).values * (1.0 if stamps else to_si(1.0, unit))
         except InputError:

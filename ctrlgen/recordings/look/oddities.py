@@ -7,11 +7,12 @@ import numpy as np
 from ctrlgen.core.units import from_si, to_si
 from ctrlgen.model.model import Model
 from ctrlgen.recordings.alike_units import alike
-from ctrlgen.recordings.look.column_facts import TableFacts
+from ctrlgen.recordings.look.column_facts import TIME_NAME, TableFacts
 
 WIDE = 5.0  # times the device's own size: no reading of it is as large
 NARROW = 1e-4  # of it: nothing moved, or the unit is another
 FITTING = (0.02, 2.5)  # of the device's size: a reading of it usually spans so much
+EVEN = 0.01  # of a step: rounding of a time that rises evenly
 
 
 def table_oddities(facts: TableFacts) -> list[str]:
@@ -22,6 +23,8 @@ def table_oddities(facts: TableFacts) -> list[str]:
             said.append(f"{time.column}: {time.backward} rows are not later than the row before")
         if time.jitter > 0.01 * time.step:
             said.append(f"{time.column}: rows are uneven by {100 * time.jitter / time.step:.2g} % of their step")
+    else:
+        said += _perhaps_times(facts)
     for column in facts.columns:
         if column.values is None:
             continue
@@ -29,6 +32,23 @@ def table_oddities(facts: TableFacts) -> list[str]:
     constant = [c.name for c in facts.columns if c.values is not None and not c.moves]
     said += [f"the same in every row: {', '.join(constant)}"] if constant else []
     said += [f"{b}: is the same as {a}" for a, b in _alike(facts)]
+    return said
+
+
+def _perhaps_times(facts: TableFacts) -> list[str]:
+    """Of a table without a time: columns that are named as one and stand still between rows, else those that rise evenly."""
+    rising = [c for c in facts.columns if c.moves and c.values is not None and bool(np.all(np.diff(c.finite) >= 0))]
+    said = []
+    for column in (c for c in rising if TIME_NAME.match(c.bare)):
+        steps = np.diff(column.finite)
+        said.append(
+            f"{column.name}: stands still in {np.sum(steps == 0)} of {len(steps)} rows: rounded too coarsely to be a time; where rows "
+            f"are even, leave it out and write their rate (1 row in {np.mean(steps):.6g} {column.unit or 'of its unit'})"
+        )
+    for column in () if said else rising:
+        steps = np.diff(column.finite)
+        if np.ptp(steps) <= EVEN * np.median(steps):
+            said.append(f"{column.name}: rises by {np.median(steps):.6g} from row to row: name it as the time if it is")
     return said
 
 

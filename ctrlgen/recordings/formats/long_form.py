@@ -1,0 +1,114 @@
+"""Tables that hold one reading a row, with the name of its signal beside it, as data bases and message logs write them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ctrlgen.recordings.formats import number_cells, time_stamps
+from ctrlgen.recordings.formats.measurement_table import MeasurementTable
+from ctrlgen.recordings.formats.unit_texts import unit_of
+
+MOST_SIGNALS = 200
+SHARED = 1.5  # rows an instant, from which several signals are read at one time
+CHANGING = (
+    0.5  # share of rows whose name is another than the row's before, from which a name is no state of the machine
+)
+TIME_NAME = re.compile(r"t|_?time.*|zeit.*|timestamp.*|date.*|stamp", re.IGNORECASE)
+Column = np.ndarray[Any, Any]
+
+
+def widened(table: MeasurementTable) -> MeasurementTable:
+    """The table with a column a signal; itself where it is none of one reading a row.
+
+    Raises InputError where the signals of such a table are read at times of their own.
+    """
+    found = _parts(table)
+    if found is None:
+        return table
+    names, time, value, unit = found
+    signals = list(dict.fromkeys(table.columns[names]))
+    instants, row = np.unique(_comparable(table.columns[time]), return_inverse=True)
+    place = np.array([signals.index(name) for name in table.columns[names]])
+    told = f"column {names!r} names the signal of each row, {value!r} holds its reading"
+    listed = ", ".join(signals[:5]) + (", ..." if len(signals) > 5 else "")
+    if len(row) < SHARED * len(instants):
+        if np.mean(place[1:] != place[:-1]) < CHANGING:
+            return table
+        raise table.fault(
+            f"holds one reading a row: {told} ({listed}), at times of their own; export each signal to its own file, or all at one rate"
+        )
+    if len(set(zip(row.tolist(), place.tolist(), strict=True))) < len(row):
+        return table
+    first = np.full(len(instants), len(row))
+    np.minimum.at(first, row, np.arange(len(row)))
+    order = np.argsort(first, kind="stable")  # as the file goes on, also where its clock was set back
+    rank = np.argsort(order)
+    spread = np.full((len(instants), len(signals)), None if table.columns[value].dtype.kind == "O" else np.nan)
+    spread[rank[row], place] = table.columns[value]
+    at = first[order]
+    return replace(
+        table,
+        columns={
+            time: table.columns[time][at],
+            **{name: spread[:, k] for k, name in enumerate(signals)},
+        },
+        units={
+            **{name: unit_text for name, unit_text in table.units.items() if name == time},
+            **({} if unit is None else _units(table, names, unit)),
+        },
+        lines=[table.lines[k] for k in at] if len(table.lines) else (),
+        notes=(*table.notes, f"one reading a row: {told}; read as columns {listed}"),
+        nameless=frozenset(),
+    )
+
+
+def _parts(table: MeasurementTable) -> tuple[str, str, str, str | None] | None:
+    """The columns of names, time, value and unit of a table of three or four; None for other tables."""
+    if len(table.columns) not in (3, 4) or table.clocks:
+        return None
+    words = [name for name, column in table.columns.items() if _holds_words(column)]
+    others = [name for name in table.columns if name not in words]
+    units = [name for name in words if all(map(unit_of, set(table.columns[name])))] if len(words) > 1 else []
+    names = [name for name in words if name not in units]
+    if len(names) != 1 or len(others) != 2 or len(units) > 1:
+        return None
+    signals = len(set(table.columns[names[0]]))
+    if not 2 <= signals <= min(MOST_SIGNALS, len(table.columns[names[0]]) // 2):
+        return None
+    timed = [name for name in others if TIME_NAME.fullmatch(name)] or [
+        name for name in others if _is_stamp(table.columns[name])
+    ]
+    if len(timed) != 1:
+        return None
+    value = next(name for name in others if name != timed[0])
+    return names[0], timed[0], value, units[0] if units else None
+
+
+def _holds_words(column: Column) -> bool:
+    """Whether every cell is a text that is neither a number nor a time."""
+    return column.dtype.kind == "O" and all(
+        isinstance(cell, str) and cell and not number_cells.is_reading(cell) for cell in dict.fromkeys(column)
+    )
+
+
+def _is_stamp(column: Column) -> bool:
+    try:
+        return time_stamps.seconds(column, "day first") is not None
+    except ValueError:
+        return False
+
+
+def _comparable(column: Column) -> Column:
+    return column.astype(str) if column.dtype.kind == "O" else column
+
+
+def _units(table: MeasurementTable, names: str, unit: str) -> dict[str, str]:
+    """The unit of each signal that states one and the same in all its rows."""
+    seen: dict[str, set[str]] = {}
+    for name, text in zip(table.columns[names], table.columns[unit], strict=True):
+        seen.setdefault(name, set()).add(text)
+    return {name: next(iter(texts)) for name, texts in seen.items() if len(texts) == 1}
