@@ -255,12 +255,16 @@ def test_the_c_answers_what_numpy_does_bit_for_bit_in_any_order(solutions, compr
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_index_wraps_or_ends(solutions, played, kind, real):
     n, closed = len(solutions[kind].drive), solutions[kind].scenario.closed
-    last = 2**32 - 1  # the largest unsigned long of a 32-bit target
-    asked = [n - 1, n, n + 1, 5 * n, last]
+    whole = 2**32 // n * n
+    asked = [n - 1, n, n + 1, 5 * n, whole - 1]
     status, drives = played(kind, real, "sample", asked)
     _, expected = played(kind, real, "sample", [k % n if closed else n - 1 for k in asked])
     assert np.array_equal(drives, expected)
     assert status.tolist() == ([0] * 5 if closed else [0, 1, 1, 1, 1])
+    if whole < 2**32:  # the round that the index does not complete: held where the next one begins
+        status, drives = played(kind, real, "sample", [whole, 2**32 - 1])
+        assert np.array_equal(drives, played(kind, real, "sample", [0 if closed else n - 1] * 2)[1])
+        assert status.tolist() == ([16, 16] if closed else [1, 1])
 
 
 @pytest.mark.parametrize("real", list(Real))

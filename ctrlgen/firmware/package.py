@@ -156,7 +156,11 @@ def _context(
 def _test_calls(c: dict[str, Any]) -> int:
     """What the test on the target counts: of the controller, and of the player its wrap or end and three refusals too."""
     online = len(c["rows"]) + 2 * c["unusable"] + 2 + 2 * c["lost"]
-    return online + (len(c["played"]) + len(c["timed"]) + 4 + c["played_unusable"] if c["player"] else 0)
+    return online + (
+        len(c["played"]) + len(c["timed"]) + 6 + (c["closed"] and c["whole"] < 2**32) + c["played_unusable"]
+        if c["player"]
+        else 0
+    )
 
 
 def _memory(c: dict[str, Any], contexts: Mapping[Real, dict[str, Any]]) -> list[dict[str, Any]]:

@@ -104,6 +104,7 @@ def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> d
         "z_typical": nominal.z_scale,
         "x_typical": np.maximum(np.abs(nominal.rest), nominal.x_scale),
         "samples": samples,
+        "closed": scenario.closed,
         "duration": samples * clock.sample_time if isinstance(clock, Sampled) else None,
         **rates_in_c(controller),
     }

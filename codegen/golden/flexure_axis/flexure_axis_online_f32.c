@@ -148,17 +148,23 @@ void flexure_axis_online_f32_init_20000hz_e8b80b62(flexure_axis_online_f32_state
     }
 }
 
-/* The answer to a lost state: the safe drive, under which the device comes to rest. The state stays lost until it is initialised. */
-static uint32_t set_lost(flexure_axis_online_f32_state *state, flexure_axis_online_f32_output *out)
+/* What is answered where nothing is known of the device: the safe drive, under which it comes to rest. */
+static void set_safe(flexure_axis_online_f32_output *out)
 {
     int i;
-    state->ready = 0U;
     for (i = 0; i < 1; i++) {
         out->drive[i] = U_SAFE[i];
     }
     for (i = 0; i < 1; i++) {
         out->displacement[i] = 0.0f;
     }
+}
+
+/* The answer to a lost state, which stays lost until it is initialised. */
+static uint32_t set_lost(flexure_axis_online_f32_state *state, flexure_axis_online_f32_output *out)
+{
+    state->ready = 0U;
+    set_safe(out);
     return FLEXURE_AXIS_ONLINE_F32_LOST;
 }
 
@@ -198,11 +204,13 @@ static uint32_t settle_within(flexure_axis_online_f32_state *state, flexure_axis
 uint32_t flexure_axis_online_f32_settle(flexure_axis_online_f32_state *state, const float target[3], flexure_axis_online_f32_output *out)
 {
     uint32_t status = FLEXURE_AXIS_ONLINE_F32_INPUT;
-    if ((state == NULL) || (target == NULL) || (out == NULL)) {
+    if (out == NULL) {
         /* nothing is written */
+    } else if (state == NULL) {
+        set_safe(out);
     } else if ((state->ready != FLEXURE_AXIS_ONLINE_F32_BUILD) || (is_lost(state) != 0)) {
         status = set_lost(state, out);
-    } else if (is_usable(target) != 0) {
+    } else if ((target != NULL) && (is_usable(target) != 0)) {
         wanted_displacement(target, out->displacement);
         if (displacement_inside(out->displacement) != 0) {
             status = settle_within(state, out);
@@ -266,11 +274,13 @@ static uint32_t motion_drives(flexure_axis_online_f32_state *at, const flexure_a
 uint32_t flexure_axis_online_f32_step(flexure_axis_online_f32_state *state, const float target[3], flexure_axis_online_f32_output *out)
 {
     uint32_t status = FLEXURE_AXIS_ONLINE_F32_INPUT;
-    if ((state == NULL) || (target == NULL) || (out == NULL)) {
+    if (out == NULL) {
         /* nothing is written */
+    } else if (state == NULL) {
+        set_safe(out);
     } else if ((state->ready != FLEXURE_AXIS_ONLINE_F32_BUILD) || (is_lost(state) != 0)) {
         status = set_lost(state, out);
-    } else if (is_usable(target) == 0) {
+    } else if ((target == NULL) || (is_usable(target) == 0)) {
         settle_safe(state, out);
     } else {
         flexure_axis_online_f32_state at;

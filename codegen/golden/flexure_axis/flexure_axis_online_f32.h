@@ -40,7 +40,7 @@ extern "C" {
 /* Status: 0, or bits of these. The drive is within its limits in every case. */
 #define FLEXURE_AXIS_ONLINE_F32_DISPLACEMENT (1U) /* target beyond the displacement range: the nearest target inside was taken */
 #define FLEXURE_AXIS_ONLINE_F32_DRIVE (8U)        /* drive at its limit: the motion is left */
-#define FLEXURE_AXIS_ONLINE_F32_INPUT (16U)       /* NaN, infinite or absurdly large target, or NULL pointer: drives at zero or the nearest admissible value */
+#define FLEXURE_AXIS_ONLINE_F32_INPUT (16U)       /* NaN, infinite or absurdly large target, or NULL: drives at zero or the nearest admissible value. Without an output nothing is written, without a state the output alone */
 #define FLEXURE_AXIS_ONLINE_F32_LOST (32U)        /* the state was not initialised, is that of another build, or a number of it is NaN, infinite or absurd: drives as with INPUT, state kept, until flexure_axis_online_f32_init */
 
 typedef struct {

@@ -612,11 +612,10 @@ void mems_hexapod_online_f32_init_1000hz_1088d91c(mems_hexapod_online_f32_state 
     }
 }
 
-/* The answer to a lost state: the safe drive, under which the device comes to rest. The state stays lost until it is initialised. */
-static uint32_t set_lost(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
+/* What is answered where nothing is known of the device: the safe drive, under which it comes to rest. */
+static void set_safe(mems_hexapod_online_f32_output *out)
 {
     int i;
-    state->ready = 0U;
     for (i = 0; i < 6; i++) {
         out->drive[i] = U_SAFE[i];
     }
@@ -626,6 +625,13 @@ static uint32_t set_lost(mems_hexapod_online_f32_state *state, mems_hexapod_onli
     for (i = 0; i < 6; i++) {
         out->state[i] = X_REST[i];
     }
+}
+
+/* The answer to a lost state, which stays lost until it is initialised. */
+static uint32_t set_lost(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
+{
+    state->ready = 0U;
+    set_safe(out);
     return MEMS_HEXAPOD_ONLINE_F32_LOST;
 }
 
@@ -696,11 +702,13 @@ static uint32_t settle_within(mems_hexapod_online_f32_state *state, mems_hexapod
 uint32_t mems_hexapod_online_f32_settle(mems_hexapod_online_f32_state *state, const float target[6], mems_hexapod_online_f32_output *out)
 {
     uint32_t status = MEMS_HEXAPOD_ONLINE_F32_INPUT;
-    if ((state == NULL) || (target == NULL) || (out == NULL)) {
+    if (out == NULL) {
         /* nothing is written */
+    } else if (state == NULL) {
+        set_safe(out);
     } else if (state->ready != MEMS_HEXAPOD_ONLINE_F32_BUILD) {
         status = set_lost(state, out);
-    } else if (is_usable(target) != 0) {
+    } else if ((target != NULL) && (is_usable(target) != 0)) {
         wanted_displacement(target, out->displacement);
         if (displacement_inside(out->displacement) != 0) {
             status = settle_within(state, out);
@@ -818,11 +826,13 @@ static uint32_t step_within(mems_hexapod_online_f32_state *state, mems_hexapod_o
 uint32_t mems_hexapod_online_f32_step(mems_hexapod_online_f32_state *state, const float target[6], mems_hexapod_online_f32_output *out)
 {
     uint32_t status = MEMS_HEXAPOD_ONLINE_F32_INPUT;
-    if ((state == NULL) || (target == NULL) || (out == NULL)) {
+    if (out == NULL) {
         /* nothing is written */
+    } else if (state == NULL) {
+        set_safe(out);
     } else if (state->ready != MEMS_HEXAPOD_ONLINE_F32_BUILD) {
         status = set_lost(state, out);
-    } else if (is_usable(target) != 0) {
+    } else if ((target != NULL) && (is_usable(target) != 0)) {
         wanted_displacement(target, out->displacement);
         if (displacement_inside(out->displacement) != 0) {
             status = step_within(state, out);

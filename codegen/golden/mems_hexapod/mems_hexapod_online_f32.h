@@ -45,7 +45,7 @@ extern "C" {
 #define MEMS_HEXAPOD_ONLINE_F32_DISPLACEMENT (1U) /* target beyond the displacement range: the nearest target inside was taken */
 #define MEMS_HEXAPOD_ONLINE_F32_COMPOSITE (2U)    /* wire flexure stress: displacement scaled toward home */
 #define MEMS_HEXAPOD_ONLINE_F32_DRIVE (8U)        /* heater power at its limit: the target is approached as far as one sample allows */
-#define MEMS_HEXAPOD_ONLINE_F32_INPUT (16U)       /* NaN, infinite or absurdly large target, or NULL pointer: drives at zero or the nearest admissible value */
+#define MEMS_HEXAPOD_ONLINE_F32_INPUT (16U)       /* NaN, infinite or absurdly large target, or NULL: drives at zero or the nearest admissible value. Without an output nothing is written, without a state the output alone */
 #define MEMS_HEXAPOD_ONLINE_F32_LOST (32U)        /* the state was not initialised, is that of another build, or a number of it is NaN, infinite or absurd: drives as with INPUT, state kept, until mems_hexapod_online_f32_init */
 
 typedef struct {

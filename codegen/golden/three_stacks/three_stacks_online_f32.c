@@ -182,11 +182,11 @@ static int limit_rate(const three_stacks_online_f32_state *state, float drive[3]
     int i;
     for (i = 0; i < 3; i++) {
         const float change = drive[i] - state->u[i];
-        if (!((change <= RISE[i]) && (change >= FALL[i]))) {
+        if ((is_nan(&state->u[i]) != 0) || (change > RISE[i]) || (change < FALL[i])) {
             const float reached = ((change > 0.0f) ? RISE[i] : FALL[i]) / change;
             changed = 1;
             least = (reached < least) ? reached : least;
-            if (!((change <= (RISE[i] + U_SLACK[i])) && (change >= (FALL[i] - U_SLACK[i])))) {
+            if ((change > (RISE[i] + U_SLACK[i])) || (change < (FALL[i] - U_SLACK[i]))) {
                 beyond = 1;
             }
         }
@@ -358,17 +358,23 @@ void three_stacks_online_f32_init_1000hz_b11068ba(three_stacks_online_f32_state 
     }
 }
 
-/* The answer to a lost state: the safe drive, under which the device comes to rest. The state stays lost until it is initialised. */
-static uint32_t set_lost(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out)
+/* What is answered where nothing is known of the device: the safe drive, under which it comes to rest. */
+static void set_safe(three_stacks_online_f32_output *out)
 {
     int i;
-    state->ready = 0U;
     for (i = 0; i < 3; i++) {
         out->drive[i] = U_SAFE[i];
     }
     for (i = 0; i < 2; i++) {
         out->displacement[i] = 0.0f;
     }
+}
+
+/* The answer to a lost state, which stays lost until it is initialised. */
+static uint32_t set_lost(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out)
+{
+    state->ready = 0U;
+    set_safe(out);
     return THREE_STACKS_ONLINE_F32_LOST;
 }
 
@@ -463,11 +469,13 @@ static uint32_t settle_within(three_stacks_online_f32_state *state, three_stacks
 uint32_t three_stacks_online_f32_settle(three_stacks_online_f32_state *state, const float target[2], three_stacks_online_f32_output *out)
 {
     uint32_t status = THREE_STACKS_ONLINE_F32_INPUT;
-    if ((state == NULL) || (target == NULL) || (out == NULL)) {
+    if (out == NULL) {
         /* nothing is written */
+    } else if (state == NULL) {
+        set_safe(out);
     } else if (state->ready != THREE_STACKS_ONLINE_F32_BUILD) {
         status = set_lost(state, out);
-    } else if (is_usable(target) != 0) {
+    } else if ((target != NULL) && (is_usable(target) != 0)) {
         wanted_displacement(target, out->displacement);
         if (displacement_inside(out->displacement) != 0) {
             status = settle_within(state, out);
@@ -579,11 +587,13 @@ static uint32_t step_within(three_stacks_online_f32_state *state, three_stacks_o
 uint32_t three_stacks_online_f32_step(three_stacks_online_f32_state *state, const float target[2], three_stacks_online_f32_output *out)
 {
     uint32_t status = THREE_STACKS_ONLINE_F32_INPUT;
-    if ((state == NULL) || (target == NULL) || (out == NULL)) {
+    if (out == NULL) {
         /* nothing is written */
+    } else if (state == NULL) {
+        set_safe(out);
     } else if (state->ready != THREE_STACKS_ONLINE_F32_BUILD) {
         status = set_lost(state, out);
-    } else if (is_usable(target) != 0) {
+    } else if ((target != NULL) && (is_usable(target) != 0)) {
         wanted_displacement(target, out->displacement);
         if (displacement_inside(out->displacement) != 0) {
             status = step_within(state, out);

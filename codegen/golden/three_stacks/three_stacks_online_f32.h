@@ -43,7 +43,7 @@ extern "C" {
 /* Status: 0, or bits of these. The drive is within its limits in every case, and changes no faster than it may, but for LOST. */
 #define THREE_STACKS_ONLINE_F32_DISPLACEMENT (1U) /* target beyond the displacement range: the nearest target inside was taken */
 #define THREE_STACKS_ONLINE_F32_DRIVE (8U)        /* drive at its limit: the target is approached as far as one sample allows */
-#define THREE_STACKS_ONLINE_F32_INPUT (16U)       /* NaN, infinite or absurdly large target, or NULL pointer: drives at zero or the nearest admissible value */
+#define THREE_STACKS_ONLINE_F32_INPUT (16U)       /* NaN, infinite or absurdly large target, or NULL: drives at zero or the nearest admissible value. Without an output nothing is written, without a state the output alone */
 #define THREE_STACKS_ONLINE_F32_LOST (32U)        /* the state was not initialised, is that of another build, or a number of it is NaN, infinite or absurd: drives as with INPUT, state kept, until three_stacks_online_f32_init */
 #define THREE_STACKS_ONLINE_F32_RATE (128U)       /* drive changes as fast as it may: the target is reached later. Bits of limits beside it: also those that the device passes, because no drive can turn back faster */
 

@@ -29,6 +29,9 @@ def player_context(solution: Solution, compression: Compression, prefix: str) ->
         "digest": solution.scenario.digest,
         "samples": len(solution.drive),
         "closed": solution.scenario.closed,
+        "whole": 2**32
+        // len(solution.drive)
+        * len(solution.drive),  # samples of the complete rounds that an index counts
         "curve": curve,
         "table": curve.drive if isinstance(curve, SampleTable) else None,
         "segments": [piece.segments for piece in pieces],
