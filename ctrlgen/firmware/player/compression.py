@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from math import ceil, inf, log10
 
 import numpy as np
 from pydantic import Field
@@ -33,6 +34,9 @@ TOLERANCE_SHARE = 0.8  # of the tolerances; the rest is left to compilers that f
 INSTRUCTION_BUDGET = 150  # of one sample, Cortex-M4F
 SEARCH_INSTRUCTIONS = 22  # of one sample, to find the piece of a cubic
 STEPS_A_DECADE = 6  # of the drive tolerance, in the search for the coarsest
+GUESSES = (
+    6  # of the next drive tolerance, after which the interval is halved: three to four find it on the shipped scenarios
+)
 FINEST_STEP = 42  # 10^(-42/6) of a drive's range: below a float's rounding
 
 
@@ -126,10 +130,16 @@ def compress(solution: Solution) -> dict[Real, Compression]:
     def spline(step: int) -> Spline | None:
         return fit(drive, low, high, span * 10 ** (-step / STEPS_A_DECADE), closed)
 
-    return {real: _compress(solution, real, spline) for real in Real}
+    found, step = {}, STEPS_A_DECADE
+    for real in Real:  # one arithmetic begins where the other ended
+        found[real], step = _compress(solution, real, spline, step)
+    return found
 
 
-def _compress(solution: Solution, real: Real, spline: Callable[[int], Spline | None]) -> Compression:
+def _compress(
+    solution: Solution, real: Real, spline: Callable[[int], Spline | None], begin: int
+) -> tuple[Compression, int]:
+    """The form in one arithmetic, and the step of the drive tolerance at which the search for it ended, begun at another."""
     bounds = _inward(solution.model, real)
     n, closed = len(solution.drive), solution.scenario.closed
 
@@ -157,8 +167,10 @@ def _compress(solution: Solution, real: Real, spline: Callable[[int], Spline | N
     table = SampleTable(np.clip(solution.drive, *bounds))
     weighed: list[tuple[Curve | None, PlayerCandidate]] = [(table, measured(table))]
 
-    cubic = _coarsest(spline, measured, table.bytes(real))
-    weighed.append(cubic or (None, _no_curve("cubic", "no shorter than the table within the tolerance")))
+    step, *cubic = _coarsest(spline, measured, lambda c: c.bytes(real) < table.bytes(real), begin) or (begin,)
+    weighed.append(
+        tuple(cubic) if cubic else (None, _no_curve("cubic", "no shorter than the table within the tolerance"))
+    )
     usable = [(curve, c) for curve, c in weighed if curve is not None and _within(c) and _affordable(c)]
     curve, best = min(usable, key=lambda pair: pair[1].bytes or 0) if usable else weighed[0]
     assert curve is not None
@@ -166,35 +178,48 @@ def _compress(solution: Solution, real: Real, spline: Callable[[int], Spline | N
     for _, c in weighed:
         told = {"chosen": c is best, "remark": c.remark or _remark(c, best, bool(usable))}
         candidates.append(c.model_copy(update=told))
-    return Compression(real, curve, closed, *_kept(curve, bounds, real), tuple(candidates))
+    return Compression(real, curve, closed, *_kept(curve, bounds, real), tuple(candidates)), step
 
 
 def _coarsest(
-    spline: Callable[[int], Spline | None], measured: Callable[[Curve], PlayerCandidate], most: int
-) -> tuple[Spline, PlayerCandidate] | None:
-    """The spline of the coarsest drive tolerance that keeps the tolerance of what is followed; None where it needs `most` bytes.
+    spline: Callable[[int], Spline | None],
+    measured: Callable[[Curve], PlayerCandidate],
+    short: Callable[[Spline], bool],
+    begin: int,
+) -> tuple[int, Spline, PlayerCandidate] | None:
+    """The `short` spline of the coarsest drive tolerance that keeps the tolerance of what is followed, after its step; None where there is
+    none.
 
-    Tolerances are refined by decades until one serves, then the coarsest that serves is found by bisection.
+    Errors are nearly proportional to the drive tolerance: from the step `begin` on each that was measured tells where the next is tried,
+    until one serves and that a step coarser does not.
     """
-    too_coarse, step, good = STEPS_A_DECADE - 1, STEPS_A_DECADE, None
-    while good is None:
-        curve = spline(step)
-        if curve is None or (candidate := measured(curve)).bytes is None or candidate.bytes >= most:
-            return None
-        if _within(candidate):
-            good = step, curve, candidate
-        elif step == FINEST_STEP:
-            return None
+    too_coarse, too_fine, step, good = STEPS_A_DECADE - 1, FINEST_STEP + 1, begin, None
+    for tried in range(FINEST_STEP):
+        curve, change = spline(step), 0.0
+        if curve is not None and short(curve):
+            candidate = measured(curve)
+            change = _steps_to_go(candidate)
+            if _within(candidate):
+                good, too_fine = (step, curve, candidate), step
+            else:
+                too_coarse = step
+        elif good is None:
+            too_fine = step
         else:
-            too_coarse, step = step, min(step + STEPS_A_DECADE, FINEST_STEP)
-    while good[0] - too_coarse > 1:
-        middle = (too_coarse + good[0]) // 2
-        curve = spline(middle)
-        if curve is not None and _within(candidate := measured(curve)):
-            good = middle, curve, candidate
-        else:
-            too_coarse = middle
-    return good[1:]
+            too_coarse = step
+        if too_fine - too_coarse <= 1:
+            break
+        guess = step + ceil(change) if tried < GUESSES else (too_coarse + too_fine) // 2
+        step = min(max(guess, too_coarse + 1), too_fine - 1)
+    return good
+
+
+def _steps_to_go(candidate: PlayerCandidate) -> float:
+    """Steps by which the drive tolerance is to be finer, coarser below zero, for an error that just keeps the tolerance; a decade where
+    the error tells nothing."""
+    shares = (candidate.length or 0.0) / LENGTH_TOLERANCE, (candidate.angle or 0.0) / ANGLE_TOLERANCE
+    share = max(shares) / TOLERANCE_SHARE
+    return STEPS_A_DECADE * log10(share) if 0 < share < inf else STEPS_A_DECADE
 
 
 def instructions(curve: Curve, limited: int) -> int:
