@@ -167,10 +167,8 @@ def _compress(
     table = SampleTable(np.clip(solution.drive, *bounds))
     weighed: list[tuple[Curve | None, PlayerCandidate]] = [(table, measured(table))]
 
-    step, *cubic = _coarsest(spline, measured, lambda c: c.bytes(real) < table.bytes(real), begin) or (begin,)
-    weighed.append(
-        tuple(cubic) if cubic else (None, _no_curve("cubic", "no shorter than the table within the tolerance"))
-    )
+    found = _coarsest(spline, measured, lambda c: c.bytes(real) < table.bytes(real), begin)
+    weighed.append(found[1:] if found else (None, _no_curve("cubic", "no shorter than the table within the tolerance")))
     usable = [(curve, c) for curve, c in weighed if curve is not None and _within(c) and _affordable(c)]
     curve, best = min(usable, key=lambda pair: pair[1].bytes or 0) if usable else weighed[0]
     assert curve is not None
@@ -178,7 +176,9 @@ def _compress(
     for _, c in weighed:
         told = {"chosen": c is best, "remark": c.remark or _remark(c, best, bool(usable))}
         candidates.append(c.model_copy(update=told))
-    return Compression(real, curve, closed, *_kept(curve, bounds, real), tuple(candidates)), step
+    return Compression(real, curve, closed, *_kept(curve, bounds, real), tuple(candidates)), found[
+        0
+    ] if found else begin
 
 
 def _coarsest(
