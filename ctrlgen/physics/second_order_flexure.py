@@ -21,6 +21,7 @@ import numpy as np
 from ctrlgen.physics.flexure import Segment
 from ctrlgen.physics.screw import Matrix
 
+NEXT, LAST = [1, 2, 0], [2, 0, 1]  # rows in a cross product: three at once, as a mechanism has thousands of them
 AXIS = ca.DM([1, 0, 0])
 # Exact to the fifth degree; the strains are of the fourth along a segment.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(3)
@@ -34,11 +35,7 @@ def dot(load: Matrix, deformation: Matrix) -> Matrix:
 
 def cross(a: Matrix, b: Matrix) -> Matrix:
     """a x b (3, m), column by column."""
-    return ca.vertcat(
-        a[1, :] * b[2, :] - a[2, :] * b[1, :],
-        a[2, :] * b[0, :] - a[0, :] * b[2, :],
-        a[0, :] * b[1, :] - a[1, :] * b[0, :],
-    )
+    return a[NEXT, :] * b[LAST, :] - a[LAST, :] * b[NEXT, :]
 
 
 def relative_motion(point: Matrix, first: Matrix, second: Matrix, a: Sequence[int], b: Sequence[int]) -> Matrix:
@@ -48,16 +45,22 @@ def relative_motion(point: Matrix, first: Matrix, second: Matrix, a: Sequence[in
     log(R_1' R_2) = theta_2 - theta_1 - theta_1 x theta_2/2 and R_1' (R_2 r + delta_2 - R_1 r - delta_1), half of each order of the
     two columns.
     """
-    return (_relative(point, first, second, a, b) + _relative(point, first, second, b, a)) / 2
-
-
-def _relative(point: Matrix, first: Matrix, second: Matrix, a: Sequence[int], b: Sequence[int]) -> Matrix:
-    one, two = first[:3, :], second[:3, :]
+    if all(
+        isinstance(x, ca.DM) for x in (point, first, second)
+    ):  # NumPy is faster on so few numbers, and there are many flexures
+        arm, one, two = (x.full() for x in (point, first, second))
+        return ca.DM(np.vstack(_relative(arm, one, two, a, b)) + np.vstack(_relative(arm, one, two, b, a))) / 2
     arm = ca.repmat(point, 1, len(a))
+    return (ca.vertcat(*_relative(arm, first, second, a, b)) + ca.vertcat(*_relative(arm, first, second, b, a))) / 2
+
+
+def _relative(arm: Any, first: Any, second: Any, a: Sequence[int], b: Sequence[int]) -> tuple[Any, Any]:
+    """Rotation and displacement (3, m); of NumPy or CasADi, as the arguments are."""
+    one, two = first[:3, :], second[:3, :]
     between = two - one
     moved = second[3:, b] - first[3:, b] + cross(between[:, b], arm)
     turned = cross(two[:, a], cross(two[:, b], arm)) - cross(one[:, a], cross(one[:, b], arm))
-    return ca.vertcat(-cross(one[:, a], between[:, b]) / 2, turned / 2 - cross(one[:, a], moved))
+    return -cross(one[:, a], between[:, b]) / 2, turned / 2 - cross(one[:, a], moved)
 
 
 def point_flexure(twist: Matrix, a: Sequence[int], b: Sequence[int]) -> Matrix:

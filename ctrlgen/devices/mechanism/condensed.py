@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -23,7 +24,11 @@ from ctrlgen.physics.screw import Matrix, adjoint, inverse_adjoint, move
 # Of Newton's method from the motion without cubic springs: with more steps they hold more than the flexures do.
 MOST_STEPS = 12
 ROUNDING = 1e-14  # of the stretch: what an iteration leaves
+KEPT = 2  # drawings: one, and what it would be with something more
 SPARE_STEPS = 2  # for numbers that differ from the file's, as in a diagnosis
+
+
+_recent: deque[tuple[Drawing, Condensed]] = deque(maxlen=KEPT)
 
 
 @dataclass(frozen=True)
@@ -322,6 +327,16 @@ class Condensed:
                 names.append(f"{e.name}_{section.name}")
                 stresses.append(e.section.largest_stress(*section.stresses(load), floor))
         return tuple(names), ca.vertcat(*stresses)
+
+
+def nominal(device: Drawing) -> Condensed:
+    """The equations with the numbers of the drawing; those of the last drawings are kept, as much of a summary asks for them."""
+    for known, c in _recent:
+        if known is device:
+            return c
+    c = Condensed(device, device.values())
+    _recent.append((device, c))
+    return c
 
 
 def _inertia(mass: Any, at: Matrix, about_centre: Matrix) -> Matrix:

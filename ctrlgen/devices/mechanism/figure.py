@@ -13,7 +13,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from ctrlgen.core.files import write_bytes
-from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.devices.mechanism.condensed import nominal
 from ctrlgen.devices.mechanism.mechanism import Mechanism
 from ctrlgen.physics.rigid_bodies import GROUND
 from ctrlgen.reporting.plots import COLOURS
@@ -33,7 +33,7 @@ def draw_mechanism(device: Mechanism, path: Path) -> None:
 
 def mechanism_figure(device: Mechanism) -> Figure:
     """The mechanism as it is described, in mm."""
-    c = Condensed(device, device.values())
+    c = nominal(device)
     free = [np.array(ca.DM(ca.evalf(ca.SX(end)))).ravel() * MM for end in c.ends]
     along = [np.array(ca.DM(ca.evalf(ca.SX(R))))[:, 0] for R in c.frames]
     extent = max(float(np.ptp(np.array(free), axis=0).max()), 1e-3)

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import scipy.linalg
 
-from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.devices.mechanism.condensed import nominal
 from ctrlgen.devices.mechanism.drawing import Drawing
 from ctrlgen.devices.mechanism.modes import as_displacements, body_matrices, guyan_modes
 from ctrlgen.devices.structural_model import StructuralModel
@@ -23,7 +23,7 @@ def structural_model(device: Drawing) -> StructuralModel | None:
         return None
     stated = device.dynamics.modes_below
     highest = REACH * float(condensed.frequencies[-1]) if stated is None else stated.si
-    c, n = Condensed(device, device.values()), len(device.placed_actuators)
+    c, n = nominal(device), len(device.placed_actuators)
     K, M, _ = body_matrices(c)
     size = as_displacements(device)
     at_rest = np.vstack([_numbers(T[:, :n]) for T in c.twists]) / size[:, None]

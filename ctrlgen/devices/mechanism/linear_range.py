@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ctrlgen.core.units import show
-from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.devices.mechanism.condensed import Condensed, nominal
 from ctrlgen.devices.mechanism.drawing import Drawing
 from ctrlgen.devices.mechanism.flexures import Beam
 from ctrlgen.devices.mechanism.second_order import SecondOrder
@@ -84,7 +84,7 @@ def linear_ranges(c: Condensed) -> list[tuple[float | None, ...]]:
 
 def range_lines(device: Drawing) -> list[str]:
     """What `ctrlgen check` prints of it: of each actuator that does not stay linear to 1 % within its travel ten times over."""
-    c = Condensed(device, device.values())
+    c = nominal(device)
     if not c.pushes or c.cubics or not any(isinstance(e.section, Beam) for e in device.placed_elements):
         return []
     held = "" if device.geometric_stiffening else "; geometric_stiffening = true holds that"

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.units import show
-from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.devices.mechanism.condensed import Condensed, nominal
 from ctrlgen.devices.mechanism.drawing import Drawing
 from ctrlgen.devices.mechanism.joining import TWIST
 from ctrlgen.devices.mechanism.loads import Loads
@@ -27,7 +27,7 @@ def load_faults(device: Drawing) -> list[str]:
     ]
     if heavy:
         return [f"load: {', '.join(heavy)}: give mass and inertia to the body that carries it"]
-    c = Condensed(device, device.values())
+    c = nominal(device)
     if c.cubics:
         return ["load: constant loads beside cubic springs are not held by the model; leave out one of them"]
     loads = Loads(c, SecondOrder(c))
@@ -39,7 +39,7 @@ def load_faults(device: Drawing) -> list[str]:
 
 def load_lines(device: Drawing) -> list[str]:
     """What `ctrlgen check` prints of them: forces, where the output goes, what they do to the stiffness of the axes."""
-    c = Condensed(device, device.values())
+    c = nominal(device)
     loads = Loads(c, SecondOrder(c))
     if not loads.there:
         return []

@@ -19,7 +19,7 @@ from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.base import Device
 from ctrlgen.devices.device_physics import DevicePhysics
 from ctrlgen.devices.mechanism.bent_beams import BentBeam, ThermalActuator
-from ctrlgen.devices.mechanism.condensed import MOST_STEPS, SPARE_STEPS, Condensed
+from ctrlgen.devices.mechanism.condensed import MOST_STEPS, SPARE_STEPS, Condensed, nominal
 from ctrlgen.devices.mechanism.copies import Copied, Placed
 from ctrlgen.devices.mechanism.flexures import Blade, CircularHinge, Flexible, Strut, Wire, flexures_in_one_place
 from ctrlgen.devices.mechanism.internal_modes import structural_model
@@ -330,7 +330,7 @@ class Mechanism(Device):
         so many do not."""
         if not any(isinstance(e, Spring) and e.cubic for e in self.element):
             return 0
-        steps = Condensed(self, self.values()).cubic_steps()
+        steps = nominal(self).cubic_steps()
         return MOST_STEPS + 1 if steps is None else steps + SPARE_STEPS if steps else 0
 
     @cached_property
@@ -349,7 +349,7 @@ class Mechanism(Device):
         travel, n, c = (
             max(a.travel.si for a in self.actuator),
             len(self.placed_actuators),
-            Condensed(self, self.values()),
+            nominal(self),
         )
         reach = np.abs(ca.DM(ca.evalf(ca.SX(c.reading_motion))).full()[:, :n]).sum(axis=1) * travel
         if self.second_order and len(reach):
@@ -359,7 +359,7 @@ class Mechanism(Device):
     @property
     def _output_motion(self) -> np.ndarray:
         """The motion of the output point (6, n) per displacement of the axes, at home."""
-        moved = ca.DM(ca.evalf(ca.SX(Condensed(self, self.values()).output_motion))).full()
+        moved = ca.DM(ca.evalf(ca.SX(nominal(self).output_motion))).full()
         return moved[:, : len(self.placed_actuators)]
 
     @property

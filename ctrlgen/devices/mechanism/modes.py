@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
 import scipy
 
 from ctrlgen.core.units import show
-from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.devices.mechanism.condensed import KEPT, Condensed, nominal
 from ctrlgen.devices.mechanism.drawing import Drawing
 from ctrlgen.devices.mechanism.linear_range import range_lines
 from ctrlgen.devices.mechanism.load_effects import load_lines
@@ -35,19 +36,16 @@ def freedoms(device: Drawing) -> tuple[int, int]:
     Each flexure holds its stiff directions ideally, a blade three and a wire one: c rows A of relative twists of all bodies,
     6 n - rank(A) and c - rank(A). Source: J. B. Hopkins, M. L. Culpepper, Precis. Eng. 34 (2010) 259 (ideal constraints).
     """
-    A, _ = constraints(device)
-    rank = int(np.linalg.matrix_rank(A, tol=_independent(device)))
-    return 6 * len(device.bodies) - rank, len(A) - rank
+    stressed = _in_balance(nominal(device))
+    rank = len(stressed) - stressed.shape[1]
+    return 6 * len(device.bodies) - rank, len(stressed) - rank
 
 
 def redundant_constraints(device: Drawing) -> dict[str, list[str]]:
     """Of each element the directions that could be left out without another freedom: those that take part in a set of forces in balance
     without a load. Those with a direction of their own, as of a stated compliance, are counted: "constraint 1"."""
-    A, names = constraints(device)
-    if not len(A):
-        return {}
-    U, values, _ = np.linalg.svd(A)
-    stressed = U[:, int((values > _independent(device)).sum()) :]  # forces in balance
+    _, names = constraints(nominal(device))
+    stressed = _in_balance(nominal(device))
     found: dict[str, list[str]] = {}
     for (element, direction), row in zip(names, stressed, strict=True):
         if np.linalg.norm(row) > INDEPENDENT:
@@ -55,15 +53,23 @@ def redundant_constraints(device: Drawing) -> dict[str, list[str]]:
     return found
 
 
-def _independent(device: Drawing) -> float:
-    return INDEPENDENT * min(1.0, (SHORT_CHAIN / len(device.bodies)) ** 2)
+@lru_cache(maxsize=KEPT)
+def _in_balance(c: Condensed) -> np.ndarray:
+    """(c, redundant) the sets of forces on the constraints that are in balance without a load, of unit size."""
+    A, _ = constraints(c)
+    if not len(A):
+        return np.zeros((0, 0))
+    U, values, _ = np.linalg.svd(A)
+    least = INDEPENDENT * min(1.0, (SHORT_CHAIN / len(c.device.bodies)) ** 2)
+    return np.asarray(U[:, int((values > least).sum()) :])
 
 
-def constraints(device: Drawing) -> tuple[np.ndarray, list[tuple[str, str]]]:
+@lru_cache(maxsize=KEPT)
+def constraints(c: Condensed) -> tuple[np.ndarray, list[tuple[str, str]]]:
     """(c, 6 bodies) unit rows of what the flexures hold of the twists of all bodies, turns counted as displacements, and (element,
     direction) of each."""
     names: list[tuple[str, str]] = []
-    c = Condensed(device, device.values())
+    device = c.device
     count, rows = len(device.bodies), []
     turn = np.array([device.size] * 3 + [1.0] * 3)  # twists (theta; delta) as displacements, wrenches (M; F) as forces
     swap = [3, 4, 5, 0, 1, 2]
@@ -95,7 +101,7 @@ def free_between_springs(device: Drawing) -> list[str]:
     """Bodies that can move without a force, because what joins them are springs."""
     if not any(isinstance(e.section, Spring) for e in device.placed_elements):
         return []
-    count, c = len(device.bodies), Condensed(device, device.values())
+    count, c = len(device.bodies), nominal(device)
     size = np.array([1 / device.size] * 3 + [1.0] * 3)  # turns as displacements
     rows = []
     for e, R, end in zip(device.placed_elements, c.frames, c.ends, strict=True):
@@ -138,7 +144,7 @@ def free_modes(device: Drawing) -> Modes:
     ends: a stack counts with its stiffness, a force
     without one leaves its axis free, a prescribed displacement holds it. Cubic springs count with their slope at home, none.
     """
-    c = Condensed(device, device.values())
+    c = nominal(device)
     count = len(device.bodies)
     K, M, heavy = body_matrices(c)
     if not heavy:
@@ -155,7 +161,7 @@ def free_modes(device: Drawing) -> Modes:
 def guyan_modes(device: Drawing) -> Modes:
     """The modes of the model with inertia, whose bodies move as they do at rest: as many as actuators; none where the actuators prescribe
     displacements, or move no mass in some direction."""
-    c = Condensed(device, device.values())
+    c = nominal(device)
     M, heavy = _mass(c)
     n = len(device.placed_actuators)
     moved = np.vstack([ca.DM(ca.evalf(ca.SX(T[:, :n]))).full() for T in c.twists]) / as_displacements(device)[:, None]
@@ -167,6 +173,7 @@ def guyan_modes(device: Drawing) -> Modes:
     return Modes(np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi), moved @ shapes, M)
 
 
+@lru_cache(maxsize=KEPT)
 def body_matrices(c: Condensed) -> tuple[np.ndarray, np.ndarray, list[int]]:
     """Stiffness with the drives held and mass (6 bodies, 6 bodies) of all bodies, turns counted as displacements; rows with mass."""
     count = len(c.device.bodies)
@@ -192,6 +199,7 @@ def as_displacements(device: Drawing) -> np.ndarray:
     return np.tile([1 / device.size] * 3 + [1.0] * 3, len(device.bodies))
 
 
+@lru_cache(maxsize=KEPT)
 def _mass(c: Condensed) -> tuple[np.ndarray, list[int]]:
     """The mass matrix of all bodies, turns counted as displacements, and its rows that are not zero."""
     count = len(c.device.bodies)
@@ -215,7 +223,7 @@ def _mass(c: Condensed) -> tuple[np.ndarray, list[int]]:
 
 def summary(device: Drawing) -> list[str]:
     """What `ctrlgen check` prints of a mechanism: its parts, and how stiff it is at the output point."""
-    c = Condensed(device, device.values())
+    c = nominal(device)
     C = ca.DM(ca.evalf(ca.SX(c.output_compliance))).full()
     springs = sum(C is None for C in c.compliances)
     lines = [
@@ -234,9 +242,10 @@ def summary(device: Drawing) -> list[str]:
     lines.append(f"stiffness at the output point: {forces}; about {moments}")
     centre = point_compliance(device).centre_of_compliance
     lines.append(f"centre of compliance: ({', '.join(show(x, 'mm') for x in centre)})")
-    if len(modes := natural_frequencies(device)):
-        lines.append(f"natural frequencies with the drives held: {', '.join(show(f, 'Hz') for f in modes[:6])}")
-    condensed, left_out = condensed_modes(device)
+    if len((whole := free_modes(device)).frequencies):
+        shown = ", ".join(show(f, "Hz") for f in whole.frequencies[:6])
+        lines.append(f"natural frequencies with the drives held: {shown}")
+    condensed, left_out = condensed_modes(device, whole)
     if condensed:
         used = "solved with it" if device.dynamics is not None else "a table [dynamics] solves with it"
         more = "" if left_out is None else f"; first mode left out: {show(left_out, 'Hz')}"
@@ -283,9 +292,9 @@ class CondensedMode:
         return f"{show(self.frequency, 'Hz')} ({off:+.2g} % of {show(self.whole, 'Hz')})"
 
 
-def condensed_modes(device: Drawing) -> tuple[tuple[CondensedMode, ...], float | None]:
+def condensed_modes(device: Drawing, whole: Modes | None = None) -> tuple[tuple[CondensedMode, ...], float | None]:
     """How far the modes of the bodies moving as at rest are from their modes, and the first mode [Hz] that is left out."""
-    full, reduced = free_modes(device), guyan_modes(device)
+    full, reduced = whole or free_modes(device), guyan_modes(device)
     if not len(reduced.frequencies):
         return (), None
     like = reduced.likeness(full)

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.units import show
-from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.devices.mechanism.condensed import nominal
 from ctrlgen.devices.mechanism.drawing import Drawing
 from ctrlgen.devices.mechanism.joining import TWIST
 from ctrlgen.physics.screw import move
@@ -45,7 +45,7 @@ class PointCompliance:
 
 def point_compliance(device: Drawing, point: np.ndarray | None = None) -> PointCompliance:
     """The output body's at `point` (3,) [m] in the global frame; left out: the output point. Of the drawing, without loads."""
-    c = Condensed(device, device.values())
+    c = nominal(device)
     home = _numbers(c.output_point).ravel()
     at = home if point is None else np.asarray(point, float)
     C = _numbers(move(ca.DM(_numbers(c.output_compliance)), None, tuple(home - at)))

@@ -52,6 +52,10 @@ class Motions:
     def deformation(self, a: Sequence[int], b: Sequence[int]) -> Matrix:
         """Its second order (6, m) in the columns `a` and `b` of equal length, in its frame (`physics.second_order_flexure`)."""
         seen = relative_motion(self.place, self.first, self.second, a, b)
+        if self.shape is not None and all(isinstance(x, ca.DM) for x in (seen, self.load, self.R, self.shape)):
+            W, R = self.load.full(), self.R.full()
+            turned = np.vstack([R.T @ half for half in np.split(seen.full(), 2)])
+            return ca.DM(turned + self.shape.full() @ (W[:, None, a] * W[None, :, b]).reshape(36, len(a)))
         local = ca.vertcat(ca.mtimes(self.R.T, seen[:3, :]), ca.mtimes(self.R.T, seen[3:, :]))
         if self.shape is None:
             return local + point_flexure(self.relative, a, b)
@@ -85,11 +89,16 @@ class SecondOrder:
         c, parts = self.c, []
         materials = {m.name: q for m, q in zip(c.device.material, c.p.material, strict=True)}
         a, b = [x for x in range(6) for _ in range(6)], [y for _ in range(6) for y in range(6)]
+        shapes: dict[tuple[Segment, ...], Matrix] = {}  # equal flexures have one
         for k, e in enumerate(c.device.placed_elements):
             numbers = c.p.element[e.index]
             segments = e.section.segments(numbers, materials.get(getattr(e.section, "material", ""), SimpleNamespace()))
             back = 0.0 if segments else e.section.pivot(numbers)
-            shape = plain(ca.sparsify(ca.SX(beam(segments, ca.DM.eye(6), a, b)))) if segments else None
+            plain_numbers = all(isinstance(x, float) for segment in segments for x in vars(segment).values())
+            shape = shapes.get(segments) if plain_numbers else None
+            if segments and shape is None:
+                shape = plain(ca.sparsify(ca.SX(beam(segments, ca.DM.eye(6), a, b))))
+                shapes |= {segments: shape} if plain_numbers else {}
             parts.append((plain(c.ends[k] - back * c.frames[k][:, 0]), segments, shape))
         return parts
 
