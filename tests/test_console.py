@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 
 import pytest
 
@@ -53,3 +54,24 @@ def test_a_warning_is_shown_once_by_each_command(capsys):
         for text in ("a", "b", "a"):
             show(UserWarning(text), UserWarning, "file.py", 3)
         assert capsys.readouterr().err.split() == ["warning:", "a", "warning:", "b"]
+
+
+def test_long_work_says_in_a_pipe_what_it_does_and_how_long_it_takes(monkeypatch, capsys):
+    monkeypatch.setattr(console.Lines.__init__, "__defaults__", (None, 0.05))
+    with console.counted("diagnosing") as told:
+        told(1, 4)
+        time.sleep(0.12)
+    said = capsys.readouterr().err.splitlines()
+    assert said and all(re.fullmatch(r"\d+ s: diagnosing, 1 of 4 done, about \d+ s to go", line) for line in said)
+    with console.progress(3) as advance:
+        advance("symbolic model")
+        advance("fit of creep")
+        time.sleep(0.08)
+    assert re.search(r"\d+ s: fit of creep, 1 of 3 done, about \d+ s to go", capsys.readouterr().err)
+    with console.progress() as advance:
+        advance("noise")
+        time.sleep(0.08)
+    assert re.search(r"^\d+ s: noise$", capsys.readouterr().err, re.MULTILINE)
+    with console.progress() as advance:
+        advance("quick")
+    assert capsys.readouterr().err == ""

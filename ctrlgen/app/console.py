@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -18,6 +20,7 @@ from ctrlgen.core.errors import CtrlgenError
 
 out = Console(highlight=False, width=None if sys.stdout.isatty() else 110)
 err = Console(stderr=True, highlight=False)
+EVERY = 10.0  # seconds between two lines of long work
 Column = tuple[str, Literal["left", "right"]]  # of a table: its heading and how it is aligned
 CHECK: ContextVar[Callable[[], None]] = ContextVar("check", default=lambda: None)  # called before each stage of work
 
@@ -42,10 +45,52 @@ def show_table(table: Table) -> None:
     out.print(table, crop=False)
 
 
+class Lines:
+    """What long work says where no bar can be drawn: a line every ten seconds on standard error, with the time to go where the pieces are
+    counted, as if those that are left took as long as those that are done."""
+
+    def __init__(self, what: str, total: int | None = None, every: float = EVERY) -> None:
+        self.what, self.done, self.total, self.every = what, 0, total, every
+        self._began, self._ended = time.monotonic(), threading.Event()
+
+    def line(self) -> str:
+        """How long it has taken, what is done at present, what is left."""
+        passed = time.monotonic() - self._began
+        if not self.total:
+            return f"{passed:.0f} s: {self.what}"
+        count = f"{passed:.0f} s: {self.what}, {self.done} of {self.total} done"
+        left = passed / self.done * (self.total - self.done) if self.done else None
+        return count if left is None else f"{count}, about {left:.0f} s to go"
+
+    def _run(self) -> None:
+        while not self._ended.wait(self.every):
+            err.print(self.line(), markup=False, soft_wrap=True)
+
+    @contextmanager
+    def shown(self) -> Iterator[Lines]:
+        """Says its lines until the work ends."""
+        thread = threading.Thread(target=self._run, daemon=True)
+        thread.start()
+        try:
+            yield self
+        finally:
+            self._ended.set()
+            thread.join()
+
+
 @contextmanager
 def counted(what: str) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on standard error for work whose pieces are counted; each call says how many of how many are done."""
+    """A progress bar on standard error for work whose pieces are counted; each call says how many of how many are done. Lines in a pipe."""
     check = CHECK.get()
+    if not err.is_terminal:
+        with Lines(what).shown() as lines:
+
+            def counted_on(done: int, of: int) -> None:
+                check()
+                lines.done, lines.total = done, of
+
+            yield counted_on
+        return
     count = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     columns = (SpinnerColumn(), TextColumn("{task.description}"), *count)
     with Progress(*columns, console=err, transient=True) as bar:
@@ -60,8 +105,17 @@ def counted(what: str) -> Iterator[Callable[[int, int], None]]:
 
 @contextmanager
 def progress(stages: int | None = None) -> Iterator[Any]:
-    """A progress bar on standard error, or a spinner where the number of steps is not known; each call names the next."""
+    """A progress bar on standard error, or a spinner where the number of steps is not known; each call names the next. Lines in a pipe."""
     check = CHECK.get()
+    if not err.is_terminal:
+        with Lines("reading", stages).shown() as lines:
+
+            def named(what: str) -> None:
+                check()
+                lines.what, lines.done = what, lines.done + (lines.what != "reading")
+
+            yield named
+        return
     bar_column = () if stages is None else (BarColumn(),)
     columns = (SpinnerColumn(), TextColumn("{task.description}"), *bar_column, TimeElapsedColumn())
     with Progress(*columns, console=err, transient=True) as bar:
