@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import runpy
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import SCENARIOS
 
 from ctrlgen.physics import sensor_models as chain
 from ctrlgen.physics.sensor_models import SENSORS, Adc, Interferometer
@@ -186,3 +188,14 @@ def test_statistics_of_repeated_recordings():
         sensitivity_statistics(
             [record(SENSORS["fibre"], LASER, 5 * UM, 5 * UM, np.random.default_rng(0))], LASER.wavelength
         )
+
+
+def test_the_shipped_record_gives_back_the_sensitivity_that_was_planted():
+    script = runpy.run_path(str(SCENARIOS / "sensor_calibration" / "calibrate.py"))
+    found = script["calibrate"](SCENARIOS / "sensor_calibration" / "record.csv")
+    planted = SENSORS["3316"].sensitivity
+    assert abs(found.sensitivity - planted) < 3 * found.sd < 1e-3 * planted
+    assert (
+        abs(found.distance - 95e-6) < 3 * script["WAVELENGTH"] / 4
+    )  # a quarter wave at each end, one for the first crossing
+    assert found.sd > max(found.fit, found.wavelength, found.tilt)
