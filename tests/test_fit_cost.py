@@ -10,7 +10,9 @@ import pytest
 from axis_records import AXIS, axis_fitter
 
 from ctrlgen.diagnosis.diagnose import diagnose_recording
+from ctrlgen.estimation.described_device import described
 from ctrlgen.estimation.error_model import ErrorModel
+from ctrlgen.estimation.isolated_outliers import mark_outliers
 from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.estimation.structure import Structure
 
@@ -52,3 +54,14 @@ def test_a_diagnosis_simulates_no_more_than_it_did(counted):
     found = diagnose_recording(AXIS, fitter.recording, laws=["backlash", "one_sided_stiffening", "stiffening"], jobs=0)
     assert [c.effect for c in found.search.chosen.causes] == ["stiffening"]
     assert counted["sensitivities"] <= 1.1 * WITH_SLOPES and counted["simulate_states"] <= 1.1 * WITHOUT
+
+
+def test_the_device_as_described_is_fitted_once_to_the_same_samples_under_the_same_errors(counted):
+    fitter = axis_fitter(n=400)
+    first = described(fitter, AXIS)
+    unmarked = mark_outliers(fitter.recording, lambda record: fitter.predict(first[1], record))
+    assert unmarked is fitter.recording
+    counted.clear()
+    assert described(replace(fitter), AXIS) is first and not counted
+    other = replace(fitter.noise, sd=2 * fitter.noise.sd)
+    assert described(fitter.with_noise(other), AXIS) is not first and counted["sensitivities"]

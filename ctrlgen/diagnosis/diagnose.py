@@ -42,6 +42,7 @@ from ctrlgen.diagnosis.shares.families import ranking
 from ctrlgen.diagnosis.shares.gather import ResidualShares, residual_shares
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.checkpoint import Checkpoint
+from ctrlgen.estimation.described_device import described, forget_described
 from ctrlgen.estimation.drive_clock import STAMPS, TOLD, stamp_deviation
 from ctrlgen.estimation.fit import Fitter, forget_predictions
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, hypotheses, nominal_physics, selected_laws
@@ -89,6 +90,7 @@ def diagnose_recording(
     # Those of an earlier diagnosis only take memory
     compiled_simulator.cache_clear()
     forget_predictions()
+    forget_described()
     # One thread: the matrices are small. No warnings: a candidate model may diverge, and is then rejected.
     with threadpool_limits(1), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         processes = usable_cores() if jobs is None else max(jobs, 1)
@@ -208,18 +210,18 @@ def noise_before_fits(device: Device, recording: Recording) -> Noise:
 def _with_noise(device: Device, fitter: Fitter) -> Fitter:
     """The fitter with noise that was guessed, or stated wrongly, taken from the residual of the device as described."""
     for _ in range(NOISE_UPDATE.guessed_refits if fitter.noise.guessed.any() else 0):
-        fitter, described = fitter.described(device)
-        fitter = fitter.with_noise(update_guessed_noise(fitter, described))
+        fitter, fit = described(fitter, device)
+        fitter = fitter.with_noise(update_guessed_noise(fitter, fit))
     if fitter.noise.stated.any():
-        weighed, described = fitter.described(device)
-        fitter = fitter.with_noise(correct_stated_noise(weighed, described))
+        weighed, fit = described(fitter, device)
+        fitter = fitter.with_noise(correct_stated_noise(weighed, fit))
     return fitter
 
 
 def _without_outliers(device: Device, fitter: Fitter) -> Fitter:
     """The fitter without samples that lie off the prediction of the device as described alone."""
-    weighed, described = fitter.described(device)
-    return replace(fitter, recording=mark_outliers(fitter.recording, lambda record: weighed.predict(described, record)))
+    weighed, fit = described(fitter, device)
+    return replace(fitter, recording=mark_outliers(fitter.recording, lambda record: weighed.predict(fit, record)))
 
 
 def _notes(

@@ -7,6 +7,7 @@ and takes peaks of its own for them.
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -23,7 +24,7 @@ from ctrlgen.recordings.recording import Record, Recording
 
 def mark_outliers(recording: Recording, predicted: Callable[[Record], np.ndarray]) -> Recording:
     """The recording with outliers of the residual, observed minus `predicted` (n, n_y), marked not valid, and their sizes in
-    `Record.spikes`.
+    `Record.spikes`; the same object where there are none.
 
     A mechanism cannot leave and return within two samples, so no physics is taken away; of settled poses see `pose_outliers`.
     Records at rest are left as they are.
@@ -31,7 +32,8 @@ def mark_outliers(recording: Recording, predicted: Callable[[Record], np.ndarray
     if recording.kind == "poses":
         return _with_pose_marks(recording, predicted)
     records = [r if r.role == "rest" else _marked(r, predicted(r)) for r in recording.records]
-    return replace(recording, records=tuple(records))
+    same = all(map(operator.is_, records, recording.records))
+    return recording if same else replace(recording, records=tuple(records))
 
 
 def mark_again(recording: Recording, predicted: Callable[[Record], np.ndarray], noise: Noise) -> Recording:

@@ -29,6 +29,7 @@ from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.selection.supported import supported
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
 from ctrlgen.diagnosis.settings import SEARCH
+from ctrlgen.estimation.described_device import described
 from ctrlgen.estimation.drive_clock import with_drive_clock
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.integration_error import with_steps_that_suffice
@@ -47,10 +48,10 @@ class Searcher:
     def run(self, device: Device) -> SearchResult:
         """Rounds until nothing more is justified, again where they have taught the noise; then the rivals of each cause."""
         trials = self.trials
-        fitter, described = trials.fitter.described(device)
+        fitter, nominal_fit = described(trials.fitter, device)
         trials.use(fitter)
         rounds: list[Round] = []
-        current = trials.with_noise_update(trials.fit(described.restarted, steps=FIT.max_steps))
+        current = trials.with_noise_update(trials.fit(nominal_fit.restarted, steps=FIT.max_steps))
         self._learn_mismatch(current)
         for _ in range(SEARCH.most_noise_updates):
             current = self._forward_rounds(current, rounds)
