@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from axis_records import AXIS, BACKLASH, LATE, fitter_of, played
 
+from ctrlgen.diagnosis.selection import pruning
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.pruning import all_pruned, pruned
 from ctrlgen.diagnosis.selection.screen import Screen
@@ -70,6 +71,21 @@ def test_what_is_left_of_two_candidates_stands_once(pair):
     alone = trials.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 6e-8}))
     nominal = trials.fit(Structure(AXIS))
     assert [t.causes for t in all_pruned(trials, nominal, [alone, candidate])] == [(BACKLASH,)]
+
+
+def test_what_takes_away_far_less_than_a_sound_cause_is_not_begun_elsewhere(pair, monkeypatch):
+    trials, both = pair
+    play = trials.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 6e-8}))
+    nominal = trials.fit(Structure(AXIS))
+    bound = at_bound(trials, trials.fit(Structure(AXIS).with_cause(OFFSET, {"offset": 0.0})), OFFSET)
+    screened, begun = trials.screened(nominal), []
+    monkeypatch.setattr(
+        pruning, "pruned", lambda branch, t, accepted, starts, before: begun.append((t.causes, bool(starts)))
+    )
+    all_pruned(trials, nominal, [play, bound, both], screened)
+    assert begun == [((BACKLASH,), True), ((OFFSET,), False), ((BACKLASH, OFFSET), True)]
+    all_pruned(trials, nominal, [bound], screened)
+    assert begun[3:] == [((OFFSET,), True)]
 
 
 def test_a_trial_that_raises_is_noted_and_the_search_goes_on(monkeypatch):

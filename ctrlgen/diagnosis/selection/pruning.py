@@ -24,13 +24,28 @@ def all_pruned(
     trials: Trials, current: CandidateModel, candidates: Sequence[CandidateModel], screened: Screened | None = None
 ) -> list[CandidateModel]:
     """The candidates that meet no objection, and of the others what is left without the causes that do, each begun again from
-    where else the screen saw it."""
+    where else the screen saw it, unless it takes away far less than a candidate that meets none and is enough: its best start did."""
     by_causes: dict[frozenset[Any], CandidateModel] = {}
     starts = {} if screened is None else {s.hypothesis: (s.start, *s.other_starts) for s in screened.suspects}
-    for kept in trials.each(lambda branch, t: pruned(branch, t, current.causes, starts, current), candidates):
+    sound = [t for t in candidates if starts and not trials.objections(t, current.causes)]
+    most = max(
+        (_taken(t, current) for t in sound if trials.selection.improves_enough(current, t)),
+        default=0.0,
+    )
+
+    def one(branch: Trials, t: CandidateModel) -> CandidateModel | None:
+        begun = starts if _taken(t, current) >= SEARCH.rival_share * most else {}
+        return pruned(branch, t, current.causes, begun, current)
+
+    for kept in trials.each(one, candidates):
         if kept is not None:
             by_causes.setdefault(frozenset(kept.causes), kept)
     return list(by_causes.values())
+
+
+def _taken(t: CandidateModel, before: CandidateModel) -> float:
+    """What a candidate takes away of the squares beyond noise that the model `before` leaves on the records to fit."""
+    return before.fitted.excess - t.fitted.excess
 
 
 def pruned(
