@@ -10,7 +10,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from scipy.optimize import brentq
 
 from ctrlgen.core.units import show
 from ctrlgen.devices.mechanism.condensed import Condensed, nominal
@@ -22,6 +21,7 @@ from ctrlgen.devices.mechanism.stretching import Stretching
 
 LEVELS = (0.01, 0.05, 0.2)  # of the linear force
 FARTHEST = 10.0  # times the largest travel: beyond it nothing is said
+SMALL = 1e-6  # of a level: what is zero by symmetry has no logarithm
 STEPS = 200  # between a thousandth of the travel and the farthest: the deviation may have a turning point
 
 
@@ -70,14 +70,13 @@ def linear_ranges(c: Condensed) -> list[tuple[float | None, ...]]:
         found: list[float | None] = []
         for level in LEVELS:
             k = int(np.argmax(shares > level))
-            beyond = shares[k] > level
-            found.append(
-                None
-                if not beyond
-                else grid[0]
-                if k == 0
-                else brentq(lambda x, s=level: off(x) - s, *grid[k - 1 : k + 1])
-            )
+            if shares[k] <= level:
+                found.append(None)
+            elif k == 0:
+                found.append(float(grid[0]))
+            else:  # between two points a power of the travel
+                logs = (np.log(x[k - 1 : k + 1]) for x in (np.maximum(shares, level * SMALL), grid))
+                found.append(float(np.exp(np.interp(np.log(level), *logs))))
         ranges.append(tuple(found))
     return ranges
 
