@@ -1,11 +1,14 @@
 from __future__ import annotations
 
+import json
+
 import casadi as ca
 import numpy as np
 import pytest
 from conftest import DEVICES
 
 from ctrlgen import InputError, build_model, load_device, simulate
+from ctrlgen.app.scenario_pipeline import map_workspace
 from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.trajectory.workspace import Workspace
@@ -141,3 +144,35 @@ def test_without_a_third_translation_slices_are_at_the_middle_of_the_drives_and_
     down, up = workspace.reach(middle, np.vstack([-way, way]))
     assert below - middle == pytest.approx(-0.5 * down * way, abs=1e-15)
     assert above - middle == pytest.approx(0.5 * up * way, abs=1e-15)
+
+
+def test_an_axis_alone_has_a_range_whose_ends_name_their_limits(tmp_path):
+    """The coil's 1.5 A against 2662 N/m would be 2.1 mm: the stroke of 500 um ends both sides first."""
+    summary = map_workspace(load_device(DEVICES / "parallelogram.toml"), [], tmp_path / "out")
+    assert summary.extent[0] == pytest.approx([-500e-6, 500e-6], rel=1e-4)
+    assert summary.bound_by == [("travel of coil", "travel of coil")] and summary.area is None
+    numbers = json.loads((tmp_path / "out" / "workspace.json").read_text())
+    assert numbers["bound_by"] == {"delta_x": ["travel of coil", "travel of coil"]}
+
+
+def test_a_platform_that_only_tilts_has_an_area_of_angles(tmp_path):
+    """Two of three feet are pushed: the strokes of both bound a parallelogram, 4 s^2 |det J|, in the angles."""
+    text = (DEVICES / "tripod.toml").read_text()
+    begin, end = text.index("[[actuator]]"), text.index("[[reading]]")
+    foot = text[begin:end].replace('pattern = "leg"\n', "")
+    feet = foot.replace('"coil"', '"a"') + foot.replace('"coil"', '"b"').replace(
+        '["30 mm", "0 mm"', '["-15 mm", "26 mm"'
+    )
+    text = (text[:begin] + feet + text[end:]).replace(', "delta_z"]', "]")
+    text = (
+        text.replace('low = "-0.8 A"', 'low = "-80 A"')
+        .replace('high = "0.8 A"', 'high = "80 A"')
+        .replace('"400 MPa"', '"400 GPa"')
+    )
+    (tmp_path / "device.toml").write_text(text)
+    device = load_device(tmp_path / "device.toml")
+    summary = map_workspace(device, [], tmp_path / "out")
+    model = build_model(device)
+    J = ca.Function("J", [model.z], [ca.jacobian(model.signals["pose"].expr, model.z)])(0).full()
+    assert summary.area == pytest.approx(4 * 400e-6**2 * abs(np.linalg.det(J)), rel=1e-4)
+    assert "slice of theta_x and theta_y" in summary.shown_area and [what for what, _ in summary.balls] == ["rotations"]

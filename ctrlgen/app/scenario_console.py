@@ -151,7 +151,12 @@ def print_workspace(summary: WorkspaceSummary) -> None:
             escape(f"{channel} [{unit}]"), *(" ... ".join(f"{from_si(v, unit):.4g}" for v in e) for e in ends)
         )
     show_table(table)
-    for what, ball in (("translations", summary.translations), ("all channels", summary.everything)):
+    for i, (channel, _) in named:
+        low, high = summary.bound_by[i]
+        out.print(f"{channel} ends by {low}, and upward by {high}", markup=False, soft_wrap=True)
+    if summary.area is not None:
+        out.print(summary.shown_area, markup=False)
+    for what, ball in summary.balls:
         out.print(
             f"largest ball of {what}: radius {ball.radius:.4g} typical sizes around {place(ball.centre)}",
             soft_wrap=True,

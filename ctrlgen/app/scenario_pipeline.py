@@ -15,7 +15,7 @@ from ctrlgen.app.workspace_page import workspace_page
 from ctrlgen.app.workspace_summary import WorkspaceSummary, workspace_numbers
 from ctrlgen.budget.budget_section import budget_section
 from ctrlgen.budget.robust import solve
-from ctrlgen.core.errors import Fault, InputError, SolverError
+from ctrlgen.core.errors import SolverError
 from ctrlgen.core.files import whole_folder, write_text
 from ctrlgen.core.steps import noted
 from ctrlgen.core.tabular import Reported
@@ -208,26 +208,20 @@ def map_workspace(device: Device, poses: list[str], out: Path) -> WorkspaceSumma
     """
     model = build_model(device)
     workspace, signal = Workspace(model), model.signals["pose"]
-    if len(signal.channels) < 2 or not workspace.translations:
-        raise InputError(
-            device.name,
-            [
-                Fault(
-                    "workspace",
-                    "cannot be mapped: the device needs a pose of two channels or more, one of them a translation",
-                )
-            ],
-        )
     frame = Frame(signal.channels, signal.units)
     bases = [frame.pose(pose, "--at") for pose in poses] or workspace.bases()
     ranges = [workspace.ranges(base) for base in bases]
     middle = bases[len(bases) // 2]
-    balls = workspace.ball(middle, workspace.translations), workspace.ball(middle, tuple(range(len(signal.channels))))
-    summary = WorkspaceSummary(workspace, bases, ranges, workspace.extent(middle), *balls)
+    balls = workspace.ball(middle, workspace.leading), workspace.ball(middle, tuple(range(len(signal.channels))))
+    drawn = workspace.drawn
+    area = workspace.area(middle, *drawn[:2]) if len(drawn) > 1 else None
+    summary = WorkspaceSummary(
+        workspace, bases, ranges, workspace.extent(middle), *balls, workspace.bound_by(middle), area
+    )
     with whole_folder(out) as draft:
         with plt.rc_context(STYLE):
-            drawn = svg(draw_workspace(workspace, bases, balls[0]))
-        write_text(draft / "workspace.svg", drawn)
+            picture = svg(draw_workspace(workspace, bases, balls[0]))
+        write_text(draft / "workspace.svg", picture)
         write_text(draft / "workspace.json", json.dumps(workspace_numbers(summary), indent=1) + "\n")
-        write_text(draft / "workspace.html", workspace_page(summary, drawn))
+        write_text(draft / "workspace.html", workspace_page(summary, picture))
     return summary

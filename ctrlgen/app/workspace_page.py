@@ -26,11 +26,9 @@ def workspace_page(summary: WorkspaceSummary, drawn: str) -> str:
     rows = []
     for i, (channel, unit) in enumerate(zip(signal.channels, signal.units, strict=True)):
         ends = [_ends(summary, r, i) for r in (*summary.ranges, summary.extent)]
-        rows.append((f"{channel} [{unit}]", ends, f"{from_si(signal.scale[i], unit):.4g}"))
-    balls = [
-        (what, f"{ball.radius:.4g}", _place(summary, ball.centre))
-        for what, ball in (("translations", summary.translations), ("all channels", summary.everything))
-    ]
+        size = f"{from_si(signal.scale[i], unit):.4g}"
+        rows.append((f"{channel} [{unit}]", ends, size, " … ".join(dict.fromkeys(summary.bound_by[i]))))
+    balls = [(what, f"{ball.radius:.4g}", _place(summary, ball.centre)) for what, ball in summary.balls]
     device = summary.workspace.model.device
     return render(
         Path(__file__).with_name("workspace.html.j2"),
@@ -46,7 +44,7 @@ def workspace_page(summary: WorkspaceSummary, drawn: str) -> str:
 
 
 def _first_screen(summary: WorkspaceSummary, figure: PageFigure) -> FirstScreen:
-    signal, ball = summary.workspace.model.signals["pose"], summary.translations
+    signal, ball = summary.workspace.model.signals["pose"], summary.leading
     i = ball.channels[0]
     radius = f"{from_si(ball.radius * signal.scale[i], signal.units[i]):.3g} {signal.units[i]}"
     named = " and ".join(signal.channels[k] for k in ball.channels)
@@ -59,6 +57,9 @@ def _first_screen(summary: WorkspaceSummary, figure: PageFigure) -> FirstScreen:
         (f"{channel}, anywhere", f"{_ends(summary, summary.extent, k)} {unit}")
         for k, (channel, unit) in enumerate(zip(signal.channels, signal.units, strict=True))
     ]
+    if summary.area is not None:
+        what, area = summary.shown_area.split(": ")
+        numbers.append((what, area))
     steps = (
         "Lay a path inside and solve it: `ctrlgen new scenario`, then `ctrlgen run`.",
         "Slices at other poses: `--at channel=value`, repeated.",

@@ -15,15 +15,37 @@ from ctrlgen.trajectory.workspace import Ball, Workspace
 class WorkspaceSummary:
     """The workspace of a device: `ranges` at each of the `bases` and the `extent` anywhere, (channels, 2) in SI.
 
-    `translations` and `everything`: the largest balls in the translations and in all channels.
+    `leading` and `everything`: the largest balls in the translations, or in the rotations where there are none, and in all channels.
+    `bound_by`: the limits that end each channel's range at the middle one of the bases. `area` [SI] of the slice there in the two
+    channels that are drawn; None where there is one.
     """
 
     workspace: Workspace
     bases: list[np.ndarray]
     ranges: list[np.ndarray]
     extent: np.ndarray
-    translations: Ball
+    leading: Ball
     everything: Ball
+    bound_by: list[tuple[str, str]]
+    area: float | None
+
+    @property
+    def balls(self) -> list[tuple[str, Ball]]:
+        """The largest balls with the words for their channels, each once."""
+        told = "translations" if self.workspace.translations else "rotations"
+        every = [("all channels", self.everything)] if self.everything.channels != self.leading.channels else []
+        return [(told, self.leading), *every]
+
+    @property
+    def shown_area(self) -> str:
+        """The area with the channels and the unit, such as 'slice of theta_x and theta_y: 1.2 mrad^2'; empty where there is none."""
+        if self.area is None:
+            return ""
+        signal, (x, y) = self.workspace.model.signals["pose"], self.workspace.drawn[:2]
+        units = [signal.units[k] for k in (x, y)]
+        unit = f"{units[0]}^2" if units[0] == units[1] else f"{units[0]}*{units[1]}"
+        size = self.area * from_si(1.0, units[0]) * from_si(1.0, units[1])
+        return f"slice of {signal.channels[x]} and {signal.channels[y]}: {size:.4g} {unit}"
 
 
 def workspace_numbers(summary: WorkspaceSummary) -> dict[str, Any]:
@@ -44,7 +66,9 @@ def workspace_numbers(summary: WorkspaceSummary) -> dict[str, Any]:
                 "centre": row(ball.centre),
                 "radius_in_typical_sizes": ball.radius,
             }
-            for ball in (summary.translations, summary.everything)
+            for ball in (summary.leading, summary.everything)
         ],
+        "bound_by": dict(zip(signal.channels, map(list, summary.bound_by), strict=True)),
+        "area": summary.shown_area or None,
         "typical_sizes": row(np.array(signal.scale)),
     }

@@ -159,6 +159,8 @@ def draw_stage_force(solution: Solution) -> Figure:
 def draw_workspace(workspace: Workspace, bases: list[np.ndarray], ball: Ball) -> Figure:
     """Slices of the workspace, one outline per base pose, with the side view through the ball and the ball itself."""
     signal = workspace.model.signals["pose"]
+    if len(workspace.drawn) == 1:
+        return _draw_range(workspace, bases[len(bases) // 2])
     x, y, *third = workspace.drawn
     figure, panels = plt.subplots(1, 1 + len(third), figsize=(8.6, 4.2) if third else (4.8, 4.2), squeeze=False)
     for base, colour in zip(bases, COLOURS[::2], strict=False):
@@ -179,6 +181,20 @@ def draw_workspace(workspace: Workspace, bases: list[np.ndarray], ball: Ball) ->
         panel.set_xlabel(f"{signal.channels[x]} [{signal.units[x]}]")
         panel.set_ylabel(f"{signal.channels[vertical]} [{signal.units[vertical]}]")
         panel.legend(fontsize=8, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    return figure
+
+
+def _draw_range(workspace: Workspace, base: np.ndarray) -> Figure:
+    """How much of the nearest limit's range is left along the one channel, to both ends."""
+    signal, ends = workspace.model.signals["pose"], workspace.ranges(base)[0]
+    figure, panel = plt.subplots(figsize=(4.8, 3.6))
+    along = np.linspace(ends[0], ends[1], 201)
+    panel.plot(from_si(along, signal.units[0]), -100 * workspace.excess(along[:, None]), color=COLOURS[0])
+    for end, name in zip(ends, workspace.bound_by(base)[0], strict=True):
+        panel.plot([from_si(end, signal.units[0])], [0], "o", color=COLOURS[2], label=name)
+    panel.set_xlabel(f"{signal.channels[0]} [{signal.units[0]}]")
+    panel.set_ylabel("left of the nearest limit's range [%]")
+    panel.legend(fontsize=8, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     return figure
 
 

@@ -93,6 +93,11 @@ class Workspace(Drawn):
         """The channels that are lengths."""
         return translations(self.model)
 
+    @property
+    def leading(self) -> tuple[int, ...]:
+        """The translations, or where there are none the rotations: the channels in which the first ball is searched."""
+        return self.translations or tuple(range(len(self.model.signals["pose"].channels)))
+
     def bases(self) -> list[np.ndarray]:
         """Poses through which slices are drawn by default: some heights, or the pose at the middle of all drives.
 
@@ -112,6 +117,13 @@ class Workspace(Drawn):
     @cached_property
     def _excess(self) -> ca.Function:
         """pose -> the largest violation of a limit over its range, and its gradient; negative inside, zero on the boundary."""
+        pose, violations, _ = self._violations
+        worst = ca.mmax(violations)
+        return ca.Function("excess", [pose], [worst, ca.gradient(worst, pose)])
+
+    @cached_property
+    def _violations(self) -> tuple[ca.SX, ca.SX, tuple[str, ...]]:
+        """(pose, the violation of each limit over its range, the labels of these limits)."""
         m = self.model
         inverse = ControllerKernels(m, "pose", None).static
         pose = ca.SX.sym("pose", len(m.signals["pose"].channels))
@@ -120,14 +132,22 @@ class Workspace(Drawn):
         state = inverse.state(x, z, d)
         u = inverse.drive(x, z, d, state)
         values = m.evaluate_limits(ca.vertcat(state, ca.DM(m.rest[m.n_states :])), d, u, m.p_nominal)
-        violations = []
+        violations, labels = [], list[str]()
         for limit, value in zip(m.limits, values, strict=True):
+            named = [limit.label if len(limit.channels) == 1 else f"{limit.label}, {c}" for c in limit.channels]
             if limit.upper is not None:
                 violations.append((value - limit.upper) / (limit.span or 1.0))
+                labels += named
             if limit.lower is not None and limit.span:
                 violations.append((limit.lower - value) / limit.span)
-        worst = ca.mmax(ca.vertcat(*violations))
-        return ca.Function("excess", [pose], [worst, ca.gradient(worst, pose)])
+                labels += named
+        return pose, ca.vertcat(*violations), tuple(labels)
+
+    def binding(self, poses: np.ndarray) -> list[str]:
+        """The label of the limit that is the nearest, or passed the farthest, in each of `poses` (n, channels)."""
+        pose, violations, labels = self._violations
+        values = ca.Function("violations", [pose], [violations]).map(len(poses))(poses.T).full()
+        return [labels[int(k)] for k in np.argmax(values, axis=0)]
 
     def excess(self, poses: np.ndarray) -> np.ndarray:
         """The largest violation of a limit in each pose, over the limit's range, (n,): negative where the pose can be held."""
@@ -167,6 +187,20 @@ class Workspace(Drawn):
         axes = np.vstack([-np.eye(len(base)), np.eye(len(base))])
         far = self.reach(base, axes)
         return np.column_stack([base - far[: len(base)], base + far[len(base) :]])
+
+    def bound_by(self, base: np.ndarray) -> list[tuple[str, str]]:
+        """For each pose component the limits that end its `ranges` from `base`, at the lowest and at the highest value."""
+        ends, bound = self.ranges(base), list[tuple[str, str]]()
+        for i in range(len(base)):
+            low, high = self.binding(np.array([np.where(np.arange(len(base)) == i, end, base) for end in ends[i]]))
+            bound.append((low, high))
+        return bound
+
+    def area(self, base: np.ndarray, first: int, second: int) -> float:
+        """Area of the slice through `base` in two channels [product of their SI units]. From 720 corners of its outline, which leave out
+        less than 2e-5 of a round one."""
+        x, y = self.outline(base, first, second).T
+        return float(abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1))) / 2)
 
     def outline(self, base: np.ndarray, first: int, second: int, points: int = 720) -> np.ndarray:
         """Boundary [SI] of the slice through `base` in the channels `first` and `second`, (points, 2); others as in `base`."""
