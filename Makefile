@@ -4,7 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: run test test-long bench battery loop mutants docs schemas lint clean
+.PHONY: run test test-long bench battery loop mutants docs schemas lint release clean
 
 run: $(VENV)/installed
 	$(BIN)/ctrlgen run scenarios/circle20 --out out/circle20
@@ -54,6 +54,23 @@ mutants: $(VENV)/installed-test
 # make schemas    writes the JSON Schemas of the result files (budget.json and so on) from their models
 schemas: $(VENV)/installed
 	$(BIN)/python -m ctrlgen.app.write_schemas
+
+# make release    builds dist/ from a clean tree, checks it, and runs the example with the wheel alone in a fresh environment;
+# publishes nothing
+FRESH := out/release
+release:
+	@test -z "$$(git status --porcelain)" || { echo "the tree is not clean: commit or set aside what git status lists"; exit 1; }
+	rm -rf dist $(FRESH)
+	$(PYTHON) -m venv $(FRESH)/tools
+	$(FRESH)/tools/bin/python -m pip install --quiet --disable-pip-version-check build twine
+	$(FRESH)/tools/bin/python -m build --outdir dist .
+	$(FRESH)/tools/bin/python -m twine check --strict dist/*
+	$(PYTHON) -m venv $(FRESH)/venv
+	$(FRESH)/venv/bin/python -m pip install --quiet --disable-pip-version-check dist/*.whl
+	cd $(FRESH) && venv/bin/ctrlgen --version && venv/bin/ctrlgen example circle20 --to scenarios && \
+	  venv/bin/ctrlgen run scenarios/circle20 --out circle20
+	@ls dist/*
+	@echo "nothing was published: tag the commit v$$($(FRESH)/venv/bin/python -c 'import ctrlgen; print(ctrlgen.__version__)'), then twine upload dist/*"
 
 lint: $(VENV)/installed-dev
 	$(BIN)/ruff check .
