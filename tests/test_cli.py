@@ -374,3 +374,10 @@ def test_bode_draws_a_picture(tmp_path, suffix):
 )
 def test_bode_refuses_what_it_cannot_draw(words, says):
     refused(ctrlgen("bode", DEVICE, *words), says)
+
+
+def test_help_needs_no_library_of_the_work():
+    """They take longer to import than the help to print."""
+    heavy = "{'casadi', 'numpy', 'pint', 'pydantic', 'scipy', 'matplotlib'}"
+    asked = f"import sys, ctrlgen.app.commands.cli; print(sorted({heavy} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True).stdout == "[]\n"

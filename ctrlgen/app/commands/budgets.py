@@ -12,7 +12,6 @@ from ctrlgen.app.budget_console import print_budget
 from ctrlgen.app.commands.app import ACCURACY_PANEL, OtherDevice, ScenarioPath, app
 from ctrlgen.app.console import out, progress
 from ctrlgen.core.errors import Fault, InputError
-from ctrlgen.core.units import read_probability
 
 DRAWS = 10_000  # as in ctrlgen.budget.error_budget, which is imported when it is needed
 
@@ -102,6 +101,8 @@ def budget(
 
 def _probability(text: str) -> float:
     """0.999 for '99.9 %' and for '0.999'. Raises InputError."""
+    from ctrlgen.core.units import read_probability
+
     try:
         return read_probability(text)
     except ValueError as error:

@@ -24,7 +24,6 @@ from ctrlgen.app.commands import (  # noqa: F401, they register their commands
 from ctrlgen.app.commands.app import PANELS, app
 from ctrlgen.app.console import CHECK, complain, err, shows_warnings
 from ctrlgen.core.errors import CtrlgenError, Unreachable
-from ctrlgen.core.files import explained
 
 app.registered_commands.sort(key=lambda command: PANELS.index(command.rich_help_panel))
 for command in (
@@ -54,6 +53,8 @@ def execute(check: Callable[[], None] = lambda: None) -> int:
     except typer.Abort:
         return 130
     except OSError as error:
+        from ctrlgen.core.files import explained
+
         place = f"{error.filename}: " if error.filename else ""
         err.print(f"error: {place}{explained(error)}", markup=False, soft_wrap=True)
         return 1

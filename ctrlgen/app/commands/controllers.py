@@ -10,7 +10,6 @@ from rich.markup import escape
 
 from ctrlgen.app.commands.app import SCENARIO_PANEL, OtherDevice, OutFolder, ScenarioPath, app
 from ctrlgen.app.console import out, progress
-from ctrlgen.app.scenario_console import print_build, print_comparison, print_solution
 
 if TYPE_CHECKING:
     from ctrlgen.app.scenario_pipeline import Outcome
@@ -30,6 +29,8 @@ def run(scenario: ScenarioPath, out_folder: OutFolder, device: OtherDevice = Non
 
     with progress(pipeline.STEPS) as advance:
         outcome = pipeline.run(_read(scenario, device), out_folder, advance)
+    from ctrlgen.app.scenario_console import print_comparison, print_solution
+
     print_solution(outcome)
     print_comparison(outcome)
     out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'report.html'))}", soft_wrap=True)
@@ -46,6 +47,8 @@ def solve(scenario: ScenarioPath, out_folder: OutFolder, device: OtherDevice = N
 
     with progress(2) as advance:
         outcome = pipeline.solve_into(_read(scenario, device), out_folder, advance)
+    from ctrlgen.app.scenario_console import print_solution
+
     print_solution(outcome)
     out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'report.html'))}", soft_wrap=True)
     _exit(outcome)
@@ -95,6 +98,8 @@ def compare(scenario: ScenarioPath, device: OtherDevice = None) -> None:
 
     with progress(pipeline.STEPS - 1) as advance:
         outcome = pipeline.compare_only(_read(scenario, device), advance)
+    from ctrlgen.app.scenario_console import print_comparison
+
     print_comparison(outcome)
     _exit(outcome)
 
@@ -125,6 +130,8 @@ def verify(
 
     with progress(pipeline.VERIFY_STEPS) as advance:
         build = pipeline.verify(_read(scenario, device), out_folder, advance, quick)
+    from ctrlgen.app.scenario_console import print_build
+
     print_build(build)
     out.print(f"[bold]page[/bold]  {escape(str(out_folder / 'build.html'))}", soft_wrap=True)
     if not build.passed:

@@ -11,7 +11,6 @@ import typer
 
 from ctrlgen.app.commands.app import DEVICE_PANEL, DevicePath, OutFolder, app, as_picture
 from ctrlgen.app.console import err, out, progress
-from ctrlgen.app.scenario_console import print_simulated, print_workspace
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.shipped_files import shipped_package
 
@@ -107,6 +106,7 @@ def workspace(
 
     Example:  ctrlgen workspace scenarios/devices/mems_hexapod.toml --out out/workspace --at delta_z=20um
     """
+    from ctrlgen.app.scenario_console import print_workspace
     from ctrlgen.app.scenario_pipeline import map_workspace
     from ctrlgen.devices import load_device
 
@@ -140,6 +140,8 @@ def simulate(
     from ctrlgen.app.simulated import simulate_device, write_simulated
 
     result = simulate_device(device, drives, step, duration, rate)
+    from ctrlgen.app.scenario_console import print_simulated
+
     print_simulated(result)
     if out_folder is not None:
         write_simulated(result, out_folder)

@@ -10,7 +10,6 @@ from rich.markup import escape
 
 from ctrlgen.app.commands.app import DEVICE_PANEL, app
 from ctrlgen.app.console import out, show_table, table_of
-from ctrlgen.app.shipped_examples import copy_examples, examples
 from ctrlgen.core.errors import Fault, InputError
 
 
@@ -30,6 +29,8 @@ def example(
 
     Example:  ctrlgen example circle20 --to scenarios
     """
+    from ctrlgen.app.shipped_examples import copy_examples, examples
+
     known = examples()
     if not names:
         if to is not None:
