@@ -95,7 +95,11 @@ static int limit_rate(const limiter_state *state, real drive[NU], real *share)
     int i;
     for (i = 0; i < NU; i++) {
         const real change = drive[i] - state->u[i];
+#if SETTLE_EXAMINED_FIRST && STEP_EXAMINED_FIRST
+        if ((change > RISE[i]) || (change < FALL[i])) {
+#else
         if ((is_nan(&state->u[i]) != 0) || (change > RISE[i]) || (change < FALL[i])) {
+#endif
             const real reached = ((change > REAL(0.0)) ? RISE[i] : FALL[i]) / change;
             changed = 1;
             least = (reached < least) ? reached : least;

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +13,8 @@ from ctrlgen.controller.feedforward import Controller
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.online.limit_tables import FLOAT_SLACK
 from ctrlgen.firmware.online.vector_cases import Call, limiter_calls
-from ctrlgen.firmware.player.compression import Compression
+from ctrlgen.firmware.player.compression import Compression, SampleTable
+from ctrlgen.firmware.player.spline import Spline
 from ctrlgen.trajectory.inverse.clock import Clock, in_time
 
 VECTORS = 24  # reference vectors along the command
@@ -21,6 +23,7 @@ CASES = 64  # at most, into the limiter's branches
 SETTLE, FRESH = 1, 2  # bits of how a vector is run: settle and not step; from a device at rest
 PLAYED = 17  # samples of the player
 BETWEEN = (0.1, 0.5, 1.3, 1.7)  # of a sample time before, and after, which the player is asked
+MEETINGS = 4  # pieces of the player whose knots and ends it is asked behind
 UNUSABLE = 3  # NaN, infinity, minus infinity: each in every channel of the target, and as the time of the player
 
 
@@ -98,10 +101,26 @@ def played_vectors(compression: Compression | None, samples: int, clock: Clock) 
     }
 
 
+def _meetings(curve: SampleTable | Spline) -> Iterator[tuple[int, float]]:
+    """Samples of a spline, and shares of a sample time after them, that lie behind a knot between two samples, and where pieces meet."""
+    if not isinstance(curve, Spline):
+        return
+    for piece in curve.pieces[:MEETINGS]:
+        length = piece.stop - piece.start
+        for k in range(piece.start, piece.stop - 1):
+            left = (length - (k - piece.start) * piece.segments % length) / piece.segments  # samples to the next knot
+            if left < 1:
+                yield k, (left + 1) / 2
+                break
+        if piece.stop < curve.samples or not curve.periodic:
+            yield piece.stop - 1, 0.5
+
+
 def _timed(compression: Compression, indices: np.ndarray, samples: int, rate: float) -> list[dict[str, Any]]:
     """Times of the player with their drives, rounded as in the C: the place of a time on the curve is then exactly the C's."""
     number: Any = np.float32 if compression.real is Real.FLOAT else np.float64
     places = {(int(k) + share) / rate for k in indices for share in BETWEEN}
+    places |= {(k + share + 0.5) % samples / rate for k, share in _meetings(compression.curve)}
     times: np.ndarray = np.array(sorted(places), dtype=number)
     times = times[times < number(samples / rate)]
     place: np.ndarray = times * number(rate) + number(samples - 0.5 if compression.closed else -0.5)
