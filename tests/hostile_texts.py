@@ -66,7 +66,7 @@ def replaced(node: Any, path: tuple[Any, ...], value: Any) -> Any:
 
 
 _C = re.compile(r'/\*.*?\*/|//[^\n]*|("(?:[^"\\\n]|\\.)*")|\s+', re.DOTALL)
-_HASH = re.compile(r"\b(?:0x)?[0-9a-f]{8,}(?:-[0-9a-f]{4,})*")
+_HASH = re.compile(r"0x[0-9A-Fa-f]{8}|(?<![^\W_])[0-9a-f]{8,}(?:-[0-9a-f]{4,})*")
 
 
 def skeleton(name: str, content: bytes, title: str) -> Any:
