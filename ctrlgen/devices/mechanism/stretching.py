@@ -179,7 +179,7 @@ def _denominator(ratio: Matrix) -> Matrix:
 
 def _merged(columns: list[Column]) -> list[Column]:
     """The columns, those with the same load and section added up, and those without a load left out, where they are numbers."""
-    if not all(isinstance(x, ca.DM) for c in columns for x in (c.axial, c.bends)):
+    if not columns or not all(isinstance(x, ca.DM) for c in columns for x in (c.axial, c.bends)):
         return columns
     numbers = [(np.array(c.axial).ravel(), np.array(c.bends).ravel(), float(c.per_load)) for c in columns]
     most_load, most_bent = (max(np.abs(row[i]).max() for row in numbers) for i in (0, 1))
