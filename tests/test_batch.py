@@ -140,7 +140,8 @@ def test_a_batch_that_is_stopped_goes_on_where_it_was(jobs, tmp_path, by):
         assert (told["total"], told["done"], told["failed"], sum(told["verdicts"].values())) == (3, 1, 0, 1)
     first = {p.parent.name for p in out.glob("*/diagnosis.json")}
     assert first == {"table--run0"}
-    assert by == signal.SIGKILL or not list(out.glob(".*"))  # what is killed while it writes leaves the file it wrote to
+    if by == signal.SIGINT:  # what is killed while it writes leaves the file it wrote to
+        assert not list(out.glob(".*"))
     rows = {row.name: row.state for row in run_batch(load_batch(jobs), out, jobs=0)}
     assert rows == {"table--run0": "done before", "table--run1": "done", "table--wrong": "failed"}
 

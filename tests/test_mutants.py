@@ -191,6 +191,7 @@ def test_a_wrong_line_is_caught_where_a_test_fails(tree, text, operator, what):
     assert not copy.root.exists()
 
 
+@pytest.mark.long
 def test_a_mutant_that_hangs_is_ended_at_the_limit(tree):
     (tree / "tests" / "test_small.py").write_text(
         "import time\nfrom ctrlgen.small import LIMIT\n\n\ndef test_waits():\n    time.sleep(600 if LIMIT != 3.0 else 0)\n"

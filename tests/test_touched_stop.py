@@ -72,6 +72,7 @@ def model(fitter: Fitter, gap: float) -> tuple[Fitter, CandidateModel]:
     return weighed, scored(weighed, weighed.fit(replace(begun, finer=2)), STOP)
 
 
+@pytest.mark.long
 def test_a_drive_that_comes_before_its_time_stamps_bends_no_stop():
     """By a hundredth of a sample, 5 us: seven times the noise, where the stage is fast, that no other number takes away."""
     fitter, bent = model(*recorded(early=0.01))
