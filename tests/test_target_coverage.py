@@ -40,7 +40,8 @@ NOT_ENTERED = (
     r"^share = |^if \(drives_admissible",  # the origin of a line search, where the device is, has admissible drives
     r"^for \(i = 0; i < \d+; i\+\+\)",  # a loop behind one of those
     r"is_lost\(state\)|lost == 0|_LOST\)|drive_inside\(",  # drives that no displacement in range brings to a limit
-    r"^if \(hit != 0\)",  # a displacement within the slack of its range, where roundings of a float may change the status
+    r"^if \(hit != 0\)|limit_state\(state, out|state_inside\(out",  # a displacement or state within the slack of its range, where
+    # roundings of a float may change the status; farther out both are beyond, and the displacement is clipped first
     r"is_nan\(|unknown != 0",  # a root that has none: no target of these devices leads to one
     r"bits_of\(&value|bits_of\(&state",  # the same, the order in which axes leave their range, or numbers that were spoilt after it
     r"^if \(offset >= |^if \(segment >= count\)|next <= k",  # a knot between two samples, where pieces place them on samples; the
