@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from typing import Any
 
@@ -10,14 +9,13 @@ import numpy as np
 
 from ctrlgen.recordings.formats import number_cells, time_stamps
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
-from ctrlgen.recordings.formats.unit_texts import unit_of
+from ctrlgen.recordings.formats.unit_texts import bare_name, unit_of
 
 MOST_SIGNALS = 200
 SHARED = 1.5  # rows an instant, from which several signals are read at one time
 CHANGING = (
     0.5  # share of rows whose name is another than the row's before, from which a name is no state of the machine
 )
-TIME_NAME = re.compile(r"t|_?time.*|zeit.*|timestamp.*|date.*|stamp", re.IGNORECASE)
 Column = np.ndarray[Any, Any]
 
 
@@ -79,7 +77,7 @@ def _parts(table: MeasurementTable) -> tuple[str, str, str, str | None] | None:
     signals = len(set(table.columns[names[0]]))
     if not 2 <= signals <= min(MOST_SIGNALS, len(table.columns[names[0]]) // 2):
         return None
-    timed = [name for name in others if TIME_NAME.fullmatch(name)] or [
+    timed = [name for name in others if time_stamps.TIME_NAME.match(bare_name(name))] or [
         name for name in others if _is_stamp(table.columns[name])
     ]
     if len(timed) != 1:

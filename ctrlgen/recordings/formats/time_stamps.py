@@ -18,6 +18,11 @@ EPOCHS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 FILETIME = (1.2e17, 1.7e17)  # hundreds of nanoseconds since 1601: the years 1981 to 2139
 STAMP = re.compile(rf"({DATE})?[T ,;]*({CLOCK})?\s*(Z|UTC|[+-]\d{{2}}:?\d{{2}})?", re.ASCII)
 BASIC = re.compile(r"^(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)(\d\d)", re.ASCII)  # ISO 8601 without marks
+# of a column; _time as InfluxDB writes it
+TIME_NAME = re.compile(
+    r"^_?(t|time|zeit|tijd|temps|tempo|timestamp|time.?stamp|clock|datetime|date|elapsed.*|sekunden|seconds?|secs?)(?![a-z])",
+    re.IGNORECASE,
+)
 PARTS = re.compile(r"(\d{1,4})[-./](\d{1,2})[-./](\d{1,4})", re.ASCII)
 
 

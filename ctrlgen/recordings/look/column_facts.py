@@ -10,14 +10,10 @@ import numpy as np
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import same_dimension, to_si
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
-from ctrlgen.recordings.formats.time_stamps import epoch_unit
+from ctrlgen.recordings.formats.time_stamps import TIME_NAME, epoch_unit
 from ctrlgen.recordings.formats.unit_texts import BASES, NAMES, bare_name, unit_of
 from ctrlgen.recordings.look.answers import NOTHING, Answers
 
-TIME_NAME = re.compile(
-    r"^(t|time|zeit|tijd|temps|tempo|timestamp|time.?stamp|clock|datetime|date|elapsed.*|sekunden|seconds?|secs?)(?![a-z])",
-    re.IGNORECASE,
-)
 SUFFIX = re.compile(r"^(?P<name>.*[A-Za-z0-9)])[_.](?P<unit>[A-Za-z%]{1,4})$")  # of a name: drive_V, time.ms
 GAP = 1.5  # steps between two rows from which rows are missing
 END = 1e-9  # of the range: rounding of a file

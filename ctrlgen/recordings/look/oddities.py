@@ -7,7 +7,8 @@ import numpy as np
 from ctrlgen.core.units import from_si, to_si
 from ctrlgen.model.model import Model
 from ctrlgen.recordings.alike_units import alike
-from ctrlgen.recordings.look.column_facts import TIME_NAME, TableFacts
+from ctrlgen.recordings.formats.time_stamps import TIME_NAME
+from ctrlgen.recordings.look.column_facts import TableFacts
 
 WIDE = 5.0  # times the device's own size: no reading of it is as large
 NARROW = 1e-4  # of it: nothing moved, or the unit is another
