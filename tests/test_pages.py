@@ -17,7 +17,7 @@ from ctrlgen.core.escaping import json_in_html
 from ctrlgen.diagnosis.report.narrative import rest_text
 from ctrlgen.reporting.chart import MOST_NUMBERS, Chart, Curve, Panel, kept_places
 from ctrlgen.reporting.html import coded, render
-from ctrlgen.reporting.numbers import shares_text
+from ctrlgen.reporting.numbers import shares_text, with_deviation
 from ctrlgen.reporting.page_figure import FirstScreen, PageFigure
 from ctrlgen.reporting.plots import STYLE, plt, svg
 
@@ -138,3 +138,9 @@ def test_the_shares_of_findings_and_what_is_left_add_up_as_they_are_printed(shar
     ]
     left = SimpleNamespace(rest=SimpleNamespace(value=1 - sum(shares)))
     assert rest_text(SimpleNamespace(findings=findings, attribution=left)) == rest
+
+
+def test_a_number_ends_with_the_digits_of_its_deviation():
+    assert with_deviation(-1.508241, 0.00612) == "-1.5082 ± 0.0061"
+    assert with_deviation(64291.0, 123.0) == "64291 ± 123"
+    assert with_deviation(0.25, 0.0) == "0.25"

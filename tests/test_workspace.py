@@ -6,11 +6,13 @@ import casadi as ca
 import numpy as np
 import pytest
 from conftest import DEVICES
+from matplotlib.patches import Ellipse
 
 from ctrlgen import InputError, build_model, load_device, simulate
 from ctrlgen.app.scenario_pipeline import map_workspace
 from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.controller.motion_feedforward import controller_of
+from ctrlgen.trajectory.solution_plots import draw_workspace
 from ctrlgen.trajectory.workspace import Workspace
 
 UM = 1e-6
@@ -144,6 +146,17 @@ def test_without_a_third_translation_slices_are_at_the_middle_of_the_drives_and_
     down, up = workspace.reach(middle, np.vstack([-way, way]))
     assert below - middle == pytest.approx(-0.5 * down * way, abs=1e-15)
     assert above - middle == pytest.approx(0.5 * up * way, abs=1e-15)
+
+
+def test_a_ball_is_drawn_where_a_view_has_two_of_its_channels():
+    """The ball of a platform that tips, tilts and lifts is an interval of its one translation: an ellipse would leave the slices."""
+    for name, views in (("tip_tilt_mirror", [0, 0]), ("mems_hexapod", [0, 1])):
+        workspace = Workspace(build_model(load_device(DEVICES / f"{name}.toml")))
+        figure = draw_workspace(
+            workspace, workspace.bases(), workspace.ball(workspace.bases()[1], workspace.translations)
+        )
+        assert [sum(isinstance(p, Ellipse) for p in panel.patches) for panel in figure.axes] == views
+        assert not any("e-" in text.get_text() for panel in figure.axes for text in panel.get_legend().get_texts())
 
 
 def test_an_axis_alone_has_a_range_whose_ends_name_their_limits(tmp_path):

@@ -136,6 +136,8 @@ def print_build(build: Build) -> None:
 
 def print_workspace(summary: WorkspaceSummary) -> None:
     """The range of every channel at some poses and anywhere, the largest balls, and the typical sizes they are given in."""
+    from ctrlgen.trajectory.workspace import ROUNDING
+
     signal_ = summary.workspace.model.signals["pose"]
     named = list(enumerate(zip(signal_.channels, signal_.units, strict=True)))
 
@@ -145,7 +147,7 @@ def print_workspace(summary: WorkspaceSummary) -> None:
 
     table = table_of(("from", "left"), *((place(base), "right") for base in summary.bases), ("anywhere", "right"))
     for i, (channel, unit) in named:
-        rounding = 1e-9 * signal_.scale[i]
+        rounding = ROUNDING * signal_.scale[i]
         ends = ([v if abs(v) > rounding else 0.0 for v in r[i]] for r in (*summary.ranges, summary.extent))
         table.add_row(
             escape(f"{channel} [{unit}]"), *(" ... ".join(f"{from_si(v, unit):.4g}" for v in e) for e in ends)
@@ -153,7 +155,8 @@ def print_workspace(summary: WorkspaceSummary) -> None:
     show_table(table)
     for i, (channel, _) in named:
         low, high = summary.bound_by[i]
-        out.print(f"{channel} ends by {low}, and upward by {high}", markup=False, soft_wrap=True)
+        limits = low if low == high else f"{low} downward and {high} upward"
+        out.print(f"{channel} is limited by {limits}", markup=False, soft_wrap=True)
     if summary.area is not None:
         out.print(summary.shown_area, markup=False)
     for what, ball in summary.balls:

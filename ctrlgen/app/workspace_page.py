@@ -11,12 +11,12 @@ from ctrlgen.core.units import from_si
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.page_figure import FirstScreen, PageFigure
 from ctrlgen.reporting.result_file import origin
+from ctrlgen.trajectory.workspace import ROUNDING
 
 NOTHING = 1e-3  # of a channel's typical size: a coordinate that is not told
-ROUNDING = 1e-9  # of it: an end that is zero
 CAPTION = (
-    "Left slices at the poses that are named, right, where there is a third translation, the side view through the middle of the largest "
-    "ball; its outline in orange. Every pose inside keeps all limits."
+    "Left slices at the poses that are named, right, where a third channel is drawn, the side view through the middle of the largest "
+    "ball; its outline in orange, where both channels of a view are its own. Every pose inside a slice keeps all limits."
 )
 
 

@@ -13,6 +13,7 @@ from ctrlgen.core.files import write_text
 from ctrlgen.core.units import from_si
 from ctrlgen.recordings.pose_errors import CHANNELS
 from ctrlgen.reporting.html import render
+from ctrlgen.reporting.numbers import with_deviation
 from ctrlgen.reporting.page_figure import FirstScreen, PageFigure
 from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
 from ctrlgen.reporting.result_file import json_text
@@ -42,6 +43,7 @@ def write_jacobian(out: Path, found: MeasuredJacobian) -> None:
         r=record,
         drives=names,
         channels=CHANNELS,
+        entries=[list(map(with_deviation, *rows)) for rows in zip(found.jacobian, found.sd, strict=True)],
         per_drive=PER_DRIVE,
         first=_first_screen(found, PageFigure(figure, "Norm of the error of every pose", CAPTION)),
         title=found.device.title,
@@ -73,13 +75,12 @@ def draw_errors(found: MeasuredJacobian) -> Figure:
     figure, panels = plt.subplots(1, 2, figsize=(8.2, 3.4))
     pose = 1 + np.arange(len(found.held_out))
     for axes, (part, unit) in zip(panels, PARTS, strict=True):
-        for errors, colour, label in (
-            (found.before, COLOURS[2], "as described"),
-            (found.after, COLOURS[0], "calibrated"),
+        for errors, colour, line, label in (
+            (found.before, COLOURS[2], "s--", "as described"),
+            (found.after, COLOURS[0], "o-", "calibrated"),
         ):
-            axes.semilogy(
-                pose, np.asarray(from_si(getattr(errors, part), unit)), "o-", ms=3, lw=0.8, color=colour, label=label
-            )
+            size = np.asarray(from_si(getattr(errors, part), unit))
+            axes.semilogy(pose, size, line, ms=3, lw=0.8, color=colour, label=label)
         for at in pose[found.held_out]:
             axes.axvspan(at - 0.5, at + 0.5, color="#000000", alpha=0.05, lw=0)
         axes.set_xlabel("pose")

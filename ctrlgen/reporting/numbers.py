@@ -16,6 +16,14 @@ def number(value: float, digits: int = 4) -> str:
     return f"{float(exact):.0f}" if "e" in exact else exact
 
 
+def with_deviation(value: float, sd: float) -> str:
+    """A number with its standard deviation to two digits, both to the same decimal (GUM 7.2.6): '-1.5082 ± 0.0061'."""
+    if not (math.isfinite(value) and math.isfinite(sd) and sd > 0):
+        return number(value)
+    decimals = max(0, 1 - math.floor(math.log10(sd)))
+    return f"{value:.{decimals}f} ± {sd:.{decimals}f}"
+
+
 def shares_text(shares: Sequence[float], decimals: int = 1) -> list[str]:
     """Shares as '12.3 %', rounded so that what is printed adds up to their sum as printed: 100 % where they are those of a whole.
 

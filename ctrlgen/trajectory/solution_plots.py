@@ -15,7 +15,7 @@ from ctrlgen.reporting.plots import COLOURS, PATTERNS, STYLE, svg
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE
 from ctrlgen.trajectory.metrics import force_parts
 from ctrlgen.trajectory.solution import Solution
-from ctrlgen.trajectory.workspace import Ball, Workspace
+from ctrlgen.trajectory.workspace import ROUNDING, Ball, Workspace
 
 
 def draw_solution(solution: Solution) -> dict[str, str]:
@@ -165,16 +165,15 @@ def draw_workspace(workspace: Workspace, bases: list[np.ndarray], ball: Ball) ->
     figure, panels = plt.subplots(1, 1 + len(third), figsize=(8.6, 4.2) if third else (4.8, 4.2), squeeze=False)
     for base, colour in zip(bases, COLOURS[::2], strict=False):
         k = third[0] if third else x  # the channel that tells the slices apart
-        label = f"{signal.channels[k]} = {from_si(base[k], signal.units[k]):.4g} {signal.units[k]}"
+        at = base[k] if abs(base[k]) > ROUNDING * signal.scale[k] else 0.0
+        label = f"{signal.channels[k]} = {from_si(at, signal.units[k]):.4g} {signal.units[k]}"
         _fill(panels[0][0], workspace, base, x, y, colour, label)
     for up in third:
         _fill(panels[0][1], workspace, ball.centre, x, up, COLOURS[0], "through the ball's centre")
-    across, up = (x, third[0]) if third and third[0] in ball.channels else (x, y)
-    panel = panels[0][1] if up in third else panels[0][0]
-    centre = [from_si(ball.centre[i], signal.units[i]) for i in (across, up)]
-    radius = [from_si(ball.radius * signal.scale[i], signal.units[i]) for i in (across, up)]
-    panel.add_patch(Ellipse((centre[0], centre[1]), 2 * radius[0], 2 * radius[1], fill=False, color=COLOURS[2], lw=1.5))
-    panel.plot([], [], color=COLOURS[2], label=f"largest ball, radius {radius[0]:.3g} {signal.units[across]}")
+    for panel, up in reversed(list(zip(panels[0], (y, *third), strict=True))):
+        if x in ball.channels and up in ball.channels:
+            _outline_ball(panel, workspace, ball, x, up)
+            break
     for panel, vertical in zip(panels[0], (y, *third), strict=True):
         if signal.units[x] == signal.units[vertical]:
             panel.set_aspect("equal", adjustable="datalim")
@@ -182,6 +181,15 @@ def draw_workspace(workspace: Workspace, bases: list[np.ndarray], ball: Ball) ->
         panel.set_ylabel(f"{signal.channels[vertical]} [{signal.units[vertical]}]")
         panel.legend(fontsize=8, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     return figure
+
+
+def _outline_ball(panel: Axes, workspace: Workspace, ball: Ball, x: int, y: int) -> None:
+    """The ball in two of its channels: an ellipse, as each radius is in the typical size of its channel."""
+    signal = workspace.model.signals["pose"]
+    centre = [from_si(ball.centre[i], signal.units[i]) for i in (x, y)]
+    radius = [from_si(ball.radius * signal.scale[i], signal.units[i]) for i in (x, y)]
+    panel.add_patch(Ellipse((centre[0], centre[1]), 2 * radius[0], 2 * radius[1], fill=False, color=COLOURS[2], lw=1.5))
+    panel.plot([], [], color=COLOURS[2], label=f"largest ball, radius {radius[0]:.3g} {signal.units[x]}")
 
 
 def _draw_range(workspace: Workspace, base: np.ndarray) -> Figure:

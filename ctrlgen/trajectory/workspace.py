@@ -20,6 +20,7 @@ from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import simulate
 
 BISECTIONS = 60  # beyond double precision of the first step
+ROUNDING = 1e-9  # of a channel's typical size: what is left of a zero
 BALL_TOLERANCE = 1e-6  # of a ball's radius: how far its worst point may stick out
 END_TOLERANCE = 1e-4  # of the distance to an end of the workspace: how far it may be off
 HEIGHTS = (10e-6, 20e-6, 30e-6)  # m, of the slices of a platform with three translations
