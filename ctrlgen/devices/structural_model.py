@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 import scipy.linalg
@@ -67,19 +66,14 @@ class StructuralModel:
 
     def response(self, force: np.ndarray, step: float, held: bool) -> np.ndarray:
         """(k, channels) pose under the forces (k, n), `step` [s] apart, which are `held` or linear between, from rest under the first."""
+        from scipy.signal import lsim  # takes long to import
+
         k, n = len(self.mass), self.axes
         inverse = np.linalg.inv(self.mass)
         A = np.block([[np.zeros((k, k)), np.eye(k)], [-inverse @ self.stiffness, -inverse @ self.damping]])
         B = np.vstack([np.zeros((k, n)), inverse[:, :n]])
-        size = 2 * k + 2 * n
-        whole = np.zeros((size, size))
-        whole[: 2 * k, : 2 * k + n] = np.hstack([A, B])
-        whole[2 * k : 2 * k + n, 2 * k + n :] = np.eye(n) / step
-        moved = scipy.linalg.expm(whole * step)
-        Phi, now, slope = moved[: 2 * k, : 2 * k], moved[: 2 * k, 2 * k : 2 * k + n], moved[: 2 * k, 2 * k + n :]
+        C = np.hstack([self.output, np.zeros_like(self.output)])
         x = np.concatenate([np.linalg.solve(self.stiffness, np.eye(k)[:, :n] @ force[0]), np.zeros(k)])
-        poses = [self.output @ x[:k]]
-        for before, after in pairwise(force):
-            x = Phi @ x + now @ before + (0 if held else slope @ (after - before))
-            poses.append(self.output @ x[:k])
-        return np.array(poses)
+        time = step * np.arange(len(force))
+        system = (A, B, C, np.zeros((len(C), n)))
+        return np.reshape(lsim(system, force, time, x, interp=not held)[1], (len(force), len(C)))
