@@ -225,9 +225,6 @@ def test_the_slit_axis_repeats_an_error_four_times_a_millimetre(name):
     assert found.verdict == "ambiguous" and "vibration" in {a.effect for a in first.alternatives}
 
 
-@pytest.mark.xfail(
-    reason="a fault since the search ends trials early: the lateness is not found, 22 % of the error is left"
-)
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["recording"])
 def test_the_piezo_stack_has_hysteresis_and_comes_late(name):

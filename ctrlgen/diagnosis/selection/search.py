@@ -163,8 +163,6 @@ class Searcher:
             rounds.append(self._round(screened, candidates, current, best))
             if not better:
                 return current
-            # what came in a set and is not needed in it need not be swapped
-            best = without_needless(trials, best)
             kept = sum(c in current.causes for c in best.causes)
             current = without_needless(trials, swapped(trials, best, kept))
             same = next((v for v in visited if frozenset(v.causes) == frozenset(current.causes)), None)
