@@ -52,6 +52,13 @@ class Frame:
         f, _, loads = self.forces(q)
         return f[driven] - load[driven], q, loads
 
+    def stiffness(self, driven: int, load) -> float:
+        """Change of the force [N/m] that holds the number `driven` at home under a `load` (3 n,), the others free."""
+        _, q, _ = self.moved(driven, 0.0, load, steps=1)
+        _, K, _ = self.forces(q)
+        rest = np.setdiff1d(self.free, [driven])
+        return K[driven, driven] - K[driven, rest] @ np.linalg.solve(K[np.ix_(rest, rest)], K[rest, driven])
+
 
 def line(start, end, parts: int):
     """The nodes of a straight piece, both ends among them."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
-from held_blades import EI, E, L, T, W
-from mechanism_files import HEAD, PARALLELOGRAM, REST, dm, loaded, with_values
+from held_blades import EI, E, L, T, W, frame_of
+from mechanism_files import HEAD, PARALLELOGRAM, REST, blade, dm, loaded, with_values
 
 from ctrlgen import InputError, build_model, run
 from ctrlgen.devices.mechanism.condensed import Condensed
@@ -57,6 +57,34 @@ def test_a_load_along_the_blades_softens_or_stiffens_a_parallelogram(tmp_path, P
     for text in (PARALLELOGRAM + load(f'force = ["0 N", "{-P} N", "0 N"]'), hung):
         _, slope = law(loaded(tmp_path, text))
         assert slope == pytest.approx(K - 6 * P / (5 * L), rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    "force, at, along, pushed",
+    [
+        ((0.03, 0.0), (-10e-3, 5e-3), ("[0, 1, 0]",), (0, 0)),
+        ((0.0, -0.05), (4e-3, 0.0), ("[0, 1, 0]",), (0, 0)),
+        ((0.02, -0.05), (4e-3, 8e-3), ("[0.2, 1, 0]",), (15, 5)),
+        ((0.3, -0.5), (4e-3, 6e-3), ("[0.2, 1, 0]", "[-0.4, 1, 0]"), (0, -10)),
+    ],
+)
+def test_the_stiffness_of_a_load_is_that_of_corotational_beams(tmp_path, force, at, along, pushed):
+    """Half the difference of the slopes under a load and its opposite, which is of first order in it: on a single blade, which the load
+    turns while the axis is held, and on leaning blades that are not alike."""
+    text = PARALLELOGRAM.replace('at = ["0 mm", "-10 mm"', f'at = ["{pushed[0]} mm", "{pushed[1]} mm"')
+    for k, (name, x) in enumerate((("left", -10), ("right", 10))):
+        turned = blade(name, x).replace("[0, 1, 0]", along[k]) if k < len(along) else ""
+        text = text.replace(blade(name, x), turned)
+    place = f'["{at[0]} m", "{at[1]} m", "0 m"]'
+    slopes = [
+        law(loaded(tmp_path, text + load(f'force = ["{s * force[0]} N", "{s * force[1]} N", "0 N"]', place)))[1]
+        for s in (1, -1)
+    ]
+    frame, (push, on) = frame_of(Condensed(*with_values(loaded(tmp_path, text))), 1e-3 * np.array(pushed), at)
+    q = np.zeros(3 * len(frame.X))
+    q[on : on + 2] = force
+    exact = frame.stiffness(push, q) - frame.stiffness(push, -q)
+    assert slopes[0] - slopes[1] == pytest.approx(exact, rel=5e-3)  # of beams a twenty-fourth of a blade long
 
 
 def test_a_weight_on_a_pivot_tips_it(tmp_path):

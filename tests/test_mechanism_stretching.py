@@ -3,37 +3,19 @@
 from __future__ import annotations
 
 import casadi as ca
-import numpy as np
 import pytest
 from command_line import ctrlgen as run_command
-from corotational_frame import Frame, line
-from held_blades import EA, EI, STIFFENS, E, L, T, W, held, stretched
+from held_blades import EI, PARTS, STIFFENS, E, L, T, W, frame_of, held, stretched
 from mechanism_files import dm, loaded, with_values
 
 from ctrlgen import build_model, load_scenario, solve
 from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.devices.mechanism.linear_range import linear_ranges
 
-PARTS = 24  # beams a blade: its force at two thicknesses is off by two thousandths
-
 
 def pushed_at(y: float) -> str:
     """The stage between two blades in line, pushed `y` [mm] beside the middle, where it turns too."""
     return held().replace('at = ["0 mm", "0 mm", "0 mm"]\nalong', f'at = ["0 mm", "{y} mm", "0 mm"]\nalong')
-
-
-def frame_of(c: Condensed, y: float) -> tuple[Frame, int]:
-    """The same as beams, and the number of the displacement that is pushed."""
-    nodes, beams, fixed, push = [], [], [], None
-    for k in range(2):
-        end, axis = dm(c.ends[k]).ravel()[:2], dm(c.frames[k])[:2, 0]
-        start = len(nodes)
-        nodes += line(end - L * axis, end, PARTS)
-        beams += [(start + j, start + j + 1, EA, EI) for j in range(PARTS)]
-        fixed += [3 * start + x for x in range(3)]
-    nodes.append(np.array([0, y]))
-    push = len(nodes) - 1
-    return Frame(nodes, beams + [(end, push, 1e4 * EA, 1e6 * EI) for end in (PARTS, 2 * PARTS + 1)], fixed), 3 * push
 
 
 def stress_of(loads) -> float:
@@ -47,7 +29,7 @@ def test_force_and_stress_of_held_blades_are_those_of_corotational_beams(tmp_pat
         device = loaded(tmp_path, pushed_at(beside))
         model, c = build_model(device), Condensed(*with_values(device))
         stress = next(limit.expr for limit in model.limits if limit.name.startswith("stress_"))
-        d, (frame, push) = ca.SX.sym("d", 1), frame_of(c, beside * 1e-3)
+        d, (frame, (push,)) = ca.SX.sym("d", 1), frame_of(c, (0, beside * 1e-3))
         law = ca.Function("law", [d], [device.physics(device.values()).restoring_force(d)])
         stresses = ca.Function("stress", [model.z], [stress])
         for share in (0.25, 1.0, 2.0):
