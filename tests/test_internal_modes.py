@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 from ctrlgen import build_model, load_scenario, solve
 from ctrlgen.app.commands.devices import bode
 from ctrlgen.controller.bode import frequency_response
+from ctrlgen.devices.structural_model import StructuralModel
 
 M1, M2, K1, K2, ZETA = 0.2, 0.1, 2e4, 3e4, 0.01  # kg, N/m
 
@@ -95,3 +96,12 @@ def test_what_internal_modes_leave_along_a_path_is_that_of_two_masses(tmp_path):
         off[n : n + 52].max(), rel=1e-2
     )
     assert "first mode of the bodies is 39.44" in solution.left_out[0]
+
+
+def test_held_and_linear_forces_are_told_apart():
+    """An oscillator without damping under a force that is 0, then 1: x(h) = 0 where it is held, (1 - sin(w h)/(w h))/k where linear."""
+    w, h = 2 * np.pi * 100, 2e-3
+    oscillator = StructuralModel(np.eye(1), np.eye(1) * w**2, np.ones((1, 1)), 1, 0.0)
+    force = np.array([[0.0], [1.0]])
+    assert oscillator.response(force, h, held=True)[:, 0] == pytest.approx([0, 0], abs=1e-15)
+    assert oscillator.response(force, h, held=False)[1, 0] == pytest.approx((1 - np.sin(w * h) / (w * h)) / w**2)
