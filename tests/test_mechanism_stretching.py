@@ -39,6 +39,29 @@ def test_force_and_stress_of_held_blades_are_those_of_corotational_beams(tmp_pat
         assert force > 2 * dm(c.stiffness)[0, 0] * share * T
 
 
+def test_round_wires_take_the_same_in_both_planes(tmp_path):
+    """Force and stress of a stage between two wires in line, pushed beside its middle across them: along x, and along z."""
+    found = []
+    for way in ([1, 0, 0], [0, 0, 1]):
+        text = (
+            pushed_at(5.0)
+            .replace('at = ["0 mm", ', 'at = ["-10 mm", ')
+            .replace('kind = "blade"', 'kind = "wire"')
+            .replace('width = "8 mm"\n', "")
+        )
+        text = text.replace('thickness = "0.2 mm"', 'diameter = "0.5 mm"').replace("across = [-1, 0, 0]\n", "")
+        text = text.replace("along = [1, 0, 0]", f"along = {way}").replace(
+            "delta_x", "delta_x" if way[0] else "delta_z"
+        )
+        device = loaded(tmp_path, text)
+        model, d = build_model(device), ca.SX.sym("d", 1)
+        law = ca.Function("law", [d], [device.physics(device.values()).restoring_force(d)])
+        stress = next(limit.expr for limit in model.limits if limit.name.startswith("stress_"))
+        whole = ca.Function("stress", [model.z], [stress])(300e-6).full()
+        found.append((float(law(300e-6)), whole.max()))
+    assert found[0] == pytest.approx(found[1], rel=1e-6)  # a few roundings of numbers that cancel
+
+
 def test_the_range_of_the_linear_force_is_that_of_the_known_cubic(tmp_path):
     """(18/25) EA y^3/l^3 over 12 EI y/l^3 is 0.72 (y/t)^2."""
     device = loaded(tmp_path, held().replace(STIFFENS, ""))
