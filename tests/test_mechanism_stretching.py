@@ -43,22 +43,22 @@ def test_round_wires_take_the_same_in_both_planes(tmp_path):
     """Force and stress of a stage between two wires in line, pushed beside its middle across them: along x, and along z."""
     found = []
     for way in ([1, 0, 0], [0, 0, 1]):
-        text = (
-            pushed_at(5.0)
-            .replace('at = ["0 mm", ', 'at = ["-10 mm", ')
-            .replace('kind = "blade"', 'kind = "wire"')
-            .replace('width = "8 mm"\n', "")
-        )
-        text = text.replace('thickness = "0.2 mm"', 'diameter = "0.5 mm"').replace("across = [-1, 0, 0]\n", "")
-        text = text.replace("along = [1, 0, 0]", f"along = {way}").replace(
-            "delta_x", "delta_x" if way[0] else "delta_z"
-        )
+        text = pushed_at(5.0)
+        for old, new in (
+            ('at = ["0 mm", ', 'at = ["-10 mm", '),
+            ('kind = "blade"', 'kind = "wire"'),
+            ('thickness = "0.2 mm"\nwidth = "8 mm"\n', 'diameter = "0.5 mm"\n'),
+            ("across = [-1, 0, 0]\n", ""),
+            ("along = [1, 0, 0]", f"along = {way}"),
+            ("delta_x", "delta_x" if way[0] else "delta_z"),
+        ):
+            text = text.replace(old, new)
         device = loaded(tmp_path, text)
         model, d = build_model(device), ca.SX.sym("d", 1)
         law = ca.Function("law", [d], [device.physics(device.values()).restoring_force(d)])
         stress = next(limit.expr for limit in model.limits if limit.name.startswith("stress_"))
         whole = ca.Function("stress", [model.z], [stress])(300e-6).full()
-        found.append((float(law(300e-6)), whole.max()))
+        found.append((float(law(300e-6)), *sorted(whole.ravel())))
     assert found[0] == pytest.approx(found[1], rel=1e-6)  # a few roundings of numbers that cancel
 
 
