@@ -54,6 +54,7 @@ def test_each_recording_gets_its_folder_and_its_line(jobs, tmp_path):
     assert [row.state for row in rows] == ["done", "done", "failed"]
     table = table_of(out)
     assert list(table) == [f"table--{name}" for name in ("run0", "run1", "wrong")]
+    assert not table["table--run1"]["warning"]
     assert table["table--run1"]["verdict"] == "consistent" and table["table--run1"]["findings"] == ""
     assert table["table--run0"]["findings"] and float(table["table--run0"]["before"]) > 0.01
     assert "row" in table["table--wrong"]["error"] and not (out / "table--wrong").exists()
@@ -231,3 +232,11 @@ def test_residuals_are_drawn_in_whole_blocks(rng):
     drawn = redrawn(record, np.zeros((n, 1)), 40, rng)
     assert drawn.shape == (n, 1) and np.all(np.isfinite(drawn))
     assert np.abs(np.diff(drawn[:40, 0])).max() < 0.5 * np.ptp(e)
+
+
+@pytest.mark.long
+def test_a_unit_that_cannot_be_right_is_told_in_the_line_of_its_recording(jobs, tmp_path):
+    file = tmp_path / "runs" / "run1" / "recording.toml"
+    file.write_text(file.read_text().replace('column = "y", unit = "deg"', 'column = "y", unit = "rad"'))
+    rows = run_batch(load_batch(jobs)[1:2], tmp_path / "out", jobs=0)
+    assert 'write unit = "deg"' in rows[0].warning and 'write unit = "deg"' in str(table_of(tmp_path / "out"))

@@ -62,6 +62,7 @@ def test_the_page_says_what_stands_out_and_what_failed(tmp_path):
         (tmp_path / row.name).mkdir()
         (tmp_path / row.name / "diagnosis.json").write_text(json.dumps({"held_out": error, "findings": [finding]}))
     rows.append(BatchRow("a--bad", "failed", error="row 3 <b>"))
+    rows[3] = replace(rows[3], warning="write unit = um")
     text = batch_page(rows, tmp_path, "jobs")
     assert (
         "Of 13 recordings 1 stands out" in text
@@ -69,6 +70,7 @@ def test_the_page_says_what_stands_out_and_what_failed(tmp_path):
         and "1 failed" in text
         and "row 3 &lt;b&gt;" in text
     )
+    assert "Correct the recording of a--3: write unit = um." in text
     assert 'href="a--5/report.html"' in text and "error of axis 102.2 nm" in text
     (tmp_path / "a--1" / "diagnosis.json").write_text("[" * 99_999)
     assert "Of 13 recordings" in batch_page(rows, tmp_path, "jobs")

@@ -93,6 +93,7 @@ def test_an_actuator_that_answers_otherwise_is_named_once_a_second_run_shows_it(
         ({"rate": 200.2}, "the path runs at 200 Hz"),  # a fifth of a sample off at the end
         ({"length_unit": "um"}, "moves by 1e-06 of what is commanded"),
         ({"length_unit": "km"}, "check the column, its unit"),
+        ({"length_unit": "km"}, 'if its numbers are in m, write unit = "m"'),
         ({"drive_unit": "mW"}, "have other units"),
         ({"record": "rows = [0, 150]"}, "less than one run"),
         ({"record": "rows = [50, 450]"}, "begins 50 samples after"),

@@ -191,6 +191,10 @@ def test_check_and_look_tell_it(written, capsys):
     (folder / "recording.toml").write_text(restated(text, "reading.axis", "mm"))
     check(folder / "recording.toml", DEVICES / LOGS["axis"].file)
     assert 'if its numbers are in um, write unit = "um"' in capsys.readouterr().out
+    posed = restated(text, "reading.axis", "mm").replace(
+        '"reading.axis"', '"pose.axis"'
+    )  # as runs that are learnt from state it
+    assert len([s for s in said_of(posed, folder, model) if 'write unit = "um"' in s]) == 1
     rows = (folder / "log.csv").read_text().splitlines()[1:]
     lines = "\n".join(f"{k / 1000},{row}" for k, row in enumerate(rows))
     (folder / "named.csv").write_text("time [s],drive [V],position [mm]\n" + lines + "\n")

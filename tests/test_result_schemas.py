@@ -33,6 +33,7 @@ RECORD = {
     **origin({"device.toml": "0" * 64}, 7, ("a note",)),
     "verdict": "consistent",
     "sentence": "Consistent.",
+    "implausible": [],
     "findings": [],
     "shares": None,
     "empirical_terms": [],

@@ -17,7 +17,7 @@ import json
 import re
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -252,9 +252,10 @@ def _row(name: str, state: str, content: bytes) -> BatchRow:
         return (e["rms_before"] or 0.0) / (e["noise_floor"] or e["rms_after"] or 1.0)
 
     channel, e = max(record["held_out"].items(), key=size)
-    return BatchRow(
+    row = BatchRow(
         name, state, record["verdict"], causes, channel, e["rms_before"], e["rms_after"], e["noise_floor"], e["unit"]
     )
+    return replace(row, warning="; ".join(record["implausible"]))
 
 
 def _one_line(text: str) -> str:

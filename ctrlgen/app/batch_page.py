@@ -164,6 +164,7 @@ def _first_screen(
     causes = Counter(cause for row in rows for cause in row.findings.split("; ") if cause)
     numbers += [(cause, f"in {k}") for cause, k in causes.most_common(3)]
     steps = [f"Read why {_named(failed)} failed, in the table of recordings."] if failed else []
+    steps += [f"Correct the recording of {row.name}: {row.warning}." for row in rows if row.warning][:NAMED]
     steps += [f"Look at {name}: {', '.join(what)} (`{name}/report.html`)." for name, what in unusual[:2]]
     steps += [f"Diagnose {_named(far)} first: error over noise is far from that of the other machines."] if far else []
     steps += [

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 class BatchRow:
     """One line of the table: `state` is "done", "done before" or "failed", and then `error` says why.
 
+    `warning`: what of its recording is not plausible beside its device, such as a unit.
     `before`, `after`, `noise`: held-out error [`unit`] of the `channel` whose error is largest beside its noise.
     """
 
@@ -22,3 +23,4 @@ class BatchRow:
     noise: float | None = None
     unit: str = ""
     error: str = ""
+    warning: str = ""

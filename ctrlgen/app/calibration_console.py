@@ -66,3 +66,5 @@ def print_jacobian(found: MeasuredJacobian) -> None:
         cells = [f"{v:.4g} {e.unit}" for v in (e.mean_before, e.mean_after, e.max_after)]
         table.add_row(f"{e.part}, {e.poses}", *cells)
     show_table(table)
+    for note in found.recording.notes:
+        out.print(note, markup=False, soft_wrap=True, style="yellow")

@@ -109,5 +109,7 @@ def print_batch(rows: Sequence[BatchRow]) -> None:
     for row in rows:
         if row.error:
             out.print(f"{row.name}: {row.error}", style="red", markup=False, soft_wrap=True)
+        if row.warning:
+            out.print(f"{row.name}: {row.warning}", style="yellow", markup=False, soft_wrap=True)
     made, kept, failed = (sum(row.state == state for row in rows) for state in ("done", "done before", "failed"))
     out.print(f"{made} diagnosed, {kept} there already, {failed} failed")

@@ -36,6 +36,7 @@ from ctrlgen.estimation.simulator import compiled_simulator
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.model.assembly import build_model, movable, symbolic_model
 from ctrlgen.model.discretisation import settling_time
+from ctrlgen.recordings.plausibility import suspected, with_plausibility
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recording import Recording
 from ctrlgen.trajectory.scenario import Input
@@ -166,7 +167,8 @@ def calibrate(
         raise InputError(device, [Fault("run_time", what)])
     progress("reading")
     paths = [recordings] if isinstance(recordings, (str, Path)) else list(recordings)
-    recording = load_recordings(paths, build_model(described))
+    model = build_model(described)
+    recording = with_plausibility(load_recordings(paths, model), model)
     inputs = {
         name: Input(path, read_text(path))
         for name, path in zip(("device", "device_code"), files_of(Path(device)), strict=False)
@@ -270,7 +272,7 @@ def _told(
     why = {c.path: Determination.BOUNDS_ALONE if c in chosen else Determination.IDLE for c in device.given_at_start}
     faults = [Fault(f"run_time.constants {path}", reason.value) for path, reason in why.items()]
     what = "determines none of the constants: record a motion that depends on them"
-    raise InputError(fitter.recording.title, [Fault("recording", what), *faults])
+    raise InputError(fitter.recording.title, [Fault("recording", what), *faults, *suspected(fitter.recording.notes)])
 
 
 def _covariance_within_bounds(
@@ -293,7 +295,7 @@ def _check_readings(fitter: Fitter, fit: Fit, errors: Sequence[ReadingError]) ->
     off = [(e, e.after / s) for e, s in zip(errors, size, strict=True) if e.after > FAR_READING * s > 0]
     what = "times as far from the model as the model moves; check its column, unit, sign and origin"
     if faults := [Fault(e.channel, f"is {ratio:.2g} {what}") for e, ratio in off]:
-        raise InputError(fitter.recording.title, faults)
+        raise InputError(fitter.recording.title, [*faults, *suspected(fitter.recording.notes)])
 
 
 def _errors(fitter: Fitter, before: Fit, after: Fit) -> tuple[ReadingError, ...]:

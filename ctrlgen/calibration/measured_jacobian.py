@@ -29,6 +29,7 @@ from ctrlgen.estimation.structure import Structure
 from ctrlgen.model.assembly import build_model
 from ctrlgen.physics.screw import adjoint, rotation_vector
 from ctrlgen.recordings.calibration import calibrate_jacobian
+from ctrlgen.recordings.plausibility import with_plausibility
 from ctrlgen.recordings.pose_errors import CHANNELS, PoseErrors
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recording import Record, Recording
@@ -88,7 +89,8 @@ def calibrate_poses(
     Raises InputError for recordings that are no poses of six components, or poses that leave a combination of drives unmoved.
     """
     described = load_device(device)
-    recording = load_recordings(list(recordings), build_model(described))
+    model = build_model(described)
+    recording = with_plausibility(load_recordings(list(recordings), model), model)
     wanted = tuple(f"reading.{channel}" for channel in CHANNELS)
     if recording.kind != "poses" or tuple(recording.channels) != wanted:
         what = f'must be settled poses (kind = "poses") of {", ".join(CHANNELS)}; a Jacobian is calibrated from these'

@@ -15,6 +15,7 @@ import numpy as np
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import show
 from ctrlgen.learning.lifted import Lifted
+from ctrlgen.recordings.plausibility import suspected, with_plausibility
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recording import Record, Recording
 from ctrlgen.recordings.validation import MissingSamples
@@ -60,7 +61,7 @@ class Runs:
 
 def load_runs(paths: Sequence[Path | str], lifted: Lifted) -> Runs:
     """The runs in the recordings at `paths`, each a recording.toml or its folder, in this order. Raises InputError with every fault."""
-    recording = load_recordings(paths, lifted.model, hold_out=False)
+    recording = with_plausibility(load_recordings(paths, lifted.model, hold_out=False), lifted.model)
     source = str(paths[0]) if len(paths) == 1 else "recordings"
     records = [record for record in recording.records if record.role != "rest"]
     places, faults = _places(recording, lifted), list[Fault]()
@@ -236,7 +237,7 @@ def check_belongs(runs: Runs, lifted: Lifted, source: str) -> None:
                 what = f"its {channel} moves by {moves:.2g} of what is commanded; check the column, its unit, and that the stage is driven"
                 faults.append(Fault(run.name, what))
     if faults:
-        raise InputError(source, faults)
+        raise InputError(source, [*faults, *suspected(runs.notes)])
 
 
 def _rms(values: np.ndarray) -> float:

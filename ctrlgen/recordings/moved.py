@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import casadi as ca
 import numpy as np
 
 from ctrlgen.model.assembly import build_model
@@ -41,14 +42,9 @@ class Moved:
     def system(self) -> LinearSystem:
         """The device without its effects, about the mean of the drives within its bounds."""
         bare = build_model(self.model.device.model_copy(update={"effect": ()}))
-        rows = [self._place(name, bare) for name, _ in self.readings]
-        outputs = bare.signals["reading"].expr[rows] if rows else bare.signals["reading"].expr[:0]
+        outputs = ca.vertcat(*(bare.signals[role].expr[k] for role, k in (_place(n, bare) for n, _ in self.readings)))
         u = np.clip(np.mean([s.u.mean(axis=0) for s in self.stretches], axis=0), *bare.u_bounds)
         return linear_system(bare, outputs, bare.rest, np.zeros(bare.z.numel()), u)
-
-    @staticmethod
-    def _place(name: str, model: Model) -> int:
-        return model.signals["reading"].channels.index(name.partition(".")[2])
 
     @cached_property
     def sizes(self) -> np.ndarray:
@@ -59,8 +55,8 @@ class Moved:
     @cached_property
     def scales(self) -> np.ndarray:
         """(n_y,) [SI] the typical size of each reading."""
-        scale = self.model.signals["reading"].scale
-        return np.array([scale[self._place(name, self.model)] for name, _ in self.readings])
+        places = (_place(name, self.model) for name, _ in self.readings)
+        return np.array([self.model.signals[role].scale[k] for role, k in places])
 
     def spans(self) -> np.ndarray:
         """(n_u,) [SI] what each drive was seen to span."""
@@ -71,10 +67,16 @@ class Moved:
         return replace(self, stretches=tuple(replace(s, step=factor * s.step) for s in self.stretches))
 
 
+def _place(name: str, model: Model) -> tuple[str, int]:
+    """The signal of a reading named "role.channel", and its place in it."""
+    role, _, channel = name.partition(".")
+    return role, model.signals[role].channels.index(channel)
+
+
 def moved(recording: Recording, model: Model) -> Moved | None:
     """The drives and readings of a recording; None where nothing of it can be held beside the model."""
     drives = tuple(zip(recording.drives, recording.drive_units, strict=False))
-    places = [i for i, name in enumerate(recording.channels) if name.startswith("reading.")]
+    places = [i for i, name in enumerate(recording.channels) if name.partition(".")[0] in ("reading", "pose")]
     readings = tuple((recording.channels[i], recording.units[i]) for i in places)
     stretches = [
         Stretch(r.drive, np.where(r.valid, r.observed, np.nan)[:, places], r.sample_time, r.linear)

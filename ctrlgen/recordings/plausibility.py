@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from ctrlgen.core.errors import Fault
 from ctrlgen.model.model import Model
 from ctrlgen.recordings.alike_units import alike, size_of
 from ctrlgen.recordings.moved import Moved, moved
@@ -23,10 +25,21 @@ RATES = (
 )  # of an imposed motion: each the slope of the one before
 
 
+class Implausible(str):
+    """A note on what cannot be of the device as it is stated, which a reader who refuses the recording tells as the likely reason."""
+
+
 def with_plausibility(recording: Recording, model: Model) -> Recording:
     """The recording with a note for each thing of it that cannot be of the device as it is stated."""
     seen = moved(recording, model)
-    return recording if seen is None else replace(recording, notes=(*recording.notes, *implausible(seen)))
+    if seen is None:
+        return recording
+    return replace(recording, notes=(*recording.notes, *map(Implausible, implausible(seen))))
+
+
+def suspected(notes: Sequence[str]) -> list[Fault]:
+    """The notes of what is not plausible, as faults beside those for which a recording is refused."""
+    return [Fault("plausible", note) for note in notes if isinstance(note, Implausible)]
 
 
 def implausible(seen: Moved) -> list[str]:

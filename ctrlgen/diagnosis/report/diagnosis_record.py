@@ -24,6 +24,7 @@ from ctrlgen.diagnosis.selection.precedence import why_alike
 from ctrlgen.diagnosis.selection.search_history import RoundEntry, search_history
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.diagnosis.shares.shares_record import FractionEntry, SharesEntry, table_record
+from ctrlgen.recordings.plausibility import Implausible
 from ctrlgen.reporting.result_file import Keys, Number, Origin, origin
 
 # 95 %
@@ -117,6 +118,9 @@ class DiagnosisRecord(Origin):
         title="Verdict", description="The answer in one word."
     )
     sentence: str = Field(description="The answer in a sentence: cause, size, share, what is left.")
+    implausible: list[str] = Field(
+        description="What of the recording cannot be of the device as it is stated: a unit, a rate."
+    )
     findings: list[FindingEntry] = Field(
         description="Causes that the device file leaves out, the most important first."
     )
@@ -150,6 +154,7 @@ def diagnosis_record(diagnosis: Diagnosis, provenance: Provenance) -> DiagnosisR
         **origin(provenance.inputs, provenance.seed, d.notes),
         verdict=d.verdict,
         sentence=sentence(d),
+        implausible=[note for note in d.notes if isinstance(note, Implausible)],
         findings=[_finding_entry(f) for f in d.findings],
         attribution=AttributionEntry(
             explained=d.attribution.explained,
