@@ -25,6 +25,7 @@ from ctrlgen.budget.uncertainty import Uncertainties, load_uncertainties
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.core.tabular import Column, Reported, Tabular
 from ctrlgen.devices import Device
+from ctrlgen.devices.quantities import shared_path
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import Solution
 
@@ -276,7 +277,8 @@ def agreement(group: Group, combined: np.ndarray, drawn: Drawn, path: UncertainP
     values, turned = {name: number.si for name, number in path.model.device.quantities()}, list[str]()
     columns = [(name, line.kind) for line in path.uncertainties.lines for name in line.paths]
     for i, (name, kind) in enumerate(columns):
-        if kind == "number" and far.any() and np.all((values[name] + drawn.columns[far, i]) * values[name] < 0):
+        described = values.get(shared_path(name), 0.0)
+        if kind == "number" and far.any() and np.all((described + drawn.columns[far, i]) * described < 0):
             turned.append(name)
     return Agreement(
         group,

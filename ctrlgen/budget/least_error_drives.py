@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.budget.uncertainty import Uncertainties
+from ctrlgen.devices.quantities import shared_path
 from ctrlgen.model.allocation import drive_ranges
 from ctrlgen.model.assembly import build_model, movable
 from ctrlgen.model.model import Model
@@ -23,7 +24,7 @@ LEAST_WEIGHT = 1e-6  # of the largest: of a drive of which everything is known
 def of_least_error(model: Model, stated: Uncertainties, follow: str) -> Model:
     """`model`, whose drives of least effort are those of the smallest expected error of the signal `follow`."""
     able = set(movable(model.device))
-    free = tuple(p for line in stated.lines if line.kind == "number" for p in line.paths if p in able)
+    free = tuple(p for line in stated.lines if line.kind == "number" for p in line.paths if shared_path(p) in able)
     symbolic = build_model(model.device, free)
     signal, n_u = symbolic.signals[follow], model.u.numel()
     B = ca.jacobian(symbolic.balance, symbolic.u)

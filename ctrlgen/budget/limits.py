@@ -72,7 +72,7 @@ def slopes_of_limits(path: UncertainPath, linear: Propagated) -> Slopes:
     trace = path.solution.trace
 
     def model_with(columns: Sequence[int]) -> Model:
-        return build_model(changed(path.model.device, {names[i]: values[names[i]] + sds[i] for i in columns}))
+        return build_model(changed(path.model.device, {names[i]: values.get(names[i], 0.0) + sds[i] for i in columns}))
 
     def same(bounds: np.ndarray, others: np.ndarray) -> bool:
         return np.allclose(bounds, others, rtol=SAME, atol=0.0)

@@ -19,6 +19,7 @@ import scipy
 
 from ctrlgen.budget.uncertainty import AMBIENT, Uncertainties
 from ctrlgen.devices import Limit
+from ctrlgen.devices.quantities import shared_path
 from ctrlgen.model.assembly import build_model, movable
 from ctrlgen.model.discretisation import NEWTON_STEPS, balanced, one_step_map, settling_time
 from ctrlgen.model.model import Model
@@ -42,8 +43,8 @@ class UncertainPath:
         scenario, device = solution.scenario, solution.model.device
         stated = [path for line in uncertainties.lines if line.kind == "number" for path in line.paths]
         able = set(movable(device))
-        self.idle = tuple(path for path in stated if path not in able)
-        self.moving = tuple(path for path in stated if path in able)
+        self.idle = tuple(path for path in stated if shared_path(path) not in able)
+        self.moving = tuple(path for path in stated if shared_path(path) in able)
         ambients = tuple(path for path in able if path.endswith(AMBIENT) and path not in self.moving)
         self.free = (*self.moving, *sorted(ambients))
         self.rise = ca.SX.sym("surroundings")

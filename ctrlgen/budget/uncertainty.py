@@ -15,7 +15,6 @@ from pydantic import Field
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, read_toml, validate
 from ctrlgen.core.units import (
-    Quantity,
     is_share,
     parse_difference,
     same_dimension,
@@ -24,6 +23,7 @@ from ctrlgen.core.units import (
     to_si,
     written_unit,
 )
+from ctrlgen.devices.quantities import shared_path
 from ctrlgen.devices.section import Section
 from ctrlgen.model.model import Model
 from ctrlgen.trajectory.playback import ANGLE_TOLERANCE, LENGTH_TOLERANCE, playback_tolerance
@@ -45,6 +45,14 @@ class Deviation(Section):
     """Standard deviation: a difference with its unit, such as "0.5 K", or a share of the number, such as "5 %"."""
     source: str
     """Where it comes from: repeated measurements, a certificate, a data sheet, experience."""
+
+
+class NumberDeviation(Deviation):
+    """A standard uncertainty of a number of the device."""
+
+    independent: bool = True
+    """Of a number in a table that a `[[pattern]]` copies: whether it deviates in each copy by itself. With `false` all copies deviate
+    together, as the thickness of blades that are cut from one sheet."""
 
 
 class Converter(Section):
@@ -93,9 +101,9 @@ class UncertaintyFile(Section):
 
     title: str
     """What the file describes, in words."""
-    numbers: dict[str, Deviation] = {}
+    numbers: dict[str, NumberDeviation] = {}
     """By the path of a number of the device, such as `"actuator.young"`; `"hexapod.base_angles[*]"` is each of a list, independent
-    of each other."""
+    of each other, as are the copies of a `[[pattern]]`."""
     surroundings: Deviation | None = None
     """Temperature of what the heaters cool to, and of what effects call the surroundings, over the described one; the temperature at
     which the actuators are without force stays as described."""
@@ -184,15 +192,16 @@ class _Reader:
     """The lines of a file and of the device's own sds, with all faults."""
 
     def __init__(self, scenario: Scenario, model: Model, file: UncertaintyFile) -> None:
-        self.numbers, self.file, self.drive = dict(model.device.quantities()), file, file.drive or DriveChain()
+        self.device, self.numbers = model.device, dict(model.device.quantities())
+        self.file, self.drive = file, file.drive or DriveChain()
         self.faults: list[Fault] = []
         self.lines: list[Uncertain] = []
         self._taken: dict[str, str] = {}
-        for name, stated in file.numbers.items():
-            self._number(name, stated)
+        for name, number_stated in file.numbers.items():
+            self._number(name, number_stated)
         for path, number in self.numbers.items():
             if number.sd and path not in self._taken:
-                self._add(path, "number", (path,), (number.sd,), "", number.source or FROM_DEVICE, number)
+                self._add(path, (path,), (number.sd,), "", number.source or FROM_DEVICE)
         if file.surroundings is not None:
             sd = self._absolute("surroundings.sd", file.surroundings.sd, "degC", "1 K")
             stated = file.surroundings
@@ -212,7 +221,7 @@ class _Reader:
         self._check_drive(scenario, model)
         self._check_correlations()
 
-    def _number(self, name: str, stated: Deviation) -> None:
+    def _number(self, name: str, stated: NumberDeviation) -> None:
         where = f'numbers."{name}"'
         pattern = re.escape(name).replace(re.escape("[*]"), r"\[\d+\]")
         paths = tuple(path for path in self.numbers if re.fullmatch(pattern, path))
@@ -245,20 +254,23 @@ class _Reader:
                 sds.append(
                     self._absolute(f"{where}.sd", stated.sd, unit, f"1 {shown_difference_unit(unit)}".replace(" 1", ""))
                 )
-        self._add(name, "number", paths, tuple(sds), stated.sd, stated.source, self.numbers[paths[0]])
+        self._add(name, paths, tuple(sds), stated.sd, stated.source, stated.independent)
 
     def _add(
         self,
         name: str,
-        kind: Literal["number"],
         paths: tuple[str, ...],
         sds: tuple[float, ...],
         text: str,
         source: str,
-        number: Quantity,
+        independent: bool = True,
     ) -> None:
-        unit = written_unit(number.text)
-        values = [abs(self.numbers[path].si) for path in paths]
+        """A line of numbers; of those that are copied one for each copy, where they are `independent`."""
+        unit = written_unit(self.numbers[paths[0]].text)
+        each = [(independent and self.device.copies(path)) or (path,) for path in paths]
+        sds = tuple(sd for sd, copies in zip(sds, each, strict=True) for _ in copies)
+        paths = tuple(path for copies in each for path in copies)
+        values = [abs(self.numbers[shared_path(path)].si) for path in paths]
         if to_si(0.0, unit):
             per = "1 K", (1.0,) * len(paths)
         elif same_dimension(unit, "rad"):
@@ -268,7 +280,7 @@ class _Reader:
         else:
             per = f"1 {unit}", (to_si(1.0, unit),) * len(paths)
         shown = text or f"{100 * sds[0] / values[0]:.3g} %" if values[0] else text or f"{sds[0]:.3g} (SI)"
-        self.lines.append(Uncertain(name, kind, paths, sds, shown, source, per))
+        self.lines.append(Uncertain(name, "number", paths, sds, shown, source, per))
 
     def _share(self, where: str, text: str) -> float:
         """A share such as "5 %" or 0.05, as a number; NaN with a fault where it is none."""
@@ -319,6 +331,8 @@ class _Reader:
             for name in pair.between:
                 if name not in single:
                     what = f"{name!r} is not a single number of which an sd is stated"
+                    if self.numbers.keys() & {name} and self.device.copies(name):
+                        what += "; it is one of each copy: state it with independent = false"
                     self.faults.append(Fault(f"correlation[{k}].between", what))
             if pair.between[0] == pair.between[1]:
                 self.faults.append(Fault(f"correlation[{k}].between", "names one number twice"))

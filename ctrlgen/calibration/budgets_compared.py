@@ -15,6 +15,7 @@ from ctrlgen.budget.uncertainty import FILE, Uncertain, Uncertainties, load_unce
 from ctrlgen.calibration.calibrate import Calibration, sd_of_bounds
 from ctrlgen.core.units import show_difference, to_si
 from ctrlgen.devices import Device
+from ctrlgen.devices.quantities import shared_path
 from ctrlgen.devices.run_time import RunTimeConstant
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 
@@ -32,7 +33,7 @@ def budgets(
     states = (read.path.parent / FILE).is_file() or any(number.sd for _, number in model.device.quantities())
     stated = load_uncertainties(read, model) if states else None
     constants = calibration.device.given_at_start
-    known = {path for line in (stated.lines if stated else ()) for path in line.paths}
+    known = {shared_path(path) for line in (stated.lines if stated else ()) for path in line.paths}
     unknown = tuple(c for c in constants if c.path not in known)
     wide = np.diag([sd_of_bounds(c) ** 2 for c in unknown])
     before = _budget(read, calibration.device, _joined(stated, unknown, wide, [BOUNDS] * len(unknown)), progress)
@@ -65,7 +66,7 @@ def _joined(
     correlation = covariance / np.outer(sds, sds)
     if others is None:
         return Uncertainties(tuple(lines), correlation, None, 0.0, False, {}, {}, {})
-    kept, columns, first = list[Uncertain](), list[int](), 0
+    others, kept, columns, first = about_their_mean(others, paths), list[Uncertain](), list[int](), 0
     for line in others.lines:
         left = [i for i, path in enumerate(line.paths) if path not in paths]
         # of a list the numbers that are no constants stay
@@ -79,6 +80,24 @@ def _joined(
     joint = np.eye(n)
     joint[:k, :k], joint[k:, k:] = correlation, others.correlation[np.ix_(columns, columns)]
     return replace(others, lines=(*lines, *kept), correlation=joint)
+
+
+def about_their_mean(stated: Uncertainties, constants: set[str]) -> Uncertainties:
+    """What is `stated`, where the copies of a constant deviate from one another alone: with n of them their sd is s sqrt(1 - 1/n) and
+    the coefficient of each two -1/(n - 1), for their mean is the constant itself."""
+    correlation, lines, first = stated.correlation.copy(), list[Uncertain](), 0
+    for line in stated.lines:
+        sds, name = np.array(line.sds), line.name
+        for path in constants:
+            of_it = np.array([p != path and shared_path(p) == path for p in line.paths])
+            if n := int(of_it.sum()):
+                sds[of_it] *= np.sqrt(1 - 1 / n)
+                columns = first + np.flatnonzero(of_it)
+                correlation[np.ix_(columns, columns)] = np.where(np.eye(n), 1.0, -1 / (n - 1))
+                name = f"{line.name}, copies about their mean"
+        lines.append(replace(line, name=name, sds=tuple(map(float, sds))))
+        first += len(sds)
+    return replace(stated, lines=tuple(lines), correlation=correlation)
 
 
 def _shown(c: RunTimeConstant, sd: float) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from types import SimpleNamespace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import casadi as ca
 from pydantic import PrivateAttr, model_validator
@@ -122,6 +122,14 @@ class Device(Shown, Section):
     def quantities(self) -> Iterator[tuple[str, Quantity]]:
         """Every number of the device with its dotted path, such as 'struts.wire_length'."""
         return ((path, number) for path, _, number in walk(self))
+
+    def copies(self, path: str) -> tuple[str, ...]:
+        """The paths of how far the number at `path` is off in each copy of its table, zero as described; none where nothing is copied."""
+        return ()
+
+    def deviating(self, deviations: Mapping[str, float]) -> Self:
+        """The device whose copies are off [SI], by the paths of `copies`."""
+        raise NotImplementedError
 
     def called(self, path: str) -> str:
         """The path of a number, with the name, or the kind, of its table where that stands in a list: 'actuator[0].gain (px)'."""

@@ -17,6 +17,16 @@ from ctrlgen.devices.section import Section
 from ctrlgen.effects import Effect
 
 
+def deviation_path(path: str, copy: int) -> str:
+    """The path of how far the number at `path` is off in one copy of its table: 'element[0].length@2'."""
+    return f"{path}@{copy}"
+
+
+def shared_path(path: str) -> str:
+    """The path of the number that a deviation is one of: 'element[0].length'; of any other path itself."""
+    return path.partition("@")[0]
+
+
 def members(node: Any) -> dict[str, Any]:
     """The members of a table, an effect or a list, by what each adds to a path: '.key' or '[0]'; none of anything else."""
     if isinstance(node, Section):

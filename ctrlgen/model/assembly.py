@@ -13,6 +13,7 @@ import numpy as np
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import show
 from ctrlgen.devices import Device, DevicePhysics, ImposedPhysics, InertialPhysics, Limit, Signal
+from ctrlgen.devices.quantities import shared_path
 from ctrlgen.devices.sensor import mounting_faults
 from ctrlgen.effects import Place
 from ctrlgen.model.effect_terms import EffectTerms
@@ -35,18 +36,21 @@ def build_model(
 ) -> Model:
     """The symbolic model of `device`; the parameters named in `free` stay symbols, the others are numbers.
 
-    `free` are dotted paths as in `device.quantities()`; `ambient` is a symbol for the rise of the surroundings [K],
-    where that is not zero; `sample_time` [s] is needed by effects that look back by samples. With `per_record` the
+    `free` are dotted paths as in `device.quantities()` or, of how far single copies are off, as in `device.copies(path)`; `ambient` is
+    a symbol for the rise of the surroundings [K], where that is not zero; `sample_time` [s] is needed by effects that look back by
+    samples. With `per_record` the
     constants of a record (where a play begins, a zero that is set anew) are states; without, they are zero. The effects `apart`, by
     their places in the file, add no term; see `Effect.apart`. Raises InputError for a
     path that is no parameter or acts on nothing, an effect that does not fit the device, and a restoring force that
     does not rise over the stroke.
     """
     nominal = dict(device.quantities())
-    unknown = [path for path in free if path not in nominal]
+    unknown = [
+        path for path in free if path not in (nominal if path == shared_path(path) else _deviations(device, path))
+    ]
     if unknown:
         raise InputError(device.name, [Fault(path, "is not a parameter of this device") for path in unknown])
-    counts = [path for path in free if nominal[path].whole]
+    counts = [path for path in free if nominal[shared_path(path)].whole]
     if counts:
         raise InputError(device.name, [Fault(path, "is a count and cannot be free") for path in counts])
     model = _assemble(device, free, NO_RISE if ambient is None else ambient, sample_time, per_record, apart)
@@ -57,6 +61,10 @@ def build_model(
         raise InputError(device.name, [Fault(path, what) for path in idle])
     _check_stiffness(model)
     return model
+
+
+def _deviations(device: Device, path: str) -> tuple[str, ...]:
+    return device.copies(shared_path(path))
 
 
 def movable(device: Device) -> tuple[str, ...]:
@@ -90,7 +98,12 @@ def _assemble(
         device.model_copy(update={"effect": ()}), tuple(path for path in free if not path.startswith("effect["))
     )
     symbols = {path: own_symbols[path] if path in own_symbols else ca.SX.sym(path) for path in free}
-    p, p_nominal = ca.vertcat(NONE, *symbols.values()), np.array([nominal[path].si for path in free])
+    p, p_nominal = (
+        ca.vertcat(NONE, *symbols.values()),
+        np.array(
+            [nominal[path].si if path in nominal else 0.0 for path in free]  # a copy as described deviates by nothing
+        ),
+    )
     n = len(physics.axes)
     n_v = n if isinstance(physics, InertialPhysics) else 0
     z, v, a = ca.SX.sym("d", n), ca.SX.sym("v", n_v), ca.SX.sym("a", n_v)

@@ -55,12 +55,12 @@ class Condensed:
         self.pushes = device.actuator[0].kind != "displacement"
         self.materials = {m.name: q for m, q in zip(device.material, p.material, strict=True)}
         self.frames = [_right_handed(ca.mtimes(e.turn, e.section.frame)) for e in device.placed_elements]
-        self.ends = [ca.mtimes(e.turn, ca.vertcat(*p.element[e.index].at)) for e in device.placed_elements]
+        self.ends = [ca.mtimes(e.turn, ca.vertcat(*e.numbers(p).at)) for e in device.placed_elements]
         self.compliances: list[Matrix | None] = []  # about their free ends, in their frames; None of springs
         self.elements: list[Element] = []
         self.cubics: list[CubicSpring] = []
         for k, (e, R, end) in enumerate(zip(device.placed_elements, self.frames, self.ends, strict=True)):
-            numbers = p.element[e.index]
+            numbers = e.numbers(p)
             C = e.section.compliance(numbers, self.materials.get(getattr(e.section, "material", ""), SimpleNamespace()))
             if C is not None and float(ca.det(e.turn)) < 0:
                 C = ca.mtimes([REFLECTED, C, -REFLECTED])
@@ -151,7 +151,7 @@ class Condensed:
     @property
     def held_stiffness(self) -> Matrix:
         """(n, n) force on the axes per displacement of them at home, with that of the actuators beside their force."""
-        stiffnesses = [getattr(self.p.actuator[a.index], "stiffness", None) for a in self.device.placed_actuators]
+        stiffnesses = [getattr(a.numbers(self.p), "stiffness", None) for a in self.device.placed_actuators]
         return self.stiffness + ca.diag(ca.vertcat(*(0.0 if k is None else k for k in stiffnesses)))
 
     def restoring_force(self, d: Matrix) -> Matrix:
@@ -162,13 +162,13 @@ class Condensed:
     def body_mass(self, number: int) -> Matrix | None:
         """(6, 6) of a body and what stands on it, twist -> (angular momentum; momentum) at the global origin; None without a mass."""
         placed = self.device.placed_bodies[number]
-        numbers = self.p.body[placed.index]
+        numbers = placed.numbers(self.p)
         if numbers.mass is None:
             return None
         R, centre = placed.turn, ca.DM.zeros(3) if numbers.centre is None else ca.vertcat(*numbers.centre)
         total = _inertia(numbers.mass, ca.mtimes(R, centre), ca.mtimes([R, ca.diag(ca.vertcat(*numbers.inertia)), R.T]))
         for load in self.device.placed_loads:
-            carried = self.p.load[load.index]
+            carried = load.numbers(self.p)
             if load.second == number and carried.mass is not None:
                 total += _inertia(carried.mass, ca.mtimes(load.turn, ca.vertcat(*carried.at)), ca.DM(3, 3))
         return total
@@ -181,7 +181,7 @@ class Condensed:
         if material is None or material.density is None:
             return None
         segments, load = (
-            e.section.segments(self.p.element[e.index], material),
+            e.section.segments(e.numbers(self.p), material),
             ca.mtimes(self.elements[k].stiffness, second - first),
         )
         if not segments:
@@ -209,7 +209,7 @@ class Condensed:
         """Where an actuator pushes [m]: a heater at the end of its bar."""
         if a.section.kind == "thermal":
             return self.ends[self.element_of(a)]
-        return ca.mtimes(a.turn, ca.vertcat(*self.p.actuator[a.index].at))
+        return ca.mtimes(a.turn, ca.vertcat(*a.numbers(self.p).at))
 
     def element_of(self, a: Placed) -> int:
         """The number of the element that an actuator moves or heats."""
@@ -249,7 +249,7 @@ class Condensed:
         """(1, 6) of each reading beside those of the output: what it sees of a body's twist [m, rad]."""
         rows = []
         for r in self.device.placed_readings:
-            direction, at = ca.mtimes(r.turn, _unit(r.section.direction)), self.p.reading[r.index].at
+            direction, at = ca.mtimes(r.turn, _unit(r.section.direction)), r.numbers(self.p).at
             row = ca.horzcat(direction.T, ca.DM.zeros(1, 3))
             if at is not None:
                 row = mechanism.point_motion(ca.mtimes(r.turn, ca.vertcat(*at)), direction)
@@ -279,7 +279,7 @@ class Condensed:
         """The elements, as they are with the drives held, and the stiffness of the actuators beside them."""
         added = []
         for i, a in enumerate(self.device.placed_actuators):
-            k = getattr(self.p.actuator[a.index], "stiffness", None)
+            k = getattr(a.numbers(self.p), "stiffness", None)
             if k is not None:
                 point, n = self.point(a), self.directions[i]
                 added.append(
@@ -315,7 +315,7 @@ class Condensed:
         for k, e in enumerate(self.device.placed_elements):
             if getattr(e.section, "material", None) != material:
                 continue
-            numbers = self.p.element[e.index]
+            numbers = e.numbers(self.p)
             for section in e.section.sections(numbers):
                 place = self.ends[k] - section.back * self.frames[k][:, 0]
                 to_place = inverse_adjoint(self.frames[k], place)

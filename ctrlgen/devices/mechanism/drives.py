@@ -52,7 +52,7 @@ def transduction(c: Condensed) -> Transduction:
 def _proportional(c: Condensed) -> Transduction:
     """Force or displacement are the drive times the gain, at once or with a lag of first order."""
     actuators = c.device.placed_actuators
-    numbers, sections = [c.p.actuator[a.index] for a in actuators], [a.section for a in actuators]
+    numbers, sections = [a.numbers(c.p) for a in actuators], [a.section for a in actuators]
     axes, units = tuple(a.name for a in actuators), tuple(written_unit(s.low.text) for s in sections)
     ranges = tuple((s.low.si, s.high.si) for s in sections)
     sizes = tuple(max(map(abs, span)) for span in ranges)
@@ -125,6 +125,6 @@ def _heaters(c: Condensed, p: SimpleNamespace) -> list[SimpleNamespace]:
     heaters, materials = [], [m.name for m in c.device.material]
     for a in c.device.placed_actuators:
         beams = c.device.placed_elements[c.element_of(a)]
-        numbers = vars(p.element[beams.index]) | vars(p.material[materials.index(beams.section.material)])
-        heaters.append(SimpleNamespace(**numbers | vars(p.actuator[a.index])))
+        numbers = vars(beams.numbers(p)) | vars(p.material[materials.index(beams.section.material)])
+        heaters.append(SimpleNamespace(**numbers | vars(a.numbers(p))))
     return heaters

@@ -37,7 +37,7 @@ def mechanism_figure(device: Mechanism) -> Figure:
     free = [np.array(ca.DM(ca.evalf(ca.SX(end)))).ravel() * MM for end in c.ends]
     along = [np.array(ca.DM(ca.evalf(ca.SX(R))))[:, 0] for R in c.frames]
     extent = max(float(np.ptp(np.array(free), axis=0).max()), 1e-3)
-    reaches = [e.section.reach(c.p.element[e.index]) for e in device.placed_elements]
+    reaches = [e.section.reach(e.numbers(c.p)) for e in device.placed_elements]
     lengths = [SHORT * extent if reach is None else reach * MM for reach in reaches]
     fixed = [end - length * x for end, length, x in zip(free, lengths, along, strict=True)]
     output = np.array([x.si for x in device.output.at]) * MM

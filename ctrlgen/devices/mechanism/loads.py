@@ -44,7 +44,7 @@ class Loads:
         c, p = self.c, self.c.p
         g = None if p.gravity is None else ca.vertcat(*p.gravity)
         for placed in c.device.placed_loads:
-            numbers = p.load[placed.index]
+            numbers = placed.numbers(p)
             at = ca.mtimes(placed.turn, ca.vertcat(*numbers.at))
             if numbers.mass is not None and g is not None:
                 yield placed.second, at, numbers.mass * g
@@ -52,7 +52,7 @@ class Loads:
                 force = ca.mtimes(placed.turn, ca.vertcat(*numbers.force))
                 yield from ((placed.second, at, force), (placed.first, at, -force))
         for i, body in enumerate(c.device.placed_bodies if g is not None else ()):
-            numbers = p.body[body.index]
+            numbers = body.numbers(p)
             if numbers.mass is not None:
                 centre = ca.DM.zeros(3) if numbers.centre is None else ca.vertcat(*numbers.centre)
                 yield i, ca.mtimes(body.turn, centre), numbers.mass * g

@@ -6,7 +6,7 @@ Motions are small: stiffness, Jacobian and loads are those of the mechanism as d
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property, wraps
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
@@ -16,11 +16,10 @@ import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
 from ctrlgen.core.units import In, Quantity
-from ctrlgen.devices.base import Device
 from ctrlgen.devices.device_physics import DevicePhysics
 from ctrlgen.devices.mechanism.bent_beams import BentBeam, ThermalActuator
 from ctrlgen.devices.mechanism.condensed import MOST_STEPS, SPARE_STEPS, Condensed, nominal
-from ctrlgen.devices.mechanism.copies import Copied, Placed
+from ctrlgen.devices.mechanism.copies import Copied, CopiedParts, Placed
 from ctrlgen.devices.mechanism.flexures import Blade, CircularHinge, Flexible, Strut, Wire, flexures_in_one_place
 from ctrlgen.devices.mechanism.internal_modes import structural_model
 from ctrlgen.devices.mechanism.joining import TWIST
@@ -68,7 +67,7 @@ def _as_described(method: Callable[[Mechanism], T]) -> cached_property[T]:
     return cached_property(described)
 
 
-class Mechanism(Device):
+class Mechanism(CopiedParts):
     """Drive -> force or displacement -> motion of all bodies -> pose of the output point."""
 
     on_flexures: ClassVar[bool | None] = True
@@ -123,7 +122,7 @@ class Mechanism(Device):
             "element": [e.name for e in self.element],
             "actuator": [a.name for a in self.actuator],
             "load": [x.name for x in self.load],
-            "reading": [*self.output.channels, *(r.name for r in self._copies(self.reading))],
+            "reading": [*self.output.channels, *(r.name for r in self._copies("reading"))],
         }.items():
             faults += [f"{what}: {name!r} is named twice" for name in dict.fromkeys(names) if names.count(name) > 1]
         if GROUND_NAME in self.bodies:
@@ -282,35 +281,26 @@ class Mechanism(Device):
                 return self.bodies.index(known)
         return None
 
-    def _copies(self, sections: Iterable[Any]) -> Iterator[Copied]:
-        for index, section in enumerate(sections):
-            pattern = next((q for q in self.pattern if q.name == section.pattern), None)
-            if pattern is None:
-                yield Copied(section, index, section.name, 0, ca.DM.eye(3))
-                continue
-            for k, turn in enumerate(pattern.turns, start=1):
-                yield Copied(section, index, f"{section.name}_{k}", k, turn)
-
     def _between(self, copy: Copied, first: str, second: str) -> Placed:
         numbers = [self._number(name, copy.section.pattern, copy.copy) for name in (first, second)]
         ends = [GROUND if n is None else n for n in numbers]
-        return Placed(copy.section, copy.index, copy.name, copy.copy, copy.turn, ends[0], ends[1])
+        return Placed(**vars(copy), first=ends[0], second=ends[1])
 
     @cached_property
     def placed_bodies(self) -> tuple[Copied, ...]:
         """Every copy of every body, by its number."""
-        return tuple(self._copies(self.body))
+        return tuple(self._copies("body"))
 
     @cached_property
     def placed_elements(self) -> tuple[Placed, ...]:
         """Every copy of every element."""
-        return tuple(self._between(c, c.section.from_, c.section.to) for c in self._copies(self.element))
+        return tuple(self._between(c, c.section.from_, c.section.to) for c in self._copies("element"))
 
     @cached_property
     def placed_actuators(self) -> tuple[Placed, ...]:
         """Every copy of every actuator; one that prescribes a displacement names an element and no bodies, a heater those of its."""
         placed, elements = [], {e.name: e for e in self.element}
-        for c in self._copies(self.actuator):
+        for c in self._copies("actuator"):
             ends = (
                 (c.section, "against", "on") if c.section.kind != "thermal" else (elements[c.section.on], "from_", "to")
             )
@@ -336,12 +326,12 @@ class Mechanism(Device):
     @cached_property
     def placed_readings(self) -> tuple[Placed, ...]:
         """Every copy of every reading."""
-        return tuple(self._between(c, c.section.against, c.section.body) for c in self._copies(self.reading))
+        return tuple(self._between(c, c.section.against, c.section.body) for c in self._copies("reading"))
 
     @cached_property
     def placed_loads(self) -> tuple[Placed, ...]:
         """Every copy of every load."""
-        return tuple(self._between(c, c.section.against, c.section.on) for c in self._copies(self.load))
+        return tuple(self._between(c, c.section.against, c.section.on) for c in self._copies("load"))
 
     @_as_described
     def reading_scale(self) -> tuple[float, ...]:

@@ -82,7 +82,7 @@ def constraints(c: Condensed) -> tuple[np.ndarray, list[tuple[str, str]]]:
     for k, e in enumerate(device.placed_elements):
         if k not in yields:
             continue  # a spring holds nothing
-        pivot = c.ends[k] - e.section.pivot(c.p.element[e.index]) * c.frames[k][:, 0]
+        pivot = c.ends[k] - e.section.pivot(e.numbers(c.p)) * c.frames[k][:, 0]
         local = inverse_adjoint(c.frames[k], pivot)  # twist in the element's frame
         directions = e.section.constrained(yields[k], largest) * turn
         A = np.zeros((len(directions), 6 * count))

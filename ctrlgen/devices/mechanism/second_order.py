@@ -91,7 +91,7 @@ class SecondOrder:
         a, b = [x for x in range(6) for _ in range(6)], [y for _ in range(6) for y in range(6)]
         shapes: dict[tuple[Segment, ...], Matrix] = {}  # equal flexures have one
         for k, e in enumerate(c.device.placed_elements):
-            numbers = c.p.element[e.index]
+            numbers = e.numbers(c.p)
             segments = e.section.segments(numbers, materials.get(getattr(e.section, "material", ""), SimpleNamespace()))
             back = 0.0 if segments else e.section.pivot(numbers)
             plain_numbers = all(isinstance(x, float) for segment in segments for x in vars(segment).values())
@@ -144,7 +144,7 @@ class SecondOrder:
     def _sensed_products(self) -> Matrix:
         rows = [ca.SX(0, len(self.pairs))]
         for r, row in zip(self.c.device.placed_readings, self.c.reading_rows, strict=True):
-            at = self.c.p.reading[r.index].at
+            at = r.numbers(self.c.p).at
             point = ca.DM.zeros(3) if at is None else ca.mtimes(r.turn, ca.vertcat(*at))
             direction = row[:, :3] if at is None else row[:, 3:]
             seen = self.seen(r.first, r.second, point)
