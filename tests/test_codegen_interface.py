@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import json
+import re
 import shutil
 import subprocess
 
 import pytest
-from conftest import SCENARIOS
+from conftest import ROOT, SCENARIOS
 from package_programs import build
 
 from ctrlgen import build_model, load_scenario
@@ -217,3 +219,25 @@ def test_a_firmware_can_pin_the_interface_at_compile_time(piece, circle_c, circl
 def test_a_rate_that_is_no_whole_number_stays_one():
     assert hertz(1 / (1 / 44100.0), Real.FLOAT) == "44100U" and hertz(None, Real.FLOAT) == "0U"
     assert hertz(0.25, Real.FLOAT) == "0.25f" and hertz(1000.5, Real.DOUBLE) == "1000.5"
+
+
+def interface_of(text: str) -> str:
+    """What of a header another program is compiled against: structures, functions, statuses and sizes, without comments, versions, hashes,
+    and the names of one build."""
+    text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+    text = re.sub(r"#define \w+_(ABI|VERSION|DEVICE_HASH|SCENARIO_HASH|BUILD) .*", "", text)
+    text = re.sub(r"_init_(with_)?[0-9_]+hz_[0-9a-f]{8}", "_init_build", text)
+    return " ".join(text.split())
+
+
+def test_the_number_of_the_interface_is_raised_with_the_interface():
+    """The digest of the interface of the golden headers belongs to the number that they state."""
+    golden = sorted((ROOT / "codegen" / "golden").glob("*/*_online_f32.h"))
+    digest = hashlib.sha256("".join(interface_of(path.read_text()) for path in golden).encode()).hexdigest()[:16]
+    path = ROOT / "tests" / "interface_digests.json"
+    known = json.loads(path.read_text())
+    assert max(map(int, known)) == ABI and known[str(ABI)] == digest, (
+        "the interface of the generated C changed. Where code written for an older header, or a state that it compiled, no longer "
+        f"fits: raise ABI in ctrlgen/firmware/c/templates.py, and write its number with {digest} into {path.name}; where something "
+        "was only added: the digest"
+    )

@@ -224,7 +224,8 @@ def test_limiter_in_c_and_in_python_agree_on_every_combination_of_branches(devic
     wrong = np.flatnonzero(~same.all(axis=1))
     assert not wrong.size, (len(wrong), len(records), records[wrong[0]], answers[wrong[0]], printed[wrong[0]])
     context = online_context(NOWHERE, controller, Real.DOUBLE, "limiter")
-    assert not unvisited(tmp_path, {kernel.name for kernel in context["kernels"]} | {"whole_below", "square_root"})
+    physics = {kernel.name for kernel in context["kernels"]} | {"whole_below", "square_root"}
+    assert not unvisited(tmp_path, {f"limiter_{name}" for name in physics})
 
 
 def test_samples_of_these_devices_take_every_branch_of_the_limiter_in_python(tmp_path):

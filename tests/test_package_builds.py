@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
 
 import pytest
+from conftest import SCENARIOS
 from package_programs import STRICT, everything, run
 
-from ctrlgen import __version__
+from ctrlgen import __version__, build_model, generate, load_scenario
 from ctrlgen.firmware.c.real import Real
 
 pytestmark = pytest.mark.long
@@ -75,7 +77,8 @@ def test_the_zephyr_module_builds_with_stand_ins_for_zephyrs_functions(packages,
         for option in ("", f"_{real.name}", "_SELFTEST"):
             text += f"set(CONFIG_{name.upper()}_CONTROLLER{option} y)\n"
         text += f"add_subdirectory({c.path}/zephyr {name})\n"
-    text += f"add_executable(app main.c)\ntarget_link_libraries(app PRIVATE {' '.join(packages)} m)\n"
+    libraries = [*packages, *(c.online[real] for c in packages.values())]
+    text += f"add_executable(app main.c)\ntarget_link_libraries(app PRIVATE {' '.join(libraries)} m)\n"
     (tmp_path / "CMakeLists.txt").write_text(text)
     calls = " + ".join(f"{c.selftest[real]}(0)" for c in packages.values())
     includes = "".join(f"#include <{c.selftest[real]}.h>\n" for c in packages.values())
@@ -83,6 +86,32 @@ def test_the_zephyr_module_builds_with_stand_ins_for_zephyrs_functions(packages,
     run(cmake, "-S", tmp_path, "-B", tmp_path / "b")
     run(cmake, "--build", tmp_path / "b")
     run(tmp_path / "b" / "app")
+
+
+def test_zephyr_modules_of_one_controller_compile_it_once(packages, circle, cmake, tmp_path):
+    """Two scenarios of one device, signal and rate; and one of another rate under the same name, which is refused."""
+    text = (SCENARIOS / "circle20" / "scenario.toml").read_text().replace("../devices", str(SCENARIOS / "devices"))
+    folders = {}
+    for name, rate in (("again", "1 kHz"), ("slower", "500 Hz")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "scenario.toml").write_text(text.replace('"1 kHz"', f'"{rate}"'))
+        scenario = load_scenario(tmp_path / name)
+        folders[name] = generate(scenario, build_model(scenario.device), tmp_path / f"{name}_c").path
+    (tmp_path / "main.c").write_text("int main(void) { return 0; }\n")
+    for name, folder in folders.items():
+        options = "".join(f"set(CONFIG_{n.upper()}_CONTROLLER y)\n" for n in ("circle20", name))
+        adds = f"add_subdirectory({packages['circle20'].path}/zephyr one)\nadd_subdirectory({folder}/zephyr two)\n"
+        whole = "-Wl,--whole-archive circle20 mems_hexapod_online_f32 -Wl,--no-whole-archive"
+        (tmp_path / "CMakeLists.txt").write_text(
+            f"{ZEPHYR}{options}{adds}add_executable(app main.c)\ntarget_link_libraries(app PRIVATE {whole})\n"
+        )
+        words = [str(cmake), "-S", str(tmp_path), "-B", str(tmp_path / f"b_{name}")]
+        done = subprocess.run(words, capture_output=True, text=True)
+        if name == "again":
+            assert done.returncode == 0, done.stderr
+            run(cmake, "--build", tmp_path / f"b_{name}")
+        else:
+            assert done.returncode != 0 and "two controllers of one name" in " ".join(done.stderr.split())
 
 
 def test_the_zephyr_module_says_what_zephyr_reads(packages):

@@ -7,14 +7,14 @@
 #error "compile this without -ffast-math, -Ofast, -ffinite-math-only or /fp:fast: they remove the checks for NaN"
 #endif
 
-static const float U_LOW[1] = { -4.0f }; /* V */
-static const float U_HIGH[1] = { 4.0f }; /* V */
-static const float U_SLACK[1] = { 8e-06f }; /* V */
-static const float U_SAFE[1] = { 0.0f }; /* V */
+static const float FLEXURE_AXIS_ONLINE_F32_U_LOW[1] = { -4.0f }; /* V */
+static const float FLEXURE_AXIS_ONLINE_F32_U_HIGH[1] = { 4.0f }; /* V */
+static const float FLEXURE_AXIS_ONLINE_F32_U_SLACK[1] = { 8e-06f }; /* V */
+static const float FLEXURE_AXIS_ONLINE_F32_U_SAFE[1] = { 0.0f }; /* V */
 
 /* The bits of a number in memory. Whether a number is one, and how large, is asked of these: a compiler that is told that no number is NaN
  * may leave comparisons of numbers out, never those of integers. */
-static uint32_t bits_of(const float *number)
+static uint32_t flexure_axis_online_f32_bits_of(const float *number)
 {
     union { float number; uint32_t bits; } v;
     v.number = *number;
@@ -22,96 +22,96 @@ static uint32_t bits_of(const float *number)
 }
 
 /* 1 if a number in memory is NaN. */
-static int is_nan(const float *number)
+static int flexure_axis_online_f32_is_nan(const float *number)
 {
-    return ((bits_of(number) & 0x7FFFFFFFU) > 0x7F800000U) ? 1 : 0;
+    return ((flexure_axis_online_f32_bits_of(number) & 0x7FFFFFFFU) > 0x7F800000U) ? 1 : 0;
 }
 
-#define FORCE_CONSTANT_STIFFNESS_1 (20000.0f) /* (1 / actuator.force_constant) * mechanics.stiffness */
-#define FORCE_CONSTANT (10.0f) /* actuator.force_constant */
-#define STIFFNESS (200000.0f) /* mechanics.stiffness */
-#define DAMPING (30.0f) /* mechanics.damping */
-#define STIFFNESS_1 (5e-06f) /* 1 / mechanics.stiffness */
+#define FLEXURE_AXIS_ONLINE_F32_FORCE_CONSTANT_STIFFNESS_1 (20000.0f) /* (1 / actuator.force_constant) * mechanics.stiffness */
+#define FLEXURE_AXIS_ONLINE_F32_FORCE_CONSTANT (10.0f) /* actuator.force_constant */
+#define FLEXURE_AXIS_ONLINE_F32_STIFFNESS (200000.0f) /* mechanics.stiffness */
+#define FLEXURE_AXIS_ONLINE_F32_DAMPING (30.0f) /* mechanics.damping */
+#define FLEXURE_AXIS_ONLINE_F32_STIFFNESS_1 (5e-06f) /* 1 / mechanics.stiffness */
 
 /* Displacement at which the platform pose is `target`, axis [m]. */
-static void wanted_displacement(const float target[1], float result[1])
+static void flexure_axis_online_f32_wanted_displacement(const float target[1], float result[1])
 {
     result[0] = target[0];
 }
 
 /* Drive that keeps the displacement `wanted` at rest. */
-static void wanted_drive(const float wanted[1], float result[1])
+static void flexure_axis_online_f32_wanted_drive(const float wanted[1], float result[1])
 {
-    result[0] = FORCE_CONSTANT_STIFFNESS_1 * wanted[0];
+    result[0] = FLEXURE_AXIS_ONLINE_F32_FORCE_CONSTANT_STIFFNESS_1 * wanted[0];
 }
 
 /* States under `drive`, at rest: velocity_axis [m / s]. */
-static void wanted_advance(float result[1])
+static void flexure_axis_online_f32_wanted_advance(float result[1])
 {
     result[0] = 0.0f;
 }
 
 /* Displacement at which the platform pose is `target`, axis [m]. */
-static void motion_displacement(const float target[3], float result[1])
+static void flexure_axis_online_f32_motion_displacement(const float target[3], float result[1])
 {
     result[0] = target[0];
 }
 
 /* States that the displacement needs during the motion that `target` says: velocity_axis [m / s]. */
-static void motion_state(const float target[3], float result[1])
+static void flexure_axis_online_f32_motion_state(const float target[3], float result[1])
 {
     result[0] = target[1];
 }
 
 /* Drive of the motion that `target` says. */
-static void motion_drive(const float target[3], float result[1])
+static void flexure_axis_online_f32_motion_drive(const float target[3], float result[1])
 {
     result[0] = (20000.0f * target[0]) + (3.0f * target[1]) + (0.05f * target[2]);
 }
 
 /* Displacement at which the forces balance, g(x, z, drive) = 0: the step z - g/(dg/dz) from z. */
-static void balance_displacement(const float x[1], const float z[1], const float drive[1], float result[1])
+static void flexure_axis_online_f32_balance_displacement(const float x[1], const float z[1], const float drive[1], float result[1])
 {
-    const float t1 = ((FORCE_CONSTANT * drive[0]) - (STIFFNESS * z[0])) - (DAMPING * x[0]);
-    result[0] = z[0] + (STIFFNESS_1 * t1);
+    const float t1 = ((FLEXURE_AXIS_ONLINE_F32_FORCE_CONSTANT * drive[0]) - (FLEXURE_AXIS_ONLINE_F32_STIFFNESS * z[0])) - (FLEXURE_AXIS_ONLINE_F32_DAMPING * x[0]);
+    result[0] = z[0] + (FLEXURE_AXIS_ONLINE_F32_STIFFNESS_1 * t1);
 }
 
 /* 1 if every displacement is inside its limits; 0 for NaN. */
-static int displacement_inside(const float value[1])
+static int flexure_axis_online_f32_displacement_inside(const float value[1])
 {
-    return (((bits_of(&value[0]) & 0x7FFFFFFFU) <= 0x38D1B717U) /* 1e-04f */) ? 1 : 0;
+    return (((flexure_axis_online_f32_bits_of(&value[0]) & 0x7FFFFFFFU) <= 0x38D1B717U) /* 1e-04f */) ? 1 : 0;
 }
 
 /* 1 if every drive is inside its limits; 0 for NaN. */
-static int drive_inside(const float value[1])
+static int flexure_axis_online_f32_drive_inside(const float value[1])
 {
-    return (((bits_of(&value[0]) & 0x7FFFFFFFU) <= 0x40800000U) /* 4.0f */) ? 1 : 0;
+    return (((flexure_axis_online_f32_bits_of(&value[0]) & 0x7FFFFFFFU) <= 0x40800000U) /* 4.0f */) ? 1 : 0;
 }
 
 /* 1 if every component is a number of a plausible size. */
-static int is_usable(const float target[3])
+static int flexure_axis_online_f32_is_usable(const float target[3])
 {
-    return (((bits_of(&target[0]) & 0x7FFFFFFFU) <= 0x41200000U) /* 10.0f */ &&
-        ((bits_of(&target[1]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */ &&
-        ((bits_of(&target[2]) & 0x7FFFFFFFU) <= 0x47C35000U) /* 100000.0f */) ? 1 : 0;
+    return (((flexure_axis_online_f32_bits_of(&target[0]) & 0x7FFFFFFFU) <= 0x41200000U) /* 10.0f */ &&
+        ((flexure_axis_online_f32_bits_of(&target[1]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */ &&
+        ((flexure_axis_online_f32_bits_of(&target[2]) & 0x7FFFFFFFU) <= 0x47C35000U) /* 100000.0f */) ? 1 : 0;
 }
 
 /* 1 if a number of the state is NaN, infinite or far beyond its range: 4 times the largest magnitude of it. Asked first where
  * displacements depend on the state or effects remember, else where a limit is met: until then it would show in the drives, or is
  * written anew. */
-static int is_lost(const flexure_axis_online_f32_state *state)
+static int flexure_axis_online_f32_is_lost(const flexure_axis_online_f32_state *state)
 {
-    return (((bits_of(&state->x[0]) & 0x7FFFFFFFU) <= 0x59635FA9U) /* 4e+15f */ &&
-        ((bits_of(&state->z[0]) & 0x7FFFFFFFU) <= 0x39D1B717U) /* 0.0004f */) ? 0 : 1;
+    return (((flexure_axis_online_f32_bits_of(&state->x[0]) & 0x7FFFFFFFU) <= 0x59635FA9U) /* 4e+15f */ &&
+        ((flexure_axis_online_f32_bits_of(&state->z[0]) & 0x7FFFFFFFU) <= 0x39D1B717U) /* 0.0004f */) ? 0 : 1;
 }
 
 /* Clips value to low ... high; 1 if a component changed by more than its slack or was NaN. */
-static int limit_all(float value[], const float low[], const float high[], const float slack[], int count)
+static int flexure_axis_online_f32_limit_all(float value[], const float low[], const float high[], const float slack[], int count)
 {
     int hit = 0;
     int i;
     for (i = 0; i < count; i++) {
-        const int unknown = is_nan(&value[i]);
+        const int unknown = flexure_axis_online_f32_is_nan(&value[i]);
         const float wanted = (unknown != 0) ? low[i] : value[i];
         const float raised = (wanted > low[i]) ? wanted : low[i];
         const float limited = (raised < high[i]) ? raised : high[i];
@@ -125,15 +125,15 @@ static int limit_all(float value[], const float low[], const float high[], const
 }
 
 /* Clips a displacement to its range; 1 if it was beyond by more than the slack. */
-static int limit_displacement(float value[1])
+static int flexure_axis_online_f32_limit_displacement(float value[1])
 {
     static const float LOW[1] = { -1e-04f }; /* m */
     static const float HIGH[1] = { 1e-04f }; /* m */
     static const float SLACK[1] = { 4e-10f }; /* m */
-    return limit_all(value, LOW, HIGH, SLACK, 1);
+    return flexure_axis_online_f32_limit_all(value, LOW, HIGH, SLACK, 1);
 }
 
-void flexure_axis_online_f32_init_20000hz_e8b80b62(flexure_axis_online_f32_state *state)
+void flexure_axis_online_f32_init_20000hz_032701d0(flexure_axis_online_f32_state *state)
 {
     static const float X_REST[1] = { 0.0f }; /* SI */
     if (state != NULL) {
@@ -149,11 +149,11 @@ void flexure_axis_online_f32_init_20000hz_e8b80b62(flexure_axis_online_f32_state
 }
 
 /* What is answered where nothing is known of the device: the safe drive, under which it comes to rest. */
-static void set_safe(flexure_axis_online_f32_output *out)
+static void flexure_axis_online_f32_set_safe(flexure_axis_online_f32_output *out)
 {
     int i;
     for (i = 0; i < 1; i++) {
-        out->drive[i] = U_SAFE[i];
+        out->drive[i] = FLEXURE_AXIS_ONLINE_F32_U_SAFE[i];
     }
     for (i = 0; i < 1; i++) {
         out->displacement[i] = 0.0f;
@@ -161,43 +161,43 @@ static void set_safe(flexure_axis_online_f32_output *out)
 }
 
 /* The answer to a lost state, which stays lost until it is initialised. */
-static uint32_t set_lost(flexure_axis_online_f32_state *state, flexure_axis_online_f32_output *out)
+static uint32_t flexure_axis_online_f32_set_lost(flexure_axis_online_f32_state *state, flexure_axis_online_f32_output *out)
 {
     state->ready = 0U;
-    set_safe(out);
+    flexure_axis_online_f32_set_safe(out);
     return FLEXURE_AXIS_ONLINE_F32_LOST;
 }
 
 /* Without a usable target: the safe drive, as fast as it may change, and the state that it leads to. */
-static void settle_safe(flexure_axis_online_f32_state *state, flexure_axis_online_f32_output *out)
+static void flexure_axis_online_f32_settle_safe(flexure_axis_online_f32_state *state, flexure_axis_online_f32_output *out)
 {
     int i;
     for (i = 0; i < 1; i++) {
-        out->drive[i] = U_SAFE[i];
+        out->drive[i] = FLEXURE_AXIS_ONLINE_F32_U_SAFE[i];
     }
     for (i = 0; i < 1; i++) {
         out->displacement[i] = state->z[i];
     }
-    wanted_advance(state->x);
-    balance_displacement(state->x, out->displacement, out->drive, state->z);
+    flexure_axis_online_f32_wanted_advance(state->x);
+    flexure_axis_online_f32_balance_displacement(state->x, out->displacement, out->drive, state->z);
 }
 
 /* The state becomes that of the next sample. */
-static void settle_proceed(flexure_axis_online_f32_state *state, const flexure_axis_online_f32_output *out)
+static void flexure_axis_online_f32_settle_proceed(flexure_axis_online_f32_state *state, const flexure_axis_online_f32_output *out)
 {
-    wanted_advance(state->x);
+    flexure_axis_online_f32_wanted_advance(state->x);
     state->z[0] = out->displacement[0];
 }
 
 /* Drives for out->displacement with every limit kept; the state becomes that of the next sample. */
-static uint32_t settle_within(flexure_axis_online_f32_state *state, flexure_axis_online_f32_output *out)
+static uint32_t flexure_axis_online_f32_settle_within(flexure_axis_online_f32_state *state, flexure_axis_online_f32_output *out)
 {
     uint32_t status = 0U;
-    wanted_drive(out->displacement, out->drive);
-    if (drive_inside(out->drive) == 0) {
-        (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, 1);
+    flexure_axis_online_f32_wanted_drive(out->displacement, out->drive);
+    if (flexure_axis_online_f32_drive_inside(out->drive) == 0) {
+        (void)flexure_axis_online_f32_limit_all(out->drive, FLEXURE_AXIS_ONLINE_F32_U_LOW, FLEXURE_AXIS_ONLINE_F32_U_HIGH, FLEXURE_AXIS_ONLINE_F32_U_SLACK, 1);
     }
-    settle_proceed(state, out);
+    flexure_axis_online_f32_settle_proceed(state, out);
     return status;
 }
 
@@ -207,34 +207,34 @@ uint32_t flexure_axis_online_f32_settle(flexure_axis_online_f32_state *state, co
     if (out == NULL) {
         /* nothing is written */
     } else if (state == NULL) {
-        set_safe(out);
-    } else if ((state->ready != FLEXURE_AXIS_ONLINE_F32_BUILD) || (is_lost(state) != 0)) {
-        status = set_lost(state, out);
-    } else if ((target != NULL) && (is_usable(target) != 0)) {
-        wanted_displacement(target, out->displacement);
-        if (displacement_inside(out->displacement) != 0) {
-            status = settle_within(state, out);
+        flexure_axis_online_f32_set_safe(out);
+    } else if ((state->ready != FLEXURE_AXIS_ONLINE_F32_BUILD) || (flexure_axis_online_f32_is_lost(state) != 0)) {
+        status = flexure_axis_online_f32_set_lost(state, out);
+    } else if ((target != NULL) && (flexure_axis_online_f32_is_usable(target) != 0)) {
+        flexure_axis_online_f32_wanted_displacement(target, out->displacement);
+        if (flexure_axis_online_f32_displacement_inside(out->displacement) != 0) {
+            status = flexure_axis_online_f32_settle_within(state, out);
         } else {
             int hit;
-            hit = limit_displacement(out->displacement);
-            status = settle_within(state, out);
+            hit = flexure_axis_online_f32_limit_displacement(out->displacement);
+            status = flexure_axis_online_f32_settle_within(state, out);
             if (hit != 0) {
                 status |= FLEXURE_AXIS_ONLINE_F32_DISPLACEMENT;
             }
         }
     } else {
-        settle_safe(state, out);
+        flexure_axis_online_f32_settle_safe(state, out);
     }
     return status;
 }
 
 /* 1 if every one of count values is within its limits or beyond by no more than the slack; 0 for NaN. */
-static int all_within(const float value[], const float low[], const float high[], const float slack[], int count)
+static int flexure_axis_online_f32_all_within(const float value[], const float low[], const float high[], const float slack[], int count)
 {
     int within = 1;
     int i;
     for (i = 0; i < count; i++) {
-        if ((is_nan(&value[i]) != 0) || (value[i] > (high[i] + slack[i])) || (value[i] < (low[i] - slack[i]))) {
+        if ((flexure_axis_online_f32_is_nan(&value[i]) != 0) || (value[i] > (high[i] + slack[i])) || (value[i] < (low[i] - slack[i]))) {
             within = 0;
         }
     }
@@ -242,26 +242,26 @@ static int all_within(const float value[], const float low[], const float high[]
 }
 
 /* The limits that a motion breaks beside those of the drives, as a status; 0 for none. */
-static uint32_t motion_broken(const flexure_axis_online_f32_state *at)
+static uint32_t flexure_axis_online_f32_motion_broken(const flexure_axis_online_f32_state *at)
 {
     static const float LOW[1] = { -1e-04f }; /* m */
     static const float HIGH[1] = { 1e-04f }; /* m */
     static const float SLACK[1] = { 4e-10f }; /* m */
     uint32_t status = 0U;
-    if (all_within(at->z, LOW, HIGH, SLACK, 1) == 0) {
+    if (flexure_axis_online_f32_all_within(at->z, LOW, HIGH, SLACK, 1) == 0) {
         status = FLEXURE_AXIS_ONLINE_F32_DISPLACEMENT;
     }
     return status;
 }
 
 /* The drives of the motion whose state is at, within their limits. */
-static uint32_t motion_drives(flexure_axis_online_f32_state *at, const flexure_axis_online_f32_state *state, const float target[3], flexure_axis_online_f32_output *out)
+static uint32_t flexure_axis_online_f32_motion_drives(flexure_axis_online_f32_state *at, const flexure_axis_online_f32_state *state, const float target[3], flexure_axis_online_f32_output *out)
 {
     uint32_t status = 0U;
     int i;
     (void)state;
-    motion_drive(target, out->drive);
-    if (limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, 1) != 0) {
+    flexure_axis_online_f32_motion_drive(target, out->drive);
+    if (flexure_axis_online_f32_limit_all(out->drive, FLEXURE_AXIS_ONLINE_F32_U_LOW, FLEXURE_AXIS_ONLINE_F32_U_HIGH, FLEXURE_AXIS_ONLINE_F32_U_SLACK, 1) != 0) {
         status = FLEXURE_AXIS_ONLINE_F32_DRIVE;
     }
     for (i = 0; i < 1; i++) {
@@ -277,19 +277,19 @@ uint32_t flexure_axis_online_f32_step(flexure_axis_online_f32_state *state, cons
     if (out == NULL) {
         /* nothing is written */
     } else if (state == NULL) {
-        set_safe(out);
-    } else if ((state->ready != FLEXURE_AXIS_ONLINE_F32_BUILD) || (is_lost(state) != 0)) {
-        status = set_lost(state, out);
-    } else if ((target == NULL) || (is_usable(target) == 0)) {
-        settle_safe(state, out);
+        flexure_axis_online_f32_set_safe(out);
+    } else if ((state->ready != FLEXURE_AXIS_ONLINE_F32_BUILD) || (flexure_axis_online_f32_is_lost(state) != 0)) {
+        status = flexure_axis_online_f32_set_lost(state, out);
+    } else if ((target == NULL) || (flexure_axis_online_f32_is_usable(target) == 0)) {
+        flexure_axis_online_f32_settle_safe(state, out);
     } else {
         flexure_axis_online_f32_state at;
         uint32_t broken;
-        motion_displacement(target, at.z);
-        motion_state(target, at.x);
-        broken = motion_broken(&at);
+        flexure_axis_online_f32_motion_displacement(target, at.z);
+        flexure_axis_online_f32_motion_state(target, at.x);
+        broken = flexure_axis_online_f32_motion_broken(&at);
         if (broken == 0U) {
-            status = motion_drives(&at, state, target, out);
+            status = flexure_axis_online_f32_motion_drives(&at, state, target, out);
             *state = at;
         } else {
             status = broken | flexure_axis_online_f32_settle(state, target, out);

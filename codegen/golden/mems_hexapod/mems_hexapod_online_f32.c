@@ -7,17 +7,17 @@
 #error "compile this without -ffast-math, -Ofast, -ffinite-math-only or /fp:fast: they remove the checks for NaN"
 #endif
 
-static const float U_LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
-static const float U_HIGH[6] = { 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f }; /* W */
-static const float U_SLACK[6] = { 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f }; /* W */
-static const float U_LEAST[6] = { -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f }; /* admissible, W */
-static const float U_MOST[6] = { 1.000004f, 1.000004f, 1.000004f, 1.000004f, 1.000004f, 1.000004f }; /* admissible, W */
-static const float U_SAFE[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
-static const float X_REST[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
+static const float MEMS_HEXAPOD_ONLINE_F32_U_LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
+static const float MEMS_HEXAPOD_ONLINE_F32_U_HIGH[6] = { 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f }; /* W */
+static const float MEMS_HEXAPOD_ONLINE_F32_U_SLACK[6] = { 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f }; /* W */
+static const float MEMS_HEXAPOD_ONLINE_F32_U_LEAST[6] = { -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f }; /* admissible, W */
+static const float MEMS_HEXAPOD_ONLINE_F32_U_MOST[6] = { 1.000004f, 1.000004f, 1.000004f, 1.000004f, 1.000004f, 1.000004f }; /* admissible, W */
+static const float MEMS_HEXAPOD_ONLINE_F32_U_SAFE[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
+static const float MEMS_HEXAPOD_ONLINE_F32_X_REST[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
 
 /* The bits of a number in memory. Whether a number is one, and how large, is asked of these: a compiler that is told that no number is NaN
  * may leave comparisons of numbers out, never those of integers. */
-static uint32_t bits_of(const float *number)
+static uint32_t mems_hexapod_online_f32_bits_of(const float *number)
 {
     union { float number; uint32_t bits; } v;
     v.number = *number;
@@ -25,15 +25,15 @@ static uint32_t bits_of(const float *number)
 }
 
 /* 1 if a number in memory is NaN. */
-static int is_nan(const float *number)
+static int mems_hexapod_online_f32_is_nan(const float *number)
 {
-    return ((bits_of(number) & 0x7FFFFFFFU) > 0x7F800000U) ? 1 : 0;
+    return ((mems_hexapod_online_f32_bits_of(number) & 0x7FFFFFFFU) > 0x7F800000U) ? 1 : 0;
 }
 
 /* Square root as IEEE 754 has it: rounded correctly, not a number for a negative one. The core's own instruction where it has one, or
    the caller's CTRLGEN_SQRT(a), which must be rounded correctly too. Elsewhere, and with CTRLGEN_PORTABLE_SQRT, Newton steps and a
    correction of the last digit in integers, S being the digits of the root and R those of a less S squared: the same bits. */
-static float square_root(float a)
+static float mems_hexapod_online_f32_square_root(float a)
 {
     float y = a;
 #if defined(CTRLGEN_SQRT)
@@ -83,28 +83,28 @@ static float square_root(float a)
     return y;
 }
 
-#define LEVER_LONG_1 (1e-06f) /* stage.lever_long^2 */
-#define LEVER_LONG (0.001f) /* stage.lever_long */
+#define MEMS_HEXAPOD_ONLINE_F32_LEVER_LONG_1 (1e-06f) /* stage.lever_long^2 */
+#define MEMS_HEXAPOD_ONLINE_F32_LEVER_LONG (0.001f) /* stage.lever_long */
 /* f(actuator, stage, stage.lever_long, stage.lever_short, stage.notch.theta_z_per_M_z) */
-#define ACTUATOR_STAGE_1 (1895.5361f)
+#define MEMS_HEXAPOD_ONLINE_F32_ACTUATOR_STAGE_1 (1895.5361f)
 /* (((2 * (stage.lever_long / stage.lever_short)) * stage.half_stage_stiffness) / stage.lever_long) / stage.lever_long */
-#define LEVER_LONG_LEVER_SHORT_1 (1.03154e+12f)
-#define BEAM_ANGLE_ACTUATOR_1 (0.0005435469f) /* sin(actuator.beam_angle) * f(actuator) */
-#define BEAM_ANGLE_ACTUATOR_2 (2.9544324e-07f) /* (sin(actuator.beam_angle) * f(actuator))^2 */
+#define MEMS_HEXAPOD_ONLINE_F32_LEVER_LONG_LEVER_SHORT_1 (1.03154e+12f)
+#define MEMS_HEXAPOD_ONLINE_F32_BEAM_ANGLE_ACTUATOR_1 (0.0005435469f) /* sin(actuator.beam_angle) * f(actuator) */
+#define MEMS_HEXAPOD_ONLINE_F32_BEAM_ANGLE_ACTUATOR_2 (2.9544324e-07f) /* (sin(actuator.beam_angle) * f(actuator))^2 */
 /* 4 * (f(actuator.beam_angle, actuator.thickness, actuator.beam_width, actuator.young, actuator.expansion_slope) / 2) */
-#define BEAM_ANGLE_THICKNESS_1 (2.1273852e-06f)
-#define AMBIENT (295.15f) /* actuator.ambient */
+#define MEMS_HEXAPOD_ONLINE_F32_BEAM_ANGLE_THICKNESS_1 (2.1273852e-06f)
+#define MEMS_HEXAPOD_ONLINE_F32_AMBIENT (295.15f) /* actuator.ambient */
 /* (1 / (actuator.thermal_resistance / actuator.time_constant)) * (1 / actuator.time_constant) */
-#define THERMAL_RESISTANCE_TIME_CONSTANT_1 (0.0018181818f)
-#define THERMAL_RESISTANCE (550.0f) /* actuator.thermal_resistance */
+#define MEMS_HEXAPOD_ONLINE_F32_THERMAL_RESISTANCE_TIME_CONSTANT_1 (0.0018181818f)
+#define MEMS_HEXAPOD_ONLINE_F32_THERMAL_RESISTANCE (550.0f) /* actuator.thermal_resistance */
 /* -(((exp(-(0.001 / actuator.time_constant)) - 1) * actuator.time_constant) / actuator.time_constant) */
-#define TIME_CONSTANT_1 (0.18126924f)
+#define MEMS_HEXAPOD_ONLINE_F32_TIME_CONSTANT_1 (0.18126924f)
 /* (-1) / f(actuator.time_constant, actuator.thermal_resistance) */
-#define TIME_CONSTANT_THERMAL_RESISTANCE_1 (0.010030283f)
-#define EXPANSION (3e-06f) /* actuator.expansion */
-#define EXPANSION_SLOPE (3e-09f) /* actuator.expansion_slope */
+#define MEMS_HEXAPOD_ONLINE_F32_TIME_CONSTANT_THERMAL_RESISTANCE_1 (0.010030283f)
+#define MEMS_HEXAPOD_ONLINE_F32_EXPANSION (3e-06f) /* actuator.expansion */
+#define MEMS_HEXAPOD_ONLINE_F32_EXPANSION_SLOPE (3e-09f) /* actuator.expansion_slope */
 /* sin(actuator.beam_angle) * (actuator.thickness * (actuator.beam_width * (actuator.young * 30))) */
-#define BEAM_ANGLE_THICKNESS_2 (177.2821f)
+#define MEMS_HEXAPOD_ONLINE_F32_BEAM_ANGLE_THICKNESS_2 (177.2821f)
 
 /* Restoring force [N] of an axis: F = F^l + F^n [N] on the bar for a stage displacement `d` [m]. Source: S1 eq. (12).
  * F^l = (K^t_14 / r + r N / (c e_4^2)) d [N] on the actuator bar, `d` [m] the stage displacement. r = e_4/e_3 is the
@@ -112,26 +112,26 @@ static float square_root(float a)
  * Source: S1 eq. (9), referred to the bar by virtual work. F^n = 2 r k_a sin(phi) cos(phi) delta_y [N] on the bar,
  * sin(phi) = d/e_4, r = e_4/e_3. The axial stiffness k_a of one half stage, rotated by phi, resists the parasitic
  * shortening delta_y of eq. (10). Source: S1 eq. (11), with K^n the rotated axial stiffness. */
-static inline float restoring_force(float z)
+static inline float mems_hexapod_online_f32_restoring_force(float z)
 {
     const float t1 = z * z;
-    const float t2 = square_root(LEVER_LONG_1 - t1);
-    const float t3 = (z * t2) * (t1 / (LEVER_LONG + t2));
-    return (ACTUATOR_STAGE_1 * z) + (LEVER_LONG_LEVER_SHORT_1 * t3);
+    const float t2 = mems_hexapod_online_f32_square_root(MEMS_HEXAPOD_ONLINE_F32_LEVER_LONG_1 - t1);
+    const float t3 = (z * t2) * (t1 / (MEMS_HEXAPOD_ONLINE_F32_LEVER_LONG + t2));
+    return (MEMS_HEXAPOD_ONLINE_F32_ACTUATOR_STAGE_1 * z) + (MEMS_HEXAPOD_ONLINE_F32_LEVER_LONG_LEVER_SHORT_1 * t3);
 }
 
 /* Actuator force [N] of an axis: F = 2 n alpha(T) (T - T_amb) E w_1 h sin(theta) [N] on the actuator bar, `T` [K].
  * Source: S1 eq. (4), where T-bar is the average temperature above ambient. alpha(T) = alpha_0 + alpha_1 (T - 0 degC)
  * [1/K], `T` [K]. Source: S1 Table 1. */
-static inline float actuator_force(float x)
+static inline float mems_hexapod_online_f32_actuator_force(float x)
 {
-    const float t1 = (EXPANSION + (EXPANSION_SLOPE * (x - 273.15f))) * (x - AMBIENT);
-    return BEAM_ANGLE_THICKNESS_2 * t1;
+    const float t1 = (MEMS_HEXAPOD_ONLINE_F32_EXPANSION + (MEMS_HEXAPOD_ONLINE_F32_EXPANSION_SLOPE * (x - 273.15f))) * (x - MEMS_HEXAPOD_ONLINE_F32_AMBIENT);
+    return MEMS_HEXAPOD_ONLINE_F32_BEAM_ANGLE_THICKNESS_2 * t1;
 }
 
 /* Displacement at which the platform pose is `target`, theta_x [rad], theta_y [rad], theta_z [rad], delta_x [m],
  * delta_y [m], delta_z [m]. */
-static void wanted_displacement(const float target[6], float result[6])
+static void mems_hexapod_online_f32_wanted_displacement(const float target[6], float result[6])
 {
     static const float TABLE_1[6][6] = {
         { -0.0026423377f, -0.0037076124f, 0.0041873017f, 1.0f, 0.0f, 0.64624566f },
@@ -156,58 +156,58 @@ static void wanted_displacement(const float target[6], float result[6])
 
 /* States that the displacement needs at rest: temperature_1X [K], temperature_1Y [K], temperature_2X [K],
  * temperature_2Y [K], temperature_3X [K], temperature_3Y [K]. */
-static void wanted_state(const float wanted[6], float result[6])
+static void mems_hexapod_online_f32_wanted_state(const float wanted[6], float result[6])
 {
     int i;
     for (i = 0; i < 6; i++) {
-        const float t1 = restoring_force(wanted[i]);
-        const float t2 = BEAM_ANGLE_ACTUATOR_1 + square_root(BEAM_ANGLE_ACTUATOR_2 + (BEAM_ANGLE_THICKNESS_1 * t1));
-        result[i] = AMBIENT + (2.0f * (t1 / t2));
+        const float t1 = mems_hexapod_online_f32_restoring_force(wanted[i]);
+        const float t2 = MEMS_HEXAPOD_ONLINE_F32_BEAM_ANGLE_ACTUATOR_1 + mems_hexapod_online_f32_square_root(MEMS_HEXAPOD_ONLINE_F32_BEAM_ANGLE_ACTUATOR_2 + (MEMS_HEXAPOD_ONLINE_F32_BEAM_ANGLE_THICKNESS_1 * t1));
+        result[i] = MEMS_HEXAPOD_ONLINE_F32_AMBIENT + (2.0f * (t1 / t2));
     }
 }
 
 /* Heater power that keeps the actuator temperatures `state` at rest. */
-static void wanted_drive(const float state[6], float result[6])
+static void mems_hexapod_online_f32_wanted_drive(const float state[6], float result[6])
 {
     int i;
     for (i = 0; i < 6; i++) {
-        result[i] = THERMAL_RESISTANCE_TIME_CONSTANT_1 * (state[i] - AMBIENT);
+        result[i] = MEMS_HEXAPOD_ONLINE_F32_THERMAL_RESISTANCE_TIME_CONSTANT_1 * (state[i] - MEMS_HEXAPOD_ONLINE_F32_AMBIENT);
     }
 }
 
 /* States under `drive`, at rest: temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K],
  * temperature_3X [K], temperature_3Y [K]. */
-static void wanted_advance(const float drive[6], float result[6])
+static void mems_hexapod_online_f32_wanted_advance(const float drive[6], float result[6])
 {
     int i;
     for (i = 0; i < 6; i++) {
-        result[i] = AMBIENT + (THERMAL_RESISTANCE * drive[i]);
+        result[i] = MEMS_HEXAPOD_ONLINE_F32_AMBIENT + (MEMS_HEXAPOD_ONLINE_F32_THERMAL_RESISTANCE * drive[i]);
     }
 }
 
 /* Heater power that leads from x to the actuator temperatures `state` within one sample of 0.001 s. */
-static void step_drive(const float x[6], const float state[6], float result[6])
+static void mems_hexapod_online_f32_step_drive(const float x[6], const float state[6], float result[6])
 {
     int i;
     for (i = 0; i < 6; i++) {
-        const float t1 = state[i] - (x[i] - (TIME_CONSTANT_1 * (x[i] - AMBIENT)));
-        result[i] = TIME_CONSTANT_THERMAL_RESISTANCE_1 * t1;
+        const float t1 = state[i] - (x[i] - (MEMS_HEXAPOD_ONLINE_F32_TIME_CONSTANT_1 * (x[i] - MEMS_HEXAPOD_ONLINE_F32_AMBIENT)));
+        result[i] = MEMS_HEXAPOD_ONLINE_F32_TIME_CONSTANT_THERMAL_RESISTANCE_1 * t1;
     }
 }
 
 /* States under `drive`, one sample of 0.001 s later: temperature_1X [K], temperature_1Y [K], temperature_2X [K],
  * temperature_2Y [K], temperature_3X [K], temperature_3Y [K]. */
-static void step_advance(const float x[6], const float drive[6], float result[6])
+static void mems_hexapod_online_f32_step_advance(const float x[6], const float drive[6], float result[6])
 {
     int i;
     for (i = 0; i < 6; i++) {
-        const float t1 = TIME_CONSTANT_1 * ((THERMAL_RESISTANCE * drive[i]) - (x[i] - AMBIENT));
+        const float t1 = MEMS_HEXAPOD_ONLINE_F32_TIME_CONSTANT_1 * ((MEMS_HEXAPOD_ONLINE_F32_THERMAL_RESISTANCE * drive[i]) - (x[i] - MEMS_HEXAPOD_ONLINE_F32_AMBIENT));
         result[i] = x[i] + t1;
     }
 }
 
 /* Displacement at which the forces balance, g(x, z, drive) = 0: 6 Newton steps z - g/(dg/dz) from z. */
-static void balance_displacement(const float x[6], const float z[6], float result[6])
+static void mems_hexapod_online_f32_balance_displacement(const float x[6], const float z[6], float result[6])
 {
     int i;
     for (i = 0; i < 6; i++) {
@@ -215,14 +215,14 @@ static void balance_displacement(const float x[6], const float z[6], float resul
         int step;
         for (step = 0; step < 6; step++) {
             const float t1 = value * value;
-            const float t2 = square_root(LEVER_LONG_1 - t1);
-            const float t3 = LEVER_LONG + t2;
+            const float t2 = mems_hexapod_online_f32_square_root(MEMS_HEXAPOD_ONLINE_F32_LEVER_LONG_1 - t1);
+            const float t3 = MEMS_HEXAPOD_ONLINE_F32_LEVER_LONG + t2;
             const float t4 = t1 / t3;
             const float t5 = value / t2;
-            const float t6 = (LEVER_LONG_LEVER_SHORT_1 * t2) - (LEVER_LONG_LEVER_SHORT_1 * (value * t5));
+            const float t6 = (MEMS_HEXAPOD_ONLINE_F32_LEVER_LONG_LEVER_SHORT_1 * t2) - (MEMS_HEXAPOD_ONLINE_F32_LEVER_LONG_LEVER_SHORT_1 * (value * t5));
             const float t7 = (2.0f * (value / t3)) + ((t4 / t3) * t5);
-            const float t8 = (t4 * t6) + (LEVER_LONG_LEVER_SHORT_1 * ((value * t2) * t7));
-            const float t9 = (actuator_force(x[i]) - restoring_force(value)) / (ACTUATOR_STAGE_1 + t8);
+            const float t8 = (t4 * t6) + (MEMS_HEXAPOD_ONLINE_F32_LEVER_LONG_LEVER_SHORT_1 * ((value * t2) * t7));
+            const float t9 = (mems_hexapod_online_f32_actuator_force(x[i]) - mems_hexapod_online_f32_restoring_force(value)) / (MEMS_HEXAPOD_ONLINE_F32_ACTUATOR_STAGE_1 + t8);
             value = value + t9;
         }
         result[i] = value;
@@ -230,7 +230,7 @@ static void balance_displacement(const float x[6], const float z[6], float resul
 }
 
 /* The square of each wire flexure stress over its limit at displacement `wanted`. */
-static void composite_shares(const float wanted[6], float result[12])
+static void mems_hexapod_online_f32_composite_shares(const float wanted[6], float result[12])
 {
     static const float TABLE_1[6][6] = {
         { 7.163396e+09f, -8.725365e+09f, -1.0396979e+10f, -4.441134e+09f, 2.0934612e+09f, 8.624482e+09f },
@@ -301,13 +301,13 @@ static void composite_shares(const float wanted[6], float result[12])
         const float t4 = (TABLE_4[i][0] * wanted_0) + (TABLE_4[i][1] * wanted_1) + (TABLE_4[i][2] * wanted_2) +
             (TABLE_4[i][3] * wanted_3) + (TABLE_4[i][4] * wanted_4) + (TABLE_4[i][5] * wanted_5);
         const float t5 = ((t3 * t3) + (t4 * t4)) + 0.3025f;
-        const float t6 = square_root(t5) + shared1[i / 2];
+        const float t6 = mems_hexapod_online_f32_square_root(t5) + shared1[i / 2];
         result[i] = 3.3057851e-18f * ((t6 * t6) + shared2[i / 2]);
     }
 }
 
 /* A cheap upper bound of the root of the largest of these shares: no more than 1 means that every limit is kept. */
-static float composite_bound(const float wanted[6])
+static float mems_hexapod_online_f32_composite_bound(const float wanted[6])
 {
     const float t1 = ((-7418.532f) * wanted[0]) - (4198.844f * wanted[1]) + (72.96058f * wanted[2]) + (8524.06f *
         wanted[3]) + (7345.572f * wanted[4]) - (4325.2153f * wanted[5]);
@@ -326,64 +326,64 @@ static float composite_bound(const float wanted[6])
 }
 
 /* 1 if every displacement is inside its limits; 0 for NaN. */
-static int displacement_inside(const float value[6])
+static int mems_hexapod_online_f32_displacement_inside(const float value[6])
 {
-    return ((bits_of(&value[0]) <= 0x3866AFCDU) /* 5.5e-05f */ &&
-        (bits_of(&value[1]) <= 0x3866AFCDU) /* 5.5e-05f */ &&
-        (bits_of(&value[2]) <= 0x3866AFCDU) /* 5.5e-05f */ &&
-        (bits_of(&value[3]) <= 0x3866AFCDU) /* 5.5e-05f */ &&
-        (bits_of(&value[4]) <= 0x3866AFCDU) /* 5.5e-05f */ &&
-        (bits_of(&value[5]) <= 0x3866AFCDU) /* 5.5e-05f */) ? 1 : 0;
+    return ((mems_hexapod_online_f32_bits_of(&value[0]) <= 0x3866AFCDU) /* 5.5e-05f */ &&
+        (mems_hexapod_online_f32_bits_of(&value[1]) <= 0x3866AFCDU) /* 5.5e-05f */ &&
+        (mems_hexapod_online_f32_bits_of(&value[2]) <= 0x3866AFCDU) /* 5.5e-05f */ &&
+        (mems_hexapod_online_f32_bits_of(&value[3]) <= 0x3866AFCDU) /* 5.5e-05f */ &&
+        (mems_hexapod_online_f32_bits_of(&value[4]) <= 0x3866AFCDU) /* 5.5e-05f */ &&
+        (mems_hexapod_online_f32_bits_of(&value[5]) <= 0x3866AFCDU) /* 5.5e-05f */) ? 1 : 0;
 }
 
 /* 1 if every heater power is inside its limits; 0 for NaN. */
-static int drive_inside(const float value[6])
+static int mems_hexapod_online_f32_drive_inside(const float value[6])
 {
-    return ((bits_of(&value[0]) <= 0x3F800000U) /* 1.0f */ &&
-        (bits_of(&value[1]) <= 0x3F800000U) /* 1.0f */ &&
-        (bits_of(&value[2]) <= 0x3F800000U) /* 1.0f */ &&
-        (bits_of(&value[3]) <= 0x3F800000U) /* 1.0f */ &&
-        (bits_of(&value[4]) <= 0x3F800000U) /* 1.0f */ &&
-        (bits_of(&value[5]) <= 0x3F800000U) /* 1.0f */) ? 1 : 0;
+    return ((mems_hexapod_online_f32_bits_of(&value[0]) <= 0x3F800000U) /* 1.0f */ &&
+        (mems_hexapod_online_f32_bits_of(&value[1]) <= 0x3F800000U) /* 1.0f */ &&
+        (mems_hexapod_online_f32_bits_of(&value[2]) <= 0x3F800000U) /* 1.0f */ &&
+        (mems_hexapod_online_f32_bits_of(&value[3]) <= 0x3F800000U) /* 1.0f */ &&
+        (mems_hexapod_online_f32_bits_of(&value[4]) <= 0x3F800000U) /* 1.0f */ &&
+        (mems_hexapod_online_f32_bits_of(&value[5]) <= 0x3F800000U) /* 1.0f */) ? 1 : 0;
 }
 
 /* 1 if every component is a number of a plausible size. */
-static int is_usable(const float target[6])
+static int mems_hexapod_online_f32_is_usable(const float target[6])
 {
-    return (((bits_of(&target[0]) & 0x7FFFFFFFU) <= 0x427E73F3U) /* 63.61323f */ &&
-        ((bits_of(&target[1]) & 0x7FFFFFFFU) <= 0x427E73F3U) /* 63.61323f */ &&
-        ((bits_of(&target[2]) & 0x7FFFFFFFU) <= 0x427E73F3U) /* 63.61323f */ &&
-        ((bits_of(&target[3]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ &&
-        ((bits_of(&target[4]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ &&
-        ((bits_of(&target[5]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */) ? 1 : 0;
+    return (((mems_hexapod_online_f32_bits_of(&target[0]) & 0x7FFFFFFFU) <= 0x427E73F3U) /* 63.61323f */ &&
+        ((mems_hexapod_online_f32_bits_of(&target[1]) & 0x7FFFFFFFU) <= 0x427E73F3U) /* 63.61323f */ &&
+        ((mems_hexapod_online_f32_bits_of(&target[2]) & 0x7FFFFFFFU) <= 0x427E73F3U) /* 63.61323f */ &&
+        ((mems_hexapod_online_f32_bits_of(&target[3]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ &&
+        ((mems_hexapod_online_f32_bits_of(&target[4]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ &&
+        ((mems_hexapod_online_f32_bits_of(&target[5]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */) ? 1 : 0;
 }
 
 /* 1 if a number of the state is NaN, infinite or far beyond its range: 4 times the largest magnitude of it. Asked first where
  * displacements depend on the state or effects remember, else where a limit is met: until then it would show in the drives, or is
  * written anew. */
-static int is_lost(const mems_hexapod_online_f32_state *state)
+static int mems_hexapod_online_f32_is_lost(const mems_hexapod_online_f32_state *state)
 {
-    return (((bits_of(&state->x[0]) & 0x7FFFFFFFU) <= 0x454DC99AU) /* 3292.6f */ &&
-        ((bits_of(&state->x[1]) & 0x7FFFFFFFU) <= 0x454DC99AU) /* 3292.6f */ &&
-        ((bits_of(&state->x[2]) & 0x7FFFFFFFU) <= 0x454DC99AU) /* 3292.6f */ &&
-        ((bits_of(&state->x[3]) & 0x7FFFFFFFU) <= 0x454DC99AU) /* 3292.6f */ &&
-        ((bits_of(&state->x[4]) & 0x7FFFFFFFU) <= 0x454DC99AU) /* 3292.6f */ &&
-        ((bits_of(&state->x[5]) & 0x7FFFFFFFU) <= 0x454DC99AU) /* 3292.6f */ &&
-        ((bits_of(&state->z[0]) & 0x7FFFFFFFU) <= 0x3966AFCDU) /* 0.00022f */ &&
-        ((bits_of(&state->z[1]) & 0x7FFFFFFFU) <= 0x3966AFCDU) /* 0.00022f */ &&
-        ((bits_of(&state->z[2]) & 0x7FFFFFFFU) <= 0x3966AFCDU) /* 0.00022f */ &&
-        ((bits_of(&state->z[3]) & 0x7FFFFFFFU) <= 0x3966AFCDU) /* 0.00022f */ &&
-        ((bits_of(&state->z[4]) & 0x7FFFFFFFU) <= 0x3966AFCDU) /* 0.00022f */ &&
-        ((bits_of(&state->z[5]) & 0x7FFFFFFFU) <= 0x3966AFCDU) /* 0.00022f */) ? 0 : 1;
+    return (((mems_hexapod_online_f32_bits_of(&state->x[0]) & 0x7FFFFFFFU) <= 0x454DC99AU) /* 3292.6f */ &&
+        ((mems_hexapod_online_f32_bits_of(&state->x[1]) & 0x7FFFFFFFU) <= 0x454DC99AU) /* 3292.6f */ &&
+        ((mems_hexapod_online_f32_bits_of(&state->x[2]) & 0x7FFFFFFFU) <= 0x454DC99AU) /* 3292.6f */ &&
+        ((mems_hexapod_online_f32_bits_of(&state->x[3]) & 0x7FFFFFFFU) <= 0x454DC99AU) /* 3292.6f */ &&
+        ((mems_hexapod_online_f32_bits_of(&state->x[4]) & 0x7FFFFFFFU) <= 0x454DC99AU) /* 3292.6f */ &&
+        ((mems_hexapod_online_f32_bits_of(&state->x[5]) & 0x7FFFFFFFU) <= 0x454DC99AU) /* 3292.6f */ &&
+        ((mems_hexapod_online_f32_bits_of(&state->z[0]) & 0x7FFFFFFFU) <= 0x3966AFCDU) /* 0.00022f */ &&
+        ((mems_hexapod_online_f32_bits_of(&state->z[1]) & 0x7FFFFFFFU) <= 0x3966AFCDU) /* 0.00022f */ &&
+        ((mems_hexapod_online_f32_bits_of(&state->z[2]) & 0x7FFFFFFFU) <= 0x3966AFCDU) /* 0.00022f */ &&
+        ((mems_hexapod_online_f32_bits_of(&state->z[3]) & 0x7FFFFFFFU) <= 0x3966AFCDU) /* 0.00022f */ &&
+        ((mems_hexapod_online_f32_bits_of(&state->z[4]) & 0x7FFFFFFFU) <= 0x3966AFCDU) /* 0.00022f */ &&
+        ((mems_hexapod_online_f32_bits_of(&state->z[5]) & 0x7FFFFFFFU) <= 0x3966AFCDU) /* 0.00022f */) ? 0 : 1;
 }
 
 /* Clips value to low ... high; 1 if a component changed by more than its slack or was NaN. */
-static int limit_all(float value[], const float low[], const float high[], const float slack[], int count)
+static int mems_hexapod_online_f32_limit_all(float value[], const float low[], const float high[], const float slack[], int count)
 {
     int hit = 0;
     int i;
     for (i = 0; i < count; i++) {
-        const int unknown = is_nan(&value[i]);
+        const int unknown = mems_hexapod_online_f32_is_nan(&value[i]);
         const float wanted = (unknown != 0) ? low[i] : value[i];
         const float raised = (wanted > low[i]) ? wanted : low[i];
         const float limited = (raised < high[i]) ? raised : high[i];
@@ -397,22 +397,22 @@ static int limit_all(float value[], const float low[], const float high[], const
 }
 
 /* Clips a displacement to its range; 1 if it was beyond by more than the slack. */
-static int limit_displacement(float value[6])
+static int mems_hexapod_online_f32_limit_displacement(float value[6])
 {
     static const float LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* m */
     static const float HIGH[6] = { 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f }; /* m */
     static const float SLACK[6] = { 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f }; /* m */
-    return limit_all(value, LOW, HIGH, SLACK, 6);
+    return mems_hexapod_online_f32_limit_all(value, LOW, HIGH, SLACK, 6);
 }
 
 /* 1 if every drive is within its limits or beyond by no more than the slack. */
-static int drives_admissible(const mems_hexapod_online_f32_state *state, const float drive[6])
+static int mems_hexapod_online_f32_drives_admissible(const mems_hexapod_online_f32_state *state, const float drive[6])
 {
     int admissible = 1;
     int i;
     (void)state;
     for (i = 0; i < 6; i++) {
-        if ((is_nan(&drive[i]) != 0) || (drive[i] > U_MOST[i]) || (drive[i] < U_LEAST[i])) {
+        if ((mems_hexapod_online_f32_is_nan(&drive[i]) != 0) || (drive[i] > MEMS_HEXAPOD_ONLINE_F32_U_MOST[i]) || (drive[i] < MEMS_HEXAPOD_ONLINE_F32_U_LEAST[i])) {
             admissible = 0;
         }
     }
@@ -421,7 +421,7 @@ static int drives_admissible(const mems_hexapod_online_f32_state *state, const f
 
 /* Scales a displacement that breaks a composite limit toward home, several times where the limited quantity is not proportional to it: 0
  * untouched, 1 scaled, 2 scaled by more than the slack. */
-static int scale_home(const mems_hexapod_online_f32_state *state, float wanted[6])
+static int mems_hexapod_online_f32_scale_home(const mems_hexapod_online_f32_state *state, float wanted[6])
 {
     int hit = 0;
     int round;
@@ -430,14 +430,14 @@ static int scale_home(const mems_hexapod_online_f32_state *state, float wanted[6
         float share[12];
         float worst;
         int i;
-        composite_shares(wanted, share);
+        mems_hexapod_online_f32_composite_shares(wanted, share);
         worst = share[0];
         for (i = 0; i < 12; i++) {
             worst = (share[i] > worst) ? share[i] : worst;
         }
         if (worst > 1.0f) {
             int scaled = 1;
-            worst = square_root(worst);
+            worst = mems_hexapod_online_f32_square_root(worst);
             if (worst > 1.000004f) {
                 scaled = 2;
             }
@@ -451,11 +451,11 @@ static int scale_home(const mems_hexapod_online_f32_state *state, float wanted[6
 }
 
 /* The same where a cheap bound does not show that every composite limit is kept. */
-static int limit_composite(const mems_hexapod_online_f32_state *state, float wanted[6])
+static int mems_hexapod_online_f32_limit_composite(const mems_hexapod_online_f32_state *state, float wanted[6])
 {
     int hit = 0;
-    if (!(composite_bound(wanted) <= 1.0f)) {
-        hit = scale_home(state, wanted);
+    if (!(mems_hexapod_online_f32_composite_bound(wanted) <= 1.0f)) {
+        hit = mems_hexapod_online_f32_scale_home(state, wanted);
     }
     return hit;
 }
@@ -463,7 +463,7 @@ static int limit_composite(const mems_hexapod_online_f32_state *state, float wan
 /* The displacement in range whose followed signal is nearest to that of the displacement beyond, to first order, from beyond clipped to
  * the range: sweeps of projected coordinate descent (C. Hildreth, Naval Res. Logist. Quart. 4 (1957) 79) on |W (value - beyond)|^2,
  * W the slope of the followed signal at home. */
-static void nearest_displacement(const float beyond[6], float value[6])
+static void mems_hexapod_online_f32_nearest_displacement(const float beyond[6], float value[6])
 {
     static const float P[6][6] = {
         { 1.0f, 0.49971864f, -0.2363756f, -0.07558483f, -0.2363756f, -0.20494296f },
@@ -507,17 +507,17 @@ static void nearest_displacement(const float beyond[6], float value[6])
 }
 
 /* Actuator state (limited) and drives (not limited) that out->displacement needs: with settling at rest, else at the next sample. */
-static void wanted_drives(const mems_hexapod_online_f32_state *state, int settling, mems_hexapod_online_f32_output *out)
+static void mems_hexapod_online_f32_wanted_drives(const mems_hexapod_online_f32_state *state, int settling, mems_hexapod_online_f32_output *out)
 {
     (void)state;
     (void)settling;
-    wanted_state(out->displacement, out->state);
-    step_drive(state->x, out->state, out->drive);
+    mems_hexapod_online_f32_wanted_state(out->displacement, out->state);
+    mems_hexapod_online_f32_step_drive(state->x, out->state, out->drive);
 }
 
 /* Line search from origin toward out->displacement, whose drives are inadmissible: secants of the drive that is first
  * at its limit. Leaves the farthest admissible displacement found and its drives; 1 if even those of origin are inadmissible. */
-static int line_search(const mems_hexapod_online_f32_state *state, int settling, const float origin[6], mems_hexapod_online_f32_output *out)
+static int mems_hexapod_online_f32_line_search(const mems_hexapod_online_f32_state *state, int settling, const float origin[6], mems_hexapod_online_f32_output *out)
 {
     float direction[6];
     float at_target[6];
@@ -529,8 +529,8 @@ static int line_search(const mems_hexapod_online_f32_state *state, int settling,
     for (i = 0; i < 6; i++) {
         at_target[i] = out->drive[i];
     }
-    wanted_drives(state, settling, out);
-    if (drives_admissible(state, out->drive) != 0) {
+    mems_hexapod_online_f32_wanted_drives(state, settling, out);
+    if (mems_hexapod_online_f32_drives_admissible(state, out->drive) != 0) {
         float at_start[6];
         float state_at_start[6];
         float accepted = 0.0f;
@@ -552,8 +552,8 @@ static int line_search(const mems_hexapod_online_f32_state *state, int settling,
             float share = 1.0f;
             float fraction;
             for (i = 0; i < 6; i++) {
-                if ((at_target[i] > U_MOST[i]) || (at_target[i] < U_LEAST[i])) {
-                    const float limit = (at_target[i] > U_HIGH[i]) ? U_HIGH[i] : U_LOW[i];
+                if ((at_target[i] > MEMS_HEXAPOD_ONLINE_F32_U_MOST[i]) || (at_target[i] < MEMS_HEXAPOD_ONLINE_F32_U_LEAST[i])) {
+                    const float limit = (at_target[i] > MEMS_HEXAPOD_ONLINE_F32_U_HIGH[i]) ? MEMS_HEXAPOD_ONLINE_F32_U_HIGH[i] : MEMS_HEXAPOD_ONLINE_F32_U_LOW[i];
                     const float reached = (limit - at_start[i]) / (at_target[i] - at_start[i]);
                     share = (reached < share) ? reached : share;
                 }
@@ -563,8 +563,8 @@ static int line_search(const mems_hexapod_online_f32_state *state, int settling,
             for (i = 0; i < 6; i++) {
                 out->displacement[i] = origin[i] + (fraction * direction[i]);
             }
-            wanted_drives(state, settling, out);
-            if (drives_admissible(state, out->drive) != 0) {
+            mems_hexapod_online_f32_wanted_drives(state, settling, out);
+            if (mems_hexapod_online_f32_drives_admissible(state, out->drive) != 0) {
                 accepted = fraction;
                 at_start[0] = out->drive[0];
                 at_start[1] = out->drive[1];
@@ -595,15 +595,15 @@ static int line_search(const mems_hexapod_online_f32_state *state, int settling,
             out->state[i] = state_at_start[i];
         }
     }
-    return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, 6);
+    return mems_hexapod_online_f32_limit_all(out->drive, MEMS_HEXAPOD_ONLINE_F32_U_LOW, MEMS_HEXAPOD_ONLINE_F32_U_HIGH, MEMS_HEXAPOD_ONLINE_F32_U_SLACK, 6);
 }
 
-void mems_hexapod_online_f32_init_1000hz_1088d91c(mems_hexapod_online_f32_state *state)
+void mems_hexapod_online_f32_init_1000hz_e744a801(mems_hexapod_online_f32_state *state)
 {
     if (state != NULL) {
         int i;
         for (i = 0; i < 6; i++) {
-            state->x[i] = X_REST[i];
+            state->x[i] = MEMS_HEXAPOD_ONLINE_F32_X_REST[i];
         }
         for (i = 0; i < 6; i++) {
             state->z[i] = 0.0f;
@@ -613,34 +613,34 @@ void mems_hexapod_online_f32_init_1000hz_1088d91c(mems_hexapod_online_f32_state 
 }
 
 /* What is answered where nothing is known of the device: the safe drive, under which it comes to rest. */
-static void set_safe(mems_hexapod_online_f32_output *out)
+static void mems_hexapod_online_f32_set_safe(mems_hexapod_online_f32_output *out)
 {
     int i;
     for (i = 0; i < 6; i++) {
-        out->drive[i] = U_SAFE[i];
+        out->drive[i] = MEMS_HEXAPOD_ONLINE_F32_U_SAFE[i];
     }
     for (i = 0; i < 6; i++) {
         out->displacement[i] = 0.0f;
     }
     for (i = 0; i < 6; i++) {
-        out->state[i] = X_REST[i];
+        out->state[i] = MEMS_HEXAPOD_ONLINE_F32_X_REST[i];
     }
 }
 
 /* The answer to a lost state, which stays lost until it is initialised. */
-static uint32_t set_lost(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
+static uint32_t mems_hexapod_online_f32_set_lost(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
     state->ready = 0U;
-    set_safe(out);
+    mems_hexapod_online_f32_set_safe(out);
     return MEMS_HEXAPOD_ONLINE_F32_LOST;
 }
 
 /* Without a usable target: the safe drive, as fast as it may change, and the state that it leads to. */
-static void settle_safe(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
+static void mems_hexapod_online_f32_settle_safe(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
     int i;
     for (i = 0; i < 6; i++) {
-        out->drive[i] = U_SAFE[i];
+        out->drive[i] = MEMS_HEXAPOD_ONLINE_F32_U_SAFE[i];
     }
     for (i = 0; i < 6; i++) {
         out->displacement[i] = state->z[i];
@@ -648,12 +648,12 @@ static void settle_safe(mems_hexapod_online_f32_state *state, mems_hexapod_onlin
     for (i = 0; i < 6; i++) {
         out->state[i] = state->x[i];
     }
-    wanted_advance(out->drive, state->x);
-    balance_displacement(state->x, out->displacement, state->z);
+    mems_hexapod_online_f32_wanted_advance(out->drive, state->x);
+    mems_hexapod_online_f32_balance_displacement(state->x, out->displacement, state->z);
 }
 
 /* The state becomes that of the next sample. */
-static void settle_proceed(mems_hexapod_online_f32_state *state, const mems_hexapod_online_f32_output *out)
+static void mems_hexapod_online_f32_settle_proceed(mems_hexapod_online_f32_state *state, const mems_hexapod_online_f32_output *out)
 {
     state->x[0] = out->state[0];
     state->x[1] = out->state[1];
@@ -670,31 +670,31 @@ static void settle_proceed(mems_hexapod_online_f32_state *state, const mems_hexa
 }
 
 /* Drives for out->displacement with every limit kept; the state becomes that of the next sample. */
-static uint32_t settle_within(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
+static uint32_t mems_hexapod_online_f32_settle_within(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
     uint32_t status = 0U;
     int lost = 0;
-    wanted_state(out->displacement, out->state);
+    mems_hexapod_online_f32_wanted_state(out->displacement, out->state);
     {
-        const int scaled = limit_composite(state, out->displacement);
+        const int scaled = mems_hexapod_online_f32_limit_composite(state, out->displacement);
         if (scaled > 0) {
             if (scaled > 1) {
                 status |= MEMS_HEXAPOD_ONLINE_F32_COMPOSITE;
             }
-            wanted_state(out->displacement, out->state);
+            mems_hexapod_online_f32_wanted_state(out->displacement, out->state);
         }
     }
-    wanted_drive(out->state, out->drive);
-    if (drive_inside(out->drive) == 0) {
-        if (is_lost(state) != 0) {
-            status = set_lost(state, out);
+    mems_hexapod_online_f32_wanted_drive(out->state, out->drive);
+    if (mems_hexapod_online_f32_drive_inside(out->drive) == 0) {
+        if (mems_hexapod_online_f32_is_lost(state) != 0) {
+            status = mems_hexapod_online_f32_set_lost(state, out);
             lost = 1;
         } else {
-            (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, 6);
+            (void)mems_hexapod_online_f32_limit_all(out->drive, MEMS_HEXAPOD_ONLINE_F32_U_LOW, MEMS_HEXAPOD_ONLINE_F32_U_HIGH, MEMS_HEXAPOD_ONLINE_F32_U_SLACK, 6);
         }
     }
     if (lost == 0) {
-        settle_proceed(state, out);
+        mems_hexapod_online_f32_settle_proceed(state, out);
     }
     return status;
 }
@@ -705,13 +705,13 @@ uint32_t mems_hexapod_online_f32_settle(mems_hexapod_online_f32_state *state, co
     if (out == NULL) {
         /* nothing is written */
     } else if (state == NULL) {
-        set_safe(out);
+        mems_hexapod_online_f32_set_safe(out);
     } else if (state->ready != MEMS_HEXAPOD_ONLINE_F32_BUILD) {
-        status = set_lost(state, out);
-    } else if ((target != NULL) && (is_usable(target) != 0)) {
-        wanted_displacement(target, out->displacement);
-        if (displacement_inside(out->displacement) != 0) {
-            status = settle_within(state, out);
+        status = mems_hexapod_online_f32_set_lost(state, out);
+    } else if ((target != NULL) && (mems_hexapod_online_f32_is_usable(target) != 0)) {
+        mems_hexapod_online_f32_wanted_displacement(target, out->displacement);
+        if (mems_hexapod_online_f32_displacement_inside(out->displacement) != 0) {
+            status = mems_hexapod_online_f32_settle_within(state, out);
         } else {
             int hit;
             float beyond[6];
@@ -719,31 +719,31 @@ uint32_t mems_hexapod_online_f32_settle(mems_hexapod_online_f32_state *state, co
             for (i = 0; i < 6; i++) {
                 beyond[i] = out->displacement[i];
             }
-            hit = limit_displacement(out->displacement);
+            hit = mems_hexapod_online_f32_limit_displacement(out->displacement);
             if (hit != 0) {
-                nearest_displacement(beyond, out->displacement);
+                mems_hexapod_online_f32_nearest_displacement(beyond, out->displacement);
             }
-            status = settle_within(state, out);
+            status = mems_hexapod_online_f32_settle_within(state, out);
             if ((hit != 0) && (status != MEMS_HEXAPOD_ONLINE_F32_LOST)) {
                 status |= MEMS_HEXAPOD_ONLINE_F32_DISPLACEMENT;
             }
         }
     } else {
-        if (is_lost(state) != 0) {
-            status = set_lost(state, out);
+        if (mems_hexapod_online_f32_is_lost(state) != 0) {
+            status = mems_hexapod_online_f32_set_lost(state, out);
         } else {
-            settle_safe(state, out);
+            mems_hexapod_online_f32_settle_safe(state, out);
         }
     }
     return status;
 }
 
 /* Without a usable target: the safe drive, as fast as it may change, and the state that it leads to. */
-static void step_safe(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
+static void mems_hexapod_online_f32_step_safe(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
     int i;
     for (i = 0; i < 6; i++) {
-        out->drive[i] = U_SAFE[i];
+        out->drive[i] = MEMS_HEXAPOD_ONLINE_F32_U_SAFE[i];
     }
     for (i = 0; i < 6; i++) {
         out->displacement[i] = state->z[i];
@@ -751,28 +751,28 @@ static void step_safe(mems_hexapod_online_f32_state *state, mems_hexapod_online_
     for (i = 0; i < 6; i++) {
         out->state[i] = state->x[i];
     }
-    step_advance(state->x, out->drive, state->x);
-    balance_displacement(state->x, out->displacement, state->z);
+    mems_hexapod_online_f32_step_advance(state->x, out->drive, state->x);
+    mems_hexapod_online_f32_balance_displacement(state->x, out->displacement, state->z);
 }
 
 /* Keeps the limits of drives that out->drive does not keep; limited is 1 then if the device does not come to out->displacement. */
-static uint32_t step_limit_drives(const mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out, int *limited)
+static uint32_t mems_hexapod_online_f32_step_limit_drives(const mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out, int *limited)
 {
     uint32_t status = 0U;
-    if (drives_admissible(state, out->drive) != 0) {
-        (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, 6);
+    if (mems_hexapod_online_f32_drives_admissible(state, out->drive) != 0) {
+        (void)mems_hexapod_online_f32_limit_all(out->drive, MEMS_HEXAPOD_ONLINE_F32_U_LOW, MEMS_HEXAPOD_ONLINE_F32_U_HIGH, MEMS_HEXAPOD_ONLINE_F32_U_SLACK, 6);
     } else {
-        *limited = line_search(state, 0, state->z, out);
+        *limited = mems_hexapod_online_f32_line_search(state, 0, state->z, out);
         status = MEMS_HEXAPOD_ONLINE_F32_DRIVE;
     }
     return status;
 }
 
 /* The state becomes that of the next sample; so does out->displacement, which the device does not come to where limited is 1. */
-static void step_proceed(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out, int limited)
+static void mems_hexapod_online_f32_step_proceed(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out, int limited)
 {
     if (limited != 0) {
-        step_advance(state->x, out->drive, state->x);
+        mems_hexapod_online_f32_step_advance(state->x, out->drive, state->x);
     } else { /* the drive was computed for these; one by one, because a loop costs a small core twice as much */
         state->x[0] = out->state[0];
         state->x[1] = out->state[1];
@@ -782,7 +782,7 @@ static void step_proceed(mems_hexapod_online_f32_state *state, mems_hexapod_onli
         state->x[5] = out->state[5];
     }
     if (limited != 0) {
-        balance_displacement(state->x, out->displacement, out->displacement);
+        mems_hexapod_online_f32_balance_displacement(state->x, out->displacement, out->displacement);
     }
     state->z[0] = out->displacement[0];
     state->z[1] = out->displacement[1];
@@ -793,32 +793,32 @@ static void step_proceed(mems_hexapod_online_f32_state *state, mems_hexapod_onli
 }
 
 /* Drives for out->displacement with every limit kept; the state becomes that of the next sample. */
-static uint32_t step_within(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
+static uint32_t mems_hexapod_online_f32_step_within(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
     uint32_t status = 0U;
     int limited = 0;
     int lost = 0;
-    wanted_state(out->displacement, out->state);
+    mems_hexapod_online_f32_wanted_state(out->displacement, out->state);
     {
-        const int scaled = limit_composite(state, out->displacement);
+        const int scaled = mems_hexapod_online_f32_limit_composite(state, out->displacement);
         if (scaled > 0) {
             if (scaled > 1) {
                 status |= MEMS_HEXAPOD_ONLINE_F32_COMPOSITE;
             }
-            wanted_state(out->displacement, out->state);
+            mems_hexapod_online_f32_wanted_state(out->displacement, out->state);
         }
     }
-    step_drive(state->x, out->state, out->drive);
-    if (drive_inside(out->drive) == 0) {
-        if (is_lost(state) != 0) {
-            status = set_lost(state, out);
+    mems_hexapod_online_f32_step_drive(state->x, out->state, out->drive);
+    if (mems_hexapod_online_f32_drive_inside(out->drive) == 0) {
+        if (mems_hexapod_online_f32_is_lost(state) != 0) {
+            status = mems_hexapod_online_f32_set_lost(state, out);
             lost = 1;
         } else {
-            status |= step_limit_drives(state, out, &limited);
+            status |= mems_hexapod_online_f32_step_limit_drives(state, out, &limited);
         }
     }
     if (lost == 0) {
-        step_proceed(state, out, limited);
+        mems_hexapod_online_f32_step_proceed(state, out, limited);
     }
     return status;
 }
@@ -829,13 +829,13 @@ uint32_t mems_hexapod_online_f32_step(mems_hexapod_online_f32_state *state, cons
     if (out == NULL) {
         /* nothing is written */
     } else if (state == NULL) {
-        set_safe(out);
+        mems_hexapod_online_f32_set_safe(out);
     } else if (state->ready != MEMS_HEXAPOD_ONLINE_F32_BUILD) {
-        status = set_lost(state, out);
-    } else if ((target != NULL) && (is_usable(target) != 0)) {
-        wanted_displacement(target, out->displacement);
-        if (displacement_inside(out->displacement) != 0) {
-            status = step_within(state, out);
+        status = mems_hexapod_online_f32_set_lost(state, out);
+    } else if ((target != NULL) && (mems_hexapod_online_f32_is_usable(target) != 0)) {
+        mems_hexapod_online_f32_wanted_displacement(target, out->displacement);
+        if (mems_hexapod_online_f32_displacement_inside(out->displacement) != 0) {
+            status = mems_hexapod_online_f32_step_within(state, out);
         } else {
             int hit;
             float beyond[6];
@@ -843,20 +843,20 @@ uint32_t mems_hexapod_online_f32_step(mems_hexapod_online_f32_state *state, cons
             for (i = 0; i < 6; i++) {
                 beyond[i] = out->displacement[i];
             }
-            hit = limit_displacement(out->displacement);
+            hit = mems_hexapod_online_f32_limit_displacement(out->displacement);
             if (hit != 0) {
-                nearest_displacement(beyond, out->displacement);
+                mems_hexapod_online_f32_nearest_displacement(beyond, out->displacement);
             }
-            status = step_within(state, out);
+            status = mems_hexapod_online_f32_step_within(state, out);
             if ((hit != 0) && (status != MEMS_HEXAPOD_ONLINE_F32_LOST)) {
                 status |= MEMS_HEXAPOD_ONLINE_F32_DISPLACEMENT;
             }
         }
     } else {
-        if (is_lost(state) != 0) {
-            status = set_lost(state, out);
+        if (mems_hexapod_online_f32_is_lost(state) != 0) {
+            status = mems_hexapod_online_f32_set_lost(state, out);
         } else {
-            step_safe(state, out);
+            mems_hexapod_online_f32_step_safe(state, out);
         }
     }
     return status;

@@ -7,18 +7,18 @@
 #error "compile this without -ffast-math, -Ofast, -ffinite-math-only or /fp:fast: they remove the checks for NaN"
 #endif
 
-static const float U_LOW[3] = { -100.0f, 0.0f, -20.0f }; /* V */
-static const float U_HIGH[3] = { 100.0f, 150.0f, 130.0f }; /* V */
-static const float U_SLACK[3] = { 0.0010786516f, 0.00015730337f, 0.00092134834f }; /* V */
-static const float U_LEAST[3] = { -100.001076f, -0.00015730337f, -20.000921f }; /* admissible, V */
-static const float U_MOST[3] = { 100.001076f, 150.00015f, 130.00092f }; /* admissible, V */
-static const float U_SAFE[3] = { 0.0f, 0.0f, 0.0f }; /* V */
-static const float FALL[3] = { -5.0f, -1e+18f, -1e+18f }; /* V a sample */
-static const float RISE[3] = { 5.0f, 1e+18f, 1e+18f }; /* V a sample */
+static const float THREE_STACKS_ONLINE_F32_U_LOW[3] = { -100.0f, 0.0f, -20.0f }; /* V */
+static const float THREE_STACKS_ONLINE_F32_U_HIGH[3] = { 100.0f, 150.0f, 130.0f }; /* V */
+static const float THREE_STACKS_ONLINE_F32_U_SLACK[3] = { 0.0010786516f, 0.00015730337f, 0.00092134834f }; /* V */
+static const float THREE_STACKS_ONLINE_F32_U_LEAST[3] = { -100.001076f, -0.00015730337f, -20.000921f }; /* admissible, V */
+static const float THREE_STACKS_ONLINE_F32_U_MOST[3] = { 100.001076f, 150.00015f, 130.00092f }; /* admissible, V */
+static const float THREE_STACKS_ONLINE_F32_U_SAFE[3] = { 0.0f, 0.0f, 0.0f }; /* V */
+static const float THREE_STACKS_ONLINE_F32_FALL[3] = { -5.0f, -1e+18f, -1e+18f }; /* V a sample */
+static const float THREE_STACKS_ONLINE_F32_RISE[3] = { 5.0f, 1e+18f, 1e+18f }; /* V a sample */
 
 /* The bits of a number in memory. Whether a number is one, and how large, is asked of these: a compiler that is told that no number is NaN
  * may leave comparisons of numbers out, never those of integers. */
-static uint32_t bits_of(const float *number)
+static uint32_t three_stacks_online_f32_bits_of(const float *number)
 {
     union { float number; uint32_t bits; } v;
     v.number = *number;
@@ -26,19 +26,19 @@ static uint32_t bits_of(const float *number)
 }
 
 /* The bits of a number so that they are ordered as numbers are, the negative ones too. */
-static uint32_t ordered(uint32_t bits)
+static uint32_t three_stacks_online_f32_ordered(uint32_t bits)
 {
     return ((bits & 0x80000000U) != 0U) ? ~bits : (bits | 0x80000000U);
 }
 
 /* 1 if a number in memory is NaN. */
-static int is_nan(const float *number)
+static int three_stacks_online_f32_is_nan(const float *number)
 {
-    return ((bits_of(number) & 0x7FFFFFFFU) > 0x7F800000U) ? 1 : 0;
+    return ((three_stacks_online_f32_bits_of(number) & 0x7FFFFFFFU) > 0x7F800000U) ? 1 : 0;
 }
 
 /* Displacement at which the platform pose is `target`, x [m], y [m]. */
-static void wanted_displacement(const float target[2], float result[2])
+static void three_stacks_online_f32_wanted_displacement(const float target[2], float result[2])
 {
     int i;
     for (i = 0; i < 2; i++) {
@@ -47,7 +47,7 @@ static void wanted_displacement(const float target[2], float result[2])
 }
 
 /* Drive that keeps the displacement `wanted` at rest. */
-static void wanted_drive(const float wanted[2], float result[3])
+static void three_stacks_online_f32_wanted_drive(const float wanted[2], float result[3])
 {
     static const float TABLE_1[2] = { 0.00056179776f, 0.00011235955f };
     static const float TABLE_2[2] = { 0.00011235955f, 0.0009113608f };
@@ -68,7 +68,7 @@ static void wanted_drive(const float wanted[2], float result[3])
 }
 
 /* Displacement at which the forces balance, g(x, z, drive) = 0: 6 Newton steps z - g/(dg/dz) from z. */
-static void balance_displacement_step(const float z[2], const float drive[3], float result[2])
+static void three_stacks_online_f32_balance_displacement_step(const float z[2], const float drive[3], float result[2])
 {
     const float shared1 = 0.5f * drive[1];
     const float t1 = z[0] * z[0];
@@ -84,7 +84,7 @@ static void balance_displacement_step(const float z[2], const float drive[3], fl
 }
 
 /* 6 such steps. */
-static void balance_displacement(const float z[2], const float drive[3], float result[2])
+static void three_stacks_online_f32_balance_displacement(const float z[2], const float drive[3], float result[2])
 {
     int i;
     int step;
@@ -92,51 +92,51 @@ static void balance_displacement(const float z[2], const float drive[3], float r
         result[i] = z[i];
     }
     for (step = 0; step < 6; step++) {
-        balance_displacement_step(result, drive, result);
+        three_stacks_online_f32_balance_displacement_step(result, drive, result);
     }
 }
 
 /* 1 if every displacement is inside its limits; 0 for NaN. */
-static int displacement_inside(const float value[2])
+static int three_stacks_online_f32_displacement_inside(const float value[2])
 {
-    return (((bits_of(&value[0]) & 0x7FFFFFFFU) <= 0x3851B717U) /* 5e-05f */ &&
-        ((bits_of(&value[1]) & 0x7FFFFFFFU) <= 0x3851B717U) /* 5e-05f */) ? 1 : 0;
+    return (((three_stacks_online_f32_bits_of(&value[0]) & 0x7FFFFFFFU) <= 0x3851B717U) /* 5e-05f */ &&
+        ((three_stacks_online_f32_bits_of(&value[1]) & 0x7FFFFFFFU) <= 0x3851B717U) /* 5e-05f */) ? 1 : 0;
 }
 
 /* 1 if every drive is inside its limits; 0 for NaN. */
-static int drive_inside(const float value[3])
+static int three_stacks_online_f32_drive_inside(const float value[3])
 {
-    return (((bits_of(&value[0]) & 0x7FFFFFFFU) <= 0x42C80000U) /* 100.0f */ &&
-        (bits_of(&value[1]) <= 0x43160000U) /* 150.0f */ &&
-        ((ordered(bits_of(&value[2])) - 0x3E5FFFFFU) <= 0x84A20001U) /* -20.0f ... 130.0f */) ? 1 : 0;
+    return (((three_stacks_online_f32_bits_of(&value[0]) & 0x7FFFFFFFU) <= 0x42C80000U) /* 100.0f */ &&
+        (three_stacks_online_f32_bits_of(&value[1]) <= 0x43160000U) /* 150.0f */ &&
+        ((three_stacks_online_f32_ordered(three_stacks_online_f32_bits_of(&value[2])) - 0x3E5FFFFFU) <= 0x84A20001U) /* -20.0f ... 130.0f */) ? 1 : 0;
 }
 
 /* 1 if every component is a number of a plausible size. */
-static int is_usable(const float target[2])
+static int three_stacks_online_f32_is_usable(const float target[2])
 {
-    return (((bits_of(&target[0]) & 0x7FFFFFFFU) <= 0x40A00000U) /* 5.0f */ &&
-        ((bits_of(&target[1]) & 0x7FFFFFFFU) <= 0x40A00000U) /* 5.0f */) ? 1 : 0;
+    return (((three_stacks_online_f32_bits_of(&target[0]) & 0x7FFFFFFFU) <= 0x40A00000U) /* 5.0f */ &&
+        ((three_stacks_online_f32_bits_of(&target[1]) & 0x7FFFFFFFU) <= 0x40A00000U) /* 5.0f */) ? 1 : 0;
 }
 
 /* 1 if a number of the state is NaN, infinite or far beyond its range: 4 times the largest magnitude of it. Asked first where
  * displacements depend on the state or effects remember, else where a limit is met: until then it would show in the drives, or is
  * written anew. */
-static int is_lost(const three_stacks_online_f32_state *state)
+static int three_stacks_online_f32_is_lost(const three_stacks_online_f32_state *state)
 {
-    return (((bits_of(&state->z[0]) & 0x7FFFFFFFU) <= 0x3951B717U) /* 0.0002f */ &&
-        ((bits_of(&state->z[1]) & 0x7FFFFFFFU) <= 0x3951B717U) /* 0.0002f */ &&
-        ((bits_of(&state->u[0]) & 0x7FFFFFFFU) <= 0x43C80000U) /* 400.0f */ &&
-        ((bits_of(&state->u[1]) & 0x7FFFFFFFU) <= 0x44160000U) /* 600.0f */ &&
-        ((bits_of(&state->u[2]) & 0x7FFFFFFFU) <= 0x44020000U) /* 520.0f */) ? 0 : 1;
+    return (((three_stacks_online_f32_bits_of(&state->z[0]) & 0x7FFFFFFFU) <= 0x3951B717U) /* 0.0002f */ &&
+        ((three_stacks_online_f32_bits_of(&state->z[1]) & 0x7FFFFFFFU) <= 0x3951B717U) /* 0.0002f */ &&
+        ((three_stacks_online_f32_bits_of(&state->u[0]) & 0x7FFFFFFFU) <= 0x43C80000U) /* 400.0f */ &&
+        ((three_stacks_online_f32_bits_of(&state->u[1]) & 0x7FFFFFFFU) <= 0x44160000U) /* 600.0f */ &&
+        ((three_stacks_online_f32_bits_of(&state->u[2]) & 0x7FFFFFFFU) <= 0x44020000U) /* 520.0f */) ? 0 : 1;
 }
 
 /* Clips value to low ... high; 1 if a component changed by more than its slack or was NaN. */
-static int limit_all(float value[], const float low[], const float high[], const float slack[], int count)
+static int three_stacks_online_f32_limit_all(float value[], const float low[], const float high[], const float slack[], int count)
 {
     int hit = 0;
     int i;
     for (i = 0; i < count; i++) {
-        const int unknown = is_nan(&value[i]);
+        const int unknown = three_stacks_online_f32_is_nan(&value[i]);
         const float wanted = (unknown != 0) ? low[i] : value[i];
         const float raised = (wanted > low[i]) ? wanted : low[i];
         const float limited = (raised < high[i]) ? raised : high[i];
@@ -150,22 +150,22 @@ static int limit_all(float value[], const float low[], const float high[], const
 }
 
 /* Clips a displacement to its range; 1 if it was beyond by more than the slack. */
-static int limit_displacement(float value[2])
+static int three_stacks_online_f32_limit_displacement(float value[2])
 {
     static const float LOW[2] = { -5e-05f, -5e-05f }; /* m */
     static const float HIGH[2] = { 5e-05f, 5e-05f }; /* m */
     static const float SLACK[2] = { 2e-10f, 2e-10f }; /* m */
-    return limit_all(value, LOW, HIGH, SLACK, 2);
+    return three_stacks_online_f32_limit_all(value, LOW, HIGH, SLACK, 2);
 }
 
 /* 1 if every drive is within its limits or beyond by no more than the slack. */
-static int drives_admissible(const three_stacks_online_f32_state *state, const float drive[3])
+static int three_stacks_online_f32_drives_admissible(const three_stacks_online_f32_state *state, const float drive[3])
 {
     int admissible = 1;
     int i;
     (void)state;
     for (i = 0; i < 3; i++) {
-        if ((is_nan(&drive[i]) != 0) || (drive[i] > U_MOST[i]) || (drive[i] < U_LEAST[i])) {
+        if ((three_stacks_online_f32_is_nan(&drive[i]) != 0) || (drive[i] > THREE_STACKS_ONLINE_F32_U_MOST[i]) || (drive[i] < THREE_STACKS_ONLINE_F32_U_LEAST[i])) {
             admissible = 0;
         }
     }
@@ -174,7 +174,7 @@ static int drives_admissible(const three_stacks_online_f32_state *state, const f
 
 /* Goes from the last drives toward drive by the largest common share that every rate allows: 0 untouched, 1 changed, 2 by more than the
  * slack. */
-static int limit_rate(const three_stacks_online_f32_state *state, float drive[3], float *share)
+static int three_stacks_online_f32_limit_rate(const three_stacks_online_f32_state *state, float drive[3], float *share)
 {
     float least = 1.0f;
     int changed = 0;
@@ -182,11 +182,11 @@ static int limit_rate(const three_stacks_online_f32_state *state, float drive[3]
     int i;
     for (i = 0; i < 3; i++) {
         const float change = drive[i] - state->u[i];
-        if ((is_nan(&state->u[i]) != 0) || (change > RISE[i]) || (change < FALL[i])) {
-            const float reached = ((change > 0.0f) ? RISE[i] : FALL[i]) / change;
+        if ((three_stacks_online_f32_is_nan(&state->u[i]) != 0) || (change > THREE_STACKS_ONLINE_F32_RISE[i]) || (change < THREE_STACKS_ONLINE_F32_FALL[i])) {
+            const float reached = ((change > 0.0f) ? THREE_STACKS_ONLINE_F32_RISE[i] : THREE_STACKS_ONLINE_F32_FALL[i]) / change;
             changed = 1;
             least = (reached < least) ? reached : least;
-            if ((change > (RISE[i] + U_SLACK[i])) || (change < (FALL[i] - U_SLACK[i]))) {
+            if ((change > (THREE_STACKS_ONLINE_F32_RISE[i] + THREE_STACKS_ONLINE_F32_U_SLACK[i])) || (change < (THREE_STACKS_ONLINE_F32_FALL[i] - THREE_STACKS_ONLINE_F32_U_SLACK[i]))) {
                 beyond = 1;
             }
         }
@@ -195,14 +195,14 @@ static int limit_rate(const three_stacks_online_f32_state *state, float drive[3]
         for (i = 0; i < 3; i++) {
             drive[i] = state->u[i] + (least * (drive[i] - state->u[i]));
         }
-        (void)limit_all(drive, U_LOW, U_HIGH, U_SLACK, 3);
+        (void)three_stacks_online_f32_limit_all(drive, THREE_STACKS_ONLINE_F32_U_LOW, THREE_STACKS_ONLINE_F32_U_HIGH, THREE_STACKS_ONLINE_F32_U_SLACK, 3);
     }
     *share = least;
     return changed + beyond;
 }
 
 /* The number nearest to t of those by which the drives of a set may move along the null space to be in low ... high. */
-static float moved_into(float t, const float drive[3], const float low[3], const float high[3], const int set[], int count)
+static float three_stacks_online_f32_moved_into(float t, const float drive[3], const float low[3], const float high[3], const int set[], int count)
 {
     static const float SHARE[3] = { -2.0f, 1.0f, 2.0f }; /* 1 over NULL_MOTION */
     float least = -1e+18f;
@@ -224,7 +224,7 @@ static float moved_into(float t, const float drive[3], const float low[3], const
 
 /* Of all drives that push as drive, the weighted pseudo-inverse, those of least effort within their limits, and as far as these allow
  * within their rates: u + t w with the smallest |t|, B w = 0. Where there are none, they are beyond a limit. */
-static void choose_drives(const three_stacks_online_f32_state *state, float drive[3])
+static void three_stacks_online_f32_choose_drives(const three_stacks_online_f32_state *state, float drive[3])
 {
     static const float NULL_MOTION[3] = { -0.5f, 1.0f, 0.5f }; /* w */
     static const int SET[] = { 0, 1, 2 }; /* drives of each group, one group after the other */
@@ -232,13 +232,13 @@ static void choose_drives(const three_stacks_online_f32_state *state, float driv
     float free[3];
     float slowest[3];
     float fastest[3];
-    int kept = drive_inside(drive);
+    int kept = three_stacks_online_f32_drive_inside(drive);
     int i;
     (void)state;
     for (i = 0; i < 3; i++) {
         free[i] = drive[i];
-        slowest[i] = state->u[i] + FALL[i];
-        fastest[i] = state->u[i] + RISE[i];
+        slowest[i] = state->u[i] + THREE_STACKS_ONLINE_F32_FALL[i];
+        fastest[i] = state->u[i] + THREE_STACKS_ONLINE_F32_RISE[i];
         if (!((drive[i] >= slowest[i]) && (drive[i] <= fastest[i]))) {
             kept = 0;
         }
@@ -249,8 +249,8 @@ static void choose_drives(const three_stacks_online_f32_state *state, float driv
             const int first = FIRST[group];
             const int count = FIRST[group + 1] - first;
             float t = 0.0f;
-            t = moved_into(t, free, slowest, fastest, &SET[first], count);
-            t = moved_into(t, free, U_LOW, U_HIGH, &SET[first], count);
+            t = three_stacks_online_f32_moved_into(t, free, slowest, fastest, &SET[first], count);
+            t = three_stacks_online_f32_moved_into(t, free, THREE_STACKS_ONLINE_F32_U_LOW, THREE_STACKS_ONLINE_F32_U_HIGH, &SET[first], count);
             for (i = 0; i < count; i++) {
                 const int k = SET[first + i];
                 drive[k] = free[k] + (t * NULL_MOTION[k]);
@@ -260,7 +260,7 @@ static void choose_drives(const three_stacks_online_f32_state *state, float driv
 }
 
 /* The limits beyond which the device is, led there by drives that may not change faster, as a status. */
-static uint32_t passed(const three_stacks_online_f32_state *state)
+static uint32_t three_stacks_online_f32_passed(const three_stacks_online_f32_state *state)
 {
     float z[2];
     uint32_t status = 0U;
@@ -268,24 +268,24 @@ static uint32_t passed(const three_stacks_online_f32_state *state)
     for (i = 0; i < 2; i++) {
         z[i] = state->z[i];
     }
-    if (limit_displacement(z) != 0) {
+    if (three_stacks_online_f32_limit_displacement(z) != 0) {
         status |= THREE_STACKS_ONLINE_F32_DISPLACEMENT;
     }
     return status;
 }
 
 /* Actuator state (limited) and drives (not limited) that out->displacement needs: with settling at rest, else at the next sample. */
-static void wanted_drives(const three_stacks_online_f32_state *state, int settling, three_stacks_online_f32_output *out)
+static void three_stacks_online_f32_wanted_drives(const three_stacks_online_f32_state *state, int settling, three_stacks_online_f32_output *out)
 {
     (void)state;
     (void)settling;
-    wanted_drive(out->displacement, out->drive);
-    choose_drives(state, out->drive);
+    three_stacks_online_f32_wanted_drive(out->displacement, out->drive);
+    three_stacks_online_f32_choose_drives(state, out->drive);
 }
 
 /* Line search from origin toward out->displacement, whose drives are inadmissible: secants of the drive that is first
  * at its limit. Leaves the farthest admissible displacement found and its drives; 1 if even those of origin are inadmissible. */
-static int line_search(const three_stacks_online_f32_state *state, int settling, const float origin[2], three_stacks_online_f32_output *out)
+static int three_stacks_online_f32_line_search(const three_stacks_online_f32_state *state, int settling, const float origin[2], three_stacks_online_f32_output *out)
 {
     float direction[2];
     float at_target[3];
@@ -297,8 +297,8 @@ static int line_search(const three_stacks_online_f32_state *state, int settling,
     for (i = 0; i < 3; i++) {
         at_target[i] = out->drive[i];
     }
-    wanted_drives(state, settling, out);
-    if (drives_admissible(state, out->drive) != 0) {
+    three_stacks_online_f32_wanted_drives(state, settling, out);
+    if (three_stacks_online_f32_drives_admissible(state, out->drive) != 0) {
         float at_start[3];
         float accepted = 0.0f;
         float rejected = 1.0f;
@@ -310,8 +310,8 @@ static int line_search(const three_stacks_online_f32_state *state, int settling,
             float share = 1.0f;
             float fraction;
             for (i = 0; i < 3; i++) {
-                if ((at_target[i] > U_MOST[i]) || (at_target[i] < U_LEAST[i])) {
-                    const float limit = (at_target[i] > U_HIGH[i]) ? U_HIGH[i] : U_LOW[i];
+                if ((at_target[i] > THREE_STACKS_ONLINE_F32_U_MOST[i]) || (at_target[i] < THREE_STACKS_ONLINE_F32_U_LEAST[i])) {
+                    const float limit = (at_target[i] > THREE_STACKS_ONLINE_F32_U_HIGH[i]) ? THREE_STACKS_ONLINE_F32_U_HIGH[i] : THREE_STACKS_ONLINE_F32_U_LOW[i];
                     const float reached = (limit - at_start[i]) / (at_target[i] - at_start[i]);
                     share = (reached < share) ? reached : share;
                 }
@@ -321,8 +321,8 @@ static int line_search(const three_stacks_online_f32_state *state, int settling,
             for (i = 0; i < 2; i++) {
                 out->displacement[i] = origin[i] + (fraction * direction[i]);
             }
-            wanted_drives(state, settling, out);
-            if (drives_admissible(state, out->drive) != 0) {
+            three_stacks_online_f32_wanted_drives(state, settling, out);
+            if (three_stacks_online_f32_drives_admissible(state, out->drive) != 0) {
                 accepted = fraction;
                 at_start[0] = out->drive[0];
                 at_start[1] = out->drive[1];
@@ -341,10 +341,10 @@ static int line_search(const three_stacks_online_f32_state *state, int settling,
             out->drive[i] = at_start[i];
         }
     }
-    return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, 3);
+    return three_stacks_online_f32_limit_all(out->drive, THREE_STACKS_ONLINE_F32_U_LOW, THREE_STACKS_ONLINE_F32_U_HIGH, THREE_STACKS_ONLINE_F32_U_SLACK, 3);
 }
 
-void three_stacks_online_f32_init_1000hz_b11068ba(three_stacks_online_f32_state *state)
+void three_stacks_online_f32_init_1000hz_759bcb20(three_stacks_online_f32_state *state)
 {
     if (state != NULL) {
         int i;
@@ -352,18 +352,18 @@ void three_stacks_online_f32_init_1000hz_b11068ba(three_stacks_online_f32_state 
             state->z[i] = 0.0f;
         }
         for (i = 0; i < 3; i++) {
-            state->u[i] = U_SAFE[i];
+            state->u[i] = THREE_STACKS_ONLINE_F32_U_SAFE[i];
         }
         state->ready = THREE_STACKS_ONLINE_F32_BUILD;
     }
 }
 
 /* What is answered where nothing is known of the device: the safe drive, under which it comes to rest. */
-static void set_safe(three_stacks_online_f32_output *out)
+static void three_stacks_online_f32_set_safe(three_stacks_online_f32_output *out)
 {
     int i;
     for (i = 0; i < 3; i++) {
-        out->drive[i] = U_SAFE[i];
+        out->drive[i] = THREE_STACKS_ONLINE_F32_U_SAFE[i];
     }
     for (i = 0; i < 2; i++) {
         out->displacement[i] = 0.0f;
@@ -371,50 +371,50 @@ static void set_safe(three_stacks_online_f32_output *out)
 }
 
 /* The answer to a lost state, which stays lost until it is initialised. */
-static uint32_t set_lost(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out)
+static uint32_t three_stacks_online_f32_set_lost(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out)
 {
     state->ready = 0U;
-    set_safe(out);
+    three_stacks_online_f32_set_safe(out);
     return THREE_STACKS_ONLINE_F32_LOST;
 }
 
 /* Without a usable target: the safe drive, as fast as it may change, and the state that it leads to. */
-static void settle_safe(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out)
+static void three_stacks_online_f32_settle_safe(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out)
 {
     float share = 1.0f;
     int i;
     for (i = 0; i < 3; i++) {
-        out->drive[i] = U_SAFE[i];
+        out->drive[i] = THREE_STACKS_ONLINE_F32_U_SAFE[i];
     }
     for (i = 0; i < 2; i++) {
         out->displacement[i] = state->z[i];
     }
-    (void)limit_rate(state, out->drive, &share);
+    (void)three_stacks_online_f32_limit_rate(state, out->drive, &share);
     for (i = 0; i < 3; i++) {
         state->u[i] = out->drive[i];
     }
-    balance_displacement(out->displacement, out->drive, state->z);
+    three_stacks_online_f32_balance_displacement(out->displacement, out->drive, state->z);
 }
 
 /* Keeps the limits of drives that out->drive does not keep; limited is 1 then if the device does not come to out->displacement. */
-static uint32_t settle_limit_drives(const three_stacks_online_f32_state *state, three_stacks_online_f32_output *out, int *limited)
+static uint32_t three_stacks_online_f32_settle_limit_drives(const three_stacks_online_f32_state *state, three_stacks_online_f32_output *out, int *limited)
 {
     static const float HOME[2] = { 0.0f, 0.0f };
     uint32_t status = 0U;
-    if (drives_admissible(state, out->drive) != 0) {
-        (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, 3);
+    if (three_stacks_online_f32_drives_admissible(state, out->drive) != 0) {
+        (void)three_stacks_online_f32_limit_all(out->drive, THREE_STACKS_ONLINE_F32_U_LOW, THREE_STACKS_ONLINE_F32_U_HIGH, THREE_STACKS_ONLINE_F32_U_SLACK, 3);
     } else {
-        *limited = line_search(state, 1, HOME, out);
+        *limited = three_stacks_online_f32_line_search(state, 1, HOME, out);
         status = THREE_STACKS_ONLINE_F32_DRIVE;
     }
     return status;
 }
 
 /* The state becomes that of the next sample; so does out->displacement, which the device does not come to where limited is 1. */
-static void settle_proceed(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out, int limited)
+static void three_stacks_online_f32_settle_proceed(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out, int limited)
 {
     if (limited != 0) {
-        balance_displacement(out->displacement, out->drive, out->displacement);
+        three_stacks_online_f32_balance_displacement(out->displacement, out->drive, out->displacement);
     }
     state->z[0] = out->displacement[0];
     state->z[1] = out->displacement[1];
@@ -424,27 +424,27 @@ static void settle_proceed(three_stacks_online_f32_state *state, three_stacks_on
 }
 
 /* Drives for out->displacement with every limit kept; the state becomes that of the next sample. */
-static uint32_t settle_within(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out)
+static uint32_t three_stacks_online_f32_settle_within(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out)
 {
     uint32_t status = 0U;
     int limited = 0;
     int lost = 0;
     float share = 1.0f;
     int held = 0;
-    wanted_drive(out->displacement, out->drive);
-    choose_drives(state, out->drive);
-    if (drive_inside(out->drive) == 0) {
-        if (is_lost(state) != 0) {
-            status = set_lost(state, out);
+    three_stacks_online_f32_wanted_drive(out->displacement, out->drive);
+    three_stacks_online_f32_choose_drives(state, out->drive);
+    if (three_stacks_online_f32_drive_inside(out->drive) == 0) {
+        if (three_stacks_online_f32_is_lost(state) != 0) {
+            status = three_stacks_online_f32_set_lost(state, out);
             lost = 1;
         } else {
-            status |= settle_limit_drives(state, out, &limited);
+            status |= three_stacks_online_f32_settle_limit_drives(state, out, &limited);
         }
     }
     if (lost == 0) {
-        held = limit_rate(state, out->drive, &share);
-        if ((held != 0) && (is_lost(state) != 0)) {
-            status = set_lost(state, out);
+        held = three_stacks_online_f32_limit_rate(state, out->drive, &share);
+        if ((held != 0) && (three_stacks_online_f32_is_lost(state) != 0)) {
+            status = three_stacks_online_f32_set_lost(state, out);
             lost = 1;
             held = 0;
         }
@@ -458,10 +458,10 @@ static uint32_t settle_within(three_stacks_online_f32_state *state, three_stacks
         status |= THREE_STACKS_ONLINE_F32_RATE;
     }
     if (lost == 0) {
-        settle_proceed(state, out, limited);
+        three_stacks_online_f32_settle_proceed(state, out, limited);
     }
     if (held > 1) {
-        status |= passed(state);
+        status |= three_stacks_online_f32_passed(state);
     }
     return status;
 }
@@ -472,67 +472,67 @@ uint32_t three_stacks_online_f32_settle(three_stacks_online_f32_state *state, co
     if (out == NULL) {
         /* nothing is written */
     } else if (state == NULL) {
-        set_safe(out);
+        three_stacks_online_f32_set_safe(out);
     } else if (state->ready != THREE_STACKS_ONLINE_F32_BUILD) {
-        status = set_lost(state, out);
-    } else if ((target != NULL) && (is_usable(target) != 0)) {
-        wanted_displacement(target, out->displacement);
-        if (displacement_inside(out->displacement) != 0) {
-            status = settle_within(state, out);
+        status = three_stacks_online_f32_set_lost(state, out);
+    } else if ((target != NULL) && (three_stacks_online_f32_is_usable(target) != 0)) {
+        three_stacks_online_f32_wanted_displacement(target, out->displacement);
+        if (three_stacks_online_f32_displacement_inside(out->displacement) != 0) {
+            status = three_stacks_online_f32_settle_within(state, out);
         } else {
             int hit;
-            hit = limit_displacement(out->displacement);
-            status = settle_within(state, out);
+            hit = three_stacks_online_f32_limit_displacement(out->displacement);
+            status = three_stacks_online_f32_settle_within(state, out);
             if ((hit != 0) && (status != THREE_STACKS_ONLINE_F32_LOST)) {
                 status |= THREE_STACKS_ONLINE_F32_DISPLACEMENT;
             }
         }
     } else {
-        if (is_lost(state) != 0) {
-            status = set_lost(state, out);
+        if (three_stacks_online_f32_is_lost(state) != 0) {
+            status = three_stacks_online_f32_set_lost(state, out);
         } else {
-            settle_safe(state, out);
+            three_stacks_online_f32_settle_safe(state, out);
         }
     }
     return status;
 }
 
 /* Without a usable target: the safe drive, as fast as it may change, and the state that it leads to. */
-static void step_safe(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out)
+static void three_stacks_online_f32_step_safe(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out)
 {
     float share = 1.0f;
     int i;
     for (i = 0; i < 3; i++) {
-        out->drive[i] = U_SAFE[i];
+        out->drive[i] = THREE_STACKS_ONLINE_F32_U_SAFE[i];
     }
     for (i = 0; i < 2; i++) {
         out->displacement[i] = state->z[i];
     }
-    (void)limit_rate(state, out->drive, &share);
+    (void)three_stacks_online_f32_limit_rate(state, out->drive, &share);
     for (i = 0; i < 3; i++) {
         state->u[i] = out->drive[i];
     }
-    balance_displacement(out->displacement, out->drive, state->z);
+    three_stacks_online_f32_balance_displacement(out->displacement, out->drive, state->z);
 }
 
 /* Keeps the limits of drives that out->drive does not keep; limited is 1 then if the device does not come to out->displacement. */
-static uint32_t step_limit_drives(const three_stacks_online_f32_state *state, three_stacks_online_f32_output *out, int *limited)
+static uint32_t three_stacks_online_f32_step_limit_drives(const three_stacks_online_f32_state *state, three_stacks_online_f32_output *out, int *limited)
 {
     uint32_t status = 0U;
-    if (drives_admissible(state, out->drive) != 0) {
-        (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, 3);
+    if (three_stacks_online_f32_drives_admissible(state, out->drive) != 0) {
+        (void)three_stacks_online_f32_limit_all(out->drive, THREE_STACKS_ONLINE_F32_U_LOW, THREE_STACKS_ONLINE_F32_U_HIGH, THREE_STACKS_ONLINE_F32_U_SLACK, 3);
     } else {
-        *limited = line_search(state, 0, state->z, out);
+        *limited = three_stacks_online_f32_line_search(state, 0, state->z, out);
         status = THREE_STACKS_ONLINE_F32_DRIVE;
     }
     return status;
 }
 
 /* The state becomes that of the next sample; so does out->displacement, which the device does not come to where limited is 1. */
-static void step_proceed(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out, int limited)
+static void three_stacks_online_f32_step_proceed(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out, int limited)
 {
     if (limited != 0) {
-        balance_displacement(out->displacement, out->drive, out->displacement);
+        three_stacks_online_f32_balance_displacement(out->displacement, out->drive, out->displacement);
     }
     state->z[0] = out->displacement[0];
     state->z[1] = out->displacement[1];
@@ -542,27 +542,27 @@ static void step_proceed(three_stacks_online_f32_state *state, three_stacks_onli
 }
 
 /* Drives for out->displacement with every limit kept; the state becomes that of the next sample. */
-static uint32_t step_within(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out)
+static uint32_t three_stacks_online_f32_step_within(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out)
 {
     uint32_t status = 0U;
     int limited = 0;
     int lost = 0;
     float share = 1.0f;
     int held = 0;
-    wanted_drive(out->displacement, out->drive);
-    choose_drives(state, out->drive);
-    if (drive_inside(out->drive) == 0) {
-        if (is_lost(state) != 0) {
-            status = set_lost(state, out);
+    three_stacks_online_f32_wanted_drive(out->displacement, out->drive);
+    three_stacks_online_f32_choose_drives(state, out->drive);
+    if (three_stacks_online_f32_drive_inside(out->drive) == 0) {
+        if (three_stacks_online_f32_is_lost(state) != 0) {
+            status = three_stacks_online_f32_set_lost(state, out);
             lost = 1;
         } else {
-            status |= step_limit_drives(state, out, &limited);
+            status |= three_stacks_online_f32_step_limit_drives(state, out, &limited);
         }
     }
     if (lost == 0) {
-        held = limit_rate(state, out->drive, &share);
-        if ((held != 0) && (is_lost(state) != 0)) {
-            status = set_lost(state, out);
+        held = three_stacks_online_f32_limit_rate(state, out->drive, &share);
+        if ((held != 0) && (three_stacks_online_f32_is_lost(state) != 0)) {
+            status = three_stacks_online_f32_set_lost(state, out);
             lost = 1;
             held = 0;
         }
@@ -576,10 +576,10 @@ static uint32_t step_within(three_stacks_online_f32_state *state, three_stacks_o
         status |= THREE_STACKS_ONLINE_F32_RATE;
     }
     if (lost == 0) {
-        step_proceed(state, out, limited);
+        three_stacks_online_f32_step_proceed(state, out, limited);
     }
     if (held > 1) {
-        status |= passed(state);
+        status |= three_stacks_online_f32_passed(state);
     }
     return status;
 }
@@ -590,26 +590,26 @@ uint32_t three_stacks_online_f32_step(three_stacks_online_f32_state *state, cons
     if (out == NULL) {
         /* nothing is written */
     } else if (state == NULL) {
-        set_safe(out);
+        three_stacks_online_f32_set_safe(out);
     } else if (state->ready != THREE_STACKS_ONLINE_F32_BUILD) {
-        status = set_lost(state, out);
-    } else if ((target != NULL) && (is_usable(target) != 0)) {
-        wanted_displacement(target, out->displacement);
-        if (displacement_inside(out->displacement) != 0) {
-            status = step_within(state, out);
+        status = three_stacks_online_f32_set_lost(state, out);
+    } else if ((target != NULL) && (three_stacks_online_f32_is_usable(target) != 0)) {
+        three_stacks_online_f32_wanted_displacement(target, out->displacement);
+        if (three_stacks_online_f32_displacement_inside(out->displacement) != 0) {
+            status = three_stacks_online_f32_step_within(state, out);
         } else {
             int hit;
-            hit = limit_displacement(out->displacement);
-            status = step_within(state, out);
+            hit = three_stacks_online_f32_limit_displacement(out->displacement);
+            status = three_stacks_online_f32_step_within(state, out);
             if ((hit != 0) && (status != THREE_STACKS_ONLINE_F32_LOST)) {
                 status |= THREE_STACKS_ONLINE_F32_DISPLACEMENT;
             }
         }
     } else {
-        if (is_lost(state) != 0) {
-            status = set_lost(state, out);
+        if (three_stacks_online_f32_is_lost(state) != 0) {
+            status = three_stacks_online_f32_set_lost(state, out);
         } else {
-            step_safe(state, out);
+            three_stacks_online_f32_step_safe(state, out);
         }
     }
     return status;

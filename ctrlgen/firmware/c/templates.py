@@ -12,12 +12,22 @@ import jinja2
 from ctrlgen.core.escaping import c_comment, c_format, kconfig, markdown, markdown_code, one_line
 from ctrlgen.core.files import write_text
 from ctrlgen.core.shipped_files import shipped
+from ctrlgen.firmware.c.file_scope import prefixed
 from ctrlgen.firmware.c.preprocessor import COMMENT, WORD
 from ctrlgen.firmware.c.real import Real
 
-# Of the interface of the generated C, in every header: raised when code that was written for an older header must be changed because a
-# function, a structure or the meaning of an argument or a status changed. Additions do not raise it.
-ABI = 1
+# Of the interface of the generated C, in every header: raised when code that was written for an older header must be changed or compiled
+# anew because a function, a structure (that of the state too) or the meaning of an argument or a status changed.
+# tests/interface_digests.json holds the digest of the interface that belongs to the number.
+ABI = 2
+# Sources of a firmware and what of their context is their own name.
+SOURCES = {
+    "online.c": "prefix",
+    "player.c": "prefix",
+    "plant.c": "prefix",
+    "selftest.c": "selftest",
+    "vectors.c": "vectors",
+}
 
 
 def codegen_folder() -> Path:
@@ -35,8 +45,13 @@ def words_of_c() -> frozenset[str]:
 
 
 def render(template: str, context: dict[str, Any]) -> str:
-    """`template` of `codegen/templates/` with `context`. A name that the template asks for and does not get is an error."""
-    return _environment().get_template(f"{template}.j2").render(context)
+    """`template` of `codegen/templates/` with `context`. A name that the template asks for and does not get is an error. In a source of
+    a firmware every name of file scope begins with that of the source."""
+    text = _environment().get_template(f"{template}.j2").render(context)
+    if template not in SOURCES:
+        return text
+    header = _environment().get_template(f"{template.removesuffix('.c')}.h.j2").render(context)
+    return prefixed(text, context[SOURCES[template]], header)
 
 
 @cache
