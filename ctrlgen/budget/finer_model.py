@@ -7,7 +7,7 @@ corrected, not added to its variance (GUM F.2.4.5).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
 
@@ -54,7 +54,7 @@ def load_finer(scenario: Scenario, model: Model, finer: Device | Path | str) -> 
         names = ("finer", "finer_code")  # the second where a file names another one
         inputs = {n: Input(p, read_text(p)) for n, p in zip(names, files_of(path), strict=False)}
     source = inputs["finer"].path if inputs else device.name
-    other = model_of(replace(scenario, device=device))
+    other = model_of(scenario.on(device))
     faults = []
     for role in ("drive", scenario.file.follow):
         signal, finer_signal = model.signals[role], other.signals.get(role)

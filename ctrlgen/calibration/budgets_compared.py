@@ -47,7 +47,7 @@ def budgets(
 
 
 def _budget(scenario: Scenario, device: Device, stated: Uncertainties, progress: Callable[[str], None]) -> ErrorBudget:
-    specimen = replace(scenario, device=device)
+    specimen = scenario.on(device)
     model = model_of(specimen)
     return budget_of(solve(specimen, model, progress), stated, draws=0, progress=progress)
 

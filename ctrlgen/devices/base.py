@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any, ClassVar, Self
 
@@ -14,6 +14,7 @@ from ctrlgen.core.names import CName
 from ctrlgen.core.shown import Shown
 from ctrlgen.core.units import Quantity
 from ctrlgen.devices.device_physics import DevicePhysics
+from ctrlgen.devices.load import Gravity, Load
 from ctrlgen.devices.machine import Machine, MachineParts, machine_parts
 from ctrlgen.devices.quantities import member_at, si_namespace, walk
 from ctrlgen.devices.reported_units import in_units_of
@@ -130,6 +131,17 @@ class Device(Shown, Section):
     def deviating(self, deviations: Mapping[str, float]) -> Self:
         """The device whose copies are off [SI], by the paths of `copies`."""
         raise NotImplementedError
+
+    def loaded(self, loads: Sequence[Load], gravity: Gravity | None) -> Device:
+        """The device with constant loads, and with gravity, beside those of its file. Raises ValueError where it cannot have them."""
+        raise ValueError(f"a device of the kind {self.kind} has no bodies that could be loaded")
+
+    @property
+    def load_texts(self) -> tuple[str, ...]:
+        """The constant loads in words, and gravity."""
+        loads, gravity = getattr(self, "load", ()), getattr(self, "gravity", None)
+        falls = () if gravity is None else (f"gravity {', '.join(q.text for q in gravity)}",)
+        return (*(load.text for load in loads), *falls)
 
     def called(self, path: str) -> str:
         """The path of a number, with the name, or the kind, of its table where that stands in a list: 'actuator[0].gain (px)'."""

@@ -14,9 +14,9 @@ from pydantic import AfterValidator, Field, model_validator
 
 from ctrlgen.core.names import ChannelName, distinct
 from ctrlgen.core.units import In, Quantity
-from ctrlgen.devices.base import Device
 from ctrlgen.devices.device_physics import BalancedPhysics, DevicePhysics, InertialPhysics
 from ctrlgen.devices.limit import Limit
+from ctrlgen.devices.loaded_platform import LoadedPlatform
 from ctrlgen.devices.section import Section
 from ctrlgen.devices.signal import AxisSignal, Signal
 from ctrlgen.numerics.constraint_second_order import second_order
@@ -24,6 +24,7 @@ from ctrlgen.physics import hexapod, thermal_actuator, xy_stage
 from ctrlgen.physics.damping import modal_damping
 from ctrlgen.physics.screw import Matrix
 
+BEYOND = 1.01  # of how far a load pushes a cold stage back: at the bound itself the force is zero but for rounding
 Length = Annotated[Quantity, In("um", positive=True)]
 Angle = Annotated[Quantity, In("deg")]
 Count = Annotated[Quantity, In("1", positive=True, whole=True)]
@@ -180,7 +181,7 @@ class HexapodDynamics(Section):
     """Damping ratio of every mode at home."""
 
 
-class MemsHexapod(Device):
+class MemsHexapod(LoadedPlatform):
     """Heater power -> temperature -> bar force = restoring force of the stage at its displacement -> pose; with `[dynamics]` the
     difference of the forces accelerates the masses.
 
@@ -256,12 +257,13 @@ class MemsHexapod(Device):
         # The moment is linear along a strut, so its magnitude is convex: largest at one of the strut's own ends.
         wires = tuple(f"strut{i + 1}_{end}" for i in range(6) for end in ("base_bottom", "platform_top"))
         outermost = [4 * i + end for i in range(6) for end in (0, 3)]
-        stress = hexapod.wire_stress(signal.mechanism_displacement, loads, p.hexapod)[outermost]
+        moved = self._with_loads(signal.mechanism_displacement)
+        stress = hexapod.wire_stress(moved, loads, p.hexapod)[outermost]
         return [
             Limit("drive", f"commanded {drive.label}", axes, drive.units[0], signal.drive, least, most),
             Limit("temperature", state.label, axes, "degC", signal.state, a.ambient, a.temperature_limit),
             Limit("force", "actuator force", axes, "N", signal.force, 0.0, None),
-            Limit("stroke", "stage displacement", axes, "um", d, 0.0, self.stage.stroke.si),
+            Limit("stroke", "stage displacement", axes, "um", d, pushed_back(self), self.stage.stroke.si),
             Limit("notch_rotation", "notch rotation", axes, "deg", turn, None, turn_limit),
             Limit("wire_stress", "wire flexure stress", wires, "MPa", stress, None, self.hexapod.stress_limit.si),
         ]
@@ -271,7 +273,12 @@ class MemsHexapod(Device):
         a, s, h = p.actuator, p.stage, p.hexapod
         C_XY = xy_stage.stage_compliance(s, a)
         J = hexapod.jacobian(h, C_XY)
-        loads, drive = hexapod.wire_loads(h, C_XY, J), self._drive()
+        drive, motion, pulled = self._drive(), J, ca.DM.zeros(6)
+        if self.load:
+            W = self.wrench(p)
+            motion = ca.horzcat(J, ca.mtimes(hexapod.platform_compliance(h, C_XY), W))
+            pulled = ca.mtimes(J.T, ca.vertcat(W[3:], W[:3]))
+        loads = hexapod.wire_loads(h, C_XY, motion)
         T = ca.SX.sym("T", 6)
         state = Signal("temperature", "actuator temperature", self.axes, ("degC",) * 6, "T_", T, (100.0,) * 6)
         rotation_scale = 1e-6 / self.hexapod.platform_radius.si  # moves the platform's rim by 1 um
@@ -286,12 +293,13 @@ class MemsHexapod(Device):
             rest=(a.ambient,) * 6,
             displacement_scale=1e-5,
             force_scale=0.05,
-            restoring_force=lambda d: xy_stage.force(d, s, a),
+            restoring_force=lambda d: xy_stage.force(d, s, a) - pulled,
             restoring_force_parts=lambda d: {
                 "linear": xy_stage.linear_force(d, s, a),
                 "nonlinear": xy_stage.nonlinear_force(d, s),
+                **({"load": -pulled} if self.load else {}),
             },
-            pose=lambda d: ca.mtimes(J, d),
+            pose=lambda d: ca.mtimes(motion, self._with_loads(d)),
             second_order_kinematics=lambda d: second_order(lambda pose, d: hexapod.loop_closure(pose, d, h), d),
             limits=partial(self._limits, p, loads, drive, state),
             bipolar=False,
@@ -308,7 +316,7 @@ class MemsHexapod(Device):
                 rates=lambda T, P: thermal_actuator.temperature_rate(T, P, a),
                 force=lambda u, T, d: thermal_actuator.force(T, a),
                 tangent_compliance=lambda d: (
-                    xy_stage.stiffened(d, s, a) * ca.mtimes(hexapod.stage_loads(h, C_XY, J), d)
+                    xy_stage.stiffened(d, s, a) * ca.mtimes(hexapod.stage_loads(h, C_XY, motion), self._with_loads(d))
                 ),
             )
         M, D = self._inertia()
@@ -321,6 +329,10 @@ class MemsHexapod(Device):
             ),
             damping_force=lambda v: p.dynamics.damping_ratio * ca.mtimes(D, v),
         )
+
+    def _with_loads(self, d: ca.SX) -> ca.SX:
+        """The displacements (6,), and behind them one for the loads where there are some."""
+        return ca.vertcat(d, 1) if self.load else d
 
     def _inertia(self) -> tuple[ca.DM, ca.DM]:
         """(6, 6) mass and damping, that by the damping ratio, of the stated numbers: their formulas would be a thousand times those of the
@@ -337,6 +349,18 @@ def home_stiffness(force: Callable[[ca.SX], ca.SX]) -> ca.SX:
     """(6, 6) [N/m] slope of a `force` (6,) of the displacements (6,) at home."""
     d = ca.SX.sym("d", 6)
     return ca.substitute(ca.jacobian(force(d), d), d, ca.SX.zeros(6))
+
+
+def pushed_back(device: MemsHexapod) -> float:
+    """The lowest displacement of a stage at rest [m], zero or below: how far the loads push the cold stages back, K^-1 J'W with their
+    stiffness at home, beyond which they only get stiffer."""
+    if not device.load:
+        return 0.0
+    p = device.values()
+    W = device.wrench(p)
+    J = hexapod.jacobian(p.hexapod, xy_stage.stage_compliance(p.stage, p.actuator))
+    K = home_stiffness(lambda d: xy_stage.force(d, p.stage, p.actuator))
+    return min(BEYOND * float(ca.mmin(ca.evalf(ca.solve(K, ca.mtimes(J.T, ca.vertcat(W[3:], W[:3])))))), 0.0)
 
 
 def natural_frequencies(device: MemsHexapod) -> np.ndarray:

@@ -11,10 +11,10 @@ from pydantic import AfterValidator, Field, model_validator
 
 from ctrlgen.core.names import ChannelName, distinct
 from ctrlgen.core.units import In, Quantity
-from ctrlgen.devices.base import Device
 from ctrlgen.devices.device_physics import BalancedPhysics
 from ctrlgen.devices.hinge import Hinge
 from ctrlgen.devices.limit import Limit
+from ctrlgen.devices.loaded_platform import LoadedPlatform
 from ctrlgen.devices.section import Section
 from ctrlgen.devices.signal import Signal
 from ctrlgen.physics import piezo_stack
@@ -68,10 +68,11 @@ class Piezo(Section):
     """Time constant with which the stack's voltage follows the amplifier's input."""
 
 
-class RrrStage(Device):
+class RrrStage(LoadedPlatform):
     """Stack voltage -> force on the input = restoring force of the input -> output displacement."""
 
     works_by: ClassVar[str | None] = "piezo"
+    planar: ClassVar[bool] = True
     on_flexures: ClassVar[bool | None] = True
 
     kind: Literal["rrr_stage"]
@@ -123,13 +124,18 @@ class RrrStage(Device):
 
         The stiffness of the stack counts as the stage's, so that its force depends on the voltage alone:
         F_b V/V_max = (C_in^-1 + k_p) d. The voltage limit keeps it below F_b. The stacks are taken to be preloaded; it is
-        not checked that none pulls on its input.
+        not checked that none pulls on its input. A load W = (F_x, F_y, M_z) on the platform, at Point o in the output frame, moves the
+        inputs by C_in,Fo W and the output by C_o,Fo W where nothing pushes (S3 eq. (1)): with the inputs at d the force is
+        C_in^-1 (d - C_in,Fo W) and the output J d + (C_o,Fo - J C_in,Fo) W.
         """
         k = stage(self, p)
         K_in, J = input_stiffness(self, k), (k.complete_J if self.inputs == "whole" else k.J)
         limit, stroke = self.piezo.voltage_limit.si, self.piezo.stroke.si
         # The lowest displacement under any voltages: an input moves back a little when the others push.
-        lowest = float(np.minimum(input_per_voltage(self), 0).sum(axis=1).min()) * limit
+        lowest = float(np.minimum(input_per_voltage(self), 0).sum(axis=1).min()) * limit + min(pushed_back(self), 0.0)
+        W = self.wrench(p)[[0, 1, 5]] if self.load else ca.DM.zeros(3)
+        given = ca.mtimes(k.C_inFo, W)  # displacement of the inputs by the load, no voltages and no stacks
+        carried = {"load": -ca.mtimes(K_in, given)} if self.load else {}
         drive = Signal("voltage", "amplifier input", self.axes, ("V",) * 3, "u_", ca.SX.sym("u", 3), (limit,) * 3)
         state = Signal("stack_voltage", "stack voltage", self.axes, ("V",) * 3, "V_", ca.SX.sym("V", 3), (limit,) * 3)
 
@@ -153,13 +159,14 @@ class RrrStage(Device):
             force_scale=self.piezo.blocking_force.si,
             rates=lambda V, u: piezo_stack.voltage_rate(V, u, p.piezo),
             force=lambda u, V, d: piezo_stack.blocked_force(V, p.piezo),
-            restoring_force=lambda d: ca.mtimes(K_in, d) + piezo_stack.stiffness(p.piezo) * d,
+            restoring_force=lambda d: ca.mtimes(K_in, d - given) + piezo_stack.stiffness(p.piezo) * d,
             documented={"force": (piezo_stack.blocked_force,)},
             restoring_force_parts=lambda d: {
                 "hinges": ca.mtimes(K_in, d),
                 "stacks": piezo_stack.stiffness(p.piezo) * d,
+                **carried,
             },
-            pose=lambda d: ca.mtimes(J, d),
+            pose=lambda d: ca.mtimes(J, d - given) + ca.mtimes(k.C_oFo, W),
             limits=limits,
             bipolar=False,
         )
@@ -191,6 +198,17 @@ def input_per_voltage(device: RrrStage, p: SimpleNamespace | None = None) -> np.
     p = device.values() if p is None else p
     K = input_stiffness(device, stage(device, p)) + piezo_stack.stiffness(p.piezo) * ca.DM.eye(3)
     return ca.DM(ca.inv(K) * piezo_stack.blocked_force(1.0, p.piezo)).full()
+
+
+def pushed_back(device: RrrStage) -> float:
+    """The lowest displacement of an input under the loads, no voltage on the stacks [m]: (C_in^-1 + k_p)^-1 C_in^-1 C_in,Fo W."""
+    if not device.load:
+        return 0.0
+    p = device.values()
+    k = stage(device, p)
+    K_in = input_stiffness(device, k)
+    force = ca.mtimes([K_in, k.C_inFo, device.wrench(p)[[0, 1, 5]]])
+    return float(ca.mmin(ca.evalf(ca.solve(K_in + piezo_stack.stiffness(p.piezo) * ca.DM.eye(3), force))))
 
 
 def matrices(device: RrrStage) -> dict[str, np.ndarray]:

@@ -187,8 +187,17 @@ def mass(h: Any, m: Any, J: Matrix) -> Matrix:
     return M
 
 
-def stage_loads(h: Any, C_XY: Matrix, J: Matrix) -> Matrix:
-    """Force of the struts against each actuated axis per stage displacement [N/m], shape (6, 6).
+def platform_compliance(h: Any, C_XY: Matrix) -> Matrix:
+    """Twist of the platform at the origin per wrench there, the stages' displacements held, shape (6, 6): the three strut pairs, each in
+    series with its stage, in parallel. Source: S1 section 3.2, eq. (14)."""
+    g = geometry(h)
+    pairs, stages = _pairs(_global_struts(g, h)), _global_stages(g, C_XY)
+    return inverse(parallel(inverse(series((inverse(K), C))) for K, C in zip(pairs, stages, strict=True)))
+
+
+def stage_loads(h: Any, C_XY: Matrix, motion: Matrix) -> Matrix:
+    """Force of the struts against each actuated axis per input [N/m], shape (6, m), of which the first six are the stages'
+    displacements; `motion` (6, m) is the platform's twist per input, J of `jacobian` or J with columns of loads.
 
     In-plane components of W_j of `wire_loads`; they deflect the stage by C_j^XY W_j. Source: S1 eq. (16).
     """
@@ -196,8 +205,10 @@ def stage_loads(h: Any, C_XY: Matrix, J: Matrix) -> Matrix:
     pair, stage = [inverse(K) for K in _pairs(_global_struts(g, h))], _global_stages(g, C_XY)
     rows = []
     for j in range(3):
-        travel = ca.horzcat(*(_travel(g, j) if k == j else ca.DM.zeros(6, 2) for k in range(3)))
-        W = solve(series((pair[j], stage[j])), travel - J)
+        travel = ca.horzcat(
+            *(_travel(g, j) if k == j else ca.DM.zeros(6, 2) for k in range(3)), ca.DM(6, motion.shape[1] - 6)
+        )
+        W = solve(series((pair[j], stage[j])), travel - motion)
         rows.append(ca.mtimes(g.rotation[j][:, :2].T, W[:3, :]))
     return ca.vertcat(*rows)
 
@@ -217,8 +228,8 @@ class WireLoads:
     bending_z: Matrix
 
 
-def wire_loads(h: Any, C_XY: Matrix, J: Matrix) -> WireLoads:
-    """Loads of the wires in the linear model of `jacobian`.
+def wire_loads(h: Any, C_XY: Matrix, motion: Matrix) -> WireLoads:
+    """Loads of the wires in the linear model of `jacobian`, per input; `motion` (6, m) as in `stage_loads`.
 
     Stage j carries W_j = (C_j^XY + C_j^pair)^-1 (M_j d_j - T^p), moves by T_j = M_j d_j - C_j^XY W_j, and
     strut i on it carries K_i^s (T_j - T^p). Source: S1 eq. (14)-(16), solved for the wrench.
@@ -229,8 +240,10 @@ def wire_loads(h: Any, C_XY: Matrix, J: Matrix) -> WireLoads:
     stage = _global_stages(g, C_XY)
     relative = []
     for j in range(3):
-        travel = ca.horzcat(*(_travel(g, j) if k == j else ca.DM.zeros(6, 2) for k in range(3)))
-        W = solve(series((pair[j], stage[j])), travel - J)
+        travel = ca.horzcat(
+            *(_travel(g, j) if k == j else ca.DM.zeros(6, 2) for k in range(3)), ca.DM(6, motion.shape[1] - 6)
+        )
+        W = solve(series((pair[j], stage[j])), travel - motion)
         relative.append(ca.mtimes(pair[j], W))  # T_j - T^p; the difference itself cancels six digits
     sections: list[list[Matrix]] = []
     for i in range(6):

@@ -6,7 +6,7 @@ import hashlib
 import re
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import casadi as ca
@@ -95,9 +95,23 @@ class Scenario(Shown):
         """Whether the path is periodic: its first sample follows the last one."""
         return self.file.closed
 
+    def on(self, device: Device) -> Scenario:
+        """The same on another device, with the loads of this scenario. Raises InputError where it cannot have them."""
+        return replace(self, device=loaded(device, self.file, self.path))
+
     def bind(self, model: Model) -> PathProblem:
         """What of it a `model` is to follow."""
         return PathProblem(self.path, self.file, model, self.home)
+
+
+def loaded(device: Device, file: ScenarioFile, path: Path) -> Device:
+    """The device with the loads of a scenario's `file`, read from `path`. Raises InputError where it cannot have them."""
+    if not file.load and file.gravity is None:
+        return device
+    try:
+        return device.loaded(file.load, file.gravity)
+    except ValueError as error:
+        raise InputError(path, [Fault("load", str(error))]) from None
 
 
 def check_tightened(scenario: Scenario, model: Model) -> None:
@@ -173,7 +187,7 @@ def load_scenario(path: Path | str, device: Device | Path | str | None = None) -
         inputs["poses"] = Input(poses, read_text(poses))
     name = file_path.resolve().parent.name if file_path.name == FILE else file_path.stem
     try:
-        return Scenario(_identifier(name), file_path, file, device, inputs)
+        return Scenario(_identifier(name), file_path, file, loaded(device, file, file_path), inputs)
     except ValueError as error:
         what = f"gives the C its name, but {error}"
         raise InputError(file_path, [Fault("the folder" if file_path.name == FILE else "the file", what)]) from None

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from ctrlgen.core.names import CName
 from ctrlgen.core.units import In, Quantity, read_probability
+from ctrlgen.devices.load import Gravity, Load
 from ctrlgen.devices.section import Section
 from ctrlgen.trajectory.inverse.clock import Clock, Sampled, Settled
 from ctrlgen.trajectory.paths import PathKind, Poses
@@ -86,6 +87,11 @@ class ScenarioFile(Section):
     """
     outcome: Literal["solved", "unreachable"] = "solved"
     """Whether a trajectory is expected to exist; `unreachable` passes where none does."""
+    load: tuple[Load, ...] = ()
+    """`[[load]]` tables: what acts on the device all the time along this path, beside what its file states; one of the same name takes
+    the place of that. They are compiled into the C."""
+    gravity: Gravity | None = None
+    """Acceleration of what falls, such as ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"], in place of the device's. Left out: as its file states."""
     robust: Robust | None = None
     """Left out: the limits hold for the device as described, and may be broken by one whose numbers differ."""
     expect: tuple[Expectation, ...] = ()

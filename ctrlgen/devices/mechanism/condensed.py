@@ -170,7 +170,7 @@ class Condensed:
         for load in self.device.placed_loads:
             carried = load.numbers(self.p)
             if load.second == number and carried.mass is not None:
-                total += _inertia(carried.mass, ca.mtimes(load.turn, ca.vertcat(*carried.at)), ca.DM(3, 3))
+                total += _inertia(carried.mass, self.load_point(load), ca.DM(3, 3))
         return total
 
     def flexure_mass(self, k: int, first: Matrix, second: Matrix) -> Matrix | None:
@@ -210,6 +210,11 @@ class Condensed:
         if a.section.kind == "thermal":
             return self.ends[self.element_of(a)]
         return ca.mtimes(a.turn, ca.vertcat(*a.numbers(self.p).at))
+
+    def load_point(self, load: Placed) -> Matrix:
+        """Where a load acts [m]: where nothing is stated at the output point."""
+        at = load.numbers(self.p).at
+        return self.output_point if at is None else ca.mtimes(load.turn, ca.vertcat(*at))
 
     def element_of(self, a: Placed) -> int:
         """The number of the element that an actuator moves or heats."""

@@ -6,8 +6,9 @@ With the axes held in place the loads F move the bodies by T_h and put W_h into 
     V_F = -f'd + d'K_F d/2,
     d'K_F d/2 = W_h . e_2(d, d) + 2 W_d . e_2(d, h) + f . s_2(d, d) - (K d) . 2 s_2(d, h) - F . (theta x (theta x r))/2:
 
-f = T_1' F their force on the axes, s_2 the second order of the actuators' travels. K_F of a blade pressed by P between guided ends is
--6 P/(5 l). Higher powers of the loads, as near buckling, are left out.
+f = T_1' F their force on the axes, s_2 the second order of the actuators' travels. A moment M that keeps half of its axis has the
+work M . theta, no more. K_F of a blade pressed by P between guided ends is -6 P/(5 l). Higher powers of the loads, as near buckling,
+are left out.
 
 Source: geometric stiffness, J. S. Przemieniecki, Theory of Matrix Structural Analysis (1968), chapter 15.
 """
@@ -44,8 +45,7 @@ class Loads:
         c, p = self.c, self.c.p
         g = None if p.gravity is None else ca.vertcat(*p.gravity)
         for placed in c.device.placed_loads:
-            numbers = placed.numbers(p)
-            at = ca.mtimes(placed.turn, ca.vertcat(*numbers.at))
+            numbers, at = placed.numbers(p), c.load_point(placed)
             if numbers.mass is not None and g is not None:
                 yield placed.second, at, numbers.mass * g
             if numbers.force is not None:
@@ -68,6 +68,12 @@ class Loads:
 
         for body, at, force in self.points():
             push(body, ca.vertcat(force, ca.cross(at, force)))
+        for placed in self.c.device.placed_loads:
+            stated = placed.numbers(self.c.p).moment
+            if stated is not None:  # of a mirror image about the image of its axis, the other way round
+                moment = ca.det(placed.turn) * ca.mtimes(placed.turn, ca.vertcat(*stated))
+                for body, sign in ((placed.second, 1), (placed.first, -1)):
+                    push(body, ca.vertcat(ca.DM.zeros(3), sign * moment))
         if self.c.p.gravity is not None:
             falls = ca.vertcat(ca.DM.zeros(3), *self.c.p.gravity)
             one, other = (

@@ -6,7 +6,7 @@ Motions are small: stiffness, Jacobian and loads are those of the mechanism as d
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, wraps
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
@@ -15,8 +15,9 @@ import casadi as ca
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
-from ctrlgen.core.units import In, Quantity
+from ctrlgen.core.units import Quantity
 from ctrlgen.devices.device_physics import DevicePhysics
+from ctrlgen.devices.load import GROUND_NAME, Gravity, Load, joined
 from ctrlgen.devices.mechanism.bent_beams import BentBeam, ThermalActuator
 from ctrlgen.devices.mechanism.condensed import MOST_STEPS, SPARE_STEPS, Condensed, nominal
 from ctrlgen.devices.mechanism.copies import Copied, CopiedParts, Placed
@@ -31,11 +32,9 @@ from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.devices.mechanism.springs import Spring
 from ctrlgen.devices.mechanism.stated_compliances import Compliance, ComplianceMatrix
 from ctrlgen.devices.mechanism.tables import (
-    GROUND_NAME,
     Actuator,
     Body,
     Dynamics,
-    Load,
     Material,
     Output,
     Pattern,
@@ -49,7 +48,6 @@ AnyElement = Annotated[
     Blade | Wire | Strut | CircularHinge | Compliance | ComplianceMatrix | Spring | BentBeam,
     Field(discriminator="kind"),
 ]
-Acceleration = Annotated[Quantity, In("m/s^2")]
 AnyActuator = Annotated[Actuator | ThermalActuator, Field(discriminator="kind")]
 ASSUMED_DAMPING = Quantity(0.01, "1 %")  # of a stage on flexures in air, where a file states none
 MOVED = 1e-6  # of the largest motion, below which a channel is not moved on purpose: symmetry leaves rounding, 1e-9
@@ -90,7 +88,7 @@ class Mechanism(CopiedParts):
     """`[[reading]]` tables: what is read beside the output."""
     load: tuple[Load, ...] = ()
     """`[[load]]` tables: what acts all the time. The pose counts from where the mechanism is drawn, without them."""
-    gravity: tuple[Acceleration, Acceleration, Acceleration] | None = None
+    gravity: Gravity | None = None
     """Acceleration of what falls, such as ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]: bodies, flexures and payloads then weigh."""
     dynamics: Dynamics | None = None
     """`[dynamics]`: where inertia counts."""
@@ -111,6 +109,10 @@ class Mechanism(CopiedParts):
 
     @model_validator(mode="after")
     def _refers_to_what_there_is(self) -> Mechanism:
+        return self._checked()
+
+    def _checked(self) -> Mechanism:
+        """Itself. Raises ValueError naming all faults."""
         empty = [key for key in ("body", "element", "actuator") if not getattr(self, key)]
         if empty:
             raise ValueError("; ".join(f"{key}: there is none; add a [[{key}]] table" for key in empty))
@@ -356,6 +358,11 @@ class Mechanism(CopiedParts):
     def _joints(self) -> list[Element]:
         """The pairs of bodies that elements join."""
         return [Element(e.first, e.second, ca.DM.eye(6)) for e in self.placed_elements]
+
+    def loaded(self, loads: Sequence[Load], gravity: Gravity | None) -> Mechanism:
+        """With more loads, and with gravity where it is given. Raises ValueError where they cannot be held."""
+        falls = {} if gravity is None else {"gravity": gravity}
+        return self.model_copy(update={"load": joined(self.load, loads)} | falls)._checked()
 
     def with_unstated_inertia(self) -> tuple[Mechanism, float] | None:
         """With a table [dynamics], where actuators push and move mass in every direction."""

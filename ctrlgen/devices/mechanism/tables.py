@@ -10,13 +10,13 @@ from pydantic import Field, field_validator, model_validator
 
 from ctrlgen.core.names import Name
 from ctrlgen.core.units import In, Quantity, same_dimension, written_unit
+from ctrlgen.devices.load import GROUND_NAME
 from ctrlgen.devices.mechanism.joining import Direction, Place
 from ctrlgen.devices.section import Section
 from ctrlgen.physics.screw import Matrix, rotation_z
 
 PerDrive = Annotated[Quantity, In(None)]
 Inertia = Annotated[Quantity, In("kg*mm^2", positive=True)]
-GROUND_NAME = "ground"
 FLAT = 0.01  # a flat plate has the sum; its numbers are rounded
 
 
@@ -174,33 +174,6 @@ class Actuator(Section):
                 )
         if faults:
             raise ValueError("; ".join(faults))
-        return self
-
-
-class Load(Section):
-    """`[[load]]`: what acts on a body all the time: a force, such as of a preload or on a platform, or a mass that stands on it."""
-
-    name: Name
-    """In messages and reports."""
-    on: str
-    """The body that it acts on."""
-    against: str = GROUND_NAME
-    """The body that a force pushes against, as a spring between both does."""
-    at: Place
-    """Where it acts, in the global frame; it moves with the body."""
-    force: tuple[Annotated[Quantity, In("N")], Annotated[Quantity, In("N")], Annotated[Quantity, In("N")]] | None = None
-    """Its components along x, y and z, which keep their directions."""
-    mass: Annotated[Quantity, In("g", positive=True)] | None = None
-    """Of a payload at a point, in place of a force: it is moved with the body, and weighs where the file states `gravity`."""
-    pattern: str = ""
-    """The pattern by which it is copied."""
-
-    @model_validator(mode="after")
-    def _is_one_thing(self) -> Load:
-        if (self.force is None) == (self.mass is None):
-            raise ValueError("give either force or mass")
-        if self.mass is not None and self.against != GROUND_NAME:
-            raise ValueError("against: belongs to a force; a mass pushes against nothing")
         return self
 
 

@@ -123,6 +123,7 @@ def plant_context(scenario: Scenario, plant: Plant, real: Real, prefix: str) -> 
         "program": program(),
         "title": m.device.title,
         "source": m.device.source,
+        "loads": m.device.load_texts,
         "device_sha256": scenario.device_sha256,
         "si": si_text,
         "drive": m.signals["drive"],

@@ -78,6 +78,7 @@ def build_of(scenario: Scenario, controller: Controller, real: Real) -> dict[str
     about = (
         ABI,
         scenario.device_sha256,
+        *scenario.device.load_texts,
         kernels.follow,
         rate,
         [limit.text for limit in kernels.nominal.limits],
@@ -107,6 +108,7 @@ def _header(scenario: Scenario, controller: Controller) -> dict[str, Any]:
         "program": program(),
         "title": model.device.title,
         "source": model.device.source,
+        "loads": model.device.load_texts,
         "device_sha256": scenario.device_sha256,
         "n": len(model.axes),
         "nu": len(drive.channels),
