@@ -29,6 +29,12 @@ except ModuleNotFoundError as missing:
 
 # One pose in so many samples is solved for; those between are on the periodic cubic through them, to a few pm
 EVERY = 5
+# The bench's readings are right but for their noise, and it says so
+SENSOR = """title = "a calibrated bench"
+[sensor]
+scale = { sd = "0.001 %", source = "simulated" }
+clock = { sd = "1 ns", source = "simulated" }
+"""
 PERIODS = 5  # of the circle in a recording
 MOST_RUNS = 3
 BENCHES = {
@@ -50,6 +56,7 @@ class Learnt:
 def solved(out: Path, device: Path = DEVICE) -> Path:
     """The folder of the circle's scenario for `device`; `run` in it holds trajectory.csv and the player's C. Raises RuntimeError."""
     scenario = scenario_of(out, device)
+    (scenario / "uncertainty.toml").write_text(SENSOR, encoding="utf-8")
     ctrlgen("solve", str(scenario), "--out", str(scenario / "run"))
     ctrlgen("generate", str(scenario), "--player", "--out", str(scenario / "c"))
     return scenario

@@ -19,7 +19,7 @@ try:
     from plants.bench import DEVICE, commanded, controlled, ctrlgen, driven, played, scenario_of
     from plants.cases import CIRCLE
     from plants.excitation import record
-    from plants.learning import EVERY, write_run
+    from plants.learning import EVERY, SENSOR, write_run
     from plants.loop_report import Expected, Measured, Stage, Story, measure, report, rows
     from plants.mems_hexapod import MemsHexapod
     from plants.numbers import read
@@ -180,6 +180,7 @@ def _played(chip: MemsHexapod, run: Path) -> Measured:
 
 def _learn(chip: MemsHexapod, scenario: Path, out: Path, every: int = 10) -> list[Measured]:
     """Runs of a scenario, the first with the drives that ctrlgen solves, the next with those it learns."""
+    (scenario / "uncertainty.toml").write_text(SENSOR, encoding="utf-8")
     ctrlgen("solve", str(scenario), "--out", str(out / "solved"))
     ctrlgen("generate", str(scenario), "--player", "--out", str(out / "c0"))
     command = commanded(out / "solved" / "trajectory.csv")

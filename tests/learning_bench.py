@@ -17,8 +17,16 @@ NOISE = np.repeat([1e-5, 2e-8], 3)  # rad, m: of a sample
 WRONG = {"actuator.expansion_slope": 3.6e-9}  # 20 % more: 3.6 % of the circle, as on the independent plant
 
 
-def shortened(text: str, folder: Path, **keys: str) -> Path:
-    """A shipped scenario with other lines, without what it expects."""
+# Of a bench whose readings are right
+RIGHT = """title = "a calibrated bench"
+[sensor]
+scale = { sd = "0.001 %", source = "simulated" }
+clock = { sd = "1 ns", source = "simulated" }
+"""
+
+
+def shortened(text: str, folder: Path, sensor: str = RIGHT, **keys: str) -> Path:
+    """A shipped scenario with other lines, without what it expects, and with what is stated of its `sensor`."""
     folder.mkdir(parents=True, exist_ok=True)
     lines = (SCENARIOS / text / "scenario.toml").read_text().partition("[[expect]]")[0].splitlines()
     lines = [next((f'{k} = "{v}"' for k, v in keys.items() if line.startswith(f"{k} =")), line) for line in lines]
@@ -27,6 +35,8 @@ def shortened(text: str, folder: Path, **keys: str) -> Path:
         for line in lines
     ]
     (folder / "scenario.toml").write_text("\n".join(lines) + "\n")
+    if sensor:
+        (folder / "uncertainty.toml").write_text(sensor)
     return folder
 
 
@@ -51,9 +61,9 @@ class Bench:
         trace = simulate(self.model, np.vstack([u, u]), h, s.trace.x[0], s.trace.z[0])
         return trace.signals["pose"][len(u) : 2 * len(u)]
 
-    def run(self, u: np.ndarray, **changes) -> Path:
-        """A recording of `periods` periods; its folder."""
-        y = np.tile(self.reached(u), (self.periods, 1))
+    def run(self, u: np.ndarray, read=lambda y: y, **changes) -> Path:
+        """A recording of `periods` periods, of which the sensor makes what `read` says; its folder."""
+        y = read(np.tile(self.reached(u), (self.periods, 1)))
         y = y + self.noise * NOISE * np.random.default_rng(len(self.runs)).standard_normal(y.shape)
         folder = self.folder / f"run{len(self.runs)}"
         write(folder, self.solution, np.tile(u, (self.periods, 1)), y, **changes)

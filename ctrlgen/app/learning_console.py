@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 def print_learning(learning: Learning) -> None:
     """The runs with their errors, reached and predicted, how the device answered, and what comes next."""
     from ctrlgen.learning.learning_page import shown_error, verdict
+    from ctrlgen.learning.sensor_words import sensor_words
 
     out.print(f"[bold]learning from runs: {escape(learning.solution.scenario.file.title)}[/bold]", soft_wrap=True)
     numbers: tuple[Column, ...] = (
@@ -43,5 +44,7 @@ def print_learning(learning: Learning) -> None:
     out.print(verdict(learning), markup=False, soft_wrap=True, style="green" if learning.stop else None)
     if learning.step < 1 and not learning.stop:
         out.print(f"share of the full step that is taken: {learning.step:g}", markup=False, soft_wrap=True)
+    for text in sensor_words(learning):
+        out.print(text, markup=False, soft_wrap=True)
     for note in learning.notes:
         out.print(note, markup=False, soft_wrap=True, style="yellow")

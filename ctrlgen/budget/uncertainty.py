@@ -12,6 +12,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from ctrlgen.budget.deviation import Deviation
+from ctrlgen.budget.sensor_statement import SensorSection
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, read_toml, validate
 from ctrlgen.core.units import (
@@ -36,15 +38,6 @@ FROM_DEVICE = "sd in the device file"
 EXAMPLE = """[numbers]
 "actuator.thermal_resistance" = { sd = "5 %", source = "spread of five specimens" }"""
 SINGULAR = 1e-9  # of an eigenvalue of a matrix of correlations, below zero: rounding
-
-
-class Deviation(Section):
-    """A standard uncertainty, GUM 3.3.5: the standard deviation of what is not known exactly."""
-
-    sd: str
-    """Standard deviation: a difference with its unit, such as "0.5 K", or a share of the number, such as "5 %"."""
-    source: str
-    """Where it comes from: repeated measurements, a certificate, a data sheet, experience."""
 
 
 class NumberDeviation(Deviation):
@@ -109,6 +102,8 @@ class UncertaintyFile(Section):
     which the actuators are without force stays as described."""
     drive: DriveChain | None = None
     """What stands between the computed drives and the actuators."""
+    sensor: SensorSection | None = None
+    """How well the sensor is known with which runs are learnt from and specimens are calibrated."""
     correlation: tuple[Correlation, ...] = ()
     """`[[correlation]]` tables; all other deviations are independent."""
 

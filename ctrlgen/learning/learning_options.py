@@ -28,3 +28,13 @@ class LearningOptions:
     """Runs in a row without a better one after which no further is tried. The step is an eighth by then."""
     most_halvings: int = 6
     """Halvings of a step that would break a limit. Less than a sixty-fourth of a step shows nothing."""
+    slow: float = 0.1
+    """Share of the frequencies within which the error of a path is taken to lie where it is to be said how many repetitions tell it."""
+    sensor_scale: float = 5e-3
+    """Standard deviation of the scale of each channel that is read, where nothing is stated. Judgement: position sensors that were not
+    calibrated in place are good to a per cent, which is two of it."""
+    sensor_clock: float = 0.5
+    """Standard deviation, in samples, of the moments of the readings against those of the drives, where nothing is stated: two of it are
+    the sample by which a log is late that writes a reading beside the next drive."""
+    sensor_coverage: float = 2.0
+    """Standard deviations up to which an error is left to the sensor: 95 %."""

@@ -5,9 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from ctrlgen.core.files import write_text
-from ctrlgen.learning.learn import Learning, RunResult
+from ctrlgen.learning.learn import Learning
 from ctrlgen.learning.learning_plots import draw_learning, learning_charts
 from ctrlgen.learning.learning_record import learning_record
+from ctrlgen.learning.run_errors import RunResult
+from ctrlgen.learning.sensor_words import sensor_words
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.page_figure import FirstScreen, PageFigure, page_figures
 from ctrlgen.reporting.result_file import json_text
@@ -35,6 +37,7 @@ def write_learning(out: Path, learning: Learning) -> None:
         r=record,
         first=first_screen(learning, drawn["runs"]),
         figures=drawn,
+        sensor_words=sensor_words(learning),
         device_title=learning.solution.model.device.title,
         player=learning.solution.scenario.sample_time is not None,
     )

@@ -7,7 +7,8 @@ from pydantic import Field
 
 from ctrlgen.budget.contributors import Group
 from ctrlgen.core.units import difference, from_si
-from ctrlgen.learning.learn import Learning, RunResult
+from ctrlgen.learning.learn import Learning
+from ctrlgen.learning.run_errors import RunResult
 from ctrlgen.reporting.result_file import ChannelGroup, Keys, Number, Origin, origin
 
 
@@ -49,6 +50,22 @@ class PredictedEntry(Keys):
     repeating: float = Field(description="Predicted root mean square length of the error that repeats.")
 
 
+class SensorEntry(Keys):
+    """One thing that may be wrong with the sensor."""
+
+    name: str = Field(description="What it is.")
+    sd: str = Field(description="Its standard deviation.")
+    source: str = Field(description="Where that comes from.")
+
+
+class SensorError(Keys):
+    """What the sensor may feign in one group: root mean square length along the path, in the unit of the group."""
+
+    group: str = Field(description="Name of the group.")
+    may_feign: float = Field(description="All lines together, to the coverage of the budget.")
+    left: float = Field(description="What of the readings is left to the sensor and not corrected.")
+
+
 class LearningRecord(Origin):
     """Result of `ctrlgen learn`: the runs so far, and the drives of the next one."""
 
@@ -66,6 +83,8 @@ class LearningRecord(Origin):
     stop: str = Field(description="Why there is nothing more to learn; empty where there is a next run.")
     step: float = Field(description="Share of the full step that is taken; lowered after runs that were worse.")
     predicted: list[PredictedEntry] = Field(description="One entry a group, of the next run.")
+    sensor: list[SensorEntry] = Field(description="What may be wrong with the sensor.")
+    sensor_errors: list[SensorError] = Field(description="One entry a group: what the sensor may feign of it.")
     largest_change: dict[str, float] = Field(
         description="Largest change of each drive from the best run to the next one, by 'channel [unit]'."
     )
@@ -110,6 +129,15 @@ def learning_record(learning: Learning) -> LearningRecord:
         step=learning.step,
         predicted=[
             PredictedEntry(group=g.name, repeating=g.shown(learning.predicted[g.name])) for g in learning.groups
+        ],
+        sensor=[SensorEntry(name=line.name, sd=line.sd, source=line.source) for line in learning.sensor.lines],
+        sensor_errors=[
+            SensorError(
+                group=g.name,
+                may_feign=g.shown(learning.of_group(learning.sensor.may_feign(), g)),
+                left=g.shown(learning.of_group(learning.left_to_sensor, g)),
+            )
+            for g in learning.groups
         ],
         largest_change={name: float(difference(v, u)) for (name, u), v in zip(columns, change, strict=True)},
         drives={name: from_si(v, u).tolist() for (name, u), v in zip(columns, upcoming.T, strict=True)},

@@ -7,15 +7,18 @@ more repetitions. A record of something else is refused: another rate, other row
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import show
+from ctrlgen.learning.implied_pose import ImpliedPose
 from ctrlgen.learning.lifted import Lifted
-from ctrlgen.recordings.plausibility import suspected, with_plausibility
+from ctrlgen.learning.steady_drift import drift_of, without_drift
+from ctrlgen.recordings.plausibility import with_plausibility
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recording import Record, Recording
 from ctrlgen.recordings.validation import MissingSamples
@@ -26,10 +29,6 @@ RATE = 0.1  # sample times by which a run's rows may drift from the path's
 FEWEST_MEASURED = 20  # samples of a run at which a channel must have been read, or all
 WIDEST_GAP = 0.1  # of the run, between samples that were read
 SETTLED = 4.0  # times the variance between periods, by which the first may differ from the others before it is left out
-OFF_PATH = 0.5  # of the path's extent, by which the model under the recorded drives may be off the path (rms)
-STILL = 0.1  # of the command's motion (rms), below which readings are not of a stage that moves
-COMMANDED = 0.2  # of the path's extent, by which a channel must be commanded to move for that to be looked at
-FAR_READING = 3.0  # times the size of the path, by which the readings may be off it (rms)
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,20 +50,23 @@ class Run:
 @dataclass(frozen=True, eq=False)
 class Runs:
     """All runs in their order. `noise` (n_y,) [SI] is stated by the recording, NaN where it is not; `observed` (n_y,): the channel was
-    read. `notes`: what reading them marked."""
+    read. `notes`: what reading them marked. `zero_sd` (n_y,) [SI]: by how much the zero moved from run to run, where that was seen."""
 
     runs: tuple[Run, ...]
     noise: np.ndarray
     observed: np.ndarray
     notes: tuple[str, ...]
+    zero_sd: np.ndarray | None = None
 
 
-def load_runs(paths: Sequence[Path | str], lifted: Lifted) -> Runs:
-    """The runs in the recordings at `paths`, each a recording.toml or its folder, in this order. Raises InputError with every fault."""
+def load_runs(paths: Sequence[Path | str], lifted: Lifted, implied: ImpliedPose) -> Runs:
+    """The runs in the recordings at `paths`, each a recording.toml or its folder, in this order, with the poses `implied` by their
+    readings; a steady drift within a record is taken out. Raises InputError with every fault."""
     recording = with_plausibility(load_recordings(paths, lifted.model, hold_out=False), lifted.model)
     source = str(paths[0]) if len(paths) == 1 else "recordings"
     records = [record for record in recording.records if record.role != "rest"]
-    places, faults = _places(recording, lifted), list[Fault]()
+    places, faults, drifting = _places(recording, lifted), list[Fault](), list[str]()
+    noise = np.array([np.nan if p is None else recording.noise[p] or np.nan for p in places], float)
     if lifted.static != (recording.kind == "poses"):
         what = (
             "a row of separate equilibria: record its settled poses"
@@ -79,25 +81,18 @@ def load_runs(paths: Sequence[Path | str], lifted: Lifted) -> Runs:
     runs = list[Run]()
     for record in records:
         try:
-            run = _run(record, places, lifted)
+            run, drift = _run(record, places, lifted, noise)
         except ValueError as error:
             faults.append(Fault(record.name, str(error)))
             continue
-        if runs and _alike(runs[-1].drive, run.drive, lifted):
-            last = runs[-1]
-            runs[-1] = Run(
-                (*last.names, *run.names),
-                last.drive,
-                np.concatenate([last.y, run.y]),
-                last.unsettled + run.unsettled,
-            )
-        else:
-            runs.append(run)
+        if implied.late.any():
+            run = replace(run, y=in_time(run, lifted, implied.late))
+        runs.append(replace(run, y=implied.pose(run.y, run.drive)))
+        drifting += _drifting(run, drift, lifted)
     if faults:
         raise InputError(source, faults)
     if not runs:
         raise InputError(source, [Fault("record", 'none is a run: all have role = "rest"')])
-    noise = np.array([np.nan if p is None else recording.noise[p] or np.nan for p in places], float)
     observed = np.array([p is not None for p in places])
     notes = [note for note in recording.notes if not isinstance(note, MissingSamples)]
     notes += [
@@ -105,7 +100,31 @@ def load_runs(paths: Sequence[Path | str], lifted: Lifted) -> Runs:
         for run in runs
         if run.unsettled
     ]
+    notes += drifting
     return Runs(tuple(runs), noise, observed, tuple(notes))
+
+
+def _drifting(run: Run, drift: np.ndarray, lifted: Lifted) -> list[str]:
+    """A note of the drift (n_y,) [SI] a period that was taken out of a run."""
+    signal = lifted.signal
+    of = [f"{c} by {show(d, u)}" for c, d, u in zip(signal.channels, drift, signal.units, strict=True) if d]
+    what = (
+        f"{run.name}: its readings drift steadily in each period, {', '.join(of)}; taken out from the first sample on."
+    )
+    return [f"{what} Sensor or stage: let both warm up."] if of else []
+
+
+def merged(runs: Runs, lifted: Lifted) -> Runs:
+    """Runs in a row that were driven alike are one run with more repetitions."""
+    joined = list[Run]()
+    for run in runs.runs:
+        if joined and _alike(joined[-1].drive, run.drive, lifted):
+            last = joined[-1]
+            y = np.concatenate([last.y, run.y])
+            joined[-1] = Run((*last.names, *run.names), last.drive, y, last.unsettled + run.unsettled)
+        else:
+            joined.append(run)
+    return replace(runs, runs=tuple(joined))
 
 
 def _places(recording: Recording, lifted: Lifted) -> list[int | None]:
@@ -127,8 +146,9 @@ def _range(lifted: Lifted) -> np.ndarray:
     return np.maximum(np.ptp(u, axis=0), SAME_DRIVE * np.abs(u).max())
 
 
-def _run(record: Record, places: Sequence[int | None], lifted: Lifted) -> Run:
-    """A record folded into repetitions of the path. Raises ValueError with what is wrong."""
+def _run(record: Record, places: Sequence[int | None], lifted: Lifted, noise: np.ndarray) -> tuple[Run, np.ndarray]:
+    """A record folded into repetitions of the path, and the drift (n_y,) [SI] a period that was taken out; `noise` (n_y,) [SI] of it where
+    that is stated. Raises ValueError with what is wrong."""
     n, every = lifted.n, _every(record, lifted)
     if record.linear and not lifted.static:
         raise ValueError(
@@ -161,8 +181,12 @@ def _run(record: Record, places: Sequence[int | None], lifted: Lifted) -> Run:
     for channel, p, values in zip(lifted.signal.channels, places, np.moveaxis(y, 2, 0), strict=True):
         if p is not None and (fault := _too_few(np.isfinite(values).any(axis=0), lifted)):
             raise ValueError(f"{channel} {fault}")
-    unsettled = first_differs(y) if lifted.closed else 0
-    return Run((record.name,), drive, y[unsettled:], unsettled)
+    drift, unsettled = np.zeros(len(places)), 0
+    if lifted.closed:
+        drift = drift_of(y, noise)
+        y = without_drift(y, drift)
+        unsettled = first_differs(y)
+    return Run((record.name,), drive, y[unsettled:], unsettled), drift
 
 
 def _every(record: Record, lifted: Lifted) -> int:
@@ -208,58 +232,34 @@ def first_differs(y: np.ndarray) -> int:
     return int(np.any(np.where(both, first, 0.0).sum(axis=0)[seen] > SETTLED * expected[seen]))
 
 
-def check_belongs(runs: Runs, lifted: Lifted, source: str) -> None:
-    """Refuses runs whose drives or readings are not of this path. Raises InputError."""
-    command, scale = lifted.solution.command, np.array(lifted.signal.scale)
-    extent = np.sqrt(np.mean(((command - command.mean(axis=0)) / scale) ** 2))
-    size = np.sqrt(np.mean((command / scale) ** 2)) or extent
-    faults = list[Fault]()
-    for run in runs.runs:
-        model = lifted.run(run.drive)
-        off = _rms((model - command) / scale)
-        if off > OFF_PATH * extent:
-            what = (
-                f"its drives would lead the device as described {100 * off / extent:.0f} % of the path's extent away from the path: "
-                "it is of another scenario or another device, or the columns of the drives have other units"
-            )
-            if (shift := _shift(model / scale, command / scale, off, lifted.closed)) is not None:
-                what = f"it begins {shift} samples after the path does; let it begin where the path begins, by `rows`"
-            faults.append(Fault(run.name, what))
-            continue
-        away = errors(run, lifted)[0].mean(axis=0) / scale
-        about = (command - command.mean(axis=0)) / scale
-        for channel, error, moved, read in zip(lifted.signal.channels, away.T, about.T, runs.observed, strict=True):
-            far, moves = _rms(error), float(np.std(error + moved)) / max(_rms(moved), 1e-300)
-            if far > FAR_READING * size:
-                what = f"its {channel} is {far / size:.0f} times the path's size away from it; check the column, its unit, sign and origin"
-                faults.append(Fault(run.name, what))
-            elif read and _rms(moved) > COMMANDED * extent and moves < STILL:
-                what = f"its {channel} moves by {moves:.2g} of what is commanded; check the column, its unit, and that the stage is driven"
-                faults.append(Fault(run.name, what))
-    if faults:
-        raise InputError(source, [*faults, *suspected(runs.notes)])
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
-def _shift(model: np.ndarray, command: np.ndarray, off: float, closed: bool) -> int | None:
-    """By how many samples a closed path is entered late, where that explains that it is `off`."""
-    if not closed:
-        return None
-    spectra = np.fft.rfft(model, axis=0) * np.conj(np.fft.rfft(command, axis=0))
-    agreement = np.fft.irfft(spectra, n=len(command), axis=0).sum(axis=1)
-    shift = int(-agreement.argmax() % len(command))
-    return shift if shift and _rms(np.roll(model, shift, axis=0) - command) < off / 4 else None
-
-
 def errors(run: Run, lifted: Lifted) -> tuple[np.ndarray, np.ndarray]:
     """Followed minus commanded in each repetition (m, n, n_y), between samples that were read by a straight line, zero in channels
     without a reading; and the share (n_y,) of the samples that were read."""
     e = run.y - lifted.solution.command
     known = np.isfinite(e)
     share = known.mean(axis=(0, 1))
+    return _bridged(e, known, lifted), np.where(share > 0, share, 1.0)
+
+
+def in_time(run: Run, lifted: Lifted, late: np.ndarray) -> np.ndarray:
+    """(m, n, n_y) the readings of a run that come `late` (n_y,) [s], at the moments that they are of: cubic between samples. They stay
+    unread where they were."""
+    command, n, h = lifted.solution.command, lifted.n, lifted.sample_time
+    known = np.isfinite(run.y)
+    y = _bridged(run.y - command, known, lifted) + command
+    ahead = min(n, int(np.ceil(np.abs(late).max() / h)) + 4)  # samples of the neighbouring periods that a cubic needs
+    moved = np.empty(y.shape)
+    for j, of in enumerate(y):
+        around = np.vstack([of[-ahead:], of, of[:ahead]]) if lifted.closed else of
+        k = (np.arange(len(around)) - (ahead if lifted.closed else 0)) * h
+        for i in range(y.shape[2]):
+            at = np.clip(np.arange(n) * h + late[i], k[0], k[-1])
+            moved[j, :, i] = CubicSpline(k, around[:, i])(at)
+    return np.where(known, moved, np.nan)
+
+
+def _bridged(e: np.ndarray, known: np.ndarray, lifted: Lifted) -> np.ndarray:
+    """Values (m, n, n_y) with straight lines over what is not `known`, zero in channels without a reading."""
     n, k = lifted.n, np.arange(lifted.n)
     period = n if lifted.closed else None
     for repetition, of in zip(e, known, strict=True):
@@ -269,4 +269,4 @@ def errors(run: Run, lifted: Lifted) -> tuple[np.ndarray, np.ndarray]:
                 repetition[:, i] = np.interp(k, read, repetition[read, i], period=period)
             elif not len(read):
                 repetition[:, i] = 0.0
-    return e, np.where(share > 0, share, 1.0)
+    return e

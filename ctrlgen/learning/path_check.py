@@ -1,0 +1,66 @@
+"""Whether the drives and readings of each run by itself are of the path."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.learning.lifted import Lifted
+from ctrlgen.learning.runs import Runs, errors
+from ctrlgen.recordings.plausibility import suspected
+
+OFF_PATH = 0.5  # of the path's extent, by which the model under the recorded drives may be off the path (rms)
+OFF_LEARNT = (
+    0.1  # of it, for a run after the first, beyond what the runs before could teach: its drives are of no other path
+)
+OF_TAUGHT = 1.5  # times the error of a run before, by which what was learnt from it may lead the model off the path
+STILL = 0.1  # of the command's motion (rms), below which readings are not of a stage that moves
+COMMANDED = 0.2  # of the path's extent, by which a channel must be commanded to move for that to be looked at
+FAR_READING = 3.0  # times the size of the path, by which the readings may be off it (rms)
+
+
+def check_belongs(runs: Runs, lifted: Lifted, source: str) -> None:
+    """Refuses runs whose drives or readings are not of this path. Raises InputError."""
+    command, scale = lifted.solution.command, np.array(lifted.signal.scale)
+    extent = np.sqrt(np.mean(((command - command.mean(axis=0)) / scale) ** 2))
+    size = np.sqrt(np.mean((command / scale) ** 2)) or extent
+    faults, taught = list[Fault](), 0.0
+    for run in runs.runs:
+        model = lifted.run(run.drive)
+        off = _rms((model - command) / scale)
+        if off > (min(OFF_PATH * extent, OFF_LEARNT * extent + taught) if taught else OFF_PATH * extent):
+            what = (
+                f"its drives would lead the device as described {100 * off / extent:.0f} % of the path's extent away from the path: "
+                "it is of another scenario or another device, or the columns of the drives have other units"
+            )
+            if (shift := _shift(model / scale, command / scale, off, lifted.closed)) is not None:
+                what = f"it begins {shift} samples after the path does; let it begin where the path begins, by `rows`"
+            faults.append(Fault(run.name, what))
+            continue
+        away = errors(run, lifted)[0].mean(axis=0) / scale
+        taught = max(taught, off + OF_TAUGHT * _rms(away))
+        about = (command - command.mean(axis=0)) / scale
+        for channel, error, moved, read in zip(lifted.signal.channels, away.T, about.T, runs.observed, strict=True):
+            far, moves = _rms(error), float(np.std(error + moved)) / max(_rms(moved), 1e-300)
+            if far > FAR_READING * size:
+                what = f"its {channel} is {far / size:.0f} times the path's size away from it; check the column, its unit, sign and origin"
+                faults.append(Fault(run.name, what))
+            elif read and _rms(moved) > COMMANDED * extent and moves < STILL:
+                what = f"its {channel} moves by {moves:.2g} of what is commanded; check the column, its unit, and that the stage is driven"
+                faults.append(Fault(run.name, what))
+    if faults:
+        raise InputError(source, [*faults, *suspected(runs.notes)])
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _shift(model: np.ndarray, command: np.ndarray, off: float, closed: bool) -> int | None:
+    """By how many samples a closed path is entered late, where that explains that it is `off`."""
+    if not closed:
+        return None
+    spectra = np.fft.rfft(model, axis=0) * np.conj(np.fft.rfft(command, axis=0))
+    agreement = np.fft.irfft(spectra, n=len(command), axis=0).sum(axis=1)
+    shift = int(-agreement.argmax() % len(command))
+    return shift if shift and _rms(np.roll(model, shift, axis=0) - command) < off / 4 else None

@@ -1,0 +1,245 @@
+"""Learning with a sensor that is wrong: what is left to it, what is taken out, what is refused; truth is known to the test alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from learning_bench import WRONG, Bench, refused, shortened, solved
+
+from ctrlgen import build_model, learn, simulate, solve
+from ctrlgen.devices.changed_numbers import changed
+from ctrlgen.effects import read_effect
+from ctrlgen.learning.implied_pose import ImpliedPose
+from ctrlgen.learning.learning_options import LearningOptions
+from ctrlgen.learning.lifted import Lifted
+from ctrlgen.learning.run_gate import belonging
+from ctrlgen.learning.runs import Run, Runs, in_time
+from ctrlgen.learning.sensor_budget import Feigned, SensorBudget
+from ctrlgen.learning.steady_drift import drift_of, without_drift
+from ctrlgen.trajectory.scenario import model_of
+from ctrlgen.trajectory.solution import Solution
+
+LOOSE = """title = "a sensor from a data sheet"
+[sensor]
+scale = { sd = "0.5 %", source = "data sheet" }
+clock = { sd = "1 us", source = "one trigger" }
+"""
+TRANSLATION = slice(3, 6)
+
+
+@pytest.fixture(scope="module")
+def circle(tmp_path_factory) -> Solution:
+    """The circle in 200 samples, nothing stated of the sensor."""
+    folder = tmp_path_factory.mktemp("sensor")
+    return solved(shortened("circle20", folder / "circle20", sensor="", sample_rate="200 Hz", duration="1 s"))
+
+
+def with_laws(solution: Solution, *laws: dict[str, object]) -> Solution:
+    """The same path of a device whose readings have these laws."""
+    device = solution.scenario.device.model_copy(update={"effect": tuple(map(read_effect, laws))})
+    scenario = replace(solution.scenario, device=device)
+    return solve(scenario, model_of(scenario))
+
+
+LAWS = (
+    {"kind": "sensor_gain", "at": "delta_x", "gain": {"value": "0.02", "sd": "0.001"}},
+    {"kind": "cubic_sensor", "at": "delta_y", "curvature": "1e7 1/m^2"},
+)
+
+
+def test_the_pose_is_that_which_the_reading_implies_under_the_laws_of_the_sensor(circle):
+    """A scale, a curve, a drift with the surroundings: readings of a pose that is off the modelled one give that pose back to rounding."""
+    sensed = with_laws(circle, *LAWS)
+    lifted = Lifted(sensed)
+    implied, u = ImpliedPose(lifted), sensed.drive
+    pose = lifted.run(u) + 1e-6 * np.sin(np.arange(lifted.n))[:, None] * np.array([10, 20, 30, 0.1, 0.2, 0.3])
+    y = pose.copy()
+    y[:, 3] *= 1.02
+    y[:, 4] += 1e7 * pose[:, 4] ** 3
+    y[7, 4] = np.nan
+    found = implied.pose(y[None], u)[0]
+    expected = np.where(np.isfinite(y), pose, np.nan)
+    assert found == pytest.approx(expected, abs=1e-15, nan_ok=True)
+    (off,) = implied.deviations(u)  # 0.1 % more of scale, and the pose is taken for 0.1/1.02 % less
+    assert off[:, 3] == pytest.approx(-1e-3 / 1.02 * lifted.run(u)[:, 3], abs=1e-15) and not off[:, 4].any()
+
+
+@pytest.mark.filterwarnings("ignore:.*changes no drive along a path")
+def test_a_stated_delay_and_a_filter_are_taken_out_of_the_readings(circle):
+    """A delay of 12.5 ms, 2.5 samples; a first-order filter by a large damping lags by 2 D tau = 16 ms."""
+    late = with_laws(circle, {"kind": "delay", "at": "all", "delay": "12.5 ms"})
+    lifted = Lifted(late)
+    implied, k = ImpliedPose(lifted), np.arange(200)
+    assert implied.late == pytest.approx(12.5e-3)
+    y = np.sin(2 * np.pi * (k - 2.5) / 200)[None, :, None] * np.ones(6)
+    moved = in_time(Run(("a",), late.drive, y), lifted, implied.late)
+    assert moved[0, :, 0] == pytest.approx(np.sin(2 * np.pi * k / 200), abs=1e-7)  # the cubic between samples
+    slow = with_laws(circle, {"kind": "low_pass", "at": "delta_x", "share": "1", "tau": "8 ms", "damping": "1"})
+    lifted = Lifted(slow)
+    u, start = slow.drive, slow.trace
+    twice = simulate(slow.model, np.vstack([u, u]), lifted.sample_time, start.x[0], start.z[0]).signals
+    pose, y = (twice[name][200:400] for name in ("pose", "reading"))
+    assert np.abs(y - pose)[:, 3].max() > 0.5e-6
+    found = ImpliedPose(lifted).pose(y[None], u)[0]
+    assert found == pytest.approx(pose, abs=1e-10)
+
+
+def test_what_is_left_to_the_sensor_never_lets_the_stage_be_worse(rng):
+    """For every sensor within its budget the true deviation after, d - a, is no longer than before."""
+    n, scale = 40, np.ones(2)
+    lines = tuple(Feigned("a", "", "", rng.standard_normal((n, 2))) for _ in range(3))
+    budget = SensorBudget(lines, 2.0, scale)
+    G = np.stack([line.deviation.ravel() for line in lines], axis=1) * 2.0
+    U, w, _ = np.linalg.svd(G, full_matrices=False)
+    for size in (0.1, 1.0, 3.0, 30.0):
+        for _ in range(100):
+            true = size * rng.standard_normal((n, 2))
+            feigned = (U @ (w * rng.uniform(-1, 1, 3))).reshape(n, 2)
+            seen = true + feigned
+            after = true - (seen - budget.of_sensor(seen))
+            assert np.linalg.norm(after) <= np.linalg.norm(true) * (1 + 1e-12)
+    large = 1e3 * lines[0].deviation
+    assert budget.of_sensor(large) == pytest.approx(0, abs=1e-9)  # no sensor is so wrong: believed
+    assert budget.of_sensor(0.5 * lines[0].deviation) == pytest.approx(0.5 * lines[0].deviation)
+
+
+def scaled(y: np.ndarray) -> np.ndarray:
+    return y * np.array([1, 1, 1, 1.008, 1.008, 1.008])
+
+
+def test_a_scale_of_the_sensor_is_not_learnt_where_the_stage_is_right(circle, tmp_path):
+    """Readings 0.8 % too large of a stage that follows its path: 0.8 % of 10 um were made of it."""
+    bench = Bench(circle, tmp_path)
+    bench.model = circle.model
+    bench.run(circle.drive, scaled)
+    found = learn(circle.scenario, bench.runs)
+    before, after = bench.error(circle.drive), bench.error(found.next.drive)
+    assert before < 1e-9 and after < 5e-9  # noise of five periods
+    assert found.of_group(found.left_to_sensor, found.groups[0]) == pytest.approx(
+        0.008 * np.hypot(10, 20) * 1e-6, rel=0.05
+    )
+
+
+def test_with_the_scale_in_the_device_file_the_stage_is_learnt_and_stays_right(circle, tmp_path):
+    """The same readings, of a stage that is 3.6 % off, by the diagnosed device: the true error falls as with a right sensor."""
+    laws = [
+        {"kind": "sensor_gain", "at": c, "gain": {"value": "0.008", "sd": "0.00001"}}
+        for c in ("delta_x", "delta_y", "delta_z")
+    ]
+    diagnosed = with_laws(circle, *laws)
+    bench = Bench(diagnosed, tmp_path)
+    bench.model = build_model(changed(circle.model.device, WRONG))
+    bench.run(diagnosed.drive, scaled)
+    options = LearningOptions(sensor_clock=1e-6)
+    found = learn(diagnosed.scenario, bench.runs, options=options)
+    assert bench.error(found.next.drive) < 0.05 * bench.error(diagnosed.drive)
+
+
+def fold(*parts):
+    """One reading after another sensor's."""
+
+    def read(y: np.ndarray) -> np.ndarray:
+        for part in parts:
+            y = part(y)
+        return y
+
+    return read
+
+
+def shifted(y: np.ndarray) -> np.ndarray:
+    return y + np.array([0, 0, 0, 4e-7, -2e-7, 0])
+
+
+def late(y: np.ndarray) -> np.ndarray:
+    return np.roll(y, 1, axis=0)
+
+
+def drifting(y: np.ndarray) -> np.ndarray:
+    return y + np.arange(len(y))[:, None] / 200 * np.array([0, 0, 0, 1e-7, 0, 0])
+
+
+@pytest.mark.long
+def test_zero_clock_and_drift_of_later_runs_are_taken_out_and_named(circle, tmp_path):
+    """A run whose zero is 400 nm off, one that is a sample late, one that drifts by 100 nm a period: what is learnt from all is that of the
+    first, to the noise."""
+    right = LearningOptions(sensor_scale=1e-6, sensor_clock=1e-6)
+    bench = Bench(circle, tmp_path)
+    bench.run(circle.drive)
+    u = learn(circle.scenario, bench.runs, options=right).next.drive
+    for name, read, says in (
+        ("zero", shifted, "its zero is off that of"),
+        ("clock", late, "samples later than those of run0"),
+        ("drift", drifting, "drift steadily in each period, delta_x by 0.09"),
+    ):
+        tried = Bench(circle, tmp_path / name)
+        tried.run(circle.drive)
+        tried.run(u, read)
+        found = learn(circle.scenario, tried.runs, options=right)
+        assert any(says in note for note in found.notes), (name, found.notes)
+        assert bench.error(found.next.drive) < 15e-9, name  # of 363 nm
+
+
+def test_a_run_of_another_path_is_refused_by_name(circle, tmp_path):
+    """Its readings under the drives of this path (a file of another run), or its drives and its readings."""
+    bench = Bench(circle, tmp_path)
+    bench.run(circle.drive)
+    bench.run(circle.drive, lambda y: y * np.array([1, 1, 1, 0.7, 1, 1]))
+    (fault,) = refused(lambda: learn(circle.scenario, bench.runs))
+    assert "run1" in fault and "of another path" in fault
+    other = Bench(circle, tmp_path / "other")
+    other.run(circle.drive)
+    smaller = circle.drive.mean(axis=0) + 0.7 * (circle.drive - circle.drive.mean(axis=0))
+    other.run(smaller)
+    (fault,) = refused(lambda: learn(circle.scenario, other.runs))
+    assert "run1" in fault and "another scenario" in fault
+
+
+@pytest.mark.parametrize("periods", [2, 3, 6])
+def test_a_drift_is_told_from_noise_and_from_a_start_that_settles(periods, rng):
+    """Of 200 records with noise alone next to none drift; 1 a period in noise of 3 is found to its standard error; a transient is none."""
+    n, none = 200, np.array([np.nan])
+    path = np.sin(2 * np.pi * np.arange(n) / n)[:, None] * 100
+    seen, found = 0, []
+    for _ in range(200):
+        y = path + 3 * rng.standard_normal((periods, n, 1))
+        seen += bool(drift_of(y, none).any())
+        k = (np.arange(periods * n) / n).reshape(periods, n, 1)
+        found.append(drift_of(y + 5 * k, none)[0])
+        settling = y + 60 * np.exp(-k * 8)
+        assert not drift_of(settling, none).any()
+    assert seen <= 2
+    assert np.mean(np.array(found) != 0) > 0.9 and np.mean([f for f in found if f]) == pytest.approx(5, abs=0.15)
+    steady = without_drift(path + 5 * k, np.array([5.0]))
+    assert steady == pytest.approx(np.broadcast_to(path, steady.shape), abs=1e-9)
+
+
+def test_runs_that_belong_together_are_left_as_they_are(circle, rng):
+    """Two of one path with noise: no zero, no clock; NaN stays NaN."""
+    lifted = Lifted(circle)
+    y = np.tile(circle.command, (3, 1, 1)) + np.repeat([1e-5, 2e-8], 3) * rng.standard_normal((3, 200, 6))
+    y[0, 3, 4] = np.nan
+    runs = Runs(
+        (Run(("a",), circle.drive, y), Run(("b",), circle.drive, y[::-1])), np.full(6, np.nan), np.ones(6, bool), ()
+    )
+    found = belonging(runs, lifted, "t")
+    assert found.notes == () and np.array_equal(found.runs[0].y, y, equal_nan=True)
+
+
+@pytest.mark.long
+def test_in_noise_it_says_how_many_repetitions_are_needed_and_these_are_enough(circle, tmp_path):
+    """Noise of 3.6 um a sample, ten times the error of 363 nm: two periods teach nothing; with as many as it asks for, asked again where
+    they show that less repeats than might have, a step is taken that takes away more than half of the error."""
+    options = LearningOptions(sensor_scale=1e-6, sensor_clock=1e-6)
+    periods, before = 2, np.inf
+    for asked in range(4):
+        bench = Bench(circle, tmp_path / f"asked{asked}", periods=periods, noise=180)
+        bench.run(circle.drive)
+        found = learn(circle.scenario, bench.runs, options=options)
+        before, after = bench.error(circle.drive), bench.error(found.next.drive)
+        if after < 0.5 * before:
+            break
+        (note,) = (note for note in found.notes if "repetitions" in note)
+        periods = int(note.split("about ")[1].split()[0])
+    assert asked and periods < 200 and after < 0.5 * before
