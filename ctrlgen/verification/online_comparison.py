@@ -66,12 +66,15 @@ def _controller_rows(
     difference is at such a sample, all may differ by what the last trial of the line search changes.
     """
     ref, real = program.reference, program.real
+    if what is ComparisonKind.SETTLED and real is Real.FLOAT and not np.array_equal(answer[:, 0], expected[:, 0]):
+        expected = ref.settled_in_float
     rows = [entry_of(program.build, what, "status", "1", _status_difference(ref, real, answer, expected), 0.0)]
+    compared = np.ones(len(expected), bool)
     if real is Real.FLOAT:  # in float the line search may accept another trial, an equally good answer
-        plain = (expected[:, 0].astype(int) & ControllerStatus.DRIVE) == 0
-        if not plain.any():
+        compared = (expected[:, 0].astype(int) & ControllerStatus.DRIVE) == 0
+        if not compared.any():
             return rows
-        answer, expected = answer[plain], expected[plain]
+        answer, expected = answer[compared], expected[compared]
     off = {role: answer[:, columns] - expected[:, columns] for role, columns in ref.columns.items()}
     sizes = {
         role: np.abs(expected[:, columns]).max() or ref.model.signals[role].scale[0]
@@ -79,6 +82,10 @@ def _controller_rows(
     }
     scaled = 1.0 if what is ComparisonKind.FOLLOWED else ref.condition  # by limits, which other targets meet
     limits = {role: controller_limit(role, scaled * size, ref, real, wider) for role, size in sizes.items()}
+    if what is ComparisonKind.SETTLED and any(np.abs(off[role]).max() > limit for role, limit in limits.items()):
+        # Beyond limits, what the inverse has not solved is held to its status and its limits
+        undefined = (expected[:, 0] != 0) & ~ref.arrived[compared]
+        off = {role: np.where(undefined[:, None], 0.0, values) for role, values in off.items()}
     differs = np.any([np.abs(off[role]).max(axis=1) > limit for role, limit in limits.items()], axis=0)
     if ties and differs.any() and int(expected[np.argmax(differs), 0]) & ControllerStatus.DRIVE:
         limits = {role: max(limit, _last_trial(ref.model, role)) for role, limit in limits.items()}

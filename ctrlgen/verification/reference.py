@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
 
-from ctrlgen.controller.controller_step import State
+from ctrlgen.controller.controller_step import State, answer
+from ctrlgen.controller.feedforward import Controller
 from ctrlgen.controller.motion_feedforward import controller_of
+from ctrlgen.firmware.online.limit_tables import FLOAT_SLACK
 from ctrlgen.model.simulation import simulate, trace
 from ctrlgen.trajectory.solution import Solution
 
 RANDOM_TARGETS = 1000
+ARRIVED = 1e-6  # of a target: Newton's next step would leave rounding
+INSIDE = 1e-3  # of a composite limit, to which reachable targets keep: at it float roundings decide the report
 MOST_CALLS = 16  # of a random target that drives with rate limits come to in several calls
 
 
@@ -22,10 +27,10 @@ class ReferenceAnswers:
     def __init__(self, solution: Solution) -> None:
         self.solution, self.model, self.scenario = solution, solution.model, solution.scenario
         self.controller = controller_of(self.model, self.scenario.file.follow, self.scenario.sample_time)
-        self.random = self._random_targets()
+        self.random, at_limits = self._random_targets(INSIDE), self._random_targets(0.0)
         if self.controller.rate is not None:  # fewer, each until the drives have come there, or nearly
             calls = min(self.controller.rate.samples(*self.model.u_bounds), MOST_CALLS)
-            self.random = self.random[::MOST_CALLS].repeat(calls, axis=0)
+            self.random, at_limits = (r[::MOST_CALLS].repeat(calls, axis=0) for r in (self.random, at_limits))
         self.settled = self._answers(self.random, None)
         self.command, self.path = solution.command, solution.command
         if self.scenario.sample_time is None:
@@ -37,7 +42,7 @@ class ReferenceAnswers:
         self.path = np.vstack([solution.command, last])
         self.command = self.scenario.bind(self.model).targets if self.model.inertial else self.path[1:]
         self.followed = self._answers(self.command, self.start)
-        self.hostile = self._hostile_targets()
+        self.hostile = self._hostile_targets(at_limits)
         self.chased = self._answers(self.hostile, self.controller.rest())
 
     @property
@@ -104,14 +109,14 @@ class ReferenceAnswers:
                 worst[role] = max(worst[role], float(np.max(getattr(off, role), initial=0.0)))
         return worst
 
-    def _random_targets(self) -> np.ndarray:
-        """Half reachable (random displacements through the model), half anywhere around, beyond every limit."""
+    def _random_targets(self, inside: float) -> np.ndarray:
+        """Half reachable (random displacements through the model, `inside` composite limits by this share), half anywhere around."""
         m, rng = self.model, np.random.default_rng(20)
         low, high = m.z_bounds
         z = rng.uniform(low, high, size=(RANDOM_TARGETS // 2, len(m.axes)))
         cold = np.tile(m.rest[:, None], (1, len(z)))
         ratio = self.controller.kernels.composite_ratio.map(len(z))(cold, 0 * z.T, z.T).full().ravel()
-        z = z / np.maximum(ratio, 1.0)[:, None]
+        z = z / np.maximum(ratio * (1 + inside), 1.0)[:, None]
         x, u = np.tile(m.rest, (len(z), 1)), np.zeros((len(z), m.u.numel()))
         signal = self.scenario.file.follow
         reachable = trace(m, np.zeros(len(z)), x, z, u).signals[signal]
@@ -120,15 +125,41 @@ class ReferenceAnswers:
         still = np.zeros((len(positions), len(self.controller.kernels.target.channels) - positions.shape[1]))
         return np.hstack([positions, still])
 
+    @cached_property
+    def settled_in_float(self) -> np.ndarray:
+        """`settled` with the slack that limits have in float, in which more excess is clipped without report."""
+        return self._answers(self.random, None, replace(self.controller, slack=FLOAT_SLACK))
+
+    @cached_property
+    def arrived(self) -> np.ndarray:
+        """(n,) whether the displacement that the inverse gives for a random target, before any limit, is one of it.
+
+        The inverse takes a fixed number of Newton steps, which reach what the device can; a target far out of reach may have no
+        displacement at all, and roundings decide where the steps are when they end.
+        """
+        m, k = self.model, self.controller.kernels.static
+        followed = ca.Function("followed", [m.x, m.z, m.u, m.p], [m.signals[self.scenario.file.follow].expr])
+        size = np.maximum(np.abs(self.positions), m.signals[self.scenario.file.follow].scale)
+        found, state = [], self.controller.rest()
+        for target, position in zip(self.random, self.positions, strict=True):
+            x, z = state[:2]
+            wanted = answer(k.displacement, x, z, target)
+            held = answer(k.state, x, z, wanted)
+            drive = self.controller.drive(k, state, wanted, held)
+            reached = followed(np.concatenate([held, answer(k.memory, x, z, wanted)]), wanted, drive, m.p_nominal)
+            found.append(np.abs(reached.full().ravel() - position))
+            state = self.controller.step(state, target, settle=True).state
+        return np.asarray(np.all(np.array(found) <= ARRIVED * size, axis=1))
+
     @property
     def positions(self) -> np.ndarray:
         """The random targets without derivatives, (n, channels)."""
         return self.random[:, : len(self.model.signals[self.scenario.file.follow].channels)]
 
-    def _hostile_targets(self) -> np.ndarray:
+    def _hostile_targets(self, at_limits: np.ndarray) -> np.ndarray:
         """A sequence of jumps between reachable and absurd targets, with some that are not numbers."""
         rng = np.random.default_rng(21)
-        targets = rng.permutation(self.random)[: RANDOM_TARGETS // 8].repeat(2, axis=0)
+        targets = rng.permutation(at_limits)[: RANDOM_TARGETS // 8].repeat(2, axis=0)
         first = self.positions.shape[1]
         targets[:, first:] = rng.normal(size=targets[:, first:].shape) * self.controller.kernels.target.scale[first:]
         targets[::7] *= 10 ** rng.uniform(0, 3, (len(targets[::7]), 1))
@@ -146,11 +177,12 @@ class ReferenceAnswers:
         start[: solution.command.shape[1]] = solution.command[0]
         return [untimed.step(untimed.rest(), start, settle=True).drive]
 
-    def _answers(self, targets: np.ndarray, start: State | None) -> np.ndarray:
+    def _answers(self, targets: np.ndarray, start: State | None, controller: Controller | None = None) -> np.ndarray:
         """(n, 1 + drives + axes + states): status, drive, displacement, actuator state; steps from `start`, or settles at each target."""
-        rows, state = [], start or self.controller.rest()
+        controller = controller or self.controller
+        rows, state = [], start or controller.rest()
         for target in targets:
-            step = self.controller.step(state, target, settle=start is None)
+            step = controller.step(state, target, settle=start is None)
             state = step.state
             rows.append(np.concatenate([[step.status], step.drive, step.displacement, step.actuator_state]))
         return np.array(rows)
