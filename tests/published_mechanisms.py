@@ -20,11 +20,11 @@ from paper_mechanisms import meso_hexapod_text, rrr_text
 
 from ctrlgen import load_device
 from ctrlgen.devices.mechanism.condensed import Condensed
-from ctrlgen.devices.mechanism.joining import TWIST
 from ctrlgen.devices.mechanism.modes import natural_frequencies
 from ctrlgen.devices.mechanism.point_compliance import point_compliance
 from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.physics.rigid_bodies import GROUND
+from ctrlgen.physics.screw import TWIST
 from papers.s0_data import load_paper_recordings
 from papers.s1_notch import hinge_equations
 

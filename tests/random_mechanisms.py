@@ -17,9 +17,9 @@ from random_drawings import Drawing, direction, place, toml
 
 from ctrlgen import InputError, build_model
 from ctrlgen.devices.mechanism.condensed import Condensed
-from ctrlgen.devices.mechanism.joining import TWIST
 from ctrlgen.devices.mechanism.modes import guyan_modes
 from ctrlgen.model.simulation import simulate
+from ctrlgen.physics.screw import TWIST
 
 USED = (
     0.35  # of the half of a drive's range that a path uses to both sides: the rest is for lags, inertia and bent forces

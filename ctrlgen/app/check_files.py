@@ -13,6 +13,7 @@ from ctrlgen.core.errors import Fault, InputError, Unreachable
 from ctrlgen.core.files import read_toml
 from ctrlgen.core.units import parse
 from ctrlgen.devices import Device, load_device
+from ctrlgen.devices.matrix import MatrixDevice
 from ctrlgen.devices.mechanism.mechanism import Mechanism
 from ctrlgen.devices.mechanism.modes import summary
 from ctrlgen.devices.mechanism.point_compliance import point_compliance
@@ -118,7 +119,9 @@ def _check_device(file: Path, figure: Path | None, point: str | None) -> None:
             f"  {model.u.numel()} drives for {len(model.axes)} axes: those of least effort, weights {weights}",
             markup=False,
         )
-    for line in summary(device) if isinstance(device, Mechanism) else ():
+    for line in (
+        summary(device) if isinstance(device, Mechanism) else device.lines() if isinstance(device, MatrixDevice) else []
+    ):
         out.print(f"  {line}", markup=False, soft_wrap=True)
     if asked is not None and isinstance(device, Mechanism):
         for line in point_compliance(device, asked).lines():

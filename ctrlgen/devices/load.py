@@ -9,9 +9,9 @@ from pydantic import Field, model_validator
 
 from ctrlgen.core.names import Name
 from ctrlgen.core.units import In, Quantity
+from ctrlgen.devices.place import Place
 from ctrlgen.devices.section import Section
 
-Coordinate = Annotated[Quantity, In("mm")]
 Force = Annotated[Quantity, In("N")]
 Moment = Annotated[Quantity, In("N*m")]
 Acceleration = Annotated[Quantity, In("m/s^2")]
@@ -29,7 +29,7 @@ class Load(Section):
     """The body that it acts on; stages of the papers have one, the platform."""
     against: str = GROUND_NAME
     """The body that a force pushes against, as a spring between both does."""
-    at: tuple[Coordinate, Coordinate, Coordinate] | None = None
+    at: Place | None = None
     """Where it acts, in the global frame; it moves with the body. Left out: the point whose pose is followed."""
     force: tuple[Force, Force, Force] | None = None
     """Its components along x, y and z, which keep their directions."""

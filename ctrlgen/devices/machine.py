@@ -155,12 +155,15 @@ def machine_parts(
         family = "electromagnetic"
     elif any(same_dimension(unit, told) for unit in units for told in ("N", "N*m")):
         reasons |= dict.fromkeys(("piezo", "thermal"), "its drive is a force")
-    longest = LONGEST_PIEZO if same_dimension(physics.travel_unit, "m") else WIDEST_PIEZO
-    if physics.displacement_scale > longest:
-        reasons.setdefault("piezo", f"its travel is beyond {'2 mm' if longest == LONGEST_PIEZO else '40 mrad'}")
+    farthest = {"m": (LONGEST_PIEZO, "2 mm"), "rad": (WIDEST_PIEZO, "40 mrad")}
+    way = next(
+        (unit for unit in farthest if same_dimension(physics.travel_unit, unit)), None
+    )  # None: counted in drives
+    if way is not None and physics.displacement_scale > farthest[way][0]:
+        reasons.setdefault("piezo", f"its travel is beyond {farthest[way][1]}")
     if between is not None:
         flexible = "flexure" in between
-    position = all(same_dimension(unit, physics.travel_unit) for unit in units)
+    position = way is not None and all(same_dimension(unit, physics.travel_unit) for unit in units)
     return MachineParts(
         actuator=given.actuator,
         transmission=between,

@@ -10,13 +10,12 @@ notation of S1 section 2.2.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import casadi as ca
 
+from ctrlgen.numerics.symmetric_solve import factor, substitute
 from ctrlgen.physics.screw import Matrix
 
 GROUND = -1  # stands for the body that does not move
@@ -80,14 +79,14 @@ def twists(count: int, elements: Sequence[Element], loads: Mapping[int, Matrix],
         left.remove(k)
         order.append(k)
         near = sorted(j for j in K[k] if j in left or j == GROUND)  # the ground first
-        factors[k] = _factor()(sum((K[k][j] for j in near[1:]), K[k][near[0]]))
-        solved = _solve(factors[k], ca.horzcat(right[k], *(K[k][j] for j in near[:-1])))
+        factors[k] = factor(sum((K[k][j] for j in near[1:]), K[k][near[0]]))
+        solved = substitute(factors[k], ca.horzcat(right[k], *(K[k][j] for j in near[:-1])))
         T, *moved = ca.horzsplit(solved, [0, *(columns + 6 * i for i in range(len(near)))])
         series = len(near) == 2 and not {_pair(k, j) for j in near} & skew
-        for j, factor in zip(near[:-1], moved, strict=True):
+        for j, motion in zip(near[:-1], moved, strict=True):
             for i in near:
                 if i > j:
-                    passed = ca.mtimes(K[i][k], factor)
+                    passed = ca.mtimes(K[i][k], motion)
                     passed = _mirrored(passed) if series else passed
                     K[i][j] = K[i][j] + passed if j in K[i] else passed
                     if j != GROUND:
@@ -101,7 +100,7 @@ def twists(count: int, elements: Sequence[Element], loads: Mapping[int, Matrix],
         K[k] = {j: K[k][j] for j in near if j != GROUND}
     for k in reversed(order):  # back substitution: T_k = S^-1 (sum_j K_kj T_j + W_k)
         if K[k]:
-            right[k] = right[k] + _solve(factors[k], sum(ca.mtimes(block, right[j]) for j, block in K[k].items()))
+            right[k] = right[k] + substitute(factors[k], sum(ca.mtimes(block, right[j]) for j, block in K[k].items()))
     return [ca.mtimes(counted, T) for T in right]
 
 
@@ -122,38 +121,3 @@ def loose_bodies(count: int, elements: Sequence[Element]) -> list[int]:
         grown = not reached <= joined
         joined |= reached
     return [i for i in range(count) if i not in joined]
-
-
-def _solve(factors: Matrix, right: Matrix) -> Matrix:
-    """x (6, n) with L D L' x = `right`, L below the diagonal and D on it."""
-    return _substitution(right.shape[1])(factors, right)
-
-
-@functools.cache
-def _factor() -> ca.Function:
-    """A (6, 6), symmetric and positive -> L below the diagonal and D on it with A = L D L'; its lower triangle is read.
-
-    With lengths in such units that forces and moments are of similar magnitude it needs no pivots: a third of the operations of the QR
-    decomposition that CasADi would write, which are what a compiler sees of a mechanism.
-    Source: G. H. Golub, C. F. Van Loan, Matrix Computations (4th ed.), section 4.2.
-    """
-    n, A = 6, ca.SX.sym("A", 6, 6)
-    F = ca.SX(ca.Sparsity.lower(n))
-    for i in range(n):
-        for j in range(i):
-            F[i, j] = (A[i, j] - sum(F[i, k] * F[k, k] * F[j, k] for k in range(j))) / F[j, j]
-        F[i, i] = A[i, i] - sum(F[i, k] ** 2 * F[k, k] for k in range(i))
-    return ca.Function("factor", [A], [F])
-
-
-@functools.cache
-def _substitution(columns: int) -> ca.Function:
-    """(L and D, b) -> x with L D L' x = b (6, columns)."""
-    n, F, right = 6, ca.SX.sym("F", ca.Sparsity.lower(6)), ca.SX.sym("b", 6, columns)
-    rows: list[Any] = []
-    for i in range(n):
-        rows.append(right[i, :] - sum(F[i, k] * rows[k] for k in range(i)))
-    rows = [row / F[i, i] for i, row in enumerate(rows)]
-    for i in reversed(range(n)):
-        rows[i] = rows[i] - sum(F[k, i] * rows[k] for k in range(i + 1, n))
-    return ca.Function("substitution", [F, right], [ca.vertcat(*rows)])

@@ -14,6 +14,8 @@ from typing import TypeAlias
 
 import casadi as ca
 
+TWIST = ("theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z")
+WRENCH = ("F_x", "F_y", "F_z", "M_x", "M_y", "M_z")
 Matrix: TypeAlias = ca.SX | ca.DM
 Scalar: TypeAlias = float | ca.SX
 

@@ -23,7 +23,9 @@ def device(
     file: Annotated[Path, typer.Argument(help="The device file to write, such as stage.toml.", show_default=False)],
     kind: Annotated[
         str,
-        typer.Option(help="What it is: piezo, voice-coil, xy, tip-tilt, hexapod, mechanism.", show_default=False),
+        typer.Option(
+            help="What it is: piezo, voice-coil, xy, tip-tilt, hexapod, mechanism, matrix.", show_default=False
+        ),
     ],
     name: Annotated[
         str | None,
@@ -45,7 +47,8 @@ def device(
     """Begin a device file: its numbers are asked for in a terminal, or given by --set; those that nobody gave are marked as assumed.
 
     Kinds: piezo (one axis, a stack and two blades), voice-coil (one axis with mass), xy (two stacks), tip-tilt (a mirror on
-    three stacks), hexapod (six struts on three planar stages), mechanism (your own, from its drawing).
+    three stacks), hexapod (six struts on three planar stages), mechanism (your own, from its drawing),
+    matrix (a stage by its compliance at a point).
 
     Example:  ctrlgen new device stage.toml --kind piezo --set voltage=150V --set free_stroke=30um
     """

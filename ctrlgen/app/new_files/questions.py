@@ -81,6 +81,17 @@ KINDS: Mapping[str, Kind] = {
             Question("drive_limit", "largest current of either sign", "1.5 A"),
         ),
     ),
+    "matrix": Kind(
+        "a stage by its compliance at a point, measured or from finite elements; or by its stiffness, or its Jacobian",
+        (
+            Question("compliance_x", "displacement along x per force along x", "20 um/N"),
+            Question("compliance_y", "displacement along y per force along y", "0.5 um/N"),
+            Question("compliance_z", "rotation about z per moment about z", "5 mrad/(N*m)"),
+            Question("gain", "force of the actuator per ampere", "3.8 N/A"),
+            Question("drive_limit", "largest current of either sign", "1.5 A"),
+            Question("travel", "largest displacement to either side", "100 um"),
+        ),
+    ),
 }
 
 

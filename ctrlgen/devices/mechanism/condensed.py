@@ -14,12 +14,12 @@ import numpy as np
 
 from ctrlgen.devices.mechanism.copies import Placed
 from ctrlgen.devices.mechanism.drawing import Drawing
-from ctrlgen.devices.mechanism.joining import TWIST, Direction
+from ctrlgen.devices.place import Direction
 from ctrlgen.numerics.newton import newton_root
 from ctrlgen.physics import rigid_bodies as mechanism
 from ctrlgen.physics.flexure_mass import flexure_mass
 from ctrlgen.physics.rigid_bodies import GROUND, Element
-from ctrlgen.physics.screw import Matrix, adjoint, inverse_adjoint, move
+from ctrlgen.physics.screw import TWIST, Matrix, adjoint, inverse_adjoint, move
 
 # Of Newton's method from the motion without cubic springs: with more steps they hold more than the flexures do.
 MOST_STEPS = 12

@@ -2,46 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from types import SimpleNamespace
 
 import casadi as ca
 
-from ctrlgen.core.units import written_unit
-from ctrlgen.devices.limit import Limit
+from ctrlgen.devices.driven import Transduction, proportional
 from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.devices.signal import AxisSignal, Signal
 from ctrlgen.physics import thermal_actuator
-
-
-@dataclass(frozen=True)
-class Transduction:
-    """Drive u, heat w = heat(u), states x' = rates(x, w), force(u, x) (n,) on the axes; `drive_range` and `state_range` by axis [SI].
-    `power` shows the heat of heaters."""
-
-    drive: Signal
-    drive_range: tuple[tuple[float, float], ...]
-    force: Callable[[ca.SX, ca.SX], ca.SX]
-    force_scale: float
-    state: Signal | None = None
-    rest: tuple[float | ca.SX, ...] = ()
-    state_range: tuple[tuple[float, float], ...] = ()
-    rates: Callable[[ca.SX, ca.SX], ca.SX] = lambda x, heat: ca.SX(0, 1)
-    heat: Callable[[ca.SX], ca.SX] = lambda u: u
-    power: AxisSignal | None = None
-
-    def limits(self, signal: SimpleNamespace) -> list[Limit]:
-        """The ranges of drive and state, axis by axis."""
-        limits = []
-        for name, of, expr, ranges in (
-            ("drive", self.drive, signal.drive, self.drive_range),
-            ("output" if self.power is None else "temperature", self.state, signal.state, self.state_range),
-        ):
-            if of is not None:
-                for i, (axis, unit, span) in enumerate(zip(of.channels, of.units, ranges, strict=True)):
-                    limits.append(Limit(f"{name}_{axis}", f"{of.label} of {axis}", (axis,), unit, expr[i], *span))
-        return limits
 
 
 def transduction(c: Condensed) -> Transduction:
@@ -51,27 +19,10 @@ def transduction(c: Condensed) -> Transduction:
 
 def _proportional(c: Condensed) -> Transduction:
     """Force or displacement are the drive times the gain, at once or with a lag of first order."""
-    actuators = c.device.placed_actuators
-    numbers, sections = [a.numbers(c.p) for a in actuators], [a.section for a in actuators]
-    axes, units = tuple(a.name for a in actuators), tuple(written_unit(s.low.text) for s in sections)
-    ranges = tuple((s.low.si, s.high.si) for s in sections)
-    sizes = tuple(max(map(abs, span)) for span in ranges)
-    gain, lags = ca.vertcat(*(q.gain for q in numbers)), [q.time_constant for q in numbers]
-    drive = Signal("drive", "drive", axes, units, "u_", ca.SX.sym("u", len(axes)), sizes)
-    scale = float(max(abs(s.gain.si) * size for s, size in zip(sections, sizes, strict=True)))
-    if any(tau is None for tau in lags):  # all of them, or none
-        return Transduction(drive, ranges, lambda u, x: gain * u, scale)
-    state = Signal("state", "amplifier output", axes, units, "x_", ca.SX.sym("x", len(axes)), sizes)
-    return Transduction(
-        drive,
-        ranges,
-        lambda u, x: gain * x,
-        scale,
-        state,
-        (0.0,) * len(axes),
-        ranges,
-        lambda x, u: (u - x) / ca.vertcat(*lags),
-    )
+    placed = c.device.placed_actuators
+    numbers, sections = [a.numbers(c.p) for a in placed], [a.section for a in placed]
+    gains, lags = [q.gain for q in numbers], [q.time_constant for q in numbers]
+    return proportional(tuple(a.name for a in placed), sections, gains, [s.gain.si for s in sections], lags)
 
 
 def _heated(c: Condensed) -> Transduction:

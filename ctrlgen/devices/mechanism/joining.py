@@ -11,16 +11,13 @@ from pydantic import Field, model_validator
 
 from ctrlgen.core.names import Name
 from ctrlgen.core.units import In, Quantity
+from ctrlgen.devices.place import Direction, Place
 from ctrlgen.devices.section import Section
 from ctrlgen.physics import rigid_bodies as mechanism
 from ctrlgen.physics.flexure import Segment
-from ctrlgen.physics.screw import Matrix, inverse
+from ctrlgen.physics.screw import TWIST, Matrix, inverse
 
 Length = Annotated[Quantity, In("mm", positive=True)]
-Coordinate = Annotated[Quantity, In("mm")]
-Place = tuple[Coordinate, Coordinate, Coordinate]
-Direction = tuple[float, float, float]
-TWIST = ("theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z")
 STIFF = 0.01  # of the largest compliance of a mechanism's flexures, below which a direction counts as held
 
 

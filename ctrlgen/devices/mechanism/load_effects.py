@@ -8,10 +8,9 @@ import numpy as np
 from ctrlgen.core.units import show
 from ctrlgen.devices.mechanism.condensed import Condensed, nominal
 from ctrlgen.devices.mechanism.drawing import Drawing
-from ctrlgen.devices.mechanism.joining import TWIST
 from ctrlgen.devices.mechanism.loads import Loads
 from ctrlgen.devices.mechanism.second_order import SecondOrder
-from ctrlgen.physics.screw import inverse_adjoint
+from ctrlgen.physics.screw import TWIST, inverse_adjoint
 
 STILL = 1e-6  # of the largest component of a motion, below which it is rounding of a symmetric drawing
 

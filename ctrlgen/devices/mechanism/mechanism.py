@@ -23,7 +23,6 @@ from ctrlgen.devices.mechanism.condensed import MOST_STEPS, SPARE_STEPS, Condens
 from ctrlgen.devices.mechanism.copies import Copied, CopiedParts, Placed
 from ctrlgen.devices.mechanism.flexures import Blade, CircularHinge, Flexible, Strut, Wire, flexures_in_one_place
 from ctrlgen.devices.mechanism.internal_modes import structural_model
-from ctrlgen.devices.mechanism.joining import TWIST
 from ctrlgen.devices.mechanism.linear_range import second_order_faults, stiffened
 from ctrlgen.devices.mechanism.load_effects import load_faults
 from ctrlgen.devices.mechanism.mechanism_physics import mechanism_physics
@@ -43,6 +42,7 @@ from ctrlgen.devices.mechanism.tables import (
 from ctrlgen.devices.structural_model import StructuralModel
 from ctrlgen.physics import rigid_bodies as mechanism
 from ctrlgen.physics.rigid_bodies import GROUND, Element
+from ctrlgen.physics.screw import TWIST
 
 AnyElement = Annotated[
     Blade | Wire | Strut | CircularHinge | Compliance | ComplianceMatrix | Spring | BentBeam,

@@ -7,9 +7,8 @@ from typing import Any
 
 import casadi as ca
 
-from ctrlgen.core.units import written_unit
 from ctrlgen.devices.device_physics import BalancedPhysics, DevicePhysics, InertialPhysics, SensedPoints
-from ctrlgen.devices.limit import Limit, rate_limit
+from ctrlgen.devices.limit import Limit
 from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.devices.mechanism.drives import transduction
 from ctrlgen.devices.mechanism.loads import Loads
@@ -69,11 +68,7 @@ def mechanism_physics(c: Condensed) -> DevicePhysics:
         limits=limits,
         sensed=_sensed(c, second if bent else None, loads),
         second_order_kinematics=None if bent or c.cubics else second.pose,
-        rate_limits=tuple(
-            rate_limit(acting.drive, i, s.rate[0].si, s.rate[1].si, written_unit(s.rate[1].text))
-            for i, s in enumerate(sections)
-            if getattr(s, "rate", None) is not None
-        ),
+        rate_limits=acting.rate_limits(sections),
     )
     if p.dynamics is None:
         return BalancedPhysics(

@@ -10,10 +10,8 @@ import numpy as np
 from ctrlgen.core.units import show
 from ctrlgen.devices.mechanism.condensed import nominal
 from ctrlgen.devices.mechanism.drawing import Drawing
-from ctrlgen.devices.mechanism.joining import TWIST
-from ctrlgen.physics.screw import move
+from ctrlgen.physics.screw import TWIST, WRENCH, move
 
-WRENCH = ("F_x", "F_y", "F_z", "M_x", "M_y", "M_z")
 UNITS = {("theta", "F"): "urad/N", ("theta", "M"): "urad/(N*m)", ("delta", "F"): "um/N", ("delta", "M"): "um/(N*m)"}
 STIFF_UNITS = {("F", "theta"): "N/rad", ("F", "delta"): "N/m", ("M", "theta"): "N*m/rad", ("M", "delta"): "N*m/m"}
 ROUNDING = 1e-9  # of the largest entry of a block, below which an entry is rounding

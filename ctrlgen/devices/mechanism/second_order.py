@@ -14,11 +14,10 @@ import numpy as np
 
 from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.devices.mechanism.copies import Placed
-from ctrlgen.devices.mechanism.joining import TWIST
 from ctrlgen.physics import rigid_bodies as mechanism
 from ctrlgen.physics.flexure import Segment
 from ctrlgen.physics.rigid_bodies import GROUND
-from ctrlgen.physics.screw import Matrix, adjoint, inverse_adjoint
+from ctrlgen.physics.screw import TWIST, Matrix, adjoint, inverse_adjoint
 from ctrlgen.physics.second_order_flexure import (
     AWTAR_2,
     beam,

@@ -9,8 +9,8 @@ import casadi as ca
 from pydantic import model_validator
 
 from ctrlgen.core.units import In, Quantity
-from ctrlgen.devices.mechanism.joining import TWIST, Joining
-from ctrlgen.physics.screw import Matrix
+from ctrlgen.devices.mechanism.joining import Joining
+from ctrlgen.physics.screw import TWIST, Matrix
 
 Translational = Annotated[Quantity, In("N/um", low=0.0)]
 Torsional = Annotated[Quantity, In("N*m/rad", low=0.0)]

@@ -12,10 +12,8 @@ from pydantic import Field, model_validator
 
 from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.mechanism.joining import Joining
-from ctrlgen.physics.screw import Matrix
-
-MOST_ASYMMETRY = 0.01  # two numbers of three printed digits, such as those of a paper, may differ by so much
-ROUNDING = 1e-9
+from ctrlgen.devices.stated_matrix import matrix_faults, symmetric_note
+from ctrlgen.physics.screw import TWIST, Matrix
 
 
 class Compliance(Joining):
@@ -71,33 +69,23 @@ class ComplianceMatrix(Joining):
 
     @model_validator(mode="after")
     def _stores_energy(self) -> ComplianceMatrix:
-        C = np.array(self.compliance_si)[[3, 4, 5, 0, 1, 2]]  # deflection per load, symmetric by reciprocity
-        size = np.sqrt(np.abs(np.outer(np.diag(C), np.diag(C))))
-        if np.any(np.diag(C) <= 0) or np.linalg.eigvalsh((C + C.T) / size).min() <= 0:
-            raise ValueError("compliance_si: is not positive: a load would gain energy from it")
-        if self.asymmetry > MOST_ASYMMETRY:
-            raise ValueError(
-                f"compliance_si: what stands across the diagonal differs by {100 * self.asymmetry:.2g} %, and by reciprocity is equal; "
-                "check the order of rows (theta, delta) and columns (F, M)"
-            )
+        if faults := matrix_faults("compliance_si", self._per_load, TWIST):
+            raise ValueError("; ".join(faults))
         return self
 
     @property
-    def asymmetry(self) -> float:
-        """How far C is from reciprocal, the largest |C_ij - C_ji|/sqrt(C_ii C_jj) of deflections per load."""
-        C = np.array(self.compliance_si)[[3, 4, 5, 0, 1, 2]]
-        return float((np.abs(C - C.T) / np.sqrt(np.outer(np.diag(C), np.diag(C)))).max())
+    def _per_load(self) -> np.ndarray:
+        """(6, 6) with moments before forces: symmetric by reciprocity."""
+        return np.array(self.compliance_si)[:, [3, 4, 5, 0, 1, 2]]
 
     def notes(self) -> list[str]:
         """That it was made symmetric."""
-        if self.asymmetry <= ROUNDING:
-            return []
-        return [f"compliance_si is not symmetric by {100 * self.asymmetry:.2g} %: the mean of both halves is taken"]
+        return symmetric_note("compliance_si", self._per_load)
 
     def compliance(self, p: SimpleNamespace, m: SimpleNamespace) -> Matrix:
         """[C] about the free end (6, 6): the symmetric part of what the file states."""
-        C = np.array(self.compliance_si)[[3, 4, 5, 0, 1, 2]]
-        return ca.DM(((C + C.T) / 2)[[3, 4, 5, 0, 1, 2]])
+        C = self._per_load
+        return ca.DM(((C + C.T) / 2)[:, [3, 4, 5, 0, 1, 2]])
 
 
 def compliance_of_entries(turns: Sequence[Any], shifts: Sequence[Any], z: Any, y: Any, x: Any = 0.0) -> Matrix:

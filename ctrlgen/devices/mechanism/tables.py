@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import casadi as ca
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from ctrlgen.core.names import Name
-from ctrlgen.core.units import In, Quantity, same_dimension, written_unit
+from ctrlgen.core.units import In, Quantity
+from ctrlgen.devices.driven import Driven, PerDrive
 from ctrlgen.devices.load import GROUND_NAME
-from ctrlgen.devices.mechanism.joining import Direction, Place
+from ctrlgen.devices.place import Direction, Place
 from ctrlgen.devices.section import Section
 from ctrlgen.physics.screw import Matrix, rotation_z
 
-PerDrive = Annotated[Quantity, In(None)]
 Inertia = Annotated[Quantity, In("kg*mm^2", positive=True)]
 FLAT = 0.01  # a flat plate has the sum; its numbers are rounded
 
@@ -106,11 +106,9 @@ class Body(Section):
         return self
 
 
-class Actuator(Section):
+class Actuator(Driven):
     """`[[actuator]]`: what moves the mechanism. One gives one axis, named after it."""
 
-    name: Name
-    """Of the axis and its drive."""
     kind: Literal["force", "displacement"]
     """Pushes on a body, or prescribes the motion of an element."""
     on: str
@@ -123,14 +121,6 @@ class Actuator(Section):
     """In which direction; of any length."""
     gain: PerDrive
     """Force or displacement per drive, such as "0.2 N/V" or "1 um/V"."""
-    low: PerDrive
-    """Lowest drive; its unit is that of the drive."""
-    high: PerDrive
-    """Highest drive."""
-    rate: tuple[PerDrive, PerDrive] | None = None
-    """Largest change of the drive by time, such as "5 V/ms", or the lowest and the highest, such as ["-2 V/ms", "5 V/ms"]."""
-    time_constant: Annotated[Quantity, In("ms", positive=True)] | None = None
-    """Time constant with which the force or displacement follows the drive; left out: at once."""
     stiffness: Annotated[Quantity, In("N/um", positive=True)] | None = None
     """Stiffness of a stack beside its blocked force, along its direction."""
     travel: Annotated[Quantity, In("um", positive=True)]
@@ -138,31 +128,9 @@ class Actuator(Section):
     pattern: str = ""
     """The pattern by which it is copied."""
 
-    @field_validator("rate", mode="before")
-    @classmethod
-    def _is_to_both_sides(cls, stated: Any) -> Any:
-        """Reads a single rate as the largest to both sides."""
-        return (f"-{stated}", stated) if isinstance(stated, str) else stated
-
     @model_validator(mode="after")
     def _fits_together(self) -> Actuator:
-        faults = []
-        drive = written_unit(self.low.text)
-        if self.rate is not None:
-            slowest, fastest = self.rate
-            if any(not same_dimension(written_unit(q.text), f"({drive})/s") for q in self.rate):
-                faults.append(f"rate: {fastest.text!r} is no rate of a drive in {drive}; write for example {drive}/ms")
-            elif not slowest.si < 0 < fastest.si:
-                faults.append("rate: must be above zero, or a rate below zero and one above")
-        if not same_dimension(drive, written_unit(self.high.text)):
-            faults.append(f"high: {self.high.text!r} is not of the dimension of low = {self.low.text!r}")
-        elif not self.low.si < self.high.si:
-            faults.append(f"low = {self.low.text!r} is not below high = {self.high.text!r}")
-        wanted = "N" if self.kind == "force" else "m"
-        if not same_dimension(f"({written_unit(self.gain.text)})*({drive})", wanted):
-            faults.append(
-                f"gain: {self.gain.text!r} is no {self.kind} per drive in {drive}; write for example {wanted}/{drive}"
-            )
+        faults = self.gain_faults(self.gain, "N" if self.kind == "force" else "m", self.kind)
         if np.linalg.norm(self.along) == 0:
             faults.append("along: is zero; give a direction")
         if self.kind == "force" and self.at is None:
