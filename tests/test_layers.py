@@ -197,3 +197,16 @@ def test_a_public_class_has_a_name_of_its_own():
     ]
     exported = [name for name in ctrlgen.__all__ if isinstance(getattr(ctrlgen, name), type)]
     assert len(exported) > 20 and {name: defined.count(name) for name in exported} == dict.fromkeys(exported, 1)
+
+
+def test_nothing_is_called_equal_within_a_fixed_size():
+    """Values are in SI units: numpy's default tolerance of 1e-8 calls two errors of nanometres equal. Each use states its own."""
+    compares = {"np.allclose", "np.isclose", "np.testing.assert_allclose", "allclose", "isclose", "assert_allclose"}
+    fixed = [
+        f"{path.relative_to(ROOT)}:{call.lineno}"
+        for path in MODULES
+        for call in ast.walk(ast.parse(path.read_text()))
+        if isinstance(call, ast.Call) and ast.unparse(call.func).replace("numpy", "np") in compares
+        if "atol" not in {k.arg for k in call.keywords}
+    ]
+    assert not fixed

@@ -220,7 +220,7 @@ class Fitter:
         for _ in range(DISCREPANCY.updates):
             before, fit = fitter, fitter.fit(Structure(device))
             fitter = fitter.with_errors_of(fit)
-            if np.allclose(fitter.error.weighted.sd, before.error.weighted.sd, rtol=DISCREPANCY.same):
+            if np.allclose(fitter.error.weighted.sd, before.error.weighted.sd, rtol=DISCREPANCY.same, atol=0):
                 break
         fit = fitter.fit(Structure(device))
         if np.all(fitter.error.rms < FIT.poor_start_rms * self.noise.floor):

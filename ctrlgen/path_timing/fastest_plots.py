@@ -93,7 +93,7 @@ def _draw_speed(axes: Axes, motion: FastestPath, alike: list[int], unit: str) ->
         def labelled(text: str, first: bool = k == 0) -> str:
             return text if first else "_"  # each once
 
-        if bound is not None and not np.allclose(bound, speed):
+        if bound is not None and not np.allclose(bound, speed, rtol=1e-3, atol=0):  # apart by more than a line's width
             label = labelled("bound of each place alone")
             axes.plot(100 * share, shown(share, bound), color=UNBOUND, lw=1, ls="--", label=label)
         axes.plot(100 * share, shown(share, speed), color="#333333", lw=1, label=labelled("fastest law of time"))

@@ -61,7 +61,7 @@ class Searcher:
                 break
             trials.use(trials.fitter.with_noise(noise))
             current = self._settled(current)
-            if np.allclose(noise.floor, before.floor, rtol=SEARCH.same_noise):
+            if np.allclose(noise.floor, before.floor, rtol=SEARCH.same_noise, atol=0):
                 break
         current = self.clocked(self._finely_stepped(self.best_settled(current)))
         current = acting_instead(trials, simplified(trials, current))

@@ -201,7 +201,9 @@ class Trials:
             return None
         if before.structure.finer != fit.structure.finer or len(before.theta) != len(fit.theta):
             return None
-        close = np.allclose(now.sd, then.sd, SEARCH.same_screen, 0.0) and all(map(np.array_equal, now.ar, then.ar))
+        close = np.allclose(now.sd, then.sd, rtol=SEARCH.same_screen, atol=0) and all(
+            map(np.array_equal, now.ar, then.ar)
+        )
         moved = np.abs(fit.theta - before.theta) <= SEARCH.same_numbers * np.sqrt(fit.covariance.diagonal())
         return screened if close and bool(np.all(moved)) else None
 
@@ -228,7 +230,7 @@ class Trials:
         """The same structure under the discrepancy that it leaves itself, estimated and fitted in turn."""
         for _ in range(DISCREPANCY.updates):
             fitter = replace(self.fitter, errors=candidate.errors)
-            if np.allclose(fitter.error.weighted.sd, self.fitter.error.weighted.sd, rtol=DISCREPANCY.same):
+            if np.allclose(fitter.error.weighted.sd, self.fitter.error.weighted.sd, rtol=DISCREPANCY.same, atol=0):
                 break
             before = self.fitter
             self.use(fitter)
@@ -263,7 +265,7 @@ class Trials:
             before = self.fitter.noise.sd
             self.use(self.fitter.with_noise(update_noise_size(self.fitter, candidate.fit)))
             candidate = self.converged(candidate)
-            if np.allclose(before, self.fitter.noise.sd, rtol=SEARCH.same_noise_size):
+            if np.allclose(before, self.fitter.noise.sd, rtol=SEARCH.same_noise_size, atol=0):
                 break
         return candidate
 
