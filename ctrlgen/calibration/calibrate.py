@@ -248,9 +248,7 @@ def _weighed(fitter: Fitter, structure: Structure) -> Fitter:
     for _ in range(NOISE_UPDATE.guessed_refits if fitter.noise.guessed.any() else 0):
         fit = fitter.fit(structure)
         fitter = fitter.with_noise(update_guessed_noise(fitter.with_errors_of(fit), fit))
-    for _ in range(DISCREPANCY.updates):
-        fitter = fitter.with_errors_of(fitter.fit(structure))
-    return fitter
+    return fitter.with_settled_errors(structure)
 
 
 def _told(

@@ -37,6 +37,7 @@ from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.selection.standing import answer_of, in_standing, possible
 from ctrlgen.diagnosis.selection.trials import FAILURES
 from ctrlgen.diagnosis.selection.verdict import Verdict, in_another_unit, verdict, within_tolerance
+from ctrlgen.diagnosis.selection.way_covered import with_longest_periods
 from ctrlgen.diagnosis.shares.empirical_terms import EmpiricalTerm, empirical_terms
 from ctrlgen.diagnosis.shares.families import ranking
 from ctrlgen.diagnosis.shares.gather import ResidualShares, residual_shares
@@ -265,7 +266,8 @@ def _hypotheses(device: Device, recording: Recording, effects: Sequence[type[Eff
     sample_time = shortest if np.isfinite(shortest) else None
     ambient = any(r.ambient is not None for r in recording.records)
     offered = hypotheses(device, nominal_physics(device), recording.channels, sample_time, ambient, effects)
-    return [h for h in offered if h.effect != PARAMETER or h.path in acting]
+    offered = [h for h in offered if h.effect != PARAMETER or h.path in acting]
+    return with_longest_periods(offered, recording, device)
 
 
 def _relative_ambient(recording: Recording) -> Recording:

@@ -120,6 +120,15 @@ class Fitter:
         residuals = [r.observed - self.predict(fit, r) for r in self.fit_records]
         return replace(self, errors=error_model(self.noise, self.fit_records, [np.nan_to_num(e) for e in residuals]))
 
+    def with_settled_errors(self, structure: Structure) -> Fitter:
+        """The same with the discrepancy that a fit of `structure` leaves under it: both are estimated in turn."""
+        fitter = self
+        for _ in range(DISCREPANCY.updates):
+            before, fitter = fitter, fitter.with_errors_of(fitter.fit(structure))
+            if np.allclose(fitter.error.weighted.sd, before.error.weighted.sd, rtol=DISCREPANCY.same, atol=0):
+                break
+        return fitter
+
     @property
     def fit_records(self) -> list[Record]:
         """The records to fit."""
@@ -216,12 +225,7 @@ class Fitter:
         residual is far above the noise, the fit is repeated with each uncertain number one standard deviation below and above
         its stated value: a device that drifts, or saturates in a loop, has several local optima.
         """
-        fitter = self.with_errors_of(self.fit(Structure(device), steps=0))
-        for _ in range(DISCREPANCY.updates):
-            before, fit = fitter, fitter.fit(Structure(device))
-            fitter = fitter.with_errors_of(fit)
-            if np.allclose(fitter.error.weighted.sd, before.error.weighted.sd, rtol=DISCREPANCY.same, atol=0):
-                break
+        fitter = self.with_errors_of(self.fit(Structure(device), steps=0)).with_settled_errors(Structure(device))
         fit = fitter.fit(Structure(device))
         if np.all(fitter.error.rms < FIT.poor_start_rms * self.noise.floor):
             return fitter, fit

@@ -57,6 +57,7 @@ class Hypothesis:
     highest: frequency [Hz] up to which samples are told from their aliases; infinite for settled poses, which have no clock.
     machine_odds: ln of how many times commoner the law is in a machine of these parts than in any.
     longest: delay [s] that is looked for; finite in the reading of a loop, where each sample of it is a state of the simulation.
+    longest_period: way [SI] of a law that repeats along one, up to which the records show that it does.
     """
 
     effect: str
@@ -68,6 +69,7 @@ class Hypothesis:
     highest: float = float("inf")
     machine_odds: float = field(default=0.0, compare=False)
     longest: float = float("inf")
+    longest_period: float = field(default=float("inf"), compare=False)
 
     def beside(self, causes: Sequence[Hypothesis]) -> Hypothesis | None:
         """The hypothesis to add to `causes`: itself, one more where it is there and repeatable, None where it cannot be added.

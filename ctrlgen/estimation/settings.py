@@ -339,9 +339,9 @@ class DiscrepancySettings:
     uncorrelated: float = 0.05
     """Correlation below which the sum of the correlation time ends: what follows is its own uncertainty."""
     fewest_independent: float = 30.0
-    """Correlation times that a record holds at least: of fewer, the correlation time itself is not known. Judgement."""
-    updates: int = 3
-    """Times that discrepancy and fit are estimated in turn: two to three iterations of feasible generalised least squares."""
+    """Correlation times that a record holds at least: fewer do not tell the correlation time itself. Judgement."""
+    updates: int = 10
+    """Most times that discrepancy and fit are estimated in turn: three do where the numbers are nearly right, more in a stiff loop."""
     same: float = 0.05
     """Relative change of the errors' deviation below which they count as unchanged."""
     blocks: int = 20

@@ -12,11 +12,11 @@ from itertools import combinations
 import numpy as np
 
 from ctrlgen.core.units import from_si
-from ctrlgen.devices import ImposedPhysics
+from ctrlgen.diagnosis.selection.way_covered import way_covered
 from ctrlgen.diagnosis.settings import OBJECTIONS
-from ctrlgen.effects import Param, Place
+from ctrlgen.effects import Param
 from ctrlgen.estimation.fit import Fit
-from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, nominal_physics
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 from ctrlgen.estimation.noise import period_of
 from ctrlgen.estimation.raw_readings import detect_directly
 from ctrlgen.estimation.settings import STATISTICS
@@ -27,7 +27,8 @@ from ctrlgen.recordings.recording import Record, Recording
 def objections(
     recording: Recording, fit: Fit, accepted: Sequence[Hypothesis] = (), exact: bool = False
 ) -> dict[int, str]:
-    """The reason by cause, by its place in the structure, of each that is not yet `accepted` and meets an objection.
+    """The reason by cause, by its place in the structure, of each that is not yet `accepted` and meets an objection; and of an accepted
+    one that has grown so long, while others came and went, that the records do not show that it repeats.
 
     `exact`: the model leaves noise alone, so that an event or a short line is what it looks like.
     """
@@ -35,6 +36,8 @@ def objections(
     reasons: dict[int, str] = {}
     for k, cause in enumerate(causes):
         if cause in accepted:
+            if not exact and (reason := _no_pitch(recording, fit, k)):
+                reasons[k] = reason
             continue
         reason = (
             outside_its_range(fit, k)
@@ -265,20 +268,6 @@ def _line(fit: Fit, k: int) -> float:
 def _covered(recording: Recording, cause: Hypothesis, fit: Fit) -> float:
     """The longest of the records to fit [s], or how far its reading, or its axis, goes in them [SI]; no end where neither is
     meant."""
-    records = [r for r in recording.records if r.role == "fit"]
-    params = cause.law.params
-    if any(p.unit == "Hz" for p in params):
-        return max(float(r.time[-1] - r.time[0]) for r in records)
-    channel = f"reading.{cause.at}"
-    if not any(_is_spatial_period(cause, p) for p in params):
-        return np.inf
-    if cause.law.place is Place.FORCE:
-        physics = nominal_physics(fit.structure.device)
-        if isinstance(physics, ImposedPhysics):
-            place = 0 if cause.at == "all" else physics.axes.index(cause.at)
-            return float(max(np.ptp(r.drive[:, place]) for r in records))
-    if channel not in recording.channels:
-        return np.inf
-    i = recording.channels.index(channel)
-    read = np.concatenate([r.observed[r.valid[:, i], i] for r in records])
-    return float(np.ptp(read)) if len(read) else np.inf
+    if any(p.unit == "Hz" for p in cause.law.params):
+        return max(float(r.time[-1] - r.time[0]) for r in recording.records if r.role == "fit")
+    return way_covered(recording, cause, fit.structure.device) if cause.prior.is_pitch else np.inf

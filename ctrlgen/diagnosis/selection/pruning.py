@@ -119,7 +119,7 @@ def without_needless(trials: Trials, current: CandidateModel) -> CandidateModel:
     for k in reversed(range(len(current.causes))):
         for bare in trials.tried(current.fit.restarted.without(k), None):
             feigned = trials.selection.within_model_form_error(bare, current, k) and not _far_worse(bare, current)
-            if not is_needed(trials, bare, current) or feigned:
+            if (not is_needed(trials, bare, current) or feigned) and not trials.objections(bare, bare.causes):
                 current = bare
     return current
 

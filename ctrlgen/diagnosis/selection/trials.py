@@ -251,7 +251,9 @@ class Trials:
                     break
                 fitter = replace(self.fitter, errors=errors)
                 fit = fitter.fit(structure, steps=FIT.max_steps)
-                errors, structure = fitter.with_errors_of(fit).error, fit.restarted
+                before, errors, structure = errors, fitter.with_errors_of(fit).error, fit.restarted
+                if np.allclose(errors.weighted.sd, before.weighted.sd, rtol=DISCREPANCY.same, atol=0):
+                    break
         except FAILURES:
             return False
         return errors.is_noise
