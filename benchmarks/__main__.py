@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from benchmarks import budget, diagnosis, job, mechanism, online, target, trajectory
+from benchmarks import budget, diagnosis, job, long_recording, mechanism, online, target, trajectory
 from benchmarks.measure import Count, Line, Note, print_table
 from benchmarks.samples import Disagreement
 
@@ -17,6 +17,7 @@ BENCHMARKS = {
     "mechanism": mechanism,
     "budget": budget,
     "diagnosis": diagnosis,
+    "long_recording": long_recording,
 }
 
 

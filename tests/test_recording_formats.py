@@ -15,7 +15,7 @@ from ctrlgen.recordings.reader import load_recordings
 
 
 def write_as(ending: str, path, columns: dict[str, np.ndarray]) -> None:
-    if READERS[ending] == "text_file":
+    if READERS[ending] == "long_text_file":
         path.write_text(csv_text(columns))
     elif ending in (".xlsx", ".xlsm"):
         openpyxl = pytest.importorskip("openpyxl", reason="openpyxl is not installed: Excel was not read")

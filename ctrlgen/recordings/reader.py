@@ -9,20 +9,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_toml, validate
-from ctrlgen.core.units import parse
 from ctrlgen.model.model import Model
-from ctrlgen.recordings import preprocessing, validation
+from ctrlgen.recordings import preprocessing, thinning, validation
 from ctrlgen.recordings.formats import READERS
-from ctrlgen.recordings.formats.measurement_table import Clock
-from ctrlgen.recordings.gaps import SHORTEST
 from ctrlgen.recordings.plausible_rate import rate_notes
-from ctrlgen.recordings.recorded_columns import RecordedColumns
+from ctrlgen.recordings.record_reader import RecordReader
 from ctrlgen.recordings.recording import Record, Recording
 from ctrlgen.recordings.schema import FILE, Column, RecordingFile, RecordTable, check, deviation, fits, stated_noise
 from ctrlgen.recordings.units_of_columns import channel_names
@@ -51,15 +48,13 @@ def load_recordings(paths: Sequence[Path | str], model: Model, *, hold_out: bool
     twice = [file.path for k, file in enumerate(files) if resolved[k] in resolved[:k]]
     faults += [Fault(str(path), "is given twice; name each recording once") for path in twice]
     source = files[0].path if len(files) == 1 else "recordings"
-    columns = [
-        (name, column)
-        for _, written in readable
-        for r in written.record
-        for name, column in written.columns_of(r).items()
-    ]
+    columns_of = [written.columns_of(r) for _, written in readable for r in written.record]
+    columns = [(name, column) for each in columns_of for name, column in each.items()]
     channels = tuple(dict.fromkeys(name for name, _ in columns if not name.startswith("drive.")))
     names = channel_names(model, [written for _, written in readable], columns, channels)
-    contents = [file.read(names) for file in files]
+    every = [file.records(names, alone=len(columns_of) == 1) for file in files]
+    m = _rows_for_one(every)
+    contents = [file.validated(reads, names, m) for file, reads in zip(files, every, strict=True)]
     faults += [fault for content in contents for fault in content.faults]
     if faults:
         raise InputError(source, faults)
@@ -71,6 +66,7 @@ def load_recordings(paths: Sequence[Path | str], model: Model, *, hold_out: bool
     if faults or divided.faults:
         raise InputError(source, [*faults, *divided.faults])
     noise, noise_notes = _stated(channels, columns, "noise")
+    noise = tuple(None if sd is None else sd / np.sqrt(m) for sd in noise)
     tolerance, tolerance_notes = _stated(channels, columns, "tolerance")
     return Recording(
         title=" + ".join(dict.fromkeys(written.title for _, written in readable)),
@@ -90,6 +86,31 @@ def load_recordings(paths: Sequence[Path | str], model: Model, *, hold_out: bool
         drive_units=names.drive_units,
         drives=names.drives,
     )
+
+
+class _Read(NamedTuple):
+    """One [[record]] as read before validation: its number, how it was read, the record of `rows`, None where it cannot be read or is read
+    again to be used, and how far it can be thinned where it is long."""
+
+    k: int
+    reader: RecordReader
+    record: Record | None
+    rows: int
+    can: thinning.Thinnable | None
+
+
+def _rows_for_one(every: Sequence[Sequence[_Read]]) -> int:
+    """How many rows of all records one stands for: 1 where none is long."""
+    reads = [read for reads in every for read in reads]
+    if all(read.can is None for read in reads):
+        return 1
+    beside = [read.record for read in reads if read.can is None and read.record is not None and not _is_rest(read)]
+    short = [thinning.thinnable(thinning.marked(record), thinning.FEWEST) for record in beside]
+    return thinning.common([*(read.can for read in reads if read.can is not None and not _is_rest(read)), *short])
+
+
+def _is_rest(read: _Read) -> bool:
+    return read.reader.table.role == "rest"
 
 
 def _stated(
@@ -146,8 +167,48 @@ class _File:
             faults = error.faults
         self.faults = [Fault(self.prefix + fault.where, fault.what) for fault in faults]
 
-    def read(self, names: validation.ChannelNames) -> _Content:
-        """The records with their columns in SI, validated one by one."""
+    def records(self, names: validation.ChannelNames, alone: bool) -> list[_Read]:
+        """The records with their columns in SI. Of a long one how far it can be thinned: it is kept only where it is `alone`."""
+        if self.written is None:
+            return []
+        reads = []
+        by_itself = self.written.kind == "series" and self.written.low_pass is None and self.written.keep_every is None
+        for k in range(len(self.written.record)):
+            reader, record = self._read(k, names)
+            can, rows = None, 0 if record is None else len(record.time)
+            if record is not None and by_itself and rows > thinning.LONG:
+                record = thinning.marked(record)
+                can = thinning.thinnable(record, thinning.ENOUGH)
+            reads.append(_Read(k, reader, record if can is None or alone else None, rows, can))
+        return reads
+
+    def _read(self, k: int, names: validation.ChannelNames) -> tuple[RecordReader, Record | None]:
+        assert self.written is not None  # it was read
+        table = self.written.record[k]
+        sound = {n: c for n, c in self.written.columns_of(table).items() if fits(n, c, self.model)}
+        reader = RecordReader(self.path.parent, self.written, table, sound, f"{self.prefix}record[{k}]")
+        return reader, reader.read(names)
+
+    def _thinned(self, read: _Read, names: validation.ChannelNames, m: int) -> tuple[Record | None, list[str]]:
+        """The record with one row for m, and what was done to it."""
+        record = read.record
+        if record is None and read.can is not None:
+            record = self._read(read.k, names)[1]
+        if record is None:
+            return None, []
+        if m == 1:
+            said = [] if read.can is None else [thinning.not_thinned(record.name, read.rows, read.can.why)]
+            return record, said
+        if _is_rest(read) and read.rows < thinning.FEWEST * m:
+            return None, [f"{record.name}: of its {read.rows} rows too few would be left beside the others; not used."]
+        before = int(np.isfinite(record.observed).sum())
+        record = thinning.marked(record)
+        lost = before - int(record.valid.sum())
+        thin = thinning.thinned(record, m, read.can or thinning.thinnable(record, thinning.FEWEST))
+        return thin, [thinning.note(thin, m, read.rows, lost)]
+
+    def validated(self, reads: Sequence[_Read], names: validation.ChannelNames, m: int) -> _Content:
+        """The records, with one row for `m` of them, validated one by one."""
         if self.written is None:
             return _Content()
         records: list[Record] = []
@@ -155,16 +216,16 @@ class _File:
         notes = preprocessing.notes(self.written)
         faults: list[Fault] = []
         spans: list[tuple[int, RecordTable, float, float]] = []
-        for k, table in enumerate(self.written.record):
-            where = f"{self.prefix}record[{k}]"
-            sound = {n: c for n, c in self.written.columns_of(table).items() if fits(n, c, self.model)}
-            reader = _RecordReader(self.path.parent, self.written, table, sound, where)
-            record = reader.read(names)
+        for read in reads:
+            k, reader = read.k, read.reader
+            table, where = self.written.record[k], reader.where
+            record, thinning_notes = self._thinned(read, names, m)
+            notes += thinning_notes
             faults += reader.faults
             if record is None:
                 continue
             record = replace(record, name=f"{self.path.resolve().parent.name}/{record.name}") if self.prefix else record
-            noise = stated_noise(sound)
+            noise = {name: sd / np.sqrt(m) for name, sd in stated_noise(reader.columns).items()}
             result = validation.validate_record(record, self.written.kind, self.model, names, where, table.gap, noise)
             records += result.records
             places += [where] * len(result.records)
@@ -188,181 +249,3 @@ class _File:
             for _, other, earliest, last in spans
             if other is not table and earliest <= begin < last and not table.shares_rows(other)
         ]
-
-
-class _RecordReader:
-    """Reads one [[record]] from its files; `faults` collects what is wrong on the way."""
-
-    def __init__(
-        self, folder: Path, written: RecordingFile, table: RecordTable, columns: dict[str, Column], where: str
-    ) -> None:
-        self.written, self.table, self.columns, self.where = written, table, columns, where
-        self.read_from = RecordedColumns(folder, written, table, where)
-        self.faults, self.rows, self.notes = self.read_from.faults, table.rows, self.read_from.notes
-        self.name = table.file + (f"[{table.rows[0]}:{table.rows[1]}]" if table.rows else "")
-
-    def read(self, names: validation.ChannelNames) -> Record | None:
-        """The record before validation; None where drives or clock cannot be read. `valid`: the channel has a column."""
-        table, kind = self.table, self.written.kind
-        values = self.read_from.signals(self.columns)
-        clock = None if table.time is None else self.read_from.column(f"{self.where}.time", table.time)
-        foreign = {name: values.pop(name) for name in list(values) if self.columns[name].sample_rate}
-        clocks = self.read_from.own_clocks(list(values), clock)
-        foreign |= {name: values.pop(name) for name in clocks}
-        ambient = self._ambient(table.conditions.ambient)
-        sizes = {name: len(column) for name, column in values.items()}
-        sizes |= {} if clock is None else {"time": len(clock)}
-        sizes |= {"ambient": len(ambient)} if isinstance(ambient, np.ndarray) else {}
-        n = min(sizes.values(), default=0)
-        if len(set(sizes.values())) > 1:
-            listed = ", ".join(f"{name} {size}" for name, size in sizes.items())
-            self._fault("", f"its columns have different numbers of rows ({listed}); export them together")
-            return None
-        if table.rows and n and table.rows[1] > n:
-            self._fault(".rows", f"{list(table.rows)} ends after the last of {n} rows of {table.file}")
-            return None
-        if kind == "series" and clock is None and (table.time is not None or table.sample_rate is None):
-            return None
-        time, period = self._clock(kind, clock, n)
-        if self.written.low_pass and clock is not None and (places := preprocessing.rows_on_grid(time)) is not None:
-            self.table, values = (
-                self.table.at_rows(places),
-                {k: preprocessing.spread(v, places) for k, v in values.items()},
-            )
-            ambient = preprocessing.spread(ambient, places) if isinstance(ambient, np.ndarray) else ambient
-            time = np.interp(np.arange(places[-1] + 1), places, time)
-            self.notes.append(preprocessing.grid_note(self.name, places))
-        if kind == "series" and n > 1:
-            values |= {name: self._resampled(name, column, time, clocks) for name, column in foreign.items()}
-            values = self._preprocessed(values, time)
-            self._check_thinned(float(np.median(np.diff(time))))
-        if any(name not in values for name in names.drives) or any(": " in fault.where for fault in self.faults):
-            return None
-        return self._record(names, values, time, period, ambient)
-
-    def _fault(self, key: str, what: str) -> None:
-        self.faults.append(Fault(f"{self.where}{key}", what))
-
-    def _preprocessed(self, values: dict[str, np.ndarray], time: np.ndarray) -> dict[str, np.ndarray]:
-        """The columns delayed, low-passed and differentiated as the file says, NaN outside the record's rows."""
-        n = len(time)
-        late = {name: c.later.si for name, c in self.columns.items() if c.later and name in values}
-        values = values | {name: preprocessing.delayed(values[name], time, lag) for name, lag in late.items()}
-        moved = [np.isfinite(values[name]) for name in values if name in late or self.columns[name].sample_rate]
-        self.rows = preprocessing.inner_rows(moved, *(self.table.rows or (0, n)))
-        rows, step = slice(*self.rows), float(np.median(np.diff(time)))
-        if not step > 0:  # the clock itself is at fault, which validation says
-            return values
-        inside = self._filtered({k: v[rows] for k, v in values.items()}, step)
-        whole = {name: np.full(n, np.nan) for name in inside}
-        for name, column in inside.items():
-            whole[name][rows] = column
-        return whole
-
-    def _resampled(self, name: str, values: np.ndarray, time: np.ndarray, clocks: dict[str, Clock]) -> np.ndarray:
-        """A column (m,) of another recorder at the record's `time` (n,) [s]: both began at once, or it states its own clock."""
-        rate = self.columns[name].sample_rate
-        start, step = clocks[name] if name in clocks else (0.0, 1 / rate.si if rate else 1.0)
-        return preprocessing.resampled(values, start + step * np.arange(len(values)), time - time[0])
-
-    def _filtered(self, values: dict[str, np.ndarray], sample_time: float) -> dict[str, np.ndarray]:
-        """The columns after the file's low-pass, with its derivatives; empty, with a fault, where that cannot be done."""
-        w, missing = self.written, dict[str, np.ndarray]()
-        if w.low_pass is not None:
-            longest = preprocessing.longest_gap(sample_time, w.low_pass.si)
-            missing = {name: ~np.isfinite(column) for name, column in values.items() if not name.startswith("drive.")}
-            values = {name: preprocessing.bridged(column, longest) for name, column in values.items()}
-            incomplete = [name for name, column in values.items() if not np.isfinite(column).all()]
-            highest = preprocessing.highest_cutoff(sample_time, self._kept(sample_time))
-            if odd := preprocessing.cannot_pass(w.low_pass, highest, min(map(len, values.values()), default=0)):
-                self._fault(": low_pass", odd)
-            if incomplete:
-                what = f"{', '.join(incomplete)} has rows without a number, which a filter would smear; leave them out with `rows`"
-                self._fault(": low_pass", what)
-            if incomplete or odd:
-                return {}
-            values = {k: preprocessing.low_passed(v, sample_time, w.low_pass.si) for k, v in values.items()}
-        derivatives = {
-            name: preprocessing.derivative(values[d.of], sample_time, d.order)
-            for name, d in w.derivatives.items()
-            if d.of in values
-        }
-        whole = values | derivatives
-        for name, lost in missing.items():
-            readings = (k for k in whole if k == name or (k in derivatives and w.derivatives[k].of == name))
-            whole |= {k: np.where(lost, np.nan, whole[k]) for k in readings if not k.startswith("drive.")}
-        return whole
-
-    def _check_thinned(self, sample_time: float) -> None:
-        """A fault where the filter leaves too few rows of a record that has enough of them."""
-        first, last = self.rows or (0, 0)
-        if not np.isfinite(sample_time):  # a clock that has a fault of its own
-            return
-        every, least = self._kept(sample_time), SHORTEST["series"]
-        if last - first < least or (last - first) // every >= least:
-            return
-        what = f"leaves {(last - first) // every} of {last - first} rows, one in {every}, and {least} are needed"
-        if self.written.keep_every is None and self.written.low_pass is not None:
-            lowest = preprocessing.lowest_cutoff(sample_time, (last - first) // least)
-            self._fault(
-                ": low_pass", f"{self.written.low_pass.text} {what}; write {lowest:.4g} Hz or more, or record longer"
-            )
-        else:
-            self._fault(": keep_every", f"{what}; write {(last - first) // least} or less, or record longer")
-
-    def _kept(self, sample_time: float) -> int:
-        """The number n of which every n-th row is kept, where rows are `sample_time` [s] apart."""
-        w = self.written
-        return w.keep_every or (preprocessing.enough_rows(sample_time, w.low_pass.si) if w.low_pass else 1)
-
-    def _clock(self, kind: str, clock: np.ndarray | None, n: int) -> tuple[np.ndarray, float]:
-        """Time of every row of the file (n,) [s] and the sample time [s], NaN where validation must find it."""
-        table = self.table
-        begin = table.start.si if table.start else 0.0
-        if clock is not None:
-            finite = clock[np.isfinite(clock)]
-            return begin + clock - (finite[0] if len(finite) else 0.0), np.nan
-        unclocked = 1 / table.sample_rate.si if kind == "series" and table.sample_rate else np.inf
-        period = table.dwell.si if table.dwell else unclocked
-        return begin + np.arange(n) * (1.0 if np.isinf(period) else period), period
-
-    def _record(
-        self,
-        names: validation.ChannelNames,
-        values: dict[str, np.ndarray],
-        time: np.ndarray,
-        period: float,
-        ambient: np.ndarray | float | None,
-    ) -> Record:
-        """The rows that are kept, as a record: the lead-in drives the device, but its readings are not valid."""
-        table, n = self.table, len(time)
-        every = self._kept(float(np.median(np.diff(time)))) if n > 1 else 1
-        kept = slice(*(self.rows or (0, n)), every)
-        observed = np.full((n, len(names.observed)), np.nan)
-        for i, name in enumerate(names.observed):
-            observed[:, i] = values.get(name, np.nan)
-        after_lead_in = (np.arange(n) >= table.used_rows[0])[:, None]
-        recorded = np.array([name in values for name in names.observed], dtype=bool)
-        return Record(
-            name=self.name,
-            role=table.role,
-            time=time[kept],
-            sample_time=period * every,
-            drive=np.column_stack([values[name] for name in names.drives])[kept],
-            observed=np.where(after_lead_in, observed, np.nan)[kept],
-            linear=table.between_samples == "linear",
-            poses=self.written.kind == "poses",
-            ambient=None if ambient is None else (np.zeros(n) + ambient)[kept],
-            valid=(after_lead_in & recorded)[kept],
-            period=None if table.period is None else table.period.si,
-            band=None if self.written.low_pass is None else self.written.low_pass.si,
-        )
-
-    def _ambient(self, given: str | Column | None) -> np.ndarray | float | None:
-        """The ambient temperature [K]: recorded (n,), constant, or None."""
-        if isinstance(given, Column):
-            return self.read_from.column(f"{self.where}.conditions.ambient", given)
-        try:
-            return None if given is None else parse(given, "degC")
-        except ValueError:  # already among the faults of recording.toml
-            return None

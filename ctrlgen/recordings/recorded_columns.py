@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from ctrlgen.core.units import same_dimension, to_si
 from ctrlgen.recordings.formats import read_table
 from ctrlgen.recordings.formats.measurement_table import Clock, MeasurementTable, Numbers
 from ctrlgen.recordings.formats.unit_texts import unit_of
+from ctrlgen.recordings.recorded_files import sha256
 from ctrlgen.recordings.schema import Column, RecordingFile, RecordTable
 
 SAME_CLOCK = 1e-3  # of a time between readings: as far as two clocks may differ by the rounding of a file
@@ -110,7 +110,7 @@ class RecordedColumns:
         if not path.is_file():
             what = f"is not here; the recording does not bring it along. Source: {source}. Put it at {path.resolve()}"
             raise InputError(path, [Fault(path.name, what)])
-        actual = hashlib.sha256(path.read_bytes()).hexdigest()
+        actual = sha256(path)
         # Rows, units and filters were chosen for that file and would mean something else in another
         if actual != stated:
             what = f"is another file, SHA-256 {actual}. Wanted: {source}. If you mean this one, state its SHA-256 in [sha256]"

@@ -24,8 +24,9 @@ def recording_files(recordings: Sequence[Path | str]) -> Iterator[tuple[str, Pat
 
 
 def sha256(path: Path) -> str:
-    """The SHA-256 of a file."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    """The SHA-256 of a file, which is not read into memory."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _named(node: Any) -> Iterator[str]:

@@ -17,7 +17,7 @@ from ctrlgen.recordings.formats.measurement_table import MeasurementTable
 from ctrlgen.recordings.formats.written_layout import Layout
 
 Reader = Callable[[Path, Layout], dict[str, MeasurementTable]]
-TEXT, MATLAB, HDF5, TDMS = "text_file", "matlab_file", "hdf5_file", "tdms_file"
+TEXT, MATLAB, HDF5, TDMS = "long_text_file", "matlab_file", "hdf5_file", "tdms_file"
 MDF, JSON, EXCEL, PARQUET, NUMPY = "mdf_file", "json_file", "excel_file", "parquet_file", "numpy_file"
 READERS: dict[str, str] = {
     ".csv": TEXT,

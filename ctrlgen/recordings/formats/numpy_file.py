@@ -18,7 +18,7 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
         if path.suffix.lower() == ".npy":
             array = np.load(path, mmap_mode="r", allow_pickle=False)  # its size is known before it is read
             check_size(path, array.nbytes)
-            arrays = {"data": np.array(array)}
+            arrays = {"data": array if array.ndim == 2 else np.array(array)}  # of a matrix each column is a copy
         else:
             check_archive(path)
             with np.load(path, allow_pickle=False) as file:

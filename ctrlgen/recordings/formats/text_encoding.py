@@ -33,7 +33,11 @@ def decoded(path: Path, encoding: str | None = None) -> tuple[str, list[str]]:
 
     Raises InputError where it is no text, or not in the stated encoding.
     """
-    content = read_bytes(path)
+    return decoded_bytes(path, read_bytes(path), encoding)
+
+
+def decoded_bytes(path: Path, content: bytes, encoding: str | None = None) -> tuple[str, list[str]]:
+    """The same of the `content` of a file, or of parts of it."""
     stated = encoding or next((name for mark, name in BOMS if content.startswith(mark)), None) or _wide(content)
     notes = [f"encoding {stated}"] if stated not in (None, encoding, "utf-8-sig") else []
     if stated is None:

@@ -91,7 +91,7 @@ def _table(
     cells = [[row[i] for row in sample if i < len(row)] for i in range(block.width)]
     style, notes = number_cells.style_of(cells, layout, separator)
     dated = " " in cells[0][0] and not lines[rows[0]].lstrip().startswith('"')
-    columns = _columns("\n".join(lines[k] for k in rows), block, separator, style, dated)
+    columns = columns_of("\n".join(lines[k] for k in rows), block, separator, style, dated)
     if not any(header.names) and lies_on_its_side(columns):
         return on_its_side(path, columns, (*said, *header.notes, *notes), layout, style)
     names, units = list(header.names), dict(header.units)
@@ -153,8 +153,8 @@ class _Lines(Sequence[int]):
         return self.rows[k] + 1
 
 
-def _columns(body: str, block: Block, separator: str, style: NumberStyle, dated: bool) -> list[np.ndarray]:
-    """The cells of a table by column: numbers where all of a column are plain ones, else texts, None where one is empty.
+def columns_of(body: str, block: Block, separator: str, style: NumberStyle, dated: bool) -> list[np.ndarray]:
+    """The cells of the rows of a table by column: numbers where all of a column are plain ones, else texts, None where one is empty.
 
     `dated`: the first cell of rows that blanks separate is a date and a time of day.
     """
