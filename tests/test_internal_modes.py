@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mechanism_files import HEAD, loaded
+import scipy.linalg
+from conftest import DEVICE
+from mechanism_files import HEAD, dm, loaded
 from scipy.integrate import solve_ivp
 
 from ctrlgen import build_model, load_scenario, solve
 from ctrlgen.app.commands.devices import bode
+from ctrlgen.app.simulated import simulate_device
 from ctrlgen.controller.bode import frequency_response
+from ctrlgen.devices.mechanism.condensed import nominal
+from ctrlgen.devices.mechanism.modes import as_displacements, body_matrices
 from ctrlgen.devices.structural_model import StructuralModel
+from ctrlgen.physics.rigid_bodies import point_motion
+from ctrlgen.physics.screw import inverse_adjoint
 
 M1, M2, K1, K2, ZETA = 0.2, 0.1, 2e4, 3e4, 0.01  # kg, N/m
 
@@ -42,7 +49,7 @@ def damping() -> np.ndarray:
 
 
 def test_the_structure_has_the_modes_and_the_response_of_two_masses(tmp_path):
-    """(-w^2 M + i w D + K)^-1 from the first mass to the second, all modes kept; with `modes_below` under the second mode the condensed."""
+    """(-w^2 M + i w D + K)^-1 from the first mass to the second, all modes kept; up to 4 Hz the condensed model does."""
     model = build_model(loaded(tmp_path, two_masses()))
     found = frequency_response(model, np.zeros(1))
     w = 2 * np.pi * found.hertz
@@ -50,8 +57,62 @@ def test_the_structure_has_the_modes_and_the_response_of_two_masses(tmp_path):
     assert found.response[0, 0] == pytest.approx(exact, rel=1e-4)
     modes = np.sqrt(np.sort(np.linalg.eigvals(np.linalg.solve(MASS, STIFFNESS)))) / (2 * np.pi)
     assert found.structure.frequencies[:2] == pytest.approx(modes, rel=1e-5)
-    few = loaded(tmp_path, two_masses('modes_below = "80 Hz"\n')).structural_model()
+    both = loaded(tmp_path, two_masses('modes_below = "80 Hz"\n')).structural_model()
+    assert both.frequencies == pytest.approx(modes, rel=1e-5)  # the condensed one is wrong there
+    few = loaded(tmp_path, two_masses('modes_below = "4 Hz"\n')).structural_model()
     assert few.frequencies == pytest.approx([np.sqrt(K1 / (M1 + M2)) / (2 * np.pi)], rel=1e-5)
+
+
+def test_as_many_modes_are_kept_as_the_response_of_all_bodies_needs(tmp_path):
+    """A stage with levers, 42 freedoms: the uncondensed (K - w^2 M + i w D)^-1, D of one damping ratio, within 1 % up to `modes_below`."""
+    text = (
+        DEVICE.parent / "xy_lever_stage.toml"
+    ).read_text() + '[dynamics]\ndamping_ratio = "1 %"\nmodes_below = "BELOW"\n'
+    counts = []
+    for below in (100.0, 2000.0):
+        device = loaded(tmp_path, text.replace("BELOW", f"{below} Hz"))
+        structure, c = device.structural_model(), nominal(device)
+        counts.append(len(structure.mass))
+        K, M, heavy = body_matrices(c)
+        size, n = as_displacements(device), len(device.placed_actuators)
+        push = np.zeros((len(K), n))
+        for i, a in enumerate(device.placed_actuators):
+            push[6 * a.second : 6 * a.second + 6, i] = dm(point_motion(c.point(a), c.directions[i])).ravel()
+        push *= size[:, None]
+        body = device.bodies.index(device.output.body)
+        see = np.zeros((2, len(K)))
+        see[:, 6 * body : 6 * body + 6] = dm(inverse_adjoint(None, c.output_point))[c.channel_rows]
+        see *= size
+        light = [i for i in range(len(K)) if i not in heavy]  # in balance with the others
+        follows = np.eye(len(K))[:, heavy]
+        follows[light] = -np.linalg.solve(K[np.ix_(light, light)], K[np.ix_(light, heavy)])
+        K, M = (follows.T @ X @ follows for X in (K, M))
+        squares, V = scipy.linalg.eigh(K, M)
+        D = M @ V @ np.diag(0.02 * np.sqrt(squares)) @ V.T @ M
+        w = 2 * np.pi * np.geomspace(1, below, 37)
+        full = np.array([see @ follows @ np.linalg.solve(K + 1j * x * D - x**2 * M, follows.T @ push) for x in w])
+        off = np.abs(np.moveaxis(structure.receptance(w), -1, 0) - full)
+        assert (off <= 0.011 * np.maximum(np.abs(full), 0.01 * np.abs(full[0]).max(axis=1, keepdims=True))).all()
+    assert counts[0] < counts[1] < 42
+
+
+def test_a_simulated_step_has_the_motion_of_two_masses(tmp_path):
+    """Beside the condensed model's, by the exponential of the whole."""
+    loaded(tmp_path, two_masses())
+    rate = 2000.0
+    trace = simulate_device(tmp_path / "device.toml", None, "5 A", 0.2, rate).trace
+    A = np.block(
+        [[np.zeros((2, 2)), np.eye(2)], [-np.linalg.solve(MASS, STIFFNESS), -np.linalg.solve(MASS, damping())]]
+    )
+    step, x, seen = scipy.linalg.expm(A / rate), np.zeros(4), [0.0]
+    held = np.concatenate([np.linalg.solve(STIFFNESS, [5.0, 0.0]), [0.0, 0.0]])
+    for k in range(400):
+        rest = held if k >= 40 else np.zeros(4)
+        x = rest + step @ (x - rest)
+        seen.append(x[1])
+    found = trace.signals["pose_with_modes"][:, 0]
+    assert found == pytest.approx(seen, abs=1e-4 * np.abs(seen).max())
+    assert np.abs(trace.signals["pose"][:, 0] - seen).max() > 0.1 * np.abs(seen).max()
 
 
 def test_the_page_of_the_response_tells_both(tmp_path):

@@ -175,7 +175,7 @@ def print_simulated(result: Simulated) -> None:
     shown = table_of(
         ("signal", "left"), ("unit", "left"), ("smallest", "right"), ("largest", "right"), ("last", "right")
     )
-    for role, signal in result.model.signals.items():
+    for role, signal in result.trace.described.items():
         values = result.trace.signals[role]
         for i, (channel, unit) in enumerate(zip(signal.channels, signal.units, strict=True)):
             ends = (values[:, i].min(), values[:, i].max(), values[-1, i])

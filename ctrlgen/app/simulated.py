@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -18,14 +18,17 @@ from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import Trace, simulate
 from ctrlgen.recordings.look.drive_file import DriveFile, read_drives
 from ctrlgen.reporting.plots import COLOURS, STYLE, image
+from ctrlgen.trajectory.unstated_modes import with_internal_modes
 
 MOST_SAMPLES = 2_000_000  # with a dozen signals these fill 200 MB
+WITH_MODES = "pose_with_modes"
 BEFORE = 0.1  # of a step's duration: at rest
 
 
 @dataclass(frozen=True)
 class Simulated:
-    """What came out: the `model`, its `trace`, what was `measured` [SI] by reading."""
+    """What came out: the `model`, its `trace`, with the pose as it is with the modes of the bodies where the model leaves them out, what
+    was `measured` [SI] by reading."""
 
     model: Model
     trace: Trace
@@ -46,7 +49,13 @@ def simulate_device(device: Path, drives: Path | None, step: str | None, duratio
     if (drives is None) == (step is None):
         raise InputError("simulate", [Fault("drives", "name a file of drives, or give --step, one of the two")])
     given = stepped(step or "", duration, rate, model) if drives is None else read_drives(drives, model)
-    return Simulated(model, simulate(model, given.u, given.sample_time), given.measured)
+    found = simulate(model, given.u, given.sample_time)
+    if (pose := with_internal_modes(model, found)) is not None:
+        label = "pose with the bodies' modes"
+        signal = replace(model.signals["pose"], name=WITH_MODES, label=label, column=f"{WITH_MODES}.")
+        described = {**found.described, WITH_MODES: signal}
+        found = replace(found, signals={**found.signals, WITH_MODES: pose}, described=described)
+    return Simulated(model, found, given.measured)
 
 
 def stepped(text: str, duration: float, rate: float, model: Model) -> DriveFile:
@@ -82,7 +91,7 @@ def write_simulated(result: Simulated, folder: Path) -> None:
 def table(result: Simulated) -> str:
     """The signals as CSV: time [s], then role.channel [unit]."""
     names, columns = ["time [s]"], [result.trace.time]
-    for role, signal in result.model.signals.items():
+    for role, signal in result.trace.described.items():
         for i, (channel, unit) in enumerate(zip(signal.channels, signal.units, strict=True)):
             names.append(f"{role}.{channel} [{unit}]")
             columns.append(from_si(result.trace.signals[role][:, i], unit))
@@ -94,11 +103,11 @@ def table(result: Simulated) -> str:
 def draw(result: Simulated) -> bytes:
     """A panel a signal, over time; measured readings as dots."""
     roles: list[str] = [role for role in ("drive", "reading") if role in result.model.signals]
-    roles += [r for r in result.model.signals if r not in (*roles, "pose")]
+    roles += [r for r in result.trace.described if r not in (*roles, "pose")]
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(len(roles), figsize=(8.2, 0.6 + 1.9 * len(roles)), sharex=True, squeeze=False)
         for panel, role in zip(axes[:, 0], roles, strict=True):
-            signal, values = result.model.signals[role], result.trace.signals[role]
+            signal, values = result.trace.described[role], result.trace.signals[role]
             for i, channel in enumerate(signal.channels):
                 colour = COLOURS[i % len(COLOURS)]
                 seen = result.measured.get(f"{role}.{channel}")

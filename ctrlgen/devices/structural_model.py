@@ -11,6 +11,9 @@ import scipy.linalg
 from ctrlgen.core.units import show
 
 TOLD = 4  # modes in a sentence
+NEAR = 0.01  # of a response: closer than a drawing's masses and damping are known
+FAINT = 0.01  # of a channel's largest static response: what is below it is not seen beside the rest
+SPAN, POINTS = 100, 60  # frequencies below the highest, beside the resonances
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,12 +60,19 @@ class StructuralModel:
         return np.asarray(self.mass @ V @ np.diag(2 * self.damping_ratio * np.sqrt(squares)) @ V.T @ self.mass)
 
     def receptance(self, omega: np.ndarray) -> np.ndarray:
-        """(channels, n, k) pose per force at the angular frequencies `omega` (k,)."""
-        s = 1j * omega[:, None, None]
-        q = np.linalg.solve(
-            self.mass * s**2 + self.damping * s + self.stiffness, np.eye(len(self.mass))[:, : self.axes]
-        )
-        return np.moveaxis(self.output @ q, 0, -1)
+        """(channels, n, k) pose per force at the angular frequencies `omega` (k,), by its modes."""
+        squares, V = scipy.linalg.eigh(self.stiffness, self.mass)
+        per_mode = 1 / (squares - omega[:, None] ** 2 + 2j * self.damping_ratio * np.sqrt(squares) * omega[:, None])
+        return np.asarray(np.einsum("cm,km,nm->cnk", self.output @ V, per_mode, V[: self.axes]))
+
+    def is_near(self, whole: StructuralModel, highest: float) -> bool:
+        """Whether its frequency response is within `NEAR` of that of the `whole` model up to `highest` [Hz], resonances included."""
+        own = whole.frequencies
+        hertz = np.unique(np.concatenate([np.geomspace(highest / SPAN, highest, POINTS), own[own < highest]]))
+        exact, static = (whole.receptance(2 * np.pi * f) for f in (hertz, np.zeros(1)))
+        floor = FAINT * np.abs(static).max(axis=1, keepdims=True)
+        off = np.abs(self.receptance(2 * np.pi * hertz) - exact)
+        return bool(np.all(off <= NEAR * np.maximum(np.abs(exact), floor)))
 
     def response(self, force: np.ndarray, step: float, held: bool) -> np.ndarray:
         """(k, channels) pose under the forces (k, n), `step` [s] apart, which are `held` or linear between, from rest under the first."""

@@ -44,6 +44,26 @@ class UnstatedModes:
         )
 
 
+def linear_force(model: Model, trace: Trace) -> np.ndarray:
+    """(n, axes) [N] of the actuators along a `trace`, less what the device is pulled home with beside its stiffness at home."""
+    d, physics = ca.SX.sym("d", trace.z.shape[1]), model.device.physics(model.device.values())
+    linear = ca.jacobian(physics.restoring_force(d), d)
+    beside = ca.Function("beside", [d], [physics.restoring_force(d) - ca.mtimes(ca.substitute(linear, d, 0 * d), d)])
+    return np.asarray(trace.signals["force"] - beside.map(len(trace.z))(trace.z.T).full().T)
+
+
+def with_internal_modes(model: Model, trace: Trace) -> np.ndarray | None:
+    """(n + 1, channels) the pose of a simulation from rest at home (`model.simulation.simulate`) as it is with the modes of the bodies;
+    None where the device has none, or effects act on it."""
+    structure = model.device.structural_model() if model.inertial and not model.device.effect else None
+    if structure is None or len(structure.mass) == structure.axes:
+        return None
+    force, step = linear_force(model, trace), float(trace.time[1] - trace.time[0])
+    force = np.vstack([0 * force[:1], force])  # at home before the first drive
+    whole, own = (m.response(force, step, model.n_states == 0)[1:] for m in (structure, structure.condensed))
+    return np.asarray(trace.signals["pose"] + whole - own)
+
+
 def unstated_modes(
     scenario: Scenario, model: Model, command: np.ndarray, trace: Trace, drive: np.ndarray
 ) -> UnstatedModes | None:
@@ -55,10 +75,7 @@ def unstated_modes(
     structure = model.device.structural_model()
     if structure is None or len(structure.mass) == structure.axes:
         return None
-    d, physics = ca.SX.sym("d", trace.z.shape[1]), model.device.physics(model.device.values())
-    linear = ca.jacobian(physics.restoring_force(d), d)
-    beside = ca.Function("beside", [d], [physics.restoring_force(d) - ca.mtimes(ca.substitute(linear, d, 0 * d), d)])
-    force = trace.signals["force"] - beside.map(len(trace.z))(trace.z.T).full().T
+    force = linear_force(model, trace)
     n, rest = len(command), min(ceil(1 / (structure.frequencies[0] * h)), MOST_SAMPLES)
     force, lags = np.vstack([force, np.tile(force[-1:], (rest, 1))]), model.n_states > 0
     off = np.abs(structure.response(force, h, not lags) - structure.condensed.response(force, h, not lags))

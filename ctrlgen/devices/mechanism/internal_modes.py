@@ -12,12 +12,13 @@ from ctrlgen.devices.mechanism.modes import as_displacements, body_matrices, guy
 from ctrlgen.devices.structural_model import StructuralModel
 from ctrlgen.physics.screw import inverse_adjoint
 
-REACH = 5.0  # times the fastest condensed mode: the modes that are kept where a file states no `modes_below`
+REACH = 5.0  # times the fastest condensed mode: how far up the response is told where a file states no `modes_below`
 MOVES = 1e-9  # of the softest mode with mass: below it a motion of bodies has no mass
 
 
 def structural_model(device: Drawing) -> StructuralModel | None:
-    """The mechanism with its inertia and the modes of its bodies below `modes_below`, at home; None without a table [dynamics]."""
+    """The mechanism with its inertia and the fewest modes of its bodies that tell its response up to `modes_below`, at home; None
+    without a table [dynamics]."""
     condensed = guyan_modes(device)
     if device.dynamics is None or not len(condensed.frequencies):
         return None
@@ -31,14 +32,24 @@ def structural_model(device: Drawing) -> StructuralModel | None:
     travel = np.vstack([_numbers(c.travel(i, [ca.DM(b) for b in bodies])) for i in range(n)])
     free = scipy.linalg.null_space(travel)  # the axes held
     slow, shapes = scipy.linalg.eigh(free.T @ M @ free, free.T @ K @ free)  # 1/w^2: bodies without a mass have none
-    keep = slow > max(MOVES * slow.max(), 1 / (2 * np.pi * highest) ** 2)
-    basis = np.hstack([at_rest, free @ shapes[:, keep] / np.sqrt(slow[keep])])
+    shapes, slow = (x[..., ::-1] for x in (shapes, slow))  # the slowest first
+    moving = slow > MOVES * slow.max(initial=0.0)
+    shapes = free @ shapes[:, moving] / np.sqrt(slow[moving])
     seen = _numbers(inverse_adjoint(None, c.output_point)) @ bodies[device.bodies.index(device.output.body)]
-    output = seen[c.channel_rows] @ basis
-    mass, stiffness = (basis.T @ X @ basis for X in (M, K))
-    return StructuralModel(
-        (mass + mass.T) / 2, (stiffness + stiffness.T) / 2, output, n, device.dynamics.damping_ratio.si
-    )
+    ratio = device.dynamics.damping_ratio.si
+
+    def with_modes(count: int) -> StructuralModel:
+        basis = np.hstack([at_rest, shapes[:, :count]])
+        mass, stiffness = (basis.T @ X @ basis for X in (M, K))
+        output = seen[c.channel_rows] @ basis
+        return StructuralModel((mass + mass.T) / 2, (stiffness + stiffness.T) / 2, output, n, ratio)
+
+    few, most = 0, shapes.shape[1]
+    whole = with_modes(most)
+    while few < most:  # the more of them, the nearer
+        middle = (few + most) // 2
+        few, most = (few, middle) if with_modes(middle).is_near(whole, highest) else (middle + 1, most)
+    return with_modes(most)
 
 
 def _numbers(matrix: ca.SX | ca.DM) -> np.ndarray:

@@ -200,5 +200,5 @@ class Dynamics(Section):
     damping_ratio: Annotated[Quantity, In("1", low=0.0, high=1.0)]
     """Of every mode of the condensed mechanism, such as "2 %"."""
     modes_below: Annotated[Quantity, In("Hz", positive=True)] | None = None
-    """Modes of the bodies with the axes held up to this frequency are in the Bode plot, and what they leave along a path is told. Left
-    out: up to five times the fastest condensed mode."""
+    """Up to this frequency the Bode plot and `ctrlgen simulate` have the modes of the bodies, as many as the response needs to be right to
+    1 %, and what they leave along a path is told. Left out: up to five times the fastest condensed mode."""
