@@ -120,7 +120,7 @@ def _inside(place: Sequence[Any], outer: Sequence[Any]) -> bool:
 
 
 def _fault(model: type[BaseModel], details: Any) -> Fault:
-    tags = {"function-before", *_tags(model)}  # pydantic's own names of the branches of a union
+    tags = {"function-before", "one number", "two numbers", *_tags(model)}  # names of the branches of a union
     location = [
         part for k, part in enumerate(details["loc"]) if not (part in tags and (k > 0 or part == "function-before"))
     ]

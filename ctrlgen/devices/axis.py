@@ -16,6 +16,7 @@ from ctrlgen.devices.limit import Limit
 from ctrlgen.devices.machine import MachineParts
 from ctrlgen.devices.section import Section
 from ctrlgen.devices.signal import AxisSignal, Signal
+from ctrlgen.devices.travel import Travel, ends_of, farthest
 
 ForceConstant = Annotated[Quantity, In("N/V", positive=True)] | Annotated[Quantity, In("N/A", positive=True)]
 
@@ -32,8 +33,9 @@ class Mechanics(Section):
     """Viscous damping c: the force -c q' opposes the velocity."""
     stiffness: Annotated[Quantity, In("N/um", low=0.0)]
     """Stiffness k of the flexures: the force -k q pulls toward q = 0."""
-    stroke: Annotated[Quantity, In("um", positive=True)]
-    """Largest displacement to either side of q = 0; a limit of trajectories and of the generated controller."""
+    stroke: Travel
+    """Largest displacement to either side of q = 0, or its ends, such as ["-10 um", "60 um"]; a limit of trajectories and of the generated
+    controller."""
 
 
 class Actuator(Section):
@@ -100,7 +102,8 @@ class Axis(Device):
     def physics(self, p: SimpleNamespace) -> InertialPhysics:
         """Newton's second law with the device's numbers."""
         m, a, axes = p.mechanics, p.actuator, ("axis",)
-        stroke, largest = self.mechanics.stroke.si, self.actuator.drive_limit.si
+        stroke, largest = farthest(self.mechanics.stroke), self.actuator.drive_limit.si
+        ends = ends_of(self.mechanics.stroke)
         unit = written_unit(self.actuator.drive_limit.text)
         force_scale = largest * self.actuator.force_constant.si
         u, closed = ca.SX.sym("u", 1), self.loop is not None
@@ -116,10 +119,10 @@ class Axis(Device):
             return ca.fmin(ca.fmax(wanted, -largest), largest)
 
         def limits(signal: SimpleNamespace) -> list[Limit]:
-            bound = stroke if closed else largest
+            bounds = ends if closed else (-largest, largest)
             return [
-                Limit("drive", f"commanded {drive.label}", axes, drive.units[0], signal.drive, -bound, bound),
-                Limit("stroke", "stage displacement", axes, "um", signal.displacement, -stroke, stroke),
+                Limit("drive", f"commanded {drive.label}", axes, drive.units[0], signal.drive, *bounds),
+                Limit("stroke", "stage displacement", axes, "um", signal.displacement, *ends),
             ]
 
         loop = None

@@ -30,6 +30,7 @@ from ctrlgen.devices.driven import Driven, PerDrive, proportional
 from ctrlgen.devices.limit import Limit
 from ctrlgen.devices.place import Direction, Place
 from ctrlgen.devices.stated_matrix import matrix_faults, symmetric_note
+from ctrlgen.devices.travel import Travel, ends_of
 from ctrlgen.numerics.symmetric_solve import solve_symmetric
 from ctrlgen.physics.rigid_bodies import point_force
 from ctrlgen.physics.screw import TWIST, WRENCH, Matrix
@@ -55,8 +56,8 @@ class MatrixActuator(Driven):
     """Force per drive, such as "0.2 N/V"."""
     stiffness: Annotated[Quantity, In("N/um", positive=True)] | None = None
     """Stiffness of a stack beside its blocked force, along its direction."""
-    travel: Annotated[Quantity, In("um", positive=True)] | None = None
-    """Largest travel to both sides; a limit."""
+    travel: Travel | None = None
+    """Largest travel to both sides, or its ends, such as ["-10 um", "60 um"]; a limit."""
 
     def faults(self, pushes: bool) -> list[str]:
         """What is missing of an actuator that pushes, or too much of one whose motion the matrix states."""
@@ -232,7 +233,7 @@ class MatrixDevice(Device):
     @property
     def _ranges(self) -> list[tuple[float, float]]:
         """The displacements that each axis may have; of a Jacobian they are drives [SI]."""
-        return [(a.low.si, a.high.si) if a.travel is None else (-a.travel.si, a.travel.si) for a in self.actuator]
+        return [(a.low.si, a.high.si) if a.travel is None else ends_of(a.travel) for a in self.actuator]
 
     @property
     def _travels(self) -> np.ndarray:

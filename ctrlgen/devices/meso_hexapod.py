@@ -16,6 +16,7 @@ from ctrlgen.devices.device_physics import BalancedPhysics
 from ctrlgen.devices.limit import Limit
 from ctrlgen.devices.section import Section
 from ctrlgen.devices.signal import Signal
+from ctrlgen.devices.travel import Travel, ends_of, farthest
 from ctrlgen.numerics.constraint_second_order import second_order
 from ctrlgen.physics import meso_hexapod_kinematics as meso_hexapod
 
@@ -93,19 +94,19 @@ class MesoHexapod(Device):
     """The reflective cube that is measured."""
     workspace: RatedTravel
     """Range of poses that the paper states."""
-    travel: Length
-    """Largest displacement of an actuator, either sign; the limit of drives and stages."""
+    travel: Travel
+    """Largest displacement of an actuator, either sign, or its ends, such as ["-0.2 mm", "1 mm"]; the limit of drives and stages."""
 
     def physics(self, p: SimpleNamespace) -> BalancedPhysics:
         """Commanded actuator travel = stage displacement -> pose by the kinematic Jacobian (6)-(10), as printed."""
         J = meso_hexapod.kinematic_jacobian(p.hexapod, p.directions.jacobian)
-        travel = self.travel.si
+        travel, ends = farthest(self.travel), ends_of(self.travel)
         drive = Signal("travel", "actuator travel", self.axes, ("um",) * 6, "u_", ca.SX.sym("u", 6), (travel,) * 6)
 
         def limits(signal: SimpleNamespace) -> list[Limit]:
             return [
-                Limit("drive", drive.label, self.axes, "um", signal.drive, -travel, travel),
-                Limit("stroke", "stage displacement", self.axes, "um", signal.displacement, -travel, travel),
+                Limit("drive", drive.label, self.axes, "um", signal.drive, *ends),
+                Limit("stroke", "stage displacement", self.axes, "um", signal.displacement, *ends),
             ]
 
         arm = 1e-6 / self.hexapod.platform_radius.si  # moves the platform's rim by 1 um

@@ -14,8 +14,7 @@ from ctrlgen.devices.device_physics import BalancedPhysics
 from ctrlgen.devices.limit import Limit
 from ctrlgen.devices.section import Section
 from ctrlgen.devices.signal import Signal
-
-Travel = Annotated[Quantity, In("deg", positive=True)] | Annotated[Quantity, In("um", positive=True)]
+from ctrlgen.devices.travel import TravelOrTurn, ends_of, farthest, travel_unit
 
 
 class Transducer(Section):
@@ -35,8 +34,9 @@ class Servo(Device):
 
     kind: Literal["servo"]
     """An axis whose reading equals its command, or is proportional to its voltage."""
-    travel: Travel
-    """Largest excursion to either side of zero; an angle makes the axis rotary, a length linear."""
+    travel: TravelOrTurn
+    """Largest excursion to either side of zero, or its ends, such as ["-10 deg", "60 deg"]; an angle makes the axis rotary, a length
+    linear."""
 
     transducer: Transducer | None = None
     """Makes the command a voltage. Left out: the command is the position."""
@@ -45,14 +45,14 @@ class Servo(Device):
     def _gain_of_one_dimension(self) -> Servo:
         if self.transducer is None:
             return self
-        unit, per_volt = written_unit(self.travel.text), written_unit(self.transducer.gain.text)
+        unit, per_volt = travel_unit(self.travel), written_unit(self.transducer.gain.text)
         if not same_dimension(f"({per_volt})*V", unit):
             raise ValueError(f"transducer.gain in {per_volt} gives no position in {unit}, the unit of travel")
         return self
 
     def physics(self, p: SimpleNamespace) -> BalancedPhysics:
         """The identity, or the gain of the transducer."""
-        axes, unit, travel = ("axis",), written_unit(self.travel.text), self.travel.si
+        axes, unit, travel = ("axis",), travel_unit(self.travel), farthest(self.travel)
         u, gain = ca.SX.sym("u", 1), p.transducer.gain if self.transducer else 1.0
         most = self.transducer.drive_limit.si if self.transducer else travel
         drive = (
@@ -62,7 +62,11 @@ class Servo(Device):
         )
 
         def limits(signal: SimpleNamespace) -> list[Limit]:
-            return [Limit("drive", drive.label, axes, drive.units[0], signal.drive, -most, most)]
+            reach, ends = (-most, most) if self.transducer else ends_of(self.travel), ends_of(self.travel)
+            limited = [Limit("drive", drive.label, axes, drive.units[0], signal.drive, *reach)]
+            if self.transducer is None or ends[0] == -ends[1]:
+                return limited
+            return [*limited, Limit("travel", "travel", axes, unit, signal.displacement, *ends)]
 
         return BalancedPhysics(
             axes=axes,

@@ -12,6 +12,7 @@ from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.mechanism.flexures import Flexible, FlexureSection
 from ctrlgen.devices.mechanism.joining import Length
 from ctrlgen.devices.section import Section
+from ctrlgen.devices.travel import Travel
 from ctrlgen.physics import thermal_actuator
 from ctrlgen.physics.screw import Matrix, inverse
 
@@ -68,8 +69,8 @@ class ThermalActuator(Section):
     """Largest heater power; the smallest is 0."""
     heater_resistance: Annotated[Quantity, In("ohm", positive=True)] | None = None
     """Where it is given, the drive is the heater's voltage, P = V^2/R; left out: its power."""
-    travel: Annotated[Quantity, In("um", positive=True)]
-    """Largest travel of the bar to both sides, as others may push it back; a limit."""
+    travel: Travel
+    """Largest travel of the bar to both sides, as others may push it back, or its ends, such as ["0 um", "60 um"]; a limit."""
     pattern: str = ""
     """The pattern by which it is copied."""
 

@@ -15,6 +15,7 @@ import numpy as np
 from ctrlgen.devices.mechanism.copies import Placed
 from ctrlgen.devices.mechanism.drawing import Drawing
 from ctrlgen.devices.place import Direction
+from ctrlgen.devices.travel import farthest
 from ctrlgen.numerics.newton import newton_root
 from ctrlgen.physics import rigid_bodies as mechanism
 from ctrlgen.physics.flexure_mass import flexure_mass
@@ -130,7 +131,7 @@ class Condensed:
         n = len(self.directions)
         AB = ca.DM(ca.evalf(ca.SX(self.stretch))).full()
         k3 = np.array([float(spring.k3) for spring in self.cubics])
-        travel = np.array([a.section.travel.si for a in self.device.placed_actuators])
+        travel = np.array([farthest(a.section.travel) for a in self.device.placed_actuators])
         needed = 0
         for corner in itertools.product((-1.0, -0.5, 0.5, 1.0), repeat=n):
             alone = AB[:, :n] @ (travel * corner)

@@ -18,6 +18,7 @@ from ctrlgen.devices.mechanism.flexures import Beam
 from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.devices.mechanism.springs import Spring
 from ctrlgen.devices.mechanism.stretching import Stretching
+from ctrlgen.devices.travel import farthest
 
 LEVELS = (0.01, 0.05, 0.2)  # of the linear force
 FARTHEST = 10.0  # times the largest travel: beyond it nothing is said
@@ -59,7 +60,7 @@ def linear_ranges(c: Condensed) -> list[tuple[float | None, ...]]:
     extra = ca.Function("extra", [d], [second.restoring_force(d, Stretching(second).energy)])
     K = ca.DM(ca.evalf(ca.SX(c.held_stiffness))).full()
     for i, a in enumerate(c.device.placed_actuators):
-        travel = a.section.travel.si
+        travel = farthest(a.section.travel)
         grid = travel * np.geomspace(1e-3, FARTHEST, STEPS)
 
         def off(x: float, i: int = i) -> float:
@@ -75,8 +76,8 @@ def linear_ranges(c: Condensed) -> list[tuple[float | None, ...]]:
             elif k == 0:
                 found.append(float(grid[0]))
             else:  # between two points a power of the travel
-                logs = (np.log(x[k - 1 : k + 1]) for x in (np.maximum(shares, level * SMALL), grid))
-                found.append(float(np.exp(np.interp(np.log(level), *logs))))
+                known, ways = (np.log(x[k - 1 : k + 1]) for x in (np.maximum(shares, level * SMALL), grid))
+                found.append(float(np.exp(np.interp(np.log(level), known, ways))))
         ranges.append(tuple(found))
     return ranges
 
@@ -90,7 +91,9 @@ def range_lines(device: Drawing) -> list[str]:
     levels = ", ".join(f"{100 * level:g}" for level in LEVELS)
     return [
         f"linear force of {a.name} off by {levels} % from a travel of "
-        + ", ".join(f"over {show(FARTHEST * a.section.travel.si, 'um')}" if x is None else show(x, "um") for x in found)
+        + ", ".join(
+            f"over {show(FARTHEST * farthest(a.section.travel), 'um')}" if x is None else show(x, "um") for x in found
+        )
         + held
         for a, found in zip(device.placed_actuators, linear_ranges(c), strict=True)
         if found[0] is not None

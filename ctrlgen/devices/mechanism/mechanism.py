@@ -40,6 +40,7 @@ from ctrlgen.devices.mechanism.tables import (
     Reading,
 )
 from ctrlgen.devices.structural_model import StructuralModel
+from ctrlgen.devices.travel import farthest
 from ctrlgen.physics import rigid_bodies as mechanism
 from ctrlgen.physics.rigid_bodies import GROUND, Element
 from ctrlgen.physics.screw import TWIST
@@ -190,7 +191,7 @@ class Mechanism(CopiedParts):
             return [
                 f"output.channels: {', '.join(channels)} move only together; follow others, or place the actuators otherwise"
             ]
-        least = MOVED * max(a.travel.si for a in self.actuator)
+        least = MOVED * max(farthest(a.travel) for a in self.actuator)
         unread = [
             r.name
             for r, seen in zip(self.placed_readings, self.reading_scale, strict=True)
@@ -313,7 +314,7 @@ class Mechanism(CopiedParts):
     def channel_scale(self) -> tuple[float, ...]:
         """A typical size [rad, m] of each channel that is followed: what all actuators at the largest travel make of it, as the
         file describes it."""
-        reach = np.abs(self._output_motion).sum(axis=1) * max(a.travel.si for a in self.actuator)
+        reach = np.abs(self._output_motion).sum(axis=1) * max(farthest(a.travel) for a in self.actuator)
         return tuple(float(reach[TWIST.index(c)]) for c in self.output.channels)
 
     @_as_described
@@ -339,7 +340,7 @@ class Mechanism(CopiedParts):
     def reading_scale(self) -> tuple[float, ...]:
         """A typical size [rad, m] of each reading, as `channel_scale`; or what it is of second order where that is more."""
         travel, n, c = (
-            max(a.travel.si for a in self.actuator),
+            max(farthest(a.travel) for a in self.actuator),
             len(self.placed_actuators),
             nominal(self),
         )

@@ -14,6 +14,7 @@ from ctrlgen.devices.mechanism.drives import transduction
 from ctrlgen.devices.mechanism.loads import Loads
 from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.devices.mechanism.stretching import Stretching
+from ctrlgen.devices.travel import ends_of, farthest
 from ctrlgen.physics.damping import modal_damping
 
 
@@ -33,8 +34,8 @@ def mechanism_physics(c: Condensed) -> DevicePhysics:
     def limits(signal: SimpleNamespace) -> list[Limit]:
         limited = acting.limits(signal)
         for i, (axis, s) in enumerate(zip(axes, sections, strict=True)):
-            d, reach = signal.displacement[i], s.travel.si
-            limited.append(Limit(f"travel_{axis}", f"travel of {axis}", (axis,), "um", d, -reach, reach))
+            d, ends = signal.displacement[i], ends_of(s.travel)
+            limited.append(Limit(f"travel_{axis}", f"travel of {axis}", (axis,), "um", d, *ends))
         return limited + _flexure_limits(c, signal.mechanism_displacement, stretching, loads)
 
     J, channels, second = c.jacobian, device.output.channels, SecondOrder(c)
@@ -58,7 +59,7 @@ def mechanism_physics(c: Condensed) -> DevicePhysics:
         drive=acting.drive,
         state=acting.state,
         rest=acting.rest,
-        displacement_scale=max(s.travel.si for s in sections),
+        displacement_scale=max(farthest(s.travel) for s in sections),
         bipolar=any(low < 0 for low, _ in acting.drive_range),
         force_scale=acting.force_scale,
         force_unit="N" if c.pushes else "um",

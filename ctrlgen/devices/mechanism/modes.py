@@ -17,6 +17,7 @@ from ctrlgen.devices.mechanism.load_effects import load_lines
 from ctrlgen.devices.mechanism.point_compliance import point_compliance
 from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.devices.mechanism.springs import Spring
+from ctrlgen.devices.travel import farthest
 from ctrlgen.physics.rigid_bodies import GROUND
 from ctrlgen.physics.screw import inverse_adjoint
 
@@ -267,7 +268,7 @@ def _second_order_lines(c: Condensed) -> list[str]:
     """What the second order adds to the channels that are followed, at the largest travels, whatever their signs."""
     second = SecondOrder(c)
     output = np.abs(ca.DM(ca.evalf(ca.SX(second.output))).full())
-    travel = np.array([a.section.travel.si for a in c.device.placed_actuators])
+    travel = np.array([farthest(a.section.travel) for a in c.device.placed_actuators])
     reach = np.abs(ca.DM(second.products(ca.DM(travel))).full()).ravel()
     turns = {r.name: r.section.about is not None for r in c.device.placed_readings}
     names = (*c.device.output.channels, *turns)

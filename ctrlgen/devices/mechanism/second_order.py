@@ -14,6 +14,7 @@ import numpy as np
 
 from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.devices.mechanism.copies import Placed
+from ctrlgen.devices.travel import farthest
 from ctrlgen.physics import rigid_bodies as mechanism
 from ctrlgen.physics.flexure import Segment
 from ctrlgen.physics.rigid_bodies import GROUND
@@ -343,12 +344,12 @@ class SecondOrder:
 
     def _reach(self) -> np.ndarray:
         """(m,): products at the largest travels, each by its own sign."""
-        travel = np.array([a.section.travel.si for a in self.c.device.placed_actuators])
+        travel = np.array([farthest(a.section.travel) for a in self.c.device.placed_actuators])
         return travel[self.I] * travel[self.J]
 
     def _energies(self, order: int) -> Any:
         """By which size the rows of `cubic` (1) and `quartic` (2) count: the stored energy over what each row is multiplied by."""
-        travel = np.array([a.section.travel.si for a in self.c.device.placed_actuators])
+        travel = np.array([farthest(a.section.travel) for a in self.c.device.placed_actuators])
         K = self.c.stiffness
         if not ca.SX(K).is_constant():
             return None

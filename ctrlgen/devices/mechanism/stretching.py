@@ -24,6 +24,7 @@ import numpy as np
 
 from ctrlgen.devices.mechanism.second_order import SecondOrder, plain
 from ctrlgen.devices.mechanism.yielding import Yielding
+from ctrlgen.devices.travel import farthest
 from ctrlgen.physics.screw import Matrix
 from ctrlgen.physics.second_order_flexure import AWTAR_2
 
@@ -146,7 +147,7 @@ class Stretching:
 
     @property
     def _least(self) -> Matrix:
-        travel = ca.DM([a.section.travel.si for a in self.s.c.device.placed_actuators])
+        travel = ca.DM([farthest(a.section.travel) for a in self.s.c.device.placed_actuators])
         return NOTHING * ca.dot(ca.diag(self.s.c.stiffness), travel**2)
 
     def _planes(self, k: int) -> list[Plane]:

@@ -14,6 +14,7 @@ from ctrlgen.devices.driven import Driven, PerDrive
 from ctrlgen.devices.load import GROUND_NAME
 from ctrlgen.devices.place import Direction, Place
 from ctrlgen.devices.section import Section
+from ctrlgen.devices.travel import Travel
 from ctrlgen.physics.screw import Matrix, rotation_z
 
 Inertia = Annotated[Quantity, In("kg*mm^2", positive=True)]
@@ -123,8 +124,8 @@ class Actuator(Driven):
     """Force or displacement per drive, such as "0.2 N/V" or "1 um/V"."""
     stiffness: Annotated[Quantity, In("N/um", positive=True)] | None = None
     """Stiffness of a stack beside its blocked force, along its direction."""
-    travel: Annotated[Quantity, In("um", positive=True)]
-    """Largest travel to both sides; a limit."""
+    travel: Travel
+    """Largest travel to both sides, such as "500 um", or its ends, such as ["-10 um", "60 um"]; a limit."""
     pattern: str = ""
     """The pattern by which it is copied."""
 

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.devices.mechanism.second_order import LOST, SecondOrder, plain
+from ctrlgen.devices.travel import farthest
 from ctrlgen.physics import rigid_bodies
 from ctrlgen.physics.rigid_bodies import GROUND
 from ctrlgen.physics.screw import Matrix
@@ -78,7 +79,7 @@ class Yielding:
         work = (work + work.T) / 2
         if not isinstance(work, ca.DM):
             return work
-        travel = np.array([a.section.travel.si for a in self.s.c.device.placed_actuators])
+        travel = np.array([farthest(a.section.travel) for a in self.s.c.device.placed_actuators])
         reach = np.array([travel[list(triple)].prod() for triple in self.triples])
         values, K = work.full(), np.abs(ca.DM(ca.evalf(ca.SX(self.s.c.stiffness))).full())
         return ca.sparsify(
