@@ -229,6 +229,38 @@ def _equations() -> Iterator[PrintedNumber]:
     )
     what = "U_o of three input forces by eq. (3), less J U_in by eq. (5): no load on the platform"
     yield identity("S3", "eq. (2) to (7)", float(np.abs(free).max() / scale), 1e-9, what)
+    yield from (_definiteness(case) for case in CASES)
+
+
+def _definiteness(case: int) -> PrintedNumber:
+    """Whether eq. (1) lets no load take energy out: the smallest eigenvalue of its 6 x 6 matrix, which Table 4 makes negative."""
+    k = stage_of_case(case)
+    C_oFo, C_oFin, C_in, complete = (ca.DM(m).full() for m in (k.C_oFo, k.C_oFin, k.C_inFin, k.input_compliance))
+    least = [float(_eigenvalues(C_oFo, C_oFin, C)[0]) for C in (C_in, complete)]
+    printed, elements = (
+        {
+            symbol: np.array([[float(x) for x in row.split()] for row in table[symbol]])
+            for symbol in ("C_oFo", "C_oFin", "C_inFin")
+        }
+        for table in (TABLE_4[case], TABLE_5)
+    )
+    for _, symbol, i, j in (lost for lost in SIGN_LOST_4 if lost[0] == case):
+        printed[symbol][i - 1, j - 1] *= -1
+    seen = [_eigenvalues(*(m[s] for s in ("C_oFo", "C_oFin", "C_inFin"))) for m in (printed, elements)]
+    what = (
+        "smallest eigenvalue of [C_oFo C_oFin; C_inFo C_inFin] scaled to a unit diagonal. (B.83) says C_inFin = C_inFo C_oFo^-1 C_oFin, "
+        f"by which three are zero: inputs that do not move while the platform is held. The digits of Table 4 leave {seen[0][0]:.4f} to "
+        f"{seen[0][2]:.4f} of them. With the input compliance at a held platform, which (B.83) leaves out, the smallest is {least[1]:.3f}, "
+        f"in the finite elements of Table 5 {seen[1][0]:.3f}: a term left out, no misprint"
+    )
+    return identity("S3", f"eq. (1), case {case}, definiteness", least[0], 1e-9, what)
+
+
+def _eigenvalues(C_oFo: np.ndarray, C_oFin: np.ndarray, C_in: np.ndarray) -> np.ndarray:
+    """(6,) ascending, of the matrix of eq. (1) with rows and columns scaled to a unit diagonal."""
+    C = np.block([[C_oFo, C_oFin], [C_oFin.T, C_in]])
+    size = np.sqrt(np.diag(C))
+    return np.asarray(np.linalg.eigvalsh((C + C.T) / 2 / np.outer(size, size)))
 
 
 def _figures() -> list[PrintedNumber]:

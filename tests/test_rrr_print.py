@@ -44,6 +44,13 @@ def test_with_the_frame_angle_at_two_decimals_one_more_entry_misses_by_a_hundred
     assert outside == {("C_oFin", 3, 1), ("J", 2, 2)}
 
 
+def test_the_matrix_of_equation_1_is_singular_because_a_held_platform_holds_the_inputs_in_b83() -> None:
+    rows = printed_rows("eq. (1), case")
+    assert [row.status for row in rows] == [ReproductionStatus.REPRODUCED] * 2
+    assert "the smallest is 0.008, in the finite elements of Table 5 0.055" in rows[1].reason
+    assert "The digits of Table 4 leave -0.0035" in rows[1].reason
+
+
 @pytest.mark.parametrize("case", [1, 2])
 def test_the_device_as_printed_does_not_reproduce_table_4(case: int) -> None:
     k = device_module.stage(s3_lengths.printed_device(case))
