@@ -168,6 +168,53 @@ def pandas_index() -> bytes:
     return (",0,1,2\n" + "\n".join(f"{k},{line}" for k, line in enumerate(lines)) + "\n").encode()
 
 
+def benchvue() -> bytes:
+    head = "Keysight BenchVue,,,\nInstrument,34465A,,\nScan,Time,Channel 1 (VDC),Channel 2 (um)\n"
+    stamps = [f"3/5/2024 10:00:00:{k:03d}" for k in range(N)]
+    return (
+        head + "".join(f"{k + 1},{s},{u},{x}\n" for k, (s, u, x) in enumerate(zip(stamps, U, X, strict=True)))
+    ).encode()
+
+
+def grafana() -> bytes:
+    stamps = [(START + datetime.timedelta(seconds=float(t))).strftime("%Y-%m-%d %H:%M:%S.%f")[:-3] for t in T]
+    body = [f'"{s}","{u} V","{x} µm"' for s, u, x in zip(stamps, U, X, strict=True)]
+    return ('"Time","drive","position"\n' + "\n".join(body) + "\n").encode()
+
+
+def influx() -> bytes:
+    head = "#group,false,false,true,true,false,false,true,true\n#default,_result,,,,,,,\n"
+    head += ",result,table,_start,_stop,_time,_value,_field,_measurement\n"
+    body = [
+        f",,{j},2024-03-05T09:00:00Z,2024-03-05T11:00:00Z,2024-03-05T10:00:00.{k:03d}Z,{values[k]},{name},stage"
+        for j, (name, values) in enumerate((("u", U), ("x", X)))
+        for k in range(N)
+    ]
+    return (head + "\n".join(body) + "\n").encode()
+
+
+def excel_dates() -> bytes:
+    days = [f"{45356.416666666667 + t / 86400:.12f}" for t in T]
+    return ("Date Time,u (V),x (um)\n" + "".join(f"{d},{u},{x}\n" for d, u, x in zip(days, U, X, strict=True))).encode()
+
+
+def two_times() -> bytes:
+    stamps = [(START + datetime.timedelta(seconds=float(t))).isoformat(timespec="milliseconds") for t in T]
+    body = [f"{s},{1000 * t:.0f},{u},{x}" for s, t, u, x in zip(stamps, T, U, X, strict=True)]
+    return ("Timestamp,Elapsed (ms),u (V),x (um)\n" + "\n".join(body) + "\n").encode()
+
+
+def ros_bag() -> bytes:
+    head = "%time,field.header.seq,field.header.frame_id,field.u,field.x\n"
+    body = [f"{1709632800000000000 + 1000000 * k},{k},base,{U[k]},{X[k]}" for k in range(N)]
+    return (head + "\n".join(body) + "\n").encode()
+
+
+def merged_header() -> bytes:
+    head = ";Stellgröße;;Messung\nZeit;Soll;Ist;x\ns;V;V;µm\n"
+    return (head + rows(";", T, U, U, X, decimal=",")).encode("cp1252")
+
+
 LOGGERS: dict[str, tuple[Callable[[], bytes], str, tuple[str | int | None, str | int, str | int], dict[str, str]]] = {
     # logger: its file, ending, columns of time, drive and reading, units that the file states
     "Keysight": (keysight, ".csv", ("x-axis", "1", "2"), {"x-axis": "s"}),
@@ -194,5 +241,12 @@ LOGGERS: dict[str, tuple[Callable[[], bytes], str, tuple[str | int | None, str |
     "R write.csv": (r_write_csv, ".csv", ("t", "u", "x"), {}),
     "R write.table": (r_write_table, ".txt", ("t", "u", "x"), {}),
     "Excel in German": (german_excel, ".csv", ("Zeit in s", "Spannung", "Weg"), {"Weg (µm)": "um"}),
+    "BenchVue": (benchvue, ".csv", ("Time", "Channel 1", "Channel 2"), {"Channel 1 (VDC)": "V"}),
+    "Grafana": (grafana, ".csv", ("Time", "drive", "position"), {"drive": "V", "position": "um"}),
+    "InfluxDB": (influx, ".csv", ("_time", "u", "x"), {}),
+    "dates of a spreadsheet": (excel_dates, ".csv", ("Date Time", "u", "x"), {"x (um)": "um"}),
+    "two times": (two_times, ".csv", ("Timestamp", "u", "x"), {"x (um)": "um"}),
+    "ROS": (ros_bag, ".csv", ("time", "field.u", "field.x"), {}),
+    "merged header": (merged_header, ".csv", ("Zeit", "Soll", "x"), {"x": "um", "Zeit": "s"}),
     "pandas": (pandas_index, ".csv", ("0", "1", "2"), {}),
 }

@@ -118,9 +118,12 @@ def test_units_in_a_row_of_their_own(written, head):
     ]
 
 
-def test_units_in_cells_are_told_as_such(written):
+def test_the_unit_of_every_cell_is_the_columns_and_several_are_refused(written):
+    table = written("t,x\n0,1 mV\n1,2 mV\n")
+    assert table.unit("x") == "mV" and list(table.numbers("x")) == [1, 2]
+    assert "x: its cells end in mV, its unit" in table.notes
     with pytest.raises(InputError, match="write the unit into the name"):
-        written("t,x\n0,1 mV\n1,2 mV\n").numbers("x")
+        written("t,x\n0,1 mV\n1,2 V\n").numbers("x")
 
 
 @pytest.mark.parametrize(

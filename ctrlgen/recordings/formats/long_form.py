@@ -12,6 +12,7 @@ from ctrlgen.recordings.formats.measurement_table import MeasurementTable
 from ctrlgen.recordings.formats.unit_texts import bare_name, unit_of
 
 MOST_SIGNALS = 200
+MOST_COLUMNS = 12  # among which such a table is sought
 SHARED = 1.5  # rows an instant, from which several signals are read at one time
 CHANGING = (
     0.5  # share of rows whose name is another than the row's before, from which a name is no state of the machine
@@ -65,11 +66,15 @@ def widened(table: MeasurementTable) -> MeasurementTable:
 
 
 def _parts(table: MeasurementTable) -> tuple[str, str, str, str | None] | None:
-    """The columns of names, time, value and unit of a table of three or four; None for other tables."""
-    if len(table.columns) not in (3, 4) or table.clocks:
+    """The columns of names, time, value and unit of a table of three or four, besides those that say the same in every row or number the
+    signals; None for other tables."""
+    if not any(map(_begins_with_a_word, table.columns.values())):
         return None
-    words = [name for name, column in table.columns.items() if _holds_words(column)]
-    others = [name for name in table.columns if name not in words]
+    telling = _telling(table) if 4 < len(table.columns) <= MOST_COLUMNS else list(table.columns)
+    if len(telling) not in (3, 4) or table.clocks:
+        return None
+    words = [name for name in telling if _holds_words(table.columns[name])]
+    others = [name for name in telling if name not in words]
     units = [name for name in words if all(map(unit_of, set(table.columns[name])))] if len(words) > 1 else []
     names = [name for name in words if name not in units]
     if len(names) != 1 or len(others) != 2 or len(units) > 1:
@@ -84,6 +89,26 @@ def _parts(table: MeasurementTable) -> tuple[str, str, str, str | None] | None:
         return None
     value = next(name for name in others if name != timed[0])
     return names[0], timed[0], value, units[0] if units else None
+
+
+def _begins_with_a_word(column: Column) -> bool:
+    first = column[0] if column.dtype.kind == "O" and len(column) else None
+    return isinstance(first, str) and bool(first) and not number_cells.is_reading(first)
+
+
+def _telling(table: MeasurementTable) -> list[str]:
+    """The columns whose cells differ, without numbers that only count the signals of another column."""
+    keys = {name: list(map(str, column)) for name, column in table.columns.items()}
+    kept = [name for name, cells in keys.items() if len(set(cells)) > 1]
+    words = [name for name in kept if _holds_words(table.columns[name])]
+    counted = {
+        name
+        for name in kept
+        for word in words
+        if name not in words
+        and len(set(keys[name])) == len(set(keys[word])) == len(set(zip(keys[name], keys[word], strict=True)))
+    }
+    return [name for name in kept if name not in counted]
 
 
 def _holds_words(column: Column) -> bool:

@@ -40,7 +40,7 @@ class MeasurementTable:
     read the file, one line each. `aliases`: further names of columns. `nameless`: columns that have no name of their own, by their
     number from 0. `clocks`: of channels whose time axis the file states.
     `style`: how numbers are written as text. `missing`: numbers and texts that the reader says are no reading,
-    None where nothing is said.
+    None where nothing is said. `stated_rate`: words of the file that state how often rows were read, and the rate [Hz].
     """
 
     path: Path
@@ -53,6 +53,7 @@ class MeasurementTable:
     clocks: Mapping[str, Clock] = field(default_factory=dict)
     style: NumberStyle = field(default_factory=NumberStyle)
     missing: tuple[str | int | float, ...] | None = None
+    stated_rate: tuple[str, float] | None = None
 
     def find(self, wanted: str | int) -> str:
         """The full name of a column that is given by name, by number from 0, without its unit, or without its group.

@@ -14,10 +14,12 @@ from ctrlgen.recordings.formats.checked_files import fault
 from ctrlgen.recordings.formats.measurement_table import Clock, MeasurementTable
 from ctrlgen.recordings.formats.number_cells import Ambiguous, NumberStyle
 from ctrlgen.recordings.formats.rows_of_signals import lies_on_its_side, on_its_side
+from ctrlgen.recordings.formats.stated_rate import stated_rate
 from ctrlgen.recordings.formats.text_blocks import MOST_LISTED, Block, blocks_of, kind_of
 from ctrlgen.recordings.formats.text_cells import cells_of, separator_of, stray_quotes
 from ctrlgen.recordings.formats.text_encoding import decoded
 from ctrlgen.recordings.formats.text_header import header_of
+from ctrlgen.recordings.formats.units_in_cells import without_units
 from ctrlgen.recordings.formats.written_layout import Layout
 
 STYLED = 1000  # rows, the first and others evenly over the table, by which the style of its numbers is known
@@ -95,6 +97,8 @@ def _table(
     if not any(header.names) and lies_on_its_side(columns):
         return on_its_side(path, columns, (*said, *header.notes, *notes), layout, style)
     names, units = list(header.names), dict(header.units)
+    columns, of_cells = without_units(columns)
+    units |= of_cells
     unique = _unique(names)
     cut = [f"line {block.cut + 1}, the last, ends before its last cell; left out"] if block.cut is not None else []
     cut += [f"line {k + 1}, below the table, is no row of it; left out" for k in block.below]
@@ -105,12 +109,19 @@ def _table(
         dict(zip(unique, columns, strict=True)),
         {unique[k]: unit for k, unit in units.items()},
         _Lines(rows),
-        (*said, *header.notes, *notes, *cut),
+        (
+            *said,
+            *header.notes,
+            *notes,
+            *(f"{unique[k]}: its cells end in {unit}, its unit" for k, unit in of_cells.items()),
+            *cut,
+        ),
         nameless=frozenset(k for k, name in enumerate(names) if not name),
         aliases={names[0]: unique[0]} if times and not clocks else {},  # one time under several names
         clocks={unique[k]: clock for k, clock in clocks.items()},
         style=style,
         missing=layout.missing,
+        stated_rate=stated_rate([lines[k] for k in block.above]),
     )
 
 

@@ -15,9 +15,12 @@ EVEN = 0.25  # of a step: how exactly an hour's jump must be an hour and one ste
 SINCE_1970 = (9.46e8, 2.5e9)  # seconds: the years 2000 to 2049; those since 1904, of LabVIEW, are more
 CENTURY = 4.1e9  # seconds: more is no time since a start, nor since 1904
 EPOCHS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+DAYS = (36526.0, 54789.0)  # days since 1900 as spreadsheets count them: the years 2000 to 2049
+SHORTEST_STEP = 1e-6  # seconds: no recorder that has run for half a day goes on in shorter steps
 FILETIME = (1.2e17, 1.7e17)  # hundreds of nanoseconds since 1601: the years 1981 to 2139
 STAMP = re.compile(rf"({DATE})?[T ,;]*({CLOCK})?\s*(Z|UTC|[+-]\d{{2}}:?\d{{2}})?", re.ASCII)
 BASIC = re.compile(r"^(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)(\d\d)", re.ASCII)  # ISO 8601 without marks
+THOUSANDTHS = re.compile(r"(\d[T ]\d{1,2}:\d{2}:\d{2}):(\d{3})(?!\d)", re.ASCII)  # behind a date; of instruments
 # of a column; _time as InfluxDB writes it
 TIME_NAME = re.compile(
     r"^_?(t|time|zeit|tijd|temps|tempo|timestamp|time.?stamp|clock|datetime|date|elapsed.*|sekunden|seconds?|secs?)(?![a-z])",
@@ -43,6 +46,7 @@ def seconds(column: np.ndarray, dates: str | None) -> Stamps | None:
     if column.dtype.kind != "O":
         return None
     cells = [re.sub(BASIC, r"\1-\2-\3T\4:\5:\6", c.strip()) if isinstance(c, str) else "" for c in column]
+    cells = [re.sub(THOUSANDTHS, r"\1.\2", c) for c in cells]
     first = next((c for c in cells if c.lower() not in MISSING), "")
     if not (re.match(DATE, first, re.ASCII) or re.match(CLOCK, first, re.ASCII)):
         return None
@@ -187,6 +191,9 @@ def from_first(column: np.ndarray, unit: str, scale: float) -> tuple[np.ndarray,
     values, size = (column - finite[0]).astype(float), float(finite[0])
     if unit not in EPOCHS:
         return values, ()
+    if unit == "s" and scale == 1 and are_days(column.astype(float)):
+        what = f"begins at {size:.10g} and goes on in steps far below a microsecond: days since 1900, as spreadsheets write dates"
+        raise ValueError(f'{what}: write unit = "day"')
     if FILETIME[0] < size < FILETIME[1] and scale / EPOCHS[unit] > 2e-7:
         raise ValueError('holds hundreds of nanoseconds since 1601: write scale = 100, unit = "ns"')
     fitting = [name for name in EPOCHS if _in_epoch(size, name)]
@@ -199,8 +206,17 @@ def from_first(column: np.ndarray, unit: str, scale: float) -> tuple[np.ndarray,
     return values, (f"time is {unit} since 1970; from {instant}",) if unit in fitting else ()
 
 
+def are_days(values: np.ndarray) -> bool:
+    """Whether numbers are the dates of a spreadsheet, days since 1900, which are too close for seconds."""
+    known = values[np.isfinite(values)]
+    steps = np.diff(known[:1000])
+    return len(steps) > 1 and DAYS[0] < known[0] < DAYS[1] and 0 < float(np.median(steps)) < SHORTEST_STEP
+
+
 def epoch_unit(values: np.ndarray) -> str | None:
-    """The unit in which numbers are times since 1970, of the years 2000 to 2049; None where they are not."""
+    """The unit in which numbers are times since 1970, of the years 2000 to 2049, or days of a spreadsheet; None where they are not."""
+    if are_days(values):
+        return "day"
     return next((unit for unit in EPOCHS if len(values) and _in_epoch(float(values[0]), unit)), None)
 
 

@@ -15,7 +15,7 @@ PLAIN = re.compile(
 """A unit after a blank or an underscore, of those that are no usual end of a name: time_ms, but not x_m or phase A."""
 WORDS = {
     "second": "s", "seconds": "s", "sec": "s", "secs": "s", "sekunde": "s", "sekunden": "s", "millisecond": "ms",
-    "milliseconds": "ms", "msec": "ms", "microseconds": "us", "usec": "us", "volt": "V", "volts": "V", "millivolt": "mV",
+    "milliseconds": "ms", "msec": "ms", "microseconds": "us", "usec": "us", "volt": "V", "vdc": "V", "volts": "V", "millivolt": "mV",
     "amp": "A", "amps": "A", "ampere": "A", "amperes": "A", "metre": "m", "meter": "m", "metres": "m", "meters": "m",
     "micron": "um", "microns": "um", "micrometer": "um", "micrometers": "um", "micrometre": "um", "nanometer": "nm",
     "degrees": "deg", "degree": "deg", "°": "deg", "°c": "degC", "ºc": "degC", "celsius": "degC",

@@ -157,9 +157,13 @@ def propose(tables: Sequence[TableFacts], model: Model, answers: Answers = NOTHI
         known = next(name for name in signals if name.startswith("reading."))
         asked.append(f"no column was recognised as a reading (--column {known}=COLUMN)")
     if first.time is None and answers.rate is None and not answers.poses:
-        asked.append(
-            'no column is a time: state sample_rate, or kind = "poses" (--time COLUMN, --rate 1kHz or --poses)'
+        stated, says = (
+            first.table.stated_rate,
+            'state sample_rate, or kind = "poses" (--time COLUMN, --rate 1kHz or --poses)',
         )
+        if stated is not None:
+            says = f"the file says {stated[0]!r} (--rate {stated[1]:.9g}Hz, else --time COLUMN or --poses)"
+        asked.append(f"no column is a time: {says}")
     remarks = _remarks(model, first, matches, answers)
     left = [c.name for c in first.columns if c.moves and c.name not in {*taken, *(m.column for m in matches)}]
     return Proposal(model, tuple(tables), tuple(matches), tuple(left), tuple(asked), tuple(remarks), answers)
