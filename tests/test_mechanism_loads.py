@@ -9,8 +9,10 @@ from held_blades import EI, E, L, T, W, frame_of
 from mechanism_files import HEAD, PARALLELOGRAM, REST, blade, dm, loaded, with_values
 
 from ctrlgen import InputError, build_model, run
+from ctrlgen.core.units import show
 from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.devices.mechanism.load_effects import load_lines
+from ctrlgen.devices.mechanism.modes import guyan_modes, summary
 
 K, G = 24 * EI / L**3, 9.81  # of the parallelogram of two blades
 HEAVY = PARALLELOGRAM.replace(
@@ -57,6 +59,15 @@ def test_a_load_along_the_blades_softens_or_stiffens_a_parallelogram(tmp_path, P
     for text in (PARALLELOGRAM + load(f'force = ["0 N", "{-P} N", "0 N"]'), hung):
         _, slope = law(loaded(tmp_path, text))
         assert slope == pytest.approx(K - 6 * P / (5 * L), rel=1e-4)
+
+
+def test_check_prints_the_modes_under_the_loads(tmp_path):
+    """sqrt((K - 6 P/(5 l))/m)/(2 pi) under a force P that presses the blades."""
+    device = loaded(tmp_path, HEAVY + load('force = ["0 N", "-3 N", "0 N"]'))
+    pressed = guyan_modes(device, under_loads=True).frequencies
+    assert pressed == pytest.approx(np.sqrt((K - 6 * 3 / (5 * L)) / 0.08) / (2 * np.pi), rel=1e-4)
+    assert f"the same under the constant loads: {show(float(pressed[0]), 'Hz')}" in summary(device)
+    assert pressed < 0.99 * guyan_modes(device).frequencies
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from ctrlgen.devices.mechanism.condensed import KEPT, Condensed, nominal
 from ctrlgen.devices.mechanism.drawing import Drawing
 from ctrlgen.devices.mechanism.linear_range import range_lines
 from ctrlgen.devices.mechanism.load_effects import load_lines
+from ctrlgen.devices.mechanism.loads import Loads
 from ctrlgen.devices.mechanism.point_compliance import point_compliance
 from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.devices.mechanism.springs import Spring
@@ -159,9 +160,9 @@ def free_modes(device: Drawing) -> Modes:
     return Modes(np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi), motions, M)
 
 
-def guyan_modes(device: Drawing) -> Modes:
+def guyan_modes(device: Drawing, under_loads: bool = False) -> Modes:
     """The modes of the model with inertia, whose bodies move as they do at rest: as many as actuators; none where the actuators prescribe
-    displacements, or move no mass in some direction."""
+    displacements, or move no mass in some direction. `under_loads`: with what constant loads change of the stiffness of the axes."""
     c = nominal(device)
     M, heavy = _mass(c)
     n = len(device.placed_actuators)
@@ -170,6 +171,8 @@ def guyan_modes(device: Drawing) -> Modes:
     if not (c.pushes and heavy) or np.linalg.eigvalsh(inert).min() <= INERT * np.linalg.eigvalsh(inert).max():
         return Modes(np.zeros(0), moved[:, :0], M)
     K = ca.DM(ca.evalf(ca.SX(c.held_stiffness))).full()
+    if under_loads:
+        K += ca.DM(Loads(c, SecondOrder(c)).stiffness).full()
     squares, shapes = scipy.linalg.eigh((K + K.T) / 2, inert)
     return Modes(np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi), moved @ shapes, M)
 
@@ -251,6 +254,9 @@ def summary(device: Drawing) -> list[str]:
         used = "solved with it" if device.dynamics is not None else "a table [dynamics] solves with it"
         more = "" if left_out is None else f"; first mode left out: {show(left_out, 'Hz')}"
         lines.append(f"inertia condensed to the actuators (Guyan; {used}): {', '.join(map(str, condensed))}{more}")
+        if device.load or device.gravity:
+            loaded = ", ".join(show(float(f), "Hz") for f in guyan_modes(device, under_loads=True).frequencies)
+            lines.append(f"the same under the constant loads: {loaded}")
     seen = ca.vertcat(c.jacobian, c.reading_motion)[:, : len(device.placed_actuators)]
     turns = [name.startswith("theta") for name in device.output.channels]
     turns += [r.section.about is not None for r in device.placed_readings]
