@@ -46,6 +46,9 @@ def print_solution(outcome: Outcome) -> None:
             signal.channels, signal.units, error, solution.between_samples, strict=True
         ):
             out.print(f"error of {channel}: {show(at, unit)} at the samples, {show(between, unit)} between them")
+    for angle in solution.angle_columns:
+        low, high = min(angle.values), max(angle.values)
+        out.print(f"{angle.name} ({scenario.file.angles}): {low:.6g} ... {high:.6g} {angle.unit}", soft_wrap=True)
     for left_out in solution.left_out:
         out.print(f"[yellow]{escape(left_out)}[/yellow]", soft_wrap=True)
     if sentence := robust_sentence(solution):

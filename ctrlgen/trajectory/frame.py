@@ -13,16 +13,23 @@ import numpy as np
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text
 from ctrlgen.core.units import Quantity, parse, same_dimension, written_unit
+from ctrlgen.physics.euler_angles import rotation_vector_of
 
 Point = dict[str, str | int | float]
+ROTATIONS = ("theta_x", "theta_y", "theta_z")
 
 
 @dataclass(frozen=True)
 class Frame:
-    """The channels a path is commanded in: names and the unit of each."""
+    """The channels a path is commanded in: names and the unit of each.
+
+    With the `angles` of an order (`physics.euler_angles.ORDERS`) theta_x, theta_y and theta_z of stated poses are angles about these axes
+    in this order; what is read is their rotation vector.
+    """
 
     channels: tuple[str, ...]
     units: tuple[str, ...]
+    angles: str | None = None
 
     def point(self, given: Point, where: str) -> np.ndarray:
         """{'delta_z': '20 um'} as an SI vector; channels not named are zero. Raises InputError."""
@@ -38,7 +45,22 @@ class Frame:
                 faults.append(Fault(f"{where}.{name}", str(error)))
         if faults:
             raise InputError("path", faults)
-        return vector
+        return self.with_rotation_vectors(vector)
+
+    def with_rotation_vectors(self, poses: np.ndarray) -> np.ndarray:
+        """Stated poses (..., channels) with rotation vectors in place of their angles."""
+        if self.angles is None:
+            return poses
+        lacking = [name for name in ROTATIONS if name not in self.channels]
+        if lacking:
+            raise InputError(
+                "path", [Fault("angles", f"need {', '.join(ROTATIONS)}, and {', '.join(lacking)} is no channel")]
+            )
+        places, converted = [self.channels.index(name) for name in ROTATIONS], poses.copy()
+        # in the order in which they turn: the angle of axis a is the channel theta_a
+        about = ["xyz".index(axis) for axis in self.angles[:3]]
+        converted[..., places] = rotation_vector_of(poses[..., [places[k] for k in about]], self.angles)
+        return converted
 
     def pose(self, text: str, option: str) -> np.ndarray:
         """'delta_x=5um,delta_z=20um', as given to a command's `option`, as an SI vector. Raises InputError."""
@@ -131,4 +153,4 @@ def read_poses(path: Path, frame: Frame) -> np.ndarray:
                 )
     if faults:
         raise InputError(path, faults[:20] + ([Fault("…", f"and {len(faults) - 20} more")] if len(faults) > 20 else []))
-    return values
+    return frame.with_rotation_vectors(values)

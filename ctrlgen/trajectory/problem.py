@@ -255,7 +255,7 @@ class PathProblem:
         if self.file.sample_rate and self.file.duration:
             n = self._sample_count(self.file.sample_rate, self.file.duration)
         try:
-            return evaluate(self._path, Frame(self.signal.channels, self.signal.units), n)
+            return evaluate(self._path, Frame(self.signal.channels, self.signal.units, self.file.angles), n)
         except InputError as error:
             if error.source != "path":
                 raise

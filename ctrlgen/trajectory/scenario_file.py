@@ -10,6 +10,7 @@ from ctrlgen.core.names import CName
 from ctrlgen.core.units import In, Quantity, read_probability
 from ctrlgen.devices.load import Gravity, Load
 from ctrlgen.devices.section import Section
+from ctrlgen.physics.euler_angles import Order
 from ctrlgen.trajectory.inverse.clock import Clock, Sampled, Settled
 from ctrlgen.trajectory.paths import PathKind, Poses
 from ctrlgen.trajectory.shaping import Shaping
@@ -70,6 +71,10 @@ class ScenarioFile(Section):
     """
     follow: Literal["pose", "displacement"] = "pose"
     """The signal that the path commands: the platform's pose, or the stages' displacements."""
+    angles: Order | None = None
+    """theta_x, theta_y and theta_z of stated poses are angles about x, y and z in this order: "xyz intrinsic" about axes that turn with the
+    body, "xyz extrinsic" about those that stay. Left out: they are the components of a rotation vector, as of every pose of a result.
+    """
     sample_rate: Annotated[Quantity, In("Hz", positive=True)] | None = None
     """Samples a second of a motion in time. Left out: the scenario is static, and its samples are separate equilibria.
     """

@@ -7,11 +7,14 @@ from functools import cached_property
 
 import numpy as np
 
+from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.tabular import Column, Reported, Tabular
 from ctrlgen.core.units import from_si
 from ctrlgen.devices import Limit
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import Trace
+from ctrlgen.physics.euler_angles import angles_of
+from ctrlgen.trajectory.frame import ROTATIONS
 from ctrlgen.trajectory.inverse.violations import Before, limited_values
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.trajectory.unstated_inertia import UnstatedInertia, unstated_inertia
@@ -95,7 +98,22 @@ class Solution(Tabular, Reported):
             Column(f"command.{channel}", unit, from_si(self.command[:, i], unit))
             for i, (channel, unit) in enumerate(zip(signal.channels, signal.units, strict=True))
         )
-        return (*self.trace.columns(), *commanded)
+        return (*self.trace.columns(), *commanded, *self.angle_columns)
+
+    @property
+    def angle_columns(self) -> tuple[Column, ...]:
+        """The pose's rotation as the angles whose order the scenario states, in the order in which they turn: angle.x, ...; none where
+        it states none. Raises InputError where two of them are one."""
+        order, signal = self.scenario.file.angles, self.model.signals["pose"]
+        if order is None:
+            return ()
+        places = [signal.channels.index(name) for name in ROTATIONS]
+        try:
+            angles = angles_of(self.trace.signals["pose"][:, places], order)
+        except ValueError as error:
+            raise InputError(self.scenario.path, [Fault("angles", str(error))]) from None
+        told = [(axis, signal.units[places["xyz".index(axis)]]) for axis in order[:3]]
+        return tuple(Column(f"angle.{axis}", unit, from_si(angles[:, i], unit)) for i, (axis, unit) in enumerate(told))
 
     @property
     def solved_by(self) -> str:
