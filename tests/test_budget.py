@@ -7,7 +7,7 @@ import pytest
 from budget_cases import FILE, TRANSLATIONS, driven, largest_nm, number, pushed, stated, two_axes
 from conftest import DEVICES, SCENARIOS
 
-from ctrlgen import build_model, error_budget, load_device, load_scenario, simulate, solve, user_device
+from ctrlgen import InputError, build_model, error_budget, load_device, load_scenario, simulate, solve, user_device
 from ctrlgen.budget import monte_carlo
 from ctrlgen.budget.error_budget import budget_of
 from ctrlgen.budget.finer_model import load_finer
@@ -294,3 +294,16 @@ def test_a_static_path(tmp_path):
         z[i] -= 1e-9 * balance[1] / (shifted - balance[1])
     expected = (z - trace.z) / 1e-4 * 0.05
     np.testing.assert_allclose(found.combined, np.abs(expected), atol=1e-3 * np.abs(expected).max())
+
+
+def test_a_sensor_by_which_drives_were_learnt_counts_with_its_scale_and_zero(circle, tmp_path):
+    """0.1 % of 20 um in delta_z and of 10 um in delta_x at its farthest, beside a zero of 5 nm; 1000 draws tell it to 7 %."""
+    text = '[sensor]\nscale = { sd = "0.1 %", source = "data sheet" }\n'
+    text += '[sensor.zero]\ndelta_x = { sd = "5 nm", source = "drift" }\n'
+    found = budget_of(circle, stated(circle, text, tmp_path), draws=1000)
+    assert found.combined[:, 5] == pytest.approx(20e-9, rel=1e-6)
+    assert found.combined[:, 3].max() == pytest.approx(np.hypot(10, 5) * 1e-9, rel=1e-3)
+    assert {line.name for line in found.lines} == {"sensor.scale", "sensor.zero.delta_x"}
+    assert found.drawn.pose.std(axis=0)[:, 5] == pytest.approx(20e-9, rel=0.07)
+    with pytest.raises(InputError, match="is not a channel"):
+        stated(circle, '[sensor.zero]\ndelta_q = { sd = "5 nm", source = "drift" }\n', tmp_path)

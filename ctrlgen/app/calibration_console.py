@@ -35,12 +35,20 @@ def print_calibration(calibration: Calibration, budgets: tuple[ErrorBudget, Erro
         table.add_row(escape(e.channel), *cells)
     show_table(table)
     if budgets is not None:
+        from ctrlgen.calibration.budgets_compared import spoiled_by_sensor
+
         before, after = budgets
+        spoiled = spoiled_by_sensor(calibration, after)
         title = before.solution.scenario.file.title
         for g in before.groups:
             both = f"{g.shown(before.peak(g)):.4g} -> {g.shown(after.peak(g)):.4g} {g.unit}"
             what = f"largest combined standard uncertainty, {g.name}"
             out.print(f"budget of {title}: {what}: {both}", markup=False, soft_wrap=True)
+            if spoiled[g.name]:
+                of_sensor = (
+                    f"and {g.shown(spoiled[g.name]):.3g} {g.unit} of true motion that the scale of the sensor may spoil"
+                )
+                out.print(f"budget of {title}: {of_sensor} (one standard deviation)", markup=False, soft_wrap=True)
     for note in calibration.notes:
         out.print(note, markup=False, soft_wrap=True, style="yellow")
 

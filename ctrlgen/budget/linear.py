@@ -42,6 +42,13 @@ class Propagated:
         variance = np.sum((Y @ stated.covariance) * Y, axis=2)
         return np.sqrt(np.maximum(variance, 0.0) + sum(sd**2 for sd in self.scatter[name].values()))
 
+    def of_sensor(self, path: UncertainPath, sample: int) -> np.ndarray:
+        """(m, n_y) the sensitivity of the followed signal at one sample by what is stated of the sensor, zero by all else: it acts through
+        no state, so that draws are exact with it."""
+        kinds = [line.kind for line in path.uncertainties.lines for _ in line.paths]
+        columns = np.array([kind in ("sensor_scale", "sensor_zero") for kind in kinds])
+        return np.where(columns[:, None], self.sensitivity["pose"][sample].T, 0.0)
+
 
 def propagate(path: UncertainPath) -> Propagated:
     """The sensitivities and the scatter of a path. Raises FloatingPointError where these are not finite."""
@@ -71,6 +78,7 @@ def propagate(path: UncertainPath) -> Propagated:
                         total = _diagonal(C[j], carried[of]) + _diagonal(direct, Q[k])
                         variance[name][of][k - before] = total
             P = {of: carried[of] + B[j] @ Q[k] @ B[j].T for of, Q in scatters.items()}
+    _add_sensor(path, nominal["pose"], sensitivity["pose"])
     if not all(np.isfinite(Y).all() for Y in (*sensitivity.values(), *nominal.values())):
         raise FloatingPointError("the sensitivities along the path are not finite")
     # What cancels in a channel leaves a variance of rounding's sign
@@ -127,9 +135,22 @@ def _columns(path: UncertainPath) -> np.ndarray:
             places += [path.free.index(p) if p in path.free else path.nothing for p in line.paths]
         elif line.kind == "surroundings":
             places.append(len(path.free))
-        else:
+        elif line.kind in ("gain", "channel_gain"):
             places += range(*path.gains(line.kind).indices(path.nothing))
+        else:  # of the sensor, which moves nothing by itself
+            places += [path.nothing] * len(line.paths)
     return np.array(places, int)
+
+
+def _add_sensor(path: UncertainPath, nominal: np.ndarray, sensitivity: np.ndarray) -> None:
+    """What the scale and the zero of a sensor make of the followed signal that was brought to its readings: `sensitivity` (n, n_y, m)."""
+    k = 0
+    for line in path.uncertainties.lines:
+        for name in line.paths:
+            if line.kind in ("sensor_scale", "sensor_zero"):
+                i = path.signal.channels.index(name)
+                sensitivity[:, i, k] = nominal[:, i] if line.kind == "sensor_scale" else 1.0
+            k += 1
 
 
 def _with_gains(by_q: np.ndarray, by_drive: np.ndarray, v: np.ndarray) -> np.ndarray:

@@ -126,7 +126,8 @@ class _Led:
             limiting = sample >= 0 and bool(np.any(here) or self.limited.near(sample).any())
             S = step(k, S, drive, limiting or sample in self.place)
             if sample in self.place:
-                deviations[:, self.place[sample]] = of_pose(S, drive).T - pose[sample] + scatter.replayed()
+                of_sensor = columns @ self.linear.of_sensor(path, sample)
+                deviations[:, self.place[sample]] = of_pose(S, drive).T - pose[sample] + scatter.replayed() + of_sensor
             if limiting:
                 values = of_limits(S, drive).T
                 limits[:, here] = np.stack([values] * 2, axis=1)[:, here]
@@ -150,9 +151,9 @@ def _numbers(path: UncertainPath, columns: np.ndarray) -> tuple[np.ndarray, np.n
         k += len(line.sds)
         if line.kind == "surroundings":
             q[:, -1] += deviations[:, 0]
-        elif line.kind != "number":
+        elif line.kind in ("gain", "channel_gain"):
             gain += deviations
-        else:
+        elif line.kind == "number":
             for i, name in enumerate(line.paths):
                 if name in path.free:
                     q[:, path.free.index(name)] += deviations[:, i]

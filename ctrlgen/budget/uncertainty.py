@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field
 
 from ctrlgen.budget.deviation import Deviation
-from ctrlgen.budget.sensor_statement import SensorSection
+from ctrlgen.budget.sensor_statement import SensorSection, stated_sensor
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, read_toml, validate
 from ctrlgen.core.units import (
@@ -117,7 +117,7 @@ class Uncertain:
     """
 
     name: str
-    kind: Literal["number", "surroundings", "gain", "channel_gain"]
+    kind: Literal["number", "surroundings", "gain", "channel_gain", "sensor_scale", "sensor_zero"]
     paths: tuple[str, ...]
     sds: tuple[float, ...]
     text: str
@@ -210,11 +210,31 @@ class _Reader:
                 of = model.signals["drive"].channels if kind == "channel_gain" else ("all",)
                 name, per = f"drive.{kind}", ("1 %", (0.01,) * len(of))
                 self.lines.append(Uncertain(name, kind, of, (share,) * len(of), gain.sd, gain.source, per))
+        self._sensor(scenario, model)
         self.jitter = (
             0.0 if self.drive.jitter is None else self._absolute("drive.jitter.sd", self.drive.jitter.sd, "s", "1 us")
         )
         self._check_drive(scenario, model)
         self._check_correlations()
+
+    def _sensor(self, scenario: Scenario, model: Model) -> None:
+        """What drives learnt and numbers calibrated with the sensor carry of its error: a share of each channel, and its zero."""
+        signal = model.signals[scenario.file.follow]
+        stated = stated_sensor(self.file.sensor, signal, scenario.path)
+        if stated.scale is not None and stated.scale.sd:
+            n, scale = len(signal.channels), stated.scale
+            per = "1 %", (0.01,) * n
+            sds = (scale.sd,) * n
+            line = Uncertain("sensor.scale", "sensor_scale", signal.channels, sds, scale.text, scale.source, per)
+            self.lines.append(line)
+        for channel, zero in stated.zero.items():
+            unit = shown_difference_unit(signal.units[signal.channels.index(channel)])
+            per_unit = f"1 {unit}", (to_si(1.0, unit) - to_si(0.0, unit),)
+            name = f"sensor.zero.{channel}"
+            if zero.sd:
+                self.lines.append(
+                    Uncertain(name, "sensor_zero", (channel,), (zero.sd,), zero.text, zero.source, per_unit)
+                )
 
     def _number(self, name: str, stated: NumberDeviation) -> None:
         where = f'numbers."{name}"'

@@ -46,6 +46,18 @@ def budgets(
     return before, after
 
 
+def spoiled_by_sensor(calibration: Calibration, after: ErrorBudget) -> dict[str, float]:
+    """The largest standard deviation [SI] of the true motion along the path of the budget `after`, by group, that a wrong scale of the
+    sensor makes by way of the constants."""
+    if calibration.of_sensor is None:
+        return {g.name: 0.0 for g in after.groups}
+    columns = [path for line in after.uncertainties.lines for path in line.paths]
+    at = [columns.index(c.path) for c in calibration.device.given_at_start]
+    Y = after.linear.sensitivity["pose"][:, :, at]
+    sd = np.sqrt(np.maximum(np.sum((Y @ calibration.of_sensor) * Y, axis=2), 0.0))
+    return {g.name: float(sd[:, g.channels].max()) for g in after.groups}
+
+
 def _budget(scenario: Scenario, device: Device, stated: Uncertainties, progress: Callable[[str], None]) -> ErrorBudget:
     specimen = scenario.on(device)
     model = model_of(specimen)

@@ -18,10 +18,11 @@ import casadi as ca
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from ctrlgen.calibration.sensor_share import ASSUMED_SCALE, sensor_covariance
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text
 from ctrlgen.core.tabular import Column, Reported, Tabular
-from ctrlgen.core.units import difference, from_si
+from ctrlgen.core.units import difference, from_si, show_difference
 from ctrlgen.devices import Device, files_of, load_device
 from ctrlgen.devices.changed_numbers import changed
 from ctrlgen.devices.run_time import RunTimeConstant
@@ -103,7 +104,8 @@ class ReadingError:
 @dataclass(frozen=True, repr=False)
 class Calibration(Tabular, Reported):
     """The constants of a specimen of `device`, described by `inputs`, from `recording`. `covariance` (k, k) [SI] of the constants in
-    their order; that of one which is not determined is what its bounds say."""
+    their order; that of one which is not determined is what its bounds say. `of_sensor` (k, k) [SI]: what a wrong scale of the sensor makes
+    of them, which is not in `covariance`: no recording with this sensor tells it."""
 
     device: Device
     inputs: dict[str, Input]
@@ -112,6 +114,7 @@ class Calibration(Tabular, Reported):
     covariance: np.ndarray
     errors: tuple[ReadingError, ...]
     notes: tuple[str, ...]
+    of_sensor: np.ndarray | None = None
 
     def facts(self) -> dict[str, object]:
         """What it is, in a few words."""
@@ -190,6 +193,8 @@ def _calibration(
     fitter = _weighed(Fitter(usable, estimate_noise(usable, settling)), specimen(device, chosen))
     fit, told = _told(fitter, device, chosen, progress)
     covariance = _covariance_within_bounds(fitter, device, fit, told, [c for c in chosen if c not in told])
+    order, of_sensor = [constants.index(c) for c in told], np.zeros(covariance.shape)
+    of_sensor[np.ix_(order, order)] = sensor_covariance(fitter, fit)
     rows = []
     for k, c in enumerate(constants):
         value = float(fit.theta[told.index(c)]) if c in told else c.default
@@ -206,8 +211,26 @@ def _calibration(
         notes.append(f"{', '.join(more)} {what}")
     noise = fitter.noise
     notes += [note for note, source in zip(noise.notes, noise.sources, strict=True) if not source.stated]
+    notes += _sensor_notes(rows, of_sensor)
     unique = tuple(dict.fromkeys(notes))
-    return Calibration(device, inputs, fitter.recording, tuple(rows), covariance, errors, unique)
+    return Calibration(device, inputs, fitter.recording, tuple(rows), covariance, errors, unique, of_sensor)
+
+
+def _sensor_notes(rows: Sequence[CalibratedConstant], of_sensor: np.ndarray) -> list[str]:
+    """The budget of the sensor: which constants its scale may be off by more than the recording leaves of them."""
+    off = [
+        f"{row.constant.path} by {show_difference(sd, row.constant.unit, 3)}"
+        for row, sd in zip(rows, np.sqrt(np.diag(of_sensor)), strict=True)
+        if row.determined and sd > row.sd
+    ]
+    if not off:
+        return []
+    scales = f"scales that are off by their standard deviation (where the device file states none, {100 * ASSUMED_SCALE:g} %)"
+    what = f"{scales} move {', '.join(off)}"
+    return [
+        f"budget of the sensor: {what}, more than the intervals show; no recording with this sensor tells it, a second sensor does, or the "
+        "specimen turned by 90 degrees under it"
+    ]
 
 
 def _usable(device: Device, recording: Recording, settling: float) -> tuple[Recording, list[str]]:

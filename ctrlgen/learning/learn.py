@@ -110,16 +110,28 @@ def learn(
     model = model_of(scenario)
     solution = solve(scenario, model, progress)
     lifted = Lifted(solution)
-    implied = ImpliedPose(lifted)
     stated, files = _stated(scenario, lifted)
+    read = {name: sha256(path) for name, path in (*recording_files(paths), *files)}
+    return learn_recorded(lifted, stated, paths, {**scenario.digest, **read}, options, progress)
+
+
+def learn_recorded(
+    lifted: Lifted,
+    stated: SensorStatement,
+    paths: Sequence[Path | str],
+    inputs: dict[str, str],
+    options: LearningOptions = DEFAULT,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Learning:
+    """The same as `learn` for a path that has been solved, with what is `stated` of its sensor."""
     progress("recorded runs")
+    implied = ImpliedPose(lifted)
     runs = load_runs(paths, lifted, implied)
     source = str(paths[0]) if len(paths) == 1 else "recordings"
     check_belongs(runs, lifted, source)
     runs = merged(belonging(runs, lifted, source), lifted)
-    sensor = sensor_budget(lifted, implied, stated, runs, options)
-    read = {name: sha256(path) for name, path in (*recording_files(paths), *files)}
-    return learn_from(lifted, runs, source, {**scenario.digest, **read}, options, progress, sensor)
+    sensor = sensor_budget(lifted, implied, stated, runs.observed, options)
+    return learn_from(lifted, runs, source, inputs, options, progress, sensor)
 
 
 def _stated(scenario: Scenario, lifted: Lifted) -> tuple[SensorStatement, list[tuple[str, Path]]]:

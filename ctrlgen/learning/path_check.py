@@ -13,7 +13,9 @@ OFF_PATH = 0.5  # of the path's extent, by which the model under the recorded dr
 OFF_LEARNT = (
     0.1  # of it, for a run after the first, beyond what the runs before could teach: its drives are of no other path
 )
-OF_TAUGHT = 1.5  # times the error of a run before, by which what was learnt from it may lead the model off the path
+OF_TAUGHT = (
+    0.3  # of what the run before showed beyond the model, for what was learnt from it otherwise than in proportion
+)
 STILL = 0.1  # of the command's motion (rms), below which readings are not of a stage that moves
 COMMANDED = 0.2  # of the path's extent, by which a channel must be commanded to move for that to be looked at
 FAR_READING = 3.0  # times the size of the path, by which the readings may be off it (rms)
@@ -24,11 +26,18 @@ def check_belongs(runs: Runs, lifted: Lifted, source: str) -> None:
     command, scale = lifted.solution.command, np.array(lifted.signal.scale)
     extent = np.sqrt(np.mean(((command - command.mean(axis=0)) / scale) ** 2))
     size = np.sqrt(np.mean((command / scale) ** 2)) or extent
-    faults, taught = list[Fault](), 0.0
+    faults, beyond, first = list[Fault](), np.zeros(command.shape), None
     for run in runs.runs:
         model = lifted.run(run.drive)
         off = _rms((model - command) / scale)
-        if off > (min(OFF_PATH * extent, OFF_LEARNT * extent + taught) if taught else OFF_PATH * extent):
+        led = (model - command) / scale
+        if (
+            first is not None
+        ):  # drives that were learnt lead the model off by what runs before showed beyond it, or a share of that
+            share = -np.sum(led * beyond) / max(float(np.sum(beyond**2)), 1e-300)
+            led = led + np.clip(share, 0.0, 1.0) * beyond
+        allowed = OFF_PATH * extent if first is None else OFF_LEARNT * extent + OF_TAUGHT * _rms(beyond) + first
+        if _rms(led) > min(OFF_PATH * extent, allowed):
             what = (
                 f"its drives would lead the device as described {100 * off / extent:.0f} % of the path's extent away from the path: "
                 "it is of another scenario or another device, or the columns of the drives have other units"
@@ -38,7 +47,9 @@ def check_belongs(runs: Runs, lifted: Lifted, source: str) -> None:
             faults.append(Fault(run.name, what))
             continue
         away = errors(run, lifted)[0].mean(axis=0) / scale
-        taught = max(taught, off + OF_TAUGHT * _rms(away))
+        if first is None:
+            first = off
+        beyond = away + (command - model) / scale
         about = (command - command.mean(axis=0)) / scale
         for channel, error, moved, read in zip(lifted.signal.channels, away.T, about.T, runs.observed, strict=True):
             far, moves = _rms(error), float(np.std(error + moved)) / max(_rms(moved), 1e-300)

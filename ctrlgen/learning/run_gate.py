@@ -89,8 +89,7 @@ def belonging(runs: Runs, lifted: Lifted, source: str) -> Runs:
         kept[j] = replace(run, y=y - zeros[j])
     if faults:
         raise InputError(source, faults)
-    moved = np.sqrt(np.mean(np.diff(zeros, axis=0) ** 2, axis=0))
-    return replace(runs, runs=tuple(kept), notes=tuple(notes), zero_sd=moved)
+    return replace(runs, runs=tuple(kept), notes=tuple(notes))
 
 
 def _seen(run: Run, runs: Runs, lifted: Lifted) -> _Seen:

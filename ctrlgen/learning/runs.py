@@ -50,13 +50,12 @@ class Run:
 @dataclass(frozen=True, eq=False)
 class Runs:
     """All runs in their order. `noise` (n_y,) [SI] is stated by the recording, NaN where it is not; `observed` (n_y,): the channel was
-    read. `notes`: what reading them marked. `zero_sd` (n_y,) [SI]: by how much the zero moved from run to run, where that was seen."""
+    read. `notes`: what reading them marked."""
 
     runs: tuple[Run, ...]
     noise: np.ndarray
     observed: np.ndarray
     notes: tuple[str, ...]
-    zero_sd: np.ndarray | None = None
 
 
 def load_runs(paths: Sequence[Path | str], lifted: Lifted, implied: ImpliedPose) -> Runs:

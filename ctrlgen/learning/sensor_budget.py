@@ -17,14 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ctrlgen.budget.sensor_statement import SensorStatement
-from ctrlgen.core.units import show
 from ctrlgen.learning.implied_pose import ImpliedPose
 from ctrlgen.learning.learning_options import LearningOptions
 from ctrlgen.learning.lifted import Lifted
-from ctrlgen.learning.runs import Runs
 
 ASSUMED = "assumed: nothing is stated"
-MOVED = "by which it moved from run to run"
 
 
 @dataclass(frozen=True)
@@ -63,11 +60,11 @@ class SensorBudget:
 
 
 def sensor_budget(
-    lifted: Lifted, implied: ImpliedPose, stated: SensorStatement, runs: Runs, options: LearningOptions
+    lifted: Lifted, implied: ImpliedPose, stated: SensorStatement, observed: np.ndarray, options: LearningOptions
 ) -> SensorBudget:
-    """What the sensor of runs of the path may feign: numbers of its laws by the device file, scale, zero and clock as `stated`, or, where
-    nothing is, as `options` assume; a zero also as far as it moved from run to run."""
-    drive, signal, observed = lifted.solution.drive, lifted.signal, runs.observed
+    """What the sensor of a run of the path may feign in the channels that were `observed` (n_y,): numbers of its laws by the device file,
+    scale, zero and clock as `stated`, or, where nothing is, as `options` assume."""
+    drive, signal = lifted.solution.drive, lifted.signal
     y = lifted.run(drive) * observed
     lines = list[Feigned]()
     with_scale = set[int]()
@@ -84,12 +81,7 @@ def sensor_budget(
             if sd:
                 lines.append(Feigned(f"scale of {channel}", f"{100 * sd:.3g} %", source, sd * y * unit))
         zero = stated.zero.get(channel)
-        if observed[i] and runs.zero_sd is not None and runs.zero_sd[i] > (zero.sd if zero else 0.0):
-            seen = float(runs.zero_sd[i])
-            lines.append(
-                Feigned(f"zero of {channel}", show(seen, signal.units[i]), MOVED, seen * np.ones(y.shape) * unit)
-            )
-        elif observed[i] and zero is not None:
+        if observed[i] and zero is not None:
             lines.append(Feigned(f"zero of {channel}", zero.text, zero.source, zero.sd * np.ones(y.shape) * unit))
     clock = _clock(lifted, stated, options)
     if clock is not None:
