@@ -119,7 +119,7 @@ class Specimen:
         return out
 
     def _next(self, lifted: Lifted, stated: SensorStatement, recordings: list[Path]) -> Learning:
-        return learn_recorded(lifted, stated, recordings, {})
+        return learn_recorded(lifted, stated, recordings)
 
 
 def battery(

@@ -13,20 +13,15 @@ from ctrlgen.devices.changed_numbers import changed
 from ctrlgen.effects import read_effect
 from ctrlgen.learning.implied_pose import ImpliedPose
 from ctrlgen.learning.learning_options import LearningOptions
+from ctrlgen.learning.learning_page import verdict
 from ctrlgen.learning.lifted import Lifted
 from ctrlgen.learning.run_gate import belonging
 from ctrlgen.learning.runs import Run, Runs, in_time
 from ctrlgen.learning.sensor_budget import Feigned, SensorBudget
+from ctrlgen.learning.sensor_words import sensor_words
 from ctrlgen.learning.steady_drift import drift_of, without_drift
 from ctrlgen.trajectory.scenario import model_of
 from ctrlgen.trajectory.solution import Solution
-
-LOOSE = """title = "a sensor from a data sheet"
-[sensor]
-scale = { sd = "0.5 %", source = "data sheet" }
-clock = { sd = "1 us", source = "one trigger" }
-"""
-TRANSLATION = slice(3, 6)
 
 
 @pytest.fixture(scope="module")
@@ -117,6 +112,9 @@ def test_a_scale_of_the_sensor_is_not_learnt_where_the_stage_is_right(circle, tm
     found = learn(circle.scenario, bench.runs)
     before, after = bench.error(circle.drive), bench.error(found.next.drive)
     assert before < 1e-9 and after < 5e-9  # noise of five periods
+    assert "The true error may be up to" in verdict(found) and any(
+        "are left to it" in words for words in sensor_words(found)
+    )
     assert found.of_group(found.left_to_sensor, found.groups[0]) == pytest.approx(
         0.008 * np.hypot(10, 20) * 1e-6, rel=0.05
     )

@@ -111,19 +111,19 @@ def learn(
     solution = solve(scenario, model, progress)
     lifted = Lifted(solution)
     stated, files = _stated(scenario, lifted)
+    learning = learn_recorded(lifted, stated, paths, options, progress)
     read = {name: sha256(path) for name, path in (*recording_files(paths), *files)}
-    return learn_recorded(lifted, stated, paths, {**scenario.digest, **read}, options, progress)
+    return replace(learning, inputs={**scenario.digest, **read})
 
 
 def learn_recorded(
     lifted: Lifted,
     stated: SensorStatement,
     paths: Sequence[Path | str],
-    inputs: dict[str, str],
     options: LearningOptions = DEFAULT,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Learning:
-    """The same as `learn` for a path that has been solved, with what is `stated` of its sensor."""
+    """The same as `learn` for a path that has been solved, with what is `stated` of its sensor; without the digests of files."""
     progress("recorded runs")
     implied = ImpliedPose(lifted)
     runs = load_runs(paths, lifted, implied)
@@ -131,7 +131,7 @@ def learn_recorded(
     check_belongs(runs, lifted, source)
     runs = merged(belonging(runs, lifted, source), lifted)
     sensor = sensor_budget(lifted, implied, stated, runs.observed, options)
-    return learn_from(lifted, runs, source, inputs, options, progress, sensor)
+    return learn_from(lifted, runs, source, {}, options, progress, sensor)
 
 
 def _stated(scenario: Scenario, lifted: Lifted) -> tuple[SensorStatement, list[tuple[str, Path]]]:

@@ -72,13 +72,25 @@ def first_screen(learning: Learning, figure: PageFigure) -> FirstScreen:
 
 
 def verdict(learning: Learning) -> str:
-    """One sentence: the error of the best run and what the next one will have, or why there is none."""
+    """One sentence: the error of the best run and what the next one will have, or why there is none; one more where the sensor may hide
+    more than that error."""
     best = learning.runs[learning.base]
     now = ", ".join(f"{shown_error(learning, best, g.name)} {g.unit} {g.name}" for g in learning.groups)
+    hidden = hidden_by_sensor(learning)
     if learning.stop:
-        return f"Nothing more to learn: {learning.stop}. Best run: {best.name}, {now}."
+        return f"Nothing more to learn: {learning.stop}. Best run: {best.name}, {now}.{hidden}"
     then = ", ".join(f"{g.shown(learning.predicted[g.name]):.3g} {g.unit}" for g in learning.groups)
-    return f"Best run: {best.name}, {now}. Predicted for the next run: {then}."
+    return f"Best run: {best.name}, {now}. Predicted for the next run: {then}.{hidden}"
+
+
+def hidden_by_sensor(learning: Learning) -> str:
+    """What the sensor may hide of the true error, in the groups where that is more than the error of the best run; empty where in none."""
+    best, more = learning.runs[learning.base], list[str]()
+    for g in learning.groups:
+        may = learning.of_group(learning.sensor.may_feign(), g)
+        if may > best.repeating[g.name]:
+            more.append(f"{g.shown(may):.3g} {g.unit} {g.name}")
+    return f" The true error may be up to {', '.join(more)}, which the sensor may hide." if more else ""
 
 
 def shown_error(learning: Learning, run: RunResult, group: str) -> str:
