@@ -1,8 +1,9 @@
 """What a wrong scale of the sensor does to constants that were fitted to its readings: the budget of the sensor in a calibration.
 
-The fit cannot tell a scale of the sensor from constants that scale the motion. With the scale of each channel that was read held as
-described while it may be anything of its standard deviation, the constants c deviate by G dg, G = dc/dg = C_cg C_gg^-1 of a fit of both
-(`calibrate.with_held`), and by that much the true motion of a path that is solved with them is spoiled where the sensor is wrong.
+The fit cannot tell a scale of the sensor from constants that scale the motion. With the scales of the channels held as described while
+they are off, the constants c deviate by G dg, G = dc/dg = C_cg C_gg^-1 of a fit of both (`calibrate.with_held`), and by that much the true
+motion of a path that is solved with them is spoiled. Scales of which nothing is stated are off together, as by a wrong reference: that a
+single one is wrong shows against the others, and the fit weighs it less.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ ASSUMED_SCALE = 5e-3
 
 def sensor_covariance(fitter: Fitter, fit: Fit) -> np.ndarray:
     """(k, k) [SI] covariance of the fitted constants that the scales of the sensor's channels make by themselves."""
+    before = len(fit.structure.device.effect)
     k, held = len(fit.theta), _held(fit.structure, fitter.recording.channels)
     if not held.free or len(held.free) == k:
         return np.zeros((k, k))
@@ -31,7 +33,10 @@ def sensor_covariance(fitter: Fitter, fit: Fit) -> np.ndarray:
     values = np.concatenate([fit.theta, [p.nominal for p in held.free[k:]]])
     joint = fitter.fit(held, values, steps=0).covariance
     G = np.linalg.solve(joint[k:, k:], joint[k:, :k]).T
-    return np.asarray(G @ np.diag(sds**2) @ G.T)
+    added = range(before, len(held.device.effect))
+    together = np.array([p.path.startswith(tuple(f"effect[{j}]." for j in added)) for p in held.free[k:]])
+    common = G @ np.where(together, sds, 0.0)
+    return np.asarray(G @ np.diag(np.where(together, 0.0, sds**2)) @ G.T + np.outer(common, common))
 
 
 def _held(structure: Structure, channels: tuple[str, ...]) -> Structure:
