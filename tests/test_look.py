@@ -219,5 +219,5 @@ def test_names_of_columns_are_no_lines_of_the_file(axis, tmp_path):
     (tmp_path / "log.json").write_text(json.dumps(table))
     proposal = propose([table_facts(read_table(tmp_path / "log.json"))], axis)
     read = tomllib.loads(recording_toml(proposal, tmp_path, 'a "title"\n[x]'))
-    assert set(read) == {"title", "device", "kind", "record", "columns"}
+    assert set(read) == {"format", "title", "device", "kind", "record", "columns"}
     assert read["columns"]["drive.axis"]["column"] == "drive"

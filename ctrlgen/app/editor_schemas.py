@@ -13,6 +13,7 @@ from typing import Annotated, Any, Union
 from pydantic import Field, TypeAdapter
 
 from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.file_format import FORMAT
 from ctrlgen.core.files import write_text
 from ctrlgen.devices import Device
 from ctrlgen.devices.python_file import KIND
@@ -20,6 +21,7 @@ from ctrlgen.recordings.schema import RecordingFile
 from ctrlgen.reporting.described_schema import DescribedSchema
 from ctrlgen.trajectory.scenario_file import ScenarioFile
 
+FORMAT_KEY = {"const": FORMAT, "description": "Format of this file; left out, it is the first."}
 FILES = ("device", "scenario", "recording")
 
 
@@ -29,6 +31,10 @@ def schema_of(kind: str) -> dict[str, Any]:
         raise InputError("schema", [Fault(kind, f"is no file that you write; known are {', '.join(FILES)}")])
     made = _of({"scenario": ScenarioFile, "recording": RecordingFile}[kind]) if kind != "device" else _device()
     made.pop("title", None)
+    whole = [made, *made.get("oneOf", ())]
+    for part in (made["$defs"][p["$ref"].rpartition("/")[2]] if "$ref" in p else p for p in whole):
+        if "properties" in part:
+            part["properties"] = {"format": FORMAT_KEY, **part["properties"]}
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": f"{kind}.toml", **made}
 
 

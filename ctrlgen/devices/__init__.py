@@ -9,6 +9,7 @@ from pkgutil import walk_packages
 
 import ctrlgen.effects  # noqa: F401  fills Effect.library before a device file is read
 from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.file_format import in_this_format
 from ctrlgen.core.files import read_toml, validate
 from ctrlgen.devices.base import Device
 from ctrlgen.devices.device_physics import BalancedPhysics, DevicePhysics, ImposedPhysics, InertialPhysics
@@ -28,6 +29,7 @@ def load_device(path: Path | str) -> Device:
     table = read_toml(Path(path) / "scenario.toml" if (Path(path) / "scenario.toml").is_file() else path)
     if "device" in table and "kind" not in table:
         raise InputError(path, [Fault("file", f"is a scenario; name its device, {table['device']}")])
+    table = in_this_format(table, path)
     if "record" in table:
         raise InputError(path, [Fault("file", "describes a recording; name the device file that it was made on")])
     kind = table.get("kind")

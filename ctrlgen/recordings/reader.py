@@ -14,6 +14,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.file_format import in_this_format
 from ctrlgen.core.files import read_toml, validate
 from ctrlgen.model.model import Model
 from ctrlgen.recordings import preprocessing, thinning, validation
@@ -150,7 +151,7 @@ def _described(path: Path) -> dict[str, Any]:
     if "record" not in table and ("path" in table or "name" in table):
         what = f"describes a {'scenario' if 'path' in table else 'device'}; name a {FILE}"
         raise InputError(path, [Fault("file", what)])
-    return table
+    return in_this_format(table, path)
 
 
 class _File:

@@ -12,6 +12,7 @@ from pathlib import Path
 import casadi as ca
 
 from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.file_format import in_this_format
 from ctrlgen.core.files import read_text, read_toml, validate
 from ctrlgen.core.names import C_NAME, checked
 from ctrlgen.core.shown import Shown
@@ -168,7 +169,7 @@ def load_scenario(path: Path | str, device: Device | Path | str | None = None) -
     if "kind" in table and "device" not in table:
         what = 'describes a device; name a scenario, or write one that has device = "..." with this file\'s path'
         raise InputError(file_path, [Fault("file", what)])
-    file = validate(ScenarioFile, table, file_path)
+    file = validate(ScenarioFile, in_this_format(table, file_path), file_path)
     inputs = {"scenario": Input(file_path, read_text(file_path))}
     if not isinstance(device, Device):
         device_path = file_path.parent / file.device if device is None else Path(device)

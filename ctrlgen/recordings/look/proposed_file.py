@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ctrlgen.core.escaping import toml
+from ctrlgen.core.file_format import FORMAT
 from ctrlgen.recordings.look.column_facts import TableFacts, rests
 from ctrlgen.recordings.look.proposal import Proposal
 
@@ -16,6 +17,7 @@ def recording_toml(proposal: Proposal, folder: Path, title: str) -> str:
     """The text of a recording.toml in `folder`, with comments where something is assumed."""
     lines = [
         "# Begun by ctrlgen look. Lines that end in a comment hold what the files do not say: correct what is wrong.",
+        f"format = {FORMAT}",
         f"title  = {toml(title)}",
         f"device = {toml(proposal.model.device.name)}",
         f'kind   = "{proposal.kind}"' + ("" if proposal.timed else " # assumed: no column is a time"),
