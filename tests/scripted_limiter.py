@@ -100,6 +100,7 @@ class Scripted(ControllerKernels):
     composite_bound: Any = None
     composite_rounds: Any = None
     nearest_slopes: Any = None
+    contraction: Any = None
     has_state_limits: bool = True
 
     def slacks(self, share: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

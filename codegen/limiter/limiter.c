@@ -10,7 +10,7 @@
  * composite limits, of which there are SHARES), RATED (drives change only so fast), PASSING (they can lead the device beyond a
  * limit), REDUNDANT (more drives than axes, of which GROUPS can be moved without a push), COUPLED (a displacement moves several
  * channels), MOVING (kernels for the next sample), MOTION (targets with derivatives), GIVEN (constants that are given at the
- * start). SETTLE_DRIVE_LIMITED and STEP_DRIVE_LIMITED: drives beyond their limits can be needed. SETTLE_EXAMINED_FIRST and
+ * start), ESTIMATED (states that are stepped from sample to sample, which can be believed wrongly). SETTLE_DRIVE_LIMITED and STEP_DRIVE_LIMITED: drives beyond their limits can be needed. SETTLE_EXAMINED_FIRST and
  * STEP_EXAMINED_FIRST: whether a state is lost is asked before it is used. STATE_BY_MODE and DRIVE_BY_MODE: the line search calls one
  * kernel to settle and another to step. U_BOUNDS_ONCE: one function alone reads the limits of drives.
  *
@@ -457,6 +457,11 @@ void INIT(limiter_state *state)
             state->u[i] = U_SAFE[i];
         }
 #endif
+#if ESTIMATED
+        state->unsure = 0U;
+        state->ticking = 0U;
+        state->tick = 0U;
+#endif
         state->ready = LIMITER_BUILD;
     }
 }
@@ -487,6 +492,10 @@ static uint32_t set_lost(limiter_state *state, limiter_output *out)
     return LIMITER_LOST;
 }
 
+#if ESTIMATED
+#include "estimate_count.c"
+
+#endif
 #define SETTLING 1
 #include "sample.c"
 #undef SETTLING
@@ -499,4 +508,8 @@ static uint32_t set_lost(limiter_state *state, limiter_output *out)
 #if MOTION
 
 #include "motion.c"
+#endif
+#if ESTIMATED
+
+#include "estimate.c"
 #endif

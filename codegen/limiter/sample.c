@@ -51,7 +51,13 @@ static void SAFE(limiter_state *state, limiter_output *out)
 #if RATED
     real share = REAL(1.0);
 #endif
+#if ESTIMATED && SETTLING
+    real before[NX];
+#endif
     int i;
+#if ESTIMATED && SETTLING
+    copy_states(state->x, before);
+#endif
     for (i = 0; i < NU; i++) {
         out->drive[i] = U_SAFE[i];
     }
@@ -73,6 +79,9 @@ static void SAFE(limiter_state *state, limiter_output *out)
     NEXT_STATES(state, state->z, out->drive, state->x);
 #endif
     BALANCE(state, state->x, out->displacement, out->drive, state->z);
+#if ESTIMATED && SETTLING
+    mark_moved(state, before);
+#endif
 }
 
 #if DRIVE_LIMITED
@@ -150,6 +159,10 @@ static uint32_t WITHIN(limiter_state *state, limiter_output *out)
     real share = REAL(1.0);
     int held = 0;
 #endif
+#if ESTIMATED && SETTLING
+    real before[NX];
+    copy_states(state->x, before);
+#endif
 #if NS
     STATE(state, out->displacement, out->state);
 #endif
@@ -216,9 +229,21 @@ static uint32_t WITHIN(limiter_state *state, limiter_output *out)
 #endif
 #if EXAMINED_FIRST
     GO_ON
+#if ESTIMATED && SETTLING
+    mark_moved(state, before);
+#endif
+#if ESTIMATED
+    status |= count_down(state);
+#endif
 #else
     if (lost == 0) {
         GO_ON
+#if ESTIMATED && SETTLING
+        mark_moved(state, before);
+#endif
+#if ESTIMATED
+        status |= count_down(state);
+#endif
     }
 #endif
 #if RATED && (NS || PASSING)
@@ -270,11 +295,17 @@ uint32_t SAMPLE(limiter_state *state, const real target[M], limiter_output *out)
     } else {
 #if EXAMINED_FIRST
         SAFE(state, out);
+#if ESTIMATED
+        status |= count_down(state);
+#endif
 #else
         if (is_lost(state) != 0) {
             status = set_lost(state, out);
         } else {
             SAFE(state, out);
+#if ESTIMATED
+            status |= count_down(state);
+#endif
         }
 #endif
     }

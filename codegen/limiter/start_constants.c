@@ -47,6 +47,11 @@ uint32_t INIT_WITH(limiter_state *state, const limiter_constants *constants)
             state->u[i] = U_SAFE[i];
         }
 #endif
+#if ESTIMATED
+        state->unsure = 0U;
+        state->ticking = 0U;
+        state->tick = 0U;
+#endif
         state->ready = LIMITER_BUILD;
         status = 0U;
     }

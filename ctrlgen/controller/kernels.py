@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.controller.composite_bound import composite_bound, worst_in_range
+from ctrlgen.controller.contraction import Contraction, Stepped, contraction
 from ctrlgen.controller.controller_step import answer
 from ctrlgen.controller.limit_reach import Slacks, drive_beyond, state_beyond
 from ctrlgen.controller.lost_state import plausible_magnitudes
@@ -242,6 +243,15 @@ class ControllerKernels:
     def redundancy(self) -> NullMotion | None:
         """What keeps more drives than axes within their limits; None where there are as many."""
         return null_motion(self.nominal)
+
+    @cached_property
+    def contraction(self) -> Contraction | None:
+        """How fast a wrong belief of the states dies out (`ctrlgen.controller.contraction`); None for a device without states, and where
+        no sample is stepped from the one before."""
+        if self.sample_time is None or not self.nominal.x.numel():
+            return None
+        every = [Stepped(k.nominal, k.static, k.moving) for k in (self, *self.variants) if k.moving is not None]
+        return contraction(every, self.sample_time) if every else None
 
     @property
     def rated(self) -> bool:

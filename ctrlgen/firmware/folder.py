@@ -144,5 +144,6 @@ def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Real,
         "m": len(controller.kernels.target.channels),
         "rated": controller.rate is not None,
         "rate": scenario.sample_time is not None,
+        "estimated": controller.kernels.contraction is not None,
     }
     write("harness.c", context, path)

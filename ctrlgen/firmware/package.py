@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ctrlgen.controller.contraction import FOREVER
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, write_text
 from ctrlgen.core.units import base_unit
@@ -155,12 +156,19 @@ def _context(
 
 def _test_calls(c: dict[str, Any]) -> int:
     """What the test on the target counts: of the controller, and of the player its wrap or end and three refusals too."""
-    online = len(c["rows"]) + 2 * c["unusable"] + 2 + 2 * c["lost"]
+    online = len(c["rows"]) + 2 * c["unusable"] + 2 + 2 * c["lost"] + _estimate_calls(c)
     return online + (
         len(c["played"]) + len(c["timed"]) + 6 + (c["closed"] and c["whole"] < 2**32) + c["played_unusable"]
         if c["player"]
         else 0
     )
+
+
+def _estimate_calls(c: dict[str, Any]) -> int:
+    """Those of what corrects a state that may be wrong."""
+    if c["estimated"] is None:
+        return 0
+    return 29 + (1 if c["estimated"].unknown == FOREVER else 3) + (16 if c["n_s"] else 0)
 
 
 def _memory(c: dict[str, Any], contexts: Mapping[Real, dict[str, Any]]) -> list[dict[str, Any]]:
@@ -169,10 +177,12 @@ def _memory(c: dict[str, Any], contexts: Mapping[Real, dict[str, Any]]) -> list[
     chosen: list[PlayerCandidate | None] = [contexts[real].get("chosen") for real in Real]
     rated = nu if c["rated"] else 0
     given = (f" + {rated}" if rated else "") + (f" + {c['given_numbers']}" if c["given_numbers"] else "")
-    state = f"`sizeof({c['online']}_state)` = ({x} + {n}{given}) numbers and a word, RAM, one a device"
+    words, told = (4, "four words") if c["estimated"] else (1, "a word")
+    state = f"`sizeof({c['online']}_state)` = ({x} + {n}{given}) numbers and {told}, RAM, one a device"
     output = f"`sizeof({c['online']}_output)` = ({nu} + {n} + {n_s}) numbers, RAM or stack"
     rows = [
-        _counted("state", x + n + rated + 1 + c["given_numbers"], 0, state),  # a word is aligned as a number
+        # a word is aligned as a number
+        _counted("state", x + n + rated + c["given_numbers"] + (words == 1), 16 * (words == 4), state),
         _counted("output", nu + n + n_s, 0, output),
         _vectors(contexts),
     ]

@@ -83,6 +83,8 @@ def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> d
         ControllerStatus.COMPOSITE if kernels.guarded_limits else bits
     )
     bits |= ControllerStatus.RATE if controller.rate else bits
+    estimated = kernels.contraction is not None
+    bits |= ControllerStatus.UNSURE | ControllerStatus.CLOCK if estimated else bits
     samples, clock = len(scenario.bind(model).samples), scenario.clock
     return {
         "real": real,
@@ -95,6 +97,7 @@ def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> d
         "m": len(kernels.input_limits),
         "rate": isinstance(clock, Sampled),
         "bits": int(bits),
+        "estimated": estimated,
         "input_limits": kernels.input_limits,
         "u_low": nominal.u_bounds[0],
         "u_high": nominal.u_bounds[1],

@@ -133,7 +133,7 @@ static int flexure_axis_online_f32_limit_displacement(float value[1])
     return flexure_axis_online_f32_limit_all(value, LOW, HIGH, SLACK, 1);
 }
 
-void flexure_axis_online_f32_init_20000hz_032701d0(flexure_axis_online_f32_state *state)
+void flexure_axis_online_f32_init_20000hz_6af76ef7(flexure_axis_online_f32_state *state)
 {
     static const float X_REST[1] = { 0.0f }; /* SI */
     if (state != NULL) {

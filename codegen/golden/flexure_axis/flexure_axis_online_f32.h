@@ -26,12 +26,12 @@
 extern "C" {
 #endif
 
-/* For _Static_assert(FLEXURE_AXIS_ONLINE_F32_ABI == 2U, "..."): raised when code written for an older header must be changed. */
-#define FLEXURE_AXIS_ONLINE_F32_ABI (2U)
+/* For _Static_assert(FLEXURE_AXIS_ONLINE_F32_ABI == 3U, "..."): raised when code written for an older header must be changed. */
+#define FLEXURE_AXIS_ONLINE_F32_ABI (3U)
 #define FLEXURE_AXIS_ONLINE_F32_VERSION "0.1.0" /* of ctrlgen */
 #define FLEXURE_AXIS_ONLINE_F32_DEVICE_HASH (0x5f641b21U) /* the first 32 bits of the SHA-256 of the device's description */
 #define FLEXURE_AXIS_ONLINE_F32_RATE_HZ (20000U) /* samples a second */
-#define FLEXURE_AXIS_ONLINE_F32_BUILD (0x032701D0U) /* of device, followed signal, rate, limits and arithmetic; the mark of an initialised state */
+#define FLEXURE_AXIS_ONLINE_F32_BUILD (0x6AF76EF7U) /* of device, followed signal, rate, limits and arithmetic; the mark of an initialised state */
 #define FLEXURE_AXIS_ONLINE_F32_TARGET_SIZE (3U)
 #define FLEXURE_AXIS_ONLINE_F32_DRIVE_SIZE (1U)
 #define FLEXURE_AXIS_ONLINE_F32_DISPLACEMENT_SIZE (1U)
@@ -56,12 +56,12 @@ typedef struct {
 
 /* What flexure_axis_online_f32_init calls. It is linked by a name of this build, rate and hash of device, signal and limits: a program that was
  * compiled with this header and is linked with another build of the same prefix is told so by the linker. */
-void flexure_axis_online_f32_init_20000hz_032701d0(flexure_axis_online_f32_state *state);
+void flexure_axis_online_f32_init_20000hz_6af76ef7(flexure_axis_online_f32_state *state);
 
 /* A cold device at rest. Also the way out of status LOST: hold the safe drive until the device has settled, then call it. */
 static inline void flexure_axis_online_f32_init(flexure_axis_online_f32_state *state)
 {
-    flexure_axis_online_f32_init_20000hz_032701d0(state);
+    flexure_axis_online_f32_init_20000hz_6af76ef7(state);
 }
 
 /* Drive of the equilibrium at the position of target; the state becomes that equilibrium. Hold the drive until the device has settled. */

@@ -37,6 +37,7 @@ typedef float real;
 #define REST_GIVEN 0
 #define CHANGING 0
 #define DOUBLE 0
+#define ESTIMATED 1
 #define STATE_BY_MODE 0
 #define DRIVE_BY_MODE 0
 #define SETTLE_DRIVE_LIMITED 0
@@ -54,8 +55,8 @@ typedef float real;
 #define SECANT_STEPS 3
 #define GROUPS 0
 #define GIVEN 0
-#define INIT limiter_init_1000hz_e744a801
-#define INIT_WITH limiter_init_with_1000hz_e744a801
+#define INIT limiter_init_1000hz_6a8340fe
+#define INIT_WITH limiter_init_with_1000hz_6a8340fe
 #define Z_LOW_TABLE { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }
 #define Z_HIGH_TABLE { 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f }
 #define Z_SLACK_TABLE { 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f }
@@ -83,6 +84,19 @@ typedef float real;
     }
 #define LIMITED_STATE STEP_STATE
 #define LIMITED_DRIVE STEP_DRIVE
+#define KNOWN_TABLE { 0.00055f, 0.00055f, 0.00055f, 0.00055f, 0.00055f, 0.00055f }
+#define START_TABLE { 845.15f, 845.15f, 845.15f, 845.15f, 845.15f, 845.15f }
+#define REACH_LOW_TABLE { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }
+#define REACH_HIGH_TABLE { 845.15f, 845.15f, 845.15f, 845.15f, 845.15f, 845.15f }
+#define KNOWN_STATE_TABLE { 0.00055f, 0.00055f, 0.00055f, 0.00055f, 0.00055f, 0.00055f }
+#define SIDE_TABLE { 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f }
+#define UNKNOWN_TICKS 71U
+#define HALVING_TICKS 4U
+#define EXACT_TICKS 64
+#define BACKWARD 2147483648U
+#define SETTLING_SWEEPS 3
+#define DOUBLED 32
+#define GROWTH 3636.3635f
 #define BALANCE(state, x, z, drive, result) balance_displacement(x, z, result)
 #define COMPOSITE_SHARES(state, wanted, result) composite_shares(wanted, result)
 #define SETTLE_DISPLACEMENT(state, target, result) wanted_displacement(target, result)

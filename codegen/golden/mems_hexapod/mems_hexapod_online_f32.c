@@ -598,7 +598,7 @@ static int mems_hexapod_online_f32_line_search(const mems_hexapod_online_f32_sta
     return mems_hexapod_online_f32_limit_all(out->drive, MEMS_HEXAPOD_ONLINE_F32_U_LOW, MEMS_HEXAPOD_ONLINE_F32_U_HIGH, MEMS_HEXAPOD_ONLINE_F32_U_SLACK, 6);
 }
 
-void mems_hexapod_online_f32_init_1000hz_e744a801(mems_hexapod_online_f32_state *state)
+void mems_hexapod_online_f32_init_1000hz_6a8340fe(mems_hexapod_online_f32_state *state)
 {
     if (state != NULL) {
         int i;
@@ -608,6 +608,9 @@ void mems_hexapod_online_f32_init_1000hz_e744a801(mems_hexapod_online_f32_state 
         for (i = 0; i < 6; i++) {
             state->z[i] = 0.0f;
         }
+        state->unsure = 0U;
+        state->ticking = 0U;
+        state->tick = 0U;
         state->ready = MEMS_HEXAPOD_ONLINE_F32_BUILD;
     }
 }
@@ -635,10 +638,50 @@ static uint32_t mems_hexapod_online_f32_set_lost(mems_hexapod_online_f32_state *
     return MEMS_HEXAPOD_ONLINE_F32_LOST;
 }
 
+/* UNSURE while the state may be wrong; a sample less of it then. */
+static uint32_t mems_hexapod_online_f32_count_down(mems_hexapod_online_f32_state *state)
+{
+    uint32_t status = 0U;
+    if (state->unsure != 0U) {
+        status = MEMS_HEXAPOD_ONLINE_F32_UNSURE;
+        if (state->unsure != MEMS_HEXAPOD_ONLINE_F32_FOREVER) {
+            state->unsure -= 1U;
+        }
+    }
+    return status;
+}
+
+static void mems_hexapod_online_f32_copy_states(const float from[6], float to[6])
+{
+    int i;
+    for (i = 0; i < 6; i++) {
+        to[i] = from[i];
+    }
+}
+
+/* After settling the device is on its way there, unless it was there before. */
+static void mems_hexapod_online_f32_mark_moved(mems_hexapod_online_f32_state *state, const float before[6])
+{
+    static const float KNOWN[6] = { 0.00055f, 0.00055f, 0.00055f, 0.00055f, 0.00055f, 0.00055f }; /* SI */
+    int moved = 0;
+    int i;
+    for (i = 0; i < 6; i++) {
+        const float by = state->x[i] - before[i];
+        if ((by > KNOWN[i]) || (by < -KNOWN[i])) {
+            moved = 1;
+        }
+    }
+    if ((moved != 0) && (state->unsure < MEMS_HEXAPOD_ONLINE_F32_SETTLING)) {
+        state->unsure = MEMS_HEXAPOD_ONLINE_F32_SETTLING;
+    }
+}
+
 /* Without a usable target: the safe drive, as fast as it may change, and the state that it leads to. */
 static void mems_hexapod_online_f32_settle_safe(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
 {
+    float before[6];
     int i;
+    mems_hexapod_online_f32_copy_states(state->x, before);
     for (i = 0; i < 6; i++) {
         out->drive[i] = MEMS_HEXAPOD_ONLINE_F32_U_SAFE[i];
     }
@@ -650,6 +693,7 @@ static void mems_hexapod_online_f32_settle_safe(mems_hexapod_online_f32_state *s
     }
     mems_hexapod_online_f32_wanted_advance(out->drive, state->x);
     mems_hexapod_online_f32_balance_displacement(state->x, out->displacement, state->z);
+    mems_hexapod_online_f32_mark_moved(state, before);
 }
 
 /* The state becomes that of the next sample. */
@@ -674,6 +718,8 @@ static uint32_t mems_hexapod_online_f32_settle_within(mems_hexapod_online_f32_st
 {
     uint32_t status = 0U;
     int lost = 0;
+    float before[6];
+    mems_hexapod_online_f32_copy_states(state->x, before);
     mems_hexapod_online_f32_wanted_state(out->displacement, out->state);
     {
         const int scaled = mems_hexapod_online_f32_limit_composite(state, out->displacement);
@@ -695,6 +741,8 @@ static uint32_t mems_hexapod_online_f32_settle_within(mems_hexapod_online_f32_st
     }
     if (lost == 0) {
         mems_hexapod_online_f32_settle_proceed(state, out);
+        mems_hexapod_online_f32_mark_moved(state, before);
+        status |= mems_hexapod_online_f32_count_down(state);
     }
     return status;
 }
@@ -733,6 +781,7 @@ uint32_t mems_hexapod_online_f32_settle(mems_hexapod_online_f32_state *state, co
             status = mems_hexapod_online_f32_set_lost(state, out);
         } else {
             mems_hexapod_online_f32_settle_safe(state, out);
+            status |= mems_hexapod_online_f32_count_down(state);
         }
     }
     return status;
@@ -819,6 +868,7 @@ static uint32_t mems_hexapod_online_f32_step_within(mems_hexapod_online_f32_stat
     }
     if (lost == 0) {
         mems_hexapod_online_f32_step_proceed(state, out, limited);
+        status |= mems_hexapod_online_f32_count_down(state);
     }
     return status;
 }
@@ -857,7 +907,195 @@ uint32_t mems_hexapod_online_f32_step(mems_hexapod_online_f32_state *state, cons
             status = mems_hexapod_online_f32_set_lost(state, out);
         } else {
             mems_hexapod_online_f32_step_safe(state, out);
+            status |= mems_hexapod_online_f32_count_down(state);
         }
+    }
+    return status;
+}
+
+/* The displacement becomes that which balances the states. */
+static void mems_hexapod_online_f32_rebalance(mems_hexapod_online_f32_state *state, const float drive[6])
+{
+    int k;
+    (void)drive;
+    for (k = 0; k < 3; k++) {
+        mems_hexapod_online_f32_balance_displacement(state->x, state->z, state->z);
+    }
+}
+
+/* The answer to what leaves the state as it is. */
+static uint32_t mems_hexapod_online_f32_is_unsure(const mems_hexapod_online_f32_state *state)
+{
+    return (state->unsure != 0U) ? MEMS_HEXAPOD_ONLINE_F32_UNSURE : 0U;
+}
+
+/* 1 if the state can be corrected; one that is lost stays so. */
+static int mems_hexapod_online_f32_can_be_corrected(mems_hexapod_online_f32_state *state)
+{
+    if ((state->ready != MEMS_HEXAPOD_ONLINE_F32_BUILD) || (mems_hexapod_online_f32_is_lost(state) != 0)) {
+        state->ready = 0U;
+    }
+    return (state->ready != 0U) ? 1 : 0;
+}
+
+uint32_t mems_hexapod_online_f32_forget(mems_hexapod_online_f32_state *state)
+{
+    static const float START[6] = { 845.15f, 845.15f, 845.15f, 845.15f, 845.15f, 845.15f }; /* SI */
+    uint32_t status = MEMS_HEXAPOD_ONLINE_F32_INPUT;
+    if (state == NULL) {
+        /* nothing is written */
+    } else if (state->ready != MEMS_HEXAPOD_ONLINE_F32_BUILD) {
+        status = MEMS_HEXAPOD_ONLINE_F32_LOST;
+    } else {
+        int i;
+        mems_hexapod_online_f32_copy_states(START, state->x);
+        for (i = 0; i < 6; i++) {
+            state->z[i] = 0.0f;
+        }
+        mems_hexapod_online_f32_rebalance(state, MEMS_HEXAPOD_ONLINE_F32_U_SAFE);
+        state->unsure = 71U;
+        status = MEMS_HEXAPOD_ONLINE_F32_UNSURE;
+    }
+    return status;
+}
+
+uint32_t mems_hexapod_online_f32_elapsed(mems_hexapod_online_f32_state *state, uint32_t ticks, const float drive[6])
+{
+    uint32_t status = MEMS_HEXAPOD_ONLINE_F32_INPUT;
+    if ((state == NULL) || (drive == NULL)) {
+        /* nothing is written */
+    } else if (mems_hexapod_online_f32_can_be_corrected(state) == 0) {
+        status = MEMS_HEXAPOD_ONLINE_F32_LOST;
+    } else if (mems_hexapod_online_f32_drive_inside(drive) != 0) {
+        uint32_t left = ticks;
+        int k;
+        for (k = 0; k < 64; k++) {
+            if (left > 0U) {
+                mems_hexapod_online_f32_step_advance(state->x, drive, state->x);
+                mems_hexapod_online_f32_balance_displacement(state->x, state->z, state->z);
+                left -= 1U;
+            }
+        }
+        if (left > 0U) { /* in the time that is left the device comes to rest, from wherever it was */
+            for (k = 0; k < 3; k++) {
+                mems_hexapod_online_f32_wanted_advance(drive, state->x);
+                mems_hexapod_online_f32_balance_displacement(state->x, state->z, state->z);
+            }
+            if (state->unsure < MEMS_HEXAPOD_ONLINE_F32_SETTLING) {
+                state->unsure = MEMS_HEXAPOD_ONLINE_F32_SETTLING;
+            }
+        }
+        if (state->unsure != MEMS_HEXAPOD_ONLINE_F32_FOREVER) {
+            state->unsure -= (state->unsure < ticks) ? state->unsure : ticks;
+        }
+        status = mems_hexapod_online_f32_is_unsure(state);
+    } else {
+        /* no drive that was held */
+    }
+    return status;
+}
+
+static const float MEMS_HEXAPOD_ONLINE_F32_REACH_LOW[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* SI: what drives can lead to */
+static const float MEMS_HEXAPOD_ONLINE_F32_REACH_HIGH[6] = { 845.15f, 845.15f, 845.15f, 845.15f, 845.15f, 845.15f };
+
+/* 1 if measured is no number, or farther than error beyond what drives can lead to. */
+static int mems_hexapod_online_f32_cannot_be(const float measured[6], float error)
+{
+    int cannot = ((mems_hexapod_online_f32_is_nan(&error) != 0) || (error < 0.0f) || (error > 1e+18f)) ? 1 : 0;
+    int i;
+    for (i = 0; i < 6; i++) {
+        if ((mems_hexapod_online_f32_is_nan(&measured[i]) != 0) || (measured[i] < (MEMS_HEXAPOD_ONLINE_F32_REACH_LOW[i] - error)) || (measured[i] > (MEMS_HEXAPOD_ONLINE_F32_REACH_HIGH[i] + error))) {
+            cannot = 1;
+        }
+    }
+    return cannot;
+}
+
+/* 1 if state and measured contradict one another. */
+static int mems_hexapod_online_f32_is_apart(const mems_hexapod_online_f32_state *state, const float measured[6], float error)
+{
+    static const float NEAR[6] = { 0.00055f, 0.00055f, 0.00055f, 0.00055f, 0.00055f, 0.00055f }; /* SI */
+    int apart = 0;
+    int i;
+    for (i = 0; i < 6; i++) {
+        const float by = measured[i] - state->x[i];
+        if ((by > (error + NEAR[i])) || (by < -(error + NEAR[i]))) {
+            apart = 1;
+        }
+    }
+    return apart;
+}
+
+/* The states of actuators become those that were measured, at the end of their error that is farther from rest. */
+static void mems_hexapod_online_f32_believe(mems_hexapod_online_f32_state *state, const float measured[6], float error)
+{
+    static const float SIDE[6] = { 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f }; /* of rest on which drives lead: 1 above, -1 below, 0 both */
+    int i;
+    for (i = 0; i < 6; i++) {
+        const float most = measured[i] + (SIDE[i] * error);
+        const float raised = (most > MEMS_HEXAPOD_ONLINE_F32_REACH_LOW[i]) ? most : MEMS_HEXAPOD_ONLINE_F32_REACH_LOW[i];
+        state->x[i] = (raised < MEMS_HEXAPOD_ONLINE_F32_REACH_HIGH[i]) ? raised : MEMS_HEXAPOD_ONLINE_F32_REACH_HIGH[i];
+    }
+    mems_hexapod_online_f32_rebalance(state, MEMS_HEXAPOD_ONLINE_F32_U_SAFE);
+}
+
+/* The samples in which an error of the states dies out. */
+static uint32_t mems_hexapod_online_f32_samples_of(float error)
+{
+    float left = error * 3636.3635f; /* of an estimate at one end of it */
+    uint32_t samples = 0U;
+    int k;
+    for (k = 0; k < 32; k++) {
+        if ((left > 1.0f) && (samples < 71U)) {
+            left = left * 0.5f;
+            samples += 4U;
+        }
+    }
+    return (samples < 71U) ? samples : 71U;
+}
+
+uint32_t mems_hexapod_online_f32_observe(mems_hexapod_online_f32_state *state, const float measured[6], float error)
+{
+    uint32_t status = MEMS_HEXAPOD_ONLINE_F32_INPUT;
+    if ((state == NULL) || (measured == NULL)) {
+        /* nothing is written */
+    } else if (mems_hexapod_online_f32_can_be_corrected(state) == 0) {
+        status = MEMS_HEXAPOD_ONLINE_F32_LOST;
+    } else if (mems_hexapod_online_f32_cannot_be(measured, error) == 0) {
+        const uint32_t told = mems_hexapod_online_f32_samples_of(error);
+        if (state->unsure > told) {
+            mems_hexapod_online_f32_believe(state, measured, error);
+            state->unsure = told;
+        } else if ((state->unsure == 0U) && (mems_hexapod_online_f32_is_apart(state, measured, error) != 0)) { /* neither is known */
+            mems_hexapod_online_f32_believe(state, measured, error);
+            state->unsure = 71U;
+        } else {
+            /* what is believed is known better */
+        }
+        status = mems_hexapod_online_f32_is_unsure(state);
+    } else {
+        /* no state that can be */
+    }
+    return status;
+}
+
+uint32_t mems_hexapod_online_f32_step_at(mems_hexapod_online_f32_state *state, uint32_t tick, const float target[6], mems_hexapod_online_f32_output *out)
+{
+    uint32_t status = 0U;
+    uint32_t since = 1U;
+    if ((state != NULL) && (out != NULL) && (state->ready == MEMS_HEXAPOD_ONLINE_F32_BUILD)) {
+        since = (state->ticking != 0U) ? (tick - state->tick) : 1U;
+        state->ticking = 1U;
+        state->tick = tick;
+        if (since != 1U) {
+            status = MEMS_HEXAPOD_ONLINE_F32_CLOCK;
+        }
+        if ((since > 1U) && ((since >= 2147483648U) || (mems_hexapod_online_f32_elapsed(state, since - 1U, out->drive) == MEMS_HEXAPOD_ONLINE_F32_INPUT))) {
+            (void)mems_hexapod_online_f32_forget(state);
+        }
+    }
+    if (since != 0U) {
+        status |= mems_hexapod_online_f32_step(state, target, out);
     }
     return status;
 }

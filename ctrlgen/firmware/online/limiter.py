@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ctrlgen.controller.estimate import BACKWARD, DOUBLED, EXACT, REST_SWEEPS
 from ctrlgen.controller.feedforward import SECANT_FRACTION, SECANT_STEPS
 from ctrlgen.controller.nearest_displacement import SWEEPS
 from ctrlgen.firmware.c.preprocessor import Macro, resolved
@@ -55,7 +56,9 @@ def limiter_macros(context: Mapping[str, Any]) -> dict[str, Macro]:
     macros = {f"EACH_{name}": Macro("\n".join(f"F({k})" for k in range(n)), ("F",)) for name, n in counts.items()}
     macros |= {"REAL": Macro("x ## f" if real is Real.FLOAT else "x", ("x",))}
     macros |= {name: Macro(str(int(value))) for name, value in _features(context).items()}
-    macros |= {name: Macro(text) for name, text in (_texts(context) | _start_texts(context)).items()}
+    macros |= {
+        name: Macro(text) for name, text in (_texts(context) | _start_texts(context) | _estimate_texts(context)).items()
+    }
     return macros | {name: Macro(body, tuple(given.split())) for name, (given, body) in _calls(context).items()}
 
 
@@ -79,6 +82,7 @@ def _features(context: Mapping[str, Any]) -> dict[str, int]:
         "REST_GIVEN": bool(context["rest_given"]),
         "CHANGING": context["changing"] is not None,
         "DOUBLE": context["real"] is Real.DOUBLE,
+        "ESTIMATED": context["estimated"] is not None,
         # Whether the line search calls one kernel to settle and another to step
         "STATE_BY_MODE": len({mode["state"].name for mode in limited if "state" in mode}) > 1,
         "DRIVE_BY_MODE": len({mode["drive"].name for mode in limited}) > 1,
@@ -148,6 +152,34 @@ def _texts(context: Mapping[str, Any]) -> dict[str, str]:
     for mode in limited_modes(context)[:1]:
         texts |= {f"LIMITED_{part}": f"{mode['name']}_{part}".upper() for part in ("STATE", "DRIVE")}
     return texts
+
+
+def _estimate_texts(context: Mapping[str, Any]) -> dict[str, str]:
+    """What the macros of estimate.c and estimate_count.c stand for."""
+    bounds, n_s, literal = context["estimated"], context["n_s"], context["real"].literal
+    if bounds is None:
+        return {}
+    known = np.minimum(bounds.known, context["unlimited"])
+    tables = {
+        "KNOWN": known,
+        "START": bounds.start,
+        "REACH_LOW": bounds.low[:n_s],
+        "REACH_HIGH": bounds.high[:n_s],
+        "KNOWN_STATE": known[:n_s],
+        "SIDE": bounds.side[:n_s],
+    }
+    counts = {
+        "UNKNOWN_TICKS": bounds.unknown,
+        "HALVING_TICKS": bounds.halving,
+        "EXACT_TICKS": EXACT,
+        "BACKWARD": BACKWARD,
+        "SETTLING_SWEEPS": REST_SWEEPS,
+        "DOUBLED": DOUBLED,
+    }
+    loops = ("EXACT_TICKS", "SETTLING_SWEEPS", "DOUBLED")  # counted by int
+    texts = {f"{name}_TABLE": _braces(literal(v) for v in values) for name, values in tables.items()}
+    texts |= {name: str(count) if name in loops else f"{count}U" for name, count in counts.items()}
+    return texts | ({"GROWTH": literal(2.0 * bounds.growth / float(np.min(bounds.known[:n_s])))} if n_s else {})
 
 
 def _start_texts(context: Mapping[str, Any]) -> dict[str, str]:

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ctrlgen.controller.contraction import FOREVER, KNOWN
+from ctrlgen.controller.estimate import EXACT
 from ctrlgen.controller.feedforward import SECANT_STEPS, Controller
 from ctrlgen.controller.lost_state import FAR
 from ctrlgen.controller.nearest_displacement import SWEEPS
@@ -56,6 +58,11 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
             "state_limited": controller.state_can_be_limited,
             "rest": kernels.nominal.rest,
             "far": FAR,
+            "estimated": kernels.contraction,
+            "forever": FOREVER,
+            "share_known": KNOWN,
+            "exact": EXACT,
+            "sample_time": kernels.sample_time,
         }
     )
     called = printed.calls | ({"square_root"} if printed.shares else set()) | set(start_calls(start))
