@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -17,18 +19,28 @@ PATH = {"sample_rate": "200 Hz", "duration": "1 s"}
 
 @pytest.mark.long
 def test_the_true_error_falls_and_runs_of_another_path_are_refused(tmp_path):
-    """Sixteen specimens: each fault twice, with a sensor from a data sheet and with a calibrated one."""
-    circle = Lifted(solved(shortened("circle20", tmp_path / "circle20", **PATH)))
-    smaller = solved(shortened("circle20", tmp_path / "smaller", diameter="14 um", **PATH))
-    outcomes = battery(range(16), circle, smaller.drive, tmp_path)
-    check(outcomes)
+    """Sixteen specimens: each fault twice, with a sensor of which nothing is stated and with a calibrated one."""
+    check(outcomes_of(range(16), tmp_path))
+
+
+# The same as above on more specimens; half an hour
+@pytest.mark.exhaustive
+def test_the_same_on_two_hundred_specimens(tmp_path):
+    check(outcomes_of(range(200), tmp_path))
+
+
+def outcomes_of(seeds: range, folder: Path) -> list[Outcome]:
+    circle = Lifted(solved(shortened("circle20", folder / "circle20", **PATH)))
+    smaller = solved(shortened("circle20", folder / "smaller", diameter="14 um", **PATH))
+    return battery(seeds, circle, smaller.drive, folder)
 
 
 def check(outcomes: list[Outcome]) -> None:
-    """What is asked of any sample of specimens."""
-    assert not [o.seed for o in outcomes if o.wrongly_refused]
-    assert [o.refused for o in outcomes] == [o.fault in ("path", "reading") for o in outcomes]
-    assert all(o.errors[-1] < o.errors[0] for o in outcomes)
-    # calibrated without friction: 0.02 % is 2 nm of 10 um, what 25 periods of 20 nm leave of noise is 1 nm
+    """What is asked of any sample of specimens: 99 % better in truth, 95 % of faulty runs refused and next to none that are not."""
+    faulty = [o for o in outcomes if o.fault in ("path", "reading")]
+    assert len([o.seed for o in outcomes if o.wrongly_refused]) <= 0.01 * len(outcomes)
+    assert sum(o.refused for o in faulty) >= 0.95 * len(faulty)
+    assert sum(o.errors[-1] <= o.errors[0] for o in outcomes) >= 0.99 * len(outcomes)
+    # 0.04 % is 4 nm of 10 um; noise of up to 60 nm a sample leaves 2 nm in what has the frequency of the circle
     free = [o.errors[-1] for o in outcomes if o.calibrated and not o.friction]
-    assert np.median(free) < 0.03
+    assert np.median(free) < 0.04
