@@ -16,6 +16,7 @@ from ctrlgen.controller.bode import frequency_response
 from ctrlgen.devices.mechanism.condensed import nominal
 from ctrlgen.devices.mechanism.modes import as_displacements, body_matrices
 from ctrlgen.devices.structural_model import StructuralModel
+from ctrlgen.model.simulation import simulate
 from ctrlgen.physics.rigid_bodies import point_motion
 from ctrlgen.physics.screw import inverse_adjoint
 
@@ -166,3 +167,32 @@ def test_held_and_linear_forces_are_told_apart():
     force = np.array([[0.0], [1.0]])
     assert oscillator.response(force, h, held=True)[:, 0] == pytest.approx([0, 0], abs=1e-15)
     assert oscillator.response(force, h, held=False)[1, 0] == pytest.approx((1 - np.sin(w * h) / (w * h)) / w**2)
+
+
+CELL = '[[reading]]\nname = "cell"\nof = "b"\n'
+
+
+def test_a_load_cell_reads_the_spring_between_two_masses(tmp_path):
+    """K2 (x2 - x1) in Bode, to 0.5 % up to seven tenths of the frequency of the second mass on a held first one."""
+    model = build_model(loaded(tmp_path, two_masses(CELL)))
+    found = frequency_response(model, np.zeros(1), "reading")
+    w = 2 * np.pi * found.hertz
+    exact = np.array([np.linalg.inv(STIFFNESS + 1j * x * damping() - x**2 * MASS)[:, 0] for x in w])
+    loads = K2 * (exact[:, 1] - exact[:, 0])
+    assert found.response[0, 0] == pytest.approx(exact[:, 1], rel=1e-4)
+    slow = w < 0.7 * np.sqrt(K2 / M2)
+    assert found.response[1, 0][slow] == pytest.approx(loads[slow], rel=5e-3)
+    assert (
+        np.abs(found.response[1, 0] / loads - 1).max() < 0.05
+    )  # damping acts between the masses too, which no cell reads
+
+
+def test_a_load_cell_is_simulated_with_the_inertia_of_what_it_carries(tmp_path):
+    """Tension -M2 x'' of the second mass under a force that begins: at once -M2/(M1 + M2) of it. Each reading is under the drive of its
+    row, as recordings have it."""
+    model = build_model(loaded(tmp_path, two_masses(CELL)))
+    trace = simulate(model, np.full((40, 1), 3.0), 1e-4)
+    x, cell = trace.signals["reading"].T
+    assert cell[0] == pytest.approx(-3.0 * M2 / (M1 + M2), rel=1e-4)
+    second = np.gradient(np.gradient(x, 1e-4), 1e-4)
+    assert cell[5:-5] == pytest.approx(-M2 * second[5:-5], rel=0.01)

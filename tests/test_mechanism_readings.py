@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from command_line import ctrlgen as run_command
 from conftest import DEVICE
-from mechanism_files import PARALLELOGRAM, chain, dm, loaded, with_values
+from held_blades import EI, E, L, T, W
+from mechanism_files import PARALLELOGRAM, blade, chain, dm, loaded, with_values
 
 import ctrlgen
 from ctrlgen import InputError, build_model, run
@@ -18,6 +19,8 @@ from ctrlgen.model.simulation import simulate
 
 TILT = '[[reading]]\nname = "tilt"\nbody = "stage"\nabout = [0, 0, 1]\n'
 EDGE = '[[reading]]\nname = "edge"\nbody = "stage"\nat = ["0 mm", "15 mm", "0 mm"]\nalong = [2, 0, 0]\n'
+
+CELL = '[[reading]]\nname = "cell"\nof = "left"\nload = "F_y"\n'
 
 # Pushed 10 mm too high
 TURNING = PARALLELOGRAM.replace('at = ["0 mm", "-10 mm", "0 mm"]', 'at = ["0 mm", "0 mm", "0 mm"]')
@@ -115,10 +118,15 @@ def test_a_sensor_may_stand_on_a_reading_and_c_is_generated_beside_it(tmp_path):
         (EDGE.replace('"edge"', '"delta_x"'), "reading: 'delta_x' is named twice"),
         (EDGE.replace('"stage"', '"table"'), "reading[0].body: 'table' is no body"),
         (EDGE.replace("along = [2, 0, 0]", "along = [0, 0, 0]"), "along: is zero"),
-        (EDGE.replace("along = [2, 0, 0]", "along = [0, 0, 1]"), "no actuator moves what edge reads"),
+        (EDGE.replace("along = [2, 0, 0]", "along = [0, 0, 1]"), "what edge reads"),
         (EDGE.replace("along = [2, 0, 0]", "about = [0, 0, 1]"), "a rotation has no point"),
         (EDGE + "about = [0, 0, 1]\n", "give either along"),
         (EDGE + 'pattern = "leg"\n', "reading[0].pattern: 'leg' is no pattern"),
+        (CELL.replace('"left"', '"lft"'), "reading[0].of: 'lft' is no element"),
+        (CELL + 'body = "stage"\n', "of: the load of an element is read by itself; leave out body"),
+        (CELL.replace('"F_y"', '"F_z"'), "no actuator moves (or loads) what cell reads"),
+        (CELL.replace('of = "left"', 'body = "stage"'), "load: belongs to of"),
+        ('[[reading]]\nname = "cell"\nalong = [1, 0, 0]\nat = ["0 mm", "0 mm", "0 mm"]\n', "body: is missing"),
     ],
 )
 def test_a_reading_that_cannot_be_is_refused(tmp_path, reading, says):
@@ -130,7 +138,7 @@ def test_a_reading_that_cannot_be_is_refused(tmp_path, reading, says):
 def test_a_reading_may_move_in_second_order_alone(tmp_path):
     """-0.6 y^2/l of leaf springs that bend, seen along them: refused of the linear mechanism, where nothing moves it."""
     along = '[[reading]]\nname = "parasitic"\nbody = "stage"\nat = ["0 mm", "0 mm", "0 mm"]\nalong = [0, 1, 0]\n'
-    with pytest.raises(InputError, match="no actuator moves what parasitic reads"):
+    with pytest.raises(InputError, match="what parasitic reads"):
         loaded(tmp_path, PARALLELOGRAM + along)
     device = loaded(
         tmp_path, PARALLELOGRAM.replace("[[material]]", 'kinematics = "second_order"\n[[material]]', 1) + along
@@ -139,3 +147,35 @@ def test_a_reading_may_move_in_second_order_alone(tmp_path):
     y, nearer = trace.signals["reading"][-1]
     assert nearer == pytest.approx(-0.6 * y**2 / 20e-3, rel=1e-3)
     assert any(re.search(r"parasitic 2\.7\d* um", line) for line in summary(device))  # at 300 um
+
+
+def test_the_loads_in_blades_are_those_of_the_textbook(tmp_path):
+    """Each guided blade of a pair has half the force across, F/2, and F l/4 at its ends, which tension and pressure balance where the coil
+    pushes at their ends; a constant load along them is tension of half."""
+    cells = CELL + '[[reading]]\nname = "bent"\nof = "left"\nload = "M_z"\n[[reading]]\nname = "pulled"\nof = "right"\n'
+    down = '[[load]]\nname = "w"\non = "stage"\nat = ["0 mm", "0 mm", "0 mm"]\nforce = ["0 N", "0.3 N", "0 N"]\n'
+    model = build_model(loaded(tmp_path, TURNING + cells))
+    assert model.signals["reading"].units[1:] == ("N", "N*m", "N")
+    change = read(model, 0.05)
+    still = read(build_model(loaded(tmp_path, TURNING + cells + down)), 0.0)
+    # the blades' stretching turns the stage by a little
+    assert abs(change["cell"]) == pytest.approx(12 * EI / L**3 * change["delta_x"], rel=1e-3)
+    assert abs(change["bent"]) == pytest.approx(6 * EI / L**2 * change["delta_x"], rel=1e-3)
+    assert abs(change["bent"]) == pytest.approx(abs(change["cell"]) * L / 2, rel=1e-3)
+    assert abs(change["cell"]) == pytest.approx(0.05, rel=1e-3)
+    assert abs(change["pulled"]) * 20e-3 == pytest.approx(2 * abs(change["bent"]), rel=1e-3)
+    assert still["pulled"] == pytest.approx(0.15, rel=1e-3)
+
+
+def test_a_blade_that_is_held_has_the_tension_of_its_stretch(tmp_path):
+    """E A 0.6 (y/l)^2 of blades on both sides of a stage, which none of them lets come nearer; at a twentieth of their thickness."""
+    both = blade("left", -10) + blade("right", 10)
+    held = both + both.replace('"left"', '"left_2"').replace('"right"', '"right_2"').replace("[0, 1, 0]", "[0, -1, 0]")
+    text = PARALLELOGRAM.replace(both, held.replace("slender = true", "slender = true\ngeometric_stiffening = true"))
+    model = build_model(loaded(tmp_path, text + CELL.replace('load = "F_y"\n', "")))
+    seen = read(model, 0.02)
+    y = seen["delta_x"]
+    assert y < T / 15
+    pushed_on_one_side = read(model, -0.02)  # what is linear in y, from the coil beside the blades' middle, goes
+    tension = (seen["cell"] + pushed_on_one_side["cell"]) / 2
+    assert tension == pytest.approx(0.6 * E * T * W * (y / L) ** 2, rel=0.01)

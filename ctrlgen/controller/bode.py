@@ -1,4 +1,4 @@
-"""Bode plot: the frequency response from every drive to the pose."""
+"""Bode plot: the frequency response from every drive to the pose, or to the readings."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from ctrlgen.controller.linearisation import equilibrium, linearise
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import write_bytes
 from ctrlgen.core.units import difference
+from ctrlgen.devices import Signal
 from ctrlgen.devices.structural_model import StructuralModel
 from ctrlgen.model.model import Model
 from ctrlgen.reporting.plots import COLOURS, PATTERNS, STYLE, image
@@ -28,9 +29,9 @@ DOWN = 1e-4  # of its largest gain, to where a panel shows
 
 @dataclass(frozen=True)
 class FrequencyResponse:
-    """From every drive to the pose, linearised at a `pose` [SI]: `hertz` (n,), `response` (channels, drives, n) and the `static` one
-    (channels, drives), in SI; `poles` [rad/s], their absolute values; `structure`: the modes beside those of the model, where its device
-    has them."""
+    """From every drive to the pose or the readings (`of`), linearised at a `pose` [SI]: `hertz` (n,), `response` (channels, drives, n) and
+    the `static` one (channels, drives), in SI; `poles` [rad/s], their absolute values; `structure`: the modes beside those of the model,
+    where its device has them."""
 
     model: Model
     pose: np.ndarray
@@ -39,15 +40,21 @@ class FrequencyResponse:
     static: np.ndarray
     poles: np.ndarray
     structure: StructuralModel | None = None
+    of: str = "pose"
+
+    @property
+    def signal(self) -> Signal:
+        """That which answers."""
+        return self.model.signals[self.of]
 
 
-def frequency_response(model: Model, pose: np.ndarray) -> FrequencyResponse:
-    """The gain from every drive to every pose component over the frequencies that matter.
+def frequency_response(model: Model, pose: np.ndarray, of: str = "pose") -> FrequencyResponse:
+    """The gain from every drive to every component of the pose, or of the "reading", over the frequencies that matter.
 
     `pose` (channels,) [rad, m] is where the model is linearised. Raises InputError where it is not an admissible
     equilibrium, or where the device has no dynamics.
     """
-    system, structure = linearise(model, pose), structure_at(model, pose)
+    system, structure = linearise(model, pose, of), structure_at(model, pose)
     poles = np.abs(system.poles())
     poles = poles[poles > 0]
     if structure is not None:
@@ -63,10 +70,10 @@ def frequency_response(model: Model, pose: np.ndarray) -> FrequencyResponse:
     response = control.frequency_response(system, omega, squeeze=False)
     static = np.atleast_2d(system.dcgain())
     if structure is None:
-        return FrequencyResponse(model, pose, omega / (2 * np.pi), response.complex, static, poles)
+        return FrequencyResponse(model, pose, omega / (2 * np.pi), response.complex, static, poles, None, of)
     force = control.frequency_response(forced, omega, squeeze=False).complex
-    whole = np.einsum("ijk,jlk->ilk", structure.receptance(omega), force)
-    return FrequencyResponse(model, pose, omega / (2 * np.pi), whole, static, poles, structure)
+    whole = np.einsum("ijk,jlk->ilk", structure.receptance(omega, of == "reading"), force)
+    return FrequencyResponse(model, pose, omega / (2 * np.pi), whole, static, poles, structure, of)
 
 
 def structure_at(model: Model, pose: np.ndarray) -> StructuralModel | None:
@@ -79,17 +86,17 @@ def structure_at(model: Model, pose: np.ndarray) -> StructuralModel | None:
     return structure.at(ca.Function("K", [d], [ca.jacobian(physics.restoring_force(d), d)])(z).full())
 
 
-def draw_bode(model: Model, pose: np.ndarray, path: Path) -> None:
-    """Draws the gain from every drive to every pose component, one panel per component, and the phase of the strongest.
+def draw_bode(model: Model, pose: np.ndarray, path: Path, of: str = "pose") -> None:
+    """Draws the gain from every drive to every component of the pose or the "reading", one panel each, and the phase of the strongest.
 
     `path` ends in .svg or .png. Raises InputError as `frequency_response` does.
     """
-    write_bytes(path, image(bode_figure(frequency_response(model, pose)), path.suffix))
+    write_bytes(path, image(bode_figure(frequency_response(model, pose, of)), path.suffix))
 
 
 def strongest(found: FrequencyResponse, drive: int) -> int:
     """The channel that answers most to a drive, in its typical sizes, at rest."""
-    return int(np.argmax(np.abs(found.static[:, drive]) / np.array(found.model.signals["pose"].scale)))
+    return int(np.argmax(np.abs(found.static[:, drive]) / np.array(found.signal.scale)))
 
 
 def phase(found: FrequencyResponse, channel: int, drive: int) -> np.ndarray:
@@ -101,7 +108,7 @@ def phase(found: FrequencyResponse, channel: int, drive: int) -> np.ndarray:
 def bode_figure(found: FrequencyResponse) -> Figure:
     """Gain by pose component, and the phase of the strongest component of each drive."""
     model, hertz, static = found.model, found.hertz, found.static
-    signal, drive = model.signals["pose"], model.signals["drive"]
+    signal, drive = found.signal, model.signals["drive"]
     channels = [str(i) for i in range(len(signal.channels))]
     across = min(ACROSS, len(channels))
     rows = [channels[k : k + across] for k in range(0, len(channels), across)]

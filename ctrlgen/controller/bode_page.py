@@ -25,11 +25,12 @@ HALF_POWER = 1 / np.sqrt(2)  # of the static gain: where the bandwidth ends
 RAISED = 1.05  # of the static gain, from which on a peak is told
 
 
-def write_bode_page(model: Model, pose: np.ndarray, path: Path) -> None:
-    """Writes the page. `pose` (channels,) [rad, m] is where the model is linearised. Raises InputError as `frequency_response` does."""
-    found = frequency_response(model, pose)
+def write_bode_page(model: Model, pose: np.ndarray, path: Path, of: str = "pose") -> None:
+    """Writes the page of the pose or the "reading". `pose` (channels,) [rad, m] is where the model is linearised. Raises
+    InputError as `frequency_response` does."""
+    found = frequency_response(model, pose, of)
     rows = drive_rows(found)
-    signal, drive = model.signals["pose"], model.signals["drive"]
+    signal, drive = found.signal, model.signals["drive"]
     caption = "Gain from every drive to the channels that answer most, and their phase against the static response."
     main = sorted({strongest(found, j) for j in range(len(drive.channels))})[:PANELS]
     rest = [i for i in range(len(signal.channels)) if i not in main]
@@ -62,7 +63,7 @@ def write_bode_page(model: Model, pose: np.ndarray, path: Path) -> None:
 
 def drive_rows(found: FrequencyResponse) -> list[dict[str, str]]:
     """Of each drive the channel that answers most, its static gain, where it has fallen by 3 dB, and its peak."""
-    signal, drive = found.model.signals["pose"], found.model.signals["drive"]
+    signal, drive = found.signal, found.model.signals["drive"]
     rows = []
     for j, name in enumerate(drive.channels):
         i = strongest(found, j)
@@ -89,7 +90,7 @@ def drive_rows(found: FrequencyResponse) -> list[dict[str, str]]:
 
 def bode_chart(found: FrequencyResponse, channels: Collection[int]) -> Chart:
     """A panel a channel of `channels` that answers to first order, and one of the phase."""
-    signal, drive = found.model.signals["pose"], found.model.signals["drive"]
+    signal, drive = found.signal, found.model.signals["drive"]
     panels = []
     for i, (channel, unit) in enumerate(zip(signal.channels, signal.units, strict=True)):
         if i not in channels:
@@ -118,7 +119,7 @@ def _at(found: FrequencyResponse) -> str:
 def _first_screen(found: FrequencyResponse, rows: list[dict[str, str]], figure: PageFigure) -> FirstScreen:
     slow, fast = found.poles.min() / (2 * np.pi), found.poles.max() / (2 * np.pi)
     answer = (
-        f"The pose follows its drives up to {rows[0]['falls']} ({rows[0]['drive']} to {rows[0]['channel']}, - 3 dB)"
+        f"The {found.of} follows the drives up to {rows[0]['falls']} ({rows[0]['drive']} to {rows[0]['channel']}, - 3 dB)"
         if rows
         else ""
     )

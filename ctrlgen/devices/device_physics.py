@@ -31,12 +31,13 @@ class FeedbackLoop:
 @dataclass(frozen=True)
 class SensedPoints:
     """What sensors see beside the pose: names, units of reports and typical sizes [SI] of the readings, and their values `at` the
-    displacement d."""
+    displacement d; of a stage with inertia `per_acceleration` (readings, n_axes) more."""
 
     channels: tuple[str, ...]
     units: tuple[str, ...]
     scale: tuple[float, ...]
     at: Callable[[ca.SX], ca.SX]
+    per_acceleration: ca.SX | ca.DM | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,7 +20,8 @@ SPAN, POINTS = 100, 60  # frequencies below the highest, beside the resonances
 class StructuralModel:
     """M q'' + D q' + K q = (f, 0), q = (d, eta): displacements of the n axes, on which the forces f act, and amplitudes of modes with
     the axes held (n + m, n + m); pose = `output` (channels, n + m) q. Without eta it is the device's own model. SI, `damping_ratio` of
-    every mode.
+    every mode. The readings are `readings` (channels + readings, n + m) q and `per_acceleration` (channels + readings, n) d'':
+    in a load what the modes that are left out would add at rest.
 
     Source: R. R. Craig, M. C. C. Bampton, AIAA J. 6 (1968) 1313.
     """
@@ -30,6 +31,8 @@ class StructuralModel:
     output: np.ndarray
     axes: int
     damping_ratio: float
+    readings: np.ndarray | None = None
+    per_acceleration: np.ndarray | None = None
 
     @cached_property
     def frequencies(self) -> np.ndarray:
@@ -59,11 +62,18 @@ class StructuralModel:
         squares, V = scipy.linalg.eigh(self.stiffness, self.mass)
         return np.asarray(self.mass @ V @ np.diag(2 * self.damping_ratio * np.sqrt(squares)) @ V.T @ self.mass)
 
-    def receptance(self, omega: np.ndarray) -> np.ndarray:
-        """(channels, n, k) pose per force at the angular frequencies `omega` (k,), by its modes."""
+    def receptance(self, omega: np.ndarray, readings: bool = False) -> np.ndarray:
+        """(channels, n, k) pose per force, or what is read of it, at the angular frequencies `omega` (k,), by its modes."""
         squares, V = scipy.linalg.eigh(self.stiffness, self.mass)
         per_mode = 1 / (squares - omega[:, None] ** 2 + 2j * self.damping_ratio * np.sqrt(squares) * omega[:, None])
-        return np.asarray(np.einsum("cm,km,nm->cnk", self.output @ V, per_mode, V[: self.axes]))
+        forced, seen = V[: self.axes], self.output
+        if readings and self.readings is not None:
+            seen = self.readings
+        found = np.asarray(np.einsum("cm,km,nm->cnk", seen @ V, per_mode, forced))
+        if readings and self.per_acceleration is not None:
+            more = np.einsum("cm,km,nm->cnk", self.per_acceleration @ forced, per_mode, forced)
+            found = found - omega**2 * more
+        return found
 
     def is_near(self, whole: StructuralModel, highest: float) -> bool:
         """Whether its frequency response is within `NEAR` of that of the `whole` model up to `highest` [Hz], resonances included."""

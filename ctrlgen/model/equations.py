@@ -134,7 +134,12 @@ def _carried(physics: DevicePhysics, terms: EffectTerms, z: ca.SX) -> tuple[ca.S
     """What follows the stages' displacement: that of the mechanism, the platform's pose and the readings, with effects."""
     displacement = terms.added(Place.DISPLACEMENT, z)
     pose = terms.added(Place.POSE, physics.pose(displacement))
-    seen = pose if physics.sensed is None else ca.vertcat(pose, physics.sensed.at(displacement))
+    if physics.sensed is None:
+        return displacement, pose, terms.added(Place.SENSOR, pose)
+    sensed = physics.sensed.at(displacement)
+    if physics.sensed.per_acceleration is not None:
+        sensed += ca.mtimes(physics.sensed.per_acceleration, terms.acceleration)
+    seen = ca.vertcat(pose, sensed)
     return displacement, pose, terms.added(Place.SENSOR, seen)
 
 

@@ -65,6 +65,10 @@ def bode(
             show_default="20 um of the third translation; without one the middle of the drives",
         ),
     ] = None,
+    of: Annotated[
+        str,
+        typer.Option(help='What answers: "pose", or "reading" for all that sensors see, loads in flexures among it.'),
+    ] = "pose",
 ) -> None:
     """Draw the frequency response from every drive to the pose, linearised at a pose; a page of it zooms and shows its values.
 
@@ -76,15 +80,17 @@ def bode(
     from ctrlgen.trajectory.frame import Frame
     from ctrlgen.trajectory.workspace import middle_pose
 
+    if of not in ("pose", "reading"):
+        raise InputError("--of", [Fault("of", f"{of!r} is neither pose nor reading")])
     model = build_model(load_device(device))
     signal_ = model.signals["pose"]
     pose = middle_pose(model) if at is None else Frame(signal_.channels, signal_.units).pose(at, "--at")
     if picture.suffix == ".html":
         from ctrlgen.controller.bode_page import write_bode_page
 
-        write_bode_page(model, pose, picture)
+        write_bode_page(model, pose, picture, of)
     else:
-        draw_bode(model, pose, as_picture("--out", picture))
+        draw_bode(model, pose, as_picture("--out", picture), of)
     out.print(str(picture), soft_wrap=True, markup=False)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from ctrlgen.devices.mechanism.copies import Placed
 from ctrlgen.devices.mechanism.drawing import Drawing
+from ctrlgen.devices.mechanism.joining import LOADS
 from ctrlgen.devices.place import Direction
 from ctrlgen.devices.travel import farthest
 from ctrlgen.numerics.newton import newton_root
@@ -219,8 +220,12 @@ class Condensed:
 
     def element_of(self, a: Placed) -> int:
         """The number of the element that an actuator moves or heats."""
-        name = f"{a.section.on}_{a.copy}" if a.copy else a.section.on
-        return next(k for k, e in enumerate(self.device.placed_elements) if e.name == name)
+        return self.element_named(a.section.on, a.copy)
+
+    def element_named(self, name: str, copy: int) -> int:
+        """The number of an element, of a pattern that of its `copy`."""
+        whole = f"{name}_{copy}" if copy else name
+        return next(k for k, e in enumerate(self.device.placed_elements) if e.name == whole)
 
     def travel(self, i: int, twists: list[Matrix]) -> Matrix:
         """(1, m) travel of actuator i in the motions `twists` (6, m) of all bodies."""
@@ -252,9 +257,12 @@ class Condensed:
 
     @property
     def reading_rows(self) -> list[Matrix]:
-        """(1, 6) of each reading beside those of the output: what it sees of a body's twist [m, rad]."""
+        """(1, 6) of each reading beside those of the output: what it sees of a body's twist [m, rad]; nothing where it is of a load."""
         rows = []
         for r in self.device.placed_readings:
+            if r.section.of is not None:
+                rows.append(ca.DM.zeros(1, 6))
+                continue
             direction, at = ca.mtimes(r.turn, _unit(r.section.direction)), r.numbers(self.p).at
             row = ca.horzcat(direction.T, ca.DM.zeros(1, 3))
             if at is not None:
@@ -264,11 +272,20 @@ class Condensed:
             rows.append(row)
         return rows
 
+    def load_row(self, r: Placed) -> tuple[int, Matrix]:
+        """The element whose load a reading is of, and its row (1, 6) of a wrench on the free end at the global origin."""
+        k = self.element_named(r.section.of, r.copy)
+        return k, inverse_adjoint(self.frames[k], self.ends[k])[LOADS.index(r.section.load or "F_x"), :]
+
     @property
     def reading_motion(self) -> Matrix:
-        """(readings, n + m): what the readings beside those of the output see per q [m, rad]."""
+        """(readings, n + m): what the readings beside those of the output see per q [m, rad, N, N m]."""
         rows = [ca.SX(0, self.twists[0].shape[1])]
         for r, row in zip(self.device.placed_readings, self.reading_rows, strict=True):
+            if r.section.of is not None:
+                k, of_wrench = self.load_row(r)
+                rows.append(ca.mtimes(of_wrench, self.wrench(k)))
+                continue
             ends = [ca.mtimes(row, self.twists[b]) if b != GROUND else 0 for b in (r.second, r.first)]
             rows.append(ends[0] - ends[1])
         return ca.vertcat(*rows)

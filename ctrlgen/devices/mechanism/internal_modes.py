@@ -6,10 +6,12 @@ import casadi as ca
 import numpy as np
 import scipy.linalg
 
-from ctrlgen.devices.mechanism.condensed import nominal
+from ctrlgen.devices.mechanism.condensed import Condensed, nominal
 from ctrlgen.devices.mechanism.drawing import Drawing
+from ctrlgen.devices.mechanism.force_readings import inertial
 from ctrlgen.devices.mechanism.modes import as_displacements, body_matrices, guyan_modes
 from ctrlgen.devices.structural_model import StructuralModel
+from ctrlgen.physics.rigid_bodies import GROUND
 from ctrlgen.physics.screw import inverse_adjoint
 
 REACH = 5.0  # times the fastest condensed mode: how far up the response is told where a file states no `modes_below`
@@ -38,11 +40,18 @@ def structural_model(device: Drawing) -> StructuralModel | None:
     seen = _numbers(inverse_adjoint(None, c.output_point)) @ bodies[device.bodies.index(device.output.body)]
     ratio = device.dynamics.damping_ratio.si
 
+    rows, per_acceleration, kept = _readings(c, bodies), _numbers(inertial(c)), slow[moving]
+
     def with_modes(count: int) -> StructuralModel:
         basis = np.hstack([at_rest, shapes[:, :count]])
         mass, stiffness = (basis.T @ X @ basis for X in (M, K))
         output = seen[c.channel_rows] @ basis
-        return StructuralModel((mass + mass.T) / 2, (stiffness + stiffness.T) / 2, output, n, ratio)
+        readings = rows @ basis
+        # of the modes that are kept what they do at rest is theirs
+        more = per_acceleration + readings[:, n:] @ (kept[:count, None] * mass[n:, :n])
+        more = np.vstack([np.zeros((len(output), n)), more])
+        read = np.vstack([output, readings])
+        return StructuralModel((mass + mass.T) / 2, (stiffness + stiffness.T) / 2, output, n, ratio, read, more)
 
     few, most = 0, shapes.shape[1]
     whole = with_modes(most)
@@ -50,6 +59,21 @@ def structural_model(device: Drawing) -> StructuralModel | None:
         middle = (few + most) // 2
         few, most = (few, middle) if with_modes(middle).is_near(whole, highest) else (middle + 1, most)
     return with_modes(most)
+
+
+def _readings(c: Condensed, bodies: list[np.ndarray]) -> np.ndarray:
+    """(readings, 6 bodies) what is read beside the output of the twists of all bodies, turns counted as displacements."""
+    rows = np.zeros((len(c.device.placed_readings), bodies[0].shape[1]))
+    for i, (r, row) in enumerate(zip(c.device.placed_readings, c.reading_rows, strict=True)):
+        first, second, seen = r.first, r.second, _numbers(row)
+        if r.section.of is not None:
+            k, of_wrench = c.load_row(r)
+            first, second = c.elements[k].first, c.elements[k].second
+            seen = _numbers(ca.mtimes(of_wrench, c.elements[k].stiffness))
+        for body, sign in ((second, 1), (first, -1)):
+            if body != GROUND:
+                rows[i] += sign * (seen @ bodies[body]).ravel()
+    return rows
 
 
 def _numbers(matrix: ca.SX | ca.DM) -> np.ndarray:

@@ -120,6 +120,10 @@ class Loads:
         """(readings,) the same of what is read beside the output."""
         rows = [ca.SX(0, 1)]
         for r, row in zip(self.c.device.placed_readings, self.c.reading_rows, strict=True):
+            if r.section.of is not None:
+                k, of_wrench = self.c.load_row(r)
+                rows.append(ca.mtimes(of_wrench, self.wrench(k)))
+                continue
             ends = [ca.mtimes(row, self.held[b]) if b != GROUND else 0 for b in (r.second, r.first)]
             rows.append(ends[0] - ends[1])
         return ca.vertcat(*rows)

@@ -22,6 +22,8 @@ from ctrlgen.devices.mechanism.bent_beams import BentBeam, ThermalActuator
 from ctrlgen.devices.mechanism.condensed import MOST_STEPS, SPARE_STEPS, Condensed, nominal
 from ctrlgen.devices.mechanism.copies import Copied, CopiedParts, Placed
 from ctrlgen.devices.mechanism.flexures import Blade, CircularHinge, Flexible, Strut, Wire, flexures_in_one_place
+from ctrlgen.devices.mechanism.force_readings import reach as load_reach
+from ctrlgen.devices.mechanism.force_readings import unloaded
 from ctrlgen.devices.mechanism.internal_modes import structural_model
 from ctrlgen.devices.mechanism.linear_range import second_order_faults, stiffened
 from ctrlgen.devices.mechanism.load_effects import load_faults
@@ -192,24 +194,22 @@ class Mechanism(CopiedParts):
                 f"output.channels: {', '.join(channels)} move only together; follow others, or place the actuators otherwise"
             ]
         least = MOVED * max(farthest(a.travel) for a in self.actuator)
-        unread = [
+        unread = unloaded(self) + [
             r.name
             for r, seen in zip(self.placed_readings, self.reading_scale, strict=True)
-            if seen * (1.0 if r.section.about is None else self.size) <= least
+            if r.section.of is None and seen * (1.0 if r.section.about is None else self.size) <= least
         ]
         return (
-            [f"reading: no actuator moves what {', '.join(unread)} reads; read in another direction"] if unread else []
+            [f"reading: no actuator moves (or loads) what {', '.join(unread)} reads; read in another direction"]
+            if unread
+            else []
         )
 
     def _unknown_names(self) -> list[str]:
         faults = []
         materials = {m.name for m in self.material}
         for k, e in enumerate(self.element):
-            faults += [
-                f"element[{k}].{key}: {name!r} is no body" + (f" with the pattern {e.pattern!r}" if e.pattern else "")
-                for key, name in (("from", e.from_), ("to", e.to))
-                if self._number(name, e.pattern, 1) is None
-            ]
+            faults += self._no_body(f"element[{k}]", e, "from", "to")
             if isinstance(e, Flexible) and e.material not in materials:
                 faults.append(f"element[{k}].material: {e.material!r} is no material")
         elements = {e.name: e for e in self.element}
@@ -230,26 +230,28 @@ class Mechanism(CopiedParts):
                 ):
                     faults.append(f"actuator[{k}].on: give the material of {a.on!r} its expansion and expansion_slope")
                 continue
-            faults += [
-                f"actuator[{k}].{key}: {name!r} is no body"
-                for key, name in (("on", a.on), ("against", a.against))
-                if self._number(name, a.pattern, 1) is None
-            ]
+            faults += self._no_body(f"actuator[{k}]", a, "on", "against")
         for k, x in enumerate(self.load):
-            faults += [
-                f"load[{k}].{key}: {name!r} is no body" + (f" with the pattern {x.pattern!r}" if x.pattern else "")
-                for key, name in (("on", x.on), ("against", x.against))
-                if self._number(name, x.pattern, 1) is None
-            ]
+            faults += self._no_body(f"load[{k}]", x, "on", "against")
         for k, r in enumerate(self.reading):
-            faults += [
-                f"reading[{k}].{key}: {name!r} is no body" + (f" with the pattern {r.pattern!r}" if r.pattern else "")
-                for key, name in (("body", r.body), ("against", r.against))
-                if self._number(name, r.pattern, 1) is None
-            ]
+            faults += self._no_body(f"reading[{k}]", r, "body", "against")
+            if r.of is not None and (r.of not in elements or elements[r.of].pattern != r.pattern):
+                faults.append(
+                    f"reading[{k}].of: {r.of!r} is no element" + f" with the pattern {r.pattern!r}" * bool(r.pattern)
+                )
         if self.output.body not in self.bodies:
             faults.append(f"output.body: {self.output.body!r} is no body; there are {', '.join(self.bodies)}")
         return faults
+
+    def _no_body(self, where: str, table: Any, *keys: str) -> list[str]:
+        """The names of bodies in a table, under `keys`, that are none."""
+        names = {key: getattr(table, "from_" if key == "from" else key) for key in keys}
+        pattern = f" with the pattern {table.pattern!r}" if table.pattern else ""
+        return [
+            f"{where}.{key}: {name!r} is no body{pattern}"
+            for key, name in names.items()
+            if name is not None and self._number(name, table.pattern, 1) is None
+        ]
 
     @property
     def second_order(self) -> bool:
@@ -329,7 +331,9 @@ class Mechanism(CopiedParts):
     @cached_property
     def placed_readings(self) -> tuple[Placed, ...]:
         """Every copy of every reading."""
-        return tuple(self._between(c, c.section.against, c.section.body) for c in self._copies("reading"))
+        return tuple(
+            self._between(c, c.section.against, c.section.body or GROUND_NAME) for c in self._copies("reading")
+        )
 
     @cached_property
     def placed_loads(self) -> tuple[Placed, ...]:
@@ -347,6 +351,7 @@ class Mechanism(CopiedParts):
         reach = np.abs(ca.DM(ca.evalf(ca.SX(c.reading_motion))).full()[:, :n]).sum(axis=1) * travel
         if self.second_order and len(reach):
             reach = np.maximum(reach, SecondOrder(c).sensed_reach())
+        reach = np.maximum(reach, load_reach(self))
         return tuple(float(x) for x in reach)
 
     @property

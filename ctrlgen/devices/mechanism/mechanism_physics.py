@@ -10,7 +10,10 @@ import casadi as ca
 from ctrlgen.devices.device_physics import BalancedPhysics, DevicePhysics, InertialPhysics, SensedPoints
 from ctrlgen.devices.limit import Limit
 from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.devices.mechanism.copies import Placed
 from ctrlgen.devices.mechanism.drives import transduction
+from ctrlgen.devices.mechanism.force_readings import inertial
+from ctrlgen.devices.mechanism.joining import LOADS
 from ctrlgen.devices.mechanism.loads import Loads
 from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.devices.mechanism.stretching import Stretching
@@ -67,7 +70,7 @@ def mechanism_physics(c: Condensed) -> DevicePhysics:
         restoring_force_parts=restoring_force_parts,
         pose=pose,
         limits=limits,
-        sensed=_sensed(c, second if bent else None, loads),
+        sensed=_sensed(c, second if bent else None, loads, stretching),
         second_order_kinematics=None if bent or c.cubics else second.pose,
         rate_limits=acting.rate_limits(sections),
     )
@@ -88,19 +91,33 @@ def mechanism_physics(c: Condensed) -> DevicePhysics:
     )
 
 
-def _sensed(c: Condensed, second: SecondOrder | None, loads: Loads) -> SensedPoints | None:
-    """The readings beside those of the output, to first order or to second."""
+def _sensed(
+    c: Condensed, second: SecondOrder | None, loads: Loads, stretching: Stretching | None
+) -> SensedPoints | None:
+    """The readings beside those of the output, to first order or to second; of loads to second where flexures stretch."""
     readings, rows = c.device.placed_readings, c.reading_motion
     if not readings:
         return None
-    units = tuple("um" if r.section.about is None else "urad" for r in readings)
+    units = tuple(r.section.unit for r in readings)
+    inertia = inertial(c) if c.device.dynamics is not None else None
     names = tuple(r.name for r in readings)
 
     def at(d: ca.SX) -> ca.SX:
         linear = ca.mtimes(rows, c.loads(d)) + (loads.sensed if loads.there else 0)
-        return linear if second is None else linear + second.sensed(d)
+        seen = linear if second is None else linear + second.sensed(d)
+        if stretching is None:
+            return seen
+        return seen + ca.vertcat(*(_stretched(c, r, stretching, d) for r in readings))
 
-    return SensedPoints(names, units, c.device.reading_scale, at)
+    return SensedPoints(names, units, c.device.reading_scale, at, inertia)
+
+
+def _stretched(c: Condensed, r: Placed, stretching: Stretching, d: ca.SX) -> ca.SX:
+    """What a reading of a load sees of second order and more."""
+    if r.section.of is None:
+        return ca.SX(1, 1)
+    k = c.element_named(r.section.of, r.copy)
+    return stretching.extra_load(k, 0.0, d)[LOADS.index(r.section.load or "F_x")]
 
 
 def _flexure_limits(c: Condensed, d: ca.SX, stretching: Stretching | None, loads: Loads) -> list[Limit]:

@@ -258,11 +258,11 @@ def summary(device: Drawing) -> list[str]:
             loaded = ", ".join(show(float(f), "Hz") for f in guyan_modes(device, under_loads=True).frequencies)
             lines.append(f"the same under the constant loads: {loaded}")
     seen = ca.vertcat(c.jacobian, c.reading_motion)[:, : len(device.placed_actuators)]
-    turns = [name.startswith("theta") for name in device.output.channels]
-    turns += [r.section.about is not None for r in device.placed_readings]
+    units = ["urad" if name.startswith("theta") else "um" for name in device.output.channels]
+    units += [r.section.unit for r in device.placed_readings]
     names = [*device.output.channels, *(r.name for r in device.placed_readings)]
-    for channel, turn, row in zip(names, turns, ca.DM(ca.evalf(ca.SX(seen))).full(), strict=True):
-        unit = "urad/um" if turn else "um/um"
+    for channel, told, row in zip(names, units, ca.DM(ca.evalf(ca.SX(seen))).full(), strict=True):
+        unit = f"{told}/um"
         parts = ", ".join(
             f"{show(v, unit)} per {a.name}" for a, v in zip(device.placed_actuators, row, strict=True) if abs(v) > STILL
         )
@@ -276,10 +276,10 @@ def _second_order_lines(c: Condensed) -> list[str]:
     output = np.abs(ca.DM(ca.evalf(ca.SX(second.output))).full())
     travel = np.array([farthest(a.section.travel) for a in c.device.placed_actuators])
     reach = np.abs(ca.DM(second.products(ca.DM(travel))).full()).ravel()
-    turns = {r.name: r.section.about is not None for r in c.device.placed_readings}
-    names = (*c.device.output.channels, *turns)
+    units = {r.name: r.section.unit for r in c.device.placed_readings}
+    names = (*c.device.output.channels, *units)
     shown = (
-        f"{name} {show(value, 'urad' if turns.get(name, name.startswith('theta')) else 'um')}"
+        f"{name} {show(value, units.get(name, 'urad' if name.startswith('theta') else 'um'))}"
         for name, value in zip(names, (*(output @ reach), *second.sensed_reach()), strict=True)
     )
     return [f"second order at the largest travels, at most: {', '.join(shown)}"]

@@ -160,11 +160,12 @@ class Output(Section):
 
 
 class Reading(Section):
-    """`[[reading]]`: a reading beside those of the output: of the displacement of a point of a body, or of its rotation."""
+    """`[[reading]]`: a reading beside those of the output: of the displacement of a point of a body, of its rotation, or of the load in
+    an element."""
 
     name: Name
     """Of the reading, as in the column "reading.NAME" of a recording, or as a `[[sensor]]` table names it."""
-    body: str
+    body: str | None = None
     """The body that is looked at."""
     against: str = GROUND_NAME
     """The body on which the sensor stands."""
@@ -174,11 +175,23 @@ class Reading(Section):
     """Direction of the displacement that is read; of any length."""
     about: Direction | None = None
     """Axis of the rotation that is read, in place of `at` and `along`."""
+    of: str | None = None
+    """The element whose load is read, in place of `body` and what is read of it; of the same pattern."""
+    load: Literal["F_x", "F_y", "F_z", "M_x", "M_y", "M_z"] | None = None
+    """Component of the load on its free end, in its own frame, x along it: F_x is the tension. Left out: F_x."""
     pattern: str = ""
     """The pattern by which it is copied."""
 
     @model_validator(mode="after")
     def _reads_one_thing(self) -> Reading:
+        if self.of is not None:
+            return self._reads_a_load()
+        if self.load is not None:
+            raise ValueError("load: belongs to of, the element whose load is read")
+        if self.body is None:
+            raise ValueError(
+                "body: is missing; name the body that is looked at, or with of the element whose load is read"
+            )
         if (self.about is None) == (self.along is None):
             raise ValueError("give either along (and at), for a displacement, or about, for a rotation")
         if (self.along is None) != (self.at is None):
@@ -188,6 +201,20 @@ class Reading(Section):
         if np.linalg.norm(self.direction) == 0:
             raise ValueError(f"{'along' if self.about is None else 'about'}: is zero; give a direction")
         return self
+
+    def _reads_a_load(self) -> Reading:
+        given = [key for key in ("body", "at", "along", "about") if getattr(self, key) is not None]
+        given += ["against"] if self.against != GROUND_NAME else []
+        if given:
+            raise ValueError(f"of: the load of an element is read by itself; leave out {', '.join(given)}")
+        return self
+
+    @property
+    def unit(self) -> str:
+        """In which it is reported."""
+        if self.of is not None:
+            return "N*m" if (self.load or "F_x").startswith("M") else "N"
+        return "um" if self.about is None else "urad"
 
     @property
     def direction(self) -> Direction:
