@@ -43,7 +43,12 @@ int main(void) {{
     if ({name}_init_with(&state, &specimen) != 0) return 1;
     double *t = target;
     for (int first = 1; scanf("%lf %lf %lf %lf %lf %lf", t, t + 1, t + 2, t + 3, t + 4, t + 5) == 6; first = 0) {{
-        if ((first ? {name}_settle(&state, target, &out) : {name}_step(&state, target, &out)) != 0) return 2;
+        if (first) {{ /* the bench waits until the device has settled */
+            (void){name}_settle(&state, target, &out);
+            if ({name}_elapsed(&state, {upper}_SETTLING, out.drive) != 0) return 2;
+        }} else if ({name}_step(&state, target, &out) != 0) {{
+            return 2;
+        }}
         for (int i = 0; i < 6; ++i) printf("%.17g%c", out.drive[i], i < 5 ? ' ' : '\\n');
     }}
     return 0;
@@ -100,7 +105,7 @@ def controlled(folder: Path, constants: Path, targets: Array) -> Array:
     names = {"name": source.stem, "constants": constants.resolve(), "macro": macro}
     rows = np.tile(targets * np.repeat([1.0, 1e-6], 3), (2, 1))
     text = "".join(" ".join(f"{value:.17g}" for value in row) + "\n" for row in rows)
-    return _printed(source, CONTROLLED.format(**names), text)[-len(targets) :]
+    return _printed(source, CONTROLLED.format(**names, upper=names["name"].upper()), text)[-len(targets) :]
 
 
 def _printed(source: Path, main: str, given: str) -> Array:
