@@ -70,7 +70,7 @@ def _law_parameter(path: str, p: Param, cause: Hypothesis, channel: Channel, sta
     """The parameter p of the law of the cause `index`; its size is how far `start` is from off. A period that begins where the records show
     that it repeats stays there."""
     low, high = cause.bounds(p, channel)
-    if cause.prior.of(p).start_from_data == "spatial_periods" and low < start < cause.longest_period:
+    if cause.prior.of(p).start_from_data == "spatial_periods" and low < start <= cause.longest_period:
         high = min(high, cause.longest_period)
     off = 0.0 if p.off is None else channel.si(p.off, p)
     size = abs(start) or high - low

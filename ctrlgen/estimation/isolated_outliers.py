@@ -44,7 +44,7 @@ def mark_again(recording: Recording, predicted: Callable[[Record], np.ndarray], 
     others are taken back: the model explains them. Stretches in which a reading is held are marked where the rest is noise.
     """
     if recording.kind == "poses":
-        marked = _with_pose_marks(_unmarked(recording), predicted)
+        marked = _with_pose_marks(_unmarked(recording), predicted, of_accepted=True)
     else:
         records = [r if r.role == "rest" else _marked_again(r, predicted(r), noise) for r in recording.records]
         marked = replace(recording, records=tuple(records))
@@ -114,14 +114,18 @@ def _unmarked(recording: Recording) -> Recording:
     return replace(recording, records=tuple(records))
 
 
-def _with_pose_marks(recording: Recording, predicted: Callable[[Record], np.ndarray]) -> Recording:
+def _with_pose_marks(
+    recording: Recording,
+    predicted: Callable[[Record], np.ndarray],
+    of_accepted: bool = False,
+) -> Recording:
     """Pose sets with their outliers, which are sought in all records together, marked not valid."""
     residuals = [np.where(r.valid, r.observed - predicted(r), np.nan) for r in recording.records]
     if not recording.records or not all(
         np.isfinite(e[r.valid]).all() for e, r in zip(residuals, recording.records, strict=True)
     ):
         return recording
-    marked = pose_outliers(np.vstack([r.drive for r in recording.records]), np.vstack(residuals))
+    marked = pose_outliers(np.vstack([r.drive for r in recording.records]), np.vstack(residuals), of_accepted)
     parts = np.split(marked, np.cumsum([len(r.drive) for r in recording.records])[:-1])
     records = []
     for record, e, at in zip(recording.records, residuals, parts, strict=True):

@@ -7,16 +7,21 @@ range, a scratch is met by its neighbours in the range, and what bends a mechani
 from __future__ import annotations
 
 import numpy as np
+from scipy import stats
 
 from ctrlgen.estimation.settings import OUTLIERS, POSE_OUTLIERS, STATISTICS
 
+BY_CHANCE = 0.95
+"""Chance that a channel whose sensor fails in the largest share of poses shows no more failures than are taken for such."""
 
-def pose_outliers(drive: np.ndarray, residual: np.ndarray) -> np.ndarray:
+
+def pose_outliers(drive: np.ndarray, residual: np.ndarray, of_accepted: bool = False) -> np.ndarray:
     """Outliers (n, n_y) of the `residual` (n, n_y), NaN where a pose has no reading, at the `drive` (n, n_u).
 
     |e| of a reading exceeds `POSE_OUTLIERS.threshold` robust standard deviations of its channel; no other channel of the pose does;
     the poses before and after and the nearest ones by drive have little of it; and no drive stands there at an end of its range.
-    A channel with more than `POSE_OUTLIERS.largest_share` of them, but at least one, has none.
+    A channel with more than `POSE_OUTLIERS.largest_share` of them, but at least one, has none; where the residual is that `of_accepted`
+    causes, with more than chance makes of that share, by a Poisson distribution: little is left that could be taken for one.
     """
     e = residual - np.nanmedian(residual, axis=0) if np.isfinite(residual).any() else residual
     size = np.nan_to_num(np.abs(e))
@@ -38,5 +43,6 @@ def pose_outliers(drive: np.ndarray, residual: np.ndarray) -> np.ndarray:
         nearest = np.argsort(distance, kind="stable")[: POSE_OUTLIERS.nearest]
         beside = [j for j in (k - 1, k + 1) if 0 <= j < len(e) and seen[j, i]]
         marked[k, i] = size[[*nearest, *beside], i].max() < OUTLIERS.neighbour_share * size[k, i]
-    most = np.maximum(POSE_OUTLIERS.largest_share * seen.sum(axis=0), 1)
+    share = POSE_OUTLIERS.largest_share * seen.sum(axis=0)
+    most = np.maximum(stats.poisson.ppf(BY_CHANCE, share) if of_accepted else share, 1)
     return marked & (marked.sum(axis=0) <= most)

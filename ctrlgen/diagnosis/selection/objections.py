@@ -133,7 +133,7 @@ def _no_pitch(recording: Recording, fit: Fit, k: int) -> str | None:
     if cause.effect == PARAMETER or not any(_is_spatial_period(cause, p) for p in cause.law.params):
         return None
     periods = _line(fit, k) * _covered(recording, cause, fit)
-    if periods >= OBJECTIONS.fewest_pitches:
+    if periods > OBJECTIONS.fewest_pitches * (1 + OBJECTIONS.shape_at_bound):  # at its bound it would go on growing
         return None
     return (
         f"the reading covers {periods:.1f} periods of it, and {OBJECTIONS.fewest_pitches:g} are needed to see it repeat"

@@ -64,6 +64,8 @@ def _without(
     if not fitted:
         return None
     bare, compare = trials.converged(fitted[0]), trials.selection
+    if trials.objections(bare, bare.causes):
+        return None
     vague = amplitude_may_be_zero(current.fit, k)
     stands_in = vague or (not is_shown(account, k) and outside_its_range(current.fit, k))
     kept = current.errors.is_noise and not stands_in
