@@ -10,7 +10,7 @@ import pytest
 from conftest import AXIS_FILE, RECORDINGS
 
 from ctrlgen import build_model, load_device
-from ctrlgen.app.look_console import look
+from ctrlgen.app.look_console import described, look
 from ctrlgen.core.errors import InputError
 from ctrlgen.recordings.formats import read_table
 from ctrlgen.recordings.look.answers import Answers, read_answers
@@ -160,3 +160,33 @@ def test_every_question_about_the_inputs_has_an_answer(tmp_path):
         assert "to be answered" not in to.read_text(), (file.parent.name, to.read_text())
         answered += 1
     assert answered >= 12
+
+
+WRITTEN_TWO_WAYS = {  # what a file may hold, and the option that its question names
+    "one number or two": ("\n".join(f"{k},{k % 7}" for k in range(30)), "--layout 'decimal = \",\"'"),
+    "names or numbers": ("0,1,2\n" + "\n".join(f"{k},{k % 3},{k % 5}" for k in range(30)), "--layout 'header = 0'"),
+    "both marks": ("t;u [V]\n" + "\n".join(f"{k}.25;{k % 3},5" for k in range(30)), "--layout 'decimal = \".\"'"),
+    "dates": (
+        "time;u [V]\n" + "\n".join(f"{1 + k:02}/03/2024 10:00;{k % 3}" for k in range(9)),
+        "--layout 'dates = \"day first\"'",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", WRITTEN_TWO_WAYS)
+def test_a_question_about_how_a_file_is_written_names_the_option(kind, tmp_path):
+    text, option = WRITTEN_TWO_WAYS[kind]
+    log = tmp_path / "log.csv"
+    log.write_text(text)
+    with pytest.raises(InputError) as asked:
+        look([log], None, None, None)
+    assert option in str(asked.value)
+    assert "layout = {" not in str(asked.value)
+
+
+def test_diagnose_of_a_log_says_where_that_option_is_given(tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text(WRITTEN_TWO_WAYS["names or numbers"][0])
+    with pytest.raises(InputError, match=f"ctrlgen look {log} --device") as asked:
+        described([log], AXIS_FILE)
+    assert "--layout 'header = 0'" in str(asked.value)

@@ -15,7 +15,7 @@ from ctrlgen.core.files import write_text
 from ctrlgen.devices import load_device
 from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.formats import READERS, read_table
-from ctrlgen.recordings.look.answers import NOTHING, Answers
+from ctrlgen.recordings.look.answers import NOTHING, Answers, as_options
 from ctrlgen.recordings.look.column_facts import ColumnFacts, TableFacts, rests, table_facts
 from ctrlgen.recordings.look.oddities import table_oddities
 from ctrlgen.recordings.look.proposal import Proposal, propose
@@ -35,7 +35,7 @@ def look(
     """
     if to is not None and to.exists():
         raise InputError("--to", [Fault(str(to), "exists; name another file, or move it away")])
-    tables = [table_facts(read_table(file, answers.table, answers.layout), answers) for file in files]
+    tables = [_read(file, answers) for file in files]
     for facts in tables:
         print_table(facts)
     if figure is not None:
@@ -66,9 +66,10 @@ def described(paths: Sequence[Path], device: Path) -> list[Path]:
     files = [path for path in paths if path.is_file() and path.suffix.lower() in READERS]
     if not files:
         return list(paths)
-    proposal = propose([table_facts(read_table(file)) for file in files], build_model(load_device(device)))
     written = files[0].with_name(f"{files[0].stem}.recording.toml")
     look_at = f"ctrlgen look {' '.join(map(str, files))} --device {device} --to {written}"
+    tables = [_read(file, NOTHING, look_at) for file in files]
+    proposal = propose(tables, build_model(load_device(device)))
     if not proposal.certain:
         what = f"the file does not say everything; {look_at} writes a recording.toml with what it says, to complete"
         raise InputError(
@@ -83,6 +84,18 @@ def described(paths: Sequence[Path], device: Path) -> list[Path]:
     print_proposal(proposal)
     out.print(f"read as {written} says: correct it where it is wrong", markup=False, soft_wrap=True)
     return [written, *(path for path in paths if path not in files)]
+
+
+def _read(file: Path, answers: Answers, look_at: str = "") -> TableFacts:
+    """What a file holds, with questions about how it is written as the options of look that answer them; where the command is another
+    one, followed by `look_at`."""
+    try:
+        return table_facts(read_table(file, answers.table, answers.layout), answers)
+    except InputError as error:
+        faults = [Fault(fault.where, as_options(fault.what)) for fault in error.faults]
+        if look_at and tuple(faults) != error.faults:
+            faults.append(Fault("then", f"{look_at} and that option write a recording.toml of it"))
+        raise InputError(error.source, faults) from None
 
 
 def print_proposal(proposal: Proposal) -> None:
@@ -101,9 +114,9 @@ def print_table(facts: TableFacts) -> None:
         shown.add_row(escape(column.name), escape(column.unit or "not stated"), *_numbers(facts, column))
     show_table(shown)
     for note in dict.fromkeys((*facts.table.notes, *(note for c in facts.columns for note in c.notes))):
-        out.print(f"  read: {note}", markup=False, soft_wrap=True)
+        out.print(f"  read: {as_options(note)}", markup=False, soft_wrap=True)
     for odd in table_oddities(facts):
-        out.print(f"  odd: {odd}", markup=False, soft_wrap=True)
+        out.print(f"  odd: {as_options(odd)}", markup=False, soft_wrap=True)
 
 
 def _length(facts: TableFacts) -> str:

@@ -131,7 +131,7 @@ class MeasurementTable:
         try:
             stamps = time_stamps.seconds(column, self.style.dates)
         except ValueError as error:
-            raise self.fault(f"column {name!r} {error}") from None
+            raise self.fault(f"column {name!r} {error}") from error
         if stamps is not None:
             if unit != "s":
                 raise self.fault(

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ctrlgen.recordings.formats.number_cells import CLOCK, DATE, MISSING
+from ctrlgen.recordings.formats.number_cells import CLOCK, DATE, MISSING, Ambiguous
 
 DAY = 86400.0
 HOUR = 3600.0
@@ -74,7 +74,7 @@ def _dates(cells: list[str], first: str, dates: str | None) -> Stamps:
 
 
 def _order(texts: list[str], first: str, match: re.Match[str], dates: str | None) -> tuple[str, tuple[str, ...]]:
-    """The format of dates that do not begin with the year. Raises ValueError where day and month cannot be told and it matters."""
+    """The format of dates that do not begin with the year. Raises `Ambiguous` where day and month cannot be told and it matters."""
     found = [m for c in dict.fromkeys(c.split(" ")[0].split("T")[0] for c in texts) if (m := PARTS.match(c))]
     if dates is None and "." in match[0]:
         dates = "day first"
@@ -84,7 +84,7 @@ def _order(texts: list[str], first: str, match: re.Match[str], dates: str | None
         dates = "month first"
     if dates is None and len(found) > 1:  # one day is the same whichever way round
         what = f"writes dates such as {first!r}, and none tells the day from the month"
-        raise ValueError(f'{what}: write layout = {{ dates = "day first" }} or layout = {{ dates = "month first" }}')
+        raise Ambiguous(f'{what}: write layout = {{ dates = "day first" }} or layout = {{ dates = "month first" }}')
     day = "%m-%d" if dates == "month first" else "%d-%m"
     year = "%Y" if len(match[3]) == 4 else "%y"
     rest = first[match.end() :]

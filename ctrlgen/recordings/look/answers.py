@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -32,6 +34,11 @@ class Answers:
 
 
 NOTHING = Answers()
+
+
+def as_options(text: str) -> str:
+    """`text` with what it would have written in recording.toml, `layout = { … }`, as the option of look that says the same."""
+    return re.sub(r"layout = \{ (.*?) \}", lambda key: f"--layout {shlex.quote(key[1])}", text)
 
 
 def read_answers(

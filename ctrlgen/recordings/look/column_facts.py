@@ -10,6 +10,7 @@ import numpy as np
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import same_dimension, to_si
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
+from ctrlgen.recordings.formats.number_cells import Ambiguous
 from ctrlgen.recordings.formats.time_stamps import TIME_NAME, epoch_unit
 from ctrlgen.recordings.formats.unit_texts import BASES, NAMES, bare_name, unit_of
 from ctrlgen.recordings.look.answers import NOTHING, Answers
@@ -140,7 +141,10 @@ def _suffix(name: str) -> str | None:
 
 
 def _time(table: MeasurementTable, columns: tuple[ColumnFacts, ...], chosen: str = "") -> TimeFacts | None:
-    """The column that is `chosen`, named as the time, or else holds dates, or else has the unit of a time and rises."""
+    """The column that is `chosen`, named as the time, or else holds dates, or else has the unit of a time and rises.
+
+    Raises InputError for dates that can be read two ways.
+    """
     named = [c for c in columns if TIME_NAME.match(c.bare)]
     dated = [c for c in columns if c.values is None]
     of_unit = [c for c in columns if c.unit is not None and same_dimension(c.unit, "s")]
@@ -151,7 +155,9 @@ def _time(table: MeasurementTable, columns: tuple[ColumnFacts, ...], chosen: str
             continue
         try:
             seconds = table.time(column, "s" if stamps else unit).values * (1.0 if stamps else to_si(1.0, unit))
-        except InputError:
+        except InputError as error:
+            if isinstance(error.__cause__, Ambiguous):
+                raise
             continue
         steps = np.diff(seconds[np.isfinite(seconds)])
         if len(steps) < 2 or not np.median(steps) > 0:
