@@ -73,8 +73,12 @@ uint32_t limiter_elapsed(limiter_state *state, uint32_t ticks, const real drive[
                 state->unsure = LIMITER_SETTLING;
             }
         }
-        if (state->unsure != LIMITER_FOREVER) {
-            state->unsure -= (state->unsure < ticks) ? state->unsure : ticks;
+        if (state->unsure == LIMITER_FOREVER) {
+            /* no time makes it known */
+        } else if (state->unsure > ticks) {
+            state->unsure -= ticks;
+        } else {
+            state->unsure = 0U;
         }
 #if RATED
         for (k = 0; k < NU; k++) {
@@ -83,7 +87,7 @@ uint32_t limiter_elapsed(limiter_state *state, uint32_t ticks, const real drive[
 #endif
         status = is_unsure(state);
     } else {
-        /* no drive that was held */
+        status = LIMITER_INPUT; /* no drive that was held */
     }
     return status;
 }
@@ -95,8 +99,11 @@ static const real REACH_HIGH[NS] = REACH_HIGH_TABLE;
 /* 1 if measured is no number, or farther than error beyond what drives can lead to. */
 static int cannot_be(const real measured[NS], real error)
 {
-    int cannot = ((is_nan(&error) != 0) || (error < REAL(0.0)) || (error > UNLIMITED)) ? 1 : 0;
+    int cannot = 0;
     int i;
+    if ((is_nan(&error) != 0) || (error < REAL(0.0)) || (error > UNLIMITED)) {
+        cannot = 1;
+    }
     for (i = 0; i < NS; i++) {
         if ((is_nan(&measured[i]) != 0) || (measured[i] < (REACH_LOW[i] - error)) || (measured[i] > (REACH_HIGH[i] + error))) {
             cannot = 1;
@@ -170,7 +177,7 @@ uint32_t limiter_observe(limiter_state *state, const real measured[NS], real err
         }
         status = is_unsure(state);
     } else {
-        /* no state that can be */
+        status = LIMITER_INPUT; /* no state that can be */
     }
     return status;
 }

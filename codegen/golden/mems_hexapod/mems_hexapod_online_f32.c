@@ -985,12 +985,16 @@ uint32_t mems_hexapod_online_f32_elapsed(mems_hexapod_online_f32_state *state, u
                 state->unsure = MEMS_HEXAPOD_ONLINE_F32_SETTLING;
             }
         }
-        if (state->unsure != MEMS_HEXAPOD_ONLINE_F32_FOREVER) {
-            state->unsure -= (state->unsure < ticks) ? state->unsure : ticks;
+        if (state->unsure == MEMS_HEXAPOD_ONLINE_F32_FOREVER) {
+            /* no time makes it known */
+        } else if (state->unsure > ticks) {
+            state->unsure -= ticks;
+        } else {
+            state->unsure = 0U;
         }
         status = mems_hexapod_online_f32_is_unsure(state);
     } else {
-        /* no drive that was held */
+        status = MEMS_HEXAPOD_ONLINE_F32_INPUT; /* no drive that was held */
     }
     return status;
 }
@@ -1001,8 +1005,11 @@ static const float MEMS_HEXAPOD_ONLINE_F32_REACH_HIGH[6] = { 845.15f, 845.15f, 8
 /* 1 if measured is no number, or farther than error beyond what drives can lead to. */
 static int mems_hexapod_online_f32_cannot_be(const float measured[6], float error)
 {
-    int cannot = ((mems_hexapod_online_f32_is_nan(&error) != 0) || (error < 0.0f) || (error > 1e+18f)) ? 1 : 0;
+    int cannot = 0;
     int i;
+    if ((mems_hexapod_online_f32_is_nan(&error) != 0) || (error < 0.0f) || (error > 1e+18f)) {
+        cannot = 1;
+    }
     for (i = 0; i < 6; i++) {
         if ((mems_hexapod_online_f32_is_nan(&measured[i]) != 0) || (measured[i] < (MEMS_HEXAPOD_ONLINE_F32_REACH_LOW[i] - error)) || (measured[i] > (MEMS_HEXAPOD_ONLINE_F32_REACH_HIGH[i] + error))) {
             cannot = 1;
@@ -1074,7 +1081,7 @@ uint32_t mems_hexapod_online_f32_observe(mems_hexapod_online_f32_state *state, c
         }
         status = mems_hexapod_online_f32_is_unsure(state);
     } else {
-        /* no state that can be */
+        status = MEMS_HEXAPOD_ONLINE_F32_INPUT; /* no state that can be */
     }
     return status;
 }
