@@ -27,7 +27,8 @@ NO_DRIVE = 2.0  # of the first displacement: within what a state may be, beyond 
 OUTCOMES = ("inside", "edge", "beyond")
 TRIALS = tuple("".join(outcome) for outcome in product("+-", repeat=3))  # "+": the drives of a trial are admissible
 PLAIN = ("inside", "inside", "kept", "inside")
-NOWHERE = SimpleNamespace(device_sha256="0" * 64)  # instead of a scenario: of it the controller's C says the device
+# instead of a scenario: of it the controller's C says the device
+NOWHERE = SimpleNamespace(device_sha256="0" * 64, device=SimpleNamespace(load_texts=()))
 PATIENCE = 3000  # samples drawn for one combination; the rarest sequence of trials is one in some hundreds
 
 
@@ -98,6 +99,9 @@ class Scripted(ControllerKernels):
     guarded_limits: Any = None
     composite_shares: Any = None
     composite_bound: Any = None
+    target_bound: Any = None
+    target_directions: Any = None
+    quick: Any = None
     composite_rounds: Any = None
     nearest_slopes: Any = None
     contraction: Any = None
@@ -170,7 +174,7 @@ def scripted(device: Device) -> Controller:
         x_units=("K",) * device.n_x,
         signals={"drive": signal, "displacement": signal, "state": signal if device.states else None},
         redundant=False,
-        device=SimpleNamespace(title="scripted", source="none", given_at_start=(), run_time=None),
+        device=SimpleNamespace(title="scripted", source="none", given_at_start=(), run_time=None, load_texts=()),
     )
     guarded, moving = device.composite != "none", inverse(0.25) if device.moving else None
     kernels = Scripted(

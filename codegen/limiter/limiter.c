@@ -8,7 +8,8 @@
  * Sizes: N displacements, NU drives, NX states that the model remembers, of them NS of actuators, M numbers of a target.
  * What a device has is 1, else 0: STATE_LIMITED (limits on states of actuators can be met), BOUNDED (a cheap bound of the shares of
  * composite limits, of which there are SHARES), RATED (drives change only so fast), PASSING (they can lead the device beyond a
- * limit), REDUNDANT (more drives than axes, of which GROUPS can be moved without a push), COUPLED (a displacement moves several
+ * limit), DIRECT (every displacement is a matrix times the target, and a target that leads into the range is a command), BOUND_FIRST (the
+ * cheap bound is known of the target), REDUNDANT (more drives than axes, of which GROUPS can be moved without a push), COUPLED (a displacement moves several
  * channels), MOVING (kernels for the next sample), MOTION (targets with derivatives), GIVEN (constants that are given at the
  * start), ESTIMATED (states that are stepped from sample to sample, which can be believed wrongly). SETTLE_DRIVE_LIMITED and STEP_DRIVE_LIMITED: drives beyond their limits can be needed. SETTLE_EXAMINED_FIRST and
  * STEP_EXAMINED_FIRST: whether a state is lost is asked before it is used. STATE_BY_MODE and DRIVE_BY_MODE: the line search calls one
@@ -219,7 +220,7 @@ static int scale_home(const limiter_state *state, real wanted[N])
     return hit;
 }
 
-#if BOUNDED
+#if BOUNDED && (PASSING || !BOUND_FIRST)
 /* The same where a cheap bound does not show that every composite limit is kept. */
 static int limit_composite(const limiter_state *state, real wanted[N])
 {

@@ -5,6 +5,8 @@
 #define LIMIT_DRIVES settle_limit_drives
 #define PROCEED settle_proceed
 #define WITHIN settle_within
+#define BEYOND settle_beyond
+#define UNUSABLE settle_unusable
 #define DISPLACEMENT SETTLE_DISPLACEMENT
 #define STATE SETTLE_STATE
 #define DRIVE SETTLE_DRIVE
@@ -18,6 +20,8 @@
 #define LIMIT_DRIVES step_limit_drives
 #define PROCEED step_proceed
 #define WITHIN step_within
+#define BEYOND step_beyond
+#define UNUSABLE step_unusable
 #define DISPLACEMENT STEP_DISPLACEMENT
 #define STATE STEP_STATE
 #define DRIVE STEP_DRIVE
@@ -136,8 +140,14 @@ static void PROCEED(limiter_state *state, const limiter_output *out)
 #endif
 }
 
+#if BOUND_FIRST
+/* Drives for out->displacement with every limit kept, the composite ones are already where kept is 1; the state becomes that of the next
+ * sample. */
+static uint32_t WITHIN(limiter_state *state, limiter_output *out, int kept)
+#else
 /* Drives for out->displacement with every limit kept; the state becomes that of the next sample. */
 static uint32_t WITHIN(limiter_state *state, limiter_output *out)
+#endif
 {
 #if U_BOUNDS_ONCE && defined(U_LOW_TABLE)
     static const real U_LOW[NU] = U_LOW_TABLE;
@@ -171,9 +181,14 @@ static uint32_t WITHIN(limiter_state *state, limiter_output *out)
         status |= keep_state(state, out);
     }
 #endif
-#if SHARES
+#if BOUND_FIRST
+    if (kept == 0) {
+        const int scaled = scale_home(state, out->displacement);
+#elif SHARES
     {
         const int scaled = LIMIT_COMPOSITE(state, out->displacement);
+#endif
+#if SHARES
         if (scaled > 0) {
             if (scaled > 1) {
                 status |= LIMITER_COMPOSITE;
@@ -259,6 +274,63 @@ static uint32_t WITHIN(limiter_state *state, limiter_output *out)
     return status;
 }
 
+/* The same for out->displacement beyond its range. */
+static uint32_t BEYOND(limiter_state *state, limiter_output *out)
+{
+    uint32_t status;
+    int hit;
+#if BOUND_FIRST
+    int kept = 0;
+#endif
+#if COUPLED
+    real beyond[N];
+    int i;
+    for (i = 0; i < N; i++) {
+        beyond[i] = out->displacement[i];
+    }
+#endif
+    hit = limit_displacement(out->displacement);
+#if COUPLED
+    if (hit != 0) {
+        nearest_displacement(beyond, out->displacement);
+    }
+#endif
+#if BOUND_FIRST
+    if (COMPOSITE_BOUND(out->displacement) <= REAL(1.0)) {
+        kept = 1;
+    }
+    status = WITHIN(state, out, kept);
+#else
+    status = WITHIN(state, out);
+#endif
+    if (WAS_BEYOND) {
+        status |= LIMITER_DISPLACEMENT;
+    }
+    return status;
+}
+
+/* The answer to a target that is no command, or to none. */
+static uint32_t UNUSABLE(limiter_state *state, limiter_output *out)
+{
+    uint32_t status = LIMITER_INPUT;
+#if EXAMINED_FIRST
+    SAFE(state, out);
+#if ESTIMATED
+    status |= count_down(state);
+#endif
+#else
+    if (is_lost(state) != 0) {
+        status = set_lost(state, out);
+    } else {
+        SAFE(state, out);
+#if ESTIMATED
+        status |= count_down(state);
+#endif
+    }
+#endif
+    return status;
+}
+
 uint32_t SAMPLE(limiter_state *state, const real target[M], limiter_output *out)
 {
     uint32_t status = LIMITER_INPUT;
@@ -268,47 +340,41 @@ uint32_t SAMPLE(limiter_state *state, const real target[M], limiter_output *out)
         set_safe(out);
     } else if (CANNOT_BE_USED) {
         status = set_lost(state, out);
+#if DIRECT
+    } else if (target == NULL) {
+        status = UNUSABLE(state, out);
+    } else { /* whether a target is a command is asked where it leads beyond the range alone: what is none, NaN too, does */
+#if BOUND_FIRST
+        int kept = 0;
+        if (TARGET_BOUND(target) <= REAL(1.0)) { /* before out, which may be the target */
+            kept = 1;
+        }
+#endif
+        DISPLACEMENT(state, target, out->displacement);
+        if (displacement_inside(out->displacement) != 0) {
+#if BOUND_FIRST
+            status = WITHIN(state, out, kept);
+#else
+            status = WITHIN(state, out);
+#endif
+        } else if (is_usable(target) != 0) {
+            status = BEYOND(state, out);
+        } else {
+            status = UNUSABLE(state, out);
+        }
+    }
+#else
     } else if ((target != NULL) && (is_usable(target) != 0)) {
         DISPLACEMENT(state, target, out->displacement);
         if (displacement_inside(out->displacement) != 0) {
             status = WITHIN(state, out);
         } else {
-            int hit;
-#if COUPLED
-            real beyond[N];
-            int i;
-            for (i = 0; i < N; i++) {
-                beyond[i] = out->displacement[i];
-            }
-#endif
-            hit = limit_displacement(out->displacement);
-#if COUPLED
-            if (hit != 0) {
-                nearest_displacement(beyond, out->displacement);
-            }
-#endif
-            status = WITHIN(state, out);
-            if (WAS_BEYOND) {
-                status |= LIMITER_DISPLACEMENT;
-            }
+            status = BEYOND(state, out);
         }
     } else {
-#if EXAMINED_FIRST
-        SAFE(state, out);
-#if ESTIMATED
-        status |= count_down(state);
-#endif
-#else
-        if (is_lost(state) != 0) {
-            status = set_lost(state, out);
-        } else {
-            SAFE(state, out);
-#if ESTIMATED
-            status |= count_down(state);
-#endif
-        }
-#endif
+        status = UNUSABLE(state, out);
     }
+#endif
     return status;
 }
 #undef SAMPLE
@@ -316,6 +382,8 @@ uint32_t SAMPLE(limiter_state *state, const real target[M], limiter_output *out)
 #undef LIMIT_DRIVES
 #undef PROCEED
 #undef WITHIN
+#undef BEYOND
+#undef UNUSABLE
 #undef DISPLACEMENT
 #undef STATE
 #undef DRIVE

@@ -12,7 +12,7 @@ from typing import Self
 import casadi as ca
 import numpy as np
 
-from ctrlgen.controller.composite_bound import composite_bound, worst_in_range
+from ctrlgen.controller.composite_bound import CompositeBound, composite_bound, worst_in_range
 from ctrlgen.controller.contraction import Contraction, Stepped, contraction
 from ctrlgen.controller.controller_step import answer
 from ctrlgen.controller.limit_reach import Slacks, drive_beyond, state_beyond
@@ -20,6 +20,7 @@ from ctrlgen.controller.lost_state import plausible_magnitudes
 from ctrlgen.controller.named_inverse import NamedInverses, given_inverses, named_inverses
 from ctrlgen.controller.nearest_displacement import coupling, nearest_displacement
 from ctrlgen.controller.null_motion import NullMotion, null_motion
+from ctrlgen.controller.quick_state import QuickState, quick_state
 from ctrlgen.controller.run_time_choices import choices, with_constants
 from ctrlgen.devices import Limit, Signal
 from ctrlgen.model.allocation import inverse_of
@@ -53,6 +54,18 @@ class ControllerKernels:
     def moving(self) -> Inverse | None:
         """Kernels for the next sample; None where there is no sample time."""
         return None if self._step_time is None else inverse_of(self.nominal, self.follow, self._step_time)
+
+    @cached_property
+    def quick(self) -> QuickState | None:
+        """The polynomials that stand for the state's kernels in single precision, the same to settle and to step; None where these are
+        used themselves. They have the same values at the ends of the range and lie between them within it."""
+        device, m = self.model.device, self.nominal
+        every = self.modes
+        if device.given_at_start or not m.n_states or m.redundant:
+            return None
+        found = [quick_state(k.state, *m.z_bounds) for k in every]
+        texts = {str(k.state(*(ca.SX.sym(name, *k.state.size_in(name)) for name in k.state.name_in()))) for k in every}
+        return found[0] if len(texts) == 1 else None
 
     @cached_property
     def named(self) -> NamedInverses:
@@ -155,10 +168,40 @@ class ControllerKernels:
     @cached_property
     def composite_bound(self) -> ca.Function | None:
         """wanted -> a cheap upper bound of `composite_ratio` (`ctrlgen.controller.composite_bound`); None where there is none."""
+        return None if self._bound is None else self._bound.of_displacement
+
+    @cached_property
+    def target_bound(self) -> ca.Function | None:
+        """target -> the same bound at the displacement of a target that leads into the range; None where it is no cheaper."""
+        if self._bound is None or (directions := self.target_directions) is None:
+            return None
+        reach = np.abs(np.linalg.pinv(directions)) @ np.max(np.abs(self.nominal.z_bounds), axis=0)
+        bound = self._bound.of_target(directions, reach)
+        return bound if bound.n_instructions() < self._bound.of_displacement.n_instructions() else None
+
+    @cached_property
+    def _bound(self) -> CompositeBound | None:
         m = self.nominal
         if not self.guarded_limits or m.x.numel() > m.n_states:
             return None
         return composite_bound(m, self.follow, self._composite_ratios)
+
+    @cached_property
+    def target_directions(self) -> np.ndarray | None:
+        """(n, channels) M where every displacement is z = M target, whatever the state, and a target that leads into the range is one
+        that is accepted, also where it is rounded; None elsewhere."""
+        found = [_matrix_of(k.displacement) for k in self.modes]
+        M = found[0]
+        if self.given is not None or M is None or found[-1] is None or not np.array_equal(M, found[-1]):
+            return None
+        if M.shape[0] != M.shape[1] or np.linalg.matrix_rank(M) < len(M):
+            return None
+        # |fl(M t) - M t| <= c |t| with t in units of its limits, and |M t| >= s |t|: in range, |t| (s - c) is at most the range.
+        limits, size = self.input_limits[: len(M)], np.max(np.abs(self.nominal.z_bounds), axis=0)
+        scaled = M * limits / size[:, None]
+        roundings = 2 * len(M) * np.finfo(np.float32).eps * np.linalg.norm(np.abs(scaled))
+        least = np.linalg.svd(scaled, compute_uv=False)[-1]
+        return M if least - roundings > np.sqrt(len(M)) else None
 
     def _composite_ratios(self, displacements: np.ndarray) -> np.ndarray:
         """`composite_ratio` at each column of `displacements`, with no memory of effects."""
@@ -263,3 +306,12 @@ class ControllerKernels:
         """Whether a drive that may not turn back faster can lead the device beyond a limit: where actuators or effects remember, or the
         forces are not linear in the displacement, so that between two admissible drives there may be one that is not."""
         return self.rated and (self.nominal.x.numel() > 0 or self.newton_steps > 1)
+
+
+def _matrix_of(displacement: ca.Function) -> np.ndarray | None:
+    """M where a displacement is M target; None where it is not."""
+    x, z, target = (ca.SX.sym(name, *displacement.size_in(name)) for name in ("x", "z", "target"))
+    slope = ca.jacobian(displacement(x, z, target), target)
+    if ca.symvar(slope) or not ca.simplify(displacement(x, z, 0 * target)).is_zero():
+        return None
+    return ca.evalf(slope).full()

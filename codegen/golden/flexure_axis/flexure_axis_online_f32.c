@@ -66,7 +66,10 @@ static void flexure_axis_online_f32_motion_state(const float target[3], float re
 /* Drive of the motion that `target` says. */
 static void flexure_axis_online_f32_motion_drive(const float target[3], float result[1])
 {
-    result[0] = (20000.0f * target[0]) + (3.0f * target[1]) + (0.05f * target[2]);
+    const float target_0 = target[0];
+    const float target_1 = target[1];
+    const float target_2 = target[2];
+    result[0] = (20000.0f * target_0) + (3.0f * target_1) + (0.05f * target_2);
 }
 
 /* Displacement at which the forces balance, g(x, z, drive) = 0: the step z - g/(dg/dz) from z. */
@@ -201,6 +204,27 @@ static uint32_t flexure_axis_online_f32_settle_within(flexure_axis_online_f32_st
     return status;
 }
 
+/* The same for out->displacement beyond its range. */
+static uint32_t flexure_axis_online_f32_settle_beyond(flexure_axis_online_f32_state *state, flexure_axis_online_f32_output *out)
+{
+    uint32_t status;
+    int hit;
+    hit = flexure_axis_online_f32_limit_displacement(out->displacement);
+    status = flexure_axis_online_f32_settle_within(state, out);
+    if (hit != 0) {
+        status |= FLEXURE_AXIS_ONLINE_F32_DISPLACEMENT;
+    }
+    return status;
+}
+
+/* The answer to a target that is no command, or to none. */
+static uint32_t flexure_axis_online_f32_settle_unusable(flexure_axis_online_f32_state *state, flexure_axis_online_f32_output *out)
+{
+    uint32_t status = FLEXURE_AXIS_ONLINE_F32_INPUT;
+    flexure_axis_online_f32_settle_safe(state, out);
+    return status;
+}
+
 uint32_t flexure_axis_online_f32_settle(flexure_axis_online_f32_state *state, const float target[3], flexure_axis_online_f32_output *out)
 {
     uint32_t status = FLEXURE_AXIS_ONLINE_F32_INPUT;
@@ -215,15 +239,10 @@ uint32_t flexure_axis_online_f32_settle(flexure_axis_online_f32_state *state, co
         if (flexure_axis_online_f32_displacement_inside(out->displacement) != 0) {
             status = flexure_axis_online_f32_settle_within(state, out);
         } else {
-            int hit;
-            hit = flexure_axis_online_f32_limit_displacement(out->displacement);
-            status = flexure_axis_online_f32_settle_within(state, out);
-            if (hit != 0) {
-                status |= FLEXURE_AXIS_ONLINE_F32_DISPLACEMENT;
-            }
+            status = flexure_axis_online_f32_settle_beyond(state, out);
         }
     } else {
-        flexure_axis_online_f32_settle_safe(state, out);
+        status = flexure_axis_online_f32_settle_unusable(state, out);
     }
     return status;
 }

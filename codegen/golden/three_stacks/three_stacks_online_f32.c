@@ -40,31 +40,20 @@ static int three_stacks_online_f32_is_nan(const float *number)
 /* Displacement at which the platform pose is `target`, x [m], y [m]. */
 static void three_stacks_online_f32_wanted_displacement(const float target[2], float result[2])
 {
-    int i;
-    for (i = 0; i < 2; i++) {
-        result[i] = target[i];
-    }
+    result[0] = target[0];
+    result[1] = target[1];
 }
 
 /* Drive that keeps the displacement `wanted` at rest. */
 static void three_stacks_online_f32_wanted_drive(const float wanted[2], float result[3])
 {
-    static const float TABLE_1[2] = { 0.00056179776f, 0.00011235955f };
-    static const float TABLE_2[2] = { 0.00011235955f, 0.0009113608f };
-    static const float TABLE_3[2] = { 8000.0f, 4500.0f };
-    float shared1[2];
-    float shared2[2];
-    int i;
-    for (i = 0; i < 2; i++) {
-        shared1[i] = (1e+06f * wanted[i]) + (1e+13f * (wanted[i] * (wanted[i] * wanted[i])));
-    }
-    for (i = 0; i < 2; i++) {
-        shared2[i] = (TABLE_1[i] * shared1[0]) + (TABLE_2[i] * shared1[1]);
-    }
-    for (i = 0; i < 2; i++) {
-        result[(2 * i)] = TABLE_3[i] * shared2[i];
-    }
-    result[1] = (2250.0f * shared2[0]) - (2250.0f * shared2[1]);
+    const float shared1 = (1e+06f * wanted[0]) + (1e+13f * (wanted[0] * (wanted[0] * wanted[0])));
+    const float shared2 = (1e+06f * wanted[1]) + (1e+13f * (wanted[1] * (wanted[1] * wanted[1])));
+    const float shared3 = (0.00056179776f * shared1) + (0.00011235955f * shared2);
+    const float shared4 = (0.00011235955f * shared1) + (0.0009113608f * shared2);
+    result[0] = 8000.0f * shared3;
+    result[1] = (2250.0f * shared3) - (2250.0f * shared4);
+    result[2] = 4500.0f * shared4;
 }
 
 /* Displacement at which the forces balance, g(x, z, drive) = 0: 6 Newton steps z - g/(dg/dz) from z. */
@@ -466,6 +455,31 @@ static uint32_t three_stacks_online_f32_settle_within(three_stacks_online_f32_st
     return status;
 }
 
+/* The same for out->displacement beyond its range. */
+static uint32_t three_stacks_online_f32_settle_beyond(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out)
+{
+    uint32_t status;
+    int hit;
+    hit = three_stacks_online_f32_limit_displacement(out->displacement);
+    status = three_stacks_online_f32_settle_within(state, out);
+    if ((hit != 0) && (status != THREE_STACKS_ONLINE_F32_LOST)) {
+        status |= THREE_STACKS_ONLINE_F32_DISPLACEMENT;
+    }
+    return status;
+}
+
+/* The answer to a target that is no command, or to none. */
+static uint32_t three_stacks_online_f32_settle_unusable(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out)
+{
+    uint32_t status = THREE_STACKS_ONLINE_F32_INPUT;
+    if (three_stacks_online_f32_is_lost(state) != 0) {
+        status = three_stacks_online_f32_set_lost(state, out);
+    } else {
+        three_stacks_online_f32_settle_safe(state, out);
+    }
+    return status;
+}
+
 uint32_t three_stacks_online_f32_settle(three_stacks_online_f32_state *state, const float target[2], three_stacks_online_f32_output *out)
 {
     uint32_t status = THREE_STACKS_ONLINE_F32_INPUT;
@@ -475,23 +489,16 @@ uint32_t three_stacks_online_f32_settle(three_stacks_online_f32_state *state, co
         three_stacks_online_f32_set_safe(out);
     } else if (state->ready != THREE_STACKS_ONLINE_F32_BUILD) {
         status = three_stacks_online_f32_set_lost(state, out);
-    } else if ((target != NULL) && (three_stacks_online_f32_is_usable(target) != 0)) {
+    } else if (target == NULL) {
+        status = three_stacks_online_f32_settle_unusable(state, out);
+    } else { /* whether a target is a command is asked where it leads beyond the range alone: what is none, NaN too, does */
         three_stacks_online_f32_wanted_displacement(target, out->displacement);
         if (three_stacks_online_f32_displacement_inside(out->displacement) != 0) {
             status = three_stacks_online_f32_settle_within(state, out);
+        } else if (three_stacks_online_f32_is_usable(target) != 0) {
+            status = three_stacks_online_f32_settle_beyond(state, out);
         } else {
-            int hit;
-            hit = three_stacks_online_f32_limit_displacement(out->displacement);
-            status = three_stacks_online_f32_settle_within(state, out);
-            if ((hit != 0) && (status != THREE_STACKS_ONLINE_F32_LOST)) {
-                status |= THREE_STACKS_ONLINE_F32_DISPLACEMENT;
-            }
-        }
-    } else {
-        if (three_stacks_online_f32_is_lost(state) != 0) {
-            status = three_stacks_online_f32_set_lost(state, out);
-        } else {
-            three_stacks_online_f32_settle_safe(state, out);
+            status = three_stacks_online_f32_settle_unusable(state, out);
         }
     }
     return status;
@@ -584,6 +591,31 @@ static uint32_t three_stacks_online_f32_step_within(three_stacks_online_f32_stat
     return status;
 }
 
+/* The same for out->displacement beyond its range. */
+static uint32_t three_stacks_online_f32_step_beyond(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out)
+{
+    uint32_t status;
+    int hit;
+    hit = three_stacks_online_f32_limit_displacement(out->displacement);
+    status = three_stacks_online_f32_step_within(state, out);
+    if ((hit != 0) && (status != THREE_STACKS_ONLINE_F32_LOST)) {
+        status |= THREE_STACKS_ONLINE_F32_DISPLACEMENT;
+    }
+    return status;
+}
+
+/* The answer to a target that is no command, or to none. */
+static uint32_t three_stacks_online_f32_step_unusable(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out)
+{
+    uint32_t status = THREE_STACKS_ONLINE_F32_INPUT;
+    if (three_stacks_online_f32_is_lost(state) != 0) {
+        status = three_stacks_online_f32_set_lost(state, out);
+    } else {
+        three_stacks_online_f32_step_safe(state, out);
+    }
+    return status;
+}
+
 uint32_t three_stacks_online_f32_step(three_stacks_online_f32_state *state, const float target[2], three_stacks_online_f32_output *out)
 {
     uint32_t status = THREE_STACKS_ONLINE_F32_INPUT;
@@ -593,23 +625,16 @@ uint32_t three_stacks_online_f32_step(three_stacks_online_f32_state *state, cons
         three_stacks_online_f32_set_safe(out);
     } else if (state->ready != THREE_STACKS_ONLINE_F32_BUILD) {
         status = three_stacks_online_f32_set_lost(state, out);
-    } else if ((target != NULL) && (three_stacks_online_f32_is_usable(target) != 0)) {
+    } else if (target == NULL) {
+        status = three_stacks_online_f32_step_unusable(state, out);
+    } else { /* whether a target is a command is asked where it leads beyond the range alone: what is none, NaN too, does */
         three_stacks_online_f32_wanted_displacement(target, out->displacement);
         if (three_stacks_online_f32_displacement_inside(out->displacement) != 0) {
             status = three_stacks_online_f32_step_within(state, out);
+        } else if (three_stacks_online_f32_is_usable(target) != 0) {
+            status = three_stacks_online_f32_step_beyond(state, out);
         } else {
-            int hit;
-            hit = three_stacks_online_f32_limit_displacement(out->displacement);
-            status = three_stacks_online_f32_step_within(state, out);
-            if ((hit != 0) && (status != THREE_STACKS_ONLINE_F32_LOST)) {
-                status |= THREE_STACKS_ONLINE_F32_DISPLACEMENT;
-            }
-        }
-    } else {
-        if (three_stacks_online_f32_is_lost(state) != 0) {
-            status = three_stacks_online_f32_set_lost(state, out);
-        } else {
-            three_stacks_online_f32_step_safe(state, out);
+            status = three_stacks_online_f32_step_unusable(state, out);
         }
     }
     return status;

@@ -15,6 +15,7 @@ from ctrlgen.firmware.c.c_expression import PLACE, SCALAR, Call, Linear, Text, t
 from ctrlgen.firmware.c.expression_graph import Node, reached, same_number
 from ctrlgen.firmware.c.real import Real
 
+SHORT = 1  # lines of a row before its result, up to which rows are written one by one
 DIVISORS = (2, 3, 4, 6)  # of a loop's index, where several rows read the same element
 
 
@@ -28,8 +29,9 @@ class Rows:
         constants: Constants,
         may_be_result: Sequence[str],
         laws: Mapping[int, Call],
+        one_by_one: bool = False,
     ) -> None:
-        self.laws = laws
+        self.laws, self.one_by_one = laws, one_by_one
         self.rows, self.real, self.may_be_result = list(rows), real, set(may_be_result)
         self.named, self.array = constants.named, constants.array
         self.ends: dict[int, Node] = {}
@@ -106,9 +108,54 @@ class Rows:
         terms = [linear.terms(row) for row in self.rows]
         arrays = {t[0] for t in terms if t}
         as_row = len(arrays) == 1 and all(terms) and any(len(t[1]) > 2 for t in terms if t)
+        if as_row and self.one_by_one:
+            self._rows_one_by_one([t for t in terms if t], result)
+            return
         for group in self._groups(self.rows, linear, as_row):
             index = str(group.places[0]) if len(group.places) == 1 else group.index(group.places)
             self._write(group, f"{result}[{index}] = ")
+
+    def _rows_one_by_one(self, terms: Sequence[tuple[str, dict[int, float]]], result: str) -> None:
+        """Rows of a matrix as one line each, without a loop: zeros and ones cost nothing, and a product or a sum of two that several rows
+        have is computed once."""
+        T, array = self.real.value, terms[0][0]
+
+        def name(i: int) -> str:
+            return f"{array}_{i}"
+
+        read = sorted({i for _, row in terms for i in row})
+        self.lines += [f"const {T} {name(i)} = {array}[{i}];" for i in read]
+        literals = [{i: self.real.literal(abs(v)) for i, v in row.items()} for _, row in terms]
+        one = self.real.literal(1.0)
+
+        def term(row: int, i: int) -> str:
+            return name(i) if literals[row][i] == one else f"({literals[row][i]} * {name(i)})"
+
+        def pair(row: int, i: int, k: int) -> tuple[str, str, int, int]:
+            return term(row, i), term(row, k), i, k
+
+        # A pair of terms with its signs in several rows comes first in each: there it is one number.
+        counts: dict[tuple[str, str, int, int, bool, bool], list[int]] = {}
+        for r, (_, row) in enumerate(terms):
+            for i in row:
+                for k in row:
+                    if i < k:
+                        counts.setdefault((*pair(r, i, k), row[i] < 0, row[k] < 0), []).append(r)
+        first: dict[int, tuple[int, int]] = {}
+        for (_, _, i, k, *_), rows in sorted(counts.items(), key=lambda item: -len(item[1])):
+            free = [r for r in rows if r not in first]
+            if len(free) > 1:
+                first |= dict.fromkeys(free, (i, k))
+        for r, (_, row) in enumerate(terms):
+            order = [*first.get(r, ()), *(i for i in sorted(row) if i not in first.get(r, ()))]
+            text = ""
+            for i in order:
+                if not text:
+                    text = f"(-{term(r, i)})" if row[i] < 0 else term(r, i)
+                else:
+                    text += f" {'-' if row[i] < 0 else '+'} {term(r, i)}"
+            self.operations += len(order) - 1 + sum(text != one for text in literals[r].values())
+            self.lines.append(f"{result}[{r}] = {bare('x = ' + (text or self.real.literal(0.0)) + ';')[4:]}")
 
     def _groups(self, roots: Sequence[Node], linear: Linear, as_row: bool) -> list[_Group]:
         """Roots of equal shape whose elements follow the loop's index, in the order of the first of each; with `as_row` all are rows of
@@ -118,7 +165,7 @@ class Rows:
             text = text_of(root, self.ends, linear, self.real, as_row, self.laws)
             self.calls |= text.calls
             self.operations += text.operations
-            for group in groups:
+            for group in () if self.one_by_one and len(text.lines) <= SHORT else groups:
                 if group.takes(place, text):
                     break
             else:

@@ -204,17 +204,19 @@ class Printer:
         steps: tuple[str, int] | None = None,
         returned: bool = False,
         named: ca.Function | None = None,
+        one_by_one: bool = False,
     ) -> Kernel:
         """`function` (SX, dense arguments, one result) as a static C function writing to its last parameter.
 
         `about`: its comment. `may_be_result`: arguments that a caller may give as the result too. With `steps` (argument, count) the
         function is one step of an iteration on that argument, and the printed one takes `count` of them. The only row can be
-        `returned` instead. `named` is the same function with an argument of `numbers`, from which its numbers have their formulas.
+        `returned` instead. Short rows are written `one_by_one`, or as a loop over a table. `named` is the same function with an argument
+        of `numbers`, from which its numbers have their formulas.
         Raises CtrlgenError for an operation C has no counterpart of.
         """
         rows = self._rows(function, named)
         laws = self._calls({a: function.numel_in(a) for a in function.name_in() if a not in self.given_numbers}, rows)
-        body = Rows(rows, self.real, self._constants, [steps[0]] if steps else may_be_result, laws).run()
+        body = Rows(rows, self.real, self._constants, [steps[0]] if steps else may_be_result, laws, one_by_one).run()
         body.lines = self._with_derived(body.lines)
         sizes = {a: function.size1_in(a) for a in function.name_in() if a not in self.given_numbers}
         parts = [(name, about, body.lines)]

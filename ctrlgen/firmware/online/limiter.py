@@ -72,6 +72,8 @@ def _features(context: Mapping[str, Any]) -> dict[str, int]:
     has = {
         "STATE_LIMITED": context["state_limited"],
         "BOUNDED": context["bound"] is not None,
+        "DIRECT": context["direct"],
+        "BOUND_FIRST": context["target_bound"] is not None,
         "RATED": context["rated"],
         "PASSING": context["passing"],
         "REDUNDANT": moves is not None,
@@ -235,6 +237,8 @@ def _calls(context: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
     }
     if context["bound"]:
         calls["COMPOSITE_BOUND"] = "wanted", context["bound"].value(wanted="wanted")
+    if context["target_bound"]:
+        calls["TARGET_BOUND"] = "target", context["target_bound"].value(target="target")
     for name, tests in (("state_inside", context["s_tests"]), ("drive_inside", context["u_tests"])):
         follows = any("derived" in test for test in tests)
         calls[name.upper()] = "state value", f"{name}({'&state->derived, ' if follows else ''}value)"

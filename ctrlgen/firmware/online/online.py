@@ -51,6 +51,9 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
             "balance": printed.balance,
             "shares": printed.shares,
             "bound": printed.bound,
+            "target_bound": printed.target_bound,
+            # derivatives of a motion's target tell nothing of the displacement: they are examined first
+            "direct": kernels.target_directions is not None and not printed.motion,
             "shares_count": kernels.composite_shares.size1_out(0) if printed.shares else 0,
             "composite_rounds": kernels.composite_rounds,
             "nearest_slopes": kernels.nearest_slopes,
@@ -169,7 +172,8 @@ def _cost(controller: Controller, printed: PrintedKernels) -> dict[str, int]:
     n = len(kernels.nominal.axes)
     advance = [] if kernels.nominal.x.numel() == kernels.nominal.n_states else ["advance"]
     step = sum(mode[part].operations for part in ("displacement", "state", "drive", *advance) if part in mode)
-    step += bound.operations if bound else 0
+    first = printed.target_bound or bound
+    step += first.operations if first else 0
     # a motion that breaks a limit is answered by settling
     if printed.motion:
         step = sum(kernel.operations for kernel in printed.motion.values())

@@ -12,6 +12,7 @@ import numpy as np
 from ctrlgen.controller.feedforward import Controller
 from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.controller.motion_feedforward import MotionKernels
+from ctrlgen.controller.quick_state import QuickState
 from ctrlgen.core.units import base_unit
 from ctrlgen.devices import Signal
 from ctrlgen.firmware.c.cprint import Kernel, Law, Printer, Ranges
@@ -19,19 +20,23 @@ from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.online.start_constants import given_ranges
 from ctrlgen.model.model import Model
 
+IN_EVERY_SAMPLE = ("displacement", "drive")  # short kernels of every sample
+UNROLLED = 8  # rows of a matrix that are written without a loop: 64 products are half a kilobyte
 UNLIMITED = 1e18  # SI: written for the bound of an actuator state that has none beside one that has; its square is still a float
 
 
 @dataclass(frozen=True)
 class PrintedKernels:
     """`modes`: for "settle" and "step" the kernels by part beside "name", "examined_first" and "drive_can_be_limited"; `motion`: those of
-    a target with derivatives, by part; `shares` and `bound` of composite limits; `every` kernel in the order of the file."""
+    a target with derivatives, by part; `shares` and `bound` of composite limits, `target_bound` where a target
+    tells it; `every` kernel in the order of the file."""
 
     modes: list[dict[str, Any]]
     motion: dict[str, Kernel]
     balance: Kernel
     shares: Kernel | None
     bound: Kernel | None
+    target_bound: Kernel | None
     every: list[Kernel]
 
     @property
@@ -69,7 +74,8 @@ def printed_kernels(controller: Controller, printer: Printer) -> PrintedKernels:
     """The kernels of a `controller`; where constants are given at the start, in terms of these."""
     kernels, inverses, given = controller.kernels, controller.kernels.named, controller.kernels.given
     static, moving = (given.static or kernels.static, given.moving) if given else (kernels.static, kernels.moving)
-    printed = _Kernels(printer, kernel_comments(kernels))
+    quick = kernels.quick if printer.real is Real.FLOAT else None  # in double their error would be the largest
+    printed = _Kernels(printer, kernel_comments(kernels, quick))
     modes: list[dict[str, Any]] = []
     for name, inverse, formulas in (("settle", static, inverses.static), ("step", moving, inverses.moving)):
         if inverse is None:
@@ -81,6 +87,8 @@ def printed_kernels(controller: Controller, printer: Printer) -> PrintedKernels:
         }
         for part in ("displacement", "state", "drive", "advance"):
             function, named = getattr(inverse, part), None if formulas is None else getattr(formulas, part)
+            if part == "state" and quick is not None:
+                function, named = quick.state, None  # the numbers of a polynomial are no formulas of the device's
             if function.size1_out(0):
                 mode[part] = printed.kernel(function, (name, part), (f"wanted_{part}", f"{name}_{part}"), named=named)
         modes.append(mode)
@@ -90,12 +98,15 @@ def printed_kernels(controller: Controller, printer: Printer) -> PrintedKernels:
     steps = ("z", kernels.newton_steps) if kernels.newton_steps > 1 else None
     named = None if inverses.static is None else inverses.static.newton
     balance = printed.kernel(static.newton, "balance", ("balance_displacement",), steps=steps, named=named)
-    shares = bound = None
+    shares = bound = target_bound = None
     if kernels.guarded_limits:
         shares = printed.kernel(kernels.composite_shares, "shares", ("composite_shares",))
     if kernels.composite_bound:
         bound = printed.kernel(kernels.composite_bound, "bound", ("composite_bound",), returned=True)
-    return PrintedKernels(modes, motion, balance, shares, bound, printed.kernels)
+    # A state that is limited moves the displacement, and so do targets with derivatives.
+    if kernels.target_bound and not controller.state_can_be_limited and not motion:
+        target_bound = printed.kernel(kernels.target_bound, "target_bound", ("target_bound",), returned=True)
+    return PrintedKernels(modes, motion, balance, shares, bound, target_bound, printed.kernels)
 
 
 @dataclass
@@ -118,12 +129,16 @@ class _Kernels:
         named: Any = None,
     ) -> Kernel:
         """`function` as C, named by the first of `names` that no other body has."""
+        # In every sample: a loop costs a small core twice as much, and most of a matrix of directions is zeros, ones and equal numbers.
+        one_by_one = what[-1] in IN_EVERY_SAMPLE and function.size1_out(0) <= UNROLLED
         may_be_result = {"advance": ["x"], "balance": ["z"]}.get(what if what == "balance" else what[-1], [])
         taken = {kernel.name for kernel in self._by_body.values()}
-        kernel = self.printer.kernel(function, names[0], self.comments[what], may_be_result, steps, returned, named)
+        kernel = self.printer.kernel(
+            function, names[0], self.comments[what], may_be_result, steps, returned, named, one_by_one
+        )
         if kernel.body not in self._by_body and kernel.name in taken:
             kernel = self.printer.kernel(
-                function, names[-1], self.comments[what], may_be_result, steps, returned, named
+                function, names[-1], self.comments[what], may_be_result, steps, returned, named, one_by_one
             )
         return self._by_body.setdefault(kernel.body, kernel)
 
@@ -150,8 +165,8 @@ def printed_laws(model: Model, symbolic: Model) -> list[Law]:
     return laws
 
 
-def kernel_comments(kernels: ControllerKernels) -> dict[Any, str]:
-    """What each kernel computes, in words, by mode and part or by name."""
+def kernel_comments(kernels: ControllerKernels, quick_state: QuickState | None = None) -> dict[Any, str]:
+    """What each kernel computes, in words, by mode and part or by name; the state by `quick_state` where there is one."""
     m, follow, drive = (
         kernels.nominal,
         kernels.model.signals[kernels.follow],
@@ -166,12 +181,19 @@ def kernel_comments(kernels: ControllerKernels) -> dict[Any, str]:
         "shares": f"The square of each {', '.join(limit.label for limit in kernels.guarded_limits)} over its limit at displacement "
         "`wanted`.",
         "bound": "A cheap upper bound of the root of the largest of these shares: no more than 1 means that every limit is kept.",
+        "target_bound": "The same bound at the displacement of a `target` that leads into the range.",
     }
+    quick = ""
+    if quick_state is not None:
+        quick = (
+            f" By polynomials of degree {quick_state.degree}, proved over the displacement's range to be off by less than a change of "
+            f"the displacement by {quick_state.off:.1g} m."
+        )
     for mode in ("settle", "step", "motion"):
         after = {"settle": "at rest", "step": within + " later", "motion": "during the motion that `target` says"}[mode]
         comments |= {
             (mode, "displacement"): f"Displacement at which the {follow.label} is `target`, {si_text(follow)}.",
-            (mode, "state"): f"States that the displacement needs {after}: {states}.",
+            (mode, "state"): f"States that the displacement needs {after}: {states}.{quick}",
             (mode, "drive"): {
                 "settle": f"{drive.label.capitalize()} that keeps {holds} at rest.",
                 "step": f"{drive.label.capitalize()} that leads from x to {holds} within {within}.",

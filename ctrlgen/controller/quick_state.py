@@ -1,0 +1,58 @@
+"""The actuator state that a displacement needs, by polynomials in place of roots, quotients and Newton steps.
+
+Where each row of the kernel follows from one displacement alone it is replaced by a polynomial over the displacement's range, off by
+less than a `SHARE` of the range in the displacement (`ctrlgen.numerics.proven_polynomial`). The model itself is not changed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen.numerics.proven_polynomial import ProvenPolynomial, proven_polynomial
+
+SHARE = 1e-7  # of the range: less than two roundings of a float at its end, 6 pm of the MEMS hexapod's 55 um
+CHEAP = frozenset((ca.OP_ADD, ca.OP_SUB, ca.OP_MUL, ca.OP_NEG, ca.OP_SQ, ca.OP_TWICE, ca.OP_ASSIGN))
+
+
+@dataclass(frozen=True)
+class QuickState:
+    """`state` (x, z, wanted) -> actuator states as polynomials; the highest `degree`, and `off` [SI], by how much a displacement
+    appears changed at most."""
+
+    state: ca.Function
+    degree: int
+    off: float
+
+
+def quick_state(state: ca.Function, low: np.ndarray, high: np.ndarray) -> QuickState | None:
+    """The polynomials of a kernel `state` for displacements low ... high (n,); None where a row has none, or needs none."""
+    x, z, wanted = (ca.SX.sym(name, *state.size_in(name)) for name in ("x", "z", "wanted"))
+    rows = ca.vertsplit(state(x, z, wanted)) if state.size1_out(0) else []
+    found: list[ca.SX] = []
+    polynomials: dict[str, ProvenPolynomial | None] = {}
+    off, degree = 0.0, 0
+    for row in rows:
+        places = ca.jacobian_sparsity(row, wanted).get_col()
+        if len(places) != 1 or ca.depends_on(row, ca.vertcat(x, z)):
+            return None
+        i, own = int(places[0]), ca.SX.sym("v")
+        f = ca.Function("f", [own], [ca.substitute(row, wanted[i], own)], {"cse": True})
+        if all(
+            f.instruction_id(k) in CHEAP | {ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST} for k in range(f.n_instructions())
+        ):
+            return None
+        key = f"{ca.substitute(row, wanted[i], own)} {low[i]!r} {high[i]!r}"
+        if key not in polynomials:
+            polynomials[key] = proven_polynomial(f, float(low[i]), float(high[i]), SHARE)
+        polynomial = polynomials[key]
+        if polynomial is None:
+            return None
+        off, degree = max(off, polynomial.off), max(degree, len(polynomial.coefficients) - 1)
+        found.append(polynomial.of(wanted[i]))
+    if not found:
+        return None
+    names = ["x", "z", "wanted"]
+    return QuickState(ca.Function("state", [x, z, wanted], [ca.vertcat(*found)], names, ["result"]), degree, off)

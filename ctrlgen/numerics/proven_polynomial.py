@@ -1,0 +1,97 @@
+"""A polynomial in place of a smooth function of one number over a range, with a proven bound of its error.
+
+It interpolates at the extrema of a Chebyshev polynomial, the ends of the range among them, where it is exact. On each of `CELLS` cells with
+centre c and half width r the error e = f - p is enclosed by its Taylor series: with order n = degree + 1, where p has no n-th derivative,
+
+    |e(c + r s)| <= sum_{k<n} |e^(k)(c)| r^k / k! + max_cell |f^(n)| r^n / n!,      |s| <= 1,
+
+the last maximum by interval arithmetic. Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), ch. 2 to 4;
+W. Tucker, Validated Numerics (2011).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import comb
+
+import casadi as ca
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from ctrlgen.numerics.taylor_intervals import taylor_intervals
+
+CELLS = 64  # of the range: the error of degree 12 turns 13 times, five cells a turn
+HIGHEST = 12  # degree: beyond it a root and a quotient cost no more
+LARGEST = 1e37  # coefficient that is a number in single precision
+CANCELLED = (
+    8.0  # of the range of values: terms of powers about zero may add up to this much, or three binary digits are lost
+)
+
+
+@dataclass(frozen=True)
+class ProvenPolynomial:
+    """f(v) ~ sum_k coefficients_k ((v - centre) / half)^k on low ... high: off by no more than a change of v by `off` changes f; it
+    rises or falls as f does."""
+
+    coefficients: np.ndarray
+    centre: float
+    half: float
+    off: float
+
+    def of(self, v: ca.SX) -> ca.SX:
+        """The polynomial as an expression of v, by Horner's rule."""
+        s = v - self.centre if self.centre else v
+        coefficients = self.coefficients / self.half ** np.arange(len(self.coefficients))
+        if np.abs(coefficients).max() > LARGEST:
+            s, coefficients = s * (1 / self.half), self.coefficients
+        value = ca.SX(float(coefficients[-1]))
+        for c in coefficients[-2::-1]:
+            value = value * s + float(c)
+        return value
+
+
+def proven_polynomial(f: ca.Function, low: float, high: float, share: float) -> ProvenPolynomial | None:
+    """The polynomial of lowest degree whose error is at most what a change of v by `share` of the range changes of f at least. None where
+    f is not smooth, not monotonic, or needs more than degree `HIGHEST`."""
+    half, middle = (high - low) / 2, (high + low) / 2
+    radius = half / CELLS
+    centres = low + radius * (2 * np.arange(CELLS) + 1)
+    over = taylor_intervals(f, centres - radius, centres + radius, radius, HIGHEST + 1)
+    at = taylor_intervals(f, centres, centres, radius, HIGHEST)
+    slopes = np.stack([over.low[1], over.high[1]])
+    if not np.all(np.isfinite(over.low)) or not (np.all(slopes > 0) or np.all(slopes < 0)):
+        return None
+    steepness = float(np.abs(slopes).min()) / radius
+    for degree in range(1, HIGHEST + 1):
+        nodes = -np.cos(np.pi * np.arange(degree + 1) / degree)
+        values = np.array([float(f(middle + half * s)) for s in nodes])
+        series = chebyshev.cheb2poly(chebyshev.chebfit(nodes, values, degree))
+        last = np.maximum(np.abs(over.low[degree + 1]), np.abs(over.high[degree + 1]))
+        off = np.abs((at.low + at.high)[: degree + 1] / 2 - _about(series, (centres - middle) / half, radius / half))
+        error = float(np.max(off.sum(axis=0) + last))
+        turn = (np.arange(degree + 1)[:, None] * off).sum(axis=0) + (degree + 1) * last
+        if error <= share * (high - low) * steepness and np.all(turn < np.abs(slopes).min(axis=0)):
+            return _conditioned(series, low, high, error / steepness, abs(values[-1] - values[0]))
+    return None
+
+
+def _about(series: np.ndarray, centres: np.ndarray, radius: float) -> np.ndarray:
+    """(degree + 1, cells) Taylor coefficients of a polynomial about each centre, times the radius to the power."""
+    degree = len(series) - 1
+    return np.array(
+        [
+            sum(series[j] * comb(j, k) * centres ** (j - k) for j in range(k, degree + 1)) * radius**k
+            for k in range(degree + 1)
+        ]
+    )
+
+
+def _conditioned(series: np.ndarray, low: float, high: float, off: float, range_of_values: float) -> ProvenPolynomial:
+    """The polynomial in powers about zero, which saves a subtraction, where these do not cancel; else about the middle."""
+    half, middle = (high - low) / 2, (high + low) / 2
+    if low <= 0.0 <= high:
+        size = max(-low, high)
+        about_zero = np.polynomial.Polynomial(series)(np.polynomial.Polynomial([-middle / half, size / half])).coef
+        if np.abs(about_zero[1:]).sum() <= CANCELLED * range_of_values:
+            return ProvenPolynomial(about_zero, 0.0, size, off)
+    return ProvenPolynomial(series, middle, half, off)
