@@ -58,7 +58,9 @@ def test_a_cause_without_which_nine_times_as_much_is_left_is_no_form_error(monke
     bare.fit.restarted = SimpleNamespace(without=lambda k: k)
     monkeypatch.setattr(pruning, "is_needed", lambda *_: True)
     weigh = SimpleNamespace(within_model_form_error=lambda *_: True)
-    trials = SimpleNamespace(selection=weigh, tried=lambda structure, cause: [bare] if structure == 1 else [])
+    trials = SimpleNamespace(
+        selection=weigh, tried=lambda structure, cause: [bare] if structure == 1 else [], objections=lambda *_: {}
+    )
     assert (pruning.without_needless(trials, full) is full) is kept
 
 

@@ -55,7 +55,9 @@ def test_a_number_of_the_device_is_told_that_moves_by_four_stated_deviations(dev
 class Search:
     """Two causes: what is left with both, with the first alone, and whether it is noise with both."""
 
-    def __init__(self, monkeypatch, small: float, left: float, noise=False, improves=False, unseen=False, vague=False):
+    def __init__(
+        self, monkeypatch, small: float, left: float, noise=False, improves=False, unseen=False, vague=False, against=()
+    ):
         theta = (0.5, 0.001 if vague else 0.5)
         free = (amplitude("effect[0].gain", 0), amplitude("effect[1].gain", 1))
         self.both = self.model(fitted((GAIN, CREEP), theta, free), 1e3, noise)
@@ -66,6 +68,7 @@ class Search:
             unseen_in_held_out=lambda bare: unseen,
             takes_much=lambda bare, current: False,
         )
+        self.objections = lambda candidate, accepted: dict(against)
         self.screen, self.jobs, self.fitter = SimpleNamespace(seed=0), 1, None
         accounts = {2: (share(0.9 - small), share(small)), 1: (share(0.9),)}
         monkeypatch.setattr(
@@ -92,6 +95,11 @@ class Search:
 def test_a_cause_below_a_hundredth_is_taken_out_where_nothing_is_lost(monkeypatch):
     assert Search(monkeypatch, 0.009, left=1e3 + 50).left() == (GAIN,)
     assert Search(monkeypatch, 0.011, left=1e3 + 50).left() == (GAIN, CREEP)
+
+
+def test_it_stays_where_the_cause_that_is_left_would_be_refused(monkeypatch):
+    refused = {0: "its period is longer than what repeats"}
+    assert Search(monkeypatch, 0.009, left=1e3 + 50, against=refused).left() == (GAIN, CREEP)
 
 
 @pytest.mark.parametrize("lost, kept", [(0.0099, False), (0.0101, True)])

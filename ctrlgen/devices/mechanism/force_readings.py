@@ -20,6 +20,7 @@ import numpy as np
 from ctrlgen.devices.mechanism.condensed import Condensed, nominal
 from ctrlgen.devices.mechanism.drawing import Drawing
 from ctrlgen.devices.mechanism.modes import guyan_modes
+from ctrlgen.devices.travel import farthest
 from ctrlgen.physics import rigid_bodies
 from ctrlgen.physics.rigid_bodies import GROUND
 from ctrlgen.physics.screw import Matrix
@@ -49,7 +50,7 @@ def inertial(c: Condensed) -> Matrix:
 def reach(device: Drawing) -> np.ndarray:
     """(readings,) typical loads [N, N m]: at the largest travels at rest, and with inertia as the fastest mode takes them there; zero of
     readings of a motion."""
-    c, travel = nominal(device), max(a.section.travel.si for a in device.placed_actuators)
+    c, travel = nominal(device), max(farthest(a.section.travel) for a in device.placed_actuators)
     n, fastest = len(c.directions), guyan_modes(device).frequencies[-1:] if device.dynamics is not None else np.zeros(0)
     found = _numbers(c.reading_motion)[:, :n]
     size = np.abs(found).sum(axis=1)
@@ -61,7 +62,7 @@ def reach(device: Drawing) -> np.ndarray:
 def unloaded(device: Drawing) -> list[str]:
     """The readings of loads that no actuator makes."""
     c, loads, faint = nominal(device), reach(device), []
-    least = FAINT * max(a.section.travel.si for a in device.placed_actuators)
+    least = FAINT * max(farthest(a.section.travel) for a in device.placed_actuators)
     for r, load in zip(device.placed_readings, loads, strict=True):
         if r.section.of is not None:
             # counted as the force that would stretch the element as far as a share of the largest travel
