@@ -116,6 +116,7 @@ def test_a_draw_is_the_same_for_a_seed_and_as_large_for_every_area(tree):
     assert [sum(m.area == area for m in first) for area in areas] == [4, 3]
 
 
+@pytest.mark.long
 def test_lines_are_seen_by_the_tests_that_run_them_and_constants_by_those_that_use_them(tree, tmp_path):
     found = seen(tree, [tree / "tests" / "test_small.py"], tmp_path / "cache", 1, lambda: None)
     area, limit = "tests/test_small.py::test_area", "tests/test_small.py::test_limit"
@@ -129,6 +130,7 @@ def test_lines_are_seen_by_the_tests_that_run_them_and_constants_by_those_that_u
     assert seen(tree, [tree / "tests" / "test_small.py"], tmp_path / "cache", 1, lambda: None).seconds == {}
 
 
+@pytest.mark.long
 def test_a_setting_is_seen_by_the_tests_that_execute_what_reads_it_of_its_group(tree, tmp_path):
     (tree / "ctrlgen" / "settings.py").write_text(
         "from dataclasses import dataclass\n\n\n@dataclass\nclass GateSettings:\n    most: int = 3\n\n\nGATE = GateSettings()\n"
@@ -207,6 +209,7 @@ def test_a_mutant_that_hangs_is_ended_at_the_limit(tree):
         copy.remove()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("least, code", [(0.9, 1), (0.4, 0)])
 def test_the_command_counts_lists_survivors_and_says_by_its_exit_whether_enough_was_caught(
     tree, tmp_path, monkeypatch, capsys, least, code
