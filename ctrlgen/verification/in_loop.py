@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ctrlgen.controller.controller_step import ControllerStatus
 from ctrlgen.core.errors import ToolError
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import CFolder
@@ -22,6 +23,7 @@ from ctrlgen.verification.host import Host
 from ctrlgen.verification.reference import ReferenceAnswers
 
 RANDOM = 400  # of the reference's random targets, reachable and beyond
+STATE_WORDS = 4  # integers at most in a controller's state: its mark, and three of what is believed (estimate.c)
 
 
 @dataclass(frozen=True)
@@ -110,7 +112,7 @@ def _sequences(
     online, real, machine = folder.online[host.real], host.real, machines["online"]
     nu, m = ref.model.u.numel(), ref.random.shape[1]
     answered = ref.width
-    numbers = sum(part.size for part in ref.controller.rest()) + 1 + folder.given_numbers
+    numbers = sum(part.size for part in ref.controller.rest()) + STATE_WORDS + folder.given_numbers
     state, target, out = (machine.reserve(count, real) for count in (numbers, m, answered))
 
     def answers(function: str, targets: np.ndarray) -> Answers:
@@ -118,7 +120,8 @@ def _sequences(
             with np.errstate(over="ignore"):
                 machine.write(target, wanted, real)
             status, count = machine.call(f"{online}_{function}", state, target, out)
-            yield machine.read(out, answered, real), status, count
+            # as the harness does: the samples of a path follow one another as those of its clock
+            yield machine.read(out, answered, real), status & ~int(ControllerStatus.UNSURE), count
 
     random = ref.random[:: max(1, len(ref.random) // RANDOM)]
     if ref.scenario.sample_time is not None:
