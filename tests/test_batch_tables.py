@@ -20,7 +20,7 @@ from ctrlgen.core.errors import InputError
 
 HELD_OUT = {"reading.y": {"rms_before": 2.0, "rms_after": 0.5, "noise_floor": 0.25, "uncertainty": 0.1, "unit": "um"}}
 CREEP = {"effect": "creep", "location": "y", "parameters": {"gain": {"value": 0.03, "ci95": [0.02, 0.04], "unit": "1"}}}
-RECORD = {"verdict": "explained", "findings": [CREEP], "held_out": HELD_OUT}
+RECORD = {"verdict": "explained", "findings": [CREEP], "held_out": HELD_OUT, "implausible": []}
 
 
 def test_the_tables_as_parquet_hold_every_result_and_every_number(tmp_path):
