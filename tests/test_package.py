@@ -202,10 +202,10 @@ def test_the_same_input_gives_the_same_bytes_of_everything(packages, circle, tmp
         # NaN is neither above nor below a limit
         (
             "online",
-            r"\(\(bits_of\(&target\[(\d)\]\) & 0x7FFFFFFFU\) <= \w+\)",
+            r"\(\(\w*bits_of\(&target\[(\d)\]\) & 0x7FFFFFFFU\) <= \w+\)",
             r"(!((target[\1] > 60.0f) || (target[\1] < -60.0f)))",
         ),
-        ("online", r"drive\[i\] = U_SAFE\[i\];", "drive[i] = U_SAFE[i] + 1.0f;"),
+        ("online", r"drive\[i\] = (\w*U_SAFE)\[i\];", r"drive[i] = \1[i] + 1.0f;"),
         ("player", r"then >= DURATION", "(time < 0.0f) || (time >= (1e9f + (float)DURATION + (0.0f * (float)then)))"),
         ("player", r"(CONTROL\[\d+\]\[6\] = \{\n        \{ 0\.0\d)(\d)", r"\g<1>0"),
     ],
