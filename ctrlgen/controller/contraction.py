@@ -61,6 +61,11 @@ class Contraction:
     halving: int
     growth: float
 
+    @property
+    def elsewhere(self) -> np.ndarray:
+        """(n_x,) of each state a value that drives can lead to, and that it has not at rest."""
+        return np.where(self.side != 0, self.start, self.high)
+
 
 class Stepped(NamedTuple):
     """A model of the device, free of parameters, with its kernels for equilibria and for the next sample."""

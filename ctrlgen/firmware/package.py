@@ -9,7 +9,6 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ctrlgen.controller.contraction import FOREVER
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, write_text
 from ctrlgen.core.units import base_unit
@@ -156,19 +155,12 @@ def _context(
 
 def _test_calls(c: dict[str, Any]) -> int:
     """What the test on the target counts: of the controller, and of the player its wrap or end and three refusals too."""
-    online = len(c["rows"]) + 2 * c["unusable"] + 2 + 2 * c["lost"] + _estimate_calls(c)
+    online = len(c["rows"]) + 2 * c["unusable"] + 2 + 2 * c["lost"] + c["estimate_calls"]
     return online + (
         len(c["played"]) + len(c["timed"]) + 6 + (c["closed"] and c["whole"] < 2**32) + c["played_unusable"]
         if c["player"]
         else 0
     )
-
-
-def _estimate_calls(c: dict[str, Any]) -> int:
-    """Those of what corrects a state that may be wrong."""
-    if c["estimated"] is None:
-        return 0
-    return 29 + (1 if c["estimated"].unknown == FOREVER else 3) + (16 if c["n_s"] else 0)
 
 
 def _memory(c: dict[str, Any], contexts: Mapping[Real, dict[str, Any]]) -> list[dict[str, Any]]:
