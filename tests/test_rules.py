@@ -271,11 +271,11 @@ def test_many_hostile_calls_of_controller_and_player_find_nothing(circle, tmp_pa
 @pytest.mark.long
 def test_planted_faults_are_found_by_hostile_calls(folder, stage, tmp_path):
     """A write beyond the end in float; a drive that is not limited in double: each is found by chance and by the fuzzer."""
-    n = len(stage[1].axes)
+    n, safe = len(stage[1].axes), f"{folder.online[Real.FLOAT].upper()}_U_SAFE"
     faults = {
         Real.FLOAT: (
-            f"    for (i = 0; i < {n}; i++) {{\n        out->drive[i] = U_SAFE[i];",
-            f"    for (i = 0; i < {9 * n}; i++) {{\n        out->drive[i] = U_SAFE[i % {n}];",
+            f"    for (i = 0; i < {n}; i++) {{\n        out->drive[i] = {safe}[i];",
+            f"    for (i = 0; i < {9 * n}; i++) {{\n        out->drive[i] = {safe}[i % {n}];",
         ),
         Real.DOUBLE: ("        value[i] = limited;", "        value[i] = (limited > 0.0) ? wanted : limited;"),
     }

@@ -188,7 +188,7 @@ def test_the_c_with_other_constants_is_the_controller_of_a_device_file_with_thes
         for k, target in enumerate(targets(controller)):
             step = reference.step(state, target, settle=k % 15 == 0)
             status, answer = library.call("settle" if k % 15 == 0 else "step", target)
-            assert status == step.status, (values, k)
+            assert status & ~ControllerStatus.UNSURE == step.status, (values, k)
             expected = np.concatenate([step.drive / 12.2, step.displacement / 55e-6, step.actuator_state / 800])
             found = answer / np.repeat([12.2, 55e-6, 800], 6)
             acted |= step.status
@@ -213,7 +213,7 @@ def test_an_ambient_that_changes_acts_from_the_next_sample_on(libraries, control
     assert library.set_ambient(273.15 + 31) == 0
     step = warm.step(state, target)
     status, answer = library.call("step", target)
-    assert status == step.status == 0
+    assert status & ~ControllerStatus.UNSURE == step.status == 0
     assert np.allclose(answer[:6], step.drive, rtol=0, atol={Real.DOUBLE: 1e-9, Real.FLOAT: 1e-3}[real])
     without = cold.step(state, target).drive
     assert np.min(np.abs(step.drive - without)) > 5e-3  # V: the test sees what it is about
@@ -251,7 +251,7 @@ def test_what_follows_from_the_constants_is_computed_by_the_same_operations_in_c
         for values in chosen(controller):
             library.init(values)
             given = np.array([values.get(c.path, c.default) for c in stated], dtype=library.number)
-            numbers = np.frombuffer(bytes(library.state), dtype=library.number)[13:]  # behind x, z and a word
+            numbers = np.frombuffer(bytes(library.state)[12 * real.bytes + 16 :], library.number)  # after x, z, 4 words
             assert np.array_equal(numbers[: len(given)], given)
             expected = derived_values(members, given, real)
             found = numbers[len(given) :][: len(expected)]

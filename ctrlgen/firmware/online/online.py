@@ -86,7 +86,7 @@ def _estimate_calls(bounds: Contraction | None, measured: int) -> int:
     states."""
     if bounds is None:
         return 0
-    return 29 + (1 if bounds.unknown == FOREVER else 3) + (16 if measured else 0)
+    return 30 + (1 if bounds.unknown == FOREVER else 3) + (16 if measured else 0)
 
 
 def build_of(scenario: Scenario, controller: Controller, real: Real) -> dict[str, Any]:
