@@ -174,7 +174,7 @@ class RandomMechanism:
         try:
             self.device = self._first()
         except InputError as error:  # a reading of what stands still
-            if "no actuator moves what" not in str(error):
+            if "no actuator moves (or loads) what" not in str(error):
                 raise
 
     def _loaded(self, channels: list[str], cubic: float = 0.0) -> Any:
