@@ -45,6 +45,9 @@ def learn(
     where no more improvement is predicted. Where the poses change from run to run otherwise than predicted, as with a reversed or an
     exchanged actuator, it refuses and names the drive; that takes two runs.
 
+    The error is that of the pose which the readings imply under the sensor laws of the device file. What the sensor may feign is left to
+    it, and told: state how well scale, clock and zero are known as [sensor] in uncertainty.toml beside the scenario.
+
     With --device device.next.toml it goes on from what a diagnosis has explained, and learns only what is left.
 
     Example:  ctrlgen learn scenarios/lever_circle scenarios/lever_runs/run_a.toml scenarios/lever_runs/run_b.toml --out out/learn
