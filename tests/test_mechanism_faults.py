@@ -32,6 +32,15 @@ def test_what_cannot_be_is_refused_by_name(tmp_path, old, new, says):
     assert re.search(says, str(caught.value), re.S)
 
 
+def test_every_fault_of_a_drawing_is_told_by_its_own_key(tmp_path):
+    text = PARALLELOGRAM.replace('to = "stage"', 'to = "table"', 1).replace(
+        'material = "silicon"', 'material = "steel"'
+    )
+    with pytest.raises(InputError) as caught:
+        loaded(tmp_path, text)
+    assert [f.where for f in caught.value.faults] == ["element[0].to", "element[0].material", "element[1].material"]
+
+
 def test_a_flat_plate_and_blades_that_cross_are_no_faults(tmp_path):
     flat = BODY.replace('"9 kg', '"18 kg')
     crossed = blade("right", -10).replace("along = [0, 1, 0]", "along = [0, 0.8, 0.6]")

@@ -45,6 +45,14 @@ class Fault:
         return f"{self.where}: {self.what}"
 
 
+class TableFaults(ValueError):
+    """What is wrong with one table of a file, as its validator finds it: `core.files.validate` lists every fault by its key."""
+
+    def __init__(self, faults: Sequence[Fault]) -> None:
+        self.faults = tuple(faults)
+        super().__init__("; ".join(map(str, self.faults)))
+
+
 class InputError(CtrlgenError):
     """An input that cannot be used, with every fault at once."""
 

@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.errors import Fault, InputError, TableFaults
 from ctrlgen.core.file_limits import LARGEST_TEXT, TOO_DEEP, foreign_parts, unreadable_toml
 from ctrlgen.core.steps import STEPS
 
@@ -107,9 +107,10 @@ def validate(model: type[Model], table: dict[str, Any], path: Path | str) -> Mod
         raise InputError(
             path,
             [
-                _fault(model, details)
+                fault
                 for details in errors
                 if details["type"] != "too_short" or not any(_inside(other, details["loc"]) for other in wrong)
+                for fault in _faults(model, details)
             ],
         ) from None
 
@@ -119,14 +120,31 @@ def _inside(place: Sequence[Any], outer: Sequence[Any]) -> bool:
     return len(place) > len(outer) and tuple(place[: len(outer)]) == tuple(outer)
 
 
-def _fault(model: type[BaseModel], details: Any) -> Fault:
-    tags = {"function-before", "one number", "two numbers", *_tags(model)}  # names of the branches of a union
-    location = [
-        part for k, part in enumerate(details["loc"]) if not (part in tags and (k > 0 or part == "function-before"))
-    ]
+def _faults(model: type[BaseModel], details: Any) -> list[Fault]:
+    """What pydantic tells at one place, where a validator may have found several faults."""
+    found = details.get("ctx", {}).get("error")
+    if not isinstance(found, TableFaults):
+        return [_fault(model, details)]
+    place = _place(model, details["loc"])
+    return [Fault(f"{place}.{fault.where}" if place else fault.where, fault.what) for fault in found.faults]
+
+
+def _location(model: type[BaseModel], loc: Sequence[Any]) -> list[Any]:
+    """Keys and numbers of entries on the way to a place, without the names of the branches of unions."""
+    tags = {"function-before", "one number", "two numbers", *_tags(model)}
+    return [part for k, part in enumerate(loc) if not (part in tags and (k > 0 or part == "function-before"))]
+
+
+def _place(model: type[BaseModel], loc: Sequence[Any]) -> str:
+    """A place as a dotted key."""
     where = ""
-    for part in location:
+    for part in _location(model, loc):
         where += f"[{part}]" if isinstance(part, int) else (f".{part}" if where else str(part))
+    return where
+
+
+def _fault(model: type[BaseModel], details: Any) -> Fault:
+    location, where = _location(model, details["loc"]), _place(model, details["loc"])
     message = str(details["msg"]).removeprefix("Value error, ")
     if details["type"] == "missing":
         message = "is missing; add it"

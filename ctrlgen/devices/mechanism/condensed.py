@@ -14,14 +14,13 @@ import numpy as np
 
 from ctrlgen.devices.mechanism.copies import Placed
 from ctrlgen.devices.mechanism.drawing import Drawing
-from ctrlgen.devices.mechanism.joining import LOADS
 from ctrlgen.devices.place import Direction
 from ctrlgen.devices.travel import farthest
 from ctrlgen.numerics.newton import newton_root
 from ctrlgen.physics import rigid_bodies as mechanism
 from ctrlgen.physics.flexure_mass import flexure_mass
 from ctrlgen.physics.rigid_bodies import GROUND, Element
-from ctrlgen.physics.screw import TWIST, Matrix, adjoint, inverse_adjoint, move
+from ctrlgen.physics.screw import TWIST, WRENCH, Matrix, adjoint, inverse_adjoint, move
 
 # Of Newton's method from the motion without cubic springs: with more steps they hold more than the flexures do.
 MOST_STEPS = 12
@@ -275,7 +274,7 @@ class Condensed:
     def load_row(self, r: Placed) -> tuple[int, Matrix]:
         """The element whose load a reading is of, and its row (1, 6) of a wrench on the free end at the global origin."""
         k = self.element_named(r.section.of, r.copy)
-        return k, inverse_adjoint(self.frames[k], self.ends[k])[LOADS.index(r.section.load or "F_x"), :]
+        return k, inverse_adjoint(self.frames[k], self.ends[k])[WRENCH.index(r.section.load or "F_x"), :]
 
     @property
     def reading_motion(self) -> Matrix:

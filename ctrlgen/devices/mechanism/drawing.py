@@ -12,6 +12,9 @@ class Drawing(Protocol):
     """What the equations need of a mechanism's description (`devices.mechanism.Mechanism`)."""
 
     actuator: tuple[Any, ...]
+    body: tuple[Any, ...]
+    pattern: tuple[Any, ...]
+    reading: tuple[Any, ...]
     material: tuple[Any, ...]
     element: tuple[Any, ...]
     output: Any
@@ -38,6 +41,10 @@ class Drawing(Protocol):
     @property
     def bodies(self) -> tuple[str, ...]:
         """The names of all bodies, copies with their number."""
+        ...
+
+    def body_number(self, name: str, pattern: str, copy: int) -> int | None:
+        """The number of a body, as a table of a pattern names it in its copy."""
         ...
 
     @property

@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 from pydantic import StrictBool, model_validator
 
+from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.hinge import Hinge
 from ctrlgen.devices.mechanism.copies import Placed
@@ -247,7 +248,7 @@ class CircularHinge(Flexible):
         return (FlexureSection("neck", R, area, about_y, about_z / (1 + t / (2 * R)) ** 0.45, torsion),)
 
 
-def flexures_in_one_place(placed: Sequence[Placed], size: float) -> list[str]:
+def flexures_in_one_place(placed: Sequence[Placed], size: float) -> list[Fault]:
     """Flexures of a material, or copies of one, of which two join the same bodies with their ends in one place of a mechanism of a
     `size` [m] and go the same way: two pieces of material cannot be there."""
     faults, seen = [], list[tuple[str, frozenset[int], np.ndarray]]()
@@ -260,6 +261,8 @@ def flexures_in_one_place(placed: Sequence[Placed], size: float) -> list[str]:
         )
         for name, bodies, other in seen:
             if bodies == {e.first, e.second} and np.abs(where - other).max() < SAME:
-                faults.append(f"element: {e.name} lies where {name} lies; move one, or give its width to the other")
+                faults.append(
+                    Fault("element", f"{e.name} lies where {name} lies; move one, or give its width to the other")
+                )
         seen.append((e.name, frozenset({e.first, e.second}), where))
     return faults

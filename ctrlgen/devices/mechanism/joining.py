@@ -18,7 +18,6 @@ from ctrlgen.physics.flexure import Segment
 from ctrlgen.physics.screw import TWIST, Matrix, inverse
 
 Length = Annotated[Quantity, In("mm", positive=True)]
-LOADS = ("F_x", "F_y", "F_z", "M_x", "M_y", "M_z")
 STIFF = 0.01  # of the largest compliance of a mechanism's flexures, below which a direction counts as held
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import show
 from ctrlgen.devices.mechanism.condensed import Condensed, nominal
 from ctrlgen.devices.mechanism.drawing import Drawing
@@ -34,20 +35,26 @@ def stiffened(elements: Sequence[Any]) -> tuple[Any, ...] | None:
     return tuple(e.model_copy(update={"geometric_stiffening": True}) if isinstance(e, Beam) else e for e in elements)
 
 
-def second_order_faults(device: Drawing) -> list[str]:
+def second_order_faults(device: Drawing) -> list[Fault]:
     """What the expansion of the equilibrium does not hold."""
     stiffens = [e.name for e in device.element if getattr(e, "geometric_stiffening", False)]
     faults, asked = [], "geometric_stiffening" if stiffens else "kinematics" if device.second_order else ""
     if asked and any(isinstance(e, Spring) and e.cubic for e in device.element):
-        faults.append(f"{asked}: the second order is that of linear flexures; leave it out, or the springs' k_3")
+        faults.append(Fault(asked, "the second order is that of linear flexures; leave it out, or the springs' k_3"))
     if stiffens and device.kinematics == "first_order" and "kinematics" in device.model_fields_set:
         faults.append(
-            f'kinematics: geometric_stiffening of {", ".join(stiffens)} is of second order, not of "first_order"; leave out one of them'
+            Fault(
+                "kinematics",
+                f'geometric_stiffening of {", ".join(stiffens)} is of second order, not of "first_order"; leave out one of them',
+            )
         )
     if stiffens and device.actuator and device.actuator[0].kind == "displacement":
         faults.append(
-            f"geometric_stiffening: of {', '.join(stiffens)} has no effect where actuators prescribe displacements; leave it out, "
-            'and write kinematics = "second_order"'
+            Fault(
+                "geometric_stiffening",
+                f"of {', '.join(stiffens)} has no effect where actuators prescribe displacements; leave it out, "
+                'and write kinematics = "second_order"',
+            )
         )
     return faults
 

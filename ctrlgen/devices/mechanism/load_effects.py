@@ -5,6 +5,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
+from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import show
 from ctrlgen.devices.mechanism.condensed import Condensed, nominal
 from ctrlgen.devices.mechanism.drawing import Drawing
@@ -15,7 +16,7 @@ from ctrlgen.physics.screw import TWIST, inverse_adjoint
 STILL = 1e-6  # of the largest component of a motion, below which it is rounding of a symmetric drawing
 
 
-def load_faults(device: Drawing) -> list[str]:
+def load_faults(device: Drawing) -> list[Fault]:
     """Loads that the model cannot hold: beside cubic springs, masses on bodies without one, and those that buckle the mechanism."""
     if not (device.load or device.gravity):
         return []
@@ -25,14 +26,14 @@ def load_faults(device: Drawing) -> list[str]:
         if x.section.mass is not None and device.placed_bodies[x.second].section.mass is None
     ]
     if heavy:
-        return [f"load: {', '.join(heavy)}: give mass and inertia to the body that carries it"]
+        return [Fault("load", f"{', '.join(heavy)}: give mass and inertia to the body that carries it")]
     c = nominal(device)
     if c.cubics:
-        return ["load: constant loads beside cubic springs are not held by the model; leave out one of them"]
+        return [Fault("load", "constant loads beside cubic springs are not held by the model; leave out one of them")]
     loads = Loads(c, SecondOrder(c))
     K = ca.DM(ca.evalf(ca.SX(c.held_stiffness))).full()
     if np.linalg.eigvalsh(K + ca.DM(loads.stiffness).full()).min() <= 0:
-        return ["load: the loads buckle the mechanism: make it stiffer, or load it less"]
+        return [Fault("load", "the loads buckle the mechanism: make it stiffer, or load it less")]
     return []
 
 

@@ -15,13 +15,14 @@ import casadi as ca
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
+from ctrlgen.core.errors import Fault, TableFaults
 from ctrlgen.core.units import Quantity
 from ctrlgen.devices.device_physics import DevicePhysics
 from ctrlgen.devices.load import GROUND_NAME, Gravity, Load, joined
 from ctrlgen.devices.mechanism.bent_beams import BentBeam, ThermalActuator
 from ctrlgen.devices.mechanism.condensed import MOST_STEPS, SPARE_STEPS, Condensed, nominal
 from ctrlgen.devices.mechanism.copies import Copied, CopiedParts, Placed
-from ctrlgen.devices.mechanism.flexures import Blade, CircularHinge, Flexible, Strut, Wire, flexures_in_one_place
+from ctrlgen.devices.mechanism.flexures import Blade, CircularHinge, Strut, Wire, flexures_in_one_place
 from ctrlgen.devices.mechanism.force_readings import reach as load_reach
 from ctrlgen.devices.mechanism.force_readings import unloaded
 from ctrlgen.devices.mechanism.internal_modes import structural_model
@@ -29,6 +30,7 @@ from ctrlgen.devices.mechanism.linear_range import second_order_faults, stiffene
 from ctrlgen.devices.mechanism.load_effects import load_faults
 from ctrlgen.devices.mechanism.mechanism_physics import mechanism_physics
 from ctrlgen.devices.mechanism.modes import free_between_springs, guyan_modes, inertia_faults, inertia_remarks
+from ctrlgen.devices.mechanism.name_faults import name_faults
 from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.devices.mechanism.springs import Spring
 from ctrlgen.devices.mechanism.stated_compliances import Compliance, ComplianceMatrix
@@ -115,83 +117,75 @@ class Mechanism(CopiedParts):
         return self._checked()
 
     def _checked(self) -> Mechanism:
-        """Itself. Raises ValueError naming all faults."""
+        """Itself. Raises TableFaults."""
         empty = [key for key in ("body", "element", "actuator") if not getattr(self, key)]
         if empty:
-            raise ValueError("; ".join(f"{key}: there is none; add a [[{key}]] table" for key in empty))
-        faults: list[str] = []
-        for what, names in {
-            "material": [m.name for m in self.material],
-            "pattern": [q.name for q in self.pattern],
-            "body": list(self.bodies),
-            "element": [e.name for e in self.element],
-            "actuator": [a.name for a in self.actuator],
-            "load": [x.name for x in self.load],
-            "reading": [*self.output.channels, *(r.name for r in self._copies("reading"))],
-        }.items():
-            faults += [f"{what}: {name!r} is named twice" for name in dict.fromkeys(names) if names.count(name) > 1]
-        if GROUND_NAME in self.bodies:
-            faults.append('body: "ground" is the name of what does not move; choose another one')
-        known = {q.name for q in self.pattern} | {""}
-        for where, sections in (
-            ("body", self.body),
-            ("element", self.element),
-            ("actuator", self.actuator),
-            ("reading", self.reading),
-            ("load", self.load),
-        ):
-            for k, section in enumerate(sections):
-                if section.pattern not in known:
-                    faults.append(f"{where}[{k}].pattern: {section.pattern!r} is no pattern")
-        if not faults:
-            faults += self._unknown_names()
+            raise TableFaults([Fault(key, f"there is none; add a [[{key}]] table") for key in empty])
+        faults = name_faults(self)
         if len({a.kind for a in self.actuator}) > 1:
             faults.append(
-                "actuator: some push, some heat or some prescribe a displacement; give one kind, a stack as force with stiffness"
+                Fault(
+                    "actuator",
+                    "some push, some heat or some prescribe a displacement; give one kind, a stack as force with stiffness",
+                )
             )
         if len({a.time_constant is None for a in self.actuator}) > 1:
-            faults.append("actuator: some have a time_constant and some do not; give one to all or to none")
+            faults.append(Fault("actuator", "some have a time_constant and some do not; give one to all or to none"))
         if len({getattr(a, "heater_resistance", None) is None for a in self.actuator}) > 1:
             faults.append(
-                "actuator: some have a heater_resistance and some do not; the drives are all voltages or all powers"
+                Fault(
+                    "actuator",
+                    "some have a heater_resistance and some do not; the drives are all voltages or all powers",
+                )
             )
         if not faults and len(self.output.channels) != len(self.placed_actuators):
             counts = f"{len(self.output.channels)} channels, {len(self.placed_actuators)} actuators"
-            faults.append(f"output.channels: {counts}; follow as many channels as there are actuators")
+            faults.append(Fault("output.channels", f"{counts}; follow as many channels as there are actuators"))
         faults += [] if faults else flexures_in_one_place(self.placed_elements, self.size)
         if not faults and (loose := mechanism.loose_bodies(len(self.bodies), self._joints)):
-            faults.append(f"body: nothing joins {', '.join(self.bodies[i] for i in loose)} to the ground")
+            faults.append(Fault("body", f"nothing joins {', '.join(self.bodies[i] for i in loose)} to the ground"))
         if not faults and (free := free_between_springs(self)):
             faults.append(
-                f"body: springs leave {', '.join(free)} free in some direction; add a spring or a flexure there"
+                Fault(
+                    "body", f"springs leave {', '.join(free)} free in some direction; add a spring or a flexure there"
+                )
             )
         if not faults and self.cubic_steps > MOST_STEPS:
             faults.append(
-                "element: at the largest travel the cubic springs push harder than the flexures beside them can hold (or soften "
-                "until nothing holds them); lower their k_3, or the travel"
+                Fault(
+                    "element",
+                    "at the largest travel the cubic springs push harder than the flexures beside them can hold (or soften "
+                    "until nothing holds them); lower their k_3, or the travel",
+                )
             )
         faults += second_order_faults(self)
         faults += [] if faults else self._unmoved()
         faults += [] if faults or self.dynamics is None else inertia_faults(self)
         faults += [] if faults else load_faults(self)
         if faults:
-            raise ValueError("; ".join(faults))
+            raise TableFaults(faults)
         # Those of the file: a copy with other numbers keeps them
         _ = (self.channel_scale, self.reading_scale, self.cubic_steps)
         return self
 
-    def _unmoved(self) -> list[str]:
+    def _unmoved(self) -> list[Fault]:
         """Channels that no actuator moves, or that move only together."""
         moved = self._output_motion * np.array([self.size] * 3 + [1.0] * 3)[:, None]  # turns as displacements
         rows, channels = moved[[TWIST.index(c) for c in self.output.channels]], self.output.channels
         still = [c for c, row in zip(channels, rows, strict=True) if np.abs(row).max() <= MOVED * np.abs(moved).max()]
         if still:
             return [
-                f"output.channels: no actuator moves {', '.join(still)}; follow others, or push in another direction"
+                Fault(
+                    "output.channels",
+                    f"no actuator moves {', '.join(still)}; follow others, or push in another direction",
+                )
             ]
         if np.linalg.cond(rows / np.abs(rows).max(axis=1, keepdims=True)) > 1 / MOVED:
             return [
-                f"output.channels: {', '.join(channels)} move only together; follow others, or place the actuators otherwise"
+                Fault(
+                    "output.channels",
+                    f"{', '.join(channels)} move only together; follow others, or place the actuators otherwise",
+                )
             ]
         least = MOVED * max(farthest(a.travel) for a in self.actuator)
         unread = unloaded(self) + [
@@ -200,58 +194,14 @@ class Mechanism(CopiedParts):
             if r.section.of is None and seen * (1.0 if r.section.about is None else self.size) <= least
         ]
         return (
-            [f"reading: no actuator moves (or loads) what {', '.join(unread)} reads; read in another direction"]
+            [
+                Fault(
+                    "reading", f"no actuator moves (or loads) what {', '.join(unread)} reads; read in another direction"
+                )
+            ]
             if unread
             else []
         )
-
-    def _unknown_names(self) -> list[str]:
-        faults = []
-        materials = {m.name for m in self.material}
-        for k, e in enumerate(self.element):
-            faults += self._no_body(f"element[{k}]", e, "from", "to")
-            if isinstance(e, Flexible) and e.material not in materials:
-                faults.append(f"element[{k}].material: {e.material!r} is no material")
-        elements = {e.name: e for e in self.element}
-        for k, a in enumerate(self.actuator):
-            if a.kind != "force":
-                moved = elements.get(a.on)
-                if moved is None or moved.pattern != a.pattern:
-                    faults.append(
-                        f"actuator[{k}].on: {a.on!r} is no element"
-                        + (f" with the pattern {a.pattern!r}" if a.pattern else "")
-                    )
-                elif a.kind == "thermal" and not isinstance(moved, BentBeam):
-                    faults.append(f"actuator[{k}].on: {a.on!r} is no bent_beam, which a heater needs")
-                elif (
-                    isinstance(moved, BentBeam)
-                    and a.kind == "thermal"
-                    and not any(m.name == moved.material and m.expansion for m in self.material)
-                ):
-                    faults.append(f"actuator[{k}].on: give the material of {a.on!r} its expansion and expansion_slope")
-                continue
-            faults += self._no_body(f"actuator[{k}]", a, "on", "against")
-        for k, x in enumerate(self.load):
-            faults += self._no_body(f"load[{k}]", x, "on", "against")
-        for k, r in enumerate(self.reading):
-            faults += self._no_body(f"reading[{k}]", r, "body", "against")
-            if r.of is not None and (r.of not in elements or elements[r.of].pattern != r.pattern):
-                faults.append(
-                    f"reading[{k}].of: {r.of!r} is no element" + f" with the pattern {r.pattern!r}" * bool(r.pattern)
-                )
-        if self.output.body not in self.bodies:
-            faults.append(f"output.body: {self.output.body!r} is no body; there are {', '.join(self.bodies)}")
-        return faults
-
-    def _no_body(self, where: str, table: Any, *keys: str) -> list[str]:
-        """The names of bodies in a table, under `keys`, that are none."""
-        names = {key: getattr(table, "from_" if key == "from" else key) for key in keys}
-        pattern = f" with the pattern {table.pattern!r}" if table.pattern else ""
-        return [
-            f"{where}.{key}: {name!r} is no body{pattern}"
-            for key, name in names.items()
-            if name is not None and self._number(name, table.pattern, 1) is None
-        ]
 
     @property
     def second_order(self) -> bool:
@@ -273,21 +223,16 @@ class Mechanism(CopiedParts):
         """The largest distance of an element's end from the origin [m]."""
         return max(float(np.linalg.norm([x.si for x in e.at])) for e in self.element) or 1e-3
 
-    def _number(self, name: str, pattern: str, copy: int) -> int | None:
+    def body_number(self, name: str, pattern: str, copy: int) -> int | None:
         """The number of a body as an element of a `pattern` names it, from its copy; None where there is none."""
         if name == GROUND_NAME:
             return GROUND
-        for known in (
-            (f"{name}_{copy}",)
-            if pattern and any(b.name == name and b.pattern == pattern for b in self.body)
-            else (name,)
-        ):
-            if known in self.bodies:
-                return self.bodies.index(known)
-        return None
+        copied = pattern and any(b.name == name and b.pattern == pattern for b in self.body)
+        known = f"{name}_{copy}" if copied else name
+        return self.bodies.index(known) if known in self.bodies else None
 
     def _between(self, copy: Copied, first: str, second: str) -> Placed:
-        numbers = [self._number(name, copy.section.pattern, copy.copy) for name in (first, second)]
+        numbers = [self.body_number(name, copy.section.pattern, copy.copy) for name in (first, second)]
         ends = [GROUND if n is None else n for n in numbers]
         return Placed(**vars(copy), first=ends[0], second=ends[1])
 

@@ -13,12 +13,12 @@ from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.devices.mechanism.copies import Placed
 from ctrlgen.devices.mechanism.drives import transduction
 from ctrlgen.devices.mechanism.force_readings import inertial
-from ctrlgen.devices.mechanism.joining import LOADS
 from ctrlgen.devices.mechanism.loads import Loads
 from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.devices.mechanism.stretching import Stretching
 from ctrlgen.devices.travel import ends_of, farthest
 from ctrlgen.physics.damping import modal_damping
+from ctrlgen.physics.screw import WRENCH
 
 
 def mechanism_physics(c: Condensed) -> DevicePhysics:
@@ -117,7 +117,7 @@ def _stretched(c: Condensed, r: Placed, stretching: Stretching, d: ca.SX) -> ca.
     if r.section.of is None:
         return ca.SX(1, 1)
     k = c.element_named(r.section.of, r.copy)
-    return stretching.extra_load(k, 0.0, d)[LOADS.index(r.section.load or "F_x")]
+    return stretching.extra_load(k, 0.0, d)[WRENCH.index(r.section.load or "F_x")]
 
 
 def _flexure_limits(c: Condensed, d: ca.SX, stretching: Stretching | None, loads: Loads) -> list[Limit]:

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 import scipy
 
+from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import show
 from ctrlgen.devices.mechanism.condensed import KEPT, Condensed, nominal
 from ctrlgen.devices.mechanism.drawing import Drawing
@@ -320,16 +321,26 @@ def inertia_remarks(device: Drawing) -> list[str]:
     return [f"the bodies do not move as at rest in the modes {', '.join(far)}: drive them far slower"] if far else []
 
 
-def inertia_faults(device: Drawing) -> list[str]:
+def inertia_faults(device: Drawing) -> list[Fault]:
     """What keeps the table `dynamics` from being of use."""
     if device.actuator[0].kind == "thermal":
-        return ["dynamics: belongs to actuators that push by force; a heater is far slower than its mechanism rings"]
+        return [
+            Fault(
+                "dynamics", "belongs to actuators that push by force; a heater is far slower than its mechanism rings"
+            )
+        ]
     if device.actuator[0].kind == "displacement":
         return [
-            "dynamics: inertia needs actuators that push; one that prescribes a displacement takes whatever force it needs"
+            Fault(
+                "dynamics",
+                "inertia needs actuators that push; one that prescribes a displacement takes whatever force it needs",
+            )
         ]
     if not len(guyan_modes(device).frequencies):
         return [
-            "dynamics: the actuators move no mass in some direction; give mass and inertia to the bodies that they move"
+            Fault(
+                "dynamics",
+                "the actuators move no mass in some direction; give mass and inertia to the bodies that they move",
+            )
         ]
     return []
