@@ -5,10 +5,12 @@ from __future__ import annotations
 import subprocess
 from pathlib import Path
 
+from ctrlgen.controller.controller_step import ControllerStatus
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.toolchains import FLAGS
 from ctrlgen.firmware.folder import CFolder
 
+UNSURE = int(ControllerStatus.UNSURE)
 STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
 
 
@@ -29,8 +31,8 @@ def everything(packages: dict[str, CFolder]) -> str:
         {online}_state state;
         {online}_output out;
         {online}_init(&state);
-        /* without UNSURE, 256, which a device that settles has */
-        if (({online}_settle(&state, {vectors}_target[0], &out) & ~256U) != {vectors}_status[0]) {{ return {4 * k + 1}; }}
+        /* without UNSURE, which a device that settles has */
+        if (({online}_settle(&state, {vectors}_target[0], &out) & ~{UNSURE}U) != {vectors}_status[0]) {{ return {4 * k + 1}; }}
         if ({player}_sample({vectors}_played[0], out.drive) != 0) {{ return {4 * k + 2}; }}
         if (({test}(&r) != 0) || (r.compared != {test.upper()}_VECTORS)) {{ return {4 * k + 3}; }}
     }}

@@ -22,7 +22,7 @@ from ctrlgen.firmware.c.misra import CPPCHECK
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.templates import write
 from ctrlgen.firmware.online.online import online_context
-from ctrlgen.firmware.online.vectors import played_vectors, vectors
+from ctrlgen.firmware.online.vectors import played_vectors, self_test_calls, vectors
 from ctrlgen.firmware.package import PIECES, owners, write_package
 from ctrlgen.firmware.player.compression import Compression, compress
 from ctrlgen.firmware.player.player_context import player_context
@@ -49,6 +49,8 @@ class CFolder(Shown):
     worst_operations: int
     # In the controller's state, behind its own: constants of the start and what follows from them.
     given_numbers: int = 0
+    # Integers in the controller's state
+    state_words: int = 1
 
     def facts(self) -> dict[str, object]:
         """What it is, in a few words."""
@@ -103,6 +105,7 @@ def generate(
             compression.get(real), len(command), scenario.clock
         )
         contexts[real] = samples | online | of | reference | {"solved": solution is not None, "left_out": left_out}
+        contexts[real] |= self_test_calls(contexts[real])
         by_template = {"online": online, "selftest": contexts[real], "vectors": contexts[real]}
         if played:
             by_template["player"] = online | samples
@@ -127,6 +130,7 @@ def generate(
         operations=cost["step"],
         worst_operations=cost["worst"],
         given_numbers=contexts[Real.FLOAT]["given_numbers"],
+        state_words=len(contexts[Real.FLOAT]["words"]),
     )
 
 

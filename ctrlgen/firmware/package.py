@@ -146,21 +146,11 @@ def _context(
         "target": c["rows"][0]["target"],
         "period": f"{scenario.sample_time:.6g}" if scenario.sample_time else "",
         "memory": _memory(c, contexts),
-        "vectors": _test_calls(c),
+        "vectors": c["calls"],
         "tolerance": {real.suffix: contexts[real]["tolerance"] for real in Real},
         "figures": list(figures),
         "inputs": list(zip(inputs, scenario.digest.values(), strict=True)),
     }
-
-
-def _test_calls(c: dict[str, Any]) -> int:
-    """What the test on the target counts: of the controller, and of the player its wrap or end and three refusals too."""
-    online = len(c["rows"]) + 2 * c["unusable"] + 2 + 2 * c["lost"] + c["estimate_calls"]
-    return online + (
-        len(c["played"]) + len(c["timed"]) + 6 + (c["closed"] and c["whole"] < 2**32) + c["played_unusable"]
-        if c["player"]
-        else 0
-    )
 
 
 def _memory(c: dict[str, Any], contexts: Mapping[Real, dict[str, Any]]) -> list[dict[str, Any]]:
@@ -169,12 +159,13 @@ def _memory(c: dict[str, Any], contexts: Mapping[Real, dict[str, Any]]) -> list[
     chosen: list[PlayerCandidate | None] = [contexts[real].get("chosen") for real in Real]
     rated = nu if c["rated"] else 0
     given = (f" + {rated}" if rated else "") + (f" + {c['given_numbers']}" if c["given_numbers"] else "")
-    words, told = (4, "four words") if c["estimated"] else (1, "a word")
+    words = len(c["words"])
+    told = "a word" if words == 1 else f"{words} words of 4 B"
     state = f"`sizeof({c['online']}_state)` = ({x} + {n}{given}) numbers and {told}, RAM, one a device"
     output = f"`sizeof({c['online']}_output)` = ({nu} + {n} + {n_s}) numbers, RAM or stack"
     rows = [
-        # a word is aligned as a number
-        _counted("state", x + n + rated + c["given_numbers"] + (words == 1), 16 * (words == 4), state),
+        # an odd word is aligned as a number
+        _counted("state", x + n + rated + c["given_numbers"] + words % 2, 4 * (words - words % 2), state),
         _counted("output", nu + n + n_s, 0, output),
         _vectors(contexts),
     ]

@@ -23,7 +23,6 @@ from ctrlgen.verification.host import Host
 from ctrlgen.verification.reference import ReferenceAnswers
 
 RANDOM = 400  # of the reference's random targets, reachable and beyond
-STATE_WORDS = 4  # integers at most in a controller's state: its mark, and three of what is believed (estimate.c)
 
 
 @dataclass(frozen=True)
@@ -112,7 +111,7 @@ def _sequences(
     online, real, machine = folder.online[host.real], host.real, machines["online"]
     nu, m = ref.model.u.numel(), ref.random.shape[1]
     answered = ref.width
-    numbers = sum(part.size for part in ref.controller.rest()) + STATE_WORDS + folder.given_numbers
+    numbers = sum(part.size for part in ref.controller.rest()) + folder.state_words + folder.given_numbers
     state, target, out = (machine.reserve(count, real) for count in (numbers, m, answered))
 
     def answers(function: str, targets: np.ndarray) -> Answers:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ctrlgen.controller.contraction import FOREVER, KNOWN, Contraction
+from ctrlgen.controller.contraction import FOREVER, KNOWN
 from ctrlgen.controller.estimate import EXACT
 from ctrlgen.controller.feedforward import SECANT_STEPS, Controller
 from ctrlgen.controller.lost_state import FAR
@@ -26,6 +26,9 @@ from ctrlgen.firmware.online.printed_kernels import PrintedKernels, kernel_print
 from ctrlgen.firmware.online.start_constants import start_calls, start_context
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.version import __version__, program
+
+WORDS = ("ready",)  # integers of a controller's state, in the order of its structure
+ESTIMATE_WORDS = ("unsure", "ticking", "tick")  # of one whose state can be wrong (estimate.c)
 
 
 def online_context(scenario: Scenario, controller: Controller, real: Real, prefix: str) -> dict[str, Any]:
@@ -62,7 +65,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
             "rest": kernels.nominal.rest,
             "far": FAR,
             "estimated": kernels.contraction,
-            "estimate_calls": _estimate_calls(kernels.contraction, kernels.nominal.n_states),
+            "words": WORDS if kernels.contraction is None else WORDS + ESTIMATE_WORDS,
             "forever": FOREVER,
             "share_known": KNOWN,
             "exact": EXACT,
@@ -79,14 +82,6 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     context["bits_wanted"] = _bits_wanted(context)
     context["limiter"] = limiter_text(prefix, real, context["macros"])
     return context
-
-
-def _estimate_calls(bounds: Contraction | None, measured: int) -> int:
-    """What the self test counts of calls that correct a state: of every controller that has them, of one that frees itself, of measured
-    states."""
-    if bounds is None:
-        return 0
-    return 30 + (1 if bounds.unknown == FOREVER else 3) + (16 if measured else 0)
 
 
 def build_of(scenario: Scenario, controller: Controller, real: Real) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import numpy as np
 from ctrlgen.controller.controller_step import ControllerStatus
 from ctrlgen.controller.feedforward import Controller
 from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.templates import render
 from ctrlgen.firmware.online.limit_tables import FLOAT_SLACK
 from ctrlgen.firmware.online.vector_cases import Call, limiter_calls
 from ctrlgen.firmware.player.compression import Compression, SampleTable
@@ -99,6 +100,18 @@ def played_vectors(compression: Compression | None, samples: int, clock: Clock) 
         "played_tolerance": max(rounding, float(np.finfo(np.float32).tiny)),
         "timed": _timed(compression, indices, samples, 1 / in_time(clock).sample_time),
     }
+
+
+def self_test_calls(c: dict[str, Any]) -> dict[str, int]:
+    """What the self test of a context counts: "online_calls" of the controller, and all "calls", with those of the player, its wrap or
+    end and the refused ones among them."""
+    estimate = render("selftest_estimate.c", c).count("count(outcome") if c["estimated"] else 0
+    online = len(c["rows"]) + 2 * c["unusable"] + 2 + 2 * c["lost"] + estimate
+    player = 0
+    if c["player"]:
+        wraps = c["closed"] and c["whole"] < 2**32
+        player = len(c["played"]) + len(c["timed"]) + 6 + wraps + c["played_unusable"]
+    return {"online_calls": online, "calls": online + player}
 
 
 def _meetings(curve: SampleTable | Spline) -> Iterator[tuple[int, float]]:
