@@ -12,12 +12,13 @@ import numpy as np
 from conftest import SCENARIOS
 
 from ctrlgen import Controller, build_model, generate, load_scenario
+from ctrlgen.controller.controller_step import ControllerStatus
 from ctrlgen.controller.estimate import Estimator
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import CFolder
 
-UNSURE, CLOCK, INPUT, LOST = 256, 512, 16, 32
+UNSURE, CLOCK, INPUT, LOST = (int(ControllerStatus[name]) for name in ("UNSURE", "CLOCK", "INPUT", "LOST"))
 N = 6
 
 
@@ -110,7 +111,6 @@ class Storm:
     late: int = 0
     double: int = 0
     told: int = 0  # calls with UNSURE
-    hottest_told: float = 0.0  # [K] one sample after a call with another status
     promised: list[np.ndarray] = field(default_factory=list)
     hot: list[np.ndarray] = field(default_factory=list)
 
@@ -180,7 +180,6 @@ def storm(c: Compiled, calls: int, seed: int, forgets: bool = True) -> Storm:
             found.hot.append(device.T)
         else:
             found.told += bool(status & UNSURE)
-            found.hottest_told = max(found.hottest_told, float(device.T.max()))
     return found
 
 

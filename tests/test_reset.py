@@ -12,9 +12,9 @@ from creeping_axis import CREEP
 from reset_storm import CLOCK, INPUT, LOST, UNSURE, Compiled, N, compiled, displacements, poses, storm
 
 from ctrlgen import build_model, load_device, load_scenario
-from ctrlgen.controller.contraction import FOREVER, shrinking
+from ctrlgen.controller.contraction import FOREVER, forgetting, shrinking
 from ctrlgen.controller.controller_step import ControllerStatus, answer
-from ctrlgen.controller.estimate import Estimator
+from ctrlgen.controller.estimate import EXACT, Estimator
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.firmware.c.real import Real
 
@@ -40,6 +40,7 @@ def keeps_its_promises(c: Compiled, calls: int, seed: int) -> None:
     T, promised, (low, high) = np.array(found.hot), np.array(found.promised), c.model.z_bounds
     z = displacements(c, T)
     assert len(T) > calls / 20 and found.resets > calls / 100 and found.told > calls / 5
+    assert found.late > calls / 50 and found.double > calls / 200
     assert T.max() <= HOT and np.all(z >= low - POSITION) and np.all(z <= high + POSITION)
     assert np.max(np.abs(z - promised)) <= POSITION
 
@@ -120,6 +121,40 @@ def test_a_measurement_is_believed_as_far_as_it_is_better(floats):
         assert told == ControllerStatus.INPUT and same is rest
 
 
+def test_a_device_that_was_not_followed_is_unsure_until_it_must_have_settled(floats):
+    """As at 100 kHz, where to settle takes much longer than the samples of a late call that are followed one by one."""
+    twin = Estimator(controller_of(floats.model, "pose", 1e-5))
+    held = np.full(N, 0.3)
+    for ticks in (EXACT, EXACT + 1, 5 * EXACT):
+        _, late = twin.elapsed(twin.rest(), ticks, held)
+        assert late.unsure == (0 if ticks <= EXACT else twin.bounds.settling - ticks)
+
+
+def test_a_clock_that_goes_back_leaves_the_state_unknown(floats):
+    twin, target = floats.twin, poses(floats, np.random.default_rng(3), 1)[0]
+    _, now = twin.step_at(twin.rest(), 10, target, np.zeros(N))
+    assert now.unsure == 0
+    step, now = twin.step_at(now, 8, target, np.zeros(N))
+    assert ControllerStatus.UNSURE | ControllerStatus.CLOCK in step.status
+    assert now.unsure == twin.bounds.unknown - 1
+
+
+def test_a_measured_state_is_known_when_it_was_said_to_be(floats):
+    """Believed at one end of the error, true at the other: as far apart as the count is for. At 100 kHz a halving is 347 samples, so that
+    none is lost to a whole sample."""
+    twin = Estimator(controller_of(floats.model, "pose", 1e-5))
+    b, rest, (_, moving) = twin.bounds, twin.rest(), twin.controller.kernels.modes
+    error = 0.49 * b.known[0] * 2**10
+    middle = rest.state[0] + 100
+    _, near = twin.observe(twin.forget(rest), middle, error)
+    gap = near.state[0] - (middle - error)
+    z, off = near.state[1], np.zeros(N)
+    ends = near.state[0], middle - error
+    for _ in range(near.unsure):
+        ends = answer(moving.advance, ends[0], z, off), answer(moving.advance, ends[1], z, off)
+    assert np.all(gap > 900 * b.known) and np.all(np.abs(ends[0] - ends[1]) <= b.known)
+
+
 def test_a_lost_state_is_not_corrected(floats):
     floats.c_init(floats.at)
     floats.state.x[0] = np.nan
@@ -167,6 +202,15 @@ def test_a_hysteresis_is_not_known_by_waiting(tmp_path):
     assert np.isinf(bounds.known[N:]).any() and np.all(np.isfinite(bounds.known[:N]))
 
 
+def test_what_a_play_acts_on_does_not_forget_either():
+    """A lag, a play (a gain of one) that follows it, a lag that follows the play, and one that follows that."""
+    gain = np.diag([0.5, 1.0, 0.5, 0.5]) + np.diag([0.1, 0.1, 0.1], -1)
+    assert forgetting(gain).tolist() == [True, False, False, False]
+    unbounded = np.diag([0.5, 0.5])
+    unbounded[1, 0] = np.inf
+    assert forgetting(unbounded).tolist() == [True, False]
+
+
 def test_devices_without_states_and_equilibria_have_nothing_to_be_wrong():
     for name in ("meso_circle", "coupled_dof"):
         scenario = load_scenario(SCENARIOS / name)
@@ -180,8 +224,11 @@ def test_errors_shrink_as_fast_as_they_are_said_to(rng):
         gain = rng.uniform(0, 1, (5, 5)) * (rng.random((5, 5)) < 0.4)
         gain *= 0.97 / max(np.abs(np.linalg.eigvals(gain)).max(), 0.1)
         error = 10 ** rng.uniform(0, 6, 5)
-        samples = shrinking(gain, error).samples(error)
-        left = np.linalg.matrix_power(gain, samples) @ error
+        shrinks = shrinking(gain, error)
+        for n in range(1, 12):  # what a measurement's error is counted by, all at one size
+            after = np.linalg.matrix_power(gain, n * shrinks.halving) @ np.ones(5)
+            assert after.max() <= shrinks.growth * 0.5**n * (1 + 1e-9)
+        left = np.linalg.matrix_power(gain, shrinks.samples(error)) @ error
         for _ in range(200):
             assert np.all(left <= 1 + 1e-9)
             left = gain @ left
@@ -196,4 +243,3 @@ def test_the_count_of_a_settling_device_is_told_by_every_call(floats):
         step, there = twin.step(there, target, settle=True)
     step, there = twin.step(there, target, settle=True)
     assert not step.status & ControllerStatus.UNSURE
-    assert isinstance(twin, Estimator)

@@ -29,14 +29,8 @@ MOST = 2**31  # samples that are counted; a state that needs more is taken for o
 SLOWEST = 1 - 2.0**-30  # rate of a sample above which an error is taken not to die out; a rounding is far below
 ROOM = 1.0  # of its range, by which a displacement is taken to be beyond while a state is unknown: a heater that was held on
 PIECES = 32  # of the range of displacements, over which interval arithmetic is narrower
-TRIED = (
-    1e-6,
-    1e-3,
-    1e-2,
-    0.03,
-    0.1,
-    0.3,
-)  # of the way from the spectral radius to one: rates of which the soonest is taken
+# Of the way from the spectral radius to one: rates of which the soonest is taken
+TRIED = (1e-6, 1e-3, 1e-2, 0.03, 0.1, 0.3)
 
 
 @dataclass(frozen=True)
@@ -61,6 +55,11 @@ class Contraction:
     halving: int
     growth: float
 
+    def in_known(self, n: int) -> float:
+        """Of a belief of the first n states at one end of a measurement: by how many times `known` it is wrong at most, over the error
+        of the measurement in SI, which is half of what lies between the ends."""
+        return 2.0 * self.growth / float(np.min(self.known[:n]))
+
     @property
     def elsewhere(self) -> np.ndarray:
         """(n_x,) of each state a value that drives can lead to, and that it has not at rest."""
@@ -83,7 +82,7 @@ def contraction(every: Sequence[Stepped], sample_time: float) -> Contraction:
     gain = np.max([_gain(k, low, high) for k in every], axis=0)
     wide, rest = high - low, nominal.rest
     known = KNOWN * np.where(np.isfinite(wide) & (wide > 0), wide, nominal.x_scale)
-    forgets = _forgetting(gain) & np.isfinite(wide)
+    forgets = forgetting(gain) & np.isfinite(wide)
     lags = gain[np.ix_(forgets, forgets)] * known[forgets] / known[forgets][:, None]
     error = wide[forgets] / known[forgets]
     shrinks = shrinking(lags, error)
@@ -101,8 +100,8 @@ def contraction(every: Sequence[Stepped], sample_time: float) -> Contraction:
         np.sign(start - rest),
         min(settling, MOST),
         settling if forgets.all() and settling < MOST else FOREVER,
-        ceil(np.log(2) / -np.log(shrinks.rate)),
-        float(np.max(shrinks.v, initial=1.0) / np.min(shrinks.v, initial=np.max(shrinks.v, initial=1.0))),
+        shrinks.halving,
+        shrinks.growth,
     )
 
 
@@ -126,9 +125,8 @@ def _gain(kernels: Stepped, low: np.ndarray, high: np.ndarray) -> np.ndarray:
         by_z = ca.substitute(_displacement_by_state(m), ca.vertcat(m.x, m.z, m.u), ca.vertcat(x, z, u))
         slope += ca.mtimes(ca.jacobian(after, z), ca.substitute(by_z, m.p, ca.DM(m.p_nominal)))
     entries = ca.Function("slope", [x, z, u], [ca.densify(ca.vec(slope))], ["x", "z", "u"], ["entries"])
-    alone = (
-        np.diff(ca.jacobian(entries(x, z, u), z).sparsity().T.colind()).max(initial=0) <= 1
-    )  # each entry reads one z at most
+    # Where each entry reads one z at most, pieces of its range are pieces of all
+    alone = np.diff(ca.jacobian(entries(x, z, u), z).sparsity().T.colind()).max(initial=0) <= 1
     room, pieces = m.z_bounds[1] - m.z_bounds[0], PIECES if alone else 1
     edges = np.linspace(m.z_bounds[0] - ROOM * room, m.z_bounds[1] + ROOM * room, pieces + 1)
     ranges = [{"x": (low, high), "z": piece, "u": m.u_bounds} for piece in pairwise(edges)]
@@ -141,7 +139,7 @@ def _displacement_by_state(m: Model) -> ca.SX:
     return -ca.solve(ca.jacobian(m.balance, m.z), ca.jacobian(m.balance, m.x))
 
 
-def _forgetting(gain: np.ndarray) -> np.ndarray:
+def forgetting(gain: np.ndarray) -> np.ndarray:
     """(n_x,) which states forget where they began: those that only states act on whose errors die out."""
     acts = np.linalg.matrix_power((gain > 0).astype(float) + np.eye(len(gain)), len(gain)) > 0  # over other states too
     dies = np.zeros(len(gain), dtype=bool)
@@ -163,6 +161,16 @@ class _Shrinking:
         """After how many an `error` is at most 1 in each place, and stays so."""
         size = float(np.max(error / self.v, initial=0.0) * np.max(self.v, initial=0.0))
         return 1 if size <= 1 else 1 + ceil(np.log(size) / -np.log(self.rate))
+
+    @property
+    def halving(self) -> int:
+        """Samples in which s v becomes at most half of it."""
+        return ceil(np.log(2) / -np.log(self.rate))
+
+    @property
+    def growth(self) -> float:
+        """The largest of v over the least: how much larger than the largest error at first any error can become."""
+        return float(np.max(self.v) / np.min(self.v)) if len(self.v) else 1.0
 
 
 def shrinking(gain: np.ndarray, error: np.ndarray) -> _Shrinking:

@@ -26,9 +26,8 @@ class ControllerStatus(IntFlag):
     # A drive changes as fast as it may: the target is reached later than commanded. Beside it DISPLACEMENT,
     # COMPOSITE and STATE say also that the device passes that limit, because a drive cannot turn back as fast as the limit asks.
     RATE = 128
-    UNSURE = (
-        256  # a state that is believed may be wrong: nothing is promised of the device beside its drives (`estimate`)
-    )
+    # A state that is believed may be wrong: nothing is promised of the device beside its drives (`estimate`)
+    UNSURE = 256
     CLOCK = 512  # the time since the last call was no sample (`estimate`)
 
 

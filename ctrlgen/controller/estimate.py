@@ -14,11 +14,11 @@ import numpy as np
 from ctrlgen.controller.contraction import FOREVER, Contraction
 from ctrlgen.controller.controller_step import ControllerStatus, ControllerStep, State, answer
 from ctrlgen.controller.feedforward import Controller
+from ctrlgen.controller.lost_state import UNLIMITED
+from ctrlgen.model.discretisation import SETTLING_SWEEPS
 
 EXACT = 64  # samples of a late call that are followed one by one; later the device is taken for settled, and counted
-REST_SWEEPS = 3  # memories that follow memories that follow actuators: as SETTLING_SWEEPS of the model
 DOUBLED = 32  # times that a measurement's error is halved at most: what is left then is below any float
-UNLIMITED = 1e18  # SI: no error is larger; as the C has it
 BACKWARD = 2**31  # ticks: a clock that went on by more went back
 
 
@@ -56,7 +56,7 @@ class Estimator:
 
     def _balanced(self, x: np.ndarray, before: State) -> State:
         z, u = before[1], self.controller.kernels.safe_drive
-        for _ in range(REST_SWEEPS):
+        for _ in range(SETTLING_SWEEPS):
             z = answer(self.controller.kernels.static.settle, x, z, u)
         return x, z, *before[2:]
 
@@ -86,7 +86,7 @@ class Estimator:
             x = answer(moving.advance, x, z, drive)
             z = answer(static.settle, x, z, drive)
         if ticks > EXACT:
-            for _ in range(REST_SWEEPS):
+            for _ in range(SETTLING_SWEEPS):
                 x = answer(static.advance, x, z, drive)
                 z = answer(static.settle, x, z, drive)
             unsure = max(unsure, self.bounds.settling)
@@ -123,7 +123,7 @@ class Estimator:
     def _samples(self, error: float) -> int:
         """After how many samples a belief at one end of a measurement with this `error` is known."""
         b, n = self.bounds, self.controller.kernels.nominal.n_states
-        left, samples = 2 * b.growth * error / float(np.min(b.known[:n])), 0
+        left, samples = b.in_known(n) * error, 0
         for _ in range(DOUBLED):
             if left > 1 and samples < b.unknown:
                 left, samples = left / 2, samples + b.halving

@@ -9,6 +9,9 @@ from ctrlgen.model.model import Model
 FAR = 4  # times the largest magnitude in its range: a number of a state that is farther was never computed
 ENDLESS = 1e15  # SI: the magnitude taken for a state without a range: none of a float's size comes near
 
+# SI: what the C has for a bound of a state that has none, and for the largest error of a measurement; its square is still a float
+UNLIMITED = 1e18
+
 
 def plausible_magnitudes(m: Model, with_drive: bool = False) -> np.ndarray:
     """(n,) the largest magnitude of each number of a state that is not lost: of x, then z, and `with_drive` then the last drive, `FAR`

@@ -23,9 +23,8 @@ from ctrlgen.numerics.taylor_intervals import taylor_intervals
 CELLS = 64  # of the range: the error of degree 12 turns 13 times, five cells a turn
 HIGHEST = 12  # degree: beyond it a root and a quotient cost no more
 LARGEST = 1e37  # coefficient that is a number in single precision
-CANCELLED = (
-    8.0  # of the range of values: terms of powers about zero may add up to this much, or three binary digits are lost
-)
+# Of the range of values: terms of powers about zero may add up to this much, or three binary digits are lost
+CANCELLED = 8.0
 
 
 @dataclass(frozen=True)

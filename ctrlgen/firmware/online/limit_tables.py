@@ -9,9 +9,9 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.controller.feedforward import Controller
+from ctrlgen.controller.lost_state import UNLIMITED
 from ctrlgen.firmware.c.cprint import Printer
 from ctrlgen.firmware.c.real import Real
-from ctrlgen.firmware.online.printed_kernels import UNLIMITED
 from ctrlgen.firmware.online.start_constants import Tables
 from ctrlgen.model.model import Model
 

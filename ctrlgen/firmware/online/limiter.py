@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from ctrlgen.controller.estimate import BACKWARD, DOUBLED, EXACT, REST_SWEEPS
+from ctrlgen.controller.estimate import BACKWARD, DOUBLED, EXACT
 from ctrlgen.controller.feedforward import SECANT_FRACTION, SECANT_STEPS
 from ctrlgen.controller.nearest_displacement import SWEEPS
 from ctrlgen.firmware.c.preprocessor import Macro, resolved
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.templates import codegen_folder
 from ctrlgen.firmware.online.limit_tables import within_test
+from ctrlgen.model.discretisation import SETTLING_SWEEPS
 
 CONFIGURATION = "limiter_config.h"  # what the macros are defined in, where the files are compiled as they are
 # Arrays of numbers of the context of online.c.j2: Z_LOW_TABLE is what stands in braces for "z_low".
@@ -175,13 +176,13 @@ def _estimate_texts(context: Mapping[str, Any]) -> dict[str, str]:
         "HALVING_TICKS": bounds.halving,
         "EXACT_TICKS": EXACT,
         "BACKWARD": BACKWARD,
-        "SETTLING_SWEEPS": REST_SWEEPS,
+        "SETTLING_SWEEPS": SETTLING_SWEEPS,
         "DOUBLED": DOUBLED,
     }
     loops = ("EXACT_TICKS", "SETTLING_SWEEPS", "DOUBLED")  # counted by int
     texts = {f"{name}_TABLE": _braces(literal(v) for v in values) for name, values in tables.items()}
     texts |= {name: str(count) if name in loops else f"{count}U" for name, count in counts.items()}
-    return texts | ({"GROWTH": literal(2.0 * bounds.growth / float(np.min(bounds.known[:n_s])))} if n_s else {})
+    return texts | ({"GROWTH": literal(bounds.in_known(n_s))} if n_s else {})
 
 
 def _start_texts(context: Mapping[str, Any]) -> dict[str, str]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ctrlgen.controller.feedforward import Controller
 from ctrlgen.controller.kernels import ControllerKernels
+from ctrlgen.controller.lost_state import UNLIMITED
 from ctrlgen.controller.motion_feedforward import MotionKernels
 from ctrlgen.controller.quick_state import QuickState
 from ctrlgen.core.units import base_unit
@@ -22,7 +23,6 @@ from ctrlgen.model.model import Model
 
 IN_EVERY_SAMPLE = ("displacement", "drive")  # short kernels of every sample
 UNROLLED = 8  # rows of a matrix that are written without a loop: 64 products are half a kilobyte
-UNLIMITED = 1e18  # SI: written for the bound of an actuator state that has none beside one that has; its square is still a float
 
 
 @dataclass(frozen=True)
