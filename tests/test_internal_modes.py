@@ -187,6 +187,20 @@ def test_a_load_cell_reads_the_spring_between_two_masses(tmp_path):
     )  # damping acts between the masses too, which no cell reads
 
 
+def test_a_load_cell_reads_the_inertia_of_modes_that_are_left_out(tmp_path):
+    """K2 (x2 - x1) far below the modes, by the condensed model in which both masses move alike."""
+    model = build_model(loaded(tmp_path, two_masses('modes_below = "4 Hz"\n' + CELL)))
+    found = frequency_response(model, np.zeros(1), "reading")
+    assert len(found.structure.mass) == 1
+    slow = found.hertz < 4
+    w = 2 * np.pi * found.hertz[slow]
+    exact = np.array([np.linalg.inv(STIFFNESS + 1j * x * damping() - x**2 * MASS)[:, 0] for x in w])
+    loads = K2 * (exact[:, 1] - exact[:, 0])
+    # damping is out of phase; what the second mass adds of higher powers of w/w_2, w_2 that of it on a held first one
+    off = np.abs(found.response[1, 0][slow].real / loads.real - 1)
+    assert off.max() < 2 * (w.max() / np.sqrt(K2 / M2)) ** 2
+
+
 def test_a_load_cell_is_simulated_with_the_inertia_of_what_it_carries(tmp_path):
     """Tension -M2 x'' of the second mass under a force that begins: at once -M2/(M1 + M2) of it. Each reading is under the drive of its
     row, as recordings have it."""

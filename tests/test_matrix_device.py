@@ -48,7 +48,8 @@ def as_texts(matrix: np.ndarray, unit) -> list[list[str]]:
 
 
 PUSHES = [
-    {"name": "a", "at": ["3 mm", "1 mm", "0 mm"], "along": [0, 1, 1], "gain": "1 N/V", "low": "-1 V", "high": "1 V", "travel": "9 um"},
+    {"name": "a", "at": ["3 mm", "1 mm", "0 mm"], "along": [0, 1, 1], "gain": "1 N/V", "low": "-1 V", "high": "1 V", "travel": "9 um",
+     "stiffness": "0.3 N/um"},
     {"name": "b", "at": ["-2 mm", "0 mm", "4 mm"], "along": [1, 0, 0], "gain": "1 N/V", "low": "-1 V", "high": "1 V", "travel": "9 um"},
 ]  # fmt: skip
 
@@ -129,6 +130,11 @@ def test_what_is_no_matrix_is_refused_by_its_rows():
     both = re.sub(r"name = .py.", 'name = "px"', MEASURED)
     with pytest.raises(InputError, match="'px' is named twice"):
         read(both)
+    alike = [tomllib.loads(NOTCH)["actuator"][0] | {"name": name} for name in "ab"]
+    with pytest.raises(InputError, match="a, b push only together"):
+        read(NOTCH, actuator=alike, channels=["delta_y", "theta_z"], readings=[])
+    with pytest.raises(InputError, match="delta_x, delta_y move only together"):
+        read(MEASURED, jacobian=[["2 um/V", "1 um/V"], ["4 nm/V", "2 nm/V"], ["1 urad/V", "3 urad/V"]])
     with pytest.raises(InputError, match="a jacobian states the motion per drive"):
         read(MEASURED + 'gain = "1 N/V"\n')
 

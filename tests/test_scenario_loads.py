@@ -85,13 +85,17 @@ def test_a_moment_is_a_couple_of_two_forces_in_the_plane(tmp_path):
         f'[[load]]\nname = "f{side + 1}"\non = "stage"\nat = ["{side * 7} mm", "3 mm", "0 mm"]\nforce = ["0 N", "{side} N", "0 N"]\n'
         for side in (1, -1)
     )
-    laws = []
-    for load in (forces, '[[load]]\nname = "m"\non = "stage"\nmoment = ["0 N*m", "0 N*m", "0.014 N*m"]\n'):
-        c = nominal(loaded(tmp_path, text + load))
-        loads = Loads(c, SecondOrder(c))
-        laws.append([dm(loads.force)[0, 0], dm(loads.stiffness)[0, 0]])
-    np.testing.assert_allclose(laws[1], laws[0], rtol=1e-9)
-    assert all(np.abs(laws[1]) > 1e-3)
+    moment = '[[load]]\nname = "m"\non = "stage"\nmoment = ["0 N*m", "0 N*m", "0.014 N*m"]\n'
+    # and with the image of each in the plane, which turns the same way
+    mirrored = ('[[pattern]]\nname = "both"\nmirror = "z"\n', 'pattern = "both"\n')
+    for before, after in (("", ""), mirrored):
+        laws = []
+        for load in (forces, moment):
+            c = nominal(loaded(tmp_path, text + before + load.replace('on = "stage"\n', f'on = "stage"\n{after}')))
+            loads = Loads(c, SecondOrder(c))
+            laws.append([dm(loads.force)[0, 0], dm(loads.stiffness)[0, 0]])
+        np.testing.assert_allclose(laws[1], laws[0], rtol=1e-9)
+        assert all(np.abs(laws[1]) > 1e-3)
 
 
 def test_a_load_on_the_3_rrr_stage_is_that_of_the_direct_stiffness_method():
@@ -147,6 +151,21 @@ def test_a_load_on_the_mems_hexapod_is_that_of_its_mechanism(tmp_path):
     J = dm(hexapod.jacobian(p.hexapod, xy_stage.stage_compliance(p.stage, p.actuator)))
     bare = at(special.physics(special.values()).restoring_force, d)
     np.testing.assert_allclose(bare - at(physics.restoring_force, d), J.T @ W, rtol=1e-9)
+    # with the stages held the struts pull at them by the same force, to which a plate yields less than at home
+    more = at(physics.tangent_compliance, d) - at(special.physics(special.values()).tangent_compliance, d)
+    np.testing.assert_allclose(
+        more, -at(lambda d: xy_stage.stiffened(d, p.stage, p.actuator), d) * (J.T @ W), rtol=1e-6
+    )
+
+
+def test_cold_stages_that_a_load_pushes_back_are_within_the_stroke():
+    """Where no actuator pushes: beyond it by a hundredth at most, of a load so small that the stages are linear."""
+    device = pushed(load_device(DEVICE), force=("0.2 mN", "-0.1 mN", "-0.5 mN"))
+    force = device.physics(device.values()).restoring_force
+    z = ca.SX.sym("z", 6)
+    cold = np.array(ca.rootfinder("cold", "newton", {"x": z, "g": force(z)})(x0=np.zeros(6))["x"])
+    stroke = next(limit for limit in build_model(device).limits if limit.name == "stroke")
+    assert cold.min() < 0 and 1.001 < stroke.lower / cold.min() < 1.011
 
 
 def test_loads_that_a_device_cannot_have_are_refused(tmp_path):

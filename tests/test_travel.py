@@ -35,6 +35,15 @@ def test_both_ends_are_limits_of_the_axis(kind, tmp_path):
     size = UM if unit == "um" else np.pi / 180
     low, high = (np.array(b) for b in (model.u_bounds if kind == "servo" else model.z_bounds))
     assert np.allclose(low, -10 * size) and np.allclose(high, 60 * size)
+    assert np.allclose(model.signals["displacement"].scale, 60 * size)  # the farther end is the typical size
+
+
+def test_the_ends_of_a_servo_that_is_driven_by_a_voltage_are_limits_of_its_position(tmp_path):
+    volts = SERVO.replace('"9 deg"', '["-10 deg", "60 deg"]') + '[transducer]\ngain = "10 deg/V"\ndrive_limit = "8 V"\n'
+    model = build_model(loaded(tmp_path, volts))
+    assert np.allclose(np.ravel(model.z_bounds), np.deg2rad([-10, 60])) and np.allclose(
+        np.ravel(model.u_bounds), [-8, 8]
+    )
 
 
 def test_the_workspace_and_the_limiter_end_where_the_travel_does(tmp_path):
