@@ -2,6 +2,7 @@
 
 Of each: who, where, whether the numbers are finite elements, measurements or a closed form, and rows of (quantity, theirs, ours).
 Closed forms are of slender beams: their blades are `slender` here too, and their dimensions are our choice.
+Their sources are partly from memory, and were not checked against the papers.
 """
 
 from __future__ import annotations
