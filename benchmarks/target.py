@@ -62,7 +62,7 @@ def _ours(samples: Samples, c: CFolder, core: Core, real: Real, scratch: Path) -
     program = scratch / f"{name}.elf"
     cross_compile(COMPILER, core, [c.path / f"{name}.c"], c.path, c.init[real], program)
     machine = Machine(core, program)
-    numbers = (2 * n + 1, samples.command.shape[1], 3 * n)  # of the state also the word that says it was initialised
+    numbers = (2 * n + c.state_words + c.given_numbers, samples.command.shape[1], 3 * n)
     state, target, out = (machine.reserve(count, real) for count in numbers)
 
     def call(function: str, wanted: np.ndarray) -> tuple[int, int]:
@@ -70,12 +70,14 @@ def _ours(samples: Samples, c: CFolder, core: Core, real: Real, scratch: Path) -
         return machine.call(f"{name}_{function}", state, target, out)
 
     machine.call(c.init[real], state)
-    circle = [call("settle", samples.command[-1]), *(call("step", t) for t in samples.command)]
+    while call("settle", samples.command[-1])[0] & ControllerStatus.UNSURE:
+        pass  # held until it knows that the device is there
+    circle = [call("step", t) for t in samples.command]
     jumps = [call("step", t) for t in samples.jumps()]
     lost = ControllerStatus.LOST | ControllerStatus.INPUT
     if any(status for status, _ in circle) or any(status & lost for status, _ in jumps):
         raise Disagreement("the circle meets a limit, or the controller is lost, on the emulated core")
-    return max(count for _, count in circle[1:]), max(count for _, count in jumps)
+    return max(count for _, count in circle), max(count for _, count in jumps)
 
 
 def _peer(

@@ -99,7 +99,7 @@ def build(name: str, contender: str, source: Path, axes: int) -> Program:
 
 
 def generated(prefix: str, real: str) -> str:
-    """The contender text of a controller that ctrlgen generated."""
+    """The contender text of a controller that ctrlgen generated; it has been held at the target until it knows that the device is there."""
     return f"""#include "{prefix}.h"
 #define N ((int)(sizeof ((({prefix}_output *)0)->drive) / sizeof ({real})))
 typedef {real} real;
@@ -115,6 +115,7 @@ static int answer_to(const real *target)
 static void start(const real *target)
 {{
     {prefix}_init(&state);
-    (void){prefix}_settle(&state, target, &out);
+    while ({prefix}_settle(&state, target, &out) & {prefix.upper()}_UNSURE) {{
+    }}
 }}
 """
