@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 import tomllib
 
@@ -190,3 +191,20 @@ def test_diagnose_of_a_log_says_where_that_option_is_given(tmp_path):
     with pytest.raises(InputError, match=f"ctrlgen look {log} --device") as asked:
         described([log], AXIS_FILE)
     assert "--layout 'header = 0'" in str(asked.value)
+
+
+def test_a_question_about_a_column_is_told_and_its_answer_reads_it(tmp_path, capsys, axis):
+    """A mark that may be a reading, and text among readings."""
+    y = 3000 * (np.arange(40) % 7)
+    for mark, key in (("-9999", "missing = [-9999]"), ("FAULT 7", 'missing = ["FAULT 7"]')):
+        file = tmp_path / f"{mark}.csv"
+        rows = [f"{k / 100},{k % 5},{mark if k in (5, 9) else y[k]}" for k in range(40)]
+        file.write_text("\n".join(["t [s],u [V],y [nm]", *rows]))
+        look([file], None, None, None)
+        assert f"--layout {shlex.quote(key)}" in capsys.readouterr().out
+        facts = table_facts(read_table(file))
+        assert any(key in question for question in propose([facts], axis).asked)
+        with pytest.raises(InputError, match=re.escape(shlex.quote(key))):
+            propose([facts], axis, options("--column", "reading.axis=y"))
+        read = table_facts(read_table(file, None, options("--layout", key).layout)).column("y [nm]")
+        assert read.missing == 2 and read.question is None

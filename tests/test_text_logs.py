@@ -199,7 +199,9 @@ def test_several_tables_are_asked(written):
 
 
 def test_a_header_of_numbers_is_asked_or_known_by_its_index(written):
-    with pytest.raises(InputError, match=r"layout = \{ header = 1 \} or layout = \{ header = 0 \}"):
+    with pytest.raises(
+        InputError, match=r"layout = \{ header = 1 \} for names or layout = \{ header = 0 \} for numbers"
+    ):
         written("0,1,2\n0,5,6\n1,7,8\n")
     assert written("0,1,2\n0,5,6\n1,7,8\n", header=1).numbers("2").tolist() == [6, 8]
     assert written("0,1,2\n0,5,6\n1,7,8\n", header=0).numbers("2").tolist() == [2, 6, 8]

@@ -15,7 +15,8 @@ from ctrlgen.core.files import write_text
 from ctrlgen.devices import load_device
 from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.formats import READERS, read_table
-from ctrlgen.recordings.look.answers import NOTHING, Answers, as_options
+from ctrlgen.recordings.formats.layout_question import AmbiguousFile
+from ctrlgen.recordings.look.answers import NOTHING, Answers, layout_option
 from ctrlgen.recordings.look.column_facts import ColumnFacts, TableFacts, rests, table_facts
 from ctrlgen.recordings.look.oddities import table_oddities
 from ctrlgen.recordings.look.proposal import Proposal, propose
@@ -91,11 +92,11 @@ def _read(file: Path, answers: Answers, look_at: str = "") -> TableFacts:
     one, followed by `look_at`."""
     try:
         return table_facts(read_table(file, answers.table, answers.layout), answers)
-    except InputError as error:
-        faults = [Fault(fault.where, as_options(fault.what)) for fault in error.faults]
-        if look_at and tuple(faults) != error.faults:
+    except AmbiguousFile as error:
+        faults = [Fault(file.name, error.question.asked(layout_option))]
+        if look_at and error.question.answers:
             faults.append(Fault("then", f"{look_at} and that option write a recording.toml of it"))
-        raise InputError(error.source, faults) from None
+        raise InputError(file, faults) from None
 
 
 def print_proposal(proposal: Proposal) -> None:
@@ -114,9 +115,11 @@ def print_table(facts: TableFacts) -> None:
         shown.add_row(escape(column.name), escape(column.unit or "not stated"), *_numbers(facts, column))
     show_table(shown)
     for note in dict.fromkeys((*facts.table.notes, *(note for c in facts.columns for note in c.notes))):
-        out.print(f"  read: {as_options(note)}", markup=False, soft_wrap=True)
+        out.print(f"  read: {note}", markup=False, soft_wrap=True)
+    for question in (c.question for c in facts.columns if c.question is not None):
+        out.print(f"  to be answered: {question.asked(layout_option)}", markup=False, soft_wrap=True)
     for odd in table_oddities(facts):
-        out.print(f"  odd: {as_options(odd)}", markup=False, soft_wrap=True)
+        out.print(f"  odd: {odd}", markup=False, soft_wrap=True)
 
 
 def _length(facts: TableFacts) -> str:
@@ -135,7 +138,7 @@ def _numbers(facts: TableFacts, column: ColumnFacts) -> tuple[str, str, str]:
     if facts.time is not None and column.name == facts.time.column:
         return "", "", "time" + (" (dates)" if facts.time.stamps else "")
     if column.values is None:
-        return "", "", "text"
+        return "", "", "text" if column.question is None else "to be answered"
     if not len(column.finite):
         return "", "", "no number"
     said = [f"{column.missing} missing"] if column.missing else []

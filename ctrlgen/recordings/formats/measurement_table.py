@@ -12,6 +12,7 @@ import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.recordings.formats import number_cells, over_range, time_stamps
+from ctrlgen.recordings.formats.layout_question import Ambiguous, AmbiguousFile
 from ctrlgen.recordings.formats.number_cells import NumberStyle
 from ctrlgen.recordings.formats.unit_texts import bare_name, split_name
 
@@ -106,7 +107,7 @@ class MeasurementTable:
         if column.dtype.kind == "O":
             cells = number_cells.to_numbers(column, self.style, self.missing or ())
             if cells.bad:
-                raise self.fault(self._bad_cells(name, cells.bad))
+                raise self._bad_cells(name, cells.bad)
             column = cells.values
             notes += [
                 f"{name}: {self._count(len(k))} {word!r} ({self._first(k[0])}), taken as missing"
@@ -115,8 +116,8 @@ class MeasurementTable:
             notes += [f"{name}: true is read as 1, false as 0"] if cells.truths else []
         try:
             values, marks = over_range.without_marks(np.asarray(column, dtype=float), self.missing)
-        except over_range.MayBeMark as error:
-            raise self.fault(f"column {name!r} {error}") from None
+        except Ambiguous as error:
+            raise AmbiguousFile(self.path, error.of_column(name)) from None
         notes += [
             f"{name}: {self._count(m.readings)} {m.text} ({self._first(m.row)}), {m.meaning}; left out" for m in marks
         ]
@@ -130,8 +131,10 @@ class MeasurementTable:
         column = np.asarray(self.columns[name])
         try:
             stamps = time_stamps.seconds(column, self.style.dates)
+        except Ambiguous as error:
+            raise AmbiguousFile(self.path, error.of_column(name)) from None
         except ValueError as error:
-            raise self.fault(f"column {name!r} {error}") from error
+            raise self.fault(f"column {name!r} {error}") from None
         if stamps is not None:
             if unit != "s":
                 raise self.fault(
@@ -150,17 +153,18 @@ class MeasurementTable:
         """Cells of text as numbers, those of a long epoch as the whole numbers that they are."""
         return self.numbers(name) if not number_cells.are_whole(column) else np.array([int(c) for c in column])
 
-    def _bad_cells(self, name: str, bad: Sequence[tuple[int, str]]) -> str:
+    def _bad_cells(self, name: str, bad: Sequence[tuple[int, str]]) -> InputError:
         words = list(dict.fromkeys(text for _, text in bad))
         listed = ", ".join(f"{self._place(k)} {text!r}" for k, text in bad[: number_cells.MOST_LISTED])
         more = f" and {len(bad) - number_cells.MOST_LISTED} more" if len(bad) > number_cells.MOST_LISTED else ""
         key = ", ".join(f'"{word}"' for word in words[: number_cells.MOST_LISTED]).replace("\\", "\\\\")
         what = f"column {name!r} holds text that is no number in {len(bad)} of {len(self.columns[name])} rows ({listed}{more})"
         if any(number_cells.has_unit(text) for _, text in bad):
-            return f"{what}; numbers stand alone: write the unit into the name, such as 'x (um)'"
+            return self.fault(f"{what}; numbers stand alone: write the unit into the name, such as 'x (um)'")
         if len(bad) == len(self.columns[name]):
-            return f"{what}; name another column"
-        return f"{what}; if that means a missing reading, write layout = {{ missing = [{key}] }}, else write numbers"
+            return self.fault(f"{what}; name another column")
+        answers = {f"missing = [{key}]": "if that means a missing reading, or numbers in their place"}
+        return AmbiguousFile(self.path, Ambiguous(what, answers))
 
     def _count(self, count: int) -> str:
         return "1 reading is" if count == 1 else f"{count} readings are"

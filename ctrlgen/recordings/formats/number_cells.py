@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from ctrlgen.recordings.formats.layout_question import Ambiguous
 from ctrlgen.recordings.formats.written_layout import Layout
 
 MOST_LISTED = 5  # bad cells of a column that a message lists; the others are counted
@@ -106,10 +107,6 @@ class NumberStyle:
         for mark in BLANKS if self.thousands == "blank" else "'\u2019" if self.thousands == "'" else self.thousands:
             cell = cell.replace(mark, "")
         return cell.replace(self.decimal, ".").replace("\u2212", "-").replace("d", "e").replace("D", "e")
-
-
-class Ambiguous(ValueError):
-    """A file whose numbers can be read two ways; the message asks which."""
 
 
 @dataclass(frozen=True)
@@ -220,19 +217,19 @@ class _Votes:
                 self.open[last] = cell
 
     def decimal(self, separator: str) -> Literal[".", ","]:
-        ask = 'write layout = { decimal = "," } or layout = { decimal = "." }'
+        marks = {'decimal = ","': "", 'decimal = "."': ""}
         if self.sure["."] and self.sure[","]:
-            raise Ambiguous(f"writes {self.sure['.']!r} and {self.sure[',']!r}: which mark is the decimal one? {ask}")
+            raise Ambiguous(f"writes {self.sure['.']!r} and {self.sure[',']!r}: which mark is the decimal one?", marks)
         if self.sure["."]:
             return "."
         if self.sure[","]:
             return ","
         if self.open[","]:
             what = f"writes {self.open[',']!r}, and no cell tells whether that is {_read_two_ways(self.open[','])}"
-            raise Ambiguous(f"{what}: {ask}")
+            raise Ambiguous(what, marks)
         if self.open["."] and separator == ";":  # as programs of countries with the decimal comma separate
             what = f"separates cells by semicolons and writes {self.open['.']!r}; no cell tells whether that is"
-            raise Ambiguous(f"{what} {_read_two_ways(self.open['.'])}: {ask}")
+            raise Ambiguous(f"{what} {_read_two_ways(self.open['.'])}", marks)
         return "."
 
 

@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ctrlgen.recordings.formats.layout_question import Ambiguous
+
 HUGE = 9e29  # no reading in any unit: SCPI says 9.9e37 and 9.91e37, others 1e30, 1e31, 1e38, the largest float and infinity
 COUNTS = (-9999, 9999, -99999, 99999, -999, -9999.99, 99999.9, 999999, -999999, 9999999, -32768, 32767, 65535, -2147483648, 2147483647,
           4294967295, 8388607, -8388608, 16777215, -999.25, -1e20, 1e20)  # fmt: skip
@@ -24,17 +26,13 @@ class Mark(NamedTuple):
     meaning: str
 
 
-class MayBeMark(ValueError):
-    """A number that may be a reading or a mark for none; the message asks."""
-
-
 def without_marks(
     values: np.ndarray, missing: Sequence[str | int | float] | None = None
 ) -> tuple[np.ndarray, list[Mark]]:
     """`values` (n,) with NaN where a number is over range, and what was left out.
 
     `missing`: numbers that the reader says are none; where they are given, even as none at all, no other of `COUNTS` is taken for one.
-    Raises `MayBeMark`.
+    Raises `Ambiguous` for a number that may be a reading or a mark for none.
     """
     own = [float(m) for m in missing or () if not isinstance(m, str) or _is_float(m)]
     marks: list[Mark] = []
@@ -54,9 +52,7 @@ def without_marks(
             told = (
                 f"holds {number:g} {np.sum(chosen)} times, beyond all its other numbers: a reading, or a mark for none?"
             )
-            raise MayBeMark(
-                f"{told} Write layout = {{ missing = [{number:g}] }}, or layout = {{ missing = [] }} if it is a reading"
-            )
+            raise Ambiguous(told, {f"missing = [{number:g}]": "if it is a mark", "missing = []": "if it is a reading"})
     return kept, marks
 
 

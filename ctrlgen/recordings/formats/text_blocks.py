@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
-from ctrlgen.recordings.formats.number_cells import OVER, Ambiguous, is_number, is_reading
+from ctrlgen.recordings.formats.layout_question import Ambiguous
+from ctrlgen.recordings.formats.number_cells import OVER, is_number, is_reading
 from ctrlgen.recordings.formats.text_cells import cells_of, is_comment, width_of, without_mark
 
 FEWEST_ROWS = 2  # of a table among other text
@@ -143,8 +144,8 @@ def _block(lines: Sequence[str], run: list[int], above: list[int], separator: st
         listed = ", ".join(f"line {k + 1} has {w}" for k, w in wrong[:MOST_LISTED]) + (
             ", ..." if len(wrong) > MOST_LISTED else ""
         )
-        mend = "repair these, or write the line of the names, layout = { header = 5 } for one, if they stand above the table"
-        raise Ambiguous(f"line {usual[0] + 1} has {width} cells, but {listed}; {mend}")
+        mend = "(for one) with the line of the names, if these stand above the table, or repair them"
+        raise Ambiguous(f"line {usual[0] + 1} has {width} cells, but {listed}", {"header = 5": mend})
     return Block(tuple(run), width, max(widths), tuple(above), cut, below)
 
 

@@ -7,7 +7,8 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 
-from ctrlgen.recordings.formats.number_cells import DATE, Ambiguous, is_number, is_reading
+from ctrlgen.recordings.formats.layout_question import Ambiguous
+from ctrlgen.recordings.formats.number_cells import DATE, is_number, is_reading
 from ctrlgen.recordings.formats.written_layout import MARKS, Layout
 
 SEPARATORS = ("\t", ";", "|", ",", " ")  # where two fit alike the earlier is meant: nobody writes numbers with it
@@ -107,4 +108,4 @@ def _one_or_two(lines: Sequence[str], layout: Layout) -> str:
     if names:
         return "," if "," in names[-1] else ";"
     what = f"has rows such as {_sample(lines)[0].strip()!r}, which may be two numbers or one with a decimal comma"
-    raise Ambiguous(f'{what}: write layout = {{ separator = "," }} or layout = {{ decimal = "," }}')
+    raise Ambiguous(what, {'separator = ","': "for two", 'decimal = ","': "for one"})

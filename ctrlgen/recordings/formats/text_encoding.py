@@ -6,6 +6,7 @@ import codecs
 from pathlib import Path
 
 from ctrlgen.recordings.formats.checked_files import fault, read_bytes
+from ctrlgen.recordings.formats.layout_question import Ambiguous, AmbiguousFile
 
 BOMS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"),
         (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))  # fmt: skip
@@ -51,9 +52,8 @@ def decoded_bytes(path: Path, content: bytes, encoding: str | None = None) -> tu
         try:
             text = content.decode(stated)
         except (UnicodeDecodeError, LookupError) as error:
-            raise fault(
-                path, f'cannot be read as {stated} ({error}): write its encoding, layout = {{ encoding = "..." }}'
-            ) from None
+            what = f"cannot be read as {stated} ({error})"
+            raise AmbiguousFile(path, Ambiguous(what, {'encoding = "cp1252"': "(for one) with its encoding"})) from None
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     lost = len(text) - len(text.rstrip("\0"))
     if lost and lost < len(text):  # a logger that lost its power

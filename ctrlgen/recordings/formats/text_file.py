@@ -11,8 +11,9 @@ import numpy as np
 
 from ctrlgen.recordings.formats import number_cells
 from ctrlgen.recordings.formats.checked_files import fault
+from ctrlgen.recordings.formats.layout_question import Ambiguous, AmbiguousFile
 from ctrlgen.recordings.formats.measurement_table import Clock, MeasurementTable
-from ctrlgen.recordings.formats.number_cells import Ambiguous, NumberStyle
+from ctrlgen.recordings.formats.number_cells import NumberStyle
 from ctrlgen.recordings.formats.rows_of_signals import lies_on_its_side, on_its_side
 from ctrlgen.recordings.formats.stated_rate import stated_rate
 from ctrlgen.recordings.formats.text_blocks import MOST_LISTED, Block, blocks_of, kind_of
@@ -68,12 +69,10 @@ def tables_of_text(path: Path, text: str, layout: Layout, notes: Sequence[str] =
             if len(rows) == 1 and len(cells_of(lines[rows[0] - 1], separator)) > 1:
                 raise fault(path, f"holds a single row of numbers, line {rows[0]}; is the file complete? Record longer")
             what = f"holds no rows of numbers (cells separated by {NAMES.get(separator, repr(separator))})"
-            raise Ambiguous(
-                f'{what}; write the separator, such as layout = {{ separator = ";" }}, or export the numbers as text'
-            )
+            raise Ambiguous(what, {'separator = ";"': "(for one) with its separator, or export the numbers as text"})
         return [_table(path, lines, block, separator, layout, notes) for block in blocks]
     except Ambiguous as error:
-        raise fault(path, str(error)) from None
+        raise AmbiguousFile(path, error) from None
 
 
 def _blocks(lines: list[str], separator: str, layout: Layout) -> list[Block]:

@@ -6,7 +6,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from ctrlgen.recordings.formats.number_cells import Ambiguous, is_number, is_reading
+from ctrlgen.recordings.formats.layout_question import Ambiguous
+from ctrlgen.recordings.formats.number_cells import is_number, is_reading
 from ctrlgen.recordings.formats.text_blocks import Block
 from ctrlgen.recordings.formats.text_cells import cells_of, is_comment, without_mark
 from ctrlgen.recordings.formats.unit_texts import is_unit_cell, is_unit_row, split_name, unit_of
@@ -214,7 +215,7 @@ def _stated(lines: Sequence[str], block: Block, separator: str, line: int) -> He
     cells = _fitting(lines[line], block.width, separator) if line < len(lines) else None
     if cells is None:
         raise Ambiguous(
-            f"line {line + 1}, layout.header, does not have {block.width} cells, as the rows of the table do"
+            f"line {line + 1}, said to hold the names, does not have {block.width} cells, as the rows of the table do"
         )
     below = [(k, c) for k in block.above if k > line and (c := _fitting(lines[k], block.width, separator)) is not None]
     units = next(({i: c for i, c in enumerate(cells) if unit_of(c)} for _, cells in below if is_unit_row(cells)), {})
@@ -229,7 +230,7 @@ def _numbered(lines: Sequence[str], block: Block, separator: str) -> Header | No
         return Header(("row", *cells[1:]), notes=("line 1 holds names, which are numbers",), in_first_row=True)
     if len(cells) > 2 and cells == counted:
         what = f"line {block.rows[0] + 1} is {', '.join(cells)}: names of columns or a row of numbers?"
-        raise Ambiguous(f"{what} Write layout = {{ header = {block.rows[0] + 1} }} or layout = {{ header = 0 }}")
+        raise Ambiguous(what, {f"header = {block.rows[0] + 1}": "for names", "header = 0": "for numbers"})
     return None
 
 
@@ -252,7 +253,5 @@ def _short(lines: Sequence[str], block: Block, separator: str) -> Header:
     if is_comment(lines[line]) or separator == " ":  # a sentence has blanks, too
         return Header(())
     what = f"line {line + 1} has {n} names, and the rows below it have {block.width} cells"
-    raise Ambiguous(
-        f"{what}: repair it; where a comma both separates and marks decimals, export with semicolons; or write "
-        "layout = { header = 0 } and name columns by their number from 0"
-    )
+    mend = "and name columns by their number from 0, or repair it; where a comma both separates and marks decimals, export with semicolons"
+    raise Ambiguous(what, {"header = 0": mend})

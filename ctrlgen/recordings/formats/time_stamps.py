@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ctrlgen.recordings.formats.number_cells import CLOCK, DATE, MISSING, Ambiguous
+from ctrlgen.recordings.formats.layout_question import Ambiguous
+from ctrlgen.recordings.formats.number_cells import CLOCK, DATE, MISSING
 
 DAY = 86400.0
 HOUR = 3600.0
@@ -84,7 +85,7 @@ def _order(texts: list[str], first: str, match: re.Match[str], dates: str | None
         dates = "month first"
     if dates is None and len(found) > 1:  # one day is the same whichever way round
         what = f"writes dates such as {first!r}, and none tells the day from the month"
-        raise Ambiguous(f'{what}: write layout = {{ dates = "day first" }} or layout = {{ dates = "month first" }}')
+        raise Ambiguous(what, {'dates = "day first"': "", 'dates = "month first"': ""})
     day = "%m-%d" if dates == "month first" else "%d-%m"
     year = "%Y" if len(match[3]) == 4 else "%y"
     rest = first[match.end() :]

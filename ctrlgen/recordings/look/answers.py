@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import shlex
 import tomllib
 from collections.abc import Sequence
@@ -36,9 +35,9 @@ class Answers:
 NOTHING = Answers()
 
 
-def as_options(text: str) -> str:
-    """`text` with what it would have written in recording.toml, `layout = { … }`, as the option of look that says the same."""
-    return re.sub(r"layout = \{ (.*?) \}", lambda key: f"--layout {shlex.quote(key[1])}", text)
+def layout_option(key: str) -> str:
+    """The option of look that says the same as a key of `layout` in recording.toml."""
+    return f"--layout {shlex.quote(key)}"
 
 
 def read_answers(

@@ -9,8 +9,8 @@ import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import same_dimension, to_si
+from ctrlgen.recordings.formats.layout_question import Ambiguous, AmbiguousFile
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
-from ctrlgen.recordings.formats.number_cells import Ambiguous
 from ctrlgen.recordings.formats.time_stamps import TIME_NAME, epoch_unit
 from ctrlgen.recordings.formats.unit_texts import BASES, NAMES, bare_name, unit_of
 from ctrlgen.recordings.look.answers import NOTHING, Answers
@@ -29,12 +29,13 @@ SMOOTH = 0.1  # median of second differences over that of first ones, of a drive
 @dataclass(frozen=True)
 class ColumnFacts:
     """One column: `unit` as the file states it or its name ends, None where neither does; `values` (n,), NaN where there is no number,
-    None where the column is text; `notes`: what was interpreted."""
+    None where the column is text or cannot be read before its `question` is answered; `notes`: what was interpreted."""
 
     name: str
     unit: str | None
     values: np.ndarray | None
     notes: tuple[str, ...] = ()
+    question: Ambiguous | None = None
 
     @property
     def bare(self) -> str:
@@ -126,6 +127,8 @@ def _facts(table: MeasurementTable, name: str) -> ColumnFacts:
     unit = _suffix(name) if stated is None else unit_of(stated)
     try:
         read = table.reading(name)
+    except AmbiguousFile as error:
+        return ColumnFacts(name, unit, None, question=error.question)
     except InputError:  # it holds text
         return ColumnFacts(name, unit, None)
     return ColumnFacts(name, unit, read.values, read.notes)
@@ -143,7 +146,7 @@ def _suffix(name: str) -> str | None:
 def _time(table: MeasurementTable, columns: tuple[ColumnFacts, ...], chosen: str = "") -> TimeFacts | None:
     """The column that is `chosen`, named as the time, or else holds dates, or else has the unit of a time and rises.
 
-    Raises InputError for dates that can be read two ways.
+    Raises `AmbiguousFile` for dates that can be read two ways.
     """
     named = [c for c in columns if TIME_NAME.match(c.bare)]
     dated = [c for c in columns if c.values is None]
@@ -151,13 +154,13 @@ def _time(table: MeasurementTable, columns: tuple[ColumnFacts, ...], chosen: str
     for column in dict.fromkeys(chosen or c.name for c in (*named, *dated, *of_unit, *columns[: bool(chosen)])):
         facts = next(c for c in columns if c.name == column)
         unit, stamps = facts.unit or epoch_unit(facts.finite) or "s", facts.values is None
-        if not same_dimension(unit, "s"):
+        if not same_dimension(unit, "s") or (facts.question is not None and not chosen):
             continue
         try:
             seconds = table.time(column, "s" if stamps else unit).values * (1.0 if stamps else to_si(1.0, unit))
-        except InputError as error:
-            if isinstance(error.__cause__, Ambiguous):
-                raise
+        except AmbiguousFile:
+            raise
+        except InputError:
             continue
         steps = np.diff(seconds[np.isfinite(seconds)])
         if len(steps) < 2 or not np.median(steps) > 0:

@@ -16,7 +16,7 @@ from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import parse, same_dimension, to_si
 from ctrlgen.model.model import Model
 from ctrlgen.recordings.alike_units import size_of
-from ctrlgen.recordings.look.answers import NOTHING, Answers
+from ctrlgen.recordings.look.answers import NOTHING, Answers, layout_option
 from ctrlgen.recordings.look.column_facts import ColumnFacts, TableFacts, between_samples, named
 from ctrlgen.recordings.look.oddities import fitting_units, implausible_range
 from ctrlgen.recordings.moved import Stretch, moved_of
@@ -164,6 +164,8 @@ def propose(tables: Sequence[TableFacts], model: Model, answers: Answers = NOTHI
         if stated is not None:
             says = f"the file says {stated[0]!r} (--rate {stated[1]:.9g}Hz, else --time COLUMN or --poses)"
         asked.append(f"no column is a time: {says}")
+    if any(name not in found for name in signals):  # which an unread column may be
+        asked += [c.question.asked(layout_option) for c in first.columns if c.question is not None]
     remarks = _remarks(model, first, matches, answers)
     left = [c.name for c in first.columns if c.moves and c.name not in {*taken, *(m.column for m in matches)}]
     return Proposal(model, tuple(tables), tuple(matches), tuple(left), tuple(asked), tuple(remarks), answers)
@@ -176,6 +178,8 @@ def _chosen(model: Model, facts: TableFacts, signals: Sequence[str], answers: An
         if signal not in signals:
             raise InputError("--column", [Fault(signal, f"is no signal of {model.name}; its are {', '.join(signals)}")])
         column = facts.column(named(facts.table, name))
+        if column.question is not None:
+            raise InputError("--column", [Fault(name, column.question.asked(layout_option))])
         if not column.moves:
             raise InputError("--column", [Fault(name, "holds no numbers that differ")])
         unit = answers.unit(signal) or column.unit
