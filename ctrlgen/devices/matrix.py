@@ -17,57 +17,31 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
 from pydantic import Field, model_validator
 
-from ctrlgen.core.units import In, Quantity, same_dimension, show, written_unit
+from ctrlgen.core.units import same_dimension, show
 from ctrlgen.devices.base import Device
 from ctrlgen.devices.device_physics import BalancedPhysics, SensedPoints
-from ctrlgen.devices.driven import Driven, PerDrive, proportional
+from ctrlgen.devices.driven import proportional
 from ctrlgen.devices.limit import Limit
+from ctrlgen.devices.matrix_actuator import MatrixActuator
+from ctrlgen.devices.matrix_entries import Entry, entry_faults, units_of
 from ctrlgen.devices.place import Direction, Place
 from ctrlgen.devices.stated_matrix import matrix_faults, symmetric_note
-from ctrlgen.devices.travel import Travel, ends_of
+from ctrlgen.devices.travel import ends_of
 from ctrlgen.numerics.symmetric_solve import solve_symmetric
 from ctrlgen.physics.rigid_bodies import point_force
-from ctrlgen.physics.screw import TWIST, WRENCH, Matrix
+from ctrlgen.physics.screw import TWIST, WRENCH, Matrix, TwistComponent, WrenchComponent
 
 CONJUGATE = dict(zip(TWIST, (*WRENCH[3:], *WRENCH[:3]), strict=True))
-SI = {"theta": "rad", "delta": "m", "F": "N", "M": "N*m"}
 TOLD = {"theta": "urad", "delta": "um"}
+NEAREST = 1e-3  # m: arm of a force whose moment counts as large as itself
+FAINT = 1e-9  # of a force, below which rounding of its direction makes a component
 MOVED = 1e-6  # of the largest motion, below which rounding moves a direction
-Entry = Annotated[Quantity, In(None)]
-Component = Literal["theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z"]
-Load = Literal["F_x", "F_y", "F_z", "M_x", "M_y", "M_z"]
-PUSHES = ("at", "along", "gain", "travel")
-
-
-class MatrixActuator(Driven):
-    """`[[actuator]]`: one axis, named after it. Beside a Jacobian it has its name and the range of its drive alone."""
-
-    at: Place | None = None
-    """Where a force acts, in the frame of the point; its travel is that of this place."""
-    along: Direction | None = None
-    """In which direction; of any length."""
-    gain: PerDrive | None = None
-    """Force per drive, such as "0.2 N/V"."""
-    stiffness: Annotated[Quantity, In("N/um", positive=True)] | None = None
-    """Stiffness of a stack beside its blocked force, along its direction."""
-    travel: Travel | None = None
-    """Largest travel to both sides, or its ends, such as ["-10 um", "60 um"]; a limit."""
-
-    def faults(self, pushes: bool) -> list[str]:
-        """What is missing of an actuator that pushes, or too much of one whose motion the matrix states."""
-        stated = [key for key in (*PUSHES, "stiffness") if getattr(self, key) is not None]
-        if not pushes:
-            return [f"{key}: belongs to a force; a jacobian states the motion per drive" for key in stated]
-        faults = [f"{key}: is missing; a force needs it" for key in PUSHES if key not in stated]
-        if self.along is not None and not np.linalg.norm(self.along) > 0:
-            faults.append("along: is zero; give a direction")
-        return faults + ([] if self.gain is None else self.gain_faults(self.gain, "N", "force"))
 
 
 class MatrixDevice(Device):
@@ -77,9 +51,9 @@ class MatrixDevice(Device):
 
     kind: Literal["matrix"]
     """A matrix of one's own, measured or from finite elements."""
-    directions: tuple[Component, ...] = Field(min_length=1)
+    directions: tuple[TwistComponent, ...] = Field(min_length=1)
     """Directions of the point that the matrix has, any of the six, in the order of its rows (of a stiffness: of its columns)."""
-    loads: tuple[Load, ...] = ()
+    loads: tuple[WrenchComponent, ...] = ()
     """Order of the loads in the columns of a compliance, the rows of a stiffness. Left out: as the directions, moments along rotations."""
     compliance: tuple[tuple[Entry, ...], ...] | None = None
     """Rows of directions per load, each entry with its unit, such as [["0.301 um/N", "7.1 urad/N"], ...], or 0."""
@@ -89,9 +63,9 @@ class MatrixDevice(Device):
     """In place of both: rows of directions per drive, a column for each actuator, such as [["1.2 um/V", "3 nm/V"], ...]."""
     at: Place = Field(default=("0 mm", "0 mm", "0 mm"), validate_default=True)
     """The point, in the frame in which actuators have their places. Left out: the origin."""
-    channels: tuple[Component, ...] = Field(min_length=1)
+    channels: tuple[TwistComponent, ...] = Field(min_length=1)
     """Directions that are followed, as many as actuators."""
-    readings: tuple[Component, ...] = ()
+    readings: tuple[TwistComponent, ...] = ()
     """Directions that are read beside these; recordings name them, as in "reading.theta_z"."""
     actuator: tuple[MatrixActuator, ...] = Field(min_length=1)
     """`[[actuator]]` tables: all push, or all move by a Jacobian."""
@@ -153,46 +127,22 @@ class MatrixDevice(Device):
         elif self.loads and sorted(self.loads) != sorted(CONJUGATE[name] for name in self.directions):
             wanted = ", ".join(CONJUGATE[name] for name in self.directions)
             faults.append(f"loads: must be those of the directions in any order: {wanted}")
-        for what, stated in {
-            "time_constant": [a.time_constant is None for a in self.actuator],
-            "drive": []
-            if self.pushes
-            else [same_dimension(a.drive_unit, self.actuator[0].drive_unit) for a in self.actuator],
-        }.items():
-            if len(set(stated)) > 1:
-                one = (
-                    "give one to all or to none"
-                    if what == "time_constant"
-                    else "beside a jacobian all drives have one unit"
-                )
-                faults.append(f"actuator: some have another {what}; {one}")
+        if len({a.time_constant is None for a in self.actuator}) > 1:
+            faults.append("actuator: some have a time_constant and some do not; give one to all or to none")
+        drive = self.actuator[0].drive_unit
+        if not self.pushes and not all(same_dimension(a.drive_unit, drive) for a in self.actuator):
+            faults.append("actuator: some have another drive; beside a jacobian all drives have one unit")
         return faults
 
     def _entry_faults(self) -> list[str]:
         """Rows and columns that are too few or too many, and entries in a wrong unit."""
-        rows: tuple[str, ...] = self.directions
-        columns = [(name, SI[name.split("_")[0]]) for name in self._load_order]
-        if self.form == "jacobian":
-            columns = [(a.name, a.drive_unit) for a in self.actuator]
-        if self.form == "stiffness":
-            rows, columns = self._load_order, [(name, SI[name.split("_")[0]]) for name in self.directions]
-        stated = getattr(self, self.form)
-        shape = f"{len(rows)} rows of {len(columns)} entries"
-        if len(stated) != len(rows) or any(len(row) != len(columns) for row in stated):
-            return [
-                f"{self.form}: must have {shape}, for {', '.join(rows)} by {', '.join(name for name, _ in columns)}"
-            ]
-        faults = []
-        for i, (name, row) in enumerate(zip(rows, stated, strict=True)):
-            for j, ((column, unit), entry) in enumerate(zip(columns, row, strict=True)):
-                wanted, plain = f"{SI[name.split('_')[0]]}/({unit})", f"{SI[name.split('_')[0]]}/{unit}"
-                written = written_unit(entry.text)
-                if not same_dimension(written, wanted) and not (entry.si == 0 and written == "1"):
-                    faults.append(
-                        f"{self.form}[{i}][{j}]: {name} per {column} = {entry.text!r} has the wrong unit; write for example "
-                        f'"1 {wanted if "*" in unit or "/" in unit else plain}", or 0'
-                    )
-        return faults
+        directions, loads = units_of(self.directions), units_of(self._load_order)
+        rows, columns = {
+            "compliance": (directions, loads),
+            "stiffness": (loads, directions),
+            "jacobian": (directions, {a.name: a.drive_unit for a in self.actuator}),
+        }[self.form]
+        return entry_faults(self.form, getattr(self, self.form), rows, columns)
 
     def _numbers(self, deviations: bool = False) -> np.ndarray:
         """The matrix as the file states it [SI], directions by conjugate loads or by drives; or its `deviations`, 0 where none is."""
@@ -257,11 +207,14 @@ class MatrixDevice(Device):
 
     def _pushes(self, p: SimpleNamespace) -> Matrix:
         """B (n, m): what a unit force of each actuator is at the point, in the directions of the matrix."""
+        return self._wrenches(p)[[WRENCH.index(CONJUGATE[name]) for name in self.directions], :]
+
+    def _wrenches(self, p: SimpleNamespace) -> Matrix:
+        """(6, m) of a unit force of each actuator at the point."""
         columns = []
         for a, numbers in zip(self.actuator, p.actuator, strict=True):
             columns.append(point_force(ca.vertcat(*numbers.at) - ca.vertcat(*p.at), ca.DM(_unit(a.along))))
-        seen = [WRENCH.index(CONJUGATE[name]) for name in self.directions]
-        return ca.horzcat(*columns)[seen, :]
+        return ca.horzcat(*columns)
 
     def remarks(self) -> list[str]:
         """That the matrix was made symmetric, and where actuators push in directions that it does not have."""
@@ -269,14 +222,12 @@ class MatrixDevice(Device):
             return []
         notes = symmetric_note(self.form, self._numbers())
         what = "which the stiffness holds" if self.form == "stiffness" else "of which the compliance says nothing"
-        for a in self.actuator:
-            along, arm = _unit(a.along), [x.si for x in a.at or ()]
-            wrench = np.concatenate([along, np.cross(arm - np.array([x.si for x in self.at]), along)])
+        wrenches = np.abs(ca.DM(self._wrenches(self.values())).full()) / np.array([[1.0]] * 3 + [[NEAREST]] * 3)
+        for a, wrench in zip(self.actuator, wrenches.T, strict=True):
             unseen = [
                 load
                 for name, load in CONJUGATE.items()
-                if name not in self.directions
-                and abs(wrench[WRENCH.index(load)]) > 1e-9 * (1 if load[0] == "F" else 1e-3)
+                if name not in self.directions and wrench[WRENCH.index(load)] > FAINT
             ]
             notes += [f"{a.name} also pushes by {', '.join(unseen)}, {what}"] if unseen else []
         return notes

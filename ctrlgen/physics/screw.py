@@ -10,12 +10,14 @@ Every function takes CasADi SX, DM or plain numbers.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TypeAlias
+from typing import Literal, TypeAlias, get_args
 
 import casadi as ca
 
-TWIST = ("theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z")
-WRENCH = ("F_x", "F_y", "F_z", "M_x", "M_y", "M_z")
+TwistComponent = Literal["theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z"]
+WrenchComponent = Literal["F_x", "F_y", "F_z", "M_x", "M_y", "M_z"]
+TWIST: tuple[str, ...] = get_args(TwistComponent)
+WRENCH: tuple[str, ...] = get_args(WrenchComponent)
 Matrix: TypeAlias = ca.SX | ca.DM
 Scalar: TypeAlias = float | ca.SX
 

@@ -15,7 +15,7 @@ from ctrlgen.devices.load import GROUND_NAME
 from ctrlgen.devices.place import Direction, Place
 from ctrlgen.devices.section import Section
 from ctrlgen.devices.travel import Travel
-from ctrlgen.physics.screw import Matrix, rotation_z
+from ctrlgen.physics.screw import Matrix, TwistComponent, WrenchComponent, rotation_z
 
 Inertia = Annotated[Quantity, In("kg*mm^2", positive=True)]
 FLAT = 0.01  # a flat plate has the sum; its numbers are rounded
@@ -153,9 +153,7 @@ class Output(Section):
     """On this body (of a pattern: with the number of the copy)."""
     at: Place
     """In the global frame."""
-    channels: tuple[Literal["theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z"], ...] = Field(
-        min_length=1
-    )
+    channels: tuple[TwistComponent, ...] = Field(min_length=1)
     """Components of its motion, as many as actuators: rotations, and displacements of the point."""
 
 
@@ -177,7 +175,7 @@ class Reading(Section):
     """Axis of the rotation that is read, in place of `at` and `along`."""
     of: str | None = None
     """The element whose load is read, in place of `body` and what is read of it; of the same pattern."""
-    load: Literal["F_x", "F_y", "F_z", "M_x", "M_y", "M_z"] | None = None
+    load: WrenchComponent | None = None
     """Component of the load on its free end, in its own frame, x along it: F_x is the tension. Left out: F_x."""
     pattern: str = ""
     """The pattern by which it is copied."""
