@@ -306,5 +306,12 @@ def test_a_sensor_by_which_drives_were_learnt_counts_with_its_scale_and_zero(cir
     assert found.combined[:, 3].max() == pytest.approx(np.hypot(10, 5) * 1e-9, rel=1e-3)
     assert {line.name for line in found.lines} == {"sensor.scale", "sensor.zero.delta_x"}
     assert found.drawn.pose.std(axis=0)[:, 5] == pytest.approx(20e-9, rel=0.07)
-    with pytest.raises(InputError, match="is not a channel"):
-        stated(circle, '[sensor.zero]\ndelta_q = { sd = "5 nm", source = "drift" }\n', tmp_path)
+    wrong = (
+        '[numbers]\n"actuator.yung" = { sd = "1 %", source = "s" }\n[sensor]\nscale = { sd = "-2 %", source = "s" }\n'
+    )
+    wrong += 'clock = { sd = "5 nm", source = "s" }\n[sensor.zero]\ndelta_q = { sd = "5 nm", source = "drift" }\n'
+    with pytest.raises(InputError, match="is not a channel") as refused:
+        stated(circle, wrong, tmp_path)
+    where = {fault.where for fault in refused.value.faults}
+    assert where == {'numbers."actuator.yung"', "sensor.scale.sd", "sensor.clock.sd", "sensor.zero.delta_q"}
+    assert "stated.toml: 4 faults" in str(refused.value)  # of the file that states them, all at once

@@ -8,17 +8,21 @@ from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 
-from ctrlgen.budget.deviation import Deviation
+from ctrlgen.budget.deviation import Deviation, parse_share
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import parse_difference, shown_difference_unit
 from ctrlgen.devices import Signal
 from ctrlgen.devices.section import Section
 
+ASSUMED_SCALE = 5e-3
+"""Standard deviation of the scale of each channel that is read, where nothing is stated. Judgement: position sensors that were not
+calibrated in place are good to a per cent, which is two of it."""
+
 
 class SensorSection(Section):
-    """What is not known exactly of the sensor that reads the followed signal. It moves no open-loop drive by itself: learning from runs and
-    calibration leave to the sensor what it may feign, and `budget` counts it, since drives learnt and numbers calibrated with this sensor
-    carry its error."""
+    """What is not known exactly of the sensor that reads the followed signal. It moves no open-loop drive by itself: learning from runs
+    leaves to the sensor what it may feign, and `budget` counts it, since drives learnt and numbers calibrated with this sensor carry its
+    error. Calibration, which has no scenario, takes an `sd` of the sensor laws in the device file instead."""
 
     scale: Deviation | None = None
     """Of every channel's scale, as a share, such as "0.1 %", independent of each other."""
@@ -57,8 +61,8 @@ def stated_sensor(section: SensorSection | None, signal: Signal, path: Path | st
         if stated is None:
             return None
         try:
-            sd = read(stated.sd.strip())
-            if not sd >= 0:
+            sd = read(stated.sd)
+            if sd < 0:
                 raise ValueError(f"{stated.sd!r} is below zero")
         except ValueError as error:
             faults.append(Fault(f"sensor.{where}.sd", str(error)))
@@ -71,19 +75,12 @@ def stated_sensor(section: SensorSection | None, signal: Signal, path: Path | st
         if channel not in units:
             faults.append(Fault(f"sensor.zero.{channel}", f"is not a channel; they are {', '.join(units)}"))
             continue
-        zero = known(f"zero.{channel}", stated, partial(_difference, shown_difference_unit(units[channel])))
+        unit = shown_difference_unit(units[channel])
+        zero = known(f"zero.{channel}", stated, partial(parse_difference, unit=unit))
         if zero is not None:
             zeros[channel] = zero
-    scale = known("scale", section.scale, _share)
-    clock = known("clock", section.clock, partial(_difference, "s"))
+    scale = known("scale", section.scale, parse_share)
+    clock = known("clock", section.clock, partial(parse_difference, unit="s"))
     if faults:
         raise InputError(path, faults)
     return SensorStatement(scale, zeros, clock)
-
-
-def _difference(unit: str, text: str) -> float:
-    return parse_difference(text, unit)
-
-
-def _share(text: str) -> float:
-    return float(text.removesuffix("%").strip()) * (0.01 if text.endswith("%") else 1.0)

@@ -5,14 +5,16 @@ from __future__ import annotations
 import difflib
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
-from ctrlgen.budget.deviation import Deviation
+from ctrlgen.budget.deviation import Deviation, parse_share
 from ctrlgen.budget.sensor_statement import SensorSection, stated_sensor
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, read_toml, validate
@@ -220,7 +222,11 @@ class _Reader:
     def _sensor(self, scenario: Scenario, model: Model) -> None:
         """What drives learnt and numbers calibrated with the sensor carry of its error: a share of each channel, and its zero."""
         signal = model.signals[scenario.file.follow]
-        stated = stated_sensor(self.file.sensor, signal, scenario.path)
+        try:
+            stated = stated_sensor(self.file.sensor, signal, scenario.path)
+        except InputError as error:  # told with the other faults of the file
+            self.faults += error.faults
+            return
         if stated.scale is not None and stated.scale.sd:
             n, scale = len(signal.channels), stated.scale
             per = "1 %", (0.01,) * n
@@ -299,17 +305,14 @@ class _Reader:
 
     def _share(self, where: str, text: str) -> float:
         """A share such as "5 %" or 0.05, as a number; NaN with a fault where it is none."""
-        body = text.strip()
-        return self._positive(
-            where, text, "1", body.removesuffix("%").strip(), 0.01 if body.endswith("%") else 1.0, "0.5 %"
-        )
+        return self._positive(where, text, parse_share, "0.5 %")
 
     def _absolute(self, where: str, text: str, unit: str, example: str) -> float:
-        return self._positive(where, text, unit, text, 1.0, example)
+        return self._positive(where, text, partial(parse_difference, unit=unit), example)
 
-    def _positive(self, where: str, text: str, unit: str, body: str, scale: float, example: str) -> float:
+    def _positive(self, where: str, text: str, read: Callable[[str], float], example: str) -> float:
         try:
-            value = parse_difference(body, unit) * scale
+            value = read(text)
         except ValueError as error:
             self.faults.append(Fault(where, f'{error}; an sd is a difference, such as "{example}"'))
             return math.nan

@@ -18,7 +18,8 @@ import casadi as ca
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from ctrlgen.calibration.sensor_share import ASSUMED_SCALE, sensor_covariance
+from ctrlgen.budget.sensor_statement import ASSUMED_SCALE
+from ctrlgen.calibration.sensor_share import by_held, sensor_covariance
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text
 from ctrlgen.core.tabular import Column, Reported, Tabular
@@ -335,13 +336,13 @@ def _errors(fitter: Fitter, before: Fit, after: Fit) -> tuple[ReadingError, ...]
 def with_held(fitted: np.ndarray, joint: np.ndarray, sds: np.ndarray) -> np.ndarray:
     """(k, k) covariance of the deviations of fitted constants c and held ones h, in this order: c - c_true = e + G (h - h_true).
 
-    e, with the covariance `fitted`, is the deviation with h known; G = dc/dh follows from the covariance `joint` (k, k) of a fit of both,
-    C_ch C_hh^-1, whatever is stated of h there. `sds` (n_h,) of h - h_true are those of the bounds, for h stays where it is.
+    e, with the covariance `fitted`, is the deviation with h known; G = dc/dh follows from the covariance `joint` (k, k) of a fit of both
+    (`by_held`). `sds` (n_h,) of h - h_true are those of the bounds, for h stays where it is.
     """
     n, S = len(fitted), np.diag(sds**2)
     if not len(sds):
         return fitted
-    G = np.linalg.solve(joint[n:, n:], joint[n:, :n]).T
+    G = by_held(joint, n)
     return np.block([[fitted + G @ S @ G.T, G @ S], [S @ G.T, S]])
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ctrlgen.budget.sensor_statement import ASSUMED_SCALE
+
 
 @dataclass(frozen=True)
 class LearningOptions:
@@ -30,9 +32,8 @@ class LearningOptions:
     """Halvings of a step that would break a limit. Less than a sixty-fourth of a step shows nothing."""
     slow: float = 0.1
     """Share of the frequencies within which the error of a path is taken to lie where it is to be said how many repetitions tell it."""
-    sensor_scale: float = 5e-3
-    """Standard deviation of the scale of each channel that is read, where nothing is stated. Judgement: position sensors that were not
-    calibrated in place are good to a per cent, which is two of it."""
+    sensor_scale: float = ASSUMED_SCALE
+    """Standard deviation of the scale of each channel that is read, where nothing is stated."""
     sensor_clock: float = 0.5
     """Standard deviation, in samples, of the moments of the readings against those of the drives, where nothing is stated: two of it are
     the sample by which a log is late that writes a reading beside the next drive."""
