@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
-from ctrlgen.core.units import Quantity, base_unit
+from ctrlgen.core.units import Quantity, base_unit, written_unit
 from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
 from ctrlgen.learning.lifted import Lifted
 from ctrlgen.model.assembly import build_model
@@ -44,9 +44,11 @@ class PoseError(Effect, listed=False):
 
 @dataclass(frozen=True)
 class SensorNumber:
-    """A number of a law of the sensor whose standard deviation `sd` [SI] the device file states; `channels` of the reading it acts on."""
+    """A number of a law of the sensor in `unit` whose standard deviation `sd` [SI] the device file states; `channels` of the reading it
+    acts on."""
 
     path: str
+    unit: str
     sd: float
     channels: tuple[int, ...]
     kind: str
@@ -182,7 +184,7 @@ def _acted(e: Effect, channels: tuple[str, ...]) -> list[int]:
 
 def _numbers(effects: tuple[Effect, ...], channels: tuple[str, ...]) -> list[SensorNumber]:
     return [
-        SensorNumber(f"effect[{k}].{name}", number.sd, tuple(_acted(e, channels)), e.kind)
+        SensorNumber(f"effect[{k}].{name}", written_unit(number.text), number.sd, tuple(_acted(e, channels)), e.kind)
         for k, e in enumerate(effects)
         if e.place is Place.SENSOR and not any(not (s.clock or s.per_record) for s in e.states)
         for name, number in e.values.items()

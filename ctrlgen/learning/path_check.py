@@ -6,19 +6,22 @@ import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.learning.lifted import Lifted
-from ctrlgen.learning.runs import Runs, errors
+from ctrlgen.learning.runs import Runs, errors, root_mean_square
 from ctrlgen.recordings.plausibility import suspected
 
-OFF_PATH = 0.5  # of the path's extent, by which the model under the recorded drives may be off the path (rms)
-OFF_LEARNT = (
-    0.1  # of it, for a run after the first, beyond what the runs before could teach: its drives are of no other path
-)
-OF_TAUGHT = (
-    0.3  # of what the run before showed beyond the model, for what was learnt from it otherwise than in proportion
-)
-STILL = 0.1  # of the command's motion (rms), below which readings are not of a stage that moves
-COMMANDED = 0.2  # of the path's extent, by which a channel must be commanded to move for that to be looked at
-FAR_READING = 3.0  # times the size of the path, by which the readings may be off it (rms)
+OFF_PATH = 0.5
+"""Of the path's extent, by which the model under the recorded drives may be off the path (rms). Judgement: drives of another path, or in
+another unit, are off by as much as it is long."""
+OFF_LEARNT = 0.1
+"""Of it, for a run after the first, beyond what the runs before could teach. Judgement: a path that is nearer is hardly another one."""
+OF_TAUGHT = 0.3
+"""Of what the run before showed beyond the model, for what was learnt from it otherwise than in proportion. Judgement."""
+STILL = 0.1
+"""Of the command's motion (rms), below which readings are not of a stage that moves. Judgement: a stage so soft has another description."""
+COMMANDED = 0.2
+"""Of the path's extent, by which a channel must be commanded to move for that to be looked at: less may be the coupling of the others."""
+FAR_READING = 3.0
+"""Times the size of the path, by which the readings may be off it (rms). Judgement: a wrong unit is a factor of a thousand, a sign two."""
 
 
 def check_belongs(runs: Runs, lifted: Lifted, source: str) -> None:
@@ -29,15 +32,16 @@ def check_belongs(runs: Runs, lifted: Lifted, source: str) -> None:
     faults, beyond, first = list[Fault](), np.zeros(command.shape), None
     for run in runs.runs:
         model = lifted.run(run.drive)
-        off = _rms((model - command) / scale)
         led = (model - command) / scale
-        if (
-            first is not None
-        ):  # drives that were learnt lead the model off by what runs before showed beyond it, or a share of that
+        off = root_mean_square(led)
+        # Drives that were learnt lead the model off by what runs before showed beyond it, or a share of that
+        if first is not None:
             share = -np.sum(led * beyond) / max(float(np.sum(beyond**2)), 1e-300)
             led = led + np.clip(share, 0.0, 1.0) * beyond
-        allowed = OFF_PATH * extent if first is None else OFF_LEARNT * extent + OF_TAUGHT * _rms(beyond) + first
-        if _rms(led) > min(OFF_PATH * extent, allowed):
+        allowed = (
+            OFF_PATH * extent if first is None else OFF_LEARNT * extent + OF_TAUGHT * root_mean_square(beyond) + first
+        )
+        if root_mean_square(led) > min(OFF_PATH * extent, allowed):
             what = (
                 f"its drives would lead the device as described {100 * off / extent:.0f} % of the path's extent away from the path: "
                 "it is of another scenario or another device, or the columns of the drives have other units"
@@ -52,19 +56,15 @@ def check_belongs(runs: Runs, lifted: Lifted, source: str) -> None:
         beyond = away + (command - model) / scale
         about = (command - command.mean(axis=0)) / scale
         for channel, error, moved, read in zip(lifted.signal.channels, away.T, about.T, runs.observed, strict=True):
-            far, moves = _rms(error), float(np.std(error + moved)) / max(_rms(moved), 1e-300)
+            far, moves = root_mean_square(error), float(np.std(error + moved)) / max(root_mean_square(moved), 1e-300)
             if far > FAR_READING * size:
                 what = f"its {channel} is {far / size:.0f} times the path's size away from it; check the column, its unit, sign and origin"
                 faults.append(Fault(run.name, what))
-            elif read and _rms(moved) > COMMANDED * extent and moves < STILL:
+            elif read and root_mean_square(moved) > COMMANDED * extent and moves < STILL:
                 what = f"its {channel} moves by {moves:.2g} of what is commanded; check the column, its unit, and that the stage is driven"
                 faults.append(Fault(run.name, what))
     if faults:
         raise InputError(source, [*faults, *suspected(runs.notes)])
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _shift(model: np.ndarray, command: np.ndarray, off: float, closed: bool) -> int | None:
@@ -74,4 +74,4 @@ def _shift(model: np.ndarray, command: np.ndarray, off: float, closed: bool) -> 
     spectra = np.fft.rfft(model, axis=0) * np.conj(np.fft.rfft(command, axis=0))
     agreement = np.fft.irfft(spectra, n=len(command), axis=0).sum(axis=1)
     shift = int(-agreement.argmax() % len(command))
-    return shift if shift and _rms(np.roll(model, shift, axis=0) - command) < off / 4 else None
+    return shift if shift and root_mean_square(np.roll(model, shift, axis=0) - command) < off / 4 else None

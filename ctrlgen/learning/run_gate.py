@@ -20,11 +20,10 @@ from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import show
 from ctrlgen.learning.lifted import Lifted
 from ctrlgen.learning.response import regressed
-from ctrlgen.learning.runs import Run, Runs, errors, in_time
+from ctrlgen.learning.runs import Run, Runs, errors, in_time, root_mean_square
 from ctrlgen.learning.sensor_budget import rate_of
+from ctrlgen.learning.steady_drift import SURE
 
-SURE = 4.0
-"""Standard errors from which on a zero or a delay counts as seen; both are many numbers' mean. One in 16,000."""
 LEAST_LATE = 0.1
 """Samples: a delay below it moves a path by less than what sampling leaves of its time."""
 ANSWER = 0.1
@@ -35,9 +34,9 @@ FOREIGN = 0.05
 OF_CHANGE = 2.5
 """Times what the change of drives moves the model by: a reversed actuator makes twice that, and is named by its answer."""
 OF_ERROR = 0.5
-"""Of what both show beyond the model: an error that does not repeat within it teaches nothing."""
+"""Of what the one of both shows beyond the model that shows less. Judgement: an error that does not repeat to half teaches nothing."""
 OF_NOISE = 4.0
-"""Times the noise of both means."""
+"""Times the noise of both means. Judgement: noise that is slower than a period is told from few of them."""
 
 
 @dataclass(frozen=True)
@@ -145,7 +144,8 @@ def _against(a: _Seen, b: _Seen, runs: Runs, lifted: Lifted) -> tuple[np.ndarray
     if by_time:
         moving = moved - moved.mean(axis=0)
         least = max(
-            LEAST_LATE * lifted.sample_time, ANSWER * _rms(moving[:, read]) / max(_rms(parts[first][:, read]), 1e-300)
+            LEAST_LATE * lifted.sample_time,
+            ANSWER * root_mean_square(moving[:, read]) / max(root_mean_square(parts[first][:, read]), 1e-300),
         )
         tau = tau if abs(tau) > max(SURE * float(se[first]), least) else 0.0
     left = change - sum(value * part for value, part in zip(g[: first + by_time], parts, strict=False))
@@ -155,19 +155,17 @@ def _against(a: _Seen, b: _Seen, runs: Runs, lifted: Lifted) -> tuple[np.ndarray
 def _typical(seen: list[_Seen], runs: Runs, lifted: Lifted) -> int:
     """The run from which the others differ least in the middle; of two the one that is nearer to the model."""
     if len(seen) == 2:
-        return int(np.argmin([_rms(s.off) for s in seen]))
-    apart = [[_rms(_against(a, b, runs, lifted)[2]) for b in seen if b is not a] for a in seen]
+        return int(np.argmin([root_mean_square(s.off) for s in seen]))
+    apart = [[root_mean_square(_against(a, b, runs, lifted)[2]) for b in seen if b is not a] for a in seen]
     return int(np.argmin([np.median(row) for row in apart]))
 
 
 def _foreign(a: _Seen, b: _Seen, left: np.ndarray, lifted: Lifted) -> float:
     """By what share of the path's extent two runs differ, where that is more than runs of one path may; else 0."""
     command = lifted.solution.command / np.array(lifted.signal.scale)
-    extent = _rms(command - command.mean(axis=0))
-    allowed = FOREIGN * extent + OF_CHANGE * _rms(a.model - b.model)
-    allowed += OF_ERROR * min(_rms(a.off), _rms(b.off)) + OF_NOISE * _rms(np.hypot(a.noise, b.noise)[None])
-    return _rms(left) / max(extent, 1e-300) if _rms(left) > allowed else 0.0
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+    extent = root_mean_square(command - command.mean(axis=0))
+    allowed = FOREIGN * extent + OF_CHANGE * root_mean_square(a.model - b.model)
+    allowed += OF_ERROR * min(root_mean_square(a.off), root_mean_square(b.off)) + OF_NOISE * root_mean_square(
+        np.hypot(a.noise, b.noise)[None]
+    )
+    return root_mean_square(left) / max(extent, 1e-300) if root_mean_square(left) > allowed else 0.0

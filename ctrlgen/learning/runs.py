@@ -231,6 +231,11 @@ def first_differs(y: np.ndarray) -> int:
     return int(np.any(np.where(both, first, 0.0).sum(axis=0)[seen] > SETTLED * expected[seen]))
 
 
+def root_mean_square(values: np.ndarray) -> float:
+    """Of all values, whatever their channel."""
+    return float(np.sqrt(np.mean(values**2)))
+
+
 def errors(run: Run, lifted: Lifted) -> tuple[np.ndarray, np.ndarray]:
     """Followed minus commanded in each repetition (m, n, n_y), between samples that were read by a straight line, zero in channels
     without a reading; and the share (n_y,) of the samples that were read."""

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ctrlgen.budget.sensor_statement import SensorStatement
+from ctrlgen.core.units import show_difference
 from ctrlgen.learning.implied_pose import ImpliedPose
 from ctrlgen.learning.learning_options import LearningOptions
 from ctrlgen.learning.lifted import Lifted
@@ -71,15 +72,16 @@ def sensor_budget(
     for number, deviation in zip(implied.numbers, implied.deviations(drive), strict=True):
         with_scale |= set(number.channels)
         name = f"{number.path} ({number.kind})"
-        lines.append(Feigned(name, f"{number.sd:.3g} (SI)", "the device file", deviation * observed))
+        sd = show_difference(number.sd, number.unit, 3)
+        lines.append(Feigned(name, sd, "the device file", deviation * observed))
     for i, channel in enumerate(signal.channels):
         unit = np.where(np.arange(len(signal.channels)) == i, 1.0, 0.0)
         scale = stated.scale
         if observed[i] and not (scale is None and i in with_scale):
-            sd = options.sensor_scale if scale is None else scale.sd
+            share = options.sensor_scale if scale is None else scale.sd
             source = ASSUMED if scale is None else scale.source
-            if sd:
-                lines.append(Feigned(f"scale of {channel}", f"{100 * sd:.3g} %", source, sd * y * unit))
+            if share:
+                lines.append(Feigned(f"scale of {channel}", f"{100 * share:.3g} %", source, share * y * unit))
         zero = stated.zero.get(channel)
         if observed[i] and zero is not None:
             lines.append(Feigned(f"zero of {channel}", zero.text, zero.source, zero.sd * np.ones(y.shape) * unit))

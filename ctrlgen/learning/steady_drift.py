@@ -6,22 +6,25 @@ import numpy as np
 from scipy.stats import t as student
 
 SURE = 4.0
-"""Standard errors from which on a drift counts as seen."""
+"""Standard errors from which on a drift, a zero or a delay counts as seen; each is the mean of many numbers. One in 16,000."""
 ONE_SIDED = 1e-3
-"""Chance with which it may be seen of periods whose means scatter."""
+"""Chance with which it may be seen of periods whose means scatter. Few periods: a smaller one would hide a drift of their size."""
 FEWEST_SCATTER = 5
 """Periods from which on the scatter of their means tells slow noise: of fewer it is hardly known."""
 QUARTERS = 4
-"""Parts of a period in which it must be the same."""
+"""Parts of a period in which it must be the same. Judgement: enough to tell a line from what settles, few enough that each
+is a mean of many."""
 EVEN = 0.5
-"""Of its mean, by which it may differ from quarter to quarter: what settles is steep at first."""
+"""Of its mean, by which it may differ from quarter to quarter, beyond noise. Judgement: what settles within a
+period falls to less."""
 
 
 def drift_of(y: np.ndarray, noise: np.ndarray) -> np.ndarray:
     """(n_y,) by how much readings (m, n, n_y) of m successive periods drift in one; zero where that is not seen. `noise` (n_y,), where it
     is stated.
 
-    The mean difference of one period to the next, which is the same in every quarter of a period for a drift that is steady.
+    The slope of the straight line through the means of the periods; of a drift that is steady the change from period to period is the same
+    in every quarter.
     """
     m, n, n_y = y.shape
     drift = np.zeros(n_y)
