@@ -6,7 +6,6 @@ its second run, which is of another path, or another run's readings, and must be
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from scipy.interpolate import CubicSpline
 
 from ctrlgen import InputError
 from ctrlgen.budget.sensor_statement import Known, SensorStatement
-from ctrlgen.learning.learn import Learning, learn_recorded
+from ctrlgen.learning.learn import learn_recorded
 from ctrlgen.learning.lifted import Lifted
 from plants.cases import Case
 from plants.imperfect import Imperfect
@@ -35,7 +34,8 @@ CALIBRATED = SensorStatement(Known(1e-5, "0.001 %", "calibrated"), clock=Known(1
 @dataclass
 class Outcome:
     """What became of a specimen: its true errors run by run, S1's mean of three translations [%]; its `fault`, whether that was refused,
-    and what else was; whether its sensor was stated as `calibrated`, and which friction it has [N]."""
+    and what else was; whether its sensor was stated as `calibrated`, and which friction it has [N] and
+    which `noise`, times `NOISE`."""
 
     seed: int
     errors: list[float]
@@ -44,6 +44,7 @@ class Outcome:
     wrongly_refused: str
     calibrated: bool
     friction: float
+    noise: float
 
 
 class Specimen:
@@ -87,7 +88,7 @@ class Specimen:
         """Learns the path of `lifted`; `other` (n, n_u) are drives of another path. A run that is refused is left out and run again."""
         rate, command = 1 / lifted.sample_time, lifted.solution.command
         stated = CALIBRATED if self.calibrated else SensorStatement()
-        out = Outcome(self.seed, [], self.fault, False, "", self.calibrated, self.plant.friction)
+        out = Outcome(self.seed, [], self.fault, False, "", self.calibrated, self.plant.friction, self.noise)
         drive, recordings, tries = lifted.solution.drive, list[Path](), 0
         for k in range(RUNS + 1):
             poses = self.poses(drive, rate)
@@ -101,7 +102,7 @@ class Specimen:
                 folder_of = write(folder / f"{tries}", lifted.solution, np.tile(played, (PERIODS, 1)), seen)
                 tries += 1
                 try:
-                    found = self._next(lifted, stated, [*recordings, folder_of])
+                    found = learn_recorded(lifted, stated, [*recordings, folder_of])
                     break
                 except InputError as refusal:
                     if fault not in ("path", "reading"):
@@ -118,16 +119,7 @@ class Specimen:
             drive = found.next.drive
         return out
 
-    def _next(self, lifted: Lifted, stated: SensorStatement, recordings: list[Path]) -> Learning:
-        return learn_recorded(lifted, stated, recordings)
 
-
-def battery(
-    seeds: range, lifted: Lifted, other: np.ndarray, folder: Path, tell: Callable[[Outcome], None] = lambda _: None
-) -> list[Outcome]:
+def battery(seeds: range, lifted: Lifted, other: np.ndarray, folder: Path) -> list[Outcome]:
     """The outcomes of all specimens."""
-    outcomes = []
-    for seed in seeds:
-        outcomes.append(Specimen(seed).learnt(lifted, other, folder / f"{seed}"))
-        tell(outcomes[-1])
-    return outcomes
+    return [Specimen(seed).learnt(lifted, other, folder / f"{seed}") for seed in seeds]
