@@ -9,6 +9,7 @@ import pytest
 from learning_bench import WRONG, Bench, refused, shortened, solved
 
 from ctrlgen import build_model, learn, simulate, solve
+from ctrlgen.budget.sensor_statement import Known, SensorStatement
 from ctrlgen.devices.changed_numbers import changed
 from ctrlgen.effects import read_effect
 from ctrlgen.learning.implied_pose import ImpliedPose
@@ -17,7 +18,7 @@ from ctrlgen.learning.learning_page import verdict
 from ctrlgen.learning.lifted import Lifted
 from ctrlgen.learning.run_gate import belonging
 from ctrlgen.learning.runs import Run, Runs, in_time
-from ctrlgen.learning.sensor_budget import Feigned, SensorBudget
+from ctrlgen.learning.sensor_budget import Feigned, SensorBudget, sensor_budget
 from ctrlgen.learning.sensor_words import sensor_words
 from ctrlgen.learning.steady_drift import drift_of, without_drift
 from ctrlgen.trajectory.scenario import model_of
@@ -98,6 +99,27 @@ def test_what_is_left_to_the_sensor_never_lets_the_stage_be_worse(rng):
     large = 1e3 * lines[0].deviation
     assert budget.of_sensor(large) == pytest.approx(0, abs=1e-9)  # no sensor is so wrong: believed
     assert budget.of_sensor(0.5 * lines[0].deviation) == pytest.approx(0.5 * lines[0].deviation)
+    one = SensorBudget(
+        lines[:1], 2.0, scale
+    )  # half as much again as it may feign: at the worst the third of it is true, and may be turned about
+    assert one.of_sensor(3 * lines[0].deviation) == pytest.approx(lines[0].deviation)
+
+
+def test_the_budget_is_what_a_wrong_scale_zero_and_clock_make_of_the_readings(circle):
+    """Where nothing is stated 0.5 % and half a sample, of what is read; as the readings of such a sensor less those of a right one."""
+    lifted, observed = Lifted(circle), np.array([1, 1, 1, 1, 1, 0], bool)
+    stated = SensorStatement(zero={"delta_x": Known(5e-9, "5 nm", "drift")})
+    found = sensor_budget(lifted, ImpliedPose(lifted), stated, observed, LearningOptions())
+    y = lifted.run(circle.drive) * observed
+    late = np.fft.irfft(np.fft.rfft(y, axis=0) * np.exp(-2j * np.pi * np.fft.rfftfreq(200) * 0.5)[:, None], axis=0)
+    by_name = {line.name: line.deviation for line in found.lines}
+    assert by_name.pop("clock") == pytest.approx(
+        late - y, abs=0.02 * np.abs(late - y).max()
+    )  # it is linear in the delay
+    zero = by_name.pop("zero of delta_x")
+    assert np.all(zero[:, 3] == 5e-9) and not np.delete(zero, 3, axis=1).any()
+    assert list(by_name) == [f"scale of {c}" for c in lifted.signal.channels[:5]]
+    assert sum(by_name.values()) == pytest.approx(0.005 * y, rel=1e-12)
 
 
 def scaled(y: np.ndarray) -> np.ndarray:
@@ -223,6 +245,26 @@ def test_runs_that_belong_together_are_left_as_they_are(circle, rng):
     )
     found = belonging(runs, lifted, "t")
     assert found.notes == () and np.array_equal(found.runs[0].y, y, equal_nan=True)
+
+
+def test_a_late_run_and_one_with_another_zero_read_as_the_others_do(circle, rng):
+    """Of three the second comes a sample late, 314 nm of the path, and the zero of the third is off by 400 nm."""
+    lifted, noise = Lifted(circle), np.repeat([1e-5, 2e-8], 3)
+    y = [np.tile(circle.command, (3, 1, 1)) + noise * rng.standard_normal((3, 200, 6)) for _ in range(3)]
+    zero = np.array([0, 0, 0, 4e-7, -2e-7, 0])
+    read = zip("abc", (y[0], np.roll(y[1], 1, axis=1), y[2] + zero), strict=True)
+    runs = Runs(tuple(Run((name,), circle.drive, of) for name, of in read), np.full(6, np.nan), np.ones(6, bool), ())
+    found = belonging(runs, lifted, "t")
+    clock, zeros = found.notes
+    # a and c are on time alike: noise decides which of them the clock is counted from
+    assert clock.startswith("b: its readings come ") and clock.partition("later than those of ")[2][:3] in (
+        "a; ",
+        "c; ",
+    )
+    assert float(clock.split()[4]) == pytest.approx(1, abs=0.02)
+    assert zeros.startswith("c: its zero is off that of a, delta_x by 0.4")
+    for run in found.runs:  # the noise of three repetitions, to a quarter: 200 samples tell it to 5 %
+        assert np.all(np.sqrt(np.mean((run.y.mean(axis=0) - circle.command) ** 2, axis=0)) < 1.25 * noise / np.sqrt(3))
 
 
 @pytest.mark.long
