@@ -87,8 +87,8 @@ def sensor_budget(
             lines.append(Feigned(f"zero of {channel}", zero.text, zero.source, zero.sd * np.ones(y.shape) * unit))
     clock = _clock(lifted, stated, options)
     if clock is not None:
-        sd, text, source = clock
-        lines.append(Feigned("clock", text, source, -sd * rate_of(lifted, y)))
+        seconds, text, source = clock
+        lines.append(Feigned("clock", text, source, -seconds * rate_of(lifted, y)))
     return SensorBudget(tuple(lines), options.sensor_coverage, np.array(signal.scale))
 
 
