@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
+from axis_records import AXIS, fitter_of
 
 from ctrlgen.diagnosis.report.answer import where
+from ctrlgen.diagnosis.selection.edge_intervals import moved_by_form, out_to_visited
 from ctrlgen.diagnosis.selection.finding_region import region_of
-from ctrlgen.diagnosis.selection.findings import Estimate
+from ctrlgen.diagnosis.selection.findings import Estimate, estimated_values, finding_estimates
 from ctrlgen.effects import Effect
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.structure import Structure
 
 UM = {"edge": Estimate(-11.5, (-11.51, -11.49), "um"), "gap": Estimate(-3.0, (-3.1, -2.9), "um")}
 SCRATCH = {"position": Estimate(4.0, (3.9, 4.1), "um"), "length": Estimate(2.0, (1.8, 2.2), "um")}
@@ -30,7 +35,7 @@ WORDS = {
     "coulomb_after": "from 1.2 s (1.1 ... 1.3 s) on",
     "viscous_at_speed": "above a speed of 2 mm/s (1.9 ... 2.1 mm/s)",
     "drive_gain_beyond": "beyond drives of +-0.5 V (0.4 ... 0.6 V)",
-    "local_error": "between positions of 3 um (2.9 ... 3.1 um) and 5 um (4.9 ... 5.1 um)",
+    "local_error": "between positions of 3 um (2.86 ... 3.14 um) and 5 um (4.86 ... 5.14 um)",
     "temperature_sensitivity_above": "above a rise of the temperature of 1 K (0.9 ... 1.1 K)",
 }
 
@@ -51,3 +56,55 @@ def test_the_open_end_of_a_region_is_null():
     assert below.lower is None and below.upper.value == -11.5 and below.unit == "um"
     farther = region_of(Effect.library["stiffness_beyond"], NUMBERS)
     assert farther.size and farther.upper is None and farther.lower.ci95 == (-11.51, -11.49)
+
+
+def test_the_interval_of_an_end_holds_the_ramp_over_which_the_law_sets_in():
+    """The straight ramp that is as gradual as (1 + tanh(2 x/w))/2 is pi/2 times w long; that of a moment is told by its duration."""
+    wide = NUMBERS | {"width": Estimate(2.0, (1.0, 3.0), "um"), "rise": Estimate(0.4, (0.3, 0.5), "s")}
+    end = region_of(Effect.library["coulomb_above"], wide).lower
+    assert end.value == -11.5 and end.ci95 == pytest.approx((-11.51 - np.pi / 2, -11.49 + np.pi / 2))
+    assert region_of(Effect.library["coulomb_after"], wide).lower.ci95 == pytest.approx((0.9, 1.5))
+    bell = region_of(Effect.library["local_error"], NUMBERS | {"rounding": Estimate(4.0, (3.0, 5.0), "um")})
+    assert bell.upper.ci95 == pytest.approx((5 - 0.02**0.5 - np.pi, 5 + 0.02**0.5 + np.pi))
+
+
+def test_an_edge_is_told_by_the_places_that_are_visited():
+    places = np.array([1.0, 2.0, 3.0, 4.0])
+    assert out_to_visited((2.2, 2.3), places) == (2.0, 3.0)
+    assert out_to_visited((2.2, 3.1), places) == (2.0, 4.0)
+    assert out_to_visited((2.0, 3.0), places) == (2.0, 3.0)
+    # where none is visited any more, the fit alone tells
+    assert out_to_visited((0.5, 4.5), places) == (0.5, 4.5)
+
+
+def test_a_bent_spring_moves_its_edge():
+    """Of depths that are visited alike, the line nearest to s^2 is s - 1/6, and rms(s)/rms(s^2) is sqrt(5/3)."""
+    depth = np.linspace(-3.0, 2.0, 5001)
+    assert moved_by_form(depth, 0.05) == pytest.approx(0.05 * (5 / 3) ** 0.5 / 6 * 2.0, rel=2e-3)
+    # a single touch tells no form
+    assert moved_by_form(np.array([-1.0, 0.5]), 0.05) == 0.5
+
+
+def test_a_finding_tells_its_edge_no_more_narrowly_than_that():
+    fitter, edge = fitter_of(n=400), 5e-6
+    fits = {
+        kind: fitter.fit(
+            Structure(AXIS).with_cause(Hypothesis(kind, "stage:axis", "axis"), numbers | {"edge": edge}), steps=0
+        )
+        for kind, numbers in (
+            ("viscous_above", {"damping": 60.0, "width": 4e-6}),
+            ("stiffness_below", {"stiffness": 2e4}),
+        )
+    }
+    for kind, fit in fits.items():
+        path = next(u.path for u in fit.structure.free_parameters if u.name == "edge")
+        plain, told = estimated_values(fit)[path], finding_estimates(fitter, fit)[path]
+        places = next(r for r in fitter.fit_records)
+        ways = fitter.simulator(fit.structure, places).simulate_states(places, fit.theta)[0]
+        visited = np.unique(ways[:, -1]) * 1e6
+        assert told.ci95[0] < plain.ci95[0] and told.ci95[1] > plain.ci95[1]
+        assert min(np.abs(visited - told.ci95[0])) < 1e-6 and min(np.abs(visited - told.ci95[1])) < 1e-6
+        depth = edge - ways[:, -1]
+        # a damper has a ramp; a spring grows from nothing
+        unsure = 2 * moved_by_form(depth, 0.05) * 1e6 if kind == "stiffness_below" else 0.0
+        assert told.ci95[1] - told.ci95[0] >= unsure and visited[-1] > told.ci95[1]

@@ -17,6 +17,8 @@ EDGE = (
 )
 # Of a sample: an integrator's step. A force that jumps between two nodes of a step acts too long or too short by a part of it.
 STEP = 0.25
+# Of the width w of (1 + tanh(2 x/w))/2: the straight ramp that changes as gradually, in the root mean square
+RAMP = math.pi / 2
 CORNER = 1e-6  # typical travels over which the corner of a spring is rounded: less than what is touched
 
 
@@ -33,12 +35,15 @@ class Side(StrEnum):
 
 @dataclass(frozen=True)
 class ActsIn:
-    """The region of a law: of which `quantity`, on which `side` of the law's parameter `at`; `length`, of a stretch, another parameter."""
+    """The region of a law: of which `quantity`, on which `side` of the law's parameter `at`; `length`, of a stretch, another parameter;
+    `over` the one that says how gradually it sets in, as a straight ramp of `ramp` times that about the edge would."""
 
     quantity: str
     at: str
     side: Side
     length: str = ""
+    over: str = ""
+    ramp: float = RAMP
 
 
 def beyond_edge(s: LawInputs, p: LawNumbers, side: int) -> Expression:

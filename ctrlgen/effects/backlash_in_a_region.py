@@ -36,7 +36,7 @@ class BacklashAbove(RegionalBacklash):
     opens over the width w_0. Holds as `backlash` does, for b below 2 w_0."""
 
     title = "Play in the upper part of the travel"
-    acts_in = ActsIn("position", "edge", Side.ABOVE)
+    acts_in = ActsIn("position", "edge", Side.ABOVE, over="width")
     side = 1
 
 
@@ -45,5 +45,5 @@ class BacklashBelow(RegionalBacklash):
     opens over the width w_0. Holds as `backlash` does, for b below 2 w_0."""
 
     title = "Play in the lower part of the travel"
-    acts_in = ActsIn("position", "edge", Side.BELOW)
+    acts_in = ActsIn("position", "edge", Side.BELOW, over="width")
     side = -1

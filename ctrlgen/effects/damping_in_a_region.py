@@ -20,7 +20,7 @@ class ViscousAbove(RegionalDamping):
 
     title = "Damping in the upper part of the travel"
     params = (Param("damping", "channel*s/travel", (0.0, 10.0), "c: damping beyond the edge", off=0.0), *EDGE)
-    acts_in = ActsIn("position", "edge", Side.ABOVE)
+    acts_in = ActsIn("position", "edge", Side.ABOVE, over="width")
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.damping * s.velocity * beyond_edge(s, p, 1)
@@ -32,7 +32,7 @@ class ViscousBelow(RegionalDamping):
 
     title = "Damping in the lower part of the travel"
     params = ViscousAbove.params
-    acts_in = ActsIn("position", "edge", Side.BELOW)
+    acts_in = ActsIn("position", "edge", Side.BELOW, over="width")
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.damping * s.velocity * beyond_edge(s, p, -1)

@@ -27,7 +27,7 @@ class CoulombAbove(RegionalFriction):
 
     title = "Dry friction in the upper part of the travel"
     params = (*CONTACT, *EDGE)
-    acts_in = ActsIn("position", "edge", Side.ABOVE)
+    acts_in = ActsIn("position", "edge", Side.ABOVE, over="width")
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.force * s.states.z * beyond_edge(s, p, 1)
@@ -39,7 +39,7 @@ class CoulombBelow(RegionalFriction):
 
     title = "Dry friction in the lower part of the travel"
     params = (*CONTACT, *EDGE)
-    acts_in = ActsIn("position", "edge", Side.BELOW)
+    acts_in = ActsIn("position", "edge", Side.BELOW, over="width")
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.force * s.states.z * beyond_edge(s, p, -1)
@@ -51,7 +51,7 @@ class CoulombAfter(RegionalFriction):
     title = "Dry friction that sets in at a moment"
     params = (*CONTACT, *WHEN)
     states = (*BRISTLES, *CLOCK)
-    acts_in = ActsIn("time", "moment", Side.ABOVE)
+    acts_in = ActsIn("time", "moment", Side.ABOVE, over="rise", ramp=1.0)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.force * s.states.z * smooth_step(s, p)

@@ -18,7 +18,7 @@ class DriveGainBeyond(Effect):
     source = "definition: a piecewise linear gain"
     params = (
         Param("gain", "1", (-1.0, 1.0), "g: change of the slope beyond the level", off=0.0),
-        Param("level", "channel", (0.01, 1.0), "L: drive beyond which the slope is another"),
+        Param("level", "channel", (1e-3, 1.0), "L: drive beyond which the slope is another"),
     )
     acts_in = ActsIn("drive", "level", Side.BOTH)
 

@@ -21,7 +21,7 @@ class LocalError(Effect):
         Param("length", "channel", (1e-4, 1.0), "w: length of the stretch"),
         Param("rounding", "channel", (1e-4, 0.5), "r: way over which it sets in and ends"),
     )
-    acts_in = ActsIn("position", "position", Side.AROUND, "length")
+    acts_in = ActsIn("position", "position", Side.AROUND, "length", "rounding")
 
     @classmethod
     def contradiction(cls, p: dict[str, float]) -> str:

@@ -1,9 +1,14 @@
-"""The region of the operating range in which the law of a finding acts, with the intervals of its ends."""
+"""The region of the operating range in which the law of a finding acts, with the intervals of its ends.
+
+A law sets in over a way, and no form of its edge is nature's: the interval of an end holds the ramp about every edge that the interval of
+the law's own number holds.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import hypot
 from typing import Protocol
 
 from pydantic import Field
@@ -53,8 +58,11 @@ class _End:
     ci95: tuple[float, float]
     unit: str
 
-    def shifted(self, way: float) -> _End:
-        return _End(self.value + way, (self.ci95[0] + way, self.ci95[1] + way), self.unit)
+    def shifted(self, way: float, unsure: float) -> _End:
+        """The end at a distance whose 95 % interval is `unsure` to either side."""
+        low, high = (abs(end - self.value) for end in self.ci95)
+        value = self.value + way
+        return _End(value, (value - hypot(low, unsure), value + hypot(high, unsure)), self.unit)
 
 
 def region_of(law: type[Effect], numbers: Mapping[str, Bounded]) -> RegionEntry | None:
@@ -67,12 +75,15 @@ def region_of(law: type[Effect], numbers: Mapping[str, Bounded]) -> RegionEntry 
     lower: _End | None = middle
     upper: _End | None = None
     if where.side is Side.AROUND:
-        half = numbers[where.length].value / 2
-        lower, upper = middle.shifted(-half), middle.shifted(half)
+        length = numbers[where.length]
+        half, unsure = length.value / 2, (length.ci95[1] - length.ci95[0]) / 4
+        lower, upper = middle.shifted(-half, unsure), middle.shifted(half, unsure)
     elif where.side is Side.BELOW or (where.side is Side.OUTWARD and middle.value < 0):
         lower, upper = None, middle
+    ramp = where.ramp * numbers[where.over].value / 2 if where.over in numbers else 0.0
     size = where.side is Side.BOTH or where.quantity == "speed"
-    return RegionEntry(quantity=where.quantity, size=size, lower=_entry(lower), upper=_entry(upper), unit=e.unit)
+    ends = (_entry(lower, ramp), _entry(upper, ramp))
+    return RegionEntry(quantity=where.quantity, size=size, lower=ends[0], upper=ends[1], unit=e.unit)
 
 
 def places_of(law: type[Effect]) -> Sequence[str]:
@@ -81,5 +92,6 @@ def places_of(law: type[Effect]) -> Sequence[str]:
     return () if where is None else tuple(name for name in (where.at, where.length) if name)
 
 
-def _entry(end: _End | None) -> EndEntry | None:
-    return None if end is None else EndEntry(value=end.value, ci95=end.ci95)
+def _entry(end: _End | None, ramp: float) -> EndEntry | None:
+    """The entry of an end; the law sets in within `ramp` of it to either side."""
+    return None if end is None else EndEntry(value=end.value, ci95=(end.ci95[0] - ramp, end.ci95[1] + ramp))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -10,12 +10,13 @@ from pydantic import Field
 
 from ctrlgen.core.units import difference, from_si
 from ctrlgen.diagnosis.selection.attribution import Attribution, ShareEntry
+from ctrlgen.diagnosis.selection.edge_intervals import edge_intervals
 from ctrlgen.diagnosis.selection.finding_region import RegionEntry, region_of
 from ctrlgen.diagnosis.selection.law_titles import title
 from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.selection.verdict import terms_of_findings, unconfirmed
 from ctrlgen.diagnosis.settings import ATTRIBUTION, LUCK
-from ctrlgen.estimation.fit import Fit
+from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, nominal_physics
 from ctrlgen.estimation.prediction_uncertainty import prediction_uncertainty
 from ctrlgen.estimation.profile_likelihood import Profile
@@ -195,13 +196,20 @@ def estimated_values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, 
     return estimates
 
 
+def finding_estimates(fitter: Fitter, fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, Estimate]:
+    """The `estimated_values`, the edges of regions with the intervals of `edge_intervals`."""
+    estimates = estimated_values(fit, profiles)
+    wide = edge_intervals(fitter, fit, {path: e.ci95 for path, e in estimates.items()})
+    return estimates | {path: replace(estimates[path], ci95=ends) for path, ends in wide.items()}
+
+
 def findings(search: SearchResult, shares: Attribution, profiles: tuple[Profile, ...] = ()) -> tuple[Finding, ...]:
     """The causes of the chosen model with intervals, shares and alternatives, that with the largest share first.
 
     Causes of one law at one place, such as harmonics, are one finding, with the numbers of the largest first, and its alternatives.
     """
     causes = search.chosen.causes
-    estimates = estimated_values(search.chosen.fit, profiles)
+    estimates = finding_estimates(search.fitter, search.chosen.fit, profiles)
     unseen = set(unconfirmed(search))
     rows = []
     for first, *others in terms_of_findings(search):

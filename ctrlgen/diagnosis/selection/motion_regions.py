@@ -90,18 +90,27 @@ def suggested(regions: Mapping[Along, tuple[Region, ...]], place: Place, i: int)
     }
 
 
-def no_region(motion: Mapping[Along, np.ndarray], fit: Fit, k: int) -> str | None:
-    """Why cause k does not act in a region alone: the records lie wholly inside it, or outside; None where they do not, and for laws that
-    act everywhere."""
+def along_region(motion: Mapping[Along, np.ndarray], fit: Fit, k: int) -> np.ndarray | None:
+    """The quantity (n,) [SI] of whose region the law of cause k is; None where the records do not show it, and for laws that act
+    everywhere."""
     cause = fit.structure.causes[k]
-    if cause.effect == PARAMETER or not cause.prior.in_a_region or (where := cause.law.acts_in) is None:
+    if cause.effect == PARAMETER or (where := cause.law.acts_in) is None:
         return None
     place: Place | None = _moved(cause.law.place)
     names = [c.name for c in channels(nominal_physics(fit.structure.device), cause.law.place)]
     i = 0 if cause.at == "all" else names.index(cause.at)
     if where.quantity in ("time", "temperature"):
         place, i = None, 0
-    x, values = motion.get((where.quantity, place, i)), fit.values(k)
+    return motion.get((where.quantity, place, i))
+
+
+def no_region(motion: Mapping[Along, np.ndarray], fit: Fit, k: int) -> str | None:
+    """Why cause k does not act in a region alone: the records lie wholly inside it, or outside; None where they do not, and for laws that
+    act everywhere."""
+    cause = fit.structure.causes[k]
+    if cause.effect == PARAMETER or not cause.prior.in_a_region or (where := cause.law.acts_in) is None:
+        return None
+    x, values = along_region(motion, fit, k), fit.values(k)
     if x is None:
         return None
     edge = values[where.at]
