@@ -341,7 +341,7 @@ def test_check_tells_what_a_file_describes():
     assert "1000 samples" in ctrlgen("check", SCENARIOS / "circle20").stdout
     assert "1000 samples" in ctrlgen("check", SCENARIOS / "circle20" / "scenario.toml").stdout
     assert "can be followed within every limit" in ctrlgen("check", SCENARIOS / "circle20").stdout
-    assert "as expected: cannot follow 1 of 1 samples" in ctrlgen("check", SCENARIOS / "unreachable").stdout
+    assert "as expected: cannot follow 1 of 1 sample" in ctrlgen("check", SCENARIOS / "unreachable").stdout
 
 
 def test_check_explains_a_path_that_cannot_be_followed_and_a_duration_that_is_no_number_of_samples(tmp_path):

@@ -12,6 +12,7 @@ from recorded import refused, samples, two
 from scipy.signal import lfilter
 
 import ctrlgen
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.units import from_si
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
@@ -54,7 +55,7 @@ def test_a_drive_that_tells_what_it_did_is_bridged_and_told_in_one_note(kind):
     np.testing.assert_allclose(bridged.time, t, atol=1e-12)
     runs = np.diff(np.flatnonzero(there)) - 1
     (note,) = notes
-    assert f"{(runs > 0).sum()} gaps, the longest of {runs.max()} samples" in note
+    assert f"{(runs > 0).sum()} gaps, the longest of {number_of(runs.max(), 'sample')}, are" in note
 
 
 @pytest.mark.parametrize("rate", [0.003, 0.02])

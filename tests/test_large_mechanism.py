@@ -44,4 +44,4 @@ def test_a_hundred_bodies_and_two_hundred_blades_are_described_in_seconds(tmp_pa
     begun = time.process_time()
     lines = summary(loaded(tmp_path, towers(10, 10)))
     assert time.process_time() - begun < MOST
-    assert lines[0] == "100 bodies, 209 flexures, 1 actuators"
+    assert lines[0] == "100 bodies, 209 flexures, 1 actuator"

@@ -169,7 +169,7 @@ def test_oddities_of_columns(tmp_path):
     (tmp_path / "log.csv").write_text("t [s],u [V],y [um],same [um],still [V]\n" + rows(t, u, clipped, clipped, 0 * t))
     said = " ".join(table_oddities(table_facts(read_table(tmp_path / "log.csv"))))
     for what in (
-        "1 rows are not later",
+        "1 row is not later",
         "y [um]: stands at its end 15",
         "same [um]: is the same as y [um]",
         "still [V]",

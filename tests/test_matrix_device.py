@@ -109,7 +109,7 @@ WRONG = {
     (r'"7.1[01] ', '"7.4 '): "a load along theta_z, delta_y together would gain energy",
     (r'"F_y", "F_z", "M_x"', '"F_y", "F_y", "M_x"'): "loads: must be those of the directions in any order",
     (r'channels = \["delta_y"\]', 'channels = ["delta_x"]'): "no actuator moves delta_x",
-    (r'channels = \["delta_y"\]', 'channels = ["delta_y", "delta_z"]'): "2 channels, 1 actuators",
+    (r'channels = \["delta_y"\]', 'channels = ["delta_y", "delta_z"]'): "2 channels, 1 actuator",
     (r", 0, 0\],", ", 0],"): "must have 6 rows of 6 entries",
     (r"gain = \{.*\}", ""): "gain: is missing",
     (r"compliance = ", "jacobian = [[0]]\ncompliance = "): "give one matrix",

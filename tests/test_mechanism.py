@@ -51,7 +51,7 @@ def test_a_mechanism_is_solved_and_its_stress_limit_kept(tmp_path):
         ("along = [0, 1, 0]\nacross = [-1, 0, 0]", "along = [0, 1, 0]\nacross = [0, 2, 0]", "is parallel to along"),
         ('gain = "2 N/A"', 'gain = "2 N/V"', "is no force per drive in A"),
         ('low = "-1 A"', 'low = "2 A"', "low = '2 A' is not below high"),
-        ('channels = ["delta_x"]', 'channels = ["delta_x", "theta_z"]', "2 channels, 1 actuators"),
+        ('channels = ["delta_x"]', 'channels = ["delta_x", "theta_z"]', "2 channels, 1 actuator"),
         ('body = "stage"', 'body = "table"', "output.body: 'table' is no body"),
         (
             '[[body]]\nname = "stage"',

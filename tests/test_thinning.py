@@ -156,5 +156,5 @@ def test_the_reader_thins_a_long_record_and_says_so(tmp_path, monkeypatch, long_
     assert [len(r.time) for r in recording.records] == [1500, 1000], recording.notes
     said = [note for note in recording.notes if "thinned" in note]
     assert len(said) == 2 and "30000 rows are thinned to 1500, each the average of 20 readings" in said[0]
-    assert "1 outliers" in said[0]
+    assert "1 outlier or stuck reading was" in said[0]
     assert recording.noise[0] == pytest.approx(5e-9 / np.sqrt(GROUP))

@@ -12,6 +12,7 @@ import numpy as np
 from ctrlgen.app.batch_row import BatchRow
 from ctrlgen.app.batch_series import Series, batch_series
 from ctrlgen.app.control_chart import LEAST
+from ctrlgen.core.counts import number_of
 from ctrlgen.reporting.chart import Chart, Curve, Panel
 from ctrlgen.reporting.chart_drawing import chart_svg
 from ctrlgen.reporting.html import render
@@ -143,12 +144,10 @@ def _first_screen(
         f"{len(unusual)} {'stands' if len(unusual) == 1 else 'stand'} out ({_named([name for name, _ in unusual])})"
         if unusual
         else "none stands out",
-        f"{len(far)} of {len(machines)} machines {'deviates' if len(far) == 1 else 'deviate'} ({_named(far)})"
+        f"{len(far)} of {number_of(len(machines), 'machine')} {'deviates' if len(far) == 1 else 'deviate'} ({_named(far)})"
         if far
         else "",
-        f"{len(drifts)} number{'s' if len(drifts) > 1 else ''} drift{'s' if len(drifts) == 1 else ''}"
-        if drifts
-        else "nothing drifts",
+        number_of(len(drifts), "number drifts", "numbers drift") if drifts else "nothing drifts",
         f"{len(failed)} failed" if failed else "",
     ]
     judged = len(rows) - len(failed) >= LEAST
@@ -177,7 +176,9 @@ def _first_screen(
         )
     steps.append("Add new recordings to the list and call the same command again: what is done is kept.")
     state = "bad" if failed else "so" if unusual or far or drifts else "ok"
-    return FirstScreen((f"Of {len(rows)} recordings {told}.",), state, figure, tuple(numbers), tuple(steps))
+    return FirstScreen(
+        (f"Of {number_of(len(rows), 'recording')} {told}.",), state, figure, tuple(numbers), tuple(steps)
+    )
 
 
 def _named(names: Sequence[str]) -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from rich.markup import escape
 
 from ctrlgen.app.console import out, show_table, table_of
+from ctrlgen.core.counts import number_of
 
 if TYPE_CHECKING:
     from ctrlgen.budget.error_budget import ErrorBudget
@@ -57,7 +58,12 @@ def print_budget(budget: ErrorBudget) -> None:
             f"at most {100 * a.difference:.1f} % in the sd, {100 * a.difference_of_interval:.1f} % in the 95 % interval"
         )
         style = None if a.passed else "yellow"
-        out.print(f"{budget.draws} draws: {both}; they {verdict}: {off}", markup=False, soft_wrap=True, style=style)
+        out.print(
+            f"{number_of(budget.draws, 'draw')}: {both}; they {verdict}: {off}",
+            markup=False,
+            soft_wrap=True,
+            style=style,
+        )
     if budget.broken is not None:
         share = f"{100 * budget.broken:.3g} % of them break a limit somewhere along the path"
         out.print(share, markup=False, soft_wrap=True, style="red" if budget.broken > 1 - budget.probability else None)

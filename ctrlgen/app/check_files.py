@@ -9,6 +9,7 @@ import numpy as np
 from ctrlgen.app.console import out
 from ctrlgen.app.diagnosis_console import print_recording
 from ctrlgen.app.scenario_console import print_shaper
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError, Unreachable
 from ctrlgen.core.files import read_toml
 from ctrlgen.core.units import parse
@@ -61,7 +62,10 @@ def _check_scenario(file: Path) -> None:
     scenario = load_scenario(file)
     model = model_of(scenario)
     problem = scenario.bind(model)
-    out.print(f"{scenario.file.title}: {len(problem.samples)} samples, device {scenario.device.name}", markup=False)
+    out.print(
+        f"{scenario.file.title}: {number_of(len(problem.samples), 'sample')}, device {scenario.device.name}",
+        markup=False,
+    )
     print_shaper(problem)
     try:
         if scenario.file.robust is not None:
@@ -110,13 +114,14 @@ def _check_device(file: Path, figure: Path | None, point: str | None) -> None:
     numbers = list(device.quantities())
     unsourced = [path for path, q in numbers if q.source is None]
     out.print(
-        f"{device.title}: {len(numbers)} numbers, {len(unsourced)} without a source of their own, {len(model.axes)} actuators",
+        f"{device.title}: {number_of(len(numbers), 'number')}, {len(unsourced)} without a source of their own, "
+        f"{number_of(len(model.axes), 'actuator')}",
         markup=False,
     )
     if model.redundant:
         weights = ", ".join(f"{w:g}" for w in model.drive_weights)
         out.print(
-            f"  {model.u.numel()} drives for {len(model.axes)} axes: those of least effort, weights {weights}",
+            f"  {model.u.numel()} drives for {number_of(len(model.axes), 'axis', 'axes')}: those of least effort, weights {weights}",
             markup=False,
         )
     for line in (

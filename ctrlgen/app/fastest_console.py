@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from rich.markup import escape
 
 from ctrlgen.app.console import out, show_table, table_of
+from ctrlgen.core.counts import number_of
 
 if TYPE_CHECKING:
     from ctrlgen.path_timing.fastest import FastestPath
@@ -40,7 +41,7 @@ def print_fastest(motion: FastestPath) -> None:
     if motion.bindings:
         show_table(table)
     if len(motion.bindings) > SHOWN:
-        out.print(f"and {len(motion.bindings) - SHOWN} more limits")
+        out.print(f"and {number_of(len(motion.bindings) - SHOWN, 'more limit')}")
     points = f"{len(motion.solution.command)} set-points every {1e3 * motion.sample_time:.6g} ms"
     between = f"largest distance from the path between them: {between_text(motion)}"
     out.print(f"{points}; {between}", markup=False, soft_wrap=True)

@@ -10,6 +10,7 @@ from rich.markup import escape
 
 from ctrlgen.app.console import out, show_table, table_of
 from ctrlgen.app.editor_schemas import schema_line
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import write_text
 from ctrlgen.devices import load_device
@@ -124,12 +125,12 @@ def print_table(facts: TableFacts) -> None:
 
 def _length(facts: TableFacts) -> str:
     if facts.time is None:
-        return f"{facts.rows} rows, no column is a time"
+        return f"{number_of(facts.rows, 'row')}, no column is a time"
     step, gaps = facts.time.step, facts.time.gaps
-    said = f"{facts.rows} rows, {number(1 / step)} Hz, {number(facts.rows * step)} s"
+    said = f"{number_of(facts.rows, 'row')}, {number(1 / step)} Hz, {number(facts.rows * step)} s"
     if gaps:
         listed = ", ".join(f"{missing} after row {row}" for row, missing in gaps[:MOST_GAPS])
-        more = f" and {len(gaps) - MOST_GAPS} more gaps" if len(gaps) > MOST_GAPS else ""
+        more = f" and {number_of(len(gaps) - MOST_GAPS, 'more gap')}" if len(gaps) > MOST_GAPS else ""
         said += f"; rows are missing: {listed}{more}"
     return said
 

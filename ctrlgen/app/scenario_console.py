@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rich.markup import escape
 
 from ctrlgen.app.console import Column, out, show_table, table_of
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.units import difference, from_si, show, show_difference
 
 if TYPE_CHECKING:
@@ -36,7 +37,8 @@ def print_solution(outcome: Outcome) -> None:
     out.print(f"[bold]{escape(scenario.file.title)}[/bold]", soft_wrap=True)
     solved = solution.solved_by
     out.print(
-        f"{len(solution.command)} samples {rate}, {escape(solution.model.device.title)}, {solved}", soft_wrap=True
+        f"{number_of(len(solution.command), 'sample')} {rate}, {escape(solution.model.device.title)}, {solved}",
+        soft_wrap=True,
     )
     print_shaper(scenario.bind(solution.model))
     if solution.between_samples is not None:
@@ -75,7 +77,7 @@ def print_solution(outcome: Outcome) -> None:
     show_table(table)
     if outcome.expected:
         good = sum(e.passed for e in outcome.expected)
-        out.print(f"expected: {good} of {len(outcome.expected)} values in range")
+        out.print(f"expected: {good} of {number_of(len(outcome.expected), 'value')} in range")
     for e in outcome.expected:
         if not e.passed:
             measured, low, high = (f"{from_si(v, e.unit):.7g}" for v in (e.measured, e.low, e.high))
@@ -102,14 +104,14 @@ def print_comparison(outcome: Outcome) -> None:
         table.add_row(row.build.real.value, f"{row.what}, {row.signal}", *numbers, verdict)
     show_table(table)
     good = sum(row.passed for row in comparison.rows)
-    out.print(f"{good} of {len(comparison.rows)} comparisons within tolerance")
+    out.print(f"{good} of {number_of(len(comparison.rows), 'comparison')} within tolerance")
 
 
 def print_build(build: Build) -> None:
     """One line per target and one per check, then what failed and what did not run."""
     good = sum(row.passed for row in build.comparison.rows)
     out.print(
-        f"{good} of {len(build.comparison.rows)} comparisons within tolerance, {', '.join(build.comparison.compilers)}"
+        f"{good} of {number_of(len(build.comparison.rows), 'comparison')} within tolerance, {', '.join(build.comparison.compilers)}"
     )
     if build.in_loop.runs:
         columns: tuple[Column, ...] = (

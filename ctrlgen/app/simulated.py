@@ -9,6 +9,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import whole_folder, write_bytes, write_text
 from ctrlgen.core.units import from_si, parse
@@ -62,7 +63,7 @@ def stepped(text: str, duration: float, rate: float, model: Model) -> DriveFile:
     """Drives that are zero and, after a tenth of the duration, step to `text`. Raises InputError."""
     drive, n = model.signals["drive"], round(duration * rate)
     if not 10 <= n <= MOST_SAMPLES:
-        what = f"gives {n} samples at {rate:g} Hz; 10 to {MOST_SAMPLES} are simulated"
+        what = f"gives {number_of(n, 'sample')} at {rate:g} Hz; 10 to {MOST_SAMPLES} are simulated"
         raise InputError("--duration", [Fault(f"{duration:g} s", what)])
     u = np.zeros((n, len(drive.channels)))
     for part in text.split(","):

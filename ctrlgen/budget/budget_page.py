@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from ctrlgen.budget.budget_record import BudgetRecord, budget_record, safety_sentence
 from ctrlgen.budget.budget_shares import printed_shares
 from ctrlgen.budget.error_budget import COVERAGE, ErrorBudget
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.files import write_text
 from ctrlgen.core.units import difference, from_si
 from ctrlgen.reporting.chart import Chart, Curve, Panel
@@ -56,7 +57,7 @@ def first_screen(b: BudgetRecord, figure: PageFigure) -> FirstScreen:
     lost = [row for row in b.limits if not row.kept]
     likely = f"{100 * b.probability:.10g} %"
     kept = (
-        f"{len(lost)} of {len(b.limits)} limits are not kept at {likely}"
+        f"{len(lost)} of {number_of(len(b.limits), 'limit')} {'is' if len(lost) == 1 else 'are'} not kept at {likely}"
         if lost
         else f"every limit is kept at {likely}"
     )

@@ -22,6 +22,7 @@ from ctrlgen.budget.monte_carlo import Drawn, draw
 from ctrlgen.budget.robust import solve
 from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.budget.uncertainty import Uncertainties, load_uncertainties
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.core.tabular import Column, Reported, Tabular
 from ctrlgen.devices import Device
@@ -138,7 +139,7 @@ class ErrorBudget(Tabular, Reported):
         """What a reader should know of how the budget was made."""
         lost = 0 if self.drawn is None else self.drawn.lost
         why = "their simulated pose or a limited quantity is not finite, as those of a stage that buckles"
-        what = f"{lost} of {self.draws} draws were left out: {why}"
+        what = f"{lost} of {self.draws} draws left out: {why}"
         return (what,) if lost else ()
 
     @property
@@ -232,7 +233,7 @@ def budget_of(
     critical = critical_samples(path_margins, probability)
     drawn = None
     if draws:
-        progress(f"{draws} draws")
+        progress(number_of(draws, "draw"))
         drawn = draw(path, linear, DrawnLimits(path_margins, slopes), _kept(combined, groups), critical, draws, seed)
         if drawn.lost > MOST_LOST * draws:
             raise SolverError(

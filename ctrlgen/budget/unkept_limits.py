@@ -8,6 +8,7 @@ import numpy as np
 
 from ctrlgen.budget.chance_constraint import ChanceConstraint
 from ctrlgen.budget.judged_path import JudgedPath
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Infeasibility, Unreachable
 from ctrlgen.core.units import show, show_difference
 from ctrlgen.trajectory.infeasibility import instead
@@ -32,7 +33,7 @@ def not_kept(
         *(text for _, text, _ in rows[:SHOWN]),
     ]
     if len(rows) > SHOWN:
-        lines.append(f"  and {len(rows) - SHOWN} more limits")
+        lines.append(f"  and {number_of(len(rows) - SHOWN, 'more limit')}")
     tightened = solution.model.tightened(judged.largest(reserve), chance.probability)
     line, others = instead(solution.scenario.bind(tightened), [k for *_, k in rows])
     lines += [f"{line}, with the same reserves"] * bool(others)

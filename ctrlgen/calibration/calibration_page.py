@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from ctrlgen.calibration.calibrate import Calibration
 from ctrlgen.calibration.calibration_record import Budgets, CalibrationRecord, calibration_record
 from ctrlgen.calibration.constants_files import write_constants
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.files import write_text
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.page_figure import FirstScreen, PageFigure
@@ -56,7 +57,7 @@ def first_screen(c: CalibrationRecord, figure: PageFigure) -> FirstScreen:
         steps.append(f"Record what shows {told}, and calibrate again: the default is kept until then.")
     steps.append("Use `device.calibrated.toml` for `ctrlgen budget`, `fastest` and `learn`.")
     state = "ok" if known == len(c.constants) else "bad"
-    answer = f"{known} of {len(c.constants)} constants are determined by the recording{better}."
+    answer = f"{known} of {number_of(len(c.constants), 'constant')} {'is' if known == 1 else 'are'} determined by the recording{better}."
     return FirstScreen((answer,), state, figure, tuple(numbers[:SHOWN]), tuple(steps))
 
 

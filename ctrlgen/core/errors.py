@@ -13,6 +13,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from ctrlgen.core.counts import number_of
+
 if TYPE_CHECKING:
     import numpy as np
 
@@ -59,7 +61,7 @@ class InputError(CtrlgenError):
     def __init__(self, source: object, faults: Sequence[Fault]) -> None:
         self.source = str(source)
         self.faults = tuple(faults)
-        count = "1 fault" if len(self.faults) == 1 else f"{len(self.faults)} faults"
+        count = number_of(len(self.faults), "fault")
         listed = [f"  - {_shortened(str(fault))}" for fault in self.faults[:LISTED]]
         if len(self.faults) > LISTED:
             listed.append(f"  - and {len(self.faults) - LISTED} more")

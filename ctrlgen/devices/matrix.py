@@ -23,6 +23,7 @@ import casadi as ca
 import numpy as np
 from pydantic import Field, model_validator
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.units import same_dimension, show
 from ctrlgen.devices.base import Device
 from ctrlgen.devices.device_physics import BalancedPhysics, SensedPoints
@@ -120,7 +121,7 @@ class MatrixDevice(Device):
                     f"{key}: {', '.join(unknown)} is no direction of the matrix, which has {', '.join(self.directions)}"
                 )
         if len(self.channels) != len(self.actuator):
-            counts = f"{len(self.channels)} channels, {len(self.actuator)} actuators"
+            counts = f"{number_of(len(self.channels), 'channel')}, {number_of(len(self.actuator), 'actuator')}"
             faults.append(f"channels: {counts}; follow as many as there are actuators")
         if self.loads and not self.pushes:
             faults.append("loads: belong to a compliance or stiffness; the columns of a jacobian are the actuators")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Annotated
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.units import In, Quantity, same_dimension, written_unit
 
 Entry = Annotated[Quantity, In(None)]
@@ -22,7 +23,7 @@ def entry_faults(
     """Rows and entries of the matrix `key` that are too few or too many, and entries that are not in the unit of their row by that of their
     column; `rows` and `columns`: the unit of each by its name. A zero needs no unit."""
     if len(stated) != len(rows) or any(len(row) != len(columns) for row in stated):
-        shape = f"{len(rows)} rows of {len(columns)} entries"
+        shape = f"{number_of(len(rows), 'row')} of {number_of(len(columns), 'entry', 'entries')}"
         return [f"{key}: must have {shape}, for {', '.join(rows)} by {', '.join(columns)}"]
     faults = []
     for i, ((row, of), entries) in enumerate(zip(rows.items(), stated, strict=True)):

@@ -21,6 +21,7 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.forks import usable_cores
 from ctrlgen.devices import Device
@@ -119,7 +120,7 @@ def _diagnose(
     parts = device.parts(nominal_physics(device))
     refused = not_offered(list(dict.fromkeys(h.effect for h in suspected)), parts) if laws is None else {}
     suspected = [with_odds(h, parts) for h in suspected if h.effect not in refused]
-    step(f"refit of the device as described, {len(suspected)} hypotheses")
+    step(f"refit of the device as described, {number_of(len(suspected), 'hypothesis', 'hypotheses')}")
     search = Searcher(fitter, Screen(fitter, suspected, seed), step, jobs).run(device)
     step("residual tests")
     tests = run_residual_tests(search.fitter, search.chosen.fit)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.files import whole_folder, write_text
 from ctrlgen.core.steps import noted
 from ctrlgen.devices import Device, files_of, load_device
@@ -41,10 +42,10 @@ class Replicates:
 
     def of(self, search: SearchResult, seed: int, step: Progress) -> Bootstrap:
         """The bootstrap of the chosen model; `step` is called with its progress."""
-        step(f"bootstrap, {self.count} replicates")
+        step(f"bootstrap, {number_of(self.count, 'replicate')}")
 
         def told(done: int, of: int) -> None:
-            step(f"bootstrap, {done} of {of} replicates")
+            step(f"bootstrap, {done} of {number_of(of, 'replicate')}")
 
         return bootstrap(search, self.count, seed, self.scheduler, self.jobs, told)
 

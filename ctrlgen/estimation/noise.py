@@ -16,6 +16,7 @@ import numpy as np
 from scipy import stats
 from scipy.signal import lfilter
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.estimation.settings import NOISE, STATISTICS
 from ctrlgen.numerics.quantisation_step import quantisation_step
 from ctrlgen.numerics.spectral_peaks import local_floor, periodogram
@@ -163,7 +164,7 @@ def _of_poses(recording: Recording, i: int, settling: float) -> _ChannelNoise:
     sd, count = repeatability(recording.records, i)
     if count >= NOISE.fewest_repeats and sd > 0:
         return _ChannelNoise(sd, NoiseSource.POSES, float(count), f", {count} beyond the first of each")
-    few = f"only {count} poses repeat an earlier one" if count else "no pose repeats"
+    few = f"only {number_of(count, 'pose repeats', 'poses repeat')} an earlier one" if count else "no pose repeats"
     return _ChannelNoise(1.0, NoiseSource.MISFIT, np.inf, f", and {few}; estimated from the residual of the best model")
 
 
@@ -208,7 +209,7 @@ def _from_stretches(stretches: list[np.ndarray], source: NoiseSource, rounding: 
     kept = sum(max(len(s) - removed * max(tau, 1.0), len(s) / 2) for s in stretches) / sum(map(len, stretches))
     sd, a = _with_rounding(innovation / np.sqrt(kept), a, rounding)
     n, ratio = sum(map(len, stretches)), stationary_deviation(sd, a) / sd
-    details = f", {n} samples, autoregressive of order {len(a)}"
+    details = f", {number_of(n, 'sample')}, autoregressive of order {len(a)}"
     if ratio > NOISE.slow_ratio:
         details += f"; it is slow, {ratio:.0f} times its innovations: part of it may be motion of the device, not of its sensor"
     return _ChannelNoise(sd, source, float(n), details, a)

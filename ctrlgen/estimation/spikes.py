@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.units import difference
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.settings import OUTLIERS, RESIDUAL_TESTS, STATISTICS
@@ -72,10 +73,8 @@ def marking_notes(before: Recording, after: Recording) -> tuple[str, ...]:
             held = [(a, b) for a, b, k in new.held if k == i]
             if held:
                 at = ", ".join(f"{new.time[a]:.6g} s" for a, _ in held)
-                count = sum(b - a for a, b in held)
-                notes.append(
-                    f"{new.name}, {channel}: {count} samples repeat one value while the device moves (from {at}); not used."
-                )
+                count = number_of(sum(b - a for a, b in held), "sample repeats", "samples repeat")
+                notes.append(f"{new.name}, {channel}: {count} one value while the device moves (from {at}); not used.")
     return tuple(notes)
 
 

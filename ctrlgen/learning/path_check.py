@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.learning.lifted import Lifted
 from ctrlgen.learning.runs import Runs, errors, root_mean_square
@@ -47,7 +48,7 @@ def check_belongs(runs: Runs, lifted: Lifted, source: str) -> None:
                 "it is of another scenario or another device, or the columns of the drives have other units"
             )
             if (shift := _shift(model / scale, command / scale, off, lifted.closed)) is not None:
-                what = f"it begins {shift} samples after the path does; let it begin where the path begins, by `rows`"
+                what = f"it begins {number_of(shift, 'sample')} after the path does; let it begin where the path begins, by `rows`"
             faults.append(Fault(run.name, what))
             continue
         away = errors(run, lifted)[0].mean(axis=0) / scale

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import show
 from ctrlgen.learning.implied_pose import ImpliedPose
@@ -157,7 +158,7 @@ def _run(record: Record, places: Sequence[int | None], lifted: Lifted, noise: np
     m = rows // n if lifted.closed or lifted.static else min(1, rows // n)
     if not m:
         raise ValueError(
-            f"has {len(record.drive)} rows, which is less than one run: {n} samples of the path"
+            f"has {number_of(len(record.drive), 'row')}, which is less than one run: {number_of(n, 'sample')} of the path"
             + (f", {every} rows each" if every > 1 else "")
         )
     used = record.drive[: m * n * every].reshape(m, n, every, -1)
@@ -173,7 +174,8 @@ def _run(record: Record, places: Sequence[int | None], lifted: Lifted, noise: np
         k, i = np.argwhere(np.abs(periods - drive).max(axis=0) > allowed)[0]
         name = lifted.model.signals["drive"].channels[i]
         raise ValueError(
-            f"its drives do not repeat after {n} samples (drive.{name} at sample {k}); cut it by `rows` so that each record is one run"
+            f"its drives do not repeat after {number_of(n, 'sample')} (drive.{name} at sample {k}); "
+            "cut it by `rows` so that each record is one run"
         )
     observed = record.observed[: m * n * every : every].reshape(m, n, -1)
     y = np.stack([np.full((m, n), np.nan) if p is None else observed[:, :, p] for p in places], axis=2)
@@ -206,7 +208,7 @@ def _too_few(measured: np.ndarray, lifted: Lifted) -> str:
     """What is wrong with the samples (n,) at which a channel was read; empty where they are enough."""
     read = np.flatnonzero(measured)
     if len(read) < min(FEWEST_MEASURED, lifted.n):
-        return f"was read at {len(read)} of {lifted.n} samples; {min(FEWEST_MEASURED, lifted.n)} or more are needed"
+        return f"was read at {len(read)} of {number_of(lifted.n, 'sample')}; {min(FEWEST_MEASURED, lifted.n)} or more are needed"
     if lifted.static:
         return "" if len(read) == lifted.n else f"was not read at pose {int(np.flatnonzero(~measured)[0])}"
     gaps = (
@@ -215,7 +217,7 @@ def _too_few(measured: np.ndarray, lifted: Lifted) -> str:
         else np.diff(np.concatenate([[0], read, [lifted.n - 1]]))
     )
     if gaps.max() > WIDEST_GAP * lifted.n:
-        return f"was not read for {gaps.max()} samples in a row; at most {int(WIDEST_GAP * lifted.n)} can be bridged"
+        return f"was not read for {number_of(gaps.max(), 'sample')} in a row; at most {int(WIDEST_GAP * lifted.n)} can be bridged"
     return ""
 
 

@@ -9,6 +9,7 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.core.tabular import Column, Drawn, Tabular
 from ctrlgen.core.units import from_si
@@ -121,7 +122,12 @@ def _checked(model: Model, u: np.ndarray, sample_time: float) -> np.ndarray:
         what = f"has the shape {drives.shape}; (n, {len(channels)}) is needed: a row a sample, a column a drive ({', '.join(channels)})"
         faults.append(Fault("u", what))
     elif not np.isfinite(drives).all():
-        faults.append(Fault("u", f"holds {int(np.sum(~np.isfinite(drives)))} numbers that are not finite"))
+        faults.append(
+            Fault(
+                "u",
+                f"holds {number_of(int(np.sum(~np.isfinite(drives))), 'number that is', 'numbers that are')} not finite",
+            )
+        )
     if not 0 < sample_time < np.inf:
         faults.append(Fault("sample_time", f"is {sample_time!r}; seconds above zero are needed"))
     if faults:

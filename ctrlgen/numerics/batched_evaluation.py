@@ -11,6 +11,7 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.numerics.compiled import Compilable
 
 BLOCK = 500  # samples of an unrolled recursion: CasADi takes longer to unroll a long one than to run it
@@ -28,7 +29,9 @@ def evaluate(batched: ca.Function, *given: np.ndarray) -> list[np.ndarray]:
     arguments = [np.ascontiguousarray(value, float) for value in given]
     for i, value in enumerate(arguments):
         if value.size != batched.nnz_in(i):
-            raise ValueError(f"argument {batched.name_in(i)} has {value.size} numbers instead of {batched.nnz_in(i)}")
+            raise ValueError(
+                f"argument {batched.name_in(i)} has {number_of(value.size, 'number')} instead of {batched.nnz_in(i)}"
+            )
         if value.size:
             buffer.set_arg(i, value.ravel().data)
     results = [np.empty((batched.size2_out(i), batched.size1_out(i))) for i in range(batched.n_out())]

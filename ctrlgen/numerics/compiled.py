@@ -21,6 +21,8 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
+from ctrlgen.core.counts import number_of
+
 FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off", "-w")
 # Of generated C, for the compiler: measured with gcc 12 to 14 on steps of an axis and a hexapod.
 SECONDS_PER_CHARACTER = 4e-6
@@ -106,7 +108,7 @@ class Compilable:
         for i, x in enumerate(rows):
             wanted = one.nnz_in(i) * (1 if i == 0 else len(x))
             if x.size != wanted or (i and len(x) not in (1, n)):
-                raise ValueError(f"argument {one.name_in(i)} has {x.size} numbers instead of {wanted}")
+                raise ValueError(f"argument {one.name_in(i)} has {number_of(x.size, 'number')} instead of {wanted}")
         states, results = np.empty((n, one.nnz_out(0))), np.empty((n, one.nnz_out(1)))
         given = (ctypes.c_void_p * len(inputs))(*(x.ctypes.data for x in rows[1:]))
         by = (ctypes.c_longlong * len(inputs))(*(x.shape[1] if len(x) == n else 0 for x in rows[1:]))

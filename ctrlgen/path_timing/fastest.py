@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ctrlgen.budget.robust import solve
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.core.tabular import Column, Reported, Tabular
 from ctrlgen.core.units import ExampleGiven, Quantity, read_quantity, show
@@ -134,7 +135,8 @@ def fastest(
         raise InputError(scenario.path, faults)
     if not model.inertial:
         if model.redundant:
-            what = f"has {model.u.numel()} drives for {len(model.axes)} axes and no inertia, for which the fastest path is not computed"
+            axes = number_of(len(model.axes), "axis", "axes")
+            what = f"has {model.u.numel()} drives for {axes} and no inertia, for which the fastest path is not computed"
             raise InputError(model.name, [Fault("device", what)])
         _check_held(scenario, model)
     followed = Followed.of(curve, model, rate)
@@ -198,7 +200,7 @@ def _sampled(optimum: Optimum, followed: Followed) -> np.ndarray:
     if begin < FEWEST:
         enough = f"{np.ceil(COARSE / optimum.duration / 1e3):g} kHz"
         lasts = show(optimum.duration, "s")
-        what = f'is too low: the fastest motion lasts {lasts}, which is {begin} samples; give --sample-rate "{enough}"'
+        what = f'is too low: the fastest motion lasts {lasts}, which is {number_of(begin, "sample")}; give --sample-rate "{enough}"'
         if COARSE / optimum.duration > HIGHEST_RATE:
             what = f"is of no use: the path is so short that it takes {lasts}; make it longer"
         raise InputError(followed.curve.scenario.path, [Fault("sample_rate", what)])

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError
 
 # a combination of inputs that moves a millionth of the largest is lost in the noise of any sensor
@@ -74,7 +75,7 @@ def calibrate_jacobian(
     n, k = U.shape
     unknowns = k + offset
     if n < unknowns:
-        what = f"{n} poses cannot tell {k} inputs" + (" and an offset" if offset else "")
+        what = f"{number_of(n, 'pose')} cannot tell {number_of(k, 'input')}" + (" and an offset" if offset else "")
         raise InputError("calibration", [Fault("poses", f"{what}; record at least {unknowns}")])
     size = np.sqrt(np.mean(U**2)) or 1.0
     design = np.hstack([U, np.full((n, int(offset)), size)])

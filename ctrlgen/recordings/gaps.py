@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.recordings import drive_across_gaps
 from ctrlgen.recordings.after_gaps import FRACTION, Described
 from ctrlgen.recordings.after_gaps import Gap as AfterGap
@@ -130,13 +131,13 @@ def _note(name: str, told: list[_Bridged], after: int) -> str:
     off = max(g.off.max() for g in told)
     right = f" (within {100 * off:.1g} % of its range, by trials)" if off > TOLD else ""
     count = (
-        f"{len(sizes)} gaps, the longest of {max(sizes)} samples, are"
+        f"{len(sizes)} gaps, the longest of {number_of(max(sizes), 'sample')}, are"
         if len(sizes) > 1
-        else f"a gap of {sizes[0]} samples is"
+        else f"a gap of {number_of(sizes[0], 'sample')} is"
     )
-    more = f", nor of {after} samples after them, which that changes" if after else ""
+    more = f", nor of {number_of(after, 'sample')} after them, which that changes" if after else ""
     return (
-        f"{name}: {count} bridged, {sum(sizes)} samples in all: the drive is taken as {' or '.join(ways)} there{right}; "
+        f"{name}: {count} bridged, {number_of(sum(sizes), 'sample')} in all: the drive is taken as {' or '.join(ways)} there{right}; "
         f"readings of theirs are not used{more}."
     )
 
@@ -192,7 +193,8 @@ def stretches(
             missing = len(joined.time) - len(parts[-1].time) - len(stretch.time)
             after = f"{parts[-1].time[-1]:.6g} s"
             notes.append(
-                f"{record.name}: {missing} samples are missing after {after} while the drive rests; marked, not used."
+                f"{record.name}: {number_of(missing, 'sample is', 'samples are')} missing after {after} while the drive rests; "
+                "marked, not used."
             )
             parts[-1] = joined
         else:
@@ -200,16 +202,15 @@ def stretches(
     kept = [stretch for stretch in parts if len(stretch.time) >= SHORTEST["series"]]
     dropped = sum(len(stretch.time) for stretch in parts) - sum(len(stretch.time) for stretch in kept)
     if not notes[len(bridged_notes) :] and len(parts) == 1:
-        count = len(known) - len(parts[0].time)
-        notes.append(
-            f"{record.name}: a drive is missing in {count} samples at its beginning or end; they are left out."
-        )
+        count = number_of(len(known) - len(parts[0].time), "sample")
+        notes.append(f"{record.name}: a drive is missing in {count} at its beginning or end: left out.")
     if len(parts) > 1:
         more = ", ..." if len(parts) > LISTED_CUTS + 1 else ""
+        lost = number_of(dropped, "sample is", "samples are")
         at = ", ".join(f"{stretch.time[0]:.6g} s" for stretch in parts[1 : LISTED_CUTS + 1]) + more
         notes.append(
-            f"{record.name}: the drive is not known across gaps, so the record is used as {len(kept)} records, cut before {at}"
-            + (f"; {dropped} samples in stretches shorter than {SHORTEST['series']} are left out." if dropped else ".")
+            f"{record.name}: the drive is not known across gaps, so the record is used as {number_of(len(kept), 'record')}, cut before {at}"
+            + (f"; {lost} left out, in stretches shorter than {SHORTEST['series']}." if dropped else ".")
         )
         kept = [replace(stretch, name=f"{stretch.name} from {stretch.time[0]:.6g} s") for stretch in kept]
     return kept, notes

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault
 from ctrlgen.model.model import Model
 from ctrlgen.recordings.alike_units import alike, size_of
@@ -55,7 +56,7 @@ def order_notes(seen: Moved) -> list[str]:
         return []
     rows = {name: early(first.u[:, 0], first.y[:, i]) for i, (name, _) in enumerate(seen.readings)}
     return [
-        f"{name} comes before its drive by {by} rows: are the columns those of one clock? `later` shifts one"
+        f"{name} comes before its drive by {number_of(by, 'row')}: are the columns those of one clock? `later` shifts one"
         for name, by in rows.items()
         if by
     ]

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy  # its parts take a while to import, and come when they are used
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.units import Quantity
 from ctrlgen.recordings import drive_across_gaps
 from ctrlgen.recordings.schema import RecordingFile
@@ -32,7 +33,7 @@ def cannot_pass(cutoff: Quantity, highest: float, rows: int) -> str:
     if not 0 < cutoff.si <= highest:
         return f"{cutoff.text} is too high for the rows that are kept; write {highest:.4g} Hz or less"
     if rows < FEWEST_FILTERED:
-        return f"takes {FEWEST_FILTERED} rows or more, and {rows} are used; leave it out, or use more rows"
+        return f"takes {FEWEST_FILTERED} rows or more, and {rows} {'is' if rows == 1 else 'are'} used; leave it out, or use more rows"
     return ""
 
 
@@ -84,9 +85,11 @@ def spread(values: np.ndarray, places: np.ndarray) -> np.ndarray:
 def grid_note(name: str, places: np.ndarray) -> str:
     """That rows are missing at the rows between `places` (n,), and what the filter was given there."""
     sizes = np.diff(places) - 1
+    count, longest = int((sizes > 0).sum()), number_of(int(sizes.max()), "sample")
+    gaps = f"a gap of {longest} is" if count == 1 else f"{count} gaps, the longest of {longest}, are"
     return (
-        f"{name}: {int((sizes > 0).sum())} gaps, the longest of {int(sizes.max())} samples, are bridged before the low-pass, "
-        f"{int(sizes.sum())} samples in all: every column as smooth as around; their readings are not used."
+        f"{name}: {gaps} bridged before the low-pass, "
+        f"{number_of(int(sizes.sum()), 'sample')} in all: every column as smooth as around; their readings are not used."
     )
 
 

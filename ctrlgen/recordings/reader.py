@@ -13,6 +13,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.file_format import in_this_format
 from ctrlgen.core.files import read_toml, validate
@@ -201,7 +202,9 @@ class _File:
             said = [] if read.can is None else [thinning.not_thinned(record.name, read.rows, read.can.why)]
             return record, said
         if _is_rest(read) and read.rows < thinning.FEWEST * m:
-            return None, [f"{record.name}: of its {read.rows} rows too few would be left beside the others; not used."]
+            return None, [
+                f"{record.name}: of its {number_of(read.rows, 'row')} too few would be left beside the others; not used."
+            ]
         before = int(np.isfinite(record.observed).sum())
         record = thinning.marked(record)
         lost = before - int(record.valid.sum())

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import parse
 from ctrlgen.recordings import preprocessing, validation
@@ -46,7 +47,7 @@ class RecordReader:
             self._fault("", f"its columns have different numbers of rows ({listed}); export them together")
             return None
         if table.rows and n and table.rows[1] > n:
-            self._fault(".rows", f"{list(table.rows)} ends after the last of {n} rows of {table.file}")
+            self._fault(".rows", f"{list(table.rows)} ends after the last of {number_of(n, 'row')} of {table.file}")
             return None
         if kind == "series" and clock is None and (table.time is not None or table.sample_rate is None):
             return None
@@ -130,7 +131,7 @@ class RecordReader:
         every, least = self._kept(sample_time), SHORTEST["series"]
         if last - first < least or (last - first) // every >= least:
             return
-        what = f"leaves {(last - first) // every} of {last - first} rows, one in {every}, and {least} are needed"
+        what = f"leaves {(last - first) // every} of {number_of(last - first, 'row')}, one in {every}, and {least} are needed"
         if self.written.keep_every is None and self.written.low_pass is not None:
             lowest = preprocessing.lowest_cutoff(sample_time, (last - first) // least)
             self._fault(

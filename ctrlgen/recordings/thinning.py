@@ -21,6 +21,7 @@ from functools import cache
 import numpy as np
 from scipy.signal import firwin, resample_poly
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.recordings.outliers import outliers, stuck_samples
 from ctrlgen.recordings.recording import Record
 from ctrlgen.recordings.validation import JITTER
@@ -288,7 +289,11 @@ def note(record: Record, m: int, rows: int, lost: int) -> str:
     return (
         f"{record.name}: {rows} rows are thinned to {len(record.time)}, each the average of {m} readings: {_because(record)}, and what the "
         f"readings do faster is no answer to the drives. White noise falls by {np.sqrt(m):.3g}"
-        + (f"; {lost} outliers and stuck readings were left out before." if lost else ".")
+        + (
+            f"; {number_of(lost, 'outlier or stuck reading was', 'outliers and stuck readings were')} left out before."
+            if lost
+            else "."
+        )
     )
 
 

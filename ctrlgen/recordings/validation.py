@@ -16,6 +16,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import from_si, show
 from ctrlgen.devices.limit import spans
@@ -107,8 +108,8 @@ def _missing_numbers(record: Record, kind: str, names: ChannelNames, where: str,
     """Faults of channels without numbers and of records too short."""
     n = len(record.drive)
     if n < SHORTEST[kind]:
-        what = "samples" if kind == "series" else "poses"
-        return [Fault(where, f"{record.name} has {n} {what}; at least {SHORTEST[kind]} are needed: record longer")]
+        what = number_of(n, "sample" if kind == "series" else "pose")
+        return [Fault(where, f"{record.name} has {what}; at least {SHORTEST[kind]} are needed: record longer")]
     faults = []
     for i, name in enumerate(names.drives):
         missing = np.flatnonzero(~np.isfinite(record.drive[:, i]))
@@ -120,7 +121,10 @@ def _missing_numbers(record: Record, kind: str, names: ChannelNames, where: str,
     for i, name in enumerate(names.observed):
         count = int(np.isfinite(record.observed[:, i]).sum())
         if recorded[i] and count < SHORTEST[kind]:
-            what = f"has {count} numbers in {n} rows of {record.name}, but {SHORTEST[kind]} are needed; leave this channel out"
+            numbers = number_of(count, "number")
+            what = (
+                f"has {numbers} in {n} rows of {record.name}, but {SHORTEST[kind]} are needed; leave this channel out"
+            )
             faults.append(Fault(f"{where}.columns.{name!r}", what))
     if record.ambient is not None and not np.isfinite(record.ambient).all():
         k = int(np.flatnonzero(~np.isfinite(record.ambient))[0])
@@ -146,7 +150,7 @@ def _beyond_limits(record: Record, kind: str, model: Model, names: ChannelNames,
         )
         mend = f'if its numbers are in {other}, write unit = "{other}"; else ' if other else ""
         what = (
-            f"reaches {show(u[k], unit)} at {row}, the device allows {limits} ({count} of {len(u)} samples beyond); "
+            f"reaches {show(u[k], unit)} at {row}, the device allows {limits} ({count} of {number_of(len(u), 'sample')} beyond); "
             f"{mend}check the column's unit and sign, or the limit in the device file"
         )
         faults.append(Fault(f"{where}.columns.{names.drives[i]!r}", what))
@@ -179,7 +183,7 @@ def _sample_time(record: Record, where: str) -> tuple[float, list[str], list[Fau
     if len(backward):
         k = int(backward[0])
         what = (
-            f"does not increase from row {k} ({t[k]:.9g} s) to row {k + 1} ({t[k + 1]:.9g} s), {len(backward)} such steps in "
+            f"does not increase from row {k} ({t[k]:.9g} s) to row {k + 1} ({t[k + 1]:.9g} s), {number_of(len(backward), 'such step')} in "
             "all; sort the rows, remove repeated ones, or give sample_rate if the samples are evenly spaced"
         )
         return np.nan, [], [Fault(f"{where}.time", what)]
@@ -225,7 +229,8 @@ def mark(record: Record, kind: str, names: ChannelNames, recorded: np.ndarray) -
         for what, chosen in marks.items():
             if chosen.any():
                 first = f"{record.time[chosen.argmax()]:.6g} s" if kind == "series" else f"row {chosen.argmax()}"
-                note = f"{title}: {chosen.sum()} of {len(y)} samples are {what} (first at {first}); not used."
+                seen = f"{chosen.sum()} of {len(y)} samples {'is' if chosen.sum() == 1 else 'are'}"
+                note = f"{title}: {seen} {what} (first at {first}); not used."
                 notes.append(MissingSamples(note) if chosen is missing else note)
                 valid[chosen, i] = False
         observed[~valid[:, i], i] = np.nan
@@ -283,7 +288,7 @@ def with_hold_out(records: Sequence[Record], kind: str) -> Validated:
     longest = max(fits, key=lambda record: len(record.time))
     n, least = len(longest.time), DIVISIBLE[kind]
     if n < least:
-        what = f'none has role = "hold_out", and {longest.name} is too short to divide ({n} rows, {least} are needed)'
+        what = f'none has role = "hold_out", and {longest.name} is too short to divide ({number_of(n, "row")}, {least} are needed)'
         thinned = ", or raise low_pass, after which fewer rows are kept" if longest.band is not None else ""
         return Validated(faults=(Fault("record", f"{what}; record a second run{thinned}"),))
     if kind == "series":

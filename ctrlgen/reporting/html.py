@@ -16,6 +16,8 @@ from typing import Any
 import jinja2
 from markupsafe import Markup, escape
 
+from ctrlgen.core.counts import number_of
+
 SHARED = Path(__file__).resolve().parent  # what several pages include
 FOLDING = "page.js"
 CHARTS = ("vendor/uplot/uPlot.iife.min.js", "chart.js")
@@ -88,4 +90,5 @@ def render(template: Path, **values: Any) -> str:
     )
     environment.globals["page"] = PageParts()
     environment.filters["coded"] = coded
+    environment.filters["number_of"] = number_of
     return environment.get_template(template.name).render(**values)

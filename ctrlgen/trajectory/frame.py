@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text
 from ctrlgen.core.units import Quantity, parse, same_dimension, written_unit
@@ -138,7 +139,8 @@ def read_poses(path: Path, frame: Frame) -> np.ndarray:
         if len(row) != len(columns):
             faults.append(
                 Fault(
-                    f"line {line}", f"has {len(row)} cells, the header has {len(columns)}; give one number per column"
+                    f"line {line}",
+                    f"has {number_of(len(row), 'cell')}, the header has {len(columns)}; give one number per column",
                 )
             )
             continue

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, Infeasibility, InputError, SolverError, Unreachable
 from ctrlgen.core.units import from_si, show, show_difference
 from ctrlgen.devices import Signal
@@ -64,7 +65,7 @@ def unreachable(problem: PathProblem, needed: InverseTrajectory, certain: bool =
     samples = tuple(map(int, np.flatnonzero(np.any([c.beyond > 0 for c in causes], axis=0))))
     worst, at = causes[0].worst, problem.clock.moment
     lines = [
-        f"cannot follow {len(samples)} of {n} samples ({_runs(samples)}); the worst is sample {worst}{at(worst)}: "
+        f"cannot follow {len(samples)} of {number_of(n, 'sample')} ({_runs(samples)}); the worst is sample {worst}{at(worst)}: "
         f"{_point(signal, wanted[worst])}"
     ]
     ends = wanted[[worst, following[worst]]]  # of the drive of the worst sample
@@ -77,7 +78,7 @@ def unreachable(problem: PathProblem, needed: InverseTrajectory, certain: bool =
         for cause, others in zip(listed[:SHOWN_CAUSES], also, strict=False)
     ]
     if len(listed) > SHOWN_CAUSES:
-        lines.append(f"  and {len(listed) - SHOWN_CAUSES} more limits")
+        lines.append(f"  and {number_of(len(listed) - SHOWN_CAUSES, 'more limit')}")
     nearest = _nearest_pose(model, problem.follow, wanted[worst]) if held else None
     if nearest is not None:
         lines.append(f"  nearest pose of that sample that can be held: {_point(signal, nearest)}")
@@ -159,7 +160,9 @@ def _runs(samples: Sequence[int]) -> str:
         else:
             runs.append([k, k])
     shown = [f"{a}" if a == b else f"{a}-{b}" for a, b in runs[:SHOWN_RUNS]]
-    return ", ".join(shown) + (f", ... {len(runs) - SHOWN_RUNS} more runs" if len(runs) > SHOWN_RUNS else "")
+    return ", ".join(shown) + (
+        f", ... {number_of(len(runs) - SHOWN_RUNS, 'more run')}" if len(runs) > SHOWN_RUNS else ""
+    )
 
 
 def _point(signal: Signal, values: np.ndarray) -> str:

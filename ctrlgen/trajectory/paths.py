@@ -18,6 +18,7 @@ import scipy
 from pydantic import AfterValidator, Field, StrictBool
 from pydantic.json_schema import SkipJsonSchema
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import In, Quantity, read_quantity, same_dimension, written_unit
 from ctrlgen.devices.section import Section
@@ -328,7 +329,7 @@ class Poses(Path_):
         listed = self.samples(frame, n)
         still = [(k, np.zeros(listed.shape[1])) for k in range(1, order + 1)]
         if len(listed) < 2 * order + 2:
-            what = f"has {len(listed)} samples; their {order}. derivative takes {2 * order + 2} or more: add samples"
+            what = f"has {number_of(len(listed), 'sample')}; their {order}. derivative takes {2 * order + 2} or more: add samples"
             raise InputError("path", [Fault("points", what)])
         if self.periodic:
             ring = np.vstack([listed, listed[:1]])

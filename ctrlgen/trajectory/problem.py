@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import Quantity, read_quantity, show, written_unit
 from ctrlgen.devices import Signal
@@ -111,7 +112,7 @@ class PathProblem:
         n, order = len(self.samples), self.order
         least = LEAST_CLOSED if self.closed else order + 1
         if n < least:
-            what = f"has {n} samples; {self.model.name}, which has inertia, takes {least} or more"
+            what = f"has {number_of(n, 'sample')}; {self.model.name}, which has inertia, takes {least} or more"
             raise InputError(self.source, [Fault("path", f"{what}: raise sample_rate, or make the path longer")])
         self._check_smoothness(order)
         tables = self._tables(order, np.arange(n) + after)

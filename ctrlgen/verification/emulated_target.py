@@ -7,6 +7,7 @@ from typing import Annotated
 
 from pydantic import Field, PlainSerializer, computed_field
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.reporting.result_file import Keys
 
@@ -101,11 +102,11 @@ class Target(Keys):
         faults = []
         if self.differing:
             faults.append(
-                f"{self.differing} of {self.numbers} numbers differ from this computer's by up to {self.ulp} units in the last "
-                f"place, first in {self.where}"
+                f"{self.differing} of {self.numbers} numbers {'differs' if self.differing == 1 else 'differ'} from this computer's by "
+                f"up to {number_of(self.ulp, 'unit')} in the last place, first in {self.where}"
             )
         if self.writable:
-            faults.append(f"{self.writable} bytes of static writable memory, where none is promised")
+            faults.append(f"{number_of(self.writable, 'byte')} of static writable memory, where none is promised")
         return "; ".join(faults)
 
 

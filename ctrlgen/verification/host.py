@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import ToolError
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.toolchains import compile_c, find_compilers
@@ -52,7 +53,7 @@ def run_host(
     done = subprocess.run([str(program), mode], input=sent, capture_output=True, check=False, start_new_session=True)
     answer = np.frombuffer(done.stdout, dtype=float)
     if done.returncode != 0 or answer.size != len(records) * (1 + width):
-        got = f"{answer.size // (1 + width)} of {len(records)} records"
+        got = f"{answer.size // (1 + width)} of {number_of(len(records), 'record')}"
         raise ToolError(f"{program.name} stopped in mode '{mode}' with status {done.returncode} after {got}")
     return answer.reshape(len(records), 1 + width)
 

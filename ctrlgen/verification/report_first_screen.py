@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from ctrlgen.budget.budget_record import BudgetRecord
 from ctrlgen.budget.budget_section import BudgetSection
+from ctrlgen.core.counts import number_of
 from ctrlgen.reporting.numbers import number
 from ctrlgen.reporting.page_figure import FirstScreen, PageFigure
 from ctrlgen.verification.summary import MarginRow, Summary
@@ -39,7 +40,7 @@ def _held(s: Summary) -> str:
         wrong += [(sum(not e.passed for e in s.expected), len(s.expected), "values that the scenario expects")]
         told = " and ".join(f"{k} of {n} {what}" for k, n, what in wrong if k)
         return f"Out of tolerance: {told}. See the rows marked OUT."
-    held = f"the path is followed within {len(s.margins)} limits" if s.margins else "the path is followed"
+    held = f"the path is followed within {number_of(len(s.margins), 'limit')}" if s.margins else "the path is followed"
     if s.comparison:
         held += f", and the C agrees with the model in all {len(s.comparison)} comparisons"
     return f"Everything checked is within tolerance: {held}."

@@ -11,6 +11,7 @@ import typer
 
 from ctrlgen.app.commands.app import DEVICE_PANEL, DevicePath, OutFolder, app, as_picture
 from ctrlgen.app.console import err, out, progress
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.shipped_files import shipped_package
 
@@ -216,4 +217,4 @@ def reproduce(
         numbers = ", ".join(f"{counts[(name, status.value)]} {status.value}" for status in row.ReproductionStatus)
         out.print(f"{name}, {everything.TITLES[name]}: {numbers}", soft_wrap=True)
     if lacking := sum(r.reason.startswith(hinges.NEEDS_FEM) for r in rows):
-        err.print(f"{lacking} rows: {hinges.NEEDS_FEM}", style="yellow", markup=False, soft_wrap=True)
+        err.print(f"{number_of(lacking, 'row')}: {hinges.NEEDS_FEM}", style="yellow", markup=False, soft_wrap=True)

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.reporting.numbers import number
 
 Record = dict[str, Any]
@@ -40,13 +41,13 @@ def answer_of(kind: ResultKind, record: Record) -> tuple[str, Mood, str]:
 def _run(record: Record) -> tuple[str, Mood, str]:
     held = record["passed"] is True
     tight = next((m for m in record["margins"] if m["limit"] == record["tightest"]), None)
-    told = [f"{record['samples']} samples"]
+    told = [number_of(record["samples"], "sample")]
     if tight is not None and tight["share_left"] is not None:
         told.append(f"of the tightest limit, {tight['label']}, {100 * tight['share_left']:.3g} % are left")
     rows = record["comparison"]
     if rows:
         told.append(
-            f"the C agrees with the model in {sum(r['passed'] is True for r in rows)} of {len(rows)} comparisons"
+            f"the C agrees with the model in {sum(r['passed'] is True for r in rows)} of {number_of(len(rows), 'comparison')}"
         )
     wrong = [e["value"] for e in record["expected"] if e["passed"] is not True]
     if wrong:
@@ -91,7 +92,11 @@ def _learning(record: Record) -> tuple[str, Mood, str]:
 
 
 def _constants(record: Record) -> tuple[str, Mood, str]:
-    return "calibrated", "ok", f"{len(record['constants'])} constants of {record['device']} from {record['recording']}."
+    return (
+        "calibrated",
+        "ok",
+        f"{number_of(len(record['constants']), 'constant')} of {record['device']} from {record['recording']}.",
+    )
 
 
 def _workspace(record: Record) -> tuple[str, Mood, str]:
@@ -102,12 +107,12 @@ def _workspace(record: Record) -> tuple[str, Mood, str]:
 def _batch(record: Record) -> tuple[str, Mood, str]:
     done, total, failed = record["done"], record["total"], record["failed"]
     verdicts = ", ".join(f"{count} {verdict}" for verdict, count in record["verdicts"].items())
-    sentence = f"{done} of {total} diagnoses done{': ' if verdicts else ''}{verdicts}; {failed} failed."
+    sentence = f"{done} of {number_of(total, 'diagnosis', 'diagnoses')} done{': ' if verdicts else ''}{verdicts}; {failed} failed."
     return ("done" if done == total else "unfinished"), "bad" if failed else "ok" if done == total else "so", sentence
 
 
 def _generated(record: Record) -> tuple[str, Mood, str]:
-    return "generated", "ok", f"{len(record['files'])} files of {record['name']}."
+    return "generated", "ok", f"{number_of(len(record['files']), 'file')} of {record['name']}."
 
 
 KINDS = (  # the first that a folder has is what the folder is

@@ -26,6 +26,7 @@ from ctrlgen.app.viewer.compared_results import ComparedRow, compared
 from ctrlgen.app.viewer.followed_jobs import followed_jobs
 from ctrlgen.app.viewer.found_results import found_results, result_at
 from ctrlgen.app.viewer.viewed_folders import Absent, Place, ViewedFolders
+from ctrlgen.core.counts import number_of
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.numbers import number
 from ctrlgen.version import program
@@ -259,7 +260,7 @@ def _bytes(size: int) -> str:
     for power, name in ((9, "GB"), (6, "MB"), (3, "kB")):
         if size >= 10**power:
             return f"{size / 10**power:.3g} {name}"
-    return f"{size} bytes"
+    return number_of(size, "byte")
 
 
 def _cells(row: ComparedRow) -> list[dict[str, Any]]:

@@ -15,6 +15,7 @@ import casadi as ca
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, TableFaults
 from ctrlgen.core.units import Quantity
 from ctrlgen.devices.device_physics import DevicePhysics
@@ -139,7 +140,7 @@ class Mechanism(CopiedParts):
                 )
             )
         if not faults and len(self.output.channels) != len(self.placed_actuators):
-            counts = f"{len(self.output.channels)} channels, {len(self.placed_actuators)} actuators"
+            counts = f"{number_of(len(self.output.channels), 'channel')}, {number_of(len(self.placed_actuators), 'actuator')}"
             faults.append(Fault("output.channels", f"{counts}; follow as many channels as there are actuators"))
         faults += [] if faults else flexures_in_one_place(self.placed_elements, self.size)
         if not faults and (loose := mechanism.loose_bodies(len(self.bodies), self._joints)):

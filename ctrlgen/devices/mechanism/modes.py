@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 import scipy
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import show
 from ctrlgen.devices.mechanism.condensed import KEPT, Condensed, nominal
@@ -232,9 +233,9 @@ def summary(device: Drawing) -> list[str]:
     C = ca.DM(ca.evalf(ca.SX(c.output_compliance))).full()
     springs = sum(C is None for C in c.compliances)
     lines = [
-        f"{len(device.bodies)} bodies, {len(c.elements) - springs} flexures, "
-        + (f"{springs} springs, " if springs else "")
-        + f"{len(device.placed_actuators)} actuators"
+        f"{number_of(len(device.bodies), 'body', 'bodies')}, {number_of(len(c.elements) - springs, 'flexure')}, "
+        + (f"{number_of(springs, 'spring')}, " if springs else "")
+        + number_of(len(device.placed_actuators), "actuator")
     ]
     free, over = freedoms(device)
     lines.append(f"degrees of freedom without actuators: {free}; redundant constraints: {over}")

@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 
 import casadi as ca
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault
 
 Law: TypeAlias = Callable[..., Any] | ca.Function
@@ -63,7 +64,7 @@ def evaluate_law(where: str, law: Law, offered: Mapping[str, Ports], names: Sequ
         lines = str(error).strip().splitlines()
         return nothing, [Fault(where, f"raised {type(error).__name__}: {lines[-1] if lines else 'no message'}")]
     if isinstance(law, ca.Function) and law.n_out() != 1:
-        return nothing, [Fault(where, f"{law.name()} has {law.n_out()} outputs; give a function with one")]
+        return nothing, [Fault(where, f"{law.name()} has {number_of(law.n_out(), 'output')}; give a function with one")]
     rows, faults = _rows(where, value, names)
     if not faults:
         known = {s.element_hash() for ports in offered.values() for s in ca.symvar(ports.vector)}
@@ -127,8 +128,12 @@ def _rows(where: str, value: Any, names: Sequence[str]) -> tuple[ca.SX, list[Fau
         rows = ca.densify(ca.vertcat(ca.SX(0, 1), *(ca.vec(ca.SX(part)) for part in parts)))
     except (TypeError, NotImplementedError, RuntimeError):
         return nothing, [
-            Fault(where, f"returns {type(value).__name__}; return {len(names)} numbers: {', '.join(names)}")
+            Fault(
+                where, f"returns {type(value).__name__}; return {number_of(len(names), 'number')}: {', '.join(names)}"
+            )
         ]
     if rows.numel() != len(names):
-        return nothing, [Fault(where, f"returns {rows.numel()} numbers; {len(names)} needed: {', '.join(names)}")]
+        return nothing, [
+            Fault(where, f"returns {number_of(rows.numel(), 'number')}; {len(names)} needed: {', '.join(names)}")
+        ]
     return rows, []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.findings import ChanceEntry, Finding, Role
 from ctrlgen.reporting.numbers import number
@@ -28,9 +29,8 @@ def luck_text(finding: Finding) -> str:
         return "read from the data"
     if chance.p is None or chance.looks is None:
         return f"{NOT_JUDGED} by luck: {chance.reason}"
-    of = (
-        f"p {_equals(chance.p)} over all signs of {chance.stretches} stretches, times {number(chance.looks, 2)} answers"
-    )
+    stretches = number_of(chance.stretches, "stretch", "stretches")
+    of = f"p {_equals(chance.p)} over all signs of {stretches}, times {number(chance.looks, 2)} answers"
     return f"{chance_text(finding)}: {of}"
 
 

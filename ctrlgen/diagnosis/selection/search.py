@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.selection.attribution import attribute
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round
@@ -148,7 +149,7 @@ class Searcher:
         trials, visited = self.trials, [current]
         most = SEARCH.most_causes[trials.fitter.recording.kind]
         while True:
-            trials.step(f"screening, {len(current.causes)} causes so far")
+            trials.step(f"screening, {number_of(len(current.causes), 'cause')} so far")
             trials.new_round(len(rounds) + 1)
             current = self._marked_again(current)
             if len(current.causes) >= most or trials.selection.residual_within_model_form_error(current):

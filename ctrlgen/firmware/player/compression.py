@@ -18,6 +18,7 @@ from math import ceil, inf, log10
 import numpy as np
 from pydantic import Field
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import SolverError
 from ctrlgen.core.units import same_dimension
 from ctrlgen.devices.limit import ranges
@@ -297,9 +298,9 @@ def _no_curve(kind: str, remark: str) -> PlayerCandidate:
 
 def _size(curve: Curve) -> str:
     if isinstance(curve, SampleTable):
-        return f"{len(curve.drive)} rows"
+        return number_of(len(curve.drive), "row")
     count = sum(p.segments for p in curve.pieces)
-    return f"{count} segments" + (f" in {len(curve.pieces)} pieces" if len(curve.pieces) > 1 else "")
+    return number_of(count, "segment") + (f" in {len(curve.pieces)} pieces" if len(curve.pieces) > 1 else "")
 
 
 def _samples(curve: Curve) -> int:

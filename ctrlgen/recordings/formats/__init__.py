@@ -10,6 +10,7 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import InputError
 from ctrlgen.recordings.formats.checked_files import check_size, fault
 from ctrlgen.recordings.formats.long_form import widened
@@ -125,4 +126,4 @@ def _chosen(path: Path, tables: dict[str, MeasurementTable], which: int | str | 
         return tables[which]
     if isinstance(which, int) and 1 <= which <= len(tables):
         return tables[names[which - 1]]
-    raise fault(path, f"holds {len(tables)} tables ({each}), not table {which!r}")
+    raise fault(path, f"holds {number_of(len(tables), 'table')} ({each}), not table {which!r}")

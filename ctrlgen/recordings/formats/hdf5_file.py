@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.recordings.formats.checked_files import check_size, fault, package
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
 from ctrlgen.recordings.formats.nested_columns import columns_of
@@ -73,7 +74,9 @@ def _applied(value: Any, attributes: dict[str, Any], name: str) -> tuple[Any, li
         none = value == fill
         if np.any(none):
             value = np.where(none, np.nan, value.astype(float))
-            notes.append(f"{int(np.sum(none))} readings of {name} are its fill value {fill:g}: left out")
+            notes.append(
+                f"{number_of(int(np.sum(none)), f'reading of {name} is', f'readings of {name} are')} its fill value {fill:g}: left out"
+            )
     if factor is not None or offset is not None:
         factor, offset = (1.0 if factor is None else float(factor)), (0.0 if offset is None else float(offset))
         value = value * factor + offset

@@ -15,6 +15,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import InputError
 from ctrlgen.recordings.formats import number_cells, text_file
 from ctrlgen.recordings.formats.checked_files import LARGEST
@@ -90,7 +91,7 @@ def whole_table(
     ]
     for name, found in zip(columns, words, strict=True):
         for word, places in found.items():
-            count = "1 reading is" if len(places) == 1 else f"{len(places)} readings are"
+            count = number_of(len(places), "reading is", "readings are")
             notes.append(f"{name}: {count} {word!r} (first in line {first + places[0]}), taken as missing")
     return replace(known, columns=columns, lines=range(first, first + rows), notes=tuple(notes))
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.recordings.formats.checked_files import fault, package
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
 from ctrlgen.recordings.formats.nested_columns import columns_of
@@ -41,7 +42,8 @@ class _Raster:
             values = column.values
             if invalid is not None and invalid.any():
                 values = np.where(invalid, np.nan, values.astype(float))
-                self.notes.append(f"{int(invalid.sum())} readings of {column.name} are marked invalid: left out")
+                marked = number_of(int(invalid.sum()), f"reading of {column.name} is", f"readings of {column.name} are")
+                self.notes.append(f"{marked} marked invalid: left out")
             self.columns[column.name] = values
             self.units[column.name] = signal.unit
 

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.recordings.formats import number_cells, over_range, time_stamps
 from ctrlgen.recordings.formats.layout_question import Ambiguous, AmbiguousFile
@@ -110,7 +111,7 @@ class MeasurementTable:
                 raise self._bad_cells(name, cells.bad)
             column = cells.values
             notes += [
-                f"{name}: {self._count(len(k))} {word!r} ({self._first(k[0])}), taken as missing"
+                f"{name}: {number_of(len(k), 'reading is', 'readings are')} {word!r} ({self._first(k[0])}), taken as missing"
                 for word, k in cells.words.items()
             ]
             notes += [f"{name}: true is read as 1, false as 0"] if cells.truths else []
@@ -119,7 +120,8 @@ class MeasurementTable:
         except Ambiguous as error:
             raise AmbiguousFile(self.path, error.of_column(name)) from None
         notes += [
-            f"{name}: {self._count(m.readings)} {m.text} ({self._first(m.row)}), {m.meaning}; left out" for m in marks
+            f"{name}: {number_of(m.readings, 'reading is', 'readings are')} {m.text} ({self._first(m.row)}), {m.meaning}; left out"
+            for m in marks
         ]
         return Numbers(values, tuple(notes))
 
@@ -158,16 +160,13 @@ class MeasurementTable:
         listed = ", ".join(f"{self._place(k)} {text!r}" for k, text in bad[: number_cells.MOST_LISTED])
         more = f" and {len(bad) - number_cells.MOST_LISTED} more" if len(bad) > number_cells.MOST_LISTED else ""
         key = ", ".join(f'"{word}"' for word in words[: number_cells.MOST_LISTED]).replace("\\", "\\\\")
-        what = f"column {name!r} holds text that is no number in {len(bad)} of {len(self.columns[name])} rows ({listed}{more})"
+        what = f"column {name!r} holds text that is no number in {len(bad)} of {number_of(len(self.columns[name]), 'row')} ({listed}{more})"
         if any(number_cells.has_unit(text) for _, text in bad):
             return self.fault(f"{what}; numbers stand alone: write the unit into the name, such as 'x (um)'")
         if len(bad) == len(self.columns[name]):
             return self.fault(f"{what}; name another column")
         answers = {f"missing = [{key}]": "if that means a missing reading, or numbers in their place"}
         return AmbiguousFile(self.path, Ambiguous(what, answers))
-
-    def _count(self, count: int) -> str:
-        return "1 reading is" if count == 1 else f"{count} readings are"
 
     def _first(self, row: int) -> str:
         return f"first in {self._place(row)}"

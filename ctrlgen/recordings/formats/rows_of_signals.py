@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
 from ctrlgen.recordings.formats.number_cells import NumberStyle
 from ctrlgen.recordings.formats.unit_texts import split_name, unit_of
@@ -34,7 +35,7 @@ def on_its_side(
     names = [str(name) for name in columns[0]]
     values = np.array([np.asarray(column, dtype=float) for column in columns[1:]])
     units = {name: unit for name in names if (unit := split_name(name)[1] or _last_word(name)) is not None}
-    told = f"each of {len(names)} rows is a signal, named by its first cell: read as columns of {len(values)} samples"
+    told = f"each of {len(names)} rows is a signal, named by its first cell: read as columns of {number_of(len(values), 'sample')}"
     return MeasurementTable(
         path,
         {name: values[:, k] for k, name in enumerate(names)},

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.recordings.formats.layout_question import Ambiguous
 from ctrlgen.recordings.formats.number_cells import OVER, is_number, is_reading
 from ctrlgen.recordings.formats.text_cells import cells_of, is_comment, width_of, without_mark
@@ -145,7 +146,7 @@ def _block(lines: Sequence[str], run: list[int], above: list[int], separator: st
             ", ..." if len(wrong) > MOST_LISTED else ""
         )
         mend = "(for one) with the line of the names, if these stand above the table, or repair them"
-        raise Ambiguous(f"line {usual[0] + 1} has {width} cells, but {listed}", {"header = 5": mend})
+        raise Ambiguous(f"line {usual[0] + 1} has {number_of(width, 'cell')}, but {listed}", {"header = 5": mend})
     return Block(tuple(run), width, max(widths), tuple(above), cut, below)
 
 

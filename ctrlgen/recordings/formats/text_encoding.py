@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 from pathlib import Path
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.recordings.formats.checked_files import fault, read_bytes
 from ctrlgen.recordings.formats.layout_question import Ambiguous, AmbiguousFile
 
@@ -58,7 +59,10 @@ def decoded_bytes(path: Path, content: bytes, encoding: str | None = None) -> tu
     lost = len(text) - len(text.rstrip("\0"))
     if lost and lost < len(text):  # a logger that lost its power
         text = text.rstrip("\0")
-        notes = [*notes, f"{lost} null characters at the end are left out"]
+        notes = [
+            *notes,
+            f"{number_of(lost, 'null character at the end is', 'null characters at the end are')} left out",
+        ]
     if "\0" in text:
         raise fault(
             path, "is no text, although its ending or its beginning says so; export it again, or give it its own ending"

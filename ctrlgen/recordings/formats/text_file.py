@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.recordings.formats import number_cells
 from ctrlgen.recordings.formats.checked_files import fault
 from ctrlgen.recordings.formats.layout_question import Ambiguous, AmbiguousFile
@@ -222,4 +223,6 @@ def _unique(names: Sequence[str]) -> list[str]:
 def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
     """The tables of a text file, by the lines that they stand in."""
     tables = read_text_tables(path, layout)
-    return {f"from line {t.lines[0]}, {len(t.lines)} rows" if t.lines else "on its side": t for t in tables}
+    return {
+        f"from line {t.lines[0]}, {number_of(len(t.lines), 'row')}" if t.lines else "on its side": t for t in tables
+    }

@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.recordings.formats.layout_question import Ambiguous
 from ctrlgen.recordings.formats.number_cells import is_number, is_reading
 from ctrlgen.recordings.formats.text_blocks import Block
@@ -215,7 +216,7 @@ def _stated(lines: Sequence[str], block: Block, separator: str, line: int) -> He
     cells = _fitting(lines[line], block.width, separator) if line < len(lines) else None
     if cells is None:
         raise Ambiguous(
-            f"line {line + 1}, said to hold the names, does not have {block.width} cells, as the rows of the table do"
+            f"line {line + 1}, said to hold the names, does not have {number_of(block.width, 'cell')}, as the rows of the table do"
         )
     below = [(k, c) for k in block.above if k > line and (c := _fitting(lines[k], block.width, separator)) is not None]
     units = next(({i: c for i, c in enumerate(cells) if unit_of(c)} for _, cells in below if is_unit_row(cells)), {})
@@ -252,6 +253,6 @@ def _short(lines: Sequence[str], block: Block, separator: str) -> Header:
         return Header(tuple(named), _units_behind(named), notes=("the first column numbers the rows and has no name",))
     if is_comment(lines[line]) or separator == " ":  # a sentence has blanks, too
         return Header(())
-    what = f"line {line + 1} has {n} names, and the rows below it have {block.width} cells"
+    what = f"line {line + 1} has {number_of(n, 'name')}, and the rows below it have {number_of(block.width, 'cell')}"
     mend = "and name columns by their number from 0, or repair it; where a comma both separates and marks decimals, export with semicolons"
     raise Ambiguous(what, {"header = 0": mend})

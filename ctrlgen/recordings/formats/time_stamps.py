@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.recordings.formats.layout_question import Ambiguous
 from ctrlgen.recordings.formats.number_cells import CLOCK, DATE, MISSING
 
@@ -112,9 +113,8 @@ def _parsed(texts: list[str], style: str) -> np.ndarray:
         [k for k, cell in enumerate(blank) if cell is not None and parsed.isna().iloc[k]] if parsed.isna().any() else []
     )
     if lost:
-        what = (
-            f"holds {len(lost)} of {len(texts)} time stamps that are none, such as {texts[lost[0]]!r} in row {lost[0]}"
-        )
+        none = f"{len(lost)} of {number_of(len(texts), 'time stamp')} that {'is' if len(lost) == 1 else 'are'} none"
+        what = f"holds {none}, such as {texts[lost[0]]!r} in row {lost[0]}"
         raise ValueError(f"{what}; write them as ISO 8601 (2024-03-31T01:59:58.000)")
     return parsed.dt.tz_localize(None).to_numpy()
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import to_si
 from ctrlgen.model.model import Model
@@ -50,7 +51,9 @@ def read_drives(file: Path, model: Model) -> DriveFile:
         raise InputError(file, faults)
     u = np.column_stack([_si(facts, matches[name]) for name in units])
     if missing := int(np.sum(~np.isfinite(u))):
-        raise InputError(file, [Fault("drives", f"{missing} numbers are missing; write every one")])
+        raise InputError(
+            file, [Fault("drives", f"{number_of(missing, 'number is', 'numbers are')} missing; write every one")]
+        )
     readings = {m.signal: _si(facts, m) for m in matches.values() if m.signal not in units and m.stated}
     return DriveFile(u, facts.time.step, readings)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.units import from_si, to_si
 from ctrlgen.model.model import Model
 from ctrlgen.recordings.alike_units import alike
@@ -21,7 +22,9 @@ def table_oddities(facts: TableFacts) -> list[str]:
     said = []
     if (time := facts.time) is not None:
         if time.backward:
-            said.append(f"{time.column}: {time.backward} rows are not later than the row before")
+            said.append(
+                f"{time.column}: {number_of(time.backward, 'row is', 'rows are')} not later than the row before"
+            )
         if time.jitter > 0.01 * time.step:
             said.append(f"{time.column}: rows are uneven by {100 * time.jitter / time.step:.2g} % of their step")
     else:

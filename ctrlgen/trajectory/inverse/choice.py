@@ -5,6 +5,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault
 from ctrlgen.devices import Signal
 from ctrlgen.model.allocation import allocate, why_not_ganged
@@ -34,19 +35,22 @@ def count_faults(model: Model, follow: str) -> list[Fault]:
     """What keeps a model from being inverted: it takes a drive or more and one axis for each channel that is followed."""
     signal, drives, axes = model.signals[follow], model.u.numel(), len(model.axes)
     channels = len(signal.channels)
+    told = f"{number_of(channels, 'channel')} of the {follow}"
     if drives > axes and not model.redundant:
         return [Fault("device", f"{model.name} has an imposed motion and no drives; nothing leads it along a path")]
     if model.redundant and (why := why_not_ganged(model)) is not None:
-        lacking = f"has {drives} drives for {axes} axes and {why}"
+        lacking = f"has {number_of(drives, 'drive')} for {number_of(axes, 'axis', 'axes')} and {why}"
         what = f"{lacking}: the drives of least effort cannot be computed; let one drive act on several actuators"
         return [Fault("device", f"{model.name} {what}")]
     if drives < channels:
         ways = "; ".join(_direction(signal, way) for way in _reached(model, signal).T)
-        what = f"has {drives} drives for {channels} channels of the {follow}; near home it moves only along {ways}"
-        return [Fault("device", f"{model.name} {what}; follow a signal of {drives} channels, or add drives")]
+        what = f"has {number_of(drives, 'drive')} for {told}; near home it moves only along {ways}"
+        return [
+            Fault("device", f"{model.name} {what}; follow a signal of {number_of(drives, 'channel')}, or add drives")
+        ]
     flexible = model.inertial and not model.redundant  # then the other axes are flexible modes, which follow
     if channels != axes and not flexible:
-        what = f"{model.name} has {axes} axes for {channels} channels of the {follow}; follow its displacement"
+        what = f"{model.name} has {number_of(axes, 'axis', 'axes')} for {told}; follow its displacement"
         return [Fault("follow", what)]
     return []
 
