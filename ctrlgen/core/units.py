@@ -8,13 +8,15 @@ from __future__ import annotations
 import math
 import re
 import reprlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from annotated_types import GroupedMetadata
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
+
+from ctrlgen.core.known_units import KNOWN
 
 if TYPE_CHECKING:
     import pint
@@ -62,6 +64,8 @@ LARGEST = {
 """The largest magnitudes [SI] that a machine of the size of a nanopositioner can have, far above what any has: a stage of 10 km."""
 LARGEST_OTHER = 1e30
 """Of other dimensions: its products stay finite, also in single precision."""
+NAMED = ("m", "rad", "K", "N", "W", "V", "A", "s", "Hz", "Pa", "kg", "ohm", "1")
+"""Units of SI with a name; of two that measure the same the first is meant."""
 SMALLEST = 1e-60
 """Below it [SI], a number that is not zero: its inverse squared stays finite."""
 _WORD = r"[^\W\d]\w*|[%°]|\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+"
@@ -97,6 +101,8 @@ def _unit(text: str) -> pint.Unit:
 @cache
 def _affine(unit: str) -> tuple[float, float]:
     """(scale, offset) with SI = scale * value + offset, from pint's conversion of 0 and 1."""
+    if (known := KNOWN.get(unit or "1")) is not None:
+        return known[:2]
     base = _unit(unit)
     try:
         zero, one = (float(_registry().Quantity(value, base).to_base_units().magnitude) for value in (0.0, 1.0))
@@ -105,6 +111,15 @@ def _affine(unit: str) -> tuple[float, float]:
     if not math.isfinite(one) or not SMALLEST < abs(one - zero) < 1 / SMALLEST:
         raise ValueError(f"{unit!r} is too large or too small a unit to reckon with")
     return one - zero, zero
+
+
+@cache
+def _dimension(unit: str) -> Mapping[str, float]:
+    """Powers of the dimensions of `unit`, as pint names them. Raises ValueError for an unknown one."""
+    if (known := KNOWN.get(unit or "1")) is not None:
+        return known[2]
+    powers: Any = _unit(unit).dimensionality  # typed as any number, complex too
+    return dict(powers)
 
 
 def to_si(value: float, unit: str) -> float:
@@ -135,12 +150,16 @@ def shown_difference_unit(unit: str) -> str:
     return "K" if offset and scale == 1 else difference_unit(unit)
 
 
+def _plain(unit: str) -> str | None:
+    """The SI unit with a name of its own that `unit` is a multiple of."""
+    return next((name for name in NAMED if same_dimension(unit, name)), None)
+
+
 def base_unit(unit: str) -> str:
     """The SI unit of a quantity given in `unit`: 'um' -> 'm', 'degC' -> 'K', 'W' -> 'W'."""
-    for plain in ("m", "rad", "K", "N", "W", "V", "A", "s", "Hz", "Pa", "kg", "ohm", "1"):
-        if same_dimension(unit, plain):
-            return plain
-    return f"{_registry().Quantity(1.0, _unit(unit)).to_base_units().units:~}"
+    if (known := KNOWN.get(unit or "1")) is not None:
+        return known[3]
+    return _plain(unit) or f"{_registry().Quantity(1.0, _unit(unit)).to_base_units().units:~}"
 
 
 def exponents(unit: str) -> dict[str, int] | None:
@@ -156,7 +175,7 @@ def exponents(unit: str) -> dict[str, int] | None:
 
 def same_dimension(unit: str, other: str) -> bool:
     """Whether two unit texts measure the same kind of quantity."""
-    return bool(_unit(unit).dimensionality == _unit(other).dimensionality)
+    return _dimension(unit) == _dimension(other)
 
 
 @dataclass(frozen=True)
@@ -189,7 +208,7 @@ def parse(text: object, unit: str) -> float:
         value, written = (float(text) if abs(text) < LARGEST_OTHER else math.inf), ""
     if not math.isfinite(value):
         raise ValueError(f"{reprlib.repr(text)} is not a finite number")
-    _unit(written)
+    _dimension(written)
     absolute = unit in ("degC", "degF", "K")
     if (written == "" and unit != "1") or (absolute and "delta" in written) or not same_dimension(written, unit):
         if written == "":
@@ -209,7 +228,7 @@ def parse(text: object, unit: str) -> float:
 @cache
 def largest(unit: str) -> float:
     """The largest magnitude [SI] that is read of a quantity in `unit`."""
-    return LARGEST.get(base_unit(unit), LARGEST_OTHER)
+    return LARGEST.get(_plain(unit) or "", LARGEST_OTHER)
 
 
 def parse_difference(text: str, unit: str) -> float:
@@ -233,7 +252,7 @@ def _bounds_text(unit: str, low: float | None, high: float | None, low_open: boo
 def _own_unit(text: object) -> str:
     """The unit that a number is written in, one that begins at zero. Raises ValueError."""
     unit = written_unit(str(text))
-    _unit(unit)
+    _dimension(unit)
     if to_si(0.0, unit):
         raise ValueError(f"{text!r} does not count from zero; write it in a unit that does, such as K")
     return unit
@@ -316,7 +335,7 @@ def read_quantity(unit: str | None, given: Any) -> Quantity:
     if unit is None:
         value = given.get("value") if isinstance(given, dict) else given
         unit = written_unit(str(value))
-        _unit(unit)
+        _dimension(unit)
     return _reader(unit, None, None, False)(given)
 
 

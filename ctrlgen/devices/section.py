@@ -17,4 +17,7 @@ class Section(BaseModel):
     domain: ClassVar[str] = "mechanism"
     relative_sd: ClassVar[float | None] = None
 
-    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True, allow_inf_nan=False)
+    # built where first used: a device waits for the tables of no other kind
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, arbitrary_types_allowed=True, allow_inf_nan=False, defer_build=True
+    )
