@@ -41,6 +41,9 @@ def print_solution(outcome: Outcome) -> None:
         soft_wrap=True,
     )
     print_shaper(scenario.bind(solution.model))
+    if scenario.file.pivot is not None:
+        place = ", ".join(x.text for x in scenario.file.pivot)
+        out.print(f"path about the pivot ({place}), seen from the point of the pose", markup=False, soft_wrap=True)
     if solution.between_samples is not None:
         signal = solution.model.signals[scenario.file.follow]
         error = abs(solution.trace.signals[scenario.file.follow] - solution.command).max(axis=0)

@@ -46,7 +46,15 @@ def retimed(
     poses = Poses(
         kind="poses", file=f"{name}.csv", periodic=closed, folder=folder, listed=tuple(map(tuple, samples.tolist()))
     )
-    timing = {"sample_rate": rate, "duration": None, "points": None, "path": poses, "angles": None, "shaping": None}
+    timing = {
+        "sample_rate": rate,
+        "duration": None,
+        "points": None,
+        "path": poses,
+        "angles": None,
+        "pivot": None,
+        "shaping": None,
+    }
     changed = {"title": title, "device": device.path.name, "outcome": "solved", "expect": ()} | timing
     inputs = {
         **scenario.inputs,

@@ -16,6 +16,7 @@ from ctrlgen.devices import Signal
 from ctrlgen.model.inverse_dynamics import inverse_dynamics, relative_degrees
 from ctrlgen.model.model import Model
 from ctrlgen.model.quasi_static import natural_modes, quasi_static
+from ctrlgen.physics.pivot import about, can_turn
 from ctrlgen.trajectory.frame import Frame
 from ctrlgen.trajectory.inverse.choice import choose_inverse
 from ctrlgen.trajectory.inverse.clock import Clock, Sampled, Settled
@@ -90,7 +91,7 @@ class PathProblem:
     @cached_property
     def samples(self) -> np.ndarray:
         """(n, channels) [SI] the commanded samples."""
-        samples = self._on_path(lambda path, frame, n: path.samples(frame, n))
+        samples = self._about(self._on_path(lambda path, frame, n: path.samples(frame, n))[None])[0]
         samples = samples + self._moved if self.file.shaping is None else self._positions(len(samples), 0.0)
         if isinstance(self.clock, Sampled) and len(samples) < 2:
             what = "has one sample, but motion in time needs two or more; for one pose leave out sample_rate"
@@ -133,7 +134,7 @@ class PathProblem:
     def geometry(self, order: int, share: np.ndarray) -> np.ndarray:
         """(order + 1, len(share), channels) [SI, per share^k]: the curve of the path alone, where the `share` of it, 0 ... 1, is
         behind."""
-        return self._on_path(lambda path, frame, n: path.geometry(frame, order, share))
+        return self._about(self._on_path(lambda path, frame, n: path.geometry(frame, order, share)))
 
     @property
     def corners(self) -> np.ndarray:
@@ -208,12 +209,22 @@ class PathProblem:
             rate = 1 / self.clock.sample_time
             delays = [(a, t * rate) for a, t in zip(self.shaper.amplitudes, self.shaper.times, strict=True)]
         parts = [
-            amplitude * self._on_path(partial(_derivatives_at, order=order, at=at - samples))
+            amplitude * self._about(self._on_path(partial(_derivatives_at, order=order, at=at - samples)))
             for amplitude, samples in delays
         ]
         tables = np.sum(parts, axis=0)
         tables[0] += self._moved
         return np.asarray(tables)
+
+    def _about(self, tables: np.ndarray) -> np.ndarray:
+        """`tables` (order + 1, n, channels) of the scenario's pivot and its derivatives, of the point that the signal states."""
+        if self.file.pivot is None:
+            return tables
+        channels = self.signal.channels
+        if self.file.follow != "pose" or not can_turn(channels):
+            what = f"turns a pose about a point, and what is followed is {', '.join(channels)}; leave it out"
+            raise InputError(self.source, [Fault("pivot", what)])
+        return about(channels, tables, np.array([x.si for x in self.file.pivot]))
 
     @property
     def _moved(self) -> np.ndarray:

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from ctrlgen.core.names import CName
 from ctrlgen.core.units import In, Quantity, read_probability
 from ctrlgen.devices.load import Gravity, Load
+from ctrlgen.devices.place import Place
 from ctrlgen.devices.section import Section
 from ctrlgen.physics.euler_angles import Order
 from ctrlgen.trajectory.inverse.clock import Clock, Sampled, Settled
@@ -75,6 +76,9 @@ class ScenarioFile(Section):
     """theta_x, theta_y and theta_z of stated poses are angles about x, y and z in this order: "xyz intrinsic" about axes that turn with the
     body, "xyz extrinsic" about those that stay. Left out: they are the components of a rotation vector, as of every pose of a result.
     """
+    pivot: Place | None = None
+    """The path is that of this point of the body, whose place at home is seen from the point that the pose states: about a point 20 mm
+    below turns ["0 mm", "0 mm", "-20 mm"]. Results state the pose of the device's own point. Left out: so does the path."""
     sample_rate: Annotated[Quantity, In("Hz", positive=True)] | None = None
     """Samples a second of a motion in time. Left out: the scenario is static, and its samples are separate equilibria.
     """
