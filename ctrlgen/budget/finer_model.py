@@ -16,12 +16,11 @@ import numpy as np
 from ctrlgen.budget.linear import Propagated
 from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.core.errors import Fault, InputError, SolverError
-from ctrlgen.core.files import read_text
-from ctrlgen.devices import Device, Signal, files_of, load_device
+from ctrlgen.devices import Device, Signal, load_device
 from ctrlgen.model.discretisation import settling_time, shortest_half_period
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import simulate, trace
-from ctrlgen.trajectory.scenario import Input, Scenario, model_of
+from ctrlgen.trajectory.scenario import Input, Scenario, device_inputs, model_of
 
 FORGOTTEN = 2.0  # settling times: it begins at rest, farther off than the deviation is long
 MOST_STEPS = 2_000_000  # of a simulation that fits into memory
@@ -51,8 +50,7 @@ def load_finer(scenario: Scenario, model: Model, finer: Device | Path | str) -> 
     if not isinstance(device, Device):
         path = Path(device)
         device = load_device(path)
-        names = ("finer", "finer_code")  # the second where a file names another one
-        inputs = {n: Input(p, read_text(p)) for n, p in zip(names, files_of(path), strict=False)}
+        inputs = device_inputs(path, "finer")
     source = inputs["finer"].path if inputs else device.name
     other = model_of(scenario.on(device))
     faults = []

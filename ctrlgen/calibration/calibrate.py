@@ -21,10 +21,9 @@ from threadpoolctl import threadpool_limits
 from ctrlgen.budget.sensor_statement import ASSUMED_SCALE
 from ctrlgen.calibration.sensor_share import by_held, sensor_covariance
 from ctrlgen.core.errors import Fault, InputError
-from ctrlgen.core.files import read_text
 from ctrlgen.core.tabular import Column, Reported, Tabular
 from ctrlgen.core.units import difference, from_si, show_difference
-from ctrlgen.devices import Device, files_of, load_device
+from ctrlgen.devices import Device, load_device
 from ctrlgen.devices.changed_numbers import changed
 from ctrlgen.devices.run_time import RunTimeConstant
 from ctrlgen.estimation.fit import Fit, Fitter
@@ -41,7 +40,7 @@ from ctrlgen.model.discretisation import settling_time
 from ctrlgen.recordings.plausibility import suspected, with_plausibility
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recording import Recording
-from ctrlgen.trajectory.scenario import Input
+from ctrlgen.trajectory.scenario import Input, device_inputs
 
 TOLD = 0.5
 """Share of the standard deviation that its bounds alone give a constant: above, the recording does not determine it."""
@@ -173,10 +172,7 @@ def calibrate(
     paths = [recordings] if isinstance(recordings, (str, Path)) else list(recordings)
     model = build_model(described)
     recording = with_plausibility(load_recordings(paths, model), model)
-    inputs = {
-        name: Input(path, read_text(path))
-        for name, path in zip(("device", "device_code"), files_of(Path(device)), strict=False)
-    }
+    inputs = device_inputs(Path(device))
     # A trial value may lead nowhere, and is then rejected.
     with threadpool_limits(1), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         return _calibration(described, recording, inputs, progress)

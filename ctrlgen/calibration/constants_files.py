@@ -16,7 +16,7 @@ import numpy as np
 
 from ctrlgen.calibration.calibrate import CalibratedConstant, Calibration
 from ctrlgen.core.escaping import c_comment
-from ctrlgen.core.files import write_text
+from ctrlgen.core.files import encoded, write_text
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.online.constants_layout import MAGIC, VERSION
 from ctrlgen.version import program
@@ -27,7 +27,7 @@ HEADER, BINARY = "constants.h", "constants.bin"
 def device_hash(calibration: Calibration) -> int:
     """The number that the generated header has as DEVICE_HASH."""
     text = "".join(read.text for read in calibration.inputs.values())
-    return int(hashlib.sha256(text.encode()).hexdigest()[:8], 16)
+    return int(hashlib.sha256(encoded(text)).hexdigest()[:8], 16)
 
 
 def c_header(calibration: Calibration) -> str:

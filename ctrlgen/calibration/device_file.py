@@ -8,7 +8,7 @@ from pathlib import Path
 import tomlkit
 
 from ctrlgen.calibration.calibrate import Calibration
-from ctrlgen.core.edited_toml import replace_quantity, sd_text, value_text
+from ctrlgen.core.edited_toml import replace_quantity, sd_text, value_text, with_moved_files
 from ctrlgen.core.files import read_text, write_text
 from ctrlgen.devices.python_file import as_toml
 
@@ -20,6 +20,7 @@ def write_calibrated_device(calibration: Calibration, original: Path, target: Pa
     and source; as their new default in [run_time] too. Raises InputError where `original` cannot be read."""
     python = original.suffix == ".py"
     text = as_toml(calibration.device, os.path.relpath(original, target.parent)) if python else read_text(original)
+    text = text if python else with_moved_files(text, calibration.device.names_files, original, target)
     document, known = tomlkit.parse(text), dict(calibration.device.quantities())
     for row in calibration.constants:
         if not row.determined:

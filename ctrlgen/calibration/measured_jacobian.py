@@ -21,8 +21,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ctrlgen.core.errors import Fault, InputError
-from ctrlgen.core.files import read_text
-from ctrlgen.devices import Device, files_of, load_device
+from ctrlgen.devices import Device, load_device
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.noise import estimate_noise
 from ctrlgen.estimation.structure import Structure
@@ -33,7 +32,7 @@ from ctrlgen.recordings.plausibility import with_plausibility
 from ctrlgen.recordings.pose_errors import CHANNELS, PoseErrors
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recording import Record, Recording
-from ctrlgen.trajectory.scenario import Input
+from ctrlgen.trajectory.scenario import Input, device_inputs
 
 
 class JacobianNumbers(Enum):
@@ -114,7 +113,7 @@ def calibrate_poses(
         raise InputError(recording.title, [Fault("poses", "are as many as unknowns; record one more to judge them by")])
     return MeasuredJacobian(
         described,
-        {n: Input(p, read_text(p)) for n, p in zip(("device", "device_code"), files_of(Path(device)), strict=False)},
+        device_inputs(Path(device)),
         recording,
         jacobian,
         sd,

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,6 +29,18 @@ def replace_quantity(document: Any, path: str, fields: dict[str, str]) -> None:
         node[parts[-1]].update(fields)
     else:
         node[parts[-1]] = inline_table(fields)
+
+
+def with_moved_files(text: str, keys: Sequence[tuple[str, str]], origin: Path, target: Path) -> str:
+    """The text of the file `origin` as it is written to `target`: files that entries of its lists name relative to it, by (list, key),
+    are found from there."""
+    document, moved = tomlkit.parse(text), False
+    for table, key in keys:
+        for entry in document.get(table, ()):
+            if isinstance(entry.get(key), str):
+                entry[key] = os.path.relpath(origin.parent / entry[key], target.parent)
+                moved = True
+    return document.as_string() if moved else text
 
 
 def inline_table(fields: dict[str, Any]) -> Item:

@@ -219,9 +219,27 @@ def _keys(model: type[BaseModel], location: Sequence[Any]) -> list[str]:
     return list(dict.fromkeys(field.alias or key for m in models for key, field in m.model_fields.items()))
 
 
+def read_bytes(path: Path) -> bytes:
+    """The content of a file that was read already, and so is no larger than its reader takes. Raises InputError."""
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(path, [Fault("file", f"cannot be read: {explained(error)}")]) from None
+
+
+def decoded(content: bytes) -> str:
+    """Any bytes as text, those that are no UTF-8 as lone surrogates (PEP 383); `encoded` gives them back."""
+    return content.decode(errors="surrogateescape")
+
+
+def encoded(text: str) -> bytes:
+    """`text` as UTF-8, the lone surrogates of `decoded` as the bytes that they were."""
+    return text.encode(errors="surrogateescape")
+
+
 def write_text(path: Path, text: str) -> None:
-    """Write `text` as UTF-8, whole or not at all."""
-    write_bytes(path, text.encode())
+    """Write `text` as UTF-8 (`encoded`), whole or not at all."""
+    write_bytes(path, encoded(text))
 
 
 def write_bytes(path: Path, content: bytes) -> None:

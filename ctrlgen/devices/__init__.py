@@ -40,15 +40,18 @@ def load_device(path: Path | str) -> Device:
         raise InputError(
             path, [Fault("kind", f"{reprlib.repr(kind)} is not a kind of device I know; write kind = one of {known}")]
         )
-    return validate(Device.library[kind], table, path)
+    return validate(Device.library[kind], Device.library[kind].with_named_files(table, Path(path)), path)
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
-    """The files that describe a device: its own, and the Python file that it names. Raises InputError."""
+    """The files that describe a device: its own, and the Python file, or those of matrices, that it names. Raises InputError."""
     if path.suffix == ".py":
         return (path,)
     table = read_toml(path)
-    return (path, python_file_of(table, path)) if table.get("kind") == KIND else (path,)
+    kind = Device.library.get(str(table.get("kind")))
+    if kind is None:
+        return (path, python_file_of(table, path)) if table.get("kind") == KIND else (path,)
+    return (path, *kind.named_files(table, path))
 
 
 __all__ = [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, ClassVar, Self
 
@@ -57,6 +58,19 @@ class Device(Shown, Section):
 
     # by signal, such as ("reading.axis", "mm"); empty: the units of the kind of device
     _told_in: tuple[tuple[str, str], ...] = PrivateAttr(())
+
+    names_files: ClassVar[tuple[tuple[str, str], ...]] = ()
+    """Lists of tables whose entries may name a file beside the device file, each with the key that does."""
+
+    @classmethod
+    def with_named_files(cls, table: dict[str, Any], path: Path) -> dict[str, Any]:
+        """The tables of a device file at `path`, with what stands in files that it names. Raises InputError."""
+        return table
+
+    @classmethod
+    def named_files(cls, table: dict[str, Any], path: Path) -> tuple[Path, ...]:
+        """Those files."""
+        return ()
 
     def facts(self) -> dict[str, object]:
         """What it is, in a few words."""

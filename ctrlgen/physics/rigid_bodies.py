@@ -23,11 +23,14 @@ GROUND = -1  # stands for the body that does not move
 
 @dataclass(frozen=True)
 class Element:
-    """A flexure from body `first` to body `second` (`GROUND`: none), `stiffness` (6, 6) [N/m ...] in the global frame."""
+    """A flexure from body `first` to body `second` (`GROUND`: none), `stiffness` (6, 6) [N/m ...] in the global frame: the wrench on
+    `second` per T_second - T_first. A pair of a part that joins more bodies, `of_many`, has no symmetric one: with the wrenches as
+    (moment; force) that on `first` per T_first - T_second is its transpose."""
 
     first: int
     second: int
     stiffness: Matrix
+    of_many: bool = False
 
 
 def frame(along: Matrix, across: Matrix) -> Matrix:
@@ -63,16 +66,18 @@ def twists(count: int, elements: Sequence[Element], loads: Mapping[int, Matrix],
     counted = ca.diag(ca.DM([1 / size] * 3 + [1] * 3))  # T and (moment; force) to and from lengths in units of `size`
     swap = [3, 4, 5, 0, 1, 2]
     K: list[dict[int, Matrix]] = [{} for _ in range(count)]  # K[i][j]: the wrench on i per T_i - T_j
+    skew: set[tuple[int, int]] = set()  # the pairs whose K is not symmetric
     for e in elements:
-        block = _mirrored(ca.mtimes([counted, e.stiffness[swap, :], counted]))
-        for i, j in ((e.first, e.second), (e.second, e.first)):
+        block = ca.mtimes([counted, e.stiffness[swap, :], counted])
+        block = block if e.of_many else _mirrored(block)
+        for i, j, on_i in ((e.first, e.second, block.T if e.of_many else block), (e.second, e.first, block)):
             if i != GROUND:
-                K[i][j] = K[i][j] + block if j in K[i] else block
+                K[i][j] = K[i][j] + on_i if j in K[i] else on_i
+        skew |= {_pair(e.first, e.second)} if e.of_many else set()
     columns = next((W.shape[1] for W in loads.values()), 0)
     right = [ca.mtimes(counted, loads[i][swap, :]) if i in loads else ca.DM.zeros(6, columns) for i in range(count)]
     left = set(range(count))
     order: list[int] = []
-    skew: set[tuple[int, int]] = set()  # the pairs whose K is not symmetric
     factors: dict[int, Matrix] = {}
     while left:  # forward elimination
         k = min(left, key=lambda i: (len(K[i].keys() & left), i))

@@ -13,7 +13,7 @@ import casadi as ca
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.file_format import in_this_format
-from ctrlgen.core.files import read_text, read_toml, validate
+from ctrlgen.core.files import decoded, encoded, read_bytes, read_text, read_toml, validate
 from ctrlgen.core.names import C_NAME, checked
 from ctrlgen.core.shown import Shown
 from ctrlgen.devices import Device, files_of, load_device
@@ -30,7 +30,10 @@ FILE = "scenario.toml"
 
 @dataclass(frozen=True)
 class Input:
-    """One file that a scenario was read from, with its `text`; `path` as it was given, or beside the scenario."""
+    """One file that a scenario was read from, with its `text`; `path` as it was given, or beside the scenario.
+
+    Bytes that are no UTF-8, such as those of a matrix in .npy, stand in the text as lone surrogates (PEP 383).
+    """
 
     path: Path
     text: str
@@ -38,14 +41,27 @@ class Input:
     @property
     def sha256(self) -> str:
         """SHA-256 of the text as UTF-8."""
-        return hashlib.sha256(self.text.encode()).hexdigest()
+        return hashlib.sha256(encoded(self.text)).hexdigest()
+
+
+def device_inputs(path: Path, name: str = "device") -> dict[str, Input]:
+    """The file of a device as the input `name`, a Python file that it names as "NAME_code", and those of its matrices, "NAME_matrix_1" ...
+    Raises InputError."""
+    own, *more = files_of(path)
+    inputs = {name: Input(own, read_text(own))}
+    for k, file in enumerate(more, 1):
+        if file.suffix == ".py":
+            inputs[f"{name}_code"] = Input(file, read_text(file))
+        else:
+            inputs[f"{name}_matrix_{k}"] = Input(file, decoded(read_bytes(file)))
+    return inputs
 
 
 @dataclass(frozen=True, repr=False)
 class Scenario(Shown):
     """A scenario ready to be solved. `file` is what scenario.toml says; `name` the folder's name as a C identifier.
 
-    `inputs`: the "scenario" itself, its "device" (with "device_code" where that names a Python file) and, where a path is read from
+    `inputs`: the "scenario" itself, its "device" (with those that it names, as `device_inputs`) and, where a path is read from
     a file, its "poses"; of a robust one that is solved its "uncertainty". `home` [SI] is by how much the path is moved, by channel.
     """
 
@@ -77,9 +93,9 @@ class Scenario(Shown):
 
     @property
     def device_sha256(self) -> str:
-        """SHA-256 of the device's description: of its file, followed by the Python file that it names, if any."""
-        texts = [read.text for name, read in self.inputs.items() if name in ("device", "device_code")]
-        return hashlib.sha256("".join(texts).encode()).hexdigest()
+        """SHA-256 of the device's description: of its file, followed by those that it names, if any."""
+        texts = [read.text for name, read in self.inputs.items() if name == "device" or name.startswith("device_")]
+        return hashlib.sha256(encoded("".join(texts))).hexdigest()
 
     @property
     def clock(self) -> Clock:
@@ -174,8 +190,7 @@ def load_scenario(path: Path | str, device: Device | Path | str | None = None) -
     if not isinstance(device, Device):
         device_path = file_path.parent / file.device if device is None else Path(device)
         device = load_device(device_path)
-        names = ("device", "device_code")  # the second where a file names another one
-        inputs |= {n: Input(p, read_text(p)) for n, p in zip(names, files_of(device_path), strict=False)}
+        inputs |= device_inputs(device_path)
     elif file.device != device.name:
         raise InputError(
             file_path, [Fault("device", f"{file.device!r} is not {device.name!r}, the device given; write its name")]

@@ -14,6 +14,7 @@ import numpy as np
 
 from ctrlgen.devices.mechanism.copies import Placed
 from ctrlgen.devices.mechanism.drawing import Drawing
+from ctrlgen.devices.mechanism.ported_parts import ported_parts
 from ctrlgen.devices.place import Direction
 from ctrlgen.devices.travel import farthest
 from ctrlgen.numerics.newton import newton_root
@@ -70,6 +71,8 @@ class Condensed:
             for place, k3 in e.section.cubic_terms(numbers).items():
                 row, wrench = inverse_adjoint(R, end)[place, :], adjoint(R, end)[:, (place + 3) % 6]
                 self.cubics.append(CubicSpring(k, row, wrench, k3))
+        self.ported = ported_parts(device, p)
+        self.joints = [*self.elements, *(pair for part in self.ported for pair in part.pairs)]
         self.directions = [
             self.frames[self.element_of(a)][:, 0]
             if a.section.kind == "thermal"
@@ -101,7 +104,7 @@ class Condensed:
             wrench = ca.mtimes(self.elements[k].stiffness, ca.vertcat(ca.DM.zeros(3, 1), direction))
             push(self.elements[k].second, i, wrench)
             push(self.elements[k].first, i, -wrench)
-        per_input = mechanism.twists(len(device.bodies), self.elements, loads, device.size)
+        per_input = mechanism.twists(len(device.bodies), self.joints, loads, device.size)
         self.stiffness, self.beside = ca.DM.eye(n), ca.DM.zeros(n, columns - n)
         self.twists = per_input
         if self.pushes:
@@ -204,7 +207,8 @@ class Condensed:
             first, second = (ca.SX.zeros(6, n) if b == GROUND else self.twists[b][:, :n] for b in (e.first, e.second))
             if (inertia := self.flexure_mass(k, first, second)) is not None:
                 M += inertia
-        return M
+        axes = [T[:, :n] for T in self.twists]
+        return M + sum((part.kinetic(axes) for part in self.ported if part.mass is not None), ca.SX.zeros(n, n))
 
     def point(self, a: Placed) -> Matrix:
         """Where an actuator pushes [m]: a heater at the end of its bar."""
@@ -298,7 +302,7 @@ class Condensed:
         return ca.mtimes(inverse_adjoint(None, at), T[k])
 
     def held_elements(self) -> list[Element]:
-        """The elements, as they are with the drives held, and the stiffness of the actuators beside them."""
+        """All that joins bodies, as it is with the drives held, and the stiffness of the actuators beside it."""
         added = []
         for i, a in enumerate(self.device.placed_actuators):
             k = getattr(a.numbers(self.p), "stiffness", None)
@@ -311,7 +315,7 @@ class Condensed:
                         k * ca.mtimes(mechanism.point_force(point, n), mechanism.point_motion(point, n)),
                     )
                 )
-        return self.elements + added
+        return self.joints + added
 
     def wrench(self, k: int) -> Matrix:
         """(6, n + m) load of element k per q, on its free end, in the global frame."""

@@ -17,6 +17,7 @@ class Drawing(Protocol):
     reading: tuple[Any, ...]
     material: tuple[Any, ...]
     element: tuple[Any, ...]
+    super_element: tuple[Any, ...]
     output: Any
     dynamics: Any
     load: tuple[Any, ...]
@@ -55,6 +56,11 @@ class Drawing(Protocol):
     @property
     def placed_elements(self) -> tuple[Placed, ...]:
         """Every copy of every element."""
+        ...
+
+    @property
+    def placed_super_elements(self) -> tuple[Any, ...]:
+        """Every copy of every super-element (`ported_parts.Ported`)."""
         ...
 
     @property

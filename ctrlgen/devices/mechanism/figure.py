@@ -35,8 +35,9 @@ def mechanism_figure(device: Mechanism) -> Figure:
     """The mechanism as it is described, in mm."""
     c = nominal(device)
     free = [np.array(ca.DM(ca.evalf(ca.SX(end)))).ravel() * MM for end in c.ends]
+    ports = [place * MM for s in device.placed_super_elements for place in s.places]
     along = [np.array(ca.DM(ca.evalf(ca.SX(R))))[:, 0] for R in c.frames]
-    extent = max(float(np.ptp(np.array(free), axis=0).max()), 1e-3)
+    extent = max(float(np.ptp(np.array([*free, *ports]), axis=0).max()), 1e-3)
     reaches = [e.section.reach(e.numbers(c.p)) for e in device.placed_elements]
     lengths = [SHORT * extent if reach is None else reach * MM for reach in reaches]
     fixed = [end - length * x for end, length, x in zip(free, lengths, along, strict=True)]
@@ -54,6 +55,15 @@ def mechanism_figure(device: Mechanism) -> Figure:
             else:
                 joints[number].append(point)
     joints[device.bodies.index(device.output.body)].append(output)
+    for s in device.placed_super_elements:
+        places = s.places * MM
+        for number, point in zip(s.bodies, places, strict=True):
+            ax.plot(*np.array([places.mean(axis=0), point]).T, color=COLOURS[0], lw=2.5, ls=":")
+            if number == GROUND:
+                ax.scatter(*point, marker="s", color="black", s=22)
+            else:
+                joints[number].append(point)
+        ax.text(*places.mean(axis=0), s.name, fontsize=6, color=COLOURS[0])
     for pushed, direction in zip(device.placed_actuators, c.directions, strict=True):
         tip = np.array(ca.DM(ca.evalf(ca.SX(c.point(pushed))))).ravel() * MM if c.pushes else free[c.element_of(pushed)]
         arrow = 3 * SHORT * extent * np.array(ca.DM(ca.evalf(ca.SX(direction)))).ravel()
@@ -75,7 +85,7 @@ def mechanism_figure(device: Mechanism) -> Figure:
         ax.text(*middle, name, fontsize=8, color="#555555")
     ax.scatter(*output, marker="*", s=120, color=COLOURS[4], label="output point")
     ax.scatter([], [], [], marker="s", color="black", s=22, label="ground")
-    _equal(ax, [*free, *fixed, output])
+    _equal(ax, [*free, *fixed, *ports, output])
     ax.set_xlabel("x [mm]")
     ax.set_ylabel("y [mm]")
     ax.set_zlabel("z [mm]")

@@ -94,6 +94,11 @@ def _held(c: Condensed) -> list[Matrix]:
             momentum = ca.mtimes(mass, ca.vertcat(*ends))
             push(e.first, momentum[:6, :])
             push(e.second, momentum[6:, :])
-    free = rigid_bodies.twists(len(c.device.bodies), c.elements, loads, c.device.size)
+    for part in c.ported:
+        if part.mass is not None:
+            momentum = ca.mtimes(part.mass, ca.vertcat(*(first[b] for b in part.bodies)))
+            for body, rows in zip(part.bodies, ca.vertsplit(momentum, 6), strict=True):
+                push(body, rows)
+    free = rigid_bodies.twists(len(c.device.bodies), c.joints, loads, c.device.size)
     travel = ca.vertcat(*(c.travel(i, free) for i in range(n)))
     return [T - ca.mtimes(T_1, travel) for T, T_1 in zip(free, first, strict=True)]

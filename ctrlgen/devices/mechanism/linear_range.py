@@ -39,6 +39,10 @@ def second_order_faults(device: Drawing) -> list[Fault]:
     """What the expansion of the equilibrium does not hold."""
     stiffens = [e.name for e in device.element if getattr(e, "geometric_stiffening", False)]
     faults, asked = [], "geometric_stiffening" if stiffens else "kinematics" if device.second_order else ""
+    if asked and device.super_element:
+        faults.append(
+            Fault(asked, "the matrices of a super-element say nothing of the second order; leave out one of them")
+        )
     if asked and any(isinstance(e, Spring) and e.cubic for e in device.element):
         faults.append(Fault(asked, "the second order is that of linear flexures; leave it out, or the springs' k_3"))
     if stiffens and device.kinematics == "first_order" and "kinematics" in device.model_fields_set:
@@ -92,7 +96,7 @@ def linear_ranges(c: Condensed) -> list[tuple[float | None, ...]]:
 def range_lines(device: Drawing) -> list[str]:
     """What `ctrlgen check` prints of it: of each actuator that does not stay linear to 1 % within its travel ten times over."""
     c = nominal(device)
-    if not c.pushes or c.cubics or not any(isinstance(e.section, Beam) for e in device.placed_elements):
+    if not c.pushes or c.cubics or c.ported or not any(isinstance(e.section, Beam) for e in device.placed_elements):
         return []
     held = "" if device.geometric_stiffening else "; geometric_stiffening = true holds that"
     levels = ", ".join(f"{100 * level:g}" for level in LEVELS)

@@ -28,6 +28,9 @@ def load_faults(device: Drawing) -> list[Fault]:
     if heavy:
         return [Fault("load", f"{', '.join(heavy)}: give mass and inertia to the body that carries it")]
     c = nominal(device)
+    if c.ported:
+        what = "constant loads beside a super-element: what they make of its stiffness is not in its matrices; leave out one of them"
+        return [Fault("load", what)]
     if c.cubics:
         return [Fault("load", "constant loads beside cubic springs are not held by the model; leave out one of them")]
     loads = Loads(c, SecondOrder(c))

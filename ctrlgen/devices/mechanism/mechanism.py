@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, wraps
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
@@ -32,9 +33,11 @@ from ctrlgen.devices.mechanism.load_effects import load_faults
 from ctrlgen.devices.mechanism.mechanism_physics import mechanism_physics
 from ctrlgen.devices.mechanism.modes import free_between_springs, guyan_modes, inertia_faults, inertia_remarks
 from ctrlgen.devices.mechanism.name_faults import name_faults
+from ctrlgen.devices.mechanism.ported_parts import Ported
 from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.devices.mechanism.springs import Spring
 from ctrlgen.devices.mechanism.stated_compliances import Compliance, ComplianceMatrix
+from ctrlgen.devices.mechanism.super_element import MATRICES, SuperElement, matrix_files, with_matrices
 from ctrlgen.devices.mechanism.tables import (
     Actuator,
     Body,
@@ -75,6 +78,7 @@ class Mechanism(CopiedParts):
     """Drive -> force or displacement -> motion of all bodies -> pose of the output point."""
 
     on_flexures: ClassVar[bool | None] = True
+    names_files = tuple(("super_element", key) for key in MATRICES)
 
     kind: Literal["mechanism"]
     """Rigid bodies and flexures."""
@@ -84,8 +88,10 @@ class Mechanism(CopiedParts):
     """`[[pattern]]` tables."""
     body: tuple[Body, ...]
     """`[[body]]` tables."""
-    element: tuple[AnyElement, ...]
+    element: tuple[AnyElement, ...] = ()
     """`[[element]]` tables."""
+    super_element: tuple[SuperElement, ...] = ()
+    """`[[super_element]]` tables: parts by their stiffness and mass from a finite-element program."""
     actuator: tuple[AnyActuator, ...]
     """`[[actuator]]` tables: all push, all heat, or all prescribe displacements."""
     output: Output
@@ -101,6 +107,16 @@ class Mechanism(CopiedParts):
     kinematics: Literal["first_order", "second_order"] = "first_order"
     """Pose and force to first order in the displacements, or with finite rotations and with flexures that shorten as they bend."""
     _described: Mechanism | None = PrivateAttr(default=None)
+
+    @classmethod
+    def with_named_files(cls, table: dict[str, Any], path: Path) -> dict[str, Any]:
+        """With the matrices of super-elements. Raises InputError."""
+        return with_matrices(table, path)
+
+    @classmethod
+    def named_files(cls, table: dict[str, Any], path: Path) -> tuple[Path, ...]:
+        """The files of the matrices of super-elements."""
+        return matrix_files(table, path)
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy with other values. What follows from them is worked out anew, but typical sizes stay those of the device that the file
@@ -119,7 +135,8 @@ class Mechanism(CopiedParts):
 
     def _checked(self) -> Mechanism:
         """Itself. Raises TableFaults."""
-        empty = [key for key in ("body", "element", "actuator") if not getattr(self, key)]
+        joined_by = () if self.super_element else ("element",)
+        empty = [key for key in ("body", *joined_by, "actuator") if not getattr(self, key)]
         if empty:
             raise TableFaults([Fault(key, f"there is none; add a [[{key}]] table") for key in empty])
         faults = name_faults(self)
@@ -145,10 +162,12 @@ class Mechanism(CopiedParts):
         faults += [] if faults else flexures_in_one_place(self.placed_elements, self.size)
         if not faults and (loose := mechanism.loose_bodies(len(self.bodies), self._joints)):
             faults.append(Fault("body", f"nothing joins {', '.join(self.bodies[i] for i in loose)} to the ground"))
+        held_by = "springs and super-elements" if self.super_element else "springs"
         if not faults and (free := free_between_springs(self)):
             faults.append(
                 Fault(
-                    "body", f"springs leave {', '.join(free)} free in some direction; add a spring or a flexure there"
+                    "body",
+                    f"{held_by} leave {', '.join(free)} free in some direction; add a spring or a flexure there",
                 )
             )
         if not faults and self.cubic_steps > MOST_STEPS:
@@ -221,8 +240,9 @@ class Mechanism(CopiedParts):
 
     @_as_described
     def size(self) -> float:
-        """The largest distance of an element's end from the origin [m]."""
-        return max(float(np.linalg.norm([x.si for x in e.at])) for e in self.element) or 1e-3
+        """The largest distance of an element's end, or of a port, from the origin [m]."""
+        ends = [[x.si for x in e.at] for e in self.element] + [p.at for s in self.super_element for p in s.port]
+        return max(float(np.linalg.norm(end)) for end in ends) or 1e-3
 
     def body_number(self, name: str, pattern: str, copy: int) -> int | None:
         """The number of a body as an element of a `pattern` names it, from its copy; None where there is none."""
@@ -246,6 +266,15 @@ class Mechanism(CopiedParts):
     def placed_elements(self) -> tuple[Placed, ...]:
         """Every copy of every element."""
         return tuple(self._between(c, c.section.from_, c.section.to) for c in self._copies("element"))
+
+    @cached_property
+    def placed_super_elements(self) -> tuple[Ported, ...]:
+        """Every copy of every super-element."""
+        found = []
+        for c in self._copies("super_element"):
+            numbers = [self.body_number(port.body, c.section.pattern, c.copy) for port in c.section.port]
+            found.append(Ported(**vars(c), bodies=tuple(GROUND if n is None else n for n in numbers)))
+        return tuple(found)
 
     @cached_property
     def placed_actuators(self) -> tuple[Placed, ...]:
@@ -309,7 +338,9 @@ class Mechanism(CopiedParts):
     @property
     def _joints(self) -> list[Element]:
         """The pairs of bodies that elements join."""
-        return [Element(e.first, e.second, ca.DM.eye(6)) for e in self.placed_elements]
+        pairs = [(e.first, e.second) for e in self.placed_elements]
+        pairs += [(s.bodies[0], other) for s in self.placed_super_elements for other in s.bodies[1:]]
+        return [Element(*pair, ca.DM.eye(6)) for pair in pairs]
 
     def loaded(self, loads: Sequence[Load], gravity: Gravity | None) -> Mechanism:
         """With more loads, and with gravity where it is given. Raises ValueError where they cannot be held."""
@@ -328,7 +359,8 @@ class Mechanism(CopiedParts):
 
     def with_unstated_stretching(self) -> Mechanism | None:
         """With `geometric_stiffening`, where actuators push and a beam has none."""
-        elements = None if self.actuator[0].kind == "displacement" else stiffened(self.element)
+        linear = self.actuator[0].kind == "displacement" or bool(self.super_element)
+        elements = None if linear else stiffened(self.element)
         return None if elements is None else self.model_copy(update={"element": elements})
 
     def remarks(self) -> list[str]:
@@ -339,7 +371,8 @@ class Mechanism(CopiedParts):
             for e in self.element
             if isinstance(e, CircularHinge) and e.material in dense
         ]
-        return [f"{e.name}: {note}" for e in self.element for note in e.notes()] + light + inertia_remarks(self)
+        parts = (*self.element, *self.super_element)
+        return [f"{e.name}: {note}" for e in parts for note in e.notes()] + light + inertia_remarks(self)
 
     def physics(self, p: SimpleNamespace) -> DevicePhysics:
         """The condensed mechanism with the values `p`."""

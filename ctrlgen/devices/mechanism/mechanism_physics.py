@@ -71,7 +71,7 @@ def mechanism_physics(c: Condensed) -> DevicePhysics:
         pose=pose,
         limits=limits,
         sensed=_sensed(c, second if bent else None, loads, stretching),
-        second_order_kinematics=None if bent or c.cubics else second.pose,
+        second_order_kinematics=None if bent or c.cubics or c.ported else second.pose,
         rate_limits=acting.rate_limits(sections),
     )
     if p.dynamics is None:

@@ -14,10 +14,12 @@ from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import show
 from ctrlgen.devices.mechanism.condensed import KEPT, Condensed, nominal
 from ctrlgen.devices.mechanism.drawing import Drawing
+from ctrlgen.devices.mechanism.joining import STIFF
 from ctrlgen.devices.mechanism.linear_range import range_lines
 from ctrlgen.devices.mechanism.load_effects import load_lines
 from ctrlgen.devices.mechanism.loads import Loads
 from ctrlgen.devices.mechanism.point_compliance import point_compliance
+from ctrlgen.devices.mechanism.ported_parts import on_bodies, part_line, stored_motions
 from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.devices.mechanism.springs import Spring
 from ctrlgen.devices.travel import farthest
@@ -28,6 +30,7 @@ SHORT_CHAIN = 10  # bodies: of a chain of n the weakest independent constraint h
 INDEPENDENT = 1e-3  # singular value of unit rows below which a constraint adds nothing: no drawing is more exact
 FREE = 1e-6  # of the largest singular value, below which springs hold nothing: symmetry leaves rounding, 1e-9
 INERT = 1e-9  # of the largest mass of an axis, below which rounding moves it and no body
+MASSLESS = 1e-13  # of the largest mass of all bodies: rounding of a motion without any
 FAR = 0.1  # of a frequency: as far as mass and stiffness of a drawing are from the built one's, roughly
 LIKE = 0.5  # of the modal assurance criterion: below it a condensed mode is no single mode
 NAMED = 8  # elements in a line
@@ -82,7 +85,9 @@ def constraints(c: Condensed) -> tuple[np.ndarray, list[tuple[str, str]]]:
         for k, C in enumerate(c.compliances)
         if C is not None
     }
+    stored = [stored_motions(s, device.size) for s in device.placed_super_elements]
     largest = max((float(np.linalg.eigvalsh((C + C.T) / 2).max()) for C in yields.values()), default=0.0)
+    largest = max([largest, *(float(1 / values.min()) for values, _ in stored)])
     for k, e in enumerate(device.placed_elements):
         if k not in yields:
             continue  # a spring holds nothing
@@ -97,13 +102,17 @@ def constraints(c: Condensed) -> tuple[np.ndarray, list[tuple[str, str]]]:
         rows.append(A)
         held_by = e.section.ideal or [f"constraint {i + 1}" for i in range(len(A))]
         names += [(e.name, direction) for direction in held_by]
+    for s, (values, motions) in zip(device.placed_super_elements, stored, strict=True):
+        stiff = motions[1 / values < STIFF * largest]
+        rows.append(on_bodies(s, stiff, count))
+        names += [(s.name, f"constraint {i + 1}") for i in range(len(stiff))]
     A = np.vstack([np.zeros((0, 6 * count)), *rows]) * np.tile([1 / device.size] * 3 + [1.0] * 3, count)
     return A / np.linalg.norm(A, axis=1, keepdims=True), names
 
 
 def free_between_springs(device: Drawing) -> list[str]:
-    """Bodies that can move without a force, because what joins them are springs."""
-    if not any(isinstance(e.section, Spring) for e in device.placed_elements):
+    """Bodies that can move without a force, because what joins them are springs, or super-elements with joints inside."""
+    if not device.super_element and not any(isinstance(e.section, Spring) for e in device.placed_elements):
         return []
     count, c = len(device.bodies), nominal(device)
     size = np.array([1 / device.size] * 3 + [1.0] * 3)  # turns as displacements
@@ -116,6 +125,8 @@ def free_between_springs(device: Drawing) -> list[str]:
             if body != GROUND:
                 row[:, 6 * body : 6 * body + 6] = sign * local
         rows.append(row)
+    stored = (on_bodies(s, stored_motions(s, device.size)[1], count) for s in device.placed_super_elements)
+    rows += [row * np.tile(size, count) for row in stored]
     _, values, motions = np.linalg.svd(np.vstack([*rows, np.zeros((6 * count, 6 * count))]))
     free = motions[values < FREE * values.max()]
     return [name for i, name in enumerate(device.bodies) if np.abs(free[:, 6 * i : 6 * i + 6]).max(initial=0) > FREE]
@@ -153,13 +164,25 @@ def free_modes(device: Drawing) -> Modes:
     K, M, heavy = body_matrices(c)
     if not heavy:
         return Modes(np.zeros(0), np.zeros((6 * count, 0)), M)
-    light = [i for i in range(6 * count) if i not in heavy]
-    follows = -np.linalg.solve(K[np.ix_(light, light)], K[np.ix_(light, heavy)])
-    K_h = K[np.ix_(heavy, heavy)] + K[np.ix_(heavy, light)] @ follows
-    squares, shapes = scipy.linalg.eigh((K_h + K_h.T) / 2, M[np.ix_(heavy, heavy)])
-    motions = np.zeros((6 * count, len(squares)))
-    motions[heavy], motions[light] = shapes, follows @ shapes
+    with_mass, without = _massive(c, M, heavy)
+    follows = -np.linalg.solve(without.T @ K @ without, without.T @ K @ with_mass)
+    moved = with_mass + without @ follows
+    K_h = with_mass.T @ K @ moved
+    squares, shapes = scipy.linalg.eigh((K_h + K_h.T) / 2, with_mass.T @ M @ with_mass)
+    motions = moved @ shapes
     return Modes(np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi), motions, M)
+
+
+def _massive(c: Condensed, M: np.ndarray, heavy: list[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Bases (6 bodies, .) of the motions with mass and without: those of the bodies with mass and of the others; where the matrix of a
+    super-element leaves a motion of a body without mass, as lumped ones do turns, the eigenvectors of M."""
+    unit = np.eye(len(M))
+    light = [i for i in range(len(M)) if i not in heavy]
+    if all(part.mass is None for part in c.ported):
+        return unit[:, heavy], unit[:, light]
+    masses, directions = np.linalg.eigh(M[np.ix_(heavy, heavy)])
+    some = masses > MASSLESS * masses.max()
+    return unit[:, heavy] @ directions[:, some], np.hstack([unit[:, light], unit[:, heavy] @ directions[:, ~some]])
 
 
 def guyan_modes(device: Drawing, under_loads: bool = False) -> Modes:
@@ -188,14 +211,14 @@ def body_matrices(c: Condensed) -> tuple[np.ndarray, np.ndarray, list[int]]:
     swap = np.r_[3:6, 0:3]  # a wrench as (moment; force) beside a twist: the stiffness is then symmetric
     for e in c.held_elements():
         k = ca.DM(ca.evalf(ca.SX(e.stiffness))).full()[swap]
-        for i, j, sign in (
-            (e.first, e.first, 1),
-            (e.second, e.second, 1),
-            (e.first, e.second, -1),
-            (e.second, e.first, -1),
+        for i, j, on_i in (
+            (e.first, e.first, k.T),
+            (e.second, e.second, k),
+            (e.first, e.second, -k.T),
+            (e.second, e.first, -k),
         ):
             if GROUND not in (i, j):
-                K[6 * i : 6 * i + 6, 6 * j : 6 * j + 6] += sign * k
+                K[6 * i : 6 * i + 6, 6 * j : 6 * j + 6] += on_i
     scale = as_displacements(c.device)
     return K * np.outer(scale, scale), M, heavy
 
@@ -223,6 +246,11 @@ def _mass(c: Condensed) -> tuple[np.ndarray, list[int]]:
                 for j, column in ends:
                     M[6 * i : 6 * i + 6, 6 * j : 6 * j + 6] += both[row, column]
             heavy |= {i for i, _ in ends}
+    for part in c.ported:
+        if part.mass is not None:
+            rows = np.concatenate([np.arange(6 * b, 6 * b + 6) for b in part.bodies])
+            M[np.ix_(rows, rows)] += ca.DM(ca.evalf(ca.SX(part.mass))).full()
+            heavy |= {*part.bodies}
     scale = as_displacements(c.device)
     return M * np.outer(scale, scale), [6 * i + n for i in sorted(heavy) for n in range(6)]
 
@@ -231,12 +259,14 @@ def summary(device: Drawing) -> list[str]:
     """What `ctrlgen check` prints of a mechanism: its parts, and how stiff it is at the output point."""
     c = nominal(device)
     C = ca.DM(ca.evalf(ca.SX(c.output_compliance))).full()
-    springs = sum(C is None for C in c.compliances)
+    springs, ported = sum(C is None for C in c.compliances), len(c.ported)
     lines = [
         f"{number_of(len(device.bodies), 'body', 'bodies')}, {number_of(len(c.elements) - springs, 'flexure')}, "
         + (f"{number_of(springs, 'spring')}, " if springs else "")
+        + (f"{number_of(ported, 'super-element')}, " if ported else "")
         + number_of(len(device.placed_actuators), "actuator")
     ]
+    lines += [part_line(s) for s in device.super_element]
     free, over = freedoms(device)
     lines.append(f"degrees of freedom without actuators: {free}; redundant constraints: {over}")
     if over:

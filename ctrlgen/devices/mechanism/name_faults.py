@@ -18,7 +18,7 @@ def name_faults(device: Drawing) -> list[Fault]:
         "material": [m.name for m in device.material],
         "pattern": [q.name for q in device.pattern],
         "body": list(device.bodies),
-        "element": [e.name for e in device.element],
+        "element": [e.name for e in (*device.element, *device.super_element)],
         "actuator": [a.name for a in device.actuator],
         "load": [x.name for x in device.load],
         "reading": [*device.output.channels, *(r.name for r in device.placed_readings)],
@@ -30,6 +30,7 @@ def name_faults(device: Drawing) -> list[Fault]:
     for where, sections in (
         ("body", device.body),
         ("element", device.element),
+        ("super_element", device.super_element),
         ("actuator", device.actuator),
         ("reading", device.reading),
         ("load", device.load),
@@ -49,6 +50,11 @@ def _unknown(device: Drawing) -> list[Fault]:
         faults += _no_body(device, f"element[{k}]", e, "from", "to")
         if isinstance(e, Flexible) and e.material not in materials:
             faults.append(Fault(f"element[{k}].material", f"{e.material!r} is no material"))
+    for k, s in enumerate(device.super_element):
+        for i, port in enumerate(s.port):
+            if device.body_number(port.body, s.pattern, 1) is None:
+                where = f"super_element[{k}].port[{i}].body"
+                faults.append(Fault(where, f"{port.body!r} is no body" + _of_pattern(s)))
     elements = {e.name: e for e in device.element}
     for k, a in enumerate(device.actuator):
         if a.kind != "force":
@@ -57,7 +63,7 @@ def _unknown(device: Drawing) -> list[Fault]:
                 faults.append(
                     Fault(
                         f"actuator[{k}].on",
-                        f"{a.on!r} is no element" + (f" with the pattern {a.pattern!r}" if a.pattern else ""),
+                        f"{a.on!r} is no element{_of_pattern(a)}",
                     )
                 )
             elif a.kind == "thermal" and not isinstance(moved, BentBeam):
@@ -80,7 +86,7 @@ def _unknown(device: Drawing) -> list[Fault]:
             faults.append(
                 Fault(
                     f"reading[{k}].of",
-                    f"{r.of!r} is no element" + (f" with the pattern {r.pattern!r}" if r.pattern else ""),
+                    f"{r.of!r} is no element{_of_pattern(r)}",
                 )
             )
     if device.output.body not in device.bodies:
@@ -91,9 +97,12 @@ def _unknown(device: Drawing) -> list[Fault]:
 def _no_body(device: Drawing, where: str, table: Any, *keys: str) -> list[Fault]:
     """The names of bodies in a table, under `keys`, that are none."""
     names = {key: getattr(table, "from_" if key == "from" else key) for key in keys}
-    pattern = f" with the pattern {table.pattern!r}" if table.pattern else ""
     return [
-        Fault(f"{where}.{key}", f"{name!r} is no body{pattern}")
+        Fault(f"{where}.{key}", f"{name!r} is no body{_of_pattern(table)}")
         for key, name in names.items()
         if name is not None and device.body_number(name, table.pattern, 1) is None
     ]
+
+
+def _of_pattern(table: Any) -> str:
+    return f" with the pattern {table.pattern!r}" if table.pattern else ""

@@ -16,7 +16,15 @@ from typing import Any
 import tomlkit
 from tomlkit.items import AoT
 
-from ctrlgen.core.edited_toml import DIGITS, inline_table, replace_quantity, sd_text, toml_text, value_text
+from ctrlgen.core.edited_toml import (
+    DIGITS,
+    inline_table,
+    replace_quantity,
+    sd_text,
+    toml_text,
+    value_text,
+    with_moved_files,
+)
 from ctrlgen.core.files import read_text, write_text
 from ctrlgen.core.units import from_si, to_si
 from ctrlgen.devices.python_file import as_toml
@@ -49,6 +57,7 @@ def write_next(diagnosis: Diagnosis, original: Path, target: Path) -> None:
     """
     python = original.suffix == ".py"
     text = as_toml(diagnosis.device, os.path.relpath(original, target.parent)) if python else read_text(original)
+    text = text if python else with_moved_files(text, diagnosis.device.names_files, original, target)
     write_text(target, next_text(diagnosis, text))
 
 
