@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from package_programs import STRICT, run
+from told_apart import alike_in_drawing
 
 from battery.consistency import contradictions
 from ctrlgen import build_model, generate, load_device, load_scenario, solve
@@ -45,7 +46,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """Every diagnosis that a test makes in this process is held to the checker of contradictions, wherever it is called from."""
+    """Every diagnosis that a test makes in this process is held to the checker of contradictions, wherever it is called from, and every
+    drawing to series that are told apart without their colour."""
+    _holds_drawings()
     called = sys.modules.get("ctrlgen.diagnosis.diagnose")
     if called is None:
         return
@@ -61,6 +64,23 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     for module in list(sys.modules.values()):
         if getattr(module, "diagnose_recording", None) is diagnose_recording:
             module.diagnose_recording = checked
+
+
+def _holds_drawings() -> None:
+    plots = sys.modules.get("ctrlgen.reporting.plots")
+    if plots is None:
+        return
+    svg = plots.svg
+
+    @wraps(svg)
+    def checked(figure: Any) -> str:
+        text = svg(figure)
+        assert not (alike := alike_in_drawing(text)), f"told apart by their colour alone: {alike}"
+        return text
+
+    for module in list(sys.modules.values()):
+        if getattr(module, "svg", None) is svg:
+            module.svg = checked
 
 
 @pytest.fixture

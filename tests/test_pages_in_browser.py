@@ -124,3 +124,12 @@ def test_a_figure_shows_its_values_in_all_panels_and_zooms(browser, pages):
     browser.run("document.querySelector('.first .bar button:last-child').click()")
     mouse(browser, "mouseMoved", left + 2, top + 21)
     assert float(browser.run(place)[0]) == pytest.approx(0.0, abs=0.003)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_legend_of_a_figure_tells_its_series_apart_without_colour(browser, pages, name):
+    browser.open(pages[name])
+    browser.run(OPEN)
+    marks = "[...one.querySelectorAll('.u-marker path')].map(p => p.getAttribute('d') + p.style.strokeDasharray)"
+    for shown in browser.run(f"[...document.querySelectorAll('.uplot')].map(one => {marks})"):
+        assert shown and len(set(shown)) == len(shown)

@@ -125,7 +125,10 @@ def _figure(title: str, series: Sequence[Series], names: Sequence[str]) -> PageF
         if c.low is not None and c.high is not None:
             rules += [(c.low, "lower limit"), (c.high, "upper limit")]
         outside = np.where(np.isin(np.arange(len(names)), c.outside), c.values, np.nan)
-        curves = [Curve(s.name, c.values, 0, "."), *([Curve("outside", outside, 1, ".")] if c.outside else [])]
+        curves = [
+            Curve(s.name, c.values, 0, 0, points=True),
+            *([Curve("outside", outside, 1, 1, points=True)] if c.outside else []),
+        ]
         panels.append(Panel(s.label, x, tuple(curves), log=s.size, rules=tuple(rules), height=150))
     chart = Chart("recording", tuple(panels), places=tuple(names))
     return PageFigure(chart_svg(chart), title, CAPTION, chart)

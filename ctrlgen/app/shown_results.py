@@ -28,6 +28,7 @@ from ctrlgen.path_timing.fastest import FastestPath
 from ctrlgen.path_timing.fastest_page import write_fastest
 from ctrlgen.path_timing.fastest_plots import draw_fastest
 from ctrlgen.recordings.recording import Recording
+from ctrlgen.reporting.line_patterns import dashes
 from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
 from ctrlgen.reporting.result_file import json_text
 from ctrlgen.trajectory.metrics import expectations
@@ -101,7 +102,7 @@ def _lines(index: Any, columns: list[Any]) -> str:
     for (role, unit), ax in zip(units, axes[:, 0], strict=True):
         alike = [c for c in columns if (c.name.partition(".")[0], c.unit) == (role, unit)]
         for k, column in enumerate(alike):
-            ax.plot(index.values, column.values, lw=1, color=COLOURS[k % len(COLOURS)], label=column.name)
+            ax.plot(index.values, column.values, lw=1, ls=dashes(k), color=COLOURS[k % len(COLOURS)], label=column.name)
         ax.set_ylabel(f"{role} [{unit}]")
         ax.legend(fontsize=8, ncols=3, loc="best")
     axes[-1, 0].set_xlabel(index.heading)

@@ -18,6 +18,7 @@ from ctrlgen.model.assembly import build_model
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import Trace, simulate
 from ctrlgen.recordings.look.drive_file import DriveFile, read_drives
+from ctrlgen.reporting.line_patterns import dashes, mark
 from ctrlgen.reporting.plots import COLOURS, STYLE, image
 from ctrlgen.trajectory.unstated_modes import with_internal_modes
 
@@ -116,14 +117,13 @@ def draw(result: Simulated) -> bytes:
                     panel.plot(
                         result.trace.time[: len(seen)],
                         from_si(seen, signal.units[i]),
-                        ".",
+                        mark(i),
                         ms=2,
                         color=colour,
                         alpha=0.5,
                     )
-                panel.plot(
-                    result.trace.time, from_si(values[:, i], signal.units[i]), lw=1.1, color=colour, label=channel
-                )
+                told = from_si(values[:, i], signal.units[i])
+                panel.plot(result.trace.time, told, lw=1.1, ls=dashes(i), color=colour, label=channel)
             panel.set_ylabel(f"{signal.label}\n[{signal.units[0]}]", fontsize=8)
             if len(signal.channels) > 1:
                 panel.legend(fontsize=7, ncols=6, loc="upper right")

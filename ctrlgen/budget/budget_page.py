@@ -16,10 +16,11 @@ from ctrlgen.core.files import write_text
 from ctrlgen.core.units import difference, from_si
 from ctrlgen.reporting.chart import Chart, Curve, Panel
 from ctrlgen.reporting.html import render
+from ctrlgen.reporting.line_patterns import dashes, mark
 from ctrlgen.reporting.page_figure import FirstScreen, PageFigure, page_figures
-from ctrlgen.reporting.plots import COLOURS, PATTERNS, STYLE, plt, svg
+from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
 from ctrlgen.reporting.result_file import json_text
-from ctrlgen.trajectory.solution_charts import abscissa, line_of
+from ctrlgen.trajectory.solution_charts import abscissa
 
 MAGNIFIED = (1, 2, 5)  # times a power of ten
 WIDEST = 0.12  # of the path's extent: half the width of the band as it is drawn
@@ -103,12 +104,14 @@ def draw_band(budget: ErrorBudget) -> Figure:
     _draw_path_with_band(left, budget, shown)
     static = solution.scenario.sample_time is None
     at = np.arange(len(command)) if static else solution.trace.time
-    for i, colour, dashes in zip(group.channels, (COLOURS[0], COLOURS[2], COLOURS[4]), PATTERNS, strict=False):
+    for k, (i, colour) in enumerate(zip(group.channels, (COLOURS[0], COLOURS[2], COLOURS[4]), strict=False)):
         half = difference(budget.factor * budget.combined[:, i], group.unit)
-        right.plot(at, half, color=colour, ls=dashes, lw=1.3, label=signal.channels[i])
+        right.plot(at, half, color=colour, ls=dashes(k), lw=1.3, label=signal.channels[i])
         if budget.drawn is not None:
             ends = np.quantile(budget.drawn.pose[:, :, i], [0.5 - COVERAGE / 2, 0.5 + COVERAGE / 2], axis=0)
-            right.plot(at[budget.drawn.kept], difference((ends[1] - ends[0]) / 2, group.unit), ".", ms=3, color=colour)
+            right.plot(
+                at[budget.drawn.kept], difference((ends[1] - ends[0]) / 2, group.unit), mark(k), ms=3, color=colour
+            )
     right.set_ylim(bottom=0)
     right.set_xlabel("sample" if static else "time [s]")
     right.set_ylabel(f"half width of the 95 % band [{group.unit}]")
@@ -126,12 +129,12 @@ def chart_band(budget: ErrorBudget) -> Chart:
         curves = []
         for k, i in enumerate(group.channels):
             half = difference(budget.factor * budget.combined[:, i], group.unit)
-            curves.append(Curve(signal.channels[i], half, k, line_of(k)))
+            curves.append(Curve(signal.channels[i], half, k, k))
             if budget.drawn is not None:
                 ends = np.quantile(budget.drawn.pose[:, :, i], [0.5 - COVERAGE / 2, 0.5 + COVERAGE / 2], axis=0)
                 drawn = np.full(len(x), np.nan)
                 drawn[budget.drawn.kept] = difference((ends[1] - ends[0]) / 2, group.unit)
-                curves.append(Curve(f"{signal.channels[i]}, draws", drawn, k, "."))
+                curves.append(Curve(f"{signal.channels[i]}, draws", drawn, k, k, points=True))
         panels.append(Panel(f"95 % band, {group.name} [± {group.unit}]", x, tuple(curves), height=CHART))
     return Chart(label, tuple(panels))
 

@@ -19,7 +19,8 @@ from ctrlgen.core.units import difference
 from ctrlgen.devices import Signal
 from ctrlgen.devices.structural_model import StructuralModel
 from ctrlgen.model.model import Model
-from ctrlgen.reporting.plots import COLOURS, PATTERNS, STYLE, image
+from ctrlgen.reporting.line_patterns import dashes
+from ctrlgen.reporting.plots import COLOURS, STYLE, image
 
 POINTS = 400  # frequencies, beside those of the poles
 DECADES = 2  # below the slowest pole and above it, and at least one above the fastest
@@ -130,7 +131,7 @@ def bode_figure(found: FrequencyResponse) -> Figure:
                 panel.loglog(
                     hertz,
                     np.where(gain > 0, gain, np.nan),
-                    ls=PATTERNS[j % 6],
+                    ls=dashes(j),
                     color=COLOURS[j % 6],
                     lw=1.3,
                     label=axis,
@@ -141,7 +142,7 @@ def bode_figure(found: FrequencyResponse) -> Figure:
             if static[i, j]:
                 what = f"{axis} -> {signal.channels[i]}"
                 grid["phase"].semilogx(
-                    hertz, phase(found, i, j), ls=PATTERNS[j % 6], color=COLOURS[j % 6], lw=1.3, label=what
+                    hertz, phase(found, i, j), ls=dashes(j), color=COLOURS[j % 6], lw=1.3, label=what
                 )
         grid["phase"].set_title(
             "phase against the static response, strongest component of each drive [deg]", fontsize=9

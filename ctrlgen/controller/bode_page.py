@@ -11,7 +11,7 @@ from ctrlgen.controller.bode import FrequencyResponse, bode_figure, frequency_re
 from ctrlgen.core.files import write_text
 from ctrlgen.core.units import difference, from_si
 from ctrlgen.model.model import Model
-from ctrlgen.reporting.chart import DASHES, Chart, Curve, Panel
+from ctrlgen.reporting.chart import Chart, Curve, Panel
 from ctrlgen.reporting.chart_drawing import chart_svg
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.numbers import number
@@ -96,12 +96,12 @@ def bode_chart(found: FrequencyResponse, channels: Collection[int]) -> Chart:
         if i not in channels:
             continue
         gains = [(j, difference(np.abs(found.response[i, j]), unit)) for j in range(len(drive.channels))]
-        curves = tuple(Curve(drive.channels[j], g, j, DASHES[j % len(DASHES)]) for j, g in gains if g.max() > 0)
+        curves = tuple(Curve(drive.channels[j], g, j, j) for j, g in gains if g.max() > 0)
         if curves:
             panels.append(Panel(f"{channel} [{unit}/{drive.units[0]}]", found.hertz, curves, log=True, height=190))
     turned = [(j, strongest(found, j)) for j in range(len(drive.channels))]
     phases = tuple(
-        Curve(f"{drive.channels[j]} -> {signal.channels[i]}", phase(found, i, j), j, DASHES[j % len(DASHES)])
+        Curve(f"{drive.channels[j]} -> {signal.channels[i]}", phase(found, i, j), j, j)
         for j, i in turned
         if found.static[i, j]
     )

@@ -9,8 +9,9 @@ from matplotlib.figure import Figure
 from ctrlgen.core.units import difference, from_si
 from ctrlgen.learning.learn import Learning
 from ctrlgen.reporting.chart import Chart, Curve, Panel
-from ctrlgen.reporting.plots import COLOURS, PATTERNS, STYLE, plt, svg
-from ctrlgen.trajectory.solution_charts import abscissa, line_of
+from ctrlgen.reporting.line_patterns import dashes
+from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
+from ctrlgen.trajectory.solution_charts import abscissa
 
 FAINTEST = 0.35  # of a colour: the oldest run in a figure
 SHOWN_RUNS = 5  # along the path, the last ones
@@ -71,12 +72,12 @@ def draw_along(learning: Learning) -> Figure:
     for axes, g in zip(panels[:, 0], learning.groups, strict=True):
         for (k, run), colour in zip(shown, _shades(len(shown)), strict=True):
             length = np.linalg.norm(run.error[:, g.channels], axis=1)
-            dashes = PATTERNS[(shown[-1][0] - k) % len(PATTERNS)]
-            axes.plot(at, difference(length, g.unit), color=colour, ls=dashes, lw=1, label=f"run {k}")
+            style = dashes(shown[-1][0] - k)
+            axes.plot(at, difference(length, g.unit), color=colour, ls=style, lw=1, label=f"run {k}")
         if not learning.stop:
             length = np.linalg.norm(learning.predicted_error[:, g.channels], axis=1)
             label = "predicted for the next, without noise"
-            axes.plot(at, difference(length, g.unit), color=COLOURS[2], lw=1.6, label=label)
+            axes.plot(at, difference(length, g.unit), color=COLOURS[2], ls=dashes(len(shown)), lw=1.6, label=label)
         axes.set_yscale("log")
         axes.set_ylabel(f"|error|, {g.name} [{g.unit}]")
     panels[-1, 0].set_xlabel("sample" if static else "time [s]")
@@ -93,10 +94,10 @@ def draw_drives(learning: Learning) -> Figure:
     now = learning.runs[learning.base].drive
     figure, (above, below) = plt.subplots(2, 1, figsize=(8.2, 4.6), sharex=True)
     for i, (channel, unit) in enumerate(zip(drive.channels, drive.units, strict=True)):
-        colour, dashes = COLOURS[i % len(COLOURS)], PATTERNS[i % len(PATTERNS)]
+        colour, style = COLOURS[i % len(COLOURS)], dashes(i)
         above.plot(at, from_si(now[:, i], unit), color=colour, lw=0.8, alpha=0.5)
-        above.plot(at, from_si(learning.next.drive[:, i], unit), color=colour, ls=dashes, lw=1.2, label=channel)
-        below.plot(at, difference(learning.next.drive[:, i] - now[:, i], unit), color=colour, ls=dashes, lw=1)
+        above.plot(at, from_si(learning.next.drive[:, i], unit), color=colour, ls=style, lw=1.2, label=channel)
+        below.plot(at, difference(learning.next.drive[:, i] - now[:, i], unit), color=colour, ls=style, lw=1)
     above.set_ylabel(f"{drive.label} [{drive.units[0]}]")
     above.set_title("thin: best run so far; full: next", fontsize=8)
     _legend_above(figure, above, len(drive.channels))
@@ -126,15 +127,15 @@ def learning_charts(learning: Learning) -> dict[str, Chart]:
         rows = [(f"run {k}", run.error) for k, run in shown]
         rows += [] if learning.stop else [("predicted for the next, without noise", learning.predicted_error)]
         curves = tuple(
-            Curve(name, difference(np.linalg.norm(error[:, g.channels], axis=1), g.unit), k, line_of(k))
+            Curve(name, difference(np.linalg.norm(error[:, g.channels], axis=1), g.unit), k, k)
             for k, (name, error) in enumerate(rows)
         )
         along.append(Panel(f"|error|, {g.name} [{g.unit}]", at, curves, log=True))
     drive, now = solution.model.signals["drive"], learning.runs[learning.base].drive
     named = list(enumerate(zip(drive.channels, drive.units, strict=True)))
-    following = tuple(Curve(c, from_si(learning.next.drive[:, i], u), i, line_of(i), held=True) for i, (c, u) in named)
+    following = tuple(Curve(c, from_si(learning.next.drive[:, i], u), i, i, held=True) for i, (c, u) in named)
     changes = tuple(
-        Curve(f"change of {c}", difference(learning.next.drive[:, i] - now[:, i], u), i, line_of(i), held=True)
+        Curve(f"change of {c}", difference(learning.next.drive[:, i] - now[:, i], u), i, i, held=True)
         for i, (c, u) in named
     )
     unit = drive.units[0]

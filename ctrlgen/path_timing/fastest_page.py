@@ -17,7 +17,6 @@ from ctrlgen.reporting.chart import Chart, Curve, Panel
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.page_figure import FirstScreen, PageFigure, page_figures
 from ctrlgen.reporting.result_file import json_text
-from ctrlgen.trajectory.solution_charts import line_of
 
 FIGURES = {
     "path": ("Path and speed", "Coloured where a limit binds; dots are the set-points."),
@@ -61,7 +60,7 @@ def drives_chart(motion: FastestPath) -> Chart:
     signal, (low, high) = motion.solution.model.signals["drive"], motion.solution.model.u_bounds
     values, unit = motion.solution.drive, signal.units[0]
     curves = tuple(
-        Curve(channel, from_si(values[:, i], its), i, line_of(i), held=True)
+        Curve(channel, from_si(values[:, i], its), i, i, held=True)
         for i, (channel, its) in enumerate(zip(signal.channels, signal.units, strict=True))
     )
     bounds = sorted({float(from_si(b, unit)) for b in (*low, *high) if np.isfinite(b)})

@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 from ctrlgen.core.units import difference, from_si, same_dimension, show
 from ctrlgen.path_timing.binding import Binding
 from ctrlgen.path_timing.fastest import FastestPath
-from ctrlgen.reporting.plots import COLOURS, PATTERNS, STYLE, plt, svg
+from ctrlgen.reporting.line_patterns import DASHED, DOTTED, dashes
+from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
 
 SHOWN = 12  # limits
 UNBOUND = "#bbbbbb"
@@ -95,7 +96,7 @@ def _draw_speed(axes: Axes, motion: FastestPath, alike: list[int], unit: str) ->
 
         if bound is not None and not np.allclose(bound, speed, rtol=1e-3, atol=0):  # apart by more than a line's width
             label = labelled("bound of each place alone")
-            axes.plot(100 * share, shown(share, bound), color=UNBOUND, lw=1, ls="--", label=label)
+            axes.plot(100 * share, shown(share, bound), color=UNBOUND, lw=1, ls=dashes(DASHED), label=label)
         axes.plot(100 * share, shown(share, speed), color="#333333", lw=1, label=labelled("fastest law of time"))
         top = max(top, float(np.nanmax(shown(share, speed))))
         for binding, colour in reversed(_colours(motion)):
@@ -108,7 +109,9 @@ def _draw_speed(axes: Axes, motion: FastestPath, alike: list[int], unit: str) ->
             inside = (even >= ends[0]) & (even <= ends[1])
             rate = np.gradient(even[inside], motion.even / (len(even) - 1))
             label = labelled("even speed, no faster")
-            axes.plot(100 * even[inside], shown(even[inside], rate), color="#888888", lw=1, ls=":", label=label)
+            axes.plot(
+                100 * even[inside], shown(even[inside], rate), color="#888888", lw=1, ls=dashes(DOTTED), label=label
+            )
     axes.set_xlabel("share of the path [%]")
     axes.set_ylabel(f"speed along the path [{unit}/s]")
     axes.set_ylim(0, ROOM * top)
@@ -140,7 +143,7 @@ def _draw_drives(motion: FastestPath) -> Figure:
             edges,
             baseline=None,
             color=COLOURS[i % len(COLOURS)],
-            ls=PATTERNS[i % len(PATTERNS)],
+            ls=dashes(i),
             lw=1,
             label=channel,
         )

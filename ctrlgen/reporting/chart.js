@@ -1,10 +1,8 @@
 "use strict";
 // Draws the data of <script class="chart"> by uPlot, in place of the static drawing beside it. Charts of one group share stretch and cursor.
 (() => {
-  const DASHES = { "-": [], "--": [7, 4], "-.": [8, 3, 2, 3], ":": [2, 3], "---": [14, 5], "-..": [9, 3, 2, 3, 2, 3], ".": [] };
-  const MARKS = { "-": "solid", "--": "dashed", "-.": "dashed", ":": "dotted", "---": "dashed", "-..": "dashed", ".": "dotted" };
   const FONT = "12px system-ui, sans-serif";
-  const POINT = 5; // pixels across a point
+  const POINT = 6; // pixels across a point
   const groups = new Map(); // name -> {plots, range, whole}
 
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -74,15 +72,52 @@
     };
   }
 
+  // Marks by matplotlib's letters: the corners of a closed shape, or strokes, about (0, 0) within ± 1.
+  const ring = (n, turn = 0, inner = 1) => Array.from({ length: n }, (_, k) => [Math.sin(turn + (2 * Math.PI * k) / n), -Math.cos(turn + (2 * Math.PI * k) / n)].map((v) => v * (k % 2 ? inner : 1)));
+  const SHAPES = { o: ring(24), s: ring(4, Math.PI / 4), "^": ring(3), v: ring(3, Math.PI), "<": ring(3, -Math.PI / 2), ">": ring(3, Math.PI / 2), D: ring(4), p: ring(5), h: ring(6), "*": ring(10, 0, 0.4) };
+  const STROKES = { x: [[-0.8, -0.8, 0.8, 0.8], [-0.8, 0.8, 0.8, -0.8]], "+": [[-1, 0, 1, 0], [0, -1, 0, 1]] };
+  const outline = (name, x, y, r) =>
+    SHAPES[name] ? `${SHAPES[name].map(([a, b], k) => `${k ? "L" : "M"}${x + r * a} ${y + r * b}`).join("")}Z` : STROKES[name].map(([a, b, c, d]) => `M${x + r * a} ${y + r * b}L${x + r * c} ${y + r * d}`).join("");
+
+  function mark(u, i, from, to, curve) {
+    const path = new Path2D();
+    for (let k = from; k <= to; k++) if (u.data[i][k] != null) path.addPath(new Path2D(outline(curve.mark, u.valToPos(u.data[0][k], "x", true), u.valToPos(u.data[i][k], "y", true), (POINT / 2) * devicePixelRatio)));
+    u.ctx.save();
+    u.ctx.beginPath();
+    u.ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
+    u.ctx.clip();
+    u.ctx.fillStyle = u.ctx.strokeStyle = colour(curve.colour);
+    u.ctx.lineWidth = 1.2 * devicePixelRatio;
+    if (SHAPES[curve.mark]) u.ctx.fill(path);
+    else u.ctx.stroke(path);
+    u.ctx.restore();
+  }
+
+  // The legend shows the line or the mark itself.
+  function legend(u, panel) {
+    u.root.querySelectorAll(".u-legend .u-marker").forEach((box, i) => {
+      const curve = panel.curves[i - (u.root.querySelectorAll(".u-legend .u-marker").length - panel.curves.length)];
+      if (!curve) return;
+      const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+      const path = document.createElementNS("http://www.w3.org/2000/svg", "path");
+      svg.setAttribute("viewBox", "0 0 36 12");
+      svg.setAttribute("aria-hidden", "true");
+      path.setAttribute("d", curve.mark ? outline(curve.mark, 18, 6, 4) : "M0 6H36");
+      path.setAttribute("style", `fill:${SHAPES[curve.mark] ? `var(--c${curve.colour % 7})` : "none"};stroke:var(--c${curve.colour % 7});stroke-width:2;stroke-dasharray:${curve.mark ? "none" : curve.dash.join(" ") || "none"}`);
+      svg.append(path);
+      box.replaceChildren(svg);
+    });
+  }
+
   function series(curve) {
-    const points = curve.line === ".";
+    const points = curve.mark !== "";
     const drawn = {
       label: curve.name,
       stroke: () => colour(curve.colour),
       width: curve.width,
-      dash: DASHES[curve.line],
+      dash: curve.dash,
       value: (u, v) => shown(v),
-      points: { show: points, size: POINT, fill: () => colour(curve.colour) },
+      points: { show: points && ((u, i, from, to) => { mark(u, i, from, to, curve); return false; }), size: POINT },
     };
     if (points) drawn.paths = () => null;
     else if (curve.held) drawn.paths = uPlot.paths.stepped({ align: 1 });
@@ -107,12 +142,12 @@
         { ...axis, label: panel.label, labelSize: 18, size: width, values: ticks },
       ],
       series: [{ label: "at", value: (u, v) => place(v) }, ...panel.curves.map(series)],
-      legend: { live: true, markers: { dash: (u, i) => MARKS[panel.curves[i - 1].line] } },
+      legend: { live: true, markers: { width: 0 } },
       cursor: { sync: { key: group.name, scales: ["x", null], filters: { pub: (type) => type === "mousemove" || type === "mouseleave" } }, drag: { x: true, y: false, setScale: true }, bind: { mousedown: (u, t, handler) => (e) => (e.shiftKey ? null : handler(e)), dblclick: () => () => { show(group, ...group.whole); return null; } } },
       hooks: {
         drawClear: panel.band || panel.rules.length ? [backdrop(panel)] : [],
         setScale: [(u, key) => { if (key === "x" && group.ready && u.scales.x.min != null && (u.scales.x.min !== group.range[0] || u.scales.x.max !== group.range[1])) show(group, u.scales.x.min, u.scales.x.max, u); }],
-        ready: [(u) => pan(u, group)],
+        ready: [(u) => pan(u, group), (u) => legend(u, panel)],
       },
     };
   }

@@ -17,18 +17,18 @@ import numpy as np
 from markupsafe import Markup
 
 from ctrlgen.core.escaping import json_in_html
+from ctrlgen.reporting.line_patterns import DASHES, mark
 
 # numbers of a panel: about 100 kB of text, so that a page of ten panels stays in the order of a megabyte
 MOST_NUMBERS = 12_000
 # digits: of a value, more than a screen has dots; of the abscissa, where a sample is far from the first one
 DIGITS, PLACE_DIGITS = 6, 9
-DASHES = ("-", "--", "-.", ":", "---", "-..")
 
 
 @dataclass(frozen=True)
 class Curve:
-    """One curve or row of points: its `values` (n,), NaN where there is none; `line` is one of
-    `DASHES`, or "." for points.
+    """One curve or row of points: its `values` (n,), NaN where there is none; `line` is its place in `line_patterns`: of its dashes, or
+    of the mark of its `points`.
 
     `held`: from each place to the next, as a drive is.
     `colour`: the place in the palette of the page, whose colours differ in the dark.
@@ -37,9 +37,10 @@ class Curve:
     name: str
     values: np.ndarray
     colour: int = 0
-    line: str = "-"
+    line: int = 0
     width: float = 1.3
     held: bool = False
+    points: bool = False
 
 
 @dataclass(frozen=True)
@@ -114,7 +115,8 @@ def _panel(panel: Panel, kept: np.ndarray) -> dict[str, Any]:
         {
             "name": c.name,
             "colour": c.colour,
-            "line": c.line,
+            "dash": DASHES[c.line % len(DASHES)],
+            "mark": mark(c.line) if c.points else "",
             "width": c.width,
             "held": c.held,
             "y": _rounded(c.values[kept], DIGITS),

@@ -6,8 +6,9 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from ctrlgen.reporting.chart import DASHES, Chart
-from ctrlgen.reporting.plots import COLOURS, PATTERNS, STYLE, plt, svg
+from ctrlgen.reporting.chart import Chart
+from ctrlgen.reporting.line_patterns import dashes, mark
+from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
 
 WIDTH, PANEL = 8.6, 2.3  # inches: width of the drawing, height of a panel
 NAMED = 40  # places that are named on the axis; more of them cover each other
@@ -20,14 +21,14 @@ def chart_svg(chart: Chart) -> str:
 
 
 def _draw(chart: Chart) -> Figure:
-    n, lines = len(chart.panels), dict(zip(DASHES, PATTERNS, strict=True))
+    n = len(chart.panels)
     figure, axes = plt.subplots(n, 1, figsize=(WIDTH, 0.6 + PANEL * n), sharex=True, squeeze=False)
     for axis, panel in zip(axes[:, 0], chart.panels, strict=True):
         for curve in panel.curves:
             style: dict[str, Any] = (
-                {"ls": "", "marker": "o", "ms": 3}
-                if curve.line == "."
-                else {"ls": lines[curve.line], "lw": curve.width}
+                {"ls": "", "marker": mark(curve.line), "ms": 3}
+                if curve.points
+                else {"ls": dashes(curve.line), "lw": curve.width}
             )
             axis.plot(panel.x, curve.values, color=COLOURS[2 * curve.colour % 6], label=curve.name, **style)
         if panel.band is not None:

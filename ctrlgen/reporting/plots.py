@@ -20,8 +20,6 @@ from matplotlib.ticker import LogFormatterMathtext, LogFormatterSciNotation
 
 # safe for the colour-blind, a pair per stage
 COLOURS = ("#0072b2", "#56b4e9", "#d55e00", "#e69f00", "#009e73", "#7fc97f")
-# lines told apart without their colour, in the order of COLOURS
-PATTERNS: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (9, 3)), (0, (6, 1.5, 1, 1.5, 1, 1.5)))
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 STYLE: dict[Any, Any] = {
     "font.size": 9,

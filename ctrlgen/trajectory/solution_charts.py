@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ctrlgen.core.units import difference, from_si
-from ctrlgen.reporting.chart import DASHES, Chart, Curve, Panel
+from ctrlgen.reporting.chart import Chart, Curve, Panel
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE
 from ctrlgen.trajectory.solution import Solution
 from ctrlgen.trajectory.solution_plots import FINER
@@ -24,11 +24,6 @@ def chart_solution(solution: Solution) -> dict[str, Chart]:
     return charts
 
 
-def line_of(k: int) -> str:
-    """The dashes of the k-th curve: neighbours differ without their colour."""
-    return DASHES[k % len(DASHES)]
-
-
 def abscissa(solution: Solution) -> tuple[str, np.ndarray]:
     """Label and values of what everything is drawn over: time [s], the sample of a static scenario."""
     static = solution.scenario.sample_time is None
@@ -41,7 +36,7 @@ def _signal(solution: Solution, role: str) -> Chart:
     values = solution.trace.signals[role][: len(x)]
     points = solution.scenario.sample_time is None
     curves = tuple(
-        Curve(channel, from_si(values[:, i], unit), i, "." if points else line_of(i), held=role == "drive")
+        Curve(channel, from_si(values[:, i], unit), i, i, held=role == "drive", points=points)
         for i, (channel, unit) in enumerate(zip(signal.channels, signal.units, strict=True))
     )
     return Chart(label, (Panel(f"{signal.label} [{signal.units[0]}]", x[: len(values)], curves, height=240),))
@@ -56,9 +51,9 @@ def _path(solution: Solution) -> Chart:
     alike = [i for i, other in enumerate(signal.units) if other == unit]
     fine = FINER.get(unit, unit)
     tolerance = float(difference(FEASIBILITY_TOLERANCE * signal.scale[most], fine))
-    shown = tuple(Curve(signal.channels[i], from_si(reached[:, i], unit), k, line_of(k)) for k, i in enumerate(alike))
+    shown = tuple(Curve(signal.channels[i], from_si(reached[:, i], unit), k, k) for k, i in enumerate(alike))
     error = tuple(
-        Curve(f"error of {signal.channels[i]}", difference(reached[:, i] - command[:, i], fine), k, line_of(k))
+        Curve(f"error of {signal.channels[i]}", difference(reached[:, i] - command[:, i], fine), k, k)
         for k, i in enumerate(alike)
     )
     panels = (

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
 from ctrlgen.core.units import from_si, show_difference
-from ctrlgen.reporting.plots import COLOURS, PATTERNS, STYLE, svg
+from ctrlgen.reporting.line_patterns import dashes, mark
+from ctrlgen.reporting.plots import COLOURS, STYLE, svg
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE
 from ctrlgen.trajectory.metrics import force_parts
 from ctrlgen.trajectory.solution import Solution
@@ -69,9 +70,9 @@ def draw_path(solution: Solution) -> Figure:
     left.legend(loc="center" if closed else "best", fontsize=8)
     fine = FINER.get(unit, unit)
     tolerance = from_si(FEASIBILITY_TOLERANCE * signal.scale[most], fine)
-    for i, colour, dashes in zip(alike, (COLOURS[0], COLOURS[2], COLOURS[4]), PATTERNS, strict=False):
+    for k, (i, colour) in enumerate(zip(alike, (COLOURS[0], COLOURS[2], COLOURS[4]), strict=False)):
         off = from_si(reached[:, i] - command[:, i], fine)
-        right.plot(time, off, color=colour, ls=dashes, lw=1, label=signal.channels[i])
+        right.plot(time, off, color=colour, ls=dashes(k), lw=1, label=signal.channels[i])
     right.axhspan(-tolerance, tolerance, color="#f0f0f0", zorder=0)
     span = max(1.3 * tolerance, 1.1 * max(abs(limit) for limit in right.get_ylim()))
     right.set_ylim(-span, span)
@@ -93,8 +94,8 @@ def draw_signal(solution: Solution, role: str) -> Figure:
         axes.plot(
             horizontal,
             from_si(values[:, i], signal.units[i]),
-            marker="o" if static else "",
-            ls="" if static else PATTERNS[i % 6],
+            marker=mark(i) if static else "",
+            ls="" if static else dashes(i),
             ms=4,
             lw=1.3,
             color=COLOURS[i % 6],
@@ -198,8 +199,8 @@ def _draw_range(workspace: Workspace, base: np.ndarray) -> Figure:
     figure, panel = plt.subplots(figsize=(4.8, 3.6))
     along = np.linspace(ends[0], ends[1], 201)
     panel.plot(from_si(along, signal.units[0]), -100 * workspace.excess(along[:, None]), color=COLOURS[0])
-    for end, name in zip(ends, workspace.bound_by(base)[0], strict=True):
-        panel.plot([from_si(end, signal.units[0])], [0], "o", color=COLOURS[2], label=name)
+    for k, (end, name) in enumerate(zip(ends, workspace.bound_by(base)[0], strict=True)):
+        panel.plot([from_si(end, signal.units[0])], [0], mark(k), color=COLOURS[2], label=name)
     panel.set_xlabel(f"{signal.channels[0]} [{signal.units[0]}]")
     panel.set_ylabel("left of the nearest limit's range [%]")
     panel.legend(fontsize=8, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))

@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 
 from ctrlgen.core.units import same_dimension
 from ctrlgen.firmware.c.real import Real
-from ctrlgen.reporting.plots import COLOURS, PATTERNS, STYLE, plt, svg
+from ctrlgen.reporting.line_patterns import dashes, mark
+from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
 from ctrlgen.trajectory import playback
 from ctrlgen.trajectory.inverse.clock import Settled
 from ctrlgen.verification.build_record import BUDGET_CORE, BUDGETS, Build
@@ -51,7 +52,7 @@ def draw_errors(build: Build, unit: str) -> Figure:
         for k, i in enumerate(channels):
             # exactly zero has no place on this axis
             values = np.where(error[:, i] > 0, error[:, i], np.nan)
-            style = {"ls": "", "marker": "o"} if static else {"ls": PATTERNS[k % len(PATTERNS)]}
+            style = {"ls": "", "marker": mark(k)} if static else {"ls": dashes(k)}
             panel.plot(time, values, ms=3, lw=0.9, color=COLOURS[2 * k % 6], label=signal.channels[i], **style)
         panel.axhline(limit, color="#222222", lw=1, ls="--")
         told, across = f"tolerance {limit:.3g} {shown}", panel.get_yaxis_transform()

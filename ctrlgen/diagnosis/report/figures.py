@@ -16,6 +16,7 @@ from ctrlgen.diagnosis.report.plot_readings import draw_readings
 from ctrlgen.diagnosis.report.plot_shares import draw_shares
 from ctrlgen.diagnosis.report.plot_uncertainty import draw_confusability, draw_intervals, draw_profiles, draw_rivals
 from ctrlgen.diagnosis.report.residuals import AFTER, BEFORE, NOISE, WIDTH, Residuals
+from ctrlgen.reporting.line_patterns import DASHED, DOTTED, SOLID, dashes, mark
 from ctrlgen.reporting.plots import STYLE, svg
 
 # columns of a long curve; of each the smallest and the largest sample are drawn
@@ -62,9 +63,9 @@ def draw_residuals(residuals: Residuals) -> Figure:
     figure, axes = plt.subplots(len(channels), wide, figsize=size, sharex=True, squeeze=False)
     for i, (channel, unit) in enumerate(zip(channels, residuals.recording.units, strict=True)):
         if residuals.changed:
-            _curve(axes[i, 0], residuals, residuals.before, i, BEFORE, "before")
+            _curve(axes[i, 0], residuals, residuals.before, i, "before")
         for panel in axes[i]:
-            _curve(panel, residuals, residuals.after, i, AFTER, "after")
+            _curve(panel, residuals, residuals.after, i, "after")
         axes[i, 0].set_ylabel(f"{short(channel)} [{unit}]")
         floor = residuals.floor(i)
         if floor is not None:
@@ -80,9 +81,12 @@ def draw_residuals(residuals: Residuals) -> Figure:
     return figure
 
 
-def _curve(panel: Axes, residuals: Residuals, parts: list[np.ndarray], i: int, colour: str, label: str) -> None:
+def _curve(panel: Axes, residuals: Residuals, parts: list[np.ndarray], i: int, label: str) -> None:
     """One channel over all held-out records, with a line between records."""
-    style: dict[str, Any] = {"ls": "", "marker": "o", "ms": 3} if residuals.settled else {"lw": 0.9}
+    colour, line = LINES[label]
+    style: dict[str, Any] = {"lw": 0.9, "ls": dashes(line)}
+    if residuals.settled:
+        style = {"ls": "", "marker": mark(line), "ms": 3}
     for k, x in residuals.spans():
         panel.plot(*thinned(x, parts[k][:, i]), color=colour, label=label if k == 0 else None, **style)
         if k > 0:
@@ -124,7 +128,12 @@ def spectra(residuals: Residuals) -> list[tuple[int, np.ndarray, Densities]]:
     return found
 
 
-LINES = {"before": (BEFORE, "-."), "after": (AFTER, "-"), "residual": (AFTER, "-"), "noise": ("#777777", "--")}
+LINES = {
+    "before": (BEFORE, DASHED),
+    "after": (AFTER, SOLID),
+    "residual": (AFTER, SOLID),
+    "noise": ("#777777", DOTTED),
+}
 
 
 def draw_spectrum(residuals: Residuals) -> Figure | None:
@@ -137,8 +146,8 @@ def draw_spectrum(residuals: Residuals) -> Figure | None:
     figure, axes = plt.subplots(rows, columns, figsize=(WIDTH, 0.8 + 2.3 * rows), squeeze=False)
     for panel, (i, f, curves) in zip(axes.flat, found, strict=False):
         for label, density in curves:
-            colour, dashes = LINES[label]
-            panel.loglog(f, density, color=colour, ls=dashes, lw=1.1, label=label)
+            colour, line = LINES[label]
+            panel.loglog(f, density, color=colour, ls=dashes(line), lw=1.1, label=label)
         panel.set_ylabel(f"{short(residuals.recording.channels[i])} [{residuals.recording.units[i]}/√Hz]")
         panel.set_xlabel("frequency [Hz]")
         lowest = np.concatenate([density for label, density in curves if label != "before"])

@@ -12,6 +12,7 @@ from matplotlib.gridspec import GridSpecFromSubplotSpec
 
 from ctrlgen.diagnosis.report.narrative import short
 from ctrlgen.diagnosis.report.residuals import AFTER, BEFORE, NOISE, WIDTH, Residuals
+from ctrlgen.reporting.line_patterns import DASHED, SOLID, dashes, mark
 
 MEASURED = "#222222"
 # of a stretch: enough to see a turn with what is before and after it
@@ -87,10 +88,12 @@ def _stretch(upper: Axes, lower: Axes, residuals: Residuals, i: int, k: int, str
     x, observed = x[stretch], np.where(record.valid[:, i], record.observed[:, i], np.nan)[stretch]
     measured = residuals.in_units(i, observed)
     upper.plot(x, measured, color=MEASURED, ls="", marker=".", ms=3, label="measured")
-    curves = [(residuals.before, BEFORE, "--", "as described"), (residuals.after, AFTER, "-", "corrected")]
-    for parts, colour, dashes, label in curves[: 1 + residuals.changed]:
+    curves = [(residuals.before, BEFORE, DASHED, "as described"), (residuals.after, AFTER, SOLID, "corrected")]
+    for parts, colour, line, label in curves[: 1 + residuals.changed]:
         error = parts[k][stretch, i]
-        style: dict[str, Any] = {"ls": "", "marker": "_", "ms": 7} if residuals.settled else {"ls": dashes, "lw": 1.1}
+        style: dict[str, Any] = {"ls": dashes(line), "lw": 1.1}
+        if residuals.settled:
+            style = {"ls": "", "marker": mark(line), "ms": 4, "mfc": "none"}
         upper.plot(x, measured - error, color=colour, label=label, **style)
         lower.plot(x, error, color=colour, **{**style, "lw": 0.9})
     unit = residuals.recording.units[i]

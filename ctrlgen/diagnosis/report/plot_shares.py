@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.shares.design import Columns, Kind
 from ctrlgen.diagnosis.shares.shares_table import ChannelShares, SharesTable
+from ctrlgen.reporting.line_patterns import mark
 from ctrlgen.reporting.plots import COLOURS
 
 WIDTH = 8.6
@@ -101,8 +102,8 @@ def _residual(panel: Axes, table: SharesTable, channel: ChannelShares, kind: Kin
     seen = np.flatnonzero(np.isfinite(channel.residual))
     seen = seen[:: max(len(seen) // POINTS, 1)]
     y, smooth = ((difference(v[seen], unit) if unit else v[seen]) for v in (channel.residual, predicted))
-    panel.plot(x[seen], y, ".", ms=2, color=RESIDUAL, label="residual")
-    panel.plot(x[seen], smooth, ".", ms=2, color=COLOURS[2], label="smoother")
+    panel.plot(x[seen], y, mark(0), ms=2, mfc="none", color=RESIDUAL, label="residual")
+    panel.plot(x[seen], smooth, mark(1), ms=2, color=COLOURS[2], label="smoother")
     limits = np.percentile(y, [0.2, 99.8])
     margin = 0.1 * float(np.ptp(limits)) or 1.0
     panel.set_ylim(float(limits[0]) - margin, float(limits[1]) + margin)

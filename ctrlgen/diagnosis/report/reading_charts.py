@@ -11,6 +11,7 @@ from ctrlgen.diagnosis.report.narrative import short
 from ctrlgen.diagnosis.report.plot_readings import worst_readings
 from ctrlgen.diagnosis.report.residuals import Residuals
 from ctrlgen.reporting.chart import Chart, Curve, Panel
+from ctrlgen.reporting.line_patterns import DASHED, DOTTED, SOLID
 
 # places in the palette of a page: measured, as described, corrected, noise
 MEASURED, DESCRIBED, CORRECTED, NOISE = 6, 1, 0, 6
@@ -34,13 +35,16 @@ def reading_chart(residuals: Residuals) -> Chart:
         told = [residuals.in_units(i, np.where(r.valid[:, i], r.observed[:, i], np.nan)) for r in residuals.records]
         unit, name = residuals.recording.units[i], short(residuals.recording.channels[i])
         measured = _joined(residuals, told, np.nan)
-        sides = [("as described", residuals.before, DESCRIBED, "--"), ("corrected", residuals.after, CORRECTED, "-")]
-        curves, errors = [Curve("measured", measured, MEASURED, "." if residuals.settled else ":", 1.6)], []
+        sides = [
+            ("as described", residuals.before, DESCRIBED, DASHED),
+            ("corrected", residuals.after, CORRECTED, SOLID),
+        ]
+        settled = residuals.settled
+        curves, errors = [Curve("measured", measured, MEASURED, DOTTED, 1.6, points=settled)], []
         for label, parts, colour, line in sides[: 1 + residuals.changed]:
             error = _joined(residuals, [part[:, i] for part in parts], np.nan)
-            line = "." if residuals.settled else line
-            curves.append(Curve(label, measured - error, colour, line))
-            errors.append(Curve(f"error {label}", error, colour, line))
+            curves.append(Curve(label, measured - error, colour, line, points=settled))
+            errors.append(Curve(f"error {label}", error, colour, line, points=settled))
         floor = residuals.floor(i)
         band = None if floor is None else (-2 * floor, 2 * floor)
         panels.append(Panel(f"{name} [{unit}]", x, tuple(curves), height=READING))
@@ -64,10 +68,10 @@ def _spectrum(residuals: Residuals) -> Chart | None:
     for i, f, curves in found:
         unit, name = residuals.recording.units[i], short(residuals.recording.channels[i])
         palette = {
-            "before": (DESCRIBED, "--"),
-            "after": (CORRECTED, "-"),
-            "residual": (CORRECTED, "-"),
-            "noise": (NOISE, ":"),
+            "before": (DESCRIBED, DASHED),
+            "after": (CORRECTED, SOLID),
+            "residual": (CORRECTED, SOLID),
+            "noise": (NOISE, DOTTED),
         }
         shown = tuple(Curve(label, density, *palette[label]) for label, density in curves)
         panels.append(Panel(f"{name} [{unit}/√Hz]", f, shown, log=True))

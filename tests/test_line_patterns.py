@@ -1,0 +1,46 @@
+"""Lines and points are told apart without their colour; every drawing of every test is held to it by conftest."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from conftest import ROOT
+from told_apart import alike_in_chart, alike_in_drawing
+
+from ctrlgen.reporting.chart import Chart, Curve, Panel
+from ctrlgen.reporting.chart_drawing import chart_svg
+from ctrlgen.reporting.line_patterns import DASHES, MARKS
+from ctrlgen.trajectory.solution_charts import chart_solution
+from ctrlgen.trajectory.solution_plots import draw_solution
+
+
+def _chart(lines: int, points: bool, alike: bool = False) -> Chart:
+    x = np.linspace(0, 1, 50)
+    curves = (Curve(f"c{k}", x + k, 0, 0 if alike else k, points=points) for k in range(lines))
+    return Chart("x", (Panel("y", x, tuple(curves), height=400),))
+
+
+@pytest.mark.parametrize("points", [False, True])
+def test_every_series_of_a_figure_has_dashes_or_a_mark_of_its_own(points):
+    chart = _chart(len(DASHES), points)
+    assert not alike_in_drawing(chart_svg(chart)) and not alike_in_chart(chart.json)
+    same = _chart(2, points, alike=True)
+    assert alike_in_chart(same.json)
+    with pytest.raises(AssertionError, match="told apart"):
+        chart_svg(same)
+
+
+def test_patterns_differ_and_every_mark_is_drawn_by_the_page():
+    assert len(set(DASHES)) == len(DASHES) == len(MARKS) == len(set(MARKS))
+    script = (ROOT / "ctrlgen" / "reporting" / "chart.js").read_text()
+    drawn = re.findall(r'["{ ]"?([^\s"])"?: (?:ring|\[\[)', script)
+    assert set(MARKS) <= set(drawn)
+
+
+def test_the_figures_of_a_solution_have_no_two_series_alike(circle):
+    for drawing in draw_solution(circle).values():
+        assert not alike_in_drawing(drawing)
+    for chart in chart_solution(circle).values():
+        assert not alike_in_chart(chart.json)
