@@ -139,14 +139,13 @@ def _names_and_units(candidates: Sequence[tuple[int, list[str]]]) -> Header:
         at = next(
             (n for n in range(min(2, len(candidates) - 1)) if _is_units(candidates[n][1], candidates[n + 1][1])), None
         )
-    if (
-        at is None
-        and len(candidates) > 1
-        and is_unit_row(candidates[1][1])
-        and not any(map(is_number, candidates[0][1]))
-    ):
-        at, names_at = 1, 0  # units above the names
+    if at is None and not any(map(is_number, candidates[0][1])):  # units above the names
+        at = next((n for n in range(1, min(4, len(candidates))) if is_unit_row(candidates[n][1])), None)
+        names_at = names_at if at is None else 0
     names_at = names_at if names_at is not None else 0 if at is None else min(at + 1, len(candidates) - 1)
+    above = candidates[names_at + 1][1] if names_at + 1 < len(candidates) and names_at + 1 != at else []
+    if at is not None and _tells_more(above, candidates[names_at][1]):
+        names_at, above = names_at + 1, []
     line, names = candidates[names_at]
     notes = [f"names in line {line + 1}"] if line else []
     if any(map(is_number, names)):
@@ -157,8 +156,26 @@ def _names_and_units(candidates: Sequence[tuple[int, list[str]]]) -> Header:
         units |= {
             k: c.strip("[](){} ") for k, c in enumerate(candidates[at][1]) if c and not is_number(c) and unit_of(c)
         }
-    above = candidates[names_at + 1][1] if names_at + 1 < len(candidates) else []
-    return Header(tuple(_grouped(names, above)), units, notes=tuple(notes))
+    found = _grouped(names, above)
+    if found == names and at is not None and _is_text(above):
+        notes.append(f"above them stands {', '.join(filter(None, above))}")
+        found = [name or other for name, other in zip(names, above, strict=True)]
+        found = found if len(set(found)) == len(found) else names
+    return Header(tuple(found), units, notes=tuple(notes))
+
+
+def _is_text(cells: Sequence[str]) -> bool:
+    return any(cells) and not any(map(is_number, cells))
+
+
+def _tells_more(above: Sequence[str], names: Sequence[str]) -> bool:
+    """Whether a row names every column by a text of its own, and the row below it, such as one of types, does not."""
+    return (
+        _is_text(above)
+        and all(above)
+        and len(set(above)) == len(above)
+        and len({n for n in names if n}) < sum(map(bool, names))
+    )
 
 
 def _is_units(cells: list[str], above: list[str]) -> bool:
