@@ -125,7 +125,7 @@ def test_what_rubs_or_lags_alike_both_ways_is_named_by_the_plainer_law(law, monk
     named = simplified(trials, general)
     assert named.causes == (plain,)
     monkeypatch.setattr("ctrlgen.diagnosis.selection.rivals.replacements", lambda *_: [])
-    assert [t.cause for t in rivals(trials, general, 0)] == [plain]
+    assert [t.cause for t in rivals(trials, general, 0)[0]] == [plain]
     # nothing that the machine cannot have
     without = Trials(fitter, Screen(fitter, [cause]), lambda _: None)
     assert simplified(without, without.fit(begun, cause, steps=12)).causes == (cause,)

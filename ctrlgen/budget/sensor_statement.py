@@ -14,10 +14,6 @@ from ctrlgen.core.units import parse_difference, shown_difference_unit
 from ctrlgen.devices import Signal
 from ctrlgen.devices.section import Section
 
-ASSUMED_SCALE = 5e-3
-"""Standard deviation of the scale of each channel that is read, where nothing is stated. Judgement: position sensors that were not
-calibrated in place are good to a per cent, which is two of it."""
-
 
 class SensorSection(Section):
     """What is not known exactly of the sensor that reads the followed signal. It moves no open-loop drive by itself: learning from runs

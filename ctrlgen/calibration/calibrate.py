@@ -18,7 +18,6 @@ import casadi as ca
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from ctrlgen.budget.sensor_statement import ASSUMED_SCALE
 from ctrlgen.calibration.sensor_share import by_held, sensor_covariance
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.tabular import Column, Reported, Tabular
@@ -26,6 +25,7 @@ from ctrlgen.core.units import difference, from_si, show_difference
 from ctrlgen.devices import Device, load_device
 from ctrlgen.devices.changed_numbers import changed
 from ctrlgen.devices.run_time import RunTimeConstant
+from ctrlgen.devices.usual_deviation import ASSUMED_SCALE
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.free_parameters import FreeParameter
 from ctrlgen.estimation.isolated_outliers import mark_outliers

@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ctrlgen.budget.sensor_statement import ASSUMED_SCALE
 from ctrlgen.core.units import Quantity
+from ctrlgen.devices.usual_deviation import ASSUMED_SCALE
 from ctrlgen.effects import Place
 from ctrlgen.effects.gain import SensorGain
 from ctrlgen.estimation.fit import Fit, Fitter

@@ -225,6 +225,8 @@ def _of_law(
     fitting = [channel for channel in places if law.applies_to(channel)]
     for channel in () if prior.acts_on_all else fitting:
         yield Hypothesis(law.kind, f"{domain}:{channel.name}", channel.name, highest=highest, longest=longest)
+    if prior.of_one_reference and len(fitting) > 1:
+        yield Hypothesis(law.kind, f"{domain}:all", "all", highest=highest)
     if len(places) < every:
         return
     if prior.acts_on_all or (len(fitting) > 1 and law.place is not Place.SENSOR):

@@ -34,6 +34,7 @@ class ParameterPrior:
     usual: of a shape: the value of the plain form of the law, which is taken where the fit does not exclude it: what the records to fit
         leave open, records that go farther show.
     fixed_range: of an amplitude: the law is present or absent. Its amplitude is set to the middle of the range, not fitted.
+    deviation: of an amplitude: its standard deviation among devices whose file states none (`estimation.size_odds`).
     at_bound: of a shape: what the law is where this ends at a bound. A fit that ends there is rejected, as one is of which the records
         do not tell the shape. at_low_bound: the same of the lower bound alone.
     proportional: of a shape: it adds a part in proportion to the signal, and what the law adds is nothing else where there is no loop.
@@ -49,6 +50,7 @@ class ParameterPrior:
     at_low_bound: str = ""
     proportional: bool = False
     usual: float | None = None
+    deviation: float | None = None
 
 
 def peaks(*multiples: float) -> ParameterPrior:
@@ -70,6 +72,7 @@ class LawPrior:
     in_a_region: the law is another one in a part of the motion: it is tried beside the others and never takes their turn.
     repeatable: the law may act more than once at one place, as harmonics do.
     acts_on_all: the law is suspected at all channels at once only.
+    of_one_reference: the law of a sensor is suspected at all channels at once too, read or not: one thing they share may be wrong.
     of_time: what it does is a function of time alone (an event, a drift, a line), whatever the machine does. A law that acts with
         the motion comes first where it explains nearly as much.
     domain: where a finding is reported to be; by default what the law's place says.
@@ -86,6 +89,7 @@ class LawPrior:
     in_a_region: bool = False
     repeatable: bool = False
     acts_on_all: bool = False
+    of_one_reference: bool = False
     of_time: bool = False
     domain: str | None = None
     parameters: Mapping[str, ParameterPrior] = field(default_factory=dict)

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
+from ctrlgen.devices.usual_deviation import ASSUMED_SCALE
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.law_prior import ONE_IN_A_HUNDRED, ONE_IN_TEN, LawPrior, ParameterPrior, peaks
 from ctrlgen.estimation.priors_in_a_region import IN_A_REGION
@@ -97,6 +98,12 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
         ),
         "sensor_step": LawPrior(
             _EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, of_time=True, domain="disturbance", parameters=_EVENT
+        ),
+        "sensor_gain": LawPrior(
+            "As common as a wrong gain of the drive. Channels that one reference serves, a wavelength or the magnification of a "
+            "camera, are off together.",
+            of_one_reference=True,
+            parameters={"gain": ParameterPrior(deviation=ASSUMED_SCALE)},
         ),
         "stitching_error": LawPrior(
             "Rarer than errors that act along the whole path: judgement. A scale may have several joints.",
@@ -328,7 +335,6 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
                 "quadratic_damping",
                 "raised_point",
                 "screw_motion",
-                "sensor_gain",
                 "stiffening",
                 "stiffness",
                 "stiffness_coupling",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ctrlgen.budget.sensor_statement import ASSUMED_SCALE
+from ctrlgen.devices.usual_deviation import ASSUMED_SCALE
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from pydantic import Field
@@ -26,10 +26,11 @@ from pydantic import Field
 from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.evidence.drive_envelope import DriveEnvelope, fastest, free_drives, occupied_band
 from ctrlgen.diagnosis.evidence.excitation_signals import admissible, pose_sets, time_series
+from ctrlgen.diagnosis.evidence.experiment_sums import Prediction, Sums
+from ctrlgen.diagnosis.evidence.other_readings import OtherReadingEntry, OtherReadings, other_readings
 from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.settings import EXPERIMENT
 from ctrlgen.estimation.fit import Fit, Fitter
-from ctrlgen.estimation.least_squares import initial_state_sd
 from ctrlgen.model.model import Model
 from ctrlgen.recordings.recording import Record
 from ctrlgen.reporting.result_file import FiniteOrNull, Keys
@@ -88,6 +89,9 @@ class NextExperimentEntry(Keys):
     alternative: AlternativeEntry | None = Field(
         description="What decides where the best drive does not; null where nothing does."
     )
+    other_readings: list[OtherReadingEntry] = Field(
+        description="Where a cause of the sensor and one of the device explain alike: the same poses read otherwise, what decides first."
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +102,8 @@ class Experiment:
     before, after: separation [standard deviations] by this recording, and with the new one.
     candidates: all drives considered, the best first. proposed: the best drive as a record without readings.
     drives: what the best asks of each drive. alternative: what decides where the best does not, None where nothing does.
-    files: the content of each file of the folder next_experiment/.
+    files: the content of each file of the folder next_experiment/. readings: what a second sensor or a turned specimen decides, None where
+    no doubt is between sensor and device.
     """
 
     rivals: tuple[str, str]
@@ -110,6 +115,7 @@ class Experiment:
     drives: tuple[ProposedDriveEntry, ...] = ()
     alternative: AlternativeEntry | None = None
     files: dict[str, str] = field(default_factory=dict)
+    readings: OtherReadings | None = None
 
     @property
     def settles(self) -> bool:
@@ -138,6 +144,7 @@ class Experiment:
             candidates=list(self.candidates),
             drives=list(self.drives),
             alternative=self.alternative,
+            other_readings=[] if self.readings is None else list(self.readings.entries),
         )
 
 
@@ -147,11 +154,12 @@ def next_experiment(search: SearchResult, explained: bool, seed: int = 0) -> Exp
     fitter, (pairs, reason) = search.fitter, _open(search, explained)
     if not pairs:
         return None
-    return max(
+    best = max(
         (experiment for a, b in pairs if (experiment := separate(fitter, a, b, reason, seed)) is not None),
         key=lambda e: -e.before,
         default=None,
     )
+    return None if best is None else replace(best, readings=other_readings(search, best.proposed))
 
 
 def _open(search: SearchResult, explained: bool) -> tuple[list[tuple[Fit, Fit]], str]:
@@ -201,12 +209,12 @@ class _Contest:
 
     fitter: Fitter
     pairs: tuple[tuple[Fit, Fit], ...]
-    now: tuple[_Sums, ...]
+    now: tuple[Sums, ...]
 
     @classmethod
     def between(cls, fitter: Fitter, a: Fit, b: Fit) -> _Contest:
         pairs = ((a, b), (b, a))
-        return cls(fitter, pairs, tuple(_Sums.present(fitter, *pair) for pair in pairs))
+        return cls(fitter, pairs, tuple(Sums.present(fitter, *pair) for pair in pairs))
 
     @property
     def before(self) -> float:
@@ -233,7 +241,9 @@ class _Contest:
             if given is None:
                 continue
             record, strength = given
-            both = [s.plus(fitter, *pair, record).separation for s, pair in zip(self.now, self.pairs, strict=True)]
+            a, b = (Prediction.of(fitter, fit, record) for fit in self.pairs[0])
+            there, back = self.now
+            both = [there.plus(fitter, a, b, record).separation, back.plus(fitter, b, a, record).separation]
             if np.all(np.isfinite(both)):
                 entry = CandidateExperimentEntry(
                     kind=shape.kind, description=shape.description, strength=strength, separation=min(both)
@@ -296,49 +306,3 @@ def _named(fit: Fit, other: Fit) -> str:
     """The causes that `other` does not have."""
     causes = [c for c in fit.structure.causes if c not in other.structure.causes]
     return " and ".join(f"{c.effect} at {c.location}" for c in causes) or "the device without it"
-
-
-@dataclass(frozen=True, eq=False)
-class _Sums:
-    """N = J'J, g = J'Delta, s = |Delta|^2 over some records, initial states projected out."""
-
-    N: np.ndarray
-    g: np.ndarray
-    s: float
-
-    @property
-    def separation(self) -> float:
-        """Norm of Delta after the best refit within J [standard deviations]; NaN where the motion diverged."""
-        if not (np.isfinite(self.N).all() and np.isfinite(self.g).all()):
-            return float("nan")
-        d = np.sqrt(np.maximum(np.diag(self.N), 1e-300))
-        taken = (self.g / d) @ np.linalg.pinv(self.N / np.outer(d, d), rcond=1e-12) @ (self.g / d)
-        return float(np.sqrt(max(self.s - float(taken), 0.0)))
-
-    @classmethod
-    def present(cls, fitter: Fitter, truth: Fit, refitted: Fit) -> _Sums:
-        """The sums over the records to fit. Prior rows of the refitted model keep its parameters near their stated values."""
-        n = sum(r.valid.size for r in fitter.fit_records)
-        delta = np.zeros(len(refitted.residual))
-        delta[:n] = refitted.residual[:n] - truth.residual[:n]
-        return cls._of(-refitted.J, delta, len(refitted.theta))
-
-    def plus(self, fitter: Fitter, truth: Fit, refitted: Fit, record: Record) -> _Sums:
-        """The sums with one more `record`."""
-        simulator = fitter.simulator(refitted.structure, record)
-        y, slopes = simulator.sensitivities(record, refitted.theta)
-        other = fitter.simulator(truth.structure, record)
-        delta = fitter.noise.whiten(other.simulate(record, truth.theta) - y, record.valid).ravel()
-        J = fitter.noise.whiten(slopes, record.valid).reshape(len(delta), -1)
-        sizes = initial_state_sd(simulator)
-        prior = np.hstack([np.zeros((len(sizes), len(refitted.theta))), np.diag(1 / sizes)])
-        new = _Sums._of(np.vstack([J, prior]), np.concatenate([delta, np.zeros(len(sizes))]), len(refitted.theta))
-        return _Sums(self.N + new.N, self.g + new.g, self.s + new.s)
-
-    @classmethod
-    def _of(cls, J: np.ndarray, delta: np.ndarray, k: int) -> _Sums:
-        theta, start = J[:, :k], J[:, k:]
-        if start.shape[1]:
-            q = np.linalg.qr(start / np.maximum(np.linalg.norm(start, axis=0), 1e-300))[0]
-            theta, delta = theta - q @ (q.T @ theta), delta - q @ (q.T @ delta)
-        return cls(theta.T @ theta, theta.T @ delta, float(delta @ delta))

@@ -33,6 +33,7 @@ from ctrlgen.diagnosis.selection.verdict import (
 )
 from ctrlgen.diagnosis.settings import VERDICT
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.estimation.size_odds import size_of
 from ctrlgen.reporting.numbers import number
 
 HEADLINE = {
@@ -87,7 +88,7 @@ def _cause(diagnosis: Diagnosis) -> str:
     if not findings:
         return f"{head}: the recording differs from {title}, and no known effect explains it."
     best = "no confirmed cause takes away most of the error; the best is " if verdict == Verdict.UNEXPLAINED else ""
-    return f"{head}: {best}{_main(findings)}{_rivals(diagnosis)}."
+    return f"{head}: {best}{_main(findings)}{_rivals(diagnosis)}{_unlikely(diagnosis)}."
 
 
 def _main(findings: Sequence[Finding]) -> str:
@@ -168,6 +169,28 @@ def _rivals(diagnosis: Diagnosis) -> str:
         f"{support.leading} ({per_cent(support.leading_share)}), not for {support.family} ({per_cent(support.share)})"
     )
     return f"{rivals}; the model-free shares speak for {told}"
+
+
+def _unlikely(diagnosis: Diagnosis) -> str:
+    """'; the readings alone do not tell it from mechanism:height, but that would be off by 30 of its usual deviations, and it is by 1.2',
+    where what is known beforehand decides."""
+    main, search = diagnosis.findings[0], diagnosis.search
+    if main.cause not in search.chosen.causes:
+        return ""
+    k = search.chosen.causes.index(main.cause)
+    if k >= len(search.unlikely) or not search.unlikely[k]:
+        return ""
+    rival = search.unlikely[k][0]
+    here = size_of(search.chosen.fit, k)
+    there = size_of(rival.fit, next(i for i, c in enumerate(rival.causes) if c == rival.cause))
+    if there is None or rival.cause is None:
+        return ""
+    own = "" if here is None else f", and {cause_name(main.cause)} is by {number(here[0], 2)}"
+    name, size = cause_name(rival.cause), number(there[0], 2)
+    kind = "stated" if there[1].stated else "usual"
+    return (
+        f"; the readings alone do not tell it from {name}, which would be off by {size} of its {kind} deviations{own}"
+    )
 
 
 def _any(causes: Sequence[Hypothesis]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ctrlgen.diagnosis.evidence.experiment_design import Experiment, ProposedDriveEntry
+from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.reporting.numbers import number
 
 # drives that a sentence names one by one
@@ -12,9 +13,29 @@ SHOWN = 3
 
 
 def experiment_sentence(experiment: Experiment | None) -> str:
-    """What to do to decide between the alternatives of an ambiguous verdict."""
+    """What to do to decide between the alternatives of an ambiguous verdict; where one of them is the sensor's and one the device's, how to
+    read the poses otherwise too."""
     if experiment is None:
         return NOTHING_DECIDES
+    said, readings = _by_drives(experiment), experiment.readings
+    if readings is None:
+        return said
+    between = f"{cause_name(readings.of_sensor)} from {cause_name(readings.of_device)}"
+    first, *others = readings.entries
+    if not first.settles:
+        tried = " nor ".join(e.description for e in readings.entries)
+        return f"{said} Neither {tried} tells {between}: measure one of them directly."
+    rest = "".join(
+        f", and {e.description} {'does too' if e.settles else 'does not'} ({number(e.separation, 2)})" for e in others
+    )
+    told = f"To tell {between}, read the same poses with {first.description}: they are {number(first.separation, 2)} standard deviations "
+    told += f"apart then{rest}."
+    # a drive that nothing recorded shows, or none: what is read otherwise comes first
+    return f"{said} {told}" if experiment.offered else told
+
+
+def _by_drives(experiment: Experiment) -> str:
+    """What drives decide."""
     what, alternative = experiment.candidates[0].description, experiment.alternative
     within = f"{asked(experiment.drives)}, within what was recorded"
     if experiment.settles:

@@ -27,6 +27,7 @@ from ctrlgen.estimation.held_out import refit_to_held_out
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.misfit import Misfit, misfit
 from ctrlgen.estimation.settings import FIT, HELD_OUT_REFIT, RESIDUAL_TESTS, STATISTICS
+from ctrlgen.estimation.size_odds import prior_odds
 from ctrlgen.estimation.structure import Structure
 
 
@@ -91,7 +92,7 @@ class ModelSelection:
     def criterion(self, t: CandidateModel, errors: ErrorModel) -> float:
         """T of a model under `errors`; smaller is better."""
         numbers = sum(u.cause is not None for u in t.fit.structure.free_parameters)
-        price = numbers * np.log(max(self.samples(t.fitted, errors), 2)) - 2 * t.fit.structure.log_prior_odds
+        price = numbers * np.log(max(self.samples(t.fitted, errors), 2)) - 2 * prior_odds(t.fit)
         return self.fit_loss(t, errors) + self.held_out_loss(t, errors) + price
 
     def reference(self, candidates: Sequence[CandidateModel]) -> ErrorModel:
@@ -124,7 +125,7 @@ class ModelSelection:
             for t in others
             if self.advantage(first, t) <= MODEL_SELECTION.tie and len(t.fit.structure.free_parameters) <= numbers
         ]
-        return min((first, *alike), key=lambda t: -t.fit.structure.log_prior_odds)
+        return max((first, *alike), key=lambda t: prior_odds(t.fit))
 
     @staticmethod
     def parameters_may_mask_cause(fit: Fit) -> bool:

@@ -19,6 +19,7 @@ from ctrlgen.diagnosis.settings import CONFUSABLE, PRECEDENCE, REGIONS, SEARCH
 from ctrlgen.diagnosis.shares.families import FAMILY_OF, Family
 from ctrlgen.effects import Place
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis
+from ctrlgen.estimation.size_odds import prior_odds
 from ctrlgen.recordings.recording import Recording
 
 
@@ -176,7 +177,7 @@ def even_speed(recording: Recording, channel: str) -> float | None:
 
 def explains_alike_but_for_odds(compare: ModelSelection, rival: CandidateModel, model: CandidateModel) -> bool:
     """Whether a rival explains as well as a model does, its odds beforehand left aside."""
-    odds = 2 * (model.fit.structure.log_prior_odds - rival.fit.structure.log_prior_odds)
+    odds = 2 * (prior_odds(model.fit) - prior_odds(rival.fit))
     return compare.advantage(model, rival) - odds < CONFUSABLE.criterion
 
 

@@ -21,6 +21,7 @@ from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis
 from ctrlgen.estimation.plainer_law import may_be_plainer, plainer_start
 from ctrlgen.estimation.settings import FIT
+from ctrlgen.estimation.size_odds import size_odds
 from ctrlgen.estimation.structure import Structure
 
 
@@ -141,9 +142,12 @@ def _begun_usual(trials: Trials, fit: Fit, k: int, i: int, usual: float) -> tupl
     return begun, np.insert(best.theta, i, usual)
 
 
-def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Round] = ()) -> tuple[CandidateModel, ...]:
+Alike = tuple[CandidateModel, ...]
+
+
+def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Round] = ()) -> tuple[Alike, Alike]:
     """What explains alike in place of cause k, or is the plainer law that the fit does not exclude; with what the `rounds` tried in its
-    place."""
+    place. And what fits alike, and is unlikely of the size that it takes."""
     there, plainer = current.causes, _as_plainer(trials, current, k)
     tried = [t for r in rounds for t in r.candidates if not current.errors.is_noise]
     candidates = [*plainer, *replacements(trials, current, k), *_in_place_of(k, there, tried)]
@@ -163,7 +167,20 @@ def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Rou
     for t in counterparts(trials, current, k):
         if explains_alike_but_for_odds(trials.selection, t, current):
             alike.setdefault(t.cause, t)
-    return tuple(t for t in trials.selection.ranked(list(alike.values())) if not trials.objections(t, there))
+    odds = size_odds(current.fit)
+    unlikely = [
+        t
+        for t in {t.cause: t for t in reversed(candidates)}.values()
+        if t.cause not in alike
+        and t.cause != there[k]
+        and size_odds(t.fit) < odds
+        and explains_alike_but_for_odds(trials.selection, t, current)
+    ]
+
+    def sound(models: list[CandidateModel]) -> Alike:
+        return tuple(t for t in trials.selection.ranked(models) if not trials.objections(t, there))
+
+    return sound(list(alike.values())), sound(unlikely)
 
 
 def _in_place_of(k: int, there: Sequence[Hypothesis], tried: Sequence[CandidateModel]) -> list[CandidateModel]:

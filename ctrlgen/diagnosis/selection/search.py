@@ -75,12 +75,13 @@ class Searcher:
             account = attribute(trials.fitter, nominal, current, trials.screen.seed, trials.jobs)
         each = range(len(current.causes))
         bare = tuple(trials.each(lambda branch, k: _without(branch, current, k, nominal), each))
-        alike = tuple(trials.each(lambda branch, k: rivals(branch, current, k, rounds), each))
+        found_alike = trials.each(lambda branch, k: rivals(branch, current, k, rounds), each)
+        alike, unlikely = (tuple(rows[i] for rows in found_alike) for i in (0, 1))
         screened = trials.screened(current)
         log = (tuple(trials.log), tuple(trials.screen.hypotheses))
         withdrawn = tuple(c for c in found.causes if c not in current.causes)
         return SearchResult(
-            trials.fitter, nominal, current, account, bare, alike, tuple(rounds), screened, withdrawn, *log
+            trials.fitter, nominal, current, account, bare, alike, tuple(rounds), screened, withdrawn, *log, unlikely
         )
 
     def _settled(self, current: CandidateModel) -> CandidateModel:

@@ -21,6 +21,7 @@ class SearchResult:
     equally well. rounds: in order. final_screen: the screen of the chosen model. withdrawn: causes that were taken out at the
     end, because with them the held-out records are predicted worse than by the device as described. attempts: every fit of a
     model with causes, in order. offered: the hypotheses among which was searched.
+    unlikely: for each cause, models with another one in its place that fit alike, of a size that is far less likely.
     """
 
     fitter: Fitter
@@ -34,3 +35,4 @@ class SearchResult:
     withdrawn: tuple[Hypothesis, ...] = ()
     attempts: tuple[Attempt, ...] = ()
     offered: tuple[Hypothesis, ...] = ()
+    unlikely: tuple[tuple[CandidateModel, ...], ...] = ()

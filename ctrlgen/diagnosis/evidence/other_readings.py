@@ -1,0 +1,187 @@
+"""Whether a second sensor or a turned specimen tells an error of the sensor from one of the device, where no drive does.
+
+The same poses are read once more, (i) by another sensor, which does not have what is suspected of this one, but scales of its own, of each
+channel and of all, known to `SECOND_SCALES`; or (ii) by the same sensor with the specimen turned by a right angle about an axis, mounted to
+`MOUNTED` about each axis: what the sensor does stays with its channels, what the device does goes round with it. Either reading is
+simulated under both models, and
+
+    separation^2 = min over delta, e of |Delta - J delta - E e|^2 + |e/s|^2
+
+over this recording and the new one together, J the sensitivities of the model that is refitted, E those of the new reading's own errors e
+of standard deviation s; of the two directions the smaller (`experiment_design`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from math import pi
+
+import numpy as np
+from pydantic import Field
+
+from ctrlgen.core.units import Quantity
+from ctrlgen.devices.usual_deviation import ASSUMED_SCALE
+from ctrlgen.diagnosis.evidence.experiment_sums import Prediction, Sums
+from ctrlgen.diagnosis.selection.search_result import SearchResult
+from ctrlgen.diagnosis.settings import EXPERIMENT
+from ctrlgen.effects import Param
+from ctrlgen.effects.frame_rotation import FrameRotation
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.free_parameters import FreeParameter
+from ctrlgen.estimation.hypothesis import Hypothesis, nominal_physics
+from ctrlgen.estimation.least_squares import initial_state_sd
+from ctrlgen.estimation.size_odds import of_sensor
+from ctrlgen.recordings.recording import Record
+from ctrlgen.reporting.result_file import FiniteOrNull, Keys, Number
+
+SECOND_SCALES = (ASSUMED_SCALE, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4)
+"""Standard deviations of the scale of a second sensor: one as good as any, then calibrated ones."""
+MOUNTED = 9e-3
+"""rad: 0.5 deg, by which a turned specimen stands otherwise than it did. Judgement: put up by hand against a stop."""
+PLANES = 3
+"""Axes about which a pose in space can be turned; it has twice as many components."""
+
+
+class OtherReadingEntry(Keys):
+    """Another reading of the same poses, and what it decides."""
+
+    kind: str = Field(description="second sensor, or turned specimen.")
+    description: str = Field(description="In words.")
+    scale: Number = Field(description="Standard deviation of the second sensor's scale that it takes; null for others.")
+    separation: FiniteOrNull = Field(description="Separation of the two by both recordings [standard deviations].")
+    settles: bool = Field(description="Whether that decides between them.")
+
+
+@dataclass(frozen=True)
+class OtherReadings:
+    """The cause that is the sensor's, the one that is the device's, and what other readings decide between them, the best first."""
+
+    of_sensor: Hypothesis
+    of_device: Hypothesis
+    entries: tuple[OtherReadingEntry, ...]
+
+    @property
+    def best(self) -> OtherReadingEntry | None:
+        """What decides, with least; None where nothing does."""
+        return self.entries[0] if self.entries and self.entries[0].settles else None
+
+
+class _Turned(FrameRotation, listed=False):
+    """The specimen stands turned under the sensor, by any angle; after all that moves it."""
+
+    title = "The specimen stands turned"
+    order = 1000
+    params = (Param("angle", "rad", (-pi, pi), "by which it is turned", off=0.0),)
+
+
+class _AboutX(_Turned, listed=False):
+    axis = 0
+
+
+class _AboutY(_Turned, listed=False):
+    axis = 1
+
+
+class _AboutZ(_Turned, listed=False):
+    axis = 2
+
+
+class _SkewX(_AboutX, listed=False):
+    order = 1001  # of the specimen as it stands then
+
+
+class _SkewY(_AboutY, listed=False):
+    order = 1001
+
+
+class _SkewZ(_AboutZ, listed=False):
+    order = 1001
+
+
+_ABOUT, _SKEW = (_AboutX, _AboutY, _AboutZ), (_SkewX, _SkewY, _SkewZ)
+
+
+def other_readings(search: SearchResult, record: Record) -> OtherReadings | None:
+    """What other readings of the poses of `record` decide between the chosen model and its first rival that gives to the sensor what it
+    gives to the device, or the other way round; None where there is no such rival."""
+    found = _pair(search)
+    if found is None:
+        return None
+    chosen, rival, here, there = found
+    fitter = search.fitter
+    now = (Sums.present(fitter, chosen, rival), Sums.present(fitter, rival, chosen))
+
+    def separation(read: Reading) -> float:
+        a, b = (read(fitter, fit, record) for fit in (chosen, rival))
+        return min(now[0].plus(fitter, a, b, record).separation, now[1].plus(fitter, b, a, record).separation)
+
+    entries = [_second(separation)]
+    if len(nominal_physics(chosen.structure.device).components) == PLANES * 2:
+        reached, axis = max((separation(partial(read_turned, axis)), axis) for axis in range(PLANES))
+        text = f"the specimen turned by 90 deg about {'xyz'[axis]} under the same sensor"
+        entries.append(_entry("turned specimen", text, None, reached))
+    # what decides; a turned specimen takes no second instrument
+    ranked = sorted(entries, key=lambda e: (not e.settles, e.kind == "second sensor"))
+    sensor, device = (here, there) if of_sensor(here) else (there, here)
+    return OtherReadings(sensor, device, tuple(ranked))
+
+
+Reading = Callable[[Fitter, Fit, Record], Prediction]
+
+
+def _entry(kind: str, text: str, scale: float | None, separation: float) -> OtherReadingEntry:
+    settles = separation >= EXPERIMENT.settles
+    return OtherReadingEntry(kind=kind, description=text, scale=scale, separation=separation, settles=settles)
+
+
+def _pair(search: SearchResult) -> tuple[Fit, Fit, Hypothesis, Hypothesis] | None:
+    """The chosen fit, that of the first rival across sensor and device, and the two causes."""
+    for own, rows in zip(search.chosen.causes, search.rivals, strict=True):
+        for t in rows:
+            if t.cause is not None and of_sensor(t.cause) != of_sensor(own):
+                return search.chosen.fit, t.fit, own, t.cause
+    return None
+
+
+def _second(separation: Callable[[Reading], float]) -> OtherReadingEntry:
+    """The coarsest second sensor that decides, else the finest."""
+    for scale in SECOND_SCALES:
+        reached = separation(partial(read_by_another, scale))
+        if reached >= EXPERIMENT.settles:
+            break
+    return _entry("second sensor", f"a second sensor whose scale is known to {100 * scale:g} %", scale, reached)
+
+
+def read_by_another(scale: float, fitter: Fitter, fit: Fit, record: Record) -> Prediction:
+    """What another sensor reads: no cause of the first one acts on it, but a `scale` of each channel and one of all."""
+    free, theta = fit.structure.free_parameters, fit.theta.copy()
+    ours = [i for i, p in enumerate(free) if p.cause is not None and of_sensor(fit.structure.causes[p.cause])]
+    for i in ours:
+        if free[i].amplitude:
+            theta[i] = free[i].nominal
+    simulator = fitter.simulator(fit.structure, record)
+    y, slopes = simulator.sensitivities(record, theta)
+    slopes[:, :, ours] = 0.0
+    n_y = y.shape[1]
+    own = np.concatenate([y[:, :, None] * np.eye(n_y), y[:, :, None]], axis=2)
+    return Prediction(y, slopes, initial_state_sd(simulator), own, np.full(n_y + 1, scale))
+
+
+def read_turned(axis: int, fitter: Fitter, fit: Fit, record: Record) -> Prediction:
+    """What the same sensor reads of the specimen turned about an axis; how it is mounted then is known to `MOUNTED`."""
+    s, k = fit.structure, len(fit.theta)
+    turn = _ABOUT[axis]("all", {"angle": Quantity(pi / 2, f"{pi / 2!r} rad")})
+    skew = [law("all", {"angle": Quantity(0.0, "0 rad")}) for law in _SKEW]
+    device = s.device.model_copy(update={"effect": (*s.device.effect, turn, *skew)})
+    turned = replace(s, device=device)
+    first = len(s.device.effect) + 1
+    angles = tuple(
+        FreeParameter(f"effect[{first + i}].angle", "rad", 0.0, -pi, pi, MOUNTED, MOUNTED) for i in range(PLANES)
+    )
+    turned = replace(turned, free=(*turned.free_parameters, *angles))
+    simulator = fitter.simulator(turned, record)
+    y, slopes = simulator.sensitivities(record, np.concatenate([fit.theta, np.zeros(PLANES)]))
+    own, rest = slopes[:, :, k : k + PLANES], np.delete(slopes, np.s_[k : k + PLANES], axis=2)
+    return Prediction(y, rest, initial_state_sd(simulator), own, np.full(PLANES, MOUNTED))

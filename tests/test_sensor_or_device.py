@@ -1,0 +1,122 @@
+"""What is the sensor's and what the device's: sizes known beforehand, and which other reading decides; see docs/evidence.md."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from axis_records import SETTLING
+from sensor_or_device import DEVICE, LAWS, Specimen, drawn, recorded
+
+from battery.plant_hexapod import COMPONENTS
+from ctrlgen.core.units import Quantity
+from ctrlgen.devices.usual_deviation import usual_deviation
+from ctrlgen.diagnosis.diagnose import diagnose_recording
+from ctrlgen.diagnosis.evidence.other_readings import read_by_another, read_turned, other_readings
+from ctrlgen.diagnosis.selection.model_selection import ModelSelection
+from ctrlgen.effects.gain import SensorGain
+from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.estimation.noise import estimate_noise
+from ctrlgen.estimation.size_odds import known_deviation, odds_of_size, of_sensor, prior_odds
+from ctrlgen.estimation.structure import Structure
+
+GAIN = 0.006
+EVERY, OF_Z = (Hypothesis("sensor_gain", f"sensor:{c}", c) for c in ("all", "delta_z"))
+LEVERS = Hypothesis("lever_ratio", "stage:all", "all")
+HEIGHT = Hypothesis(PARAMETER, "mechanism:height", path="hexapod.height")
+
+
+@pytest.fixture(scope="module")
+def fits():
+    """A few poses in a plane of drives, read with one channel's scale off, or that of all; the sensor and the device as causes of it."""
+    found = {}
+    for channel, sensor, device, start in (
+        (5, OF_Z, HEIGHT, {"value": 4.127e-3}),
+        (None, EVERY, LEVERS, {"gain": 0.0}),
+    ):
+        gain = np.zeros(6)
+        gain[slice(3, 6) if channel is None else channel] = GAIN
+        recording = recorded(Specimen(5, gain, {}, False, COMPONENTS[3:], True), 6)
+        fitter = Fitter(recording, estimate_noise(recording, SETTLING))
+        causes = ((sensor, {"gain": 0.0}), (device, start))
+        found[sensor.at] = (fitter, *(fitter.fit(Structure(DEVICE).with_cause(*cause)) for cause in causes))
+    return found
+
+
+def decided(fits, at):
+    """By kind what other readings decide between the sensor and the device."""
+    fitter, ours, theirs = fits[at]
+    chosen = SimpleNamespace(fit=ours, causes=ours.structure.causes)
+    rival = SimpleNamespace(fit=theirs, cause=theirs.structure.causes[0])
+    found = other_readings(SimpleNamespace(fitter=fitter, chosen=chosen, rivals=((rival,),)), fitter.fit_records[0])
+    assert of_sensor(found.of_sensor) and not of_sensor(found.of_device)
+    return found.entries[0], {e.kind: e for e in found.entries}
+
+
+def test_a_turned_specimen_tells_a_channel_from_a_height_and_no_reference_of_all(fits):
+    """The scale of one channel stays with it when the specimen turns; one of all goes round with it, as levers do: there another sensor
+    decides, whose scale must be known to a sixth of the 0.6 % at three standard deviations."""
+    first, by_kind = decided(fits, "delta_z")
+    assert first.kind == "turned specimen" and first.separation > 10 and "about z" not in first.description
+    first, by_kind = decided(fits, "all")
+    assert first.kind == "second sensor" and first.scale == 1e-3 and first.settles
+    assert not by_kind["turned specimen"].settles
+
+
+def test_the_turned_specimen_is_read_as_turned_about_the_axis(fits):
+    """By 90 deg about x: what went along z goes along -y, and y along z, where this channel's scale acts on it."""
+    fitter, ours, _ = fits["delta_z"]
+    record = fitter.fit_records[0]
+    straight = fitter.predict(ours, record) / [1, 1, 1 + ours.theta[0]]
+    turned = read_turned(0, fitter, ours, record)
+    expected = np.stack([straight[:, 0], -straight[:, 2], straight[:, 1] * (1 + ours.theta[0])], axis=1)
+    assert turned.y == pytest.approx(expected, abs=1e-12)
+    by_skew_about_z = np.stack([-expected[:, 1], expected[:, 0]], axis=1)  # of the specimen as it stands then
+    assert turned.own[:, :2, 2] == pytest.approx(by_skew_about_z, rel=1e-6, abs=1e-12)
+    assert np.degrees(turned.own_sd) == pytest.approx(0.5, rel=0.05)
+    another = read_by_another(1e-3, fitter, ours, record)  # it has not the scale of the first, and no fit gives it one
+    assert another.y == pytest.approx(straight, abs=1e-12) and not another.slopes[:, :, 0].any()
+
+
+def test_a_size_is_judged_by_what_is_stated_or_usual(fits):
+    """A radius that is 5 of its deviations off is less likely than a scale that is 1.2 of its own off; a stated deviation counts first."""
+    assert usual_deviation(Quantity(1.572e-3, "1.572 mm")) == pytest.approx(3.28e-6, rel=0.01)  # IT8 of 1.6 mm: 13 um
+    assert usual_deviation(Quantity(0.06, "60 mm")) == pytest.approx(11.4e-6, rel=0.01)  # IT8: 46 um
+    assert odds_of_size(1.0) == 0 and odds_of_size(0.1) == 0
+    assert odds_of_size(3.0) == pytest.approx(np.log(3) - 2.5 * np.log(3.25 / 1.25))
+    assert odds_of_size(1e3) == -4.6  # a slip of the pen
+    fitter, ours, theirs = fits["delta_z"]
+    assert prior_odds(ours) > -0.1 and prior_odds(theirs) < -2
+    assert known_deviation(OF_Z, DEVICE).sd == 0.005
+    law = SensorGain("delta_z", {"gain": Quantity(0.0, "0", sd=1e-4)})
+    calibrated = DEVICE.model_copy(update={"effect": (law,)})
+    assert known_deviation(OF_Z, calibrated).sd == 1e-4 and known_deviation(OF_Z, calibrated).stated
+    assert known_deviation(EVERY, calibrated).sd == 0.005
+    compare = ModelSelection(fitter, lambda *_: [])
+    for fit in (ours, theirs):  # -2 ln of the odds is in the criterion
+        left = SimpleNamespace(fit=fit)
+        compare.fit_loss = compare.held_out_loss = lambda *_: 0.0
+        compare.samples = lambda *_: 1.0
+        left.fitted = None
+        assert compare.criterion(left, None) == pytest.approx(np.log(2) - 2 * prior_odds(fit))
+
+
+def told(seed: int) -> tuple[bool, bool, bool]:
+    """Whether the first cause across sensor and device is on the right side; whether the answer says that it may be either; and whether
+    it is sure of the wrong one."""
+    s = drawn(seed)
+    found = diagnose_recording(DEVICE, recorded(s), laws=LAWS, jobs=0)
+    right = [f for f in found.findings if of_sensor(f.cause) == s.of_sensor]
+    open_ = any(of_sensor(a) == s.of_sensor for f in found.findings for a in f.alternatives)
+    first = found.findings and of_sensor(found.findings[0].cause) == s.of_sensor
+    return bool(first), bool(open_), not right and not open_
+
+
+@pytest.mark.long
+def test_no_answer_is_sure_of_the_wrong_side():
+    """A sensor's channel and a number of the device, read in six channels and in three."""
+    for seed in (0, 6, 3, 11):
+        first, _, wrong = told(seed)
+        assert first and not wrong, seed
