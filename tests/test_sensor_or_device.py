@@ -13,7 +13,7 @@ from battery.plant_hexapod import COMPONENTS
 from ctrlgen.core.units import Quantity
 from ctrlgen.devices.usual_deviation import usual_deviation
 from ctrlgen.diagnosis.diagnose import diagnose_recording
-from ctrlgen.diagnosis.evidence.other_readings import read_by_another, read_turned, other_readings
+from ctrlgen.diagnosis.evidence.other_readings import other_readings, read_by_another, read_turned
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection
 from ctrlgen.effects.gain import SensorGain
 from ctrlgen.estimation.fit import Fitter
