@@ -16,7 +16,7 @@ from ctrlgen.controller.controller_step import ControllerStatus
 from ctrlgen.core.errors import ToolError
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import CFolder, generate
-from ctrlgen.verification.cores import BASE, CORES, INSTALL, Core, cross_compile, cross_compilers
+from ctrlgen.verification.cores import BASE, INSTALL, M4F, M7, Core, cross_compile, cross_compilers
 from ctrlgen.verification.emulation import MISSING, Machine, available
 
 COMPILER = "arm-none-eabi-gcc"  # CasADi's C calls sqrt, which needs a library
@@ -38,7 +38,7 @@ def run(repeat: int) -> list[Count | Note]:
     with tempfile.TemporaryDirectory(prefix="ctrlgen-bench-") as name:
         scratch = Path(name)
         c = generate(samples.scenario, samples.model, scratch / "c", samples.solution)
-        for core, real in ((CORES[0], Real.FLOAT), (CORES[1], Real.DOUBLE)):
+        for core, real in ((M4F, Real.FLOAT), (M7, Real.DOUBLE)):
             where, single = f"{core.name}, {real.value}", real is Real.FLOAT
             circle, jumps = _ours(samples, c, core, real, scratch)
             for title, make in PEERS.items():

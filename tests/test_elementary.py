@@ -18,7 +18,7 @@ from ctrlgen.firmware.c import elementary
 from ctrlgen.firmware.c.elementary import TURN_END, TURNS, elementary_text, polynomial
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.toolchains import COMPILERS, FLAGS
-from ctrlgen.verification.cores import CORES, cross_compile, cross_compilers
+from ctrlgen.verification.cores import M4F, cross_compile, cross_compilers
 from ctrlgen.verification.emulation import Machine, available
 
 EXACT = np.longdouble
@@ -322,7 +322,7 @@ def test_only_what_is_called_is_printed_and_no_library(real, compiler, tmp_path)
 def test_a_microcontroller_computes_the_same_bits(libraries, cross, tmp_path, rng):
     if not available() or cross not in cross_compilers():
         pytest.skip(f"unicorn, pyelftools or {cross} is missing: the functions did not run on an emulated core")
-    real, core, n = Real.FLOAT, CORES[0], 300
+    real, core, n = Real.FLOAT, M4F, 300
     pointers = "const float *a, const float *b, float *r"
     calls = [f"case {k}: {f}s({'a' if f in ONE else 'a, b'}, r, {n}); break;" for k, f in enumerate([*ONE, *TWO])]
     entry = f"int all(int what, {pointers});\nint all(int what, {pointers})\n{{\n"

@@ -15,7 +15,7 @@ from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.verification import cores, emulation, in_loop
 from ctrlgen.verification.build_record import BUDGETS
-from ctrlgen.verification.cores import CORES, cross_compile, cross_compilers
+from ctrlgen.verification.cores import CORES, M0_PLUS, M4F, RV32IMC, cross_compile, cross_compilers
 from ctrlgen.verification.emulated_target import SETTLES, NotRun
 from ctrlgen.verification.emulation import Machine, available
 from ctrlgen.verification.in_loop import InLoop, run_in_loop
@@ -23,8 +23,6 @@ from ctrlgen.verification.qemu import check_on_boards
 from ctrlgen.verification.reference import ReferenceAnswers
 
 pytestmark = pytest.mark.long
-
-M4F, M7 = CORES
 
 # each r0 <- (r0 + 1) + 2 + ... + n style loop is written out, so that what it executes is known
 KNOWN = """
@@ -55,6 +53,36 @@ int all(void) { return known(1) + deep() + spin() + astray() + keeps(); }
 """
 
 
+# the same without IT, which ARMv6-M has not, and for RISC-V, with an instruction of two bytes and one of four in each round
+PLAIN = """
+__attribute__((naked, noinline)) int known(int count)
+{
+    __asm__ volatile(
+        ".syntax unified\\n"
+        "movs r1, #0\\n"           /* 1 */
+        "1: adds r1, r1, r0\\n"    /* 3 a round */
+        "subs r0, r0, #1\\n"
+        "bne 1b\\n"
+        "mov r0, r1\\n"
+        "bx lr\\n");
+}
+"""
+REDUCED = """
+__attribute__((naked, noinline)) int known(int count)
+{
+    __asm__ volatile(
+        "li a1, 0\\n"              /* 1 */
+        "1: c.add a1, a0\\n"       /* 3 a round */
+        ".option push\\n.option norvc\\n"
+        "addi a0, a0, -1\\n"
+        ".option pop\\n"
+        "bnez a0, 1b\\n"
+        "mv a0, a1\\n"
+        "ret\\n");
+}
+"""
+
+
 @pytest.fixture(params=["zig", "arm-none-eabi-gcc"])
 def cross(request) -> str:
     if not available():
@@ -78,6 +106,29 @@ def test_instructions_are_counted_exactly(machine, rounds):
     returned, count = machine.call("known", rounds)
     assert returned == rounds * (rounds + 1) // 2
     assert count == 1 + 3 * rounds + 6
+
+
+@pytest.mark.parametrize(("core", "text"), [(M0_PLUS, PLAIN), (RV32IMC, REDUCED)], ids=["Cortex-M0+", "RV32IMC"])
+def test_cores_without_an_fpu_count_exactly_and_divide_by_software(core, text, tmp_path):
+    """A quotient needs the compiler's own arithmetic, and data whose place RISC-V knows by a register."""
+    present = [name for name in core.compilers if name in cross_compilers()]
+    if not available() or not present:
+        pytest.skip(f"{emulation.MISSING}; {'; '.join(cores.INSTALL[name] for name in core.compilers)}")
+    text += "static float third = 3.0f;\nfloat *place(void) { return &third; }\n"
+    text += "float by(const float *x, float *y) { *y = *x / third; return 0; }\n"
+    text += "int all(void) { float y = 1.0f; return known(1) + (int)by(&y, place()); }\n"
+    (tmp_path / "known.c").write_text(text)
+    for compiler in present:
+        program = tmp_path / f"{compiler}.elf"
+        cross_compile(compiler, core, [tmp_path / "known.c"], tmp_path, "all", program)
+        machine = Machine(core, program)
+        for rounds in (1, 2, 17):
+            assert machine.call("known", rounds) == (rounds * (rounds + 1) // 2, 1 + 3 * rounds + 2)
+        x, y = machine.reserve(1, Real.FLOAT), machine.reserve(1, Real.FLOAT)
+        machine.write(x, np.array([np.pi]), Real.FLOAT)
+        machine.call("by", x, y)
+        assert machine.read(y, 1, Real.FLOAT)[0] == np.float32(np.pi) / np.float32(3)
+        assert machine.code < 4096  # of the compiler's arithmetic only what is called
 
 
 def test_stack_is_what_the_deepest_call_touched(machine):
@@ -176,9 +227,11 @@ def ran(compiler, folder, reference) -> InLoop:
 @pytest.mark.long
 def test_every_target_answers_with_this_computers_bits(ran):
     assert ran.passed and not ran.stopped
-    assert len(ran.runs) == 3 * len(cross_compilers())
+    assert len(ran.runs) == sum(len(core.reals) * len(set(core.compilers) & set(cross_compilers())) for core in CORES)
+    assert {run.core for run in ran.runs} == {core.name for core in CORES}
     for run in ran.runs:
-        assert run.numbers > 30_000 and run.differing == 0 and run.writable == 0, run.where
+        assert run.numbers > (30_000 if run.core in ("Cortex-M4F", "Cortex-M7") else 6_000)
+        assert run.differing == 0 and run.writable == 0, run.where
 
 
 @pytest.mark.long
@@ -193,7 +246,7 @@ def test_the_circle_costs_what_the_project_promises_on_a_cortex_m4f(ran):
 
 def only(monkeypatch, core=M4F, real: Real = Real.FLOAT) -> None:
     """One run instead of six."""
-    compiler = next(iter(cross_compilers()), None)
+    compiler = next((name for name in core.compilers if name in cross_compilers()), None)
     if not available() or compiler is None:
         pytest.skip(f"nothing emulates: {emulation.MISSING} ziglang")
     found = {compiler: cross_compilers()[compiler]}
@@ -294,6 +347,7 @@ def test_without_cross_compilers_each_is_named_with_its_remedy(small, compiler, 
     assert found.runs == () and {row.what: row.remedy for row in found.not_run} == {
         "zig": "pip install ziglang",
         "arm-none-eabi-gcc": "apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi",
+        "riscv64-unknown-elf-gcc": "apt-get install gcc-riscv64-unknown-elf",
     }
 
 
@@ -306,7 +360,7 @@ def boards() -> None:
 
 def test_the_vectors_agree_on_every_board(boards, small):
     checks = check_on_boards(small[1])
-    assert len(checks) == 3
+    assert len(checks) == 4
     for check in checks:
         assert check.passed and re.search(r"^(\d+) of \1 reference vectors agree$", check.note)
 

@@ -82,16 +82,17 @@ def draw_instructions(build: Build) -> Figure:
     for panel, kind in zip(axes[0], kinds, strict=True):
         budget = BUDGETS[kind] if build.budgeted else None
         counts = {k: count for k, run in enumerate(runs) if (count := run.instructions[kind])}
-        widest = max(*counts.values(), budget or 0)
+        least, widest = min(counts.values()), max(*counts.values(), budget or 0)
         for k, count in counts.items():
             over = budget is not None and runs[k].core == BUDGET_CORE and count > budget
             panel.barh(k, count, color=COLOURS[2] if over else COLOURS[0], height=0.62)
-            panel.text(count - 0.02 * widest, k, str(count), va="center", ha="right", fontsize=8, color="white")
+            panel.text(0.93 * count, k, str(count), va="center", ha="right", fontsize=8, color="white")
         if budget is not None:
             for k, run in enumerate(runs):
                 if run.core == BUDGET_CORE and run.real is Real.FLOAT:
                     panel.plot([budget, budget], [k - 0.5, k + 0.5], color="#222222", lw=1.2, ls="--")
-        panel.set_xlim(0, 1.12 * widest)
+        panel.set_xscale("log")  # arithmetic in software takes tens of times as many
+        panel.set_xlim(least / 10, 1.3 * widest)  # the shortest bar has room for its number
         goal = f"\ndashed: goal, {budget}" if budget is not None else ""
         panel.set_title(f"{KINDS[kind]}{goal}", fontsize=9)
         panel.set_xlabel("instructions a sample")

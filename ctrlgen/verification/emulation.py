@@ -1,11 +1,13 @@
 """An emulated microcontroller (Unicorn): calls functions of a linked program and counts what they execute.
 
-It counts executed instructions exactly, those skipped by an IT block included. It does not model cycles.
+It counts executed instructions exactly, on an ARM those skipped by an IT block included. It does not model cycles.
 """
 
 from __future__ import annotations
 
 import importlib.util
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ import numpy as np
 
 from ctrlgen.core.errors import ToolError
 from ctrlgen.firmware.c.real import Real
-from ctrlgen.verification.cores import Core
+from ctrlgen.verification.cores import Architecture, Core
 
 PAGE = 0x1000
 RAM, RAM_SIZE = 0x20000000, 0x40000
@@ -22,6 +24,7 @@ STACK = RAM + RAM_SIZE // 2  # grows downward from here; data stands above
 PATTERN = 0xA5  # of stack that nothing has touched
 MOST = 20_000_000  # instructions of a call that may still return; a longer one hangs
 FPU_ON = 0xF << 20  # coprocessors 10 and 11 in CPACR
+FPEXC_ON = 1 << 30
 MISSING = "pip install unicorn pyelftools"
 
 
@@ -30,19 +33,55 @@ def available() -> bool:
     return all(importlib.util.find_spec(name) for name in ("unicorn", "elftools"))
 
 
+@dataclass(frozen=True)
+class _Processor:
+    """An emulated core: the registers of the first argument, which holds the result too, of stack, return and place; the mark of an
+    address of code; how many half words an instruction has, by its first one."""
+
+    emulator: Any
+    argument: int
+    stack: int
+    link: int
+    place: int
+    mark: int
+    half_words: Callable[[int], int]
+
+
+def _arm(core: Core) -> _Processor:
+    import unicorn
+    from unicorn import arm_const as arm
+
+    model = arm.UC_CPU_ARM_MAX if core.unicorn is None else getattr(arm, core.unicorn)
+    emulator = unicorn.Uc(unicorn.UC_ARCH_ARM, unicorn.UC_MODE_THUMB | (unicorn.UC_MODE_MCLASS if core.unicorn else 0))
+    emulator.ctl_set_cpu_model(model)
+    emulator.reg_write(arm.UC_ARM_REG_C1_C0_2, emulator.reg_read(arm.UC_ARM_REG_C1_C0_2) | FPU_ON)
+    emulator.reg_write(arm.UC_ARM_REG_FPEXC, FPEXC_ON)
+    registers = arm.UC_ARM_REG_R0, arm.UC_ARM_REG_SP, arm.UC_ARM_REG_LR, arm.UC_ARM_REG_PC
+    return _Processor(emulator, *registers, 1, lambda first: 2 if first >= 0xE800 else 1)
+
+
+def _riscv(core: Core) -> _Processor:
+    import unicorn
+    from unicorn import riscv_const as riscv
+
+    emulator = unicorn.Uc(unicorn.UC_ARCH_RISCV, unicorn.UC_MODE_RISCV32)
+    if core.unicorn is not None:
+        emulator.ctl_set_cpu_model(getattr(riscv, core.unicorn))
+    registers = riscv.UC_RISCV_REG_A0, riscv.UC_RISCV_REG_SP, riscv.UC_RISCV_REG_RA, riscv.UC_RISCV_REG_PC
+    return _Processor(emulator, *registers, 0, lambda first: 2 if first & 3 == 3 else 1)
+
+
 class Machine:
     """One core with a program in its memory. Raises ToolError where the program does something the core cannot."""
 
     def __init__(self, core: Core, program: Path) -> None:
         import unicorn
         from elftools.elf.elffile import ELFFile
-        from unicorn import arm_const
+        from unicorn import riscv_const
 
-        self._arm, self._error = arm_const, unicorn.UcError
-        model = arm_const.UC_CPU_ARM_MAX if core.unicorn is None else getattr(arm_const, core.unicorn)
-        mode = unicorn.UC_MODE_THUMB | (unicorn.UC_MODE_MCLASS if core.unicorn else 0)
-        self.emulator = unicorn.Uc(unicorn.UC_ARCH_ARM, mode)
-        self.emulator.ctl_set_cpu_model(model)
+        self._error = unicorn.UcError
+        self._core = _riscv(core) if core.architecture is Architecture.RISCV else _arm(core)
+        self.emulator = self._core.emulator
         with program.open("rb") as stream:
             elf = ELFFile(stream)
             # typed as any section; that of symbols is there, nothing is stripped
@@ -59,10 +98,8 @@ class Machine:
         self.emulator.mem_map(RAM, RAM_SIZE)
         self.emulator.mem_map(RETURN, PAGE)
         self.emulator.mem_write(RAM, bytes([PATTERN]) * (STACK - RAM))
-        self.emulator.reg_write(
-            arm_const.UC_ARM_REG_C1_C0_2, self.emulator.reg_read(arm_const.UC_ARM_REG_C1_C0_2) | FPU_ON
-        )
-        self.emulator.reg_write(arm_const.UC_ARM_REG_FPEXC, 0x40000000)
+        if (middle := self.symbols.get("__global_pointer$")) is not None:  # of the data that RISC-V reaches in one instruction
+            self.emulator.reg_write(riscv_const.UC_RISCV_REG_GP, middle)
         self._lengths: dict[tuple[int, int], int] = {}
         self._executed = 0
         self.emulator.hook_add(unicorn.UC_HOOK_BLOCK, self._count)
@@ -77,12 +114,12 @@ class Machine:
         self.emulator.mem_write(address, data)
 
     def _count(self, machine: object, address: int, size: int, _: object) -> None:
-        """A block of Thumb code is about to run: instructions whose first half word is 0xE800 or more have four bytes."""
+        """A block is about to run: how many instructions it has."""
         if (address, size) not in self._lengths:
             words = np.frombuffer(self.emulator.mem_read(address, size), dtype="<u2")
             at, count = 0, 0
             while at < len(words):
-                at += 2 if words[at] >= 0xE800 else 1
+                at += self._core.half_words(int(words[at]))
                 count += 1
             self._lengths[address, size] = count
         self._executed += self._lengths[address, size]
@@ -105,21 +142,21 @@ class Machine:
 
     def call(self, function: str, *arguments: int) -> tuple[int, int]:
         """(returned integer, instructions executed) of a call with addresses or integers as arguments."""
-        arm, self._executed = self._arm, 0
+        core, self._executed = self._core, 0
         for i, argument in enumerate(arguments):
-            self.emulator.reg_write(arm.UC_ARM_REG_R0 + i, argument)
-        self.emulator.reg_write(arm.UC_ARM_REG_SP, STACK)
-        self.emulator.reg_write(arm.UC_ARM_REG_LR, RETURN | 1)
+            self.emulator.reg_write(core.argument + i, argument)
+        self.emulator.reg_write(core.stack, STACK)
+        self.emulator.reg_write(core.link, RETURN | core.mark)
         try:
-            self.emulator.emu_start(self.symbols[function] | 1, RETURN)
+            self.emulator.emu_start(self.symbols[function] | core.mark, RETURN)
         except self._error as error:
-            place = self.emulator.reg_read(arm.UC_ARM_REG_PC)
+            place = self.emulator.reg_read(core.place)
             raise ToolError(f"the emulated core stopped in {function} at {place:#x}: {error}") from error
-        if self.emulator.reg_read(arm.UC_ARM_REG_PC) != RETURN:
+        if self.emulator.reg_read(core.place) != RETURN:
             raise ToolError(
                 f"{function} did not return within {MOST // 1000000} million instructions on the emulated core"
             )
-        returned = self.emulator.reg_read(arm.UC_ARM_REG_R0)
+        returned = self.emulator.reg_read(core.argument)
         return returned - (1 << 32) if returned >> 31 else returned, self._executed
 
     @property

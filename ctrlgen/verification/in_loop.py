@@ -42,7 +42,8 @@ class InLoop:
 def run_in_loop(
     folder: CFolder, reference: ReferenceAnswers, progress: Callable[[str], None] = lambda _: None
 ) -> InLoop:
-    """Every core, arithmetic and cross compiler that is there. Raises ToolError where this computer's own compiler refuses the C."""
+    """Every core, arithmetic and cross compiler that is there, see `CORES`. Raises ToolError where this computer's own compiler refuses the
+    C."""
     if not available():
         return InLoop((), (), (NotRun(what="emulated cores", remedy=MISSING),))
     compilers = cross_compilers()
@@ -51,14 +52,15 @@ def run_in_loop(
         return InLoop((), (), missing)
     runs: list[Target] = []
     stopped: list[StoppedTarget] = []
-    with tempfile.TemporaryDirectory(prefix="ctrlgen-") as name:
-        hosts = {real: Host(folder, reference, real, Path(name)) for real in Real}
+    with tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch:
+        hosts = {real: Host(folder, reference, real, Path(scratch)) for real in Real}
         for core in CORES:
-            for compiler, version in compilers.items():
+            for compiler in (name for name in core.compilers if name in compilers):
+                version = compilers[compiler]
                 for real in core.reals:
                     progress(f"{core.name}, {compiler}, {real.value}")
                     try:
-                        runs.append(_run(folder, reference, hosts[real], core, compiler, version, Path(name)))
+                        runs.append(_run(folder, reference, hosts[real], core, compiler, version, Path(scratch)))
                     except ToolError as error:
                         stopped.append(StoppedTarget(core=core.name, compiler=version, real=real, words=str(error)))
     return InLoop(tuple(runs), tuple(stopped), missing)
@@ -76,7 +78,7 @@ def _run(
             cross_compile(compiler, core, [folder.path / f"{names[real]}.c"], folder.path, entry, program)
             machines[piece] = Machine(core, program)
     costs, compared = [], _Compared(real)
-    for what, answers, expected in _sequences(machines, folder, ref, host):
+    for what, answers, expected in _sequences(machines, folder, ref, host, core.calls):
         counts, plain = [], []
         for k, (numbers, status, count) in enumerate(answers):
             counts.append(count)
@@ -105,9 +107,9 @@ Answers = Iterator[tuple[np.ndarray, int, int]]  # numbers, status, instructions
 
 
 def _sequences(
-    machines: dict[str, Machine], folder: CFolder, ref: ReferenceAnswers, host: Host
+    machines: dict[str, Machine], folder: CFolder, ref: ReferenceAnswers, host: Host, most: int | None
 ) -> Iterator[tuple[CallKind, Answers, np.ndarray]]:
-    """What is run, its answers, and this computer's."""
+    """What is run, its answers, and this computer's; of each kind at most so many calls, the first ones."""
     online, real, machine = folder.online[host.real], host.real, machines["online"]
     nu, m = ref.model.u.numel(), ref.random.shape[1]
     answered = ref.width
@@ -122,23 +124,24 @@ def _sequences(
             # as the harness does: the samples of a path follow one another as those of its clock
             yield machine.read(out, answered, real), status & ~int(ControllerStatus.UNSURE), count
 
-    random = ref.random[:: max(1, len(ref.random) // RANDOM)]
+    count = min(RANDOM, most or RANDOM)
+    random, command = ref.random[:: max(1, len(ref.random) // count)], ref.command[:most]
     if ref.scenario.sample_time is not None:
         machine.call(folder.init[real], state)
         machine.write(state, np.concatenate(ref.start), real)
-        yield CallKind.STEP_SCENARIO, answers("step", ref.command), host.followed(ref.command, ref.start)
+        yield CallKind.STEP_SCENARIO, answers("step", command), host.followed(command, ref.start)
         rest = ref.controller.rest()
-        for what, targets in ((CallKind.STEP_RANDOM, random), (CallKind.STEP_HOSTILE, ref.hostile)):
+        for what, targets in ((CallKind.STEP_RANDOM, random), (CallKind.STEP_HOSTILE, ref.hostile[:most])):
             machine.write(state, np.concatenate(rest), real)
             yield what, answers("step", targets), host.followed(targets, rest)
     else:  # nothing but equilibria
         machine.call(folder.init[real], state)
-        yield CallKind.SETTLE_SCENARIO, answers("settle", ref.command), host.settled(ref.command)
+        yield CallKind.SETTLE_SCENARIO, answers("settle", command), host.settled(command)
     machine.call(folder.init[real], state)
     yield CallKind.SETTLE_RANDOM, answers("settle", random), host.settled(random)
     if "player" in machines:
         player, drive = machines["player"], machines["player"].reserve(nu, real)
-        samples = np.arange(len(ref.solution.drive))
+        samples = np.arange(len(ref.solution.drive))[:most]
 
         def played() -> Answers:
             for k in samples:

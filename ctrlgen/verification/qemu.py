@@ -13,7 +13,7 @@ from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.templates import write
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.verification.check import Check, error_in, finished, not_run, run_tool, version_of
-from ctrlgen.verification.cores import CORES, INSTALL, Core, cross_compile
+from ctrlgen.verification.cores import CORES, INSTALL, Architecture, Core, cross_compile
 
 TOOL = "qemu-system-arm"
 REMEDY = "apt-get install qemu-system-arm"
@@ -24,14 +24,14 @@ OUTCOME = re.compile(r"^(\d+) of (\d+) disagree$", re.M)
 
 def check_on_boards(folder: CFolder, progress: Callable[[str], None] = lambda _: None) -> tuple[Check, ...]:
     """The selftest of every arithmetic on every core's board; passed where every vector agrees."""
-    compiler = "arm-none-eabi-gcc"
+    compiler = Architecture.ARM_M.value
     missing = [remedy for tool, remedy in ((compiler, INSTALL[compiler]), (TOOL, REMEDY)) if not shutil.which(tool)]
     subjects = tuple((folder.selftest[real], real) for real in Real)
     if missing:
         return (not_run(TOOL, subjects, "; ".join(missing)),)
     checks = []
     with tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch:
-        for core in CORES:
+        for core in (core for core in CORES if core.board is not None):
             for real in core.reals:
                 progress(f"{core.board}, {real.value}")
                 checks.append(_run(folder, core, real, compiler, Path(scratch)))
