@@ -29,6 +29,7 @@ class ControllerStatus(IntFlag):
     # A state that is believed may be wrong: nothing is promised of the device beside its drives (`estimate`)
     UNSURE = 256
     CLOCK = 512  # the time since the last call was no sample (`estimate`)
+    # 1024 is of the C's checksum over its state (`ctrlgen.firmware.online.checksum`).
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ Zephyr. Programs for a computer are in test/.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from ctrlgen.firmware.c.deviations import deviations_context
 from ctrlgen.firmware.c.misra import CPPCHECK
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.templates import write
+from ctrlgen.firmware.online.checksum import checked_context
 from ctrlgen.firmware.online.online import online_context
 from ctrlgen.firmware.online.vectors import played_vectors, self_test_calls, vectors
 from ctrlgen.firmware.package import PIECES, owners, write_package
@@ -51,6 +52,8 @@ class CFolder(Shown):
     given_numbers: int = 0
     # Integers in the controller's state
     state_words: int = 1
+    # The online controller with a checksum over its state, where the scenario asks for it
+    checked: dict[Real, str] = field(default_factory=dict)
 
     def facts(self) -> dict[str, object]:
         """What it is, in a few words."""
@@ -64,7 +67,7 @@ class CFolder(Shown):
 
     def sources(self, real: Real) -> list[Path]:
         """The C of the library in one arithmetic."""
-        pieces = (self.online, self.player, self.selftest, self.vectors)
+        pieces = (self.online, self.checked, self.player, self.selftest, self.vectors)
         return [self.path / f"{names[real]}.c" for names in pieces if names]
 
     def runner(self, real: Real) -> Path:
@@ -94,6 +97,7 @@ def generate(
     names = {
         piece: {real: f"{owner}_{piece}_{real.suffix}" for real in Real} for piece, owner in owners(scenario).items()
     }
+    checked = {real: f"{scenario.controller_name}_checked_{real.suffix}" for real in Real if scenario.file.checksum}
     compression = compress(played) if played else {}
     left_out = () if solution is None else solution.left_out
     contexts, written = {}, []
@@ -105,10 +109,14 @@ def generate(
             compression.get(real), len(command), scenario.clock
         )
         contexts[real] = samples | online | of | reference | {"solved": solution is not None, "left_out": left_out}
+        contexts[real] |= {"checked": checked.get(real)}
         contexts[real] |= self_test_calls(contexts[real])
         by_template = {"online": online, "selftest": contexts[real], "vectors": contexts[real]}
         if played:
             by_template["player"] = online | samples
+        if checked:
+            of["checked"] = checked[real]
+            by_template["checked"] = checked_context(online, checked[real])
         for template, context in by_template.items():
             for kind in ("h", "c"):
                 written.append(write(f"{template}.{kind}", context, out / f"{of[template]}.{kind}"))
@@ -131,6 +139,7 @@ def generate(
         worst_operations=cost["worst"],
         given_numbers=contexts[Real.FLOAT]["given_numbers"],
         state_words=len(contexts[Real.FLOAT]["words"]),
+        checked=checked,
     )
 
 

@@ -15,6 +15,7 @@ from ctrlgen.core.units import base_unit
 from ctrlgen.devices.signal import Signal
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.templates import write
+from ctrlgen.firmware.online.checksum import checksum_instructions
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.version import __version__, commit
 
@@ -146,6 +147,7 @@ def _context(
         "target": c["rows"][0]["target"],
         "period": f"{scenario.sample_time:.6g}" if scenario.sample_time else "",
         "memory": _memory(c, contexts),
+        "checksum_cost": checksum_instructions(_memory(c, contexts)[0]["float"]),
         "vectors": c["calls"],
         "tolerance": {real.suffix: contexts[real]["tolerance"] for real in Real},
         "figures": list(figures),
@@ -169,6 +171,9 @@ def _memory(c: dict[str, Any], contexts: Mapping[Real, dict[str, Any]]) -> list[
         _counted("output", nu + n + n_s, 0, output),
         _vectors(contexts),
     ]
+    if c["checked"]:
+        formula = f"`sizeof({c['checked']}_state)` is 4 B more than the state (8 B in double), 256 constants of 4 B; only if it is called"
+        rows.append({"what": "checksum", "float": 4 + 1024, "double": 8 + 1024, "formula": formula})
     if c["played"]:
         forms = "; ".join(
             f"{real.value}: {kept.kind}, {kept.size}" for real, kept in zip(Real, chosen, strict=True) if kept

@@ -70,6 +70,10 @@ class ScenarioFile(Section):
     """C name of the online controller and of the plant, a C identifier in lower case. Left out: the device's name. Controllers of one
     device at two rates need two names to be linked into one program.
     """
+    checksum: bool = False
+    """`true`: the C has a second interface to the controller, `..._checked`, with a CRC-32 over its state and run-time constants, which
+    finds bits that flipped in memory; what it costs is in the README of the C. Left out: it has not.
+    """
     follow: Literal["pose", "displacement"] = "pose"
     """The signal that the path commands: the platform's pose, or the stages' displacements."""
     angles: Order | None = None

@@ -98,7 +98,9 @@ class Machine:
         self.emulator.mem_map(RAM, RAM_SIZE)
         self.emulator.mem_map(RETURN, PAGE)
         self.emulator.mem_write(RAM, bytes([PATTERN]) * (STACK - RAM))
-        if (middle := self.symbols.get("__global_pointer$")) is not None:  # of the data that RISC-V reaches in one instruction
+        if (
+            middle := self.symbols.get("__global_pointer$")
+        ) is not None:  # of the data that RISC-V reaches in one instruction
             self.emulator.reg_write(riscv_const.UC_RISCV_REG_GP, middle)
         self._lengths: dict[tuple[int, int], int] = {}
         self._executed = 0

@@ -120,9 +120,9 @@ def verify(
     """Check a scenario's C in every way and report on one page: limits, cost on each target, equivalence, rules, origin.
 
     Solves, generates, compares with every compiler, runs the C on emulated Cortex-M4F, M7, M3, M0+ and RV32IMC and on boards,
-    analyses it and calls it with hostile inputs. Leaves in --out: build.html (open this first), build.json (every number), and c/. The exit status
-    is 1 when any check failed. A missing tool is no failure: what it would have checked is listed as not run, with the command
-    that installs it.
+    analyses it and calls it with hostile inputs. Leaves in --out: build.html (open this first), build.json (every number), and
+    c/. The exit status is 1 when any check failed. A missing tool is no failure: what it would have checked is listed as not run,
+    with the command that installs it.
 
     Example:  ctrlgen verify scenarios/circle20 --out out/verify
     """

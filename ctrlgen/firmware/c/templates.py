@@ -23,6 +23,7 @@ ABI = 3
 # Sources of a firmware and what of their context is their own name.
 SOURCES = {
     "online.c": "prefix",
+    "checked.c": "prefix",
     "player.c": "prefix",
     "plant.c": "prefix",
     "selftest.c": "selftest",
