@@ -31,25 +31,25 @@ def check_on_boards(folder: CFolder, progress: Callable[[str], None] = lambda _:
         return (not_run(TOOL, subjects, "; ".join(missing)),)
     checks = []
     with tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch:
-        for core in (core for core in CORES if core.board is not None):
+        for core, board in ((core, core.board) for core in CORES if core.board is not None):
             for real in core.reals:
-                progress(f"{core.board}, {real.value}")
-                checks.append(_run(folder, core, real, compiler, Path(scratch)))
+                progress(f"{board}, {real.value}")
+                checks.append(_run(folder, core, board, real, compiler, Path(scratch)))
     return tuple(checks)
 
 
-def _run(folder: CFolder, core: Core, real: Real, compiler: str, scratch: Path) -> Check:
+def _run(folder: CFolder, core: Core, board: str, real: Real, compiler: str, scratch: Path) -> Check:
     subject = ((folder.selftest[real], real),)
-    tool, version = f"{TOOL} -M {core.board} ({core.name}, {real.value})", version_of(TOOL) or ""
+    tool, version = f"{TOOL} -M {board} ({core.name}, {real.value})", version_of(TOOL) or ""
     for name in ("board.c", "board.ld"):
         write(name, {"selftest": folder.selftest[real]}, scratch / name)
-    program = scratch / f"{core.board}_{real.suffix}.elf"
+    program = scratch / f"{board}_{real.suffix}.elf"
     sources = [*folder.sources(real), scratch / "board.c"]
     try:
         cross_compile(compiler, core, sources, folder.path, "reset", program, ("-T", str(scratch / "board.ld"), "-lc"))
     except ToolError as error:
         return finished(tool, version, subject, [error_in(sources[0].name, 1, "build", str(error))])
-    done = run_tool([TOOL, "-M", core.board, *WORDS, *SEMIHOSTING, "-kernel", str(program)])
+    done = run_tool([TOOL, "-M", board, *WORDS, *SEMIHOSTING, "-kernel", str(program)])
     outcome = OUTCOME.search(done.stdout)
     if outcome and outcome[1] == "0" and done.returncode == 0:
         return finished(tool, version, subject, (), f"{outcome[2]} of {outcome[2]} reference vectors agree")
