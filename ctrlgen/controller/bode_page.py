@@ -14,6 +14,7 @@ from ctrlgen.model.model import Model
 from ctrlgen.reporting.chart import Chart, Curve, Panel
 from ctrlgen.reporting.chart_drawing import chart_svg
 from ctrlgen.reporting.html import render
+from ctrlgen.reporting.mode_drawing import mode_svg
 from ctrlgen.reporting.numbers import number
 from ctrlgen.reporting.page_figure import FirstScreen, PageFigure
 from ctrlgen.reporting.plots import svg
@@ -54,6 +55,10 @@ def write_bode_page(model: Model, pose: np.ndarray, path: Path, of: str = "pose"
         static=static,
         drives=drive.channels,
         unit=drive.units[0],
+        modes=[
+            PageFigure(mode_svg(shape), f"{number(shape.frequency, 4)} Hz", "At rest (grey) and displaced.")
+            for shape in model.device.mode_shapes()
+        ],
         poles=[number(f, 4) for f in np.sort(found.poles / (2 * np.pi))],
         origin=origin({}),
         source=model.device.source,

@@ -24,6 +24,7 @@ from ctrlgen.devices.section import Section
 from ctrlgen.devices.sensor import AnySensor
 from ctrlgen.devices.structural_model import StructuralModel
 from ctrlgen.effects import EffectTable
+from ctrlgen.reporting.mode_lines import ModeShape
 
 
 class Device(Shown, Section):
@@ -125,6 +126,10 @@ class Device(Shown, Section):
     def structural_model(self) -> StructuralModel | None:
         """The device with modes that its model leaves out, linear at home; None where it has none."""
         return None
+
+    def mode_shapes(self) -> tuple[ModeShape, ...]:
+        """Its modes as lines to draw; none of a device that is not drawn."""
+        return ()
 
     def with_unstated_stretching(self) -> Device | None:
         """The same device with flexures that stretch where its model leaves that out; None where there are none."""

@@ -18,14 +18,20 @@ REACH = 5.0  # times the fastest condensed mode: how far up the response is told
 MOVES = 1e-9  # of the softest mode with mass: below it a motion of bodies has no mass
 
 
-def structural_model(device: Drawing) -> StructuralModel | None:
-    """The mechanism with its inertia and the fewest modes of its bodies that tell its response up to `modes_below`, at home; None
-    without a table [dynamics]."""
+def highest_told(device: Drawing) -> float | None:
+    """The frequency [Hz] up to which the response is told; None without a table [dynamics]."""
     condensed = guyan_modes(device)
     if device.dynamics is None or not len(condensed.frequencies):
         return None
     stated = device.dynamics.modes_below
-    highest = REACH * float(condensed.frequencies[-1]) if stated is None else stated.si
+    return REACH * float(condensed.frequencies[-1]) if stated is None else float(stated.si)
+
+
+def structural_model(device: Drawing) -> StructuralModel | None:
+    """The mechanism with its inertia and the fewest modes of its bodies that tell its response up to `modes_below`, at home; None
+    without a table [dynamics]."""
+    if (highest := highest_told(device)) is None:
+        return None
     c, n = nominal(device), len(device.placed_actuators)
     K, M, _ = body_matrices(c)
     size = as_displacements(device)

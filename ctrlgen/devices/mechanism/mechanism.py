@@ -31,6 +31,7 @@ from ctrlgen.devices.mechanism.internal_modes import structural_model
 from ctrlgen.devices.mechanism.linear_range import second_order_faults, stiffened
 from ctrlgen.devices.mechanism.load_effects import load_faults
 from ctrlgen.devices.mechanism.mechanism_physics import mechanism_physics
+from ctrlgen.devices.mechanism.mode_shapes import mode_shapes
 from ctrlgen.devices.mechanism.modes import free_between_springs, guyan_modes, inertia_faults, inertia_remarks
 from ctrlgen.devices.mechanism.name_faults import name_faults
 from ctrlgen.devices.mechanism.ported_parts import Ported
@@ -52,6 +53,7 @@ from ctrlgen.devices.travel import farthest
 from ctrlgen.physics import rigid_bodies as mechanism
 from ctrlgen.physics.rigid_bodies import GROUND, Element
 from ctrlgen.physics.screw import TWIST
+from ctrlgen.reporting.mode_lines import ModeShape
 
 AnyElement = Annotated[
     Blade | Wire | Strut | CircularHinge | Compliance | ComplianceMatrix | Spring | BentBeam,
@@ -356,6 +358,10 @@ class Mechanism(CopiedParts):
     def structural_model(self) -> StructuralModel | None:
         """With the modes of the bodies while the axes are held."""
         return structural_model(self)
+
+    def mode_shapes(self) -> tuple[ModeShape, ...]:
+        """The modes of the bodies with the drives held."""
+        return mode_shapes(self)
 
     def with_unstated_stretching(self) -> Mechanism | None:
         """With `geometric_stiffening`, where actuators push and a beam has none."""
