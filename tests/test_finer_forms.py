@@ -1,18 +1,24 @@
-"""A law that is found is tried in a finer form, with more numbers, where it leaves more than noise: hysteresis with free weights."""
+"""A law that is found is tried in a finer form, with more numbers, where it leaves more than noise: hysteresis with free weights,
+friction in a region that falls with the speed."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from axis_records import H, record
+from axis_records import AXIS, H, move, record
+from axis_records import NOISE as READ
 from play_records import NOISE, SERVO, N, lagging, moved
 from recovery import fitter_of
 
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
+from ctrlgen.diagnosis.selection.candidates import finer_forms
+from ctrlgen.diagnosis.selection.rivals import simplified
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
+from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.structure import Structure
 
 OFFERED = [Hypothesis(kind, "stage:axis", "axis") for kind in ("displacement_hysteresis", "backlash", "creep")]
 TWO_GROUPS = np.r_[np.linspace(1e-6, 3e-6, 80), np.linspace(2e-5, 3e-5, 20)]  # half widths of plays of equal weight [m]
@@ -27,6 +33,54 @@ def found(radii: np.ndarray):
         parts.append(record(u, lagging(u, radii) + NOISE * rng.standard_normal(N), role, h=H))
     fitter = fitter_of(device, ("reading.axis",), ("um",), (NOISE,), "series", parts)
     return Searcher(fitter, Screen(fitter, OFFERED), lambda _: None).run(device).chosen
+
+
+def rubbing(u: np.ndarray, breakaway: float) -> np.ndarray:
+    """From 0.3 s on LuGre's bristles, without damping of their own: 0.2 N at speed, more below about 1 mm/s."""
+
+    def force(time, q, v, memory):
+        z, before = memory or (0.0, 0.0)
+        step, level = q - before, 1 + (breakaway - 1) * np.exp(-((v / 1e-3) ** 2))
+        z += (step - abs(step) * z / level) / 1e-6
+        return -0.2 * z * (time > 0.3), (z, q)
+
+    return move(u, force, fine=100)
+
+
+def friction_found(breakaway: float, plain_kind: str = "coulomb_after"):
+    """The candidate of the plain law, and that of its finer form beside it."""
+    n, parts, rng = 600, [], np.random.default_rng(1)
+    for k, role in enumerate(("fit", "hold_out")):
+        t = H * np.arange(n)
+        u = 0.5 * np.sin(2 * np.pi * (3 + k) * t) + 0.3 * np.sin(2 * np.pi * (7.3 - k) * t + 1)
+        parts.append(record(u, rubbing(u, breakaway) + READ * rng.standard_normal(n), role))
+    fitter = fitter_of(AXIS, ("reading.axis",), ("um",), (READ,), "series", parts)
+    plain = Hypothesis(plain_kind, "stage:axis", "axis")
+    trials = Trials(fitter, Screen(fitter, [plain]), lambda _: None)
+    nominal = trials.fit(Structure(AXIS))
+    trials.screened(nominal)
+    begun = {"force": 0.2, "reach": 1e-6, "smoothing": 1e-5, "moment": 0.3, "rise": 2e-3}
+    found = trials.fit(Structure(AXIS).with_cause(plain, begun), plain, steps=40)
+    trials.use(fitter.with_errors_of(found.fit))
+    found = trials.fit(found.fit.restarted, plain, steps=40)
+    return trials, found, finer_forms(trials, found)
+
+
+def test_friction_that_sticks_from_a_moment_on_falls_with_the_speed():
+    trials, plain, (finer,) = friction_found(2.0)
+    assert [c.effect for c in finer.causes] == ["stribeck_after"] and trials.selection.improves_enough(plain, finer)
+    values = finer.fit.values(0)
+    assert values["breakaway"] == pytest.approx(2.0, rel=0.05) and values["force"] == pytest.approx(0.2, rel=0.05)
+    assert values["speed"] == pytest.approx(1e-3, rel=0.1) and values["moment"] == pytest.approx(0.3, abs=H)
+    # the numbers of its own are begun at several values: nothing of the plain law tells them
+    assert simplified(trials, finer).causes == finer.causes
+
+
+def test_friction_alike_at_every_speed_keeps_the_plain_law():
+    trials, plain, finer = friction_found(1.0)
+    assert not any(trials.selection.improves_enough(plain, t) for t in finer)
+    for t in finer:
+        assert [c.effect for c in simplified(trials, t).causes] == ["coulomb_after"]
 
 
 @pytest.mark.long

@@ -181,6 +181,9 @@ def test_the_force_of_dry_friction_at_standstill_is_whatever_holds_the_stage():
         "coulomb_below",
         "directional_friction",
         "stribeck",
+        "stribeck_above",
+        "stribeck_after",
+        "stribeck_below",
     }
 
 

@@ -90,6 +90,16 @@ def test_the_laws_of_two_channels_and_those_with_a_clock_are_these():
     two = {"abbe_arm", "coupling", "link_compliance", "swapped"} | couplings | empirical
     assert {k for k, law in library if law.pairs} == two
     finer = {"weighted_displacement_hysteresis", "weighted_drive_hysteresis"}
+    finer |= {"stribeck_above", "stribeck_after", "stribeck_below"}
     assert {k for k, law in library if not prior_of(law).suspected} == empirical | finer | {"zero_per_record"}
-    clocked = {"coulomb_after", "degradation", "drift", "force_step", "lost_beams", "sensor_step", "vibration"}
+    clocked = {
+        "coulomb_after",
+        "degradation",
+        "drift",
+        "force_step",
+        "lost_beams",
+        "sensor_step",
+        "stribeck_after",
+        "vibration",
+    }
     assert {k for k, law in library if any(s.clock for s in law.states)} == clocked

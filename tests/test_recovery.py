@@ -194,7 +194,12 @@ def test_of_a_reading_that_moves_in_the_warmth_alone():
 
 
 STATED = {"zero_per_record"}
-FINER = {"weighted_displacement_hysteresis", "weighted_drive_hysteresis"}  # found in tests/test_finer_forms.py
+# found in tests/test_finer_forms.py
+FINER = {
+    "weighted_displacement_hysteresis",
+    "weighted_drive_hysteresis",
+    *(f"stribeck_{where}" for where in ("above", "after", "below")),
+}
 
 
 def test_a_zero_that_is_stated_to_be_free_is_fitted_in_every_record():

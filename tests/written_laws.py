@@ -322,6 +322,19 @@ LAWS = {
         lambda s, p: -p.force * s.z,
         lambda s, p: {"z": lugre_rate(s, p)},
     ),
+    **{
+        f"stribeck_{side}": (
+            {"breakaway": 1.8, "speed": 0.5, "reach": 0.02, "edge": 0.2, "width": 0.3},
+            lambda s, p, sign=sign: -p.force * s.z * past(s, p, sign),
+            lambda s, p: {"z": lugre_rate(s, p)},
+        )
+        for side, sign in SIDES.items()
+    },
+    "stribeck_after": (
+        {"breakaway": 1.8, "speed": 0.5, "reach": 0.02, **EVENT},
+        lambda s, p: -p.force * s.z * event(s, p),
+        lambda s, p: {"z": lugre_rate(s, p)},
+    ),
     "slack_friction": ({"slack": 0.2, "reach": 0.3}, gripping),
     "stuck": ({"level": 0.2}, lambda s, p: -p.share * (s.value - 0.2)),
     "swapped": ({}, lambda s, p: p.share * (s.all[s.partner] - s.value)),

@@ -4,10 +4,11 @@ number of the device that is off.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import product
+from types import MappingProxyType
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import Quantity
@@ -30,6 +31,7 @@ DOMAIN = {
     Place.SENSOR: "sensor",
 }
 PARAMETER = "parameter"
+NOTHING: Mapping[str, float] = MappingProxyType({})
 DEVICES_KEPT = 8
 """Devices of which what is derived is kept: a diagnosis has one, the bootstrap and the tests a few."""
 
@@ -117,13 +119,15 @@ class Hypothesis:
             return channel
         return channel.paired_with(next(c for c in partner_channels(physics, self.law) if c.name == self.of))
 
-    def shapes(self, channel: Channel, hints: DataHints) -> list[dict[str, float]]:
-        """Every combination of start values of the shape parameters, which are all but the amplitude [SI].
+    def shapes(
+        self, channel: Channel, hints: DataHints, given: Mapping[str, float] = NOTHING
+    ) -> list[dict[str, float]]:
+        """Every combination of start values of the shape parameters, which are all but the amplitude [SI]; those `given` have one.
 
         A law without shape parameters has one empty combination.
         """
         shaped = [p for p in self.law.params if p is not self.law.amplitude()]
-        starts = [self._starts(p, channel, hints) for p in shaped]
+        starts = [[given[p.name]] if p.name in given else self._starts(p, channel, hints) for p in shaped]
         return [dict(zip((p.name for p in shaped), values, strict=True)) for values in product(*starts)]
 
     def secants(self, channel: Channel, hints: DataHints) -> list[float]:

@@ -50,12 +50,25 @@ def _backlash(suggested: str) -> LawPrior:
     return _law(gap=gap, edge=_seen(suggested), width=ParameterPrior((0.05, 0.2)))
 
 
-IN_A_REGION: Mapping[str, LawPrior] = {
-    "backlash_above": _backlash("edges_above"),
-    "backlash_below": _backlash("edges_below"),
+_FRICTIONS = {
     "coulomb_above": _friction(_edge("edges_above"), ONE_IN_TEN),
     "coulomb_below": _friction(_edge("edges_below"), ONE_IN_TEN),
     "coulomb_after": _friction(_FROM_A_MOMENT, ONE_IN_A_HUNDRED),
+}
+
+
+def _falling(kind: str) -> LawPrior:
+    """Friction in a region that falls with the speed: a finer form of the law `kind`, which does not."""
+    plain = _FRICTIONS[kind]
+    contact = {"breakaway": ParameterPrior((1.2, 1.8)), "speed": peaks(0.01, 0.05, 0.2), "reach": peaks(1e-3, 0.01)}
+    where = {name: row for name, row in plain.parameters.items() if name not in ("reach", "smoothing")}
+    return replace(plain, suspected=False, refines=frozenset({kind}), parameters=contact | where)
+
+
+IN_A_REGION: Mapping[str, LawPrior] = {
+    "backlash_above": _backlash("edges_above"),
+    "backlash_below": _backlash("edges_below"),
+    **_FRICTIONS,
     "drive_gain_beyond": _law(level=_seen("drives")),
     "local_error": replace(
         _law(position=_seen("middles"), length=_seen("lengths"), rounding=ParameterPrior((0.003, 0.03))),
@@ -64,6 +77,9 @@ IN_A_REGION: Mapping[str, LawPrior] = {
     "stiffness_above": _law(edge=_seen("edges_above")),
     "stiffness_below": _law(edge=_seen("edges_below")),
     "stiffness_beyond": _law(edge=_seen("edges_beyond")),
+    "stribeck_above": _falling("coulomb_above"),
+    "stribeck_below": _falling("coulomb_below"),
+    "stribeck_after": _falling("coulomb_after"),
     "temperature_sensitivity_above": _law(reference=_seen("warmer")),
     "viscous_above": _law(**_edge("edges_above")),
     "viscous_below": _law(**_edge("edges_below")),

@@ -14,9 +14,10 @@ from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, REGIONS, SEARCH
 from ctrlgen.estimation.fit import Fit
-from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis, nominal_physics
 from ctrlgen.estimation.settings import FIT
 from ctrlgen.estimation.structure import Structure
+from ctrlgen.model.effect_terms import channels
 
 
 def fit_candidates(trials: Trials, current: CandidateModel, screened: Screened) -> tuple[CandidateModel, ...]:
@@ -144,9 +145,23 @@ def finer_forms(trials: Trials, current: CandidateModel) -> tuple[CandidateModel
 
     def one(branch: Trials, form: tuple[int, Hypothesis]) -> list[CandidateModel]:
         k, finer = form
-        start = finer.law.from_plainer(current.fit.values(k))
-        structure = current.fit.restarted.without(k).with_cause(finer, start)
-        return branch.tried(structure, finer, steps=FIT.max_steps)
+        values, others = current.fit.values(k), current.fit.restarted.without(k)
+        names = {p.name for p in finer.law.params}
+
+        def begun(shape: dict[str, float]) -> dict[str, float]:
+            return {name: v for name, v in finer.law.from_plainer(values | shape).items() if name in names}
+
+        shapes = finer.shapes(finer.channel_on(others.device), peaks(finer), begun({}))
+        starts = [others.with_cause(finer, shape | begun(shape)) for shape in shapes]
+        if len(starts) > 1:
+            starts = sorted(starts, key=branch.fitter.rough_objective)[: SEARCH.restarts]
+        fitted = branch.tried(starts[0], finer, steps=FIT.max_steps)
+        return [branch.begun_better(t, starts[1:]) for t in fitted]
+
+    def peaks(finer: Hypothesis) -> DataHints:
+        names = [c.name for c in channels(nominal_physics(current.fit.structure.device), finer.law.place)]
+        where = (finer.law.place, 0 if finer.at == "all" else names.index(finer.at))
+        return DataHints((trials.screen.peaks or {}).get(where, {}))
 
     forms = [(k, finer) for k, cause in enumerate(current.causes) for finer in cause.finer]
     fits = trials.each(one, forms, lambda form: f"{trying(form[1])} instead")
@@ -183,13 +198,10 @@ def restart_elsewhere(
                     (structure.restarted(k, begin) for begin in group), key=trials.fitter.rough_objective
                 )[:most]
             ]
-            best = candidate.fit
-            for s in promising:
-                best = trials.fitter.better_of(best, s, SEARCH.candidate_steps)
-            if best is not candidate.fit:
-                candidate = trials.converged(trials.scored(best.structure, best, candidate.cause))
         except FAILURES as error:
             trials.note_failure(cause, error)
+            continue
+        candidate = trials.begun_better(candidate, promising)
     return candidate
 
 

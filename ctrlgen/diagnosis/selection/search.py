@@ -18,7 +18,7 @@ from ctrlgen.core.counts import number_of
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.selection.attribution import attribute
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round
-from ctrlgen.diagnosis.selection.candidates import fit_candidates, restart_elsewhere
+from ctrlgen.diagnosis.selection.candidates import finer_forms, fit_candidates, restart_elsewhere
 from ctrlgen.diagnosis.selection.confusable import explains_alike
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.not_taken import not_taken
@@ -154,7 +154,7 @@ class Searcher:
             trials.new_round(len(rounds) + 1)
             current = self._marked_again(current)
             if len(current.causes) >= most or trials.selection.residual_within_model_form_error(current):
-                return current
+                return self._in_finer_form(current)
             screened = trials.screened(current)
             candidates = all_pruned(trials, current, fit_candidates(trials, current, screened), screened)
             candidates = trials.selection.ranked(candidates)
@@ -173,6 +173,15 @@ class Searcher:
                 return current
             current = trials.with_noise_update(trials.with_errors(trials.converged(current)))
             visited.append(current)
+
+    def _in_finer_form(self, current: CandidateModel) -> CandidateModel:
+        """The model with a law in a finer form where that leaves enough less: no further cause could be trusted beside an error of the
+        form, but a better form of the law takes it away."""
+        trials = self.trials
+        for t in trials.selection.ranked(finer_forms(trials, current)):
+            if trials.selection.improves_enough(current, t) and not trials.objections(t, current.causes):
+                return trials.with_noise_update(trials.with_errors(trials.converged(t)))
+        return current
 
     def _most_parsimonious(
         self, current: CandidateModel, better: Sequence[CandidateModel], screened: Screened

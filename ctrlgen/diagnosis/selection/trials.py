@@ -177,6 +177,18 @@ class Trials:
         fitted = self.tried(candidate.fit.restarted, candidate.cause, steps=FIT.max_steps)
         return fitted[0] if fitted else candidate
 
+    def begun_better(self, candidate: CandidateModel, starts: Sequence[Structure]) -> CandidateModel:
+        """The same candidate begun again at each of the `starts`, where the end is better; as far as these can be fitted."""
+        best = candidate.fit
+        try:
+            for s in starts:
+                best = self.fitter.better_of(best, s, SEARCH.candidate_steps)
+            if best is not candidate.fit:
+                return self.converged(self.scored(best.structure, best, candidate.cause))
+        except FAILURES as error:
+            self.note_failure(candidate.cause, error)
+        return candidate
+
     def screened(self, candidate: CandidateModel) -> Screened:
         """The screen of what a candidate leaves."""
         key = frozenset(candidate.causes)

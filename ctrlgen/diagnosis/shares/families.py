@@ -87,6 +87,7 @@ SPEAKS_FOR: dict[Kind, tuple[tuple[Family, ...], str]] = {
 FAMILY_OF = {
     **dict.fromkeys(("coulomb", "directional_friction", "stribeck"), Family.FRICTION),
     **dict.fromkeys(("coulomb_above", "coulomb_after", "coulomb_below"), Family.FRICTION),
+    **dict.fromkeys(("stribeck_above", "stribeck_after", "stribeck_below"), Family.FRICTION),
     **dict.fromkeys(("viscous_above", "viscous_at_speed", "viscous_below"), Family.DYNAMICS),
     **dict.fromkeys(
         (
