@@ -80,7 +80,7 @@ def test_friction_that_sticks_from_a_moment_on_falls_with_the_speed(monkeypatch)
     searcher = Searcher(trials.fitter, trials.screen, lambda _: None)
     searcher.trials, searcher.markings = trials, SEARCH.most_markings
     monkeypatch.setattr(ModelSelection, "residual_within_model_form_error", lambda *_: True)
-    assert [c.effect for c in searcher._forward_rounds(plain, []).causes] == ["stribeck_after"]
+    assert [c.effect for c in searcher.forward_rounds(plain, []).causes] == ["stribeck_after"]
 
 
 @pytest.mark.long

@@ -55,7 +55,7 @@ class Searcher:
         current = trials.with_noise_update(trials.fit(nominal_fit.restarted, steps=FIT.max_steps))
         self._learn_mismatch(current)
         for _ in range(SEARCH.most_noise_updates):
-            current = self._forward_rounds(current, rounds)
+            current = self.forward_rounds(current, rounds)
             before = trials.fitter.noise
             noise = update_noise(trials.fitter, current.fit)
             if noise is before:
@@ -145,7 +145,7 @@ class Searcher:
         self._learn_mismatch(scored(trials.fitter, trials.fitter.described(current.fit.structure.device)[1]))
         return trials.with_noise_update(trials.with_errors(trials.converged(current)))
 
-    def _forward_rounds(self, current: CandidateModel, rounds: list[Round]) -> CandidateModel:
+    def forward_rounds(self, current: CandidateModel, rounds: list[Round]) -> CandidateModel:
         """Forward rounds from `current`, with swaps in between, until nothing more is justified; appends each to `rounds`."""
         trials, visited = self.trials, [current]
         most = SEARCH.most_causes[trials.fitter.recording.kind]
