@@ -168,19 +168,20 @@ class ControllerKernels:
     @cached_property
     def composite_bound(self) -> ca.Function | None:
         """wanted -> a cheap upper bound of `composite_ratio` (`ctrlgen.controller.composite_bound`); None where there is none."""
-        return None if self._bound is None else self._bound.of_displacement
+        return None if self.bound is None else self.bound.of_displacement
 
     @cached_property
     def target_bound(self) -> ca.Function | None:
         """target -> the same bound at the displacement of a target that leads into the range; None where it is no cheaper."""
-        if self._bound is None or (directions := self.target_directions) is None:
+        if self.bound is None or (directions := self.target_directions) is None:
             return None
         reach = np.abs(np.linalg.pinv(directions)) @ np.max(np.abs(self.nominal.z_bounds), axis=0)
-        bound = self._bound.of_target(directions, reach)
-        return bound if bound.n_instructions() < self._bound.of_displacement.n_instructions() else None
+        bound = self.bound.of_target(directions, reach)
+        return bound if bound.n_instructions() < self.bound.of_displacement.n_instructions() else None
 
     @cached_property
-    def _bound(self) -> CompositeBound | None:
+    def bound(self) -> CompositeBound | None:
+        """The cheap bound of guarded limits; None where there are none, or no bound."""
         m = self.nominal
         if not self.guarded_limits or m.x.numel() > m.n_states:
             return None

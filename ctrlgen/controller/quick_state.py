@@ -29,20 +29,33 @@ class QuickState:
 
 def quick_state(state: ca.Function, low: np.ndarray, high: np.ndarray) -> QuickState | None:
     """The polynomials of a kernel `state` for displacements low ... high (n,); None where a row has none, or needs none."""
+    rows = state_polynomials(state, low, high, even_cheap=False)
+    if not rows:
+        return None
+    names = ["x", "z", "wanted"]
+    x, z, wanted = (ca.SX.sym(name, *state.size_in(name)) for name in names)
+    values = ca.vertcat(*(polynomial.of(wanted[i]) for i, polynomial in rows))
+    degree = max(len(polynomial.coefficients) - 1 for _, polynomial in rows)
+    off = max(polynomial.off for _, polynomial in rows)
+    return QuickState(ca.Function("state", [x, z, wanted], [values], names, ["result"]), degree, off)
+
+
+def state_polynomials(
+    state: ca.Function, low: np.ndarray, high: np.ndarray, even_cheap: bool
+) -> tuple[tuple[int, ProvenPolynomial], ...] | None:
+    """Of each row of a kernel `state` the displacement that it is a function of, and its polynomial for displacements low ... high (n,);
+    None where a row has none, or, unless `even_cheap`, where it is one already."""
     x, z, wanted = (ca.SX.sym(name, *state.size_in(name)) for name in ("x", "z", "wanted"))
     rows = ca.vertsplit(state(x, z, wanted)) if state.size1_out(0) else []
-    found: list[ca.SX] = []
     polynomials: dict[str, ProvenPolynomial | None] = {}
-    off, degree = 0.0, 0
+    found: list[tuple[int, ProvenPolynomial]] = []
     for row in rows:
         places = ca.jacobian_sparsity(row, wanted).get_col()
         if len(places) != 1 or ca.depends_on(row, ca.vertcat(x, z)):
             return None
         i, own = int(places[0]), ca.SX.sym("v")
         f = ca.Function("f", [own], [ca.substitute(row, wanted[i], own)], {"cse": True})
-        if all(
-            f.instruction_id(k) in CHEAP | {ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST} for k in range(f.n_instructions())
-        ):
+        if not even_cheap and _is_cheap(f):
             return None
         key = f"{ca.substitute(row, wanted[i], own)} {low[i]!r} {high[i]!r}"
         if key not in polynomials:
@@ -50,9 +63,10 @@ def quick_state(state: ca.Function, low: np.ndarray, high: np.ndarray) -> QuickS
         polynomial = polynomials[key]
         if polynomial is None:
             return None
-        off, degree = max(off, polynomial.off), max(degree, len(polynomial.coefficients) - 1)
-        found.append(polynomial.of(wanted[i]))
-    if not found:
-        return None
-    names = ["x", "z", "wanted"]
-    return QuickState(ca.Function("state", [x, z, wanted], [ca.vertcat(*found)], names, ["result"]), degree, off)
+        found.append((i, polynomial))
+    return tuple(found)
+
+
+def _is_cheap(f: ca.Function) -> bool:
+    cheap = CHEAP | {ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST}
+    return all(f.instruction_id(k) in cheap for k in range(f.n_instructions()))

@@ -1,7 +1,7 @@
 """Model and solution -> a package of C99, the only writer of C.
 
-`online` controllers (any reachable target -> drives) and `player`s (the solved trajectory, compressed), each in
-double and in float, with a test of reference `vectors` that runs on the target; around them the package of
+`online` controllers (any reachable target -> drives; in integers too where the scenario asks for it) and `player`s (the solved trajectory,
+compressed), each in double and in float, with a test of reference `vectors` that runs on the target; around them the package of
 `ctrlgen.firmware.package`. Same input, same bytes.
 
 The C is at the root, where Arduino looks in a library without src/; the build files name it for PlatformIO, CMake and
@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ctrlgen.controller.feedforward import Controller
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.core.shown import Shown
 from ctrlgen.firmware.c.deviations import deviations_context
@@ -22,6 +23,7 @@ from ctrlgen.firmware.c.misra import CPPCHECK
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.templates import write
 from ctrlgen.firmware.online.checksum import checked_context
+from ctrlgen.firmware.online.fixed_source import ARITHMETIC, fixed_context
 from ctrlgen.firmware.online.online import online_context
 from ctrlgen.firmware.online.vectors import played_vectors, self_test_calls, vectors
 from ctrlgen.firmware.package import PIECES, owners, write_package
@@ -54,6 +56,9 @@ class CFolder(Shown):
     state_words: int = 1
     # The online controller with a checksum over its state, where the scenario asks for it
     checked: dict[Real, str] = field(default_factory=dict)
+    # The online controller in integers of 32 bits and its symbol that `..._init` calls; empty where the scenario asks for none
+    fixed: str = ""
+    fixed_init: str = ""
 
     def facts(self) -> dict[str, object]:
         """What it is, in a few words."""
@@ -98,6 +103,7 @@ def generate(
         piece: {real: f"{owner}_{piece}_{real.suffix}" for real in Real} for piece, owner in owners(scenario).items()
     }
     checked = {real: f"{scenario.controller_name}_checked_{real.suffix}" for real in Real if scenario.file.checksum}
+    fixed = _fixed(scenario, controller)
     compression = compress(played) if played else {}
     left_out = () if solution is None else solution.left_out
     contexts, written = {}, []
@@ -110,7 +116,7 @@ def generate(
         )
         contexts[real] = samples | online | of | reference | {"solved": solution is not None, "left_out": left_out}
         contexts[real] |= {"checked": checked.get(real)}
-        contexts[real] |= self_test_calls(contexts[real])
+        contexts[real] |= self_test_calls(contexts[real]) | {"fixed": fixed}
         by_template = {"online": online, "selftest": contexts[real], "vectors": contexts[real]}
         if played:
             by_template["player"] = online | samples
@@ -121,6 +127,8 @@ def generate(
             for kind in ("h", "c"):
                 written.append(write(f"{template}.{kind}", context, out / f"{of[template]}.{kind}"))
         written.append(write("test.c", contexts[real], out / "test" / f"test_{scenario.name}_{real.suffix}.c"))
+    if fixed is not None:
+        written += [write(f"fixed.{kind}", fixed, out / f"{fixed['prefix']}.{kind}") for kind in ("h", "c")]
     of_c = {path.name: path.read_text(encoding="utf-8") for path in written}
     written.append(write("DEVIATIONS.md", {"cppcheck": CPPCHECK, **deviations_context(of_c)}, out / "DEVIATIONS.md"))
     write_package(out, scenario, contexts, figures or {}, written)
@@ -140,7 +148,16 @@ def generate(
         given_numbers=contexts[Real.FLOAT]["given_numbers"],
         state_words=len(contexts[Real.FLOAT]["words"]),
         checked=checked,
+        fixed="" if fixed is None else fixed["prefix"],
+        fixed_init="" if fixed is None else f"{fixed['prefix']}_init_{fixed['build']}",
     )
+
+
+def _fixed(scenario: Scenario, controller: Controller) -> dict[str, Any] | None:
+    """The context of the controller in integers; None where the scenario does not ask for it."""
+    if not scenario.file.fixed_point:
+        return None
+    return fixed_context(scenario, controller, f"{owners(scenario)['online']}_online_{ARITHMETIC}")
 
 
 def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Real, path: Path) -> None:

@@ -11,7 +11,7 @@ W. Tucker, Validated Numerics (2011).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import comb
 
 import casadi as ca
@@ -30,12 +30,14 @@ CANCELLED = 8.0
 @dataclass(frozen=True)
 class ProvenPolynomial:
     """f(v) ~ sum_k coefficients_k ((v - centre) / half)^k on low ... high: off by no more than a change of v by `off` changes f; it
-    rises or falls as f does."""
+    rises or falls as f does. `flattest` and `steepest`: between which magnitudes the slopes of f are."""
 
     coefficients: np.ndarray
     centre: float
     half: float
     off: float
+    flattest: float
+    steepest: float
 
     def of(self, v: ca.SX) -> ca.SX:
         """The polynomial as an expression of v, by Horner's rule."""
@@ -60,7 +62,7 @@ def proven_polynomial(f: ca.Function, low: float, high: float, share: float) -> 
     slopes = np.stack([over.low[1], over.high[1]])
     if not np.all(np.isfinite(over.low)) or not (np.all(slopes > 0) or np.all(slopes < 0)):
         return None
-    steepness = float(np.abs(slopes).min()) / radius
+    steepness, steepest = float(np.abs(slopes).min()) / radius, float(np.abs(slopes).max()) / radius
     for degree in range(1, HIGHEST + 1):
         nodes = -np.cos(np.pi * np.arange(degree + 1) / degree)
         values = np.array([float(f(middle + half * s)) for s in nodes])
@@ -70,7 +72,8 @@ def proven_polynomial(f: ca.Function, low: float, high: float, share: float) -> 
         error = float(np.max(off.sum(axis=0) + last))
         turn = (np.arange(degree + 1)[:, None] * off).sum(axis=0) + (degree + 1) * last
         if error <= share * (high - low) * steepness and np.all(turn < np.abs(slopes).min(axis=0)):
-            return _conditioned(series, low, high, error / steepness, abs(values[-1] - values[0]))
+            found = ProvenPolynomial(series, middle, half, error / steepness, steepness, steepest)
+            return _conditioned(found, low, high, abs(values[-1] - values[0]))
     return None
 
 
@@ -85,12 +88,12 @@ def _about(series: np.ndarray, centres: np.ndarray, radius: float) -> np.ndarray
     )
 
 
-def _conditioned(series: np.ndarray, low: float, high: float, off: float, range_of_values: float) -> ProvenPolynomial:
+def _conditioned(found: ProvenPolynomial, low: float, high: float, range_of_values: float) -> ProvenPolynomial:
     """The polynomial in powers about zero, which saves a subtraction, where these do not cancel; else about the middle."""
-    half, middle = (high - low) / 2, (high + low) / 2
     if low <= 0.0 <= high:
         size = max(-low, high)
-        about_zero = np.polynomial.Polynomial(series)(np.polynomial.Polynomial([-middle / half, size / half])).coef
+        about_middle = np.polynomial.Polynomial(found.coefficients)
+        about_zero = about_middle(np.polynomial.Polynomial([-found.centre / found.half, size / found.half])).coef
         if np.abs(about_zero[1:]).sum() <= CANCELLED * range_of_values:
-            return ProvenPolynomial(about_zero, 0.0, size, off)
-    return ProvenPolynomial(series, middle, half, off)
+            return replace(found, coefficients=about_zero, centre=0.0, half=size)
+    return found

@@ -98,6 +98,9 @@ class ScenarioFile(Section):
     """Of a device with inertia. `inertia`: the drives that move its masses along the path. `static`: those that would if it stood in
     balance at every moment, without inertia and damping; it then follows as well as it does, and vibrates.
     """
+    fixed_point: bool = False
+    """Whether the C has a third online controller, in integers of 32 bits with a proven error, for cores without a floating-point unit
+    (Cortex-M0+). For actuators with a lag whose displacements are linear in the target; refused for others, with the reason."""
     outcome: Literal["solved", "unreachable"] = "solved"
     """Whether a trajectory is expected to exist; `unreachable` passes where none does."""
     load: tuple[Load, ...] = ()

@@ -24,6 +24,7 @@ ABI = 3
 SOURCES = {
     "online.c": "prefix",
     "checked.c": "prefix",
+    "fixed.c": "prefix",
     "player.c": "prefix",
     "plant.c": "prefix",
     "selftest.c": "selftest",

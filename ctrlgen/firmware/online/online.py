@@ -40,8 +40,8 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     limits = limit_context(controller, printer)
     start = start_context(kernels, printer)
     context = (
-        _header(scenario, controller)
-        | build_of(scenario, controller, real)
+        header_context(scenario, controller)
+        | build_of(scenario, controller, real.value)
         | limits
         | start
         | {
@@ -84,9 +84,9 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     return context
 
 
-def build_of(scenario: Scenario, controller: Controller, real: Real) -> dict[str, Any]:
+def build_of(scenario: Scenario, controller: Controller, arithmetic: str) -> dict[str, Any]:
     """What tells this controller from others of the same name: the word "ready", by which it marks its states, and "build", which with the
-    rate is part of a symbol: of device, followed signal, rate, limits and arithmetic."""
+    rate is part of a symbol: of device, followed signal, rate, limits and `arithmetic`."""
     kernels = controller.kernels
     rate = hertz(1 / kernels.sample_time) if kernels.sample_time else "0"
     about = (
@@ -96,7 +96,7 @@ def build_of(scenario: Scenario, controller: Controller, real: Real) -> dict[str
         kernels.follow,
         rate,
         [limit.text for limit in kernels.nominal.limits],
-        real.value,
+        arithmetic,
     )
     ready = int(hashlib.sha256(repr(about).encode()).hexdigest()[:8], 16)
     if len(set(ready.to_bytes(4, "big"))) == 1:  # as memory set to one value is
@@ -111,8 +111,8 @@ def _bits_wanted(context: Mapping[str, Any]) -> set[str]:
     return {"bits_of", "is_nan"} | ({"ordered"} if "ordered(" in " ".join(tests) else set())
 
 
-def _header(scenario: Scenario, controller: Controller) -> dict[str, Any]:
-    """What online.h.j2 says of the device and of its limits."""
+def header_context(scenario: Scenario, controller: Controller) -> dict[str, Any]:
+    """What the header of a controller says of the device and of its limits."""
     kernels, model = controller.kernels, controller.kernels.nominal
     drive, follow = model.signals["drive"], kernels.target
     limits = (*model.limits, *(model.rate_limits if controller.rate else ()))

@@ -1,0 +1,385 @@
+"""The online controller in integers: it errs by no more than is proved, keeps every limit, and says what it cannot be made of."""
+
+from __future__ import annotations
+
+import ctypes
+import re
+import shutil
+import subprocess
+from itertools import pairwise
+
+import casadi as ca
+import numpy as np
+import pytest
+from conftest import SCENARIOS
+
+from ctrlgen import InputError, build_model, load_scenario
+from ctrlgen.controller.controller_step import ControllerStatus, answer
+from ctrlgen.controller.fixed_point import NoFixedPoint, fixed_point
+from ctrlgen.controller.motion_feedforward import controller_of
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.templates import write
+from ctrlgen.firmware.folder import generate
+from ctrlgen.firmware.online.fixed_source import fixed_context
+from ctrlgen.firmware.package import verify_package
+from ctrlgen.numerics.proven_polynomial import proven_polynomial
+from ctrlgen.numerics.scaled_integers import DoesNotFit, integer_polynomial, integer_rows
+from ctrlgen.verification.cores import BASE, FLAGS, M0_PLUS
+from ctrlgen.verification.emulation import Machine
+from ctrlgen.verification.rules import STRICT
+
+NAME = "device_online_q31"
+WITHIN = (
+    12_000  # instructions of a Cortex-M0+ on the circle: at 48 MHz a quarter of a millisecond, 49,742 in emulated float
+)
+
+
+class InC:
+    """The C of a scenario on this computer, called with integers."""
+
+    def __init__(self, folder, scenario="circle20"):
+        self.scenario = load_scenario(SCENARIOS / scenario)
+        self.model = build_model(self.scenario.device)
+        self.controller = controller_of(self.model, self.scenario.file.follow, self.scenario.sample_time)
+        self.fixed = fixed_point(self.controller)
+        context = fixed_context(self.scenario, self.controller, NAME)
+        self.header, self.source = (write(f"fixed.{kind}", context, folder / f"{NAME}.{kind}") for kind in "hc")
+        self.init = f"{NAME}_init_{context['build']}"
+        library = folder / "fixed.so"
+        subprocess.run(["gcc", *STRICT, "-Werror", "-O1", "-shared", "-fPIC", "-o", library, self.source], check=True)
+        self.library = ctypes.CDLL(str(library))
+        f = self.fixed
+        self.n, self.n_s, self.n_u = (len(b) for b in (f.bits.displacement, f.bits.state, f.bits.drive))
+        self.state = np.zeros(self.n_s + self.n + 3, dtype=np.int32)
+        self.out = np.zeros(self.n_u + self.n + self.n_s, dtype=np.int32)
+
+    def start(self):
+        getattr(self.library, self.init)(self.state.ctypes)
+
+    def call(self, function, target=None):
+        """(status, drive, displacement, state), integers, of a target of real numbers, rounded, or of none."""
+        given = None if target is None else self.counts(target)
+        status = getattr(self.library, f"{NAME}_{function}")(
+            self.state.ctypes, None if given is None else given.ctypes, self.out.ctypes
+        )
+        return (ControllerStatus(status), *np.split(self.out.astype(float), [self.n_u, self.n_u + self.n]))
+
+    def counts(self, target):
+        return np.clip(np.rint(target * 2.0**self.fixed.bits.target), -(2**31), 2**31 - 1).astype(np.int32)
+
+    def target_of(self, z):
+        """The target of a displacement, as integers can say it."""
+        exact = np.linalg.solve(self.controller.kernels.target_directions, z)
+        return self.counts(exact) * 2.0**-self.fixed.bits.target
+
+    def targets(self, rng, count, beyond=0.0):
+        low, high = self.model.z_bounds
+        room = beyond * (high - low)
+        return [self.target_of(rng.uniform(low - room, high + room)) for _ in range(count)]
+
+
+@pytest.fixture(scope="module")
+def circle(tmp_path_factory):
+    return InC(tmp_path_factory.mktemp("fixed"))
+
+
+def test_integer_maps_are_off_by_no_more_than_they_say_whatever_the_sizes():
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        slope = rng.normal(size=(3, 4)) * 10.0 ** rng.integers(-6, 7)
+        bits_in, bits_out = rng.integers(5, 40, 4), np.full(3, 0)
+        at_zero = rng.normal(size=3) * np.abs(slope).max()
+        largest = np.full(4, 2.0**31)
+        reach = np.abs(slope) @ (largest * 2.0**-bits_in) + np.abs(at_zero)
+        bits_out = np.floor(np.log2(2.0**30 / reach)).astype(int)
+        rows = integer_rows(slope, at_zero, (bits_in, bits_out), largest, largest)
+        values = rng.integers(-(2**31), 2**31, (200, 4))
+        values[0] = np.where(np.array(rows.coefficients[0]) > 0, 2**31 - 1, -(2**31))
+        off = [np.abs(rows(v) - (slope @ (v * 2.0**-bits_in) + at_zero) * 2.0**bits_out) for v in values]
+        assert np.all(np.max(off, axis=0) <= rows.off * (1 + 1e-6)) and np.all(rows.off < 40)
+        for row, o in zip(rows.coefficients, rows.offset, strict=True):
+            assert max(map(abs, row)) < 2**31 and sum(abs(c) * 2**31 for c in row) + abs(o) < 2**62
+    with pytest.raises(DoesNotFit):
+        integer_rows(np.array([[1e9]]), np.zeros(1), (np.zeros(1), np.zeros(1)), np.array([2.0**31]), np.ones(1))
+
+
+@pytest.mark.parametrize("low", [0.0, 1.5, -0.6])
+def test_integer_polynomials_are_off_by_no_more_than_they_say(low):
+    v = ca.SX.sym("v")
+    f = ca.Function("f", [v], [ca.exp(v) - 3])
+    polynomial = proven_polynomial(f, low, 2.0, 1e-8)
+    bits_in, bits_out = 28, 24
+    ends = round(low * 2**bits_in), round(2.0 * 2**bits_in)
+    integers = integer_polynomial(polynomial, (bits_in, bits_out), ends)
+    exact = np.polynomial.Polynomial(polynomial.coefficients)
+    places = np.linspace(*ends, 3001).astype(int)
+    off = [
+        abs(integers(int(p)) - exact((p * 2.0**-bits_in - polynomial.centre) / polynomial.half) * 2.0**bits_out)
+        for p in places
+    ]
+    assert 0.1 * integers.off < max(off) <= integers.off < 10
+    assert max(map(abs, integers.coefficients)) < 2**31
+    with pytest.raises(DoesNotFit):
+        integer_polynomial(polynomial, (bits_in, 29), ends)
+
+
+def test_answers_are_off_those_in_real_numbers_by_no_more_than_is_proved(circle):
+    """And a device as described, under these drives, stands where it was asked to be: to 0.01 nm, a hundredth of an atom."""
+    rng, fixed, kernels = np.random.default_rng(11), circle.fixed, circle.controller.kernels
+    assert fixed.off.stage.max() < 1e-11 and fixed.off.target.max() < 1e-12
+    bound, (low, high) = kernels.composite_bound, circle.model.z_bounds
+    drawn = [low + (high - low) * rng.uniform(0.1, 1.0, circle.n) for _ in range(12)]
+    corners = [circle.target_of(z / max(1.0, 1.01 * float(bound(z)))) for z in drawn]
+    path = [a + (b - a) * s for a, b in pairwise(corners) for s in np.linspace(0, 1, 30)]
+    state, x = circle.controller.rest(), circle.model.rest
+    circle.start()
+    compared, largest = 0, np.zeros(4)
+    for target in map(lambda t: circle.counts(t) * 2.0**-fixed.bits.target, path):
+        before = state
+        real = circle.controller.step(before, target)
+        status, u, z, s = circle.call("step", target)
+        u, z, s = (
+            v * 2.0**-b
+            for v, b in zip((u, z, s), (fixed.bits.drive, fixed.bits.displacement, fixed.bits.state), strict=True)
+        )
+        x = answer(kernels.moving.advance, x, z, u)
+        stands = answer(kernels.static.settle, x, z, u)
+        if real.status or status:
+            state = (s, z)
+            continue
+        state = real.state
+        compared += 1
+        assert np.all(np.abs(z - real.displacement) <= fixed.off.displacement)
+        assert np.all(np.abs(s - real.actuator_state) <= fixed.off.state)
+        assert np.all(np.abs(stands - real.displacement) <= fixed.off.stage)
+        assert np.all(np.abs(u - real.drive) <= fixed.off.drive + fixed.drive_slack * 2.0**-fixed.bits.drive)
+        found = (z - real.displacement, s - real.actuator_state, u - real.drive, stands - real.displacement)
+        bounds = (fixed.off.displacement, fixed.off.state, fixed.off.drive, fixed.off.stage)
+        largest = np.maximum(largest, [np.max(np.abs(a) / b) for a, b in zip(found, bounds, strict=True)])
+    assert compared > 300 and np.all(largest > 0.1)  # the bounds are no idle ones
+
+
+def test_jumps_beyond_every_limit_keep_them_and_are_told(circle):
+    rng, fixed, m = np.random.default_rng(5), circle.fixed, circle.model
+    kernels = circle.controller.kernels
+    circle.start()
+    x, seen = m.rest, ControllerStatus(0)
+    low, high = fixed.drive_ends
+    for k, target in enumerate(circle.targets(rng, 60, beyond=0.3)):
+        for _ in range(4):
+            status, u, z, _ = circle.call("step", target if k % 7 else None)
+            seen |= status
+            assert (status == ControllerStatus.INPUT) == (k % 7 == 0)
+            assert np.all((u >= low) & (u <= high))
+            z = z * 2.0**-fixed.bits.displacement
+            x = answer(kernels.moving.advance, x, z, u * 2.0**-fixed.bits.drive)
+            stands = answer(kernels.static.settle, x, z, u)
+            assert np.all(np.abs(stands - z) <= fixed.off.stage)
+            assert np.all((stands >= m.z_bounds[0] - fixed.off.stage) & (stands <= m.z_bounds[1] + fixed.off.stage))
+            assert answer(kernels.composite_ratio, x, z, stands)[0] <= 1
+    wanted = (
+        ControllerStatus.DISPLACEMENT | ControllerStatus.COMPOSITE | ControllerStatus.DRIVE | ControllerStatus.INPUT
+    )
+    assert seen == wanted
+    # What one sample cannot reach is reached in several, a lag of five of them
+    target = circle.target_of(0.4 * m.z_bounds[1])
+    statuses = [circle.call("step", target)[0] for _ in range(40)]
+    assert statuses[0] == ControllerStatus.DRIVE and not any(statuses[-10:])
+
+
+def test_nothing_is_promised_while_the_device_settles_cools_or_is_lost(circle):
+    fixed, target = circle.fixed, circle.target_of(0.3 * circle.model.z_bounds[1])
+    circle.state[:] = 0
+    assert circle.call("step", target)[0] == ControllerStatus.LOST
+    circle.start()
+    statuses = [circle.call("settle", target)[0] for _ in range(fixed.settling + 1)]
+    assert statuses == [ControllerStatus.UNSURE] * fixed.settling + [ControllerStatus(0)]
+    assert circle.call("step", target)[0] == 0
+    assert getattr(circle.library, f"{NAME}_forget")(circle.state.ctypes) == ControllerStatus.UNSURE
+    for _ in range(fixed.unknown):
+        status, u, z, _ = circle.call("step", target)
+        assert status == ControllerStatus.UNSURE and not u.any() and not z.any()
+    after = np.concatenate(circle.call("step", target)[1:])
+    circle.start()
+    assert np.array_equal(after, np.concatenate(circle.call("step", target)[1:])) and after.any()  # it is cold now
+    for place in range(circle.n_s + circle.n):
+        circle.start()
+        circle.state[place] ^= 1 << 30
+        status, u, *_ = circle.call("step", target)
+        assert status == ControllerStatus.LOST and not u.any()
+        assert circle.call("step", target)[0] == ControllerStatus.LOST  # until it is initialised
+
+
+def test_devices_without_a_controller_in_integers_are_refused_with_the_reason(tmp_path):
+    for name, why in (
+        ("xy_stage_force", "no sample_rate"),
+        ("meso_circle", "no state"),
+        ("rrr_circle", "state beyond its limits"),
+    ):
+        scenario = load_scenario(SCENARIOS / name)
+        controller = controller_of(build_model(scenario.device), scenario.file.follow, scenario.sample_time)
+        with pytest.raises(NoFixedPoint, match=why):
+            fixed_point(controller)
+    folder = tmp_path / "scenarios" / "meso_circle"
+    shutil.copytree(SCENARIOS / "meso_circle", folder)
+    shutil.copytree(SCENARIOS / "devices", tmp_path / "scenarios" / "devices")
+    path = folder / "scenario.toml"
+    path.write_text("fixed_point = true\n" + path.read_text())
+    scenario = load_scenario(folder)
+    with pytest.raises(InputError, match="fixed_point: is asked for, but its actuators have no state"):
+        generate(scenario, build_model(scenario.device), tmp_path / "c")
+    assert not (tmp_path / "c").exists()
+
+
+HOSTILE = """
+#include "%(name)s.h"
+#include <stdio.h>
+static uint64_t seed = 88172645463325252ULL;
+static uint32_t draw(void)
+{
+    seed ^= (seed & 0x7FFFFFFFFFFFFULL) << 13U;
+    seed ^= seed >> 7U;
+    seed ^= (seed & 0x7FFFFFFFFFFFULL) << 17U;
+    return (uint32_t)(seed >> 32U);
+}
+static int32_t any(void)
+{
+    const uint32_t digits = draw() %% 32U;
+    const int64_t value = (int64_t)(draw() >> digits) - (int64_t)(0x80000000U >> digits);
+    return (int32_t)value;
+}
+int main(void)
+{
+    static const int32_t LOW[] = { %(low)s };
+    static const int32_t HIGH[] = { %(high)s };
+    static %(name)s_state state;
+    %(name)s_output out;
+    int32_t target[%(m)d];
+    unsigned long seen = 0UL;
+    long k;
+    int i;
+    %(name)s_init(&state);
+    for (k = 0; k < %(calls)ld; k++) {
+        const uint32_t what = draw() %% 64U;
+        uint32_t status;
+        for (i = 0; i < %(m)d; i++) {
+            target[i] = any();
+        }
+        if (what == 0U) {
+            state.x[draw() %% %(n_s)dU] = any();
+        } else if (what == 1U) {
+            state.z[draw() %% %(n)dU] = any();
+        } else if (what == 2U) {
+            state.unsure = draw();
+        } else if (what == 3U) {
+            (void)%(name)s_forget(&state);
+        }
+        status = ((what & 8U) != 0U) ? %(name)s_settle(&state, (what == 9U) ? NULL : target, &out) : %(name)s_step(&state, target, &out);
+        seen |= status;
+        for (i = 0; i < %(nu)d; i++) {
+            if ((out.drive[i] < LOW[i]) || (out.drive[i] > HIGH[i])) {
+                printf("drive %%d: %%d\\n", i, out.drive[i]);
+                return 1;
+            }
+        }
+        if (((status & %(U)s_LOST) != 0U) || (state.cooling > 3U)) {
+            %(name)s_init(&state);
+        }
+    }
+    printf("%%lu\\n", seen);
+    return 0;
+}
+"""
+
+
+@pytest.mark.long
+@pytest.mark.skipif(shutil.which("clang") is None, reason="needs clang")
+def test_hostile_calls_find_no_undefined_behaviour_and_no_drive_beyond_its_limit(circle, tmp_path):
+    fixed = circle.fixed
+    low, high = (", ".join(str(int(v)) for v in end) for end in fixed.drive_ends)
+    sizes = {"m": len(fixed.bits.target), "n": circle.n, "n_s": circle.n_s, "nu": circle.n_u, "calls": 1_000_000}
+    main = tmp_path / "hostile.c"
+    main.write_text(
+        "#include <stddef.h>\n" + HOSTILE % ({"name": NAME, "U": NAME.upper(), "low": low, "high": high} | sizes)
+    )
+    words = ["-std=c99", "-O1", "-g", "-fsanitize=undefined,integer,address", "-fno-sanitize-recover=all"]
+    program = tmp_path / "hostile"
+    subprocess.run(["clang", *words, "-I", circle.source.parent, main, circle.source, "-o", program], check=True)
+    done = subprocess.run([program], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    every = ControllerStatus.DISPLACEMENT | ControllerStatus.COMPOSITE | ControllerStatus.DRIVE
+    every |= ControllerStatus.INPUT | ControllerStatus.LOST | ControllerStatus.UNSURE
+    assert int(done.stdout) == every
+
+
+@pytest.mark.long
+@pytest.mark.skipif(shutil.which("cppcheck") is None, reason="needs cppcheck")
+def test_rules_of_misra_are_kept_but_for_those_of_the_list(circle):
+    words = [
+        "cppcheck",
+        "--addon=misra",
+        "--std=c99",
+        "-U__cplusplus",
+        "--quiet",
+        "--enable=warning,style,performance,portability",
+    ]
+    done = subprocess.run([*words, "--template={id}", circle.source], capture_output=True, text=True)
+    assert set(done.stderr.split()) == {"misra-c2012-2.5"}  # constants of the interface, as DEVIATIONS.md says
+    if shutil.which("clang"):
+        warned = ["-Weverything", "-Wno-padded", "-Wno-declaration-after-statement", "-Werror"]
+        subprocess.run(["clang", "-std=c99", *warned, "-fsyntax-only", circle.source], check=True)
+
+
+@pytest.mark.long
+@pytest.mark.skipif(shutil.which("arm-none-eabi-gcc") is None, reason="needs arm-none-eabi-gcc")
+def test_a_cortex_m0_takes_a_sample_in_a_quarter_of_a_millisecond(circle, tmp_path):
+    program, target_size = tmp_path / "m0.elf", len(circle.fixed.bits.target)
+    words = ["arm-none-eabi-gcc", "-mcpu=cortex-m0plus", "-mthumb", "-mfloat-abi=soft", *FLAGS, "-nostdlib"]
+    words += [f"-Wl,-e,{circle.init}", f"-Wl,-Ttext={BASE:#x}", circle.source, "-lgcc", "-o", program]
+    subprocess.run(words, check=True)
+    machine = Machine(M0_PLUS, program)
+    state, target, out = (
+        machine.reserve(len(a), Real.FLOAT) for a in (circle.state, np.zeros(target_size), circle.out)
+    )
+    command = circle.scenario.bind(circle.model).targets
+
+    def call(function, wanted):
+        machine.emulator.mem_write(target, circle.counts(wanted).tobytes())
+        return machine.call(f"{NAME}_{function}", state, target, out)
+
+    machine.call(circle.init, state)
+    circle.start()
+    for _ in range(circle.fixed.settling + 1):
+        call("settle", command[-1])
+        circle.call("settle", command[-1])
+    counted = []
+    for wanted in command:
+        status, count = call("step", wanted)
+        counted.append(count)
+        assert status == circle.call("step", wanted)[0] == 0
+        assert bytes(machine.emulator.mem_read(out, 4 * len(circle.out))) == circle.out.tobytes()
+    assert max(counted) <= WITHIN
+
+
+@pytest.mark.long
+def test_the_package_has_it_where_the_scenario_asks_for_it_alone(tmp_path):
+    scenarios = tmp_path / "scenarios"
+    for name in ("circle20", "devices"):
+        shutil.copytree(SCENARIOS / name, scenarios / name)
+    path = scenarios / "circle20" / "scenario.toml"
+    for asked in (False, True):
+        if asked:
+            path.write_text("fixed_point = true\n" + path.read_text())
+        scenario = load_scenario(path.parent)
+        c = generate(scenario, build_model(scenario.device), tmp_path / f"c{asked}")
+        files = {file.name for file in c.path.glob("*q31*")}
+        assert files == ({"mems_hexapod_online_q31.c", "mems_hexapod_online_q31.h"} if asked else set())
+        assert verify_package(c.path) == ()
+        for text in ((c.path / name).read_text() for name in ("README.md", "CMakeLists.txt")):
+            assert ("q31" in text) == asked
+        if asked:
+            assert re.search(rf"void {c.fixed_init}\(", (c.path / f"{c.fixed}.h").read_text())
+            if shutil.which("cmake"):
+                build = tmp_path / "build"
+                subprocess.run(["cmake", "-S", c.path, "-B", build], check=True, capture_output=True)
+                subprocess.run(["cmake", "--build", build, "--target", c.fixed], check=True, capture_output=True)
