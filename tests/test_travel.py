@@ -46,6 +46,17 @@ def test_the_ends_of_a_servo_that_is_driven_by_a_voltage_are_limits_of_its_posit
     )
 
 
+def test_a_servo_keeps_within_its_travel_whatever_leads_it(tmp_path):
+    """Its drive would reach 80 deg; without a limit of the displacement its C could not be written."""
+    volts = '[transducer]\ngain = "10 deg/V"\ndrive_limit = "8 V"\n'
+    for text in (SERVO, SERVO + volts):
+        model = build_model(loaded(tmp_path, text))
+        assert np.allclose(np.ravel(model.z_bounds), np.deg2rad([-9, 9]))
+        controller = controller_of(model, "pose", None)
+        step = controller.step(controller.rest(), np.array([np.deg2rad(30)]), settle=True)
+        assert np.allclose(step.displacement, np.deg2rad(9))
+
+
 def test_the_workspace_and_the_limiter_end_where_the_travel_does(tmp_path):
     text, old, *_ = KINDS["mechanism"]
     model = build_model(loaded(tmp_path, re.sub(old, 'travel = ["-10 um", "60 um"]', text)))

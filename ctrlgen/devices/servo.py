@@ -62,11 +62,12 @@ class Servo(Device):
         )
 
         def limits(signal: SimpleNamespace) -> list[Limit]:
-            reach, ends = (-most, most) if self.transducer else ends_of(self.travel), ends_of(self.travel)
-            limited = [Limit("drive", drive.label, axes, drive.units[0], signal.drive, *reach)]
-            if self.transducer is None or ends[0] == -ends[1]:
-                return limited
-            return [*limited, Limit("travel", "travel", axes, unit, signal.displacement, *ends)]
+            ends = ends_of(self.travel)
+            reach = (-most, most) if self.transducer else ends
+            return [
+                Limit("drive", drive.label, axes, drive.units[0], signal.drive, *reach),
+                Limit("travel", "travel", axes, unit, signal.displacement, *ends),
+            ]
 
         return BalancedPhysics(
             axes=axes,
