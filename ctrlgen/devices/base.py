@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Self
 import casadi as ca
 from pydantic import PrivateAttr, model_validator
 
+from ctrlgen.core.mode_lines import ModeShape
 from ctrlgen.core.names import CName
 from ctrlgen.core.shown import Shown
 from ctrlgen.core.units import Quantity
@@ -24,7 +25,6 @@ from ctrlgen.devices.section import Section
 from ctrlgen.devices.sensor import AnySensor
 from ctrlgen.devices.structural_model import StructuralModel
 from ctrlgen.effects import EffectTable
-from ctrlgen.reporting.mode_lines import ModeShape
 
 
 class Device(Shown, Section):

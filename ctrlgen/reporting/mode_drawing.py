@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ctrlgen.reporting.mode_lines import Line, ModeShape
+from ctrlgen.core.mode_lines import Line, ModeShape
 from ctrlgen.reporting.plots import COLOURS
 
 # An axonometric view: x to the right and toward the reader, y away, z up; (2, 3) from space to the picture

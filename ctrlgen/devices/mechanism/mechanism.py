@@ -18,6 +18,7 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, TableFaults
+from ctrlgen.core.mode_lines import ModeShape
 from ctrlgen.core.units import Quantity
 from ctrlgen.devices.device_physics import DevicePhysics
 from ctrlgen.devices.load import GROUND_NAME, Gravity, Load, joined
@@ -53,7 +54,6 @@ from ctrlgen.devices.travel import farthest
 from ctrlgen.physics import rigid_bodies as mechanism
 from ctrlgen.physics.rigid_bodies import GROUND, Element
 from ctrlgen.physics.screw import TWIST
-from ctrlgen.reporting.mode_lines import ModeShape
 
 AnyElement = Annotated[
     Blade | Wire | Strut | CircularHinge | Compliance | ComplianceMatrix | Spring | BentBeam,

@@ -6,12 +6,12 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
+from ctrlgen.core.mode_lines import Line, ModeShape
 from ctrlgen.devices.mechanism.condensed import nominal
 from ctrlgen.devices.mechanism.drawing import Drawing
 from ctrlgen.devices.mechanism.internal_modes import highest_told
 from ctrlgen.devices.mechanism.modes import as_displacements, free_modes
 from ctrlgen.physics.rigid_bodies import GROUND
-from ctrlgen.reporting.mode_lines import Line, ModeShape
 
 MOST = 12
 """Modes of a page; as many as a reader compares."""

@@ -1,4 +1,4 @@
-"""Modes as lines that `mode_drawing` draws."""
+"""Modes of a device as lines, which pages draw."""
 
 from __future__ import annotations
 
