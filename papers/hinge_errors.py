@@ -9,6 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from ctrlgen.physics import circular_hinge_table as table
+from ctrlgen.reporting.line_patterns import dashes
 from ctrlgen.reporting.plots import COLOURS, STYLE, svg
 
 from . import hinge_fem
@@ -81,11 +82,11 @@ def draw_hinge_errors(data: HingeErrors, compliance: str) -> str:
     """One of S3 Figs. 3-5 as SVG: errors in percent over t/R; thick where S3 Table 3 recommends the equation."""
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(figsize=(6.8, 3.8))
-        styles = [(colour, line) for line in ("-", "--") for colour in COLOURS]
-        for (groups, errors), (colour, line) in zip(_distinct(data.errors[compliance]), styles, strict=False):
+        for k, (groups, errors) in enumerate(_distinct(data.errors[compliance])):
+            colour = COLOURS[k % len(COLOURS)]
             equations = [table.named(compliance, group) for group in groups]
             label = " = ".join(f"{e.number} {e.group.replace('_', ' ')}" for e in equations)
-            axes.plot(data.ratios, 100 * errors, line, color=colour, lw=1, label=label)
+            axes.plot(data.ratios, 100 * errors, ls=dashes(k), color=colour, lw=1, label=label)
             if equations[0].errors is not None:
                 inside = np.array([equations[0].holds(float(ratio)) for ratio in data.ratios])
                 axes.plot(data.ratios, np.where(inside, 100 * errors, np.nan), color=colour, lw=3.5, alpha=0.6)

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from ctrlgen.core.units import from_si
 from ctrlgen.recordings.pose_errors import BOX, CHANNELS, Parasitic, PoseErrors, parasitic, pose_errors
+from ctrlgen.reporting.line_patterns import mark
 from ctrlgen.reporting.plots import COLOURS, STYLE, svg
 
 from .s0_data import PaperRecordings, load_s0
@@ -107,7 +108,8 @@ def draw_single(parts: list[Parasitic]) -> Figure:
             (right if turning else length).plot(
                 command,
                 from_si(values, _unit(channel)),
-                "o-" if turning else "s--",
+                marker=mark(CHANNELS.index(channel)),
+                ls="-" if turning else "--",
                 ms=3,
                 lw=0.9,
                 color=COLOURS[CHANNELS.index(channel)],

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from ctrlgen.core.units import from_si, to_si
 from ctrlgen.physics.sensor_models import SENSORS, Interferometer
+from ctrlgen.reporting.line_patterns import dashes, mark
 from ctrlgen.reporting.plots import COLOURS, STYLE, svg
 
 from .sensor_calibration import calibrate_sensor, find_fringes, record
@@ -38,7 +39,7 @@ def draw_sensitivities() -> Figure:
         volts = np.interp(fringes.at, np.arange(run.sensor.size), run.sensor)
         found = f"{name}: {from_si(slope.sensitivity, 'um/V'):.3f} um/V"
         panels[int(name == "fibre")].plot(
-            volts, from_si(counted, "um"), ".", ms=3, color=COLOURS[2 * k % 6 + k // 3], label=found
+            volts, from_si(counted, "um"), mark(k), ms=2, color=COLOURS[2 * k % 6 + k // 3], label=found
         )
     for panel in panels:
         panel.set_xlabel("sensor voltage [V]")
@@ -60,9 +61,9 @@ def draw_fringes_and_offsets() -> Figure:
     left.set_title("red: extrema found, a quarter wave apart", fontsize=8)
     left.set_xlabel("displacement [um]")
     left.set_ylabel("photodiode [V]")
-    for colour, name in zip(COLOURS[::2], ("3316", "3317", "3338"), strict=True):
+    for k, name in enumerate(("3316", "3317", "3338")):
         offsets = [from_si(SENSORS[name].offset(to_si(T, "degC")), "V") for T in TEMPERATURES]
-        right.plot(TEMPERATURES, offsets, color=colour, label=name)
+        right.plot(TEMPERATURES, offsets, color=COLOURS[2 * k], ls=dashes(k), label=name)
     right.set_xlabel("room temperature [degC]")
     right.set_ylabel("thermal offset of the reading [V]")
     right.legend(fontsize=8)

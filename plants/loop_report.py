@@ -22,6 +22,7 @@ from plants.cases import CHANNELS, CIRCLE, PARASITIC, Case
 from plants.frame import Array
 
 COLOURS = ("#c4442c", "#1f6f8b", "#b8860b", "#5b4b8a", "#3a7d44", "#8b1f5f", "#444444", "#0f8b8d")
+DASHES = ("-", (0, (5, 2)), "-.", ":", (0, (9, 3)), (0, (9, 2, 2, 2, 2, 2)), (0, (2, 6)), (0, (14, 3, 5, 3)))
 DRAWN = 2.0  # um, as which the largest error of a path is drawn
 FRAMES, FRAMES_A_SECOND = 48, 12
 COLUMNS = 3  # pictures in a row of the film
@@ -103,12 +104,12 @@ def rows(stages: Sequence[Stage]) -> list[tuple[str, ...]]:
 def draw_errors(stages: Sequence[Stage], expected: Expected) -> plt.Figure:
     """Along the path: the distance from it, and the size of the rotation, for each stage; the expected band."""
     figure, (along, turns) = plt.subplots(2, 1, figsize=(10, 6.4), sharex=True, layout="constrained")
-    for stage, colour in zip(stages, COLOURS, strict=False):
+    for k, (stage, colour) in enumerate(zip(stages, COLOURS, strict=False)):
         m = stage.measured
         error, share = m.reached - m.command, np.arange(len(m.command)) / len(m.command)
-        along.semilogy(share, 1e3 * np.linalg.norm(error[:, 3:], axis=1), color=colour, label=stage.name)
-        turns.semilogy(share, 1e6 * np.linalg.norm(error[:, :3], axis=1), color=colour)
-    band = {"color": "0.5", "ls": "--", "lw": 1}
+        along.semilogy(share, 1e3 * np.linalg.norm(error[:, 3:], axis=1), ls=DASHES[k], color=colour, label=stage.name)
+        turns.semilogy(share, 1e6 * np.linalg.norm(error[:, :3], axis=1), ls=DASHES[k], color=colour)
+    band = {"color": "0.5", "lw": 4, "alpha": 0.5}
     along.axhline(1e3 * expected.translation, label="95 % band of one translation, by the error budget", **band)
     turns.axhline(1e6 * expected.rotation, **band)
     along.set(ylabel="distance from the path [nm]", title="generated C on the independent plant, along the circle")

@@ -123,7 +123,7 @@ def other_readings(search: SearchResult, record: Record) -> OtherReadings | None
         text = f"the specimen turned by 90 deg about {'xyz'[axis]} under the same sensor"
         entries.append(_entry("turned specimen", text, None, reached))
     # what decides; a turned specimen takes no second instrument
-    ranked = sorted(entries, key=lambda e: (not e.settles, e.kind == "second sensor"))
+    ranked = sorted(entries, key=lambda e: (not e.settles, e.scale is not None))
     sensor, device = (here, there) if of_sensor(here) else (there, here)
     return OtherReadings(sensor, device, tuple(ranked))
 
