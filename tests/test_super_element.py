@@ -19,6 +19,7 @@ from ctrlgen.app.scenario_pipeline import compare_only, run
 from ctrlgen.core.edited_toml import with_moved_files
 from ctrlgen.core.matrix_file import LARGEST_FILE
 from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.devices.mechanism.force_readings import inertial
 from ctrlgen.devices.mechanism.modes import (
     as_displacements,
     body_matrices,
@@ -28,7 +29,7 @@ from ctrlgen.devices.mechanism.modes import (
     summary,
 )
 from ctrlgen.model.assembly import movable
-from ctrlgen.physics.stated_part import counted, extent
+from ctrlgen.physics.stated_part import counted, extent, rigid_mass, rigid_motions
 
 DEVICES = Path(__file__).parent.parent / "scenarios" / "devices"
 # Two programs that solve the same equations in another order: 1e-12 of K, lost by the condition of a blade, 1e4
@@ -75,7 +76,10 @@ def test_a_part_by_its_condensed_matrices_is_the_part(tmp_path):
         ("parallelogram", "left right"),
         ("xy_lever_stage", "guide_left guide_right coupling_left push_x"),
     ):
-        device = loaded(tmp_path, text := dense(name))
+        cell = (
+            "" if name == "parallelogram" else '[[reading]]\nname = "cell"\nof = "coupling_right"\npattern = "side"\n'
+        )
+        device = loaded(tmp_path, text := dense(name) + cell)
         elements = [k for k, e in enumerate(device.placed_elements) if e.section.name in taken.split()]
         bodies = sorted(
             {b for k in elements for b in (device.placed_elements[k].first, device.placed_elements[k].second)}
@@ -87,6 +91,8 @@ def test_a_part_by_its_condensed_matrices_is_the_part(tmp_path):
         for of in ("held_stiffness", "jacobian", "mass", "output_compliance"):
             one, two = (dm(getattr(c, of)) for c in of_both)
             assert np.abs(one - two).max() < SAME * np.abs(one).max(), (name, of)
+        one, two = (dm(inertial(c)) for c in of_both)
+        assert np.abs(one - two).max(initial=0) <= SAME * np.abs(one).max(initial=0)
         scales = [np.outer(as_displacements(d), as_displacements(d)) for d in (device, other)]
         for k in range(2):  # stiffness and mass of all bodies
             one, two = (body_matrices(c)[k] / scale for c, scale in zip(of_both, scales, strict=True))
@@ -160,6 +166,10 @@ def test_matrices_that_no_part_has_are_refused(tmp_path):
         "is not symmetric: ": table(skewed, M, places),
         "not positive semidefinite": table(_with_an_energy_below_zero(K, places), M, places),
         "check signs": table(-K, M, places),
+        "leave stage free": table(_with_an_energy_below_zero(K, places, 1.0), M, places),
+        "mass: is not symmetric": table(K, M + 0.1 * np.triu(np.abs(M), 1), places),
+        "mass: the part weighs -": table(K, np.kron([[1, -2], [-2, 1]], np.diag([0, 0, 0, 1, 1, 1])), places),
+        "above the sum of the others": table(K, on_ports(np.diag([1e-6, 1e-6, 3e-6, 1, 1, 1]), places), places),
         "mass: moved rigidly it is no body": table(K, np.diag(np.diag(M)) @ np.diag([1, 1, 1, 1, 2, 1] * 2), places),
         "six at each of 2 ports are 12": table(K[:6, :6], M, places),
         "all stand on ground": table(K, M, places).replace('body = "stage"', 'body = "ground"'),
@@ -174,12 +184,64 @@ def test_matrices_that_no_part_has_are_refused(tmp_path):
         assert said in faults(tmp_path, whole), said
 
 
-def _with_an_energy_below_zero(K: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """K with one deformation, of a part of each of its six stiffnesses, that gives back a tenth of what it stored."""
+def on_ports(inertia: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """M (6 P, 6 P) of a body whose twist at the origin is the one nearest to the motions of its ports, from that of its twist (6, 6)."""
+    nearest = np.linalg.pinv(rigid_motions(places))
+    return nearest.T @ inertia @ nearest
+
+
+def _with_an_energy_below_zero(K: np.ndarray, places: np.ndarray, share: float = 1.1) -> np.ndarray:
+    """K with one deformation, of a part of each of its six stiffnesses, that gives back a `share` of what it stored; 1: a joint."""
     by = counted(extent(K, places), 2)
     values, motions = np.linalg.eigh(K * np.outer(by, by))
     load = motions[:, 6:] @ np.sqrt(values[6:]) / by
-    return K - 1.1 * np.outer(load, load) / 6
+    return K - share * np.outer(load, load) / 6
+
+
+def test_the_mass_of_points_is_told_with_their_centre_and_inertia():
+    """Summed point by point; rounding of numbers of one size."""
+    rng = np.random.default_rng(8)
+    masses, at, places = rng.uniform(0.1, 1, 7), rng.normal(size=(7, 3)), rng.normal(size=(3, 3))
+    moved = [np.hstack([np.cross(np.eye(3), p).T, np.eye(3)]) for p in at]  # velocity per twist, omega x p + v
+    M = on_ports(sum(m * V.T @ V for m, V in zip(masses, moved, strict=True)), places)
+    found, centre = rigid_mass(M, places, 1.0), masses @ at / masses.sum()
+    off = at - centre
+    inertia = sum(m * (r @ r * np.eye(3) - np.outer(r, r)) for m, r in zip(masses, off, strict=True))
+    assert found.mass == pytest.approx(masses.sum(), rel=1e-12)
+    assert np.allclose(found.centre, centre, rtol=0, atol=1e-12)
+    assert np.allclose(found.inertia, inertia, rtol=0, atol=1e-11)
+    assert found.off < 1e-11
+
+
+def test_soft_directions_of_a_part_are_freedoms(tmp_path):
+    """Both ports in one place, between them four directions that are 1e5 times as stiff as the others."""
+    text, *_ = parallelogram(tmp_path)
+    stiffnesses = 1e7 * np.array([0.025**2, 0.025**2, 1e-5 * 0.025**2, 1e-5, 1, 1])
+    K = np.kron([[1, -1], [-1, 1]], np.diag(stiffnesses))
+    units = '{ length = "mm", force = "N" }'
+    place = np.array([0, 0.025, 0])
+    device = loaded(
+        tmp_path,
+        text
+        + super_element(
+            "part", [("ground", place), ("stage", place)], {}, units=units, stiffness=repr(written(K).tolist())
+        ),
+    )
+    assert freedoms(device) == (2, 0)
+
+
+def test_printed_digits_are_taken_out_and_told(tmp_path):
+    """Five printed digits and a ten-thousandth across the diagonal: the model's matrix is symmetric and free to rounding."""
+    text, K, M, places = parallelogram(tmp_path)
+    printed = np.vectorize(lambda x: float(f"{x:.4e}"))(written(K) * (1 + 1e-4 * np.triu(np.ones_like(K), 1)))
+    device = loaded(tmp_path, text + table(K, M, places, stiffness=repr(printed.tolist())))
+    notes = " ".join(device.remarks())
+    assert "stiffness: rigid motions meet" in notes
+    assert "stiffness is not symmetric by 0.01" in notes
+    assert "mass is not symmetric" not in notes
+    taken, R = device.super_element[0].matrices[0], rigid_motions(places)
+    assert np.array_equal(taken, taken.T)
+    assert np.abs(taken @ R).max() < 1e-12 * (np.abs(taken) @ np.abs(R)).max()
 
 
 def test_a_matrix_is_the_same_from_every_kind_of_file(tmp_path):

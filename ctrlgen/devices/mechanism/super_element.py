@@ -20,16 +20,16 @@ from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.matrix_file import StatedMatrix, read_matrix, square_fault
 from ctrlgen.core.names import Name
 from ctrlgen.core.units import In, Quantity, parse
-from ctrlgen.devices.mechanism.super_element_faults import FREED, mass_faults, stiffness_faults
+from ctrlgen.devices.mechanism.super_element_faults import FREED, asymmetry, mass_faults, stiffness_faults
 from ctrlgen.devices.mechanism.written_matrix import Written
 from ctrlgen.devices.place import Direction
 from ctrlgen.devices.section import Section
+from ctrlgen.physics.screw import TwistComponent
 from ctrlgen.physics.stated_part import RigidMass, extent, freed, held_by_nothing, rigid_mass
 
 MOST_PORTS = 32
 """Of a super-element: 192 rows. With more a part is better condensed again."""
 MATRICES = ("stiffness", "mass")
-Motion = Literal["theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z"]
 
 
 def _coordinate(text: object) -> float:
@@ -103,7 +103,7 @@ class SuperElement(Section):
     """Its ports, in the order in which the matrices have them."""
     units: MatrixUnits
     """Units of the matrices, such as { length = "mm", force = "N", mass = "t" }."""
-    order: tuple[Motion, Motion, Motion, Motion, Motion, Motion]
+    order: tuple[TwistComponent, TwistComponent, TwistComponent, TwistComponent, TwistComponent, TwistComponent]
     """The six motions of a port in the order of the rows, such as the displacements first."""
     sorted_by: Literal["port", "motion"] = "port"
     """Whether the six rows of a port stand together, or those of a motion at all ports."""
@@ -125,7 +125,7 @@ class SuperElement(Section):
     @model_validator(mode="after")
     def _is_a_part(self) -> SuperElement:
         faults = []
-        if sorted(self.order) != sorted(set(self.order)):
+        if len(set(self.order)) < len(self.order):
             faults.append("order: names a motion twice; give each of the six once")
         if np.linalg.norm(np.cross(self.along, self.across)) <= 1e-6 * np.linalg.norm(self.along) * np.linalg.norm(
             self.across
@@ -160,29 +160,34 @@ class SuperElement(Section):
 
     @cached_property
     def as_written(self) -> tuple[np.ndarray, np.ndarray | None]:
-        """K and M (6 P, 6 P) in SI and in the global frame, twists (theta; delta) of the ports -> (M; F), symmetric, as they are stated."""
+        """K and M (6 P, 6 P) in SI and in the global frame, twists (theta; delta) of the ports -> (M; F), as they are stated."""
         written = self.written
         M = None if self.mass is None else written.of(self.mass.numbers).in_si("mass")
-        return written.in_si("stiffness"), None if M is None else (M + M.T) / 2
+        return written.in_si("stiffness"), M
 
     @cached_property
     def matrices(self) -> tuple[np.ndarray, np.ndarray | None]:
-        """The same, K the nearest one in which rigid motions meet no load."""
+        """The same, symmetric, and K the nearest one in which rigid motions meet no load."""
         K, M = self.as_written
-        return freed((K + K.T) / 2, self.written.places), M
+        return freed((K + K.T) / 2, self.written.places), None if M is None else (M + M.T) / 2
 
     @property
     def weighed(self) -> RigidMass | None:
         """Mass, centre and inertia where it moves rigidly, without `mass_factor`; None where it has none."""
-        K, M = self.as_written
+        K, M = self.matrices
         places = self.written.places
         return None if M is None else rigid_mass(M, places, extent(K, places))
 
     def notes(self) -> list[str]:
         """What was taken out of the matrices, and that K says nothing of what is not linear."""
-        held = held_by_nothing(self.as_written[0], self.written.places).max()
+        K, M = self.as_written
+        notes, size = [], extent(K, self.written.places)
+        for key, stated in zip(MATRICES, (K, M), strict=True):
+            if stated is not None and (most := asymmetry(stated, size).max()) > FREED:
+                notes.append(f"{key} is not symmetric by {100 * most:.2g} %: the mean of both halves is taken")
+        held = held_by_nothing((K + K.T) / 2, self.written.places).max()
         taken = f": the nearest K without that is taken (told from {FREED:g} on)"
-        notes = [f"stiffness: rigid motions meet {held:.1g} of the loads of its rows{taken}"] if held > FREED else []
+        notes += [f"stiffness: rigid motions meet {held:.1g} of the loads of its rows{taken}"] if held > FREED else []
         return [*notes, "it is linear: how far that holds is not in its matrices"]
 
 

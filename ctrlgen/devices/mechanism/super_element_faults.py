@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -44,10 +44,8 @@ def stiffness_faults(written: Written) -> list[str]:
     if held.max() > HELD:
         named = [name.replace("theta_", "turning about ").replace("delta_", "shifting along ") for name in TWIST]
         met = ", ".join(f"{name} {share:.2g}" for name, share in zip(named, held, strict=True) if share > HELD)
-        mended = mending(written, "stiffness", lambda w: float(_held(w).max()) <= HELD)
-        return [
-            f"stiffness: a rigid motion meets a load, as a share of those of its rows: {met} (at most {HELD:g}); {mended}"
-        ]
+        told = f"{met} (at most {HELD:g}); {_mending(written)}"
+        return [f"stiffness: a rigid motion meets a load, as a share of those of its rows: {told}"]
     eigenvalues = unit_eigenvalues(freed((K + K.T) / 2, written.places))
     if eigenvalues[0] < -GAINED * eigenvalues[-1]:
         return [
@@ -62,6 +60,7 @@ def mass_faults(written: Written, M: np.ndarray) -> list[str]:
     size = extent(written.in_si("stiffness"), written.places)
     if faults := _symmetric("mass", M, size):
         return faults
+    M = (M + M.T) / 2
     weighed = rigid_mass(M, written.places, size)
     if not weighed.mass > 0:
         return [f"mass: the part weighs {1e3 * weighed.mass:.3g} g where it moves rigidly; check signs"]
@@ -81,8 +80,8 @@ def mass_faults(written: Written, M: np.ndarray) -> list[str]:
     return []
 
 
-def mending(written: Written, what: str, mended: Callable[[Written], bool]) -> str:
-    """Which usual mistake, or two of them, would explain a matrix that is not what it must be."""
+def _mending(written: Written) -> str:
+    """Which usual mistake, or two of them, would explain a stiffness that is not free."""
     single = list(_trials(written))
     double = (
         (f"{one}, and {other}", second)
@@ -91,10 +90,9 @@ def mending(written: Written, what: str, mended: Callable[[Written], bool]) -> s
         if one.split(" = ")[0] != other.split(" = ")[0]
     )
     for told, trial in itertools.chain(single, double):
-        if mended(trial):
+        if _held(trial).max() <= HELD:
             return f"it would be free with {told}"
-    held = _held(written)
-    if what == "stiffness" and held[3:].max() > HELD:
+    if _held(written)[3:].max() > HELD:
         return (
             "no usual mistake explains it: shifted it resists too, so that it is held somewhere, or a port is left out"
         )
@@ -141,14 +139,21 @@ def _axes() -> Iterator[tuple[tuple[float, float, float], tuple[float, float, fl
             yield along, across  # type: ignore[misc]
 
 
+def asymmetry(K: np.ndarray, size: float) -> np.ndarray:
+    """(6 P, 6 P) |K_ij - K_ji|/sqrt(K_ii K_jj), turns counted as displacements at `size` [m]; a diagonal of rounding counts as `NOISE` of
+    the largest, as lumped masses have none of turns."""
+    by = counted(size, len(K) // 6)
+    diagonal = np.diag(K) * by**2
+    least = np.sqrt(np.maximum(diagonal, NOISE * diagonal.max()))
+    return np.asarray(np.abs(K - K.T) * np.outer(by, by) / np.outer(least, least))
+
+
 def _symmetric(key: str, K: np.ndarray, size: float) -> list[str]:
     """That K_ij and K_ji differ by more than `MOST_ASYMMETRY` of sqrt(K_ii K_jj)."""
     diagonal = np.diag(K)
     if not diagonal.max() > 0 or np.any(diagonal < 0):
         return [f"{key}: on its diagonal nothing is above zero, or a number is below it; check signs"]
-    by = counted(size, len(K) // 6)
-    least = np.sqrt(np.maximum(diagonal * by**2, NOISE * (diagonal * by**2).max()))
-    share = np.abs(K - K.T) * np.outer(by, by) / np.outer(least, least)
+    share = asymmetry(K, size)
     if share.max() > MOST_ASYMMETRY:
         i, j = np.unravel_index(int(share.argmax()), share.shape)
         first, second = (f"{TWIST[k % 6]} of port {k // 6 + 1}" for k in (int(i), int(j)))
