@@ -361,25 +361,52 @@ def test_a_cortex_m0_takes_a_sample_in_a_quarter_of_a_millisecond(circle, tmp_pa
     assert max(counted) <= WITHIN
 
 
+USES = """
+#include "%(name)s_online_f32.h"
+#include "%(name)s_checked_f32.h"
+#include "%(name)s_online_q31.h"
+int main(void)
+{
+    static %(name)s_online_f32_state plain;
+    static %(name)s_checked_f32_state checked;
+    static %(name)s_online_q31_state integers;
+    %(name)s_online_f32_init(&plain);
+    %(name)s_checked_f32_init(&checked);
+    %(name)s_online_q31_init(&integers);
+    return 0;
+}
+"""
+
+
 @pytest.mark.long
 def test_the_package_has_it_where_the_scenario_asks_for_it_alone(tmp_path):
-    scenarios = tmp_path / "scenarios"
-    for name in ("circle20", "devices"):
-        shutil.copytree(SCENARIOS / name, scenarios / name)
-    path = scenarios / "circle20" / "scenario.toml"
-    for asked in (False, True):
+    """With a checksum beside it; both in one project with a folder of the same controller that has neither."""
+    scenarios, added = tmp_path / "scenarios", ""
+    shutil.copytree(SCENARIOS / "devices", scenarios / "devices")
+    for name in ("plain", "with_both"):
+        asked = name == "with_both"
+        shutil.copytree(SCENARIOS / "circle20", scenarios / name)
+        path = scenarios / name / "scenario.toml"
         if asked:
-            path.write_text("fixed_point = true\n" + path.read_text())
+            path.write_text("fixed_point = true\nchecksum = true\n" + path.read_text())
         scenario = load_scenario(path.parent)
-        c = generate(scenario, build_model(scenario.device), tmp_path / f"c{asked}")
+        c = generate(scenario, build_model(scenario.device), tmp_path / name)
+        added += f"add_subdirectory({c.path} {name}_build)\n"
         files = {file.name for file in c.path.glob("*q31*")}
         assert files == ({"mems_hexapod_online_q31.c", "mems_hexapod_online_q31.h"} if asked else set())
         assert verify_package(c.path) == ()
-        for text in ((c.path / name).read_text() for name in ("README.md", "CMakeLists.txt")):
+        for text in ((c.path / file).read_text() for file in ("README.md", "CMakeLists.txt")):
             assert ("q31" in text) == asked
+            assert ("checked_f32" in text or "_checked_${real}" in text) == asked
         if asked:
             assert re.search(rf"void {c.fixed_init}\(", (c.path / f"{c.fixed}.h").read_text())
-            if shutil.which("cmake"):
-                build = tmp_path / "build"
-                subprocess.run(["cmake", "-S", c.path, "-B", build], check=True, capture_output=True)
-                subprocess.run(["cmake", "--build", build, "--target", c.fixed], check=True, capture_output=True)
+    if shutil.which("cmake"):
+        (tmp_path / "main.c").write_text(USES % {"name": "mems_hexapod"})
+        (tmp_path / "CMakeLists.txt").write_text(
+            f"cmake_minimum_required(VERSION 3.16)\nproject(firmware C)\n{added}add_executable(app main.c)\n"
+            f"target_link_libraries(app PRIVATE ctrlgen::plain_f32 ctrlgen::with_both_f32 ctrlgen::{c.fixed})\n"
+        )
+        for words in (["-S", tmp_path, "-B", tmp_path / "b"], ["--build", tmp_path / "b", "--target", "app"]):
+            done = subprocess.run(["cmake", *words], capture_output=True, text=True)
+            assert done.returncode == 0, done.stderr
+        subprocess.run([tmp_path / "b" / "app"], check=True)

@@ -89,19 +89,20 @@ def test_the_zephyr_module_builds_with_stand_ins_for_zephyrs_functions(packages,
 
 
 def test_zephyr_modules_of_one_controller_compile_it_once(packages, circle, cmake, tmp_path):
-    """Two scenarios of one device, signal and rate; and one of another rate under the same name, which is refused."""
+    """Two scenarios of one device, signal and rate, one with a checksum; and one of another rate under the same name, which is refused."""
     text = (SCENARIOS / "circle20" / "scenario.toml").read_text().replace("../devices", str(SCENARIOS / "devices"))
     folders = {}
-    for name, rate in (("again", "1 kHz"), ("slower", "500 Hz")):
+    for name, rate, more in (("again", "1 kHz", "checksum = true\n"), ("slower", "500 Hz", "")):
         (tmp_path / name).mkdir()
-        (tmp_path / name / "scenario.toml").write_text(text.replace('"1 kHz"', f'"{rate}"'))
+        (tmp_path / name / "scenario.toml").write_text(more + text.replace('"1 kHz"', f'"{rate}"'))
         scenario = load_scenario(tmp_path / name)
         folders[name] = generate(scenario, build_model(scenario.device), tmp_path / f"{name}_c").path
     (tmp_path / "main.c").write_text("int main(void) { return 0; }\n")
     for name, folder in folders.items():
         options = "".join(f"set(CONFIG_{n.upper()}_CONTROLLER y)\n" for n in ("circle20", name))
         adds = f"add_subdirectory({packages['circle20'].path}/zephyr one)\nadd_subdirectory({folder}/zephyr two)\n"
-        whole = "-Wl,--whole-archive circle20 mems_hexapod_online_f32 -Wl,--no-whole-archive"
+        checked = "mems_hexapod_checked_f32 " if name == "again" else ""
+        whole = f"-Wl,--whole-archive circle20 mems_hexapod_online_f32 {checked}-Wl,--no-whole-archive"
         (tmp_path / "CMakeLists.txt").write_text(
             f"{ZEPHYR}{options}{adds}add_executable(app main.c)\ntarget_link_libraries(app PRIVATE {whole})\n"
         )
