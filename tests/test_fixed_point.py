@@ -3,35 +3,27 @@
 from __future__ import annotations
 
 import ctypes
-import re
 import shutil
 import subprocess
 from itertools import pairwise
 
-import casadi as ca
 import numpy as np
 import pytest
 from conftest import SCENARIOS
 
-from ctrlgen import InputError, build_model, load_scenario
+from ctrlgen import build_model, load_scenario
 from ctrlgen.controller.controller_step import ControllerStatus, answer
-from ctrlgen.controller.fixed_point import NoFixedPoint, fixed_point
+from ctrlgen.controller.fixed_point import fixed_point
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.templates import write
-from ctrlgen.firmware.folder import generate
 from ctrlgen.firmware.online.fixed_source import fixed_context
-from ctrlgen.firmware.package import verify_package
-from ctrlgen.numerics.proven_polynomial import proven_polynomial
-from ctrlgen.numerics.scaled_integers import DoesNotFit, integer_polynomial, integer_rows
 from ctrlgen.verification.cores import BASE, FLAGS, M0_PLUS
 from ctrlgen.verification.emulation import Machine
 from ctrlgen.verification.rules import STRICT
 
 NAME = "device_online_q31"
-WITHIN = (
-    12_000  # instructions of a Cortex-M0+ on the circle: at 48 MHz a quarter of a millisecond, 49,742 in emulated float
-)
+WITHIN = 12_000  # instructions of a Cortex-M0+ on the circle, which takes 49,742 in emulated float: the goal
 
 
 class InC:
@@ -81,46 +73,6 @@ class InC:
 @pytest.fixture(scope="module")
 def circle(tmp_path_factory):
     return InC(tmp_path_factory.mktemp("fixed"))
-
-
-def test_integer_maps_are_off_by_no_more_than_they_say_whatever_the_sizes():
-    rng = np.random.default_rng(3)
-    for _ in range(20):
-        slope = rng.normal(size=(3, 4)) * 10.0 ** rng.integers(-6, 7)
-        bits_in, bits_out = rng.integers(5, 40, 4), np.full(3, 0)
-        at_zero = rng.normal(size=3) * np.abs(slope).max()
-        largest = np.full(4, 2.0**31)
-        reach = np.abs(slope) @ (largest * 2.0**-bits_in) + np.abs(at_zero)
-        bits_out = np.floor(np.log2(2.0**30 / reach)).astype(int)
-        rows = integer_rows(slope, at_zero, (bits_in, bits_out), largest, largest)
-        values = rng.integers(-(2**31), 2**31, (200, 4))
-        values[0] = np.where(np.array(rows.coefficients[0]) > 0, 2**31 - 1, -(2**31))
-        off = [np.abs(rows(v) - (slope @ (v * 2.0**-bits_in) + at_zero) * 2.0**bits_out) for v in values]
-        assert np.all(np.max(off, axis=0) <= rows.off * (1 + 1e-6)) and np.all(rows.off < 40)
-        for row, o in zip(rows.coefficients, rows.offset, strict=True):
-            assert max(map(abs, row)) < 2**31 and sum(abs(c) * 2**31 for c in row) + abs(o) < 2**62
-    with pytest.raises(DoesNotFit):
-        integer_rows(np.array([[1e9]]), np.zeros(1), (np.zeros(1), np.zeros(1)), np.array([2.0**31]), np.ones(1))
-
-
-@pytest.mark.parametrize("low", [0.0, 1.5, -0.6])
-def test_integer_polynomials_are_off_by_no_more_than_they_say(low):
-    v = ca.SX.sym("v")
-    f = ca.Function("f", [v], [ca.exp(v) - 3])
-    polynomial = proven_polynomial(f, low, 2.0, 1e-8)
-    bits_in, bits_out = 28, 24
-    ends = round(low * 2**bits_in), round(2.0 * 2**bits_in)
-    integers = integer_polynomial(polynomial, (bits_in, bits_out), ends)
-    exact = np.polynomial.Polynomial(polynomial.coefficients)
-    places = np.linspace(*ends, 3001).astype(int)
-    off = [
-        abs(integers(int(p)) - exact((p * 2.0**-bits_in - polynomial.centre) / polynomial.half) * 2.0**bits_out)
-        for p in places
-    ]
-    assert 0.1 * integers.off < max(off) <= integers.off < 10
-    assert max(map(abs, integers.coefficients)) < 2**31
-    with pytest.raises(DoesNotFit):
-        integer_polynomial(polynomial, (bits_in, 29), ends)
 
 
 def test_answers_are_off_those_in_real_numbers_by_no_more_than_is_proved(circle):
@@ -208,27 +160,6 @@ def test_nothing_is_promised_while_the_device_settles_cools_or_is_lost(circle):
         status, u, *_ = circle.call("step", target)
         assert status == ControllerStatus.LOST and not u.any()
         assert circle.call("step", target)[0] == ControllerStatus.LOST  # until it is initialised
-
-
-def test_devices_without_a_controller_in_integers_are_refused_with_the_reason(tmp_path):
-    for name, why in (
-        ("xy_stage_force", "no sample_rate"),
-        ("meso_circle", "no state"),
-        ("rrr_circle", "state beyond its limits"),
-    ):
-        scenario = load_scenario(SCENARIOS / name)
-        controller = controller_of(build_model(scenario.device), scenario.file.follow, scenario.sample_time)
-        with pytest.raises(NoFixedPoint, match=why):
-            fixed_point(controller)
-    folder = tmp_path / "scenarios" / "meso_circle"
-    shutil.copytree(SCENARIOS / "meso_circle", folder)
-    shutil.copytree(SCENARIOS / "devices", tmp_path / "scenarios" / "devices")
-    path = folder / "scenario.toml"
-    path.write_text("fixed_point = true\n" + path.read_text())
-    scenario = load_scenario(folder)
-    with pytest.raises(InputError, match="fixed_point: is asked for, but its actuators have no state"):
-        generate(scenario, build_model(scenario.device), tmp_path / "c")
-    assert not (tmp_path / "c").exists()
 
 
 HOSTILE = """
@@ -332,7 +263,7 @@ def test_rules_of_misra_are_kept_but_for_those_of_the_list(circle):
 
 @pytest.mark.long
 @pytest.mark.skipif(shutil.which("arm-none-eabi-gcc") is None, reason="needs arm-none-eabi-gcc")
-def test_a_cortex_m0_takes_a_sample_in_a_quarter_of_a_millisecond(circle, tmp_path):
+def test_a_cortex_m0_takes_a_sample_in_a_quarter_of_what_emulated_float_does(circle, tmp_path):
     program, target_size = tmp_path / "m0.elf", len(circle.fixed.bits.target)
     words = ["arm-none-eabi-gcc", "-mcpu=cortex-m0plus", "-mthumb", "-mfloat-abi=soft", *FLAGS, "-nostdlib"]
     words += [f"-Wl,-e,{circle.init}", f"-Wl,-Ttext={BASE:#x}", circle.source, "-lgcc", "-o", program]
@@ -359,54 +290,8 @@ def test_a_cortex_m0_takes_a_sample_in_a_quarter_of_a_millisecond(circle, tmp_pa
         assert status == circle.call("step", wanted)[0] == 0
         assert bytes(machine.emulator.mem_read(out, 4 * len(circle.out))) == circle.out.tobytes()
     assert max(counted) <= WITHIN
-
-
-USES = """
-#include "%(name)s_online_f32.h"
-#include "%(name)s_checked_f32.h"
-#include "%(name)s_online_q31.h"
-int main(void)
-{
-    static %(name)s_online_f32_state plain;
-    static %(name)s_checked_f32_state checked;
-    static %(name)s_online_q31_state integers;
-    %(name)s_online_f32_init(&plain);
-    %(name)s_checked_f32_init(&checked);
-    %(name)s_online_q31_init(&integers);
-    return 0;
-}
-"""
-
-
-@pytest.mark.long
-def test_the_package_has_it_where_the_scenario_asks_for_it_alone(tmp_path):
-    """With a checksum beside it; both in one project with a folder of the same controller that has neither."""
-    scenarios, added = tmp_path / "scenarios", ""
-    shutil.copytree(SCENARIOS / "devices", scenarios / "devices")
-    for name in ("plain", "with_both"):
-        asked = name == "with_both"
-        shutil.copytree(SCENARIOS / "circle20", scenarios / name)
-        path = scenarios / name / "scenario.toml"
-        if asked:
-            path.write_text("fixed_point = true\nchecksum = true\n" + path.read_text())
-        scenario = load_scenario(path.parent)
-        c = generate(scenario, build_model(scenario.device), tmp_path / name)
-        added += f"add_subdirectory({c.path} {name}_build)\n"
-        files = {file.name for file in c.path.glob("*q31*")}
-        assert files == ({"mems_hexapod_online_q31.c", "mems_hexapod_online_q31.h"} if asked else set())
-        assert verify_package(c.path) == ()
-        for text in ((c.path / file).read_text() for file in ("README.md", "CMakeLists.txt")):
-            assert ("q31" in text) == asked
-            assert ("checked_f32" in text or "_checked_${real}" in text) == asked
-        if asked:
-            assert re.search(rf"void {c.fixed_init}\(", (c.path / f"{c.fixed}.h").read_text())
-    if shutil.which("cmake"):
-        (tmp_path / "main.c").write_text(USES % {"name": "mems_hexapod"})
-        (tmp_path / "CMakeLists.txt").write_text(
-            f"cmake_minimum_required(VERSION 3.16)\nproject(firmware C)\n{added}add_executable(app main.c)\n"
-            f"target_link_libraries(app PRIVATE ctrlgen::plain_f32 ctrlgen::with_both_f32 ctrlgen::{c.fixed})\n"
-        )
-        for words in (["-S", tmp_path, "-B", tmp_path / "b"], ["--build", tmp_path / "b", "--target", "app"]):
-            done = subprocess.run(["cmake", *words], capture_output=True, text=True)
-            assert done.returncode == 0, done.stderr
-        subprocess.run([tmp_path / "b" / "app"], check=True)
+    # Beyond a limit the limits are computed once more, as often as the line is halved, and once at the answer
+    jumps = [call("step", target) for target in circle.targets(np.random.default_rng(5), 300, beyond=0.3)]
+    told = [count for status, count in jumps if status & (ControllerStatus.COMPOSITE | ControllerStatus.DRIVE)]
+    assert len(told) > 200 and max(told) <= (circle.fixed.trials + 2) * max(counted)
+    print(f"{max(counted)} instructions at most on the circle, {max(told)} of {len(told)} jumps")
