@@ -23,13 +23,14 @@ def told(verdict: Verdict, *findings: Finding, passed: bool = False, after: floa
     errors = ChannelErrorEntry(rms_before=50.0, rms_after=after, noise_floor=1.0, unit="um", uncertainty=None)
     noise = SimpleNamespace(known=np.ones(1, bool))
     fitter = SimpleNamespace(recording=SimpleNamespace(tolerance=(None,)), noise=noise)
+    chosen = SimpleNamespace(fit=fitted(), causes=tuple(f.cause for f in findings))
     return answer(
         SimpleNamespace(
             verdict=verdict,
             findings=findings,
             held_out={"reading.axis": errors},
             device=SimpleNamespace(title="an axis"),
-            search=SimpleNamespace(chosen=SimpleNamespace(fit=fitted()), fitter=fitter),
+            search=SimpleNamespace(chosen=chosen, fitter=fitter, unlikely=()),
             residual_tests=SimpleNamespace(passed=passed),
             shares=None,
             unconfirmed=(),
