@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import re
 import reprlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -113,13 +113,10 @@ def _affine(unit: str) -> tuple[float, float]:
     return one - zero, zero
 
 
-@cache
-def _dimension(unit: str) -> Mapping[str, float]:
-    """Powers of the dimensions of `unit`, as pint names them. Raises ValueError for an unknown one."""
-    if (known := KNOWN.get(unit or "1")) is not None:
-        return known[2]
-    powers: Any = _unit(unit).dimensionality  # typed as any number, complex too
-    return dict(powers)
+def _check_known(unit: str) -> None:
+    """Raises ValueError for an unknown unit."""
+    if (unit or "1") not in KNOWN:
+        _unit(unit)
 
 
 def to_si(value: float, unit: str) -> float:
@@ -150,16 +147,14 @@ def shown_difference_unit(unit: str) -> str:
     return "K" if offset and scale == 1 else difference_unit(unit)
 
 
-def _plain(unit: str) -> str | None:
-    """The SI unit with a name of its own that `unit` is a multiple of."""
-    return next((name for name in NAMED if same_dimension(unit, name)), None)
-
-
 def base_unit(unit: str) -> str:
     """The SI unit of a quantity given in `unit`: 'um' -> 'm', 'degC' -> 'K', 'W' -> 'W'."""
     if (known := KNOWN.get(unit or "1")) is not None:
-        return known[3]
-    return _plain(unit) or f"{_registry().Quantity(1.0, _unit(unit)).to_base_units().units:~}"
+        return known[2]
+    for name in NAMED:
+        if same_dimension(unit, name):
+            return name
+    return f"{_registry().Quantity(1.0, _unit(unit)).to_base_units().units:~}"
 
 
 def exponents(unit: str) -> dict[str, int] | None:
@@ -175,7 +170,10 @@ def exponents(unit: str) -> dict[str, int] | None:
 
 def same_dimension(unit: str, other: str) -> bool:
     """Whether two unit texts measure the same kind of quantity."""
-    return _dimension(unit) == _dimension(other)
+    known, also = KNOWN.get(unit or "1"), KNOWN.get(other or "1")
+    if known is not None and also is not None:
+        return known[2] == also[2]
+    return bool(_unit(unit).dimensionality == _unit(other).dimensionality)
 
 
 @dataclass(frozen=True)
@@ -208,7 +206,7 @@ def parse(text: object, unit: str) -> float:
         value, written = (float(text) if abs(text) < LARGEST_OTHER else math.inf), ""
     if not math.isfinite(value):
         raise ValueError(f"{reprlib.repr(text)} is not a finite number")
-    _dimension(written)
+    _check_known(written)
     absolute = unit in ("degC", "degF", "K")
     if (written == "" and unit != "1") or (absolute and "delta" in written) or not same_dimension(written, unit):
         if written == "":
@@ -228,7 +226,7 @@ def parse(text: object, unit: str) -> float:
 @cache
 def largest(unit: str) -> float:
     """The largest magnitude [SI] that is read of a quantity in `unit`."""
-    return LARGEST.get(_plain(unit) or "", LARGEST_OTHER)
+    return LARGEST.get(base_unit(unit), LARGEST_OTHER)
 
 
 def parse_difference(text: str, unit: str) -> float:
@@ -252,7 +250,7 @@ def _bounds_text(unit: str, low: float | None, high: float | None, low_open: boo
 def _own_unit(text: object) -> str:
     """The unit that a number is written in, one that begins at zero. Raises ValueError."""
     unit = written_unit(str(text))
-    _dimension(unit)
+    _check_known(unit)
     if to_si(0.0, unit):
         raise ValueError(f"{text!r} does not count from zero; write it in a unit that does, such as K")
     return unit
@@ -335,7 +333,7 @@ def read_quantity(unit: str | None, given: Any) -> Quantity:
     if unit is None:
         value = given.get("value") if isinstance(given, dict) else given
         unit = written_unit(str(value))
-        _dimension(unit)
+        _check_known(unit)
     return _reader(unit, None, None, False)(given)
 
 
