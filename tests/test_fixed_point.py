@@ -23,7 +23,7 @@ from ctrlgen.verification.emulation import Machine
 from ctrlgen.verification.rules import STRICT
 
 NAME = "device_online_q31"
-WITHIN = 12_000  # instructions of a Cortex-M0+ on the circle, which takes 49,742 in emulated float: the goal
+WITHIN = 12_000  # instructions of a Cortex-M0+ on the circle, which takes 16,400 in emulated float: the goal
 
 
 class InC:
