@@ -9,9 +9,11 @@ import pytest
 from conftest import ROOT
 from told_apart import alike_in_chart, alike_in_drawing
 
+from ctrlgen.reporting import chart_drawing
 from ctrlgen.reporting.chart import Chart, Curve, Panel
 from ctrlgen.reporting.chart_drawing import chart_svg
 from ctrlgen.reporting.line_patterns import DASHES, MARKS
+from ctrlgen.reporting.plots import STYLE, plt
 from ctrlgen.trajectory.solution_charts import chart_solution
 from ctrlgen.trajectory.solution_plots import draw_solution
 
@@ -30,6 +32,15 @@ def test_every_series_of_a_figure_has_dashes_or_a_mark_of_its_own(points):
     assert alike_in_chart(same.json)
     with pytest.raises(AssertionError, match="told apart"):
         chart_svg(same)
+
+
+def test_the_legend_of_twelve_lines_covers_no_data():
+    with plt.rc_context(STYLE):
+        figure = chart_drawing._draw(_chart(len(DASHES), points=False))
+        figure.draw_without_rendering()
+    legend, panel = figure.axes[0].get_legend().get_window_extent(), figure.axes[0].get_window_extent()
+    assert legend.y0 >= panel.y1 and 0 <= legend.x0 < legend.x1 <= figure.bbox.x1
+    plt.close(figure)
 
 
 def test_patterns_differ_and_every_mark_is_drawn_by_the_page():

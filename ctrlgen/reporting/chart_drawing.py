@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from typing import Any
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ctrlgen.reporting.chart import Chart
+from ctrlgen.reporting.chart import Chart, Panel
 from ctrlgen.reporting.line_patterns import dashes, mark
 from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
 
 WIDTH, PANEL = 8.6, 2.3  # inches: width of the drawing, height of a panel
+SIZE, LONG = (
+    7,
+    4,
+)  # points of the letters of a legend; length of its lines in letters, a whole turn of the longest dashes
+LETTER, HANDLE = 0.06, 0.85  # inches: width of a letter of a legend, of the line beside it with its space
 NAMED = 40  # places that are named on the axis; more of them cover each other
 
 
@@ -42,9 +48,16 @@ def _draw(chart: Chart) -> Figure:
             axis.set_xscale("log")
         axis.set_ylabel(panel.label)
         if panel.curves:
-            axis.legend(fontsize=7, ncols=3)
+            _name(axis, panel)
     last = axes[-1, 0]
     last.set_xlabel(chart.x_label)
     if chart.places and len(chart.places) <= NAMED:
         last.set_xticks(range(1, len(chart.places) + 1), chart.places, rotation=60, ha="right", fontsize=7)
     return figure
+
+
+def _name(axis: Axes, panel: Panel) -> None:
+    """The legend above the panel, where it covers nothing, in as many columns as fit."""
+    fit = int(WIDTH / (HANDLE + LETTER * max(len(curve.name) for curve in panel.curves)))
+    columns = min(max(fit, 1), len(panel.curves))
+    axis.legend(fontsize=SIZE, handlelength=LONG, ncols=columns, loc="lower center", bbox_to_anchor=(0.5, 1.0))
