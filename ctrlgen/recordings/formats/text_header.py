@@ -156,6 +156,10 @@ def _names_and_units(candidates: Sequence[tuple[int, list[str]]]) -> Header:
         units |= {
             k: c.strip("[](){} ") for k, c in enumerate(candidates[at][1]) if c and not is_number(c) and unit_of(c)
         }
+    passed = [k + 1 for n, (k, _) in enumerate(candidates[: max(names_at, at or 0)]) if n not in (names_at, at)]
+    if passed:
+        lines = f"line {passed[0]} holds" if len(passed) == 1 else f"lines {', '.join(map(str, passed))} hold"
+        notes.append(f"{lines} neither names nor units")
     found = _grouped(names, above)
     if found == names and at is not None and _is_text(above):
         notes.append(f"above them stands {', '.join(filter(None, above))}")
