@@ -9,9 +9,8 @@ import pytest
 from conftest import ROOT
 from told_apart import alike_in_chart, alike_in_drawing
 
-from ctrlgen.reporting import chart_drawing
 from ctrlgen.reporting.chart import Chart, Curve, Panel
-from ctrlgen.reporting.chart_drawing import chart_svg
+from ctrlgen.reporting.chart_drawing import chart_svg, draw_chart
 from ctrlgen.reporting.line_patterns import DASHES, MARKS
 from ctrlgen.reporting.plots import STYLE, plt
 from ctrlgen.trajectory.solution_charts import chart_solution
@@ -36,11 +35,17 @@ def test_every_series_of_a_figure_has_dashes_or_a_mark_of_its_own(points):
 
 def test_the_legend_of_twelve_lines_covers_no_data():
     with plt.rc_context(STYLE):
-        figure = chart_drawing._draw(_chart(len(DASHES), points=False))
+        figure = draw_chart(_chart(len(DASHES), points=False))
         figure.draw_without_rendering()
     legend, panel = figure.axes[0].get_legend().get_window_extent(), figure.axes[0].get_window_extent()
     assert legend.y0 >= panel.y1 and 0 <= legend.x0 < legend.x1 <= figure.bbox.x1
     plt.close(figure)
+
+
+def test_dashes_of_a_drawing_are_as_long_as_those_of_the_page():
+    """An inch has 96 pixels of a page and 72 points of a drawing."""
+    drawn = re.findall(r"stroke-dasharray: ([0-9. ,]+)", chart_svg(_chart(2, points=False)))
+    assert [float(n) for n in drawn[0].split(",")] == pytest.approx([n * 72 / 96 for n in DASHES[1]])
 
 
 def test_patterns_differ_and_every_mark_is_drawn_by_the_page():

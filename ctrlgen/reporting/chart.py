@@ -17,7 +17,7 @@ import numpy as np
 from markupsafe import Markup
 
 from ctrlgen.core.escaping import json_in_html
-from ctrlgen.reporting.line_patterns import DASHES, mark
+from ctrlgen.reporting.line_patterns import DASHES, LINE, mark
 
 # numbers of a panel: about 100 kB of text, so that a page of ten panels stays in the order of a megabyte
 MOST_NUMBERS = 12_000
@@ -38,7 +38,7 @@ class Curve:
     values: np.ndarray
     colour: int = 0
     line: int = 0
-    width: float = 1.3
+    width: float = LINE
     held: bool = False
     points: bool = False
 

@@ -23,10 +23,11 @@ NAMED = 40  # places that are named on the axis; more of them cover each other
 def chart_svg(chart: Chart) -> str:
     """The chart as SVG text."""
     with plt.rc_context(STYLE):
-        return svg(_draw(chart))
+        return svg(draw_chart(chart))
 
 
-def _draw(chart: Chart) -> Figure:
+def draw_chart(chart: Chart) -> Figure:
+    """The chart as a figure, in the style of the rc context that it is drawn in."""
     n = len(chart.panels)
     figure, axes = plt.subplots(n, 1, figsize=(WIDTH, 0.6 + PANEL * n), sharex=True, squeeze=False)
     for axis, panel in zip(axes[:, 0], chart.panels, strict=True):

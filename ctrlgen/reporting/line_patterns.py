@@ -22,7 +22,8 @@ DASHES: tuple[tuple[int, ...], ...] = (
 # Points, by the letters of matplotlib
 MARKS = ("o", "s", "^", "D", "v", "x", "+", "*", "<", ">", "p", "h")
 SOLID, DASHED, DASH_DOTTED, DOTTED = range(4)
-PER_WIDTH = 0.5  # of the widths in which matplotlib counts dashes, at a line of 1.3 points
+LINE = 1.3  # width of a line; points
+PER_WIDTH = 72 / 96 / LINE  # a pixel of the page, in the widths of such a line, in which matplotlib counts dashes
 
 
 def dashes(k: int) -> Any:
