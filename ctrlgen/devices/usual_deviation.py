@@ -10,13 +10,15 @@ what parts that are milled, eroded or etched hold. Other numbers see below.
 
 from __future__ import annotations
 
+from math import radians
+
 from ctrlgen.core.units import Quantity, base_unit, written_unit
 
 ASSUMED_SCALE = 5e-3
 """Standard deviation of the scale of each channel that is read, where nothing is stated. Judgement: position sensors that were not
 calibrated in place are good to a per cent, which is two of it."""
-ANGLE = 4.4e-3
-"""rad: half of 0.5 deg, the limit of ISO 2768-1 (fine and medium) for sides of 10 to 50 mm."""
+ANGLE = radians(0.5) / 2
+"""rad: half of the limit of ISO 2768-1 (fine and medium) for sides of 10 to 50 mm, 0.5 deg."""
 TEMPERATURE = 2.0
 """K: of a room. Judgement."""
 SHARE = 0.1

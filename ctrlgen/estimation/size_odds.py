@@ -21,6 +21,7 @@ from ctrlgen.devices import Device
 from ctrlgen.devices.usual_deviation import usual_deviation
 from ctrlgen.effects import Place
 from ctrlgen.estimation.fit import Fit
+from ctrlgen.estimation.free_parameters import nuisances
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, numbers
 from ctrlgen.estimation.law_prior import ONE_IN_A_HUNDRED
 
@@ -39,12 +40,9 @@ class Deviation:
 def known_deviation(cause: Hypothesis, device: Device) -> Deviation | None:
     """By how much what a cause says is wrong is usually off; None where nothing is known of it."""
     if cause.effect == PARAMETER:
-        for path, section, number in numbers(device):
-            if path == cause.path:
-                stated = number.sd if number.sd is not None else (section.relative_sd or 0.0) * abs(number.si)
-                sd = stated or usual_deviation(number)
-                return Deviation(sd, bool(stated)) if sd else None
-        return None
+        number = next(number for path, _, number in numbers(device) if path == cause.path)
+        sd = nuisances(device).get(cause.path) or usual_deviation(number)
+        return Deviation(sd, bool(number.sd)) if sd else None
     amplitude = cause.law.amplitude()
     for e in device.effect:
         here = e.kind == cause.effect and e.at in (cause.at, "all")
