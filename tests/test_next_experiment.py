@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from axis_records import AXIS, H, axis_fitter, record
@@ -11,8 +13,9 @@ from ctrlgen import build_model, load_device
 from ctrlgen.diagnosis.evidence.drive_envelope import DriveEnvelope, free_drives, occupied_band
 from ctrlgen.diagnosis.evidence.excitation_signals import admissible, pose_sets, time_series
 from ctrlgen.diagnosis.evidence.experiment_design import Experiment, separate
+from ctrlgen.diagnosis.evidence.other_readings import OtherReadingEntry, OtherReadings
 from ctrlgen.diagnosis.report.experiment_sentences import experiment_sentence
-from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.estimation.structure import Structure
 
@@ -172,3 +175,31 @@ def test_what_does_not_decide_within_the_recording_has_an_alternative():
         assert 0.05 < found.alternative.drives[0].range[1] <= limit
         assert found.alternative.separation_after > 3
     assert isinstance(found, Experiment) and experiment_sentence(found) != experiment_sentence(None)
+
+
+def test_what_is_read_otherwise_is_told_where_it_decides_and_where_nothing_does():
+    """It comes first where no drive is worth recording, and after the drive where one is."""
+    fitter, creep, drift = doubtful(1e-4, 0.05)
+    found = separate(fitter, creep, drift, "alike")
+    gain = Hypothesis("sensor_gain", "sensor:axis", "axis")
+    height = Hypothesis(PARAMETER, "mechanism:height", path="hexapod.height")
+
+    def said(after: float, *rows: tuple[str, float]) -> str:
+        entries = (
+            OtherReadingEntry(kind=text, description=text, scale=None, separation=s, settles=s > 3) for text, s in rows
+        )
+        design = replace(found, after=after, alternative=None, readings=OtherReadings(gain, height, tuple(entries)))
+        return experiment_sentence(design)
+
+    both = "sensor_gain at sensor:axis from a wrong mechanism:height"
+    first = (
+        f"To tell {both}, read the same poses with a turned specimen: they are 12 standard deviations apart then, "
+        "and a second sensor does not (1.4)."
+    )
+    rows = ("a turned specimen", 12.0), ("a second sensor", 1.4)
+    assert said(0.1, *rows) == first
+    by_drive = said(99.0, *rows)
+    assert by_drive.startswith("Run the next experiment") and by_drive.endswith(first)
+    assert said(0.1, rows[0], ("a second sensor", 4.0)).endswith("apart then, and a second sensor does too (4).")
+    assert f"Neither a nor b tells {both}: measure" in said(0.1, ("a", 1.0), ("b", 1.0))
+    assert f"Not even b tells {both}: measure" in said(0.1, ("b", 1.0))

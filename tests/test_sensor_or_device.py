@@ -14,12 +14,13 @@ from ctrlgen.core.units import Quantity
 from ctrlgen.devices.usual_deviation import usual_deviation
 from ctrlgen.diagnosis.diagnose import diagnose_recording
 from ctrlgen.diagnosis.evidence.other_readings import other_readings, read_by_another, read_turned
+from ctrlgen.diagnosis.report.answer import unlikely_rival
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection
 from ctrlgen.effects.gain import SensorGain
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 from ctrlgen.estimation.noise import estimate_noise
-from ctrlgen.estimation.size_odds import known_deviation, odds_of_size, of_sensor, prior_odds
+from ctrlgen.estimation.size_odds import known_deviation, odds_of_size, of_sensor, prior_odds, size_of
 from ctrlgen.estimation.structure import Structure
 
 GAIN = 0.006
@@ -101,6 +102,25 @@ def test_a_size_is_judged_by_what_is_stated_or_usual(fits):
         compare.samples = lambda *_: 1.0
         left.fitted = None
         assert compare.criterion(left, None) == pytest.approx(np.log(2) - 2 * prior_odds(fit))
+
+
+def test_the_answer_tells_what_fits_alike_and_is_unlikely_of_its_size(fits):
+    """The height of 4.1 mm would be off by 0.6 % of it, five of its usual deviations; the channel's scale is off by 1.2."""
+    _, ours, theirs = fits["delta_z"]
+    rival = SimpleNamespace(fit=theirs, causes=theirs.structure.causes, cause=HEIGHT)
+    chosen = SimpleNamespace(fit=ours, causes=ours.structure.causes)
+
+    def said(*alike):
+        search = SimpleNamespace(chosen=chosen, unlikely=(alike,))
+        return unlikely_rival(SimpleNamespace(findings=(SimpleNamespace(cause=OF_Z),), search=search))
+
+    of_height, of_scale = (size_of(fit, 0)[0] for fit in (theirs, ours))
+    assert of_scale == pytest.approx(GAIN / 0.005, rel=0.1) and of_height > 4
+    assert said() == ""
+    assert said(rival) == (
+        "; the readings alone do not tell it from a wrong mechanism:height, which would be off by "
+        f"{of_height:.2g} of its usual deviations, and sensor_gain at sensor:delta_z is by {of_scale:.2g}"
+    )
 
 
 def told(seed: int) -> tuple[bool, bool, bool]:

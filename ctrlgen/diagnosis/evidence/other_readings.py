@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from math import pi
+from math import pi, radians
 
 import numpy as np
 from pydantic import Field
@@ -38,8 +38,8 @@ from ctrlgen.reporting.result_file import FiniteOrNull, Keys, Number
 
 SECOND_SCALES = (ASSUMED_SCALE, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4)
 """Standard deviations of the scale of a second sensor: one as good as any, then calibrated ones."""
-MOUNTED = 9e-3
-"""rad: 0.5 deg, by which a turned specimen stands otherwise than it did. Judgement: put up by hand against a stop."""
+MOUNTED = radians(0.5)
+"""rad, by which a turned specimen stands otherwise than it did. Judgement: put up by hand against a stop."""
 PLANES = 3
 """Axes about which a pose in space can be turned; it has twice as many components."""
 
@@ -61,11 +61,6 @@ class OtherReadings:
     of_sensor: Hypothesis
     of_device: Hypothesis
     entries: tuple[OtherReadingEntry, ...]
-
-    @property
-    def best(self) -> OtherReadingEntry | None:
-        """What decides, with least; None where nothing does."""
-        return self.entries[0] if self.entries and self.entries[0].settles else None
 
 
 class _Turned(FrameRotation, listed=False):

@@ -21,7 +21,7 @@ from ctrlgen.diagnosis.report.narrative import (
 )
 from ctrlgen.diagnosis.report.shares_sentences import rest_kind
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
-from ctrlgen.diagnosis.selection.cause_entry import cause_name
+from ctrlgen.diagnosis.selection.cause_entry import cause_name, cause_noun
 from ctrlgen.diagnosis.selection.finding_region import EndEntry, places_of
 from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding, Role
 from ctrlgen.diagnosis.selection.verdict import (
@@ -88,7 +88,7 @@ def _cause(diagnosis: Diagnosis) -> str:
     if not findings:
         return f"{head}: the recording differs from {title}, and no known effect explains it."
     best = "no confirmed cause takes away most of the error; the best is " if verdict == Verdict.UNEXPLAINED else ""
-    return f"{head}: {best}{_main(findings)}{_rivals(diagnosis)}{_unlikely(diagnosis)}."
+    return f"{head}: {best}{_main(findings)}{_rivals(diagnosis)}{unlikely_rival(diagnosis)}."
 
 
 def _main(findings: Sequence[Finding]) -> str:
@@ -160,7 +160,7 @@ def _rivals(diagnosis: Diagnosis) -> str:
     least = VERDICT.main_share * (main.share.value if main.share else 0.0)
     counts = [f for f in diagnosis.findings if main.share is None or (f.share is not None and f.share.value >= least)]
     alike = [f for f in counts if f.alternatives]
-    pairs = [f"{'it' if f is main else cause_name(f.cause)} from {_any(f.alternatives)}" for f in alike]
+    pairs = [f"{'it' if f is main else cause_noun(f.cause)} from {_any(f.alternatives)}" for f in alike]
     rivals = f"; this recording cannot tell {', nor '.join(pairs)}" if pairs else ""
     support = diagnosis.findings[0].support
     if support is None or not support.contradicted:
@@ -171,22 +171,19 @@ def _rivals(diagnosis: Diagnosis) -> str:
     return f"{rivals}; the model-free shares speak for {told}"
 
 
-def _unlikely(diagnosis: Diagnosis) -> str:
-    """'; the readings alone do not tell it from mechanism:height, but that would be off by 30 of its usual deviations, and it is by 1.2',
-    where what is known beforehand decides."""
+def unlikely_rival(diagnosis: Diagnosis) -> str:
+    """'; the readings alone do not tell it from a wrong mechanism:height, which would be off by 30 of its usual deviations, and
+    sensor_gain at sensor:delta_z is by 1.2', where what is known beforehand decides."""
     main, search = diagnosis.findings[0], diagnosis.search
-    if main.cause not in search.chosen.causes:
+    alike = dict(zip(search.chosen.causes, search.unlikely, strict=False)).get(main.cause)
+    if not alike:
         return ""
-    k = search.chosen.causes.index(main.cause)
-    if k >= len(search.unlikely) or not search.unlikely[k]:
-        return ""
-    rival = search.unlikely[k][0]
-    here = size_of(search.chosen.fit, k)
+    rival, here = alike[0], size_of(search.chosen.fit, search.chosen.causes.index(main.cause))
     there = size_of(rival.fit, next(i for i, c in enumerate(rival.causes) if c == rival.cause))
     if there is None or rival.cause is None:
         return ""
-    own = "" if here is None else f", and {cause_name(main.cause)} is by {number(here[0], 2)}"
-    name, size = cause_name(rival.cause), number(there[0], 2)
+    own = "" if here is None else f", and {cause_noun(main.cause)} is by {number(here[0], 2)}"
+    name, size = cause_noun(rival.cause), number(there[0], 2)
     kind = "stated" if there[1].stated else "usual"
     return (
         f"; the readings alone do not tell it from {name}, which would be off by {size} of its {kind} deviations{own}"
@@ -196,7 +193,7 @@ def _unlikely(diagnosis: Diagnosis) -> str:
 def _any(causes: Sequence[Hypothesis]) -> str:
     """'backlash at stage:axis or creep at stage:axis', the first ones: the table has them all."""
     more = [f"{len(causes) - LISTED} more"] if len(causes) > LISTED else []
-    return " or ".join([*map(cause_name, causes[:LISTED]), *more])
+    return " or ".join([*map(cause_noun, causes[:LISTED]), *more])
 
 
 def _left(diagnosis: Diagnosis) -> list[str]:

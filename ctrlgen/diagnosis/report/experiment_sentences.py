@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ctrlgen.diagnosis.evidence.experiment_design import Experiment, ProposedDriveEntry
-from ctrlgen.diagnosis.selection.cause_entry import cause_name
+from ctrlgen.diagnosis.selection.cause_entry import cause_noun
 from ctrlgen.reporting.numbers import number
 
 # drives that a sentence names one by one
@@ -20,11 +20,12 @@ def experiment_sentence(experiment: Experiment | None) -> str:
     said, readings = _by_drives(experiment), experiment.readings
     if readings is None:
         return said
-    between = f"{cause_name(readings.of_sensor)} from {cause_name(readings.of_device)}"
+    between = f"{cause_noun(readings.of_sensor)} from {cause_noun(readings.of_device)}"
     first, *others = readings.entries
     if not first.settles:
         tried = " nor ".join(e.description for e in readings.entries)
-        return f"{said} Neither {tried} tells {between}: measure one of them directly."
+        none = "Neither" if others else "Not even"
+        return f"{said} {none} {tried} tells {between}: measure one of them directly."
     rest = "".join(
         f", and {e.description} {'does too' if e.settles else 'does not'} ({number(e.separation, 2)})" for e in others
     )

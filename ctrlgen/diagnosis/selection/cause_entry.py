@@ -15,6 +15,11 @@ def cause_name(cause: Hypothesis) -> str:
     return f"{cause.effect} at {cause.location}" + (f" of {cause.of}" if cause.of else "")
 
 
+def cause_noun(cause: Hypothesis) -> str:
+    """'coupling at stage:x of y', or 'a wrong mechanism:radius': as a part of a sentence."""
+    return f"a wrong {cause.location}" if cause.effect == PARAMETER else cause_name(cause)
+
+
 class EffectAt(Keys):
     """An effect at a location."""
 
