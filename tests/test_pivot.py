@@ -11,6 +11,7 @@ from ctrlgen import InputError
 from ctrlgen.path_timing.retimed import retimed
 from ctrlgen.physics.pivot import about
 from ctrlgen.physics.screw import TWIST
+from ctrlgen.trajectory.problem import PathProblem
 from ctrlgen.trajectory.scenario import load_scenario, model_of
 
 ARM = np.array([3e-3, -20e-3, 11e-3])
@@ -100,6 +101,26 @@ def test_set_points_of_a_path_about_a_pivot_are_of_the_stated_point(tmp_path):
     assert scenario.file.sample_rate is not None
     again = retimed(scenario, model, samples, scenario.file.sample_rate, "set-points")
     assert np.array_equal(again.bind(model).samples, samples)
+
+
+def test_a_path_between_its_samples_is_about_the_pivot_too(tmp_path, monkeypatch):
+    """A straight line of the pivot: what is asked for between samples is moved as they are, and the mode that is shaped is that of the
+    stated point's end."""
+    timed = 'pivot = ["5 mm", "1 mm", "0 mm"]\nsample_rate = "1 kHz"\nduration = "8 ms"'
+    line = 'kind = "line"\nend = { theta_z = "1 mrad" }'
+    problem = (scenario := written(tmp_path, STAGE, timed, line)).bind(model := model_of(scenario))
+    assert np.allclose(problem.positions(0.0), problem.samples, rtol=0, atol=1e-17)
+    a = (between := problem.positions(0.5))[:, 2]
+    moved = -np.column_stack([5e-3 * (np.cos(a) - 1) - 1e-3 * np.sin(a), 5e-3 * np.sin(a) + 1e-3 * (np.cos(a) - 1)])
+    assert np.allclose(between[:, :2], moved, rtol=0, atol=1e-17)
+
+    asked = []
+    monkeypatch.setattr(PathProblem, "order", 2)
+    monkeypatch.setattr(
+        "ctrlgen.trajectory.problem.least_damped_mode", lambda *given: asked.append(given) or (400.0, 0.0)
+    )
+    _ = written(tmp_path, STAGE, f'{timed}\nshaping = {{ kind = "ZV" }}', line).bind(model).shaper
+    assert np.allclose(asked[0][2], problem.samples[-1], rtol=0, atol=1e-17)
 
 
 def test_what_cannot_turn_is_refused(tmp_path):

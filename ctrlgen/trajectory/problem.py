@@ -91,12 +91,16 @@ class PathProblem:
     @cached_property
     def samples(self) -> np.ndarray:
         """(n, channels) [SI] the commanded samples."""
-        samples = self._about(self._on_path(lambda path, frame, n: path.samples(frame, n))[None])[0]
-        samples = samples + self._moved if self.file.shaping is None else self._positions(len(samples), 0.0)
+        samples = self._unshaped if self.file.shaping is None else self._positions(len(self._unshaped), 0.0)
         if isinstance(self.clock, Sampled) and len(samples) < 2:
             what = "has one sample, but motion in time needs two or more; for one pose leave out sample_rate"
             raise InputError(self.source, [Fault("path", what)])
         return samples
+
+    @cached_property
+    def _unshaped(self) -> np.ndarray:
+        """(n, channels) [SI] the samples of the path that is not shaped, of the point that the signal states, from `home`."""
+        return self._about(self._on_path(lambda path, frame, n: path.samples(frame, n))[None])[0] + self._moved
 
     @cached_property
     def motion(self) -> Motion:
@@ -129,7 +133,7 @@ class PathProblem:
 
     def positions(self, after: float) -> np.ndarray:
         """(n, channels) [SI] of the followed signal so many samples `after` each sample; before it where negative."""
-        return self._positions(len(self._on_path(lambda path, frame, n: path.samples(frame, n))), after)
+        return self._positions(len(self._unshaped), after)
 
     def geometry(self, order: int, share: np.ndarray) -> np.ndarray:
         """(order + 1, len(share), channels) [SI, per share^k]: the curve of the path alone, where the `share` of it, 0 ... 1, is
@@ -175,8 +179,7 @@ class PathProblem:
                 raise InputError(self.source, [Fault("shaping.frequency", what)])
             ratio = 0.0 if given.damping_ratio is None else given.damping_ratio.si
             return make_shaper(given.kind, given.frequency.si, ratio)
-        end = self._on_path(lambda path, frame, n: path.samples(frame, n))[-1]
-        mode = least_damped_mode(self.model, self.follow, tuple(end)) if self.order else None
+        mode = least_damped_mode(self.model, self.follow, tuple(self._unshaped[-1])) if self.order else None
         if mode is None:
             name = self.model.name
             why = "no mode that vibrates" if self.order else "no inertia, so that no mode vibrates"
