@@ -117,10 +117,9 @@ class Samples:
         low, high = m.z_bounds
         n = COUNT // PAUSE
         z = np.random.default_rng(1).uniform(low + 0.1 * (high - low), high, size=(n, self.axes))
-        state, none = np.tile(m.rest[:, None], (1, n)), np.zeros((self.axes, n))
-        values = m.evaluate_limits.map(n)(state, z.T, none, np.tile(m.p_nominal[:, None], (1, n)))
-        by_name = {limit.name: value.full() for limit, value in zip(m.limits, values, strict=True)}
-        ratios = [np.max(by_name[c.name] / c.upper, axis=0) for c in m.composite_limits() if c.upper is not None]
+        values = m.limited_values(np.tile(m.rest, (n, 1)), z, np.zeros((n, self.axes)))
+        by_name = {limit.name: value for limit, value in zip(m.limits, values, strict=True)}
+        ratios = [np.max(by_name[c.name] / c.upper, axis=1) for c in m.composite_limits() if c.upper is not None]
         z = z / np.maximum(np.max(ratios, axis=0), 1.0)[:, None] * (1 - 1e-6)
         share = (1 - np.cos(np.pi * np.arange(PAUSE) / PAUSE)) / 2
         lines = z[:, None, :] + share[None, :, None] * (np.roll(z, -1, axis=0) - z)[:, None, :]
@@ -162,9 +161,7 @@ class Samples:
         u = answers.u[1:]
         reached = simulate(m, u, in_time(self.scenario.clock).sample_time, answers.T[0])
         x, z = reached.x[1:], reached.z[1:]
-        values = m.evaluate_limits.map(len(u))(x.T, z.T, u.T, np.tile(m.p_nominal[:, None], (1, len(u))))
-        for limit, value in zip(m.limits, values, strict=True):
-            v = value.full()
+        for limit, v in zip(m.limits, m.limited_values(x, z, u), strict=True):
             size = max(abs(limit.upper or 0.0), abs(limit.lower or 0.0)) or np.abs(v).max()
             over = -np.inf if limit.upper is None else v.max() - limit.upper
             under = -np.inf if limit.lower is None else limit.lower - v.min()

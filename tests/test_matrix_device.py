@@ -146,6 +146,12 @@ def test_a_subset_of_directions_tells_what_else_is_pushed():
         actuator=[PUSHES[0] | {"at": ["100 um", "0 um", "0 um"], "along": [0, 1, 0]}],
     )  # fmt: skip
     assert hinge.remarks() == ["a also pushes by F_y, of which the compliance says nothing"]
+    slider = read(
+        NOTCH,
+        directions=["delta_y"], loads=["F_y"], compliance=[["0.301 um/N"]], channels=["delta_y"], readings=[],
+        actuator=[PUSHES[0] | {"at": ["100 um", "0 um", "0 um"], "along": [0, 1, 0]}],
+    )  # fmt: skip
+    assert slider.remarks() == ["a also pushes by M_z, of which the compliance says nothing"]
     physics = hinge.physics(hinge.values())
     assert np.isclose(dm(physics.pose(np.array([1e-6])))[0, 0], 1e-6 / 100e-6)  # an arm of 100 um
 

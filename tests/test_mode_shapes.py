@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from ctrlgen import load_device
+from ctrlgen.devices.mechanism.mode_shapes import bent
 from ctrlgen.reporting.mode_drawing import mode_svg
 
 DEVICES = Path(__file__).parent.parent / "scenarios" / "devices"
@@ -27,6 +28,14 @@ def test_the_first_mode_of_a_parallelogram_bends_its_blades_with_clamped_ends():
         assert np.abs(blade.moved[0]).max() == 0
     moves = np.vstack([line.moved for line in stage])
     assert np.abs(moves[:, 1:]).max() < 1e-2 * np.abs(moves[:, 0]).min()
+
+
+def test_a_flexure_whose_ends_move_as_one_is_only_turned():
+    """About the origin, by w x p + v; rounding of numbers of one size."""
+    start, end, w, v = np.random.default_rng(4).normal(size=(4, 3))
+    line = bent(start, end, twist := np.concatenate([w, v]), twist)
+    assert np.allclose(line.rest[[0, -1]], [start, end], rtol=0, atol=1e-15)
+    assert np.allclose(line.moved, np.cross(w, line.rest) + v, rtol=0, atol=1e-14)
 
 
 def test_modes_are_drawn_up_to_the_frequency_that_is_told():

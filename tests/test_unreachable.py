@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conftest import DEVICE
@@ -259,6 +261,18 @@ def test_a_margin_is_a_share_of_the_range_of_a_limit(tmp_path):
         if broken:
             assert broken[0].beyond == pytest.approx([missing]) and broken[0].share == pytest.approx(missing / 60e-6)
             assert broken[0].bound == pytest.approx(47e-6 if x > 0 else -7e-6)
+
+
+def test_a_model_may_have_one_limit_or_none(tmp_path):
+    """The values of several are a tuple, and of one a matrix, where a function of CasADi is called by its arguments alone."""
+    _, model = pair(tmp_path, [(0, 0)])
+    z = np.array([[60e-6, 0.0], [0.0, 0.0]])
+    stroke = next(
+        limit for limit in model.limits if limit.channels == ("x",) and limit.bounds[1] == pytest.approx(50e-6)
+    )
+    for limits in ((stroke,), ()):
+        broken = violations(replace(model, limits=limits), np.zeros((2, 0)), z, 1e6 * z)
+        assert [list(v.samples) for v in broken] == [[0]] * len(limits)
 
 
 def test_of_a_jump_beyond_the_stroke_the_stroke_alone_is_the_cause(tmp_path):

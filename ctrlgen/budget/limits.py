@@ -120,13 +120,9 @@ def _bounds(path: UncertainPath, model: Model) -> np.ndarray:
 
 def _limited(path: UncertainPath, model: Model, x: np.ndarray, z: np.ndarray) -> np.ndarray:
     """The limited quantities (n, channels) of a `model` at the path's states."""
-    n, wanted = path.n, [limit.name for limit in path.limits]
-    u = path.drive[path.before :]
-    values = model.evaluate_limits.map(n)(x.T, z.T, u.T, np.tile(model.p_nominal[:, None], (1, n)))
-    named = dict(
-        zip((limit.name for limit in model.limits), values if len(model.limits) > 1 else [values], strict=True)
-    )
-    return np.vstack([named[name].full() for name in wanted]).T
+    values = model.limited_values(x, z, path.drive[path.before :])
+    named = {limit.name: its for limit, its in zip(model.limits, values, strict=True)}
+    return np.hstack([named[limit.name] for limit in path.limits])
 
 
 @dataclass(frozen=True)

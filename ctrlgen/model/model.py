@@ -226,6 +226,11 @@ class Model(Shown):
         variables: tuple[tuple[Literal["x", "z", "u"], ca.SX], ...] = (("x", self.x), ("z", self.z), ("u", self.u))
         return next((name for name, s in variables if channel in dict(_positions(limit, s))), None)
 
+    def limited_values(self, x: np.ndarray, z: np.ndarray, u: np.ndarray) -> list[np.ndarray]:
+        """(n, channels) [SI] of each of the `limits` under the states x (n, n_x), displacements z (n, n_axes) and drives u (n, n_u)."""
+        p = np.tile(self.p_nominal[:, None], (1, len(x)))
+        return [values.full().T for values in self.evaluate_limits.map(len(x)).call([x.T, z.T, u.T, p])]
+
     def limited_rates(self, u: np.ndarray, before: np.ndarray, sample_time: float) -> list[np.ndarray]:
         """(n,) [SI] of each of the `rate_limits`: the change by time of its drive to `u` (n, n_u) from the one `before` (n, n_u)."""
         change = (u - before) / sample_time

@@ -175,11 +175,8 @@ def _excess(model: Model, drives: np.ndarray, sample_time: float, x_0: np.ndarra
     """(n, limits): how far the model driven so goes beyond each limit, over the bound's size; 0 where it is kept."""
     along = simulate(model, drives, sample_time, x_0)
     u = np.vstack([drives[:1], drives])
-    parameters = np.tile(model.p_nominal[:, None], (1, len(u)))
-    values = model.evaluate_limits.map(len(u))(along.x.T, along.z.T, u.T, parameters)
     columns = []
-    for limit, value in zip(model.limits, values, strict=True):
-        v = value.full().T
+    for limit, v in zip(model.limits, model.limited_values(along.x, along.z, u), strict=True):
         size = max(abs(limit.upper or 0.0), abs(limit.lower or 0.0)) or np.abs(v).max() or 1.0
         over = np.zeros(len(u)) if limit.upper is None else v.max(axis=1) - limit.upper
         under = np.zeros(len(u)) if limit.lower is None else limit.lower - v.min(axis=1)

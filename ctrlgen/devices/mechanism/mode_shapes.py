@@ -51,7 +51,7 @@ def mode_shapes(device: Drawing) -> tuple[ModeShape, ...]:
             return np.zeros(6) if body == GROUND else twists[6 * body : 6 * body + 6, k]
 
         lines = [
-            _bent(start, end, twist(e.first), twist(e.second))
+            bent(start, end, twist(e.first), twist(e.second))
             for e, start, end in zip(device.placed_elements, starts, ends, strict=True)
         ]
         for s in device.placed_super_elements:
@@ -75,7 +75,7 @@ def _at(place: np.ndarray, twist: np.ndarray) -> np.ndarray:
     return np.asarray(twist[3:] + np.cross(twist[:3], place))
 
 
-def _bent(start: np.ndarray, end: np.ndarray, first: np.ndarray, second: np.ndarray) -> Line:
+def bent(start: np.ndarray, end: np.ndarray, first: np.ndarray, second: np.ndarray) -> Line:
     """A flexure whose ends move by the twists of its bodies: the cubic through their displacements with their slopes."""
     s, span = STATIONS[:, None], end - start
     u, v = _at(start, first), _at(end, second)

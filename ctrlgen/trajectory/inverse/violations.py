@@ -50,9 +50,7 @@ def limited_values(
 ) -> list[tuple[Limit, np.ndarray]]:
     """Every limit with the limited quantity (n, channels) [SI] under the states x (n, n_x), displacements z (n, n_axes) and drives u
     (n, n_u); those on the rates of drives where the drives `before` are given."""
-    n = len(x)
-    tables = model.evaluate_limits.map(n)(x.T, z.T, u.T, np.tile(model.p_nominal[:, None], (1, n)))
-    limited = [(limit, values.full().T) for limit, values in zip(model.limits, tables, strict=True)]
+    limited = list(zip(model.limits, model.limited_values(x, z, u), strict=True))
     if before is not None and model.rate_limits:
         rates = model.limited_rates(u, before.drive, before.sample_time)
         limited += [(limit, rate[:, None]) for limit, rate in zip(model.rate_limits, rates, strict=True)]
