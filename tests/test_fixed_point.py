@@ -13,7 +13,7 @@ from conftest import SCENARIOS
 
 from ctrlgen import build_model, load_scenario
 from ctrlgen.controller.controller_step import ControllerStatus, answer
-from ctrlgen.controller.fixed_point import fixed_point
+from ctrlgen.controller.fixed_point import FINEST, SHARE_BITS, fixed_point
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.templates import write
@@ -87,9 +87,13 @@ def test_answers_are_off_those_in_real_numbers_by_no_more_than_is_proved(circle)
     circle.start()
     compared, largest = 0, np.zeros(4)
     for target in map(lambda t: circle.counts(t) * 2.0**-fixed.bits.target, path):
-        before = state
+        before, x_before = state, circle.state[: circle.n_s].copy()
         real = circle.controller.step(before, target)
         status, u, z, s = circle.call("step", target)
+        if not status:  # the C has the maps whose bounds are tested in test_scaled_integers
+            assert np.array_equal(z, fixed.displacement(circle.counts(target))) and np.array_equal(s, fixed.state_of(z))
+            both = np.concatenate([x_before, s])
+            assert np.array_equal(u, np.clip(fixed.step_drive(both), *fixed.drive_ends))
         u, z, s = (
             v * 2.0**-b
             for v, b in zip((u, z, s), (fixed.bits.drive, fixed.bits.displacement, fixed.bits.state), strict=True)
@@ -109,6 +113,43 @@ def test_answers_are_off_those_in_real_numbers_by_no_more_than_is_proved(circle)
         bounds = (fixed.off.displacement, fixed.off.state, fixed.off.drive, fixed.off.stage)
         largest = np.maximum(largest, [np.max(np.abs(a) / b) for a, b in zip(found, bounds, strict=True)])
     assert compared > 300 and np.all(largest > 0.1)  # the bounds are no idle ones
+
+
+def test_composite_limits_are_kept_with_every_error(circle):
+    """What the shares may add up to, their rounding, the bound's own rest and what the stage is off come to one at most."""
+    fixed, bound = circle.fixed, circle.controller.kernels.bound
+    shares = (fixed.bound_limit + fixed.bound.off.sum()) * 2.0**-SHARE_BITS
+    errors = bound.rest + np.sum(np.abs(bound.rows) @ fixed.off.stage)
+    assert 1 - 4 * 2.0**-SHARE_BITS < shares + errors <= 1
+
+
+def test_a_jump_is_approached_in_parts_that_a_lag_outdoes_in_a_sample(circle):
+    moved = 1 - np.exp(-circle.scenario.sample_time / 5e-3)  # of its way, with the device's time constant of 5 ms
+    assert 2.0**-circle.fixed.trials <= moved / FINEST < 2 * 2.0**-circle.fixed.trials
+
+
+def test_the_ends_of_the_range_are_within_it_in_spite_of_roundings(circle):
+    (low, high), fixed = circle.model.z_bounds, circle.fixed
+    slack = fixed.displacement_slack * 2.0**-fixed.bits.displacement
+    assert np.all(slack >= np.maximum(circle.controller.slacks[0], fixed.off.target + fixed.off.displacement))
+    for beyond, told in ((0.5, False), (3.0, True)):
+        for end in (low - beyond * slack, high + beyond * slack):
+            circle.start()
+            assert (ControllerStatus.DISPLACEMENT in circle.call("step", circle.target_of(end))[0]) == told
+
+
+def test_to_settle_starts_from_home_wherever_the_device_was(circle):
+    rng, answers = np.random.default_rng(2), []
+    ends = rng.uniform(0, 1, (100, circle.n)) * circle.model.z_bounds[1]
+    bound = circle.controller.kernels.composite_bound
+    far = circle.target_of(max(ends, key=lambda z: float(bound(z))))
+    for start in (np.zeros(circle.n), *rng.uniform(0.1, 0.4, (3, circle.n)) * circle.model.z_bounds[1]):
+        circle.start()
+        circle.call("settle", circle.target_of(start))
+        status, *answer_of = circle.call("settle", far)
+        assert ControllerStatus.COMPOSITE in status
+        answers.append(np.concatenate(answer_of))
+    assert all(np.array_equal(answers[0], other) for other in answers)
 
 
 def test_jumps_beyond_every_limit_keep_them_and_are_told(circle):
@@ -147,6 +188,10 @@ def test_nothing_is_promised_while_the_device_settles_cools_or_is_lost(circle):
     statuses = [circle.call("settle", target)[0] for _ in range(fixed.settling + 1)]
     assert statuses == [ControllerStatus.UNSURE] * fixed.settling + [ControllerStatus(0)]
     assert circle.call("step", target)[0] == 0
+    near = circle.target_of(
+        0.3001 * circle.model.z_bounds[1]
+    )  # a state off by 10^-4: more than the 10^-6 that is known
+    assert circle.call("settle", near)[0] == ControllerStatus.UNSURE
     assert getattr(circle.library, f"{NAME}_forget")(circle.state.ctypes) == ControllerStatus.UNSURE
     for _ in range(fixed.unknown):
         status, u, z, _ = circle.call("step", target)
@@ -159,7 +204,10 @@ def test_nothing_is_promised_while_the_device_settles_cools_or_is_lost(circle):
         circle.state[place] ^= 1 << 30
         status, u, *_ = circle.call("step", target)
         assert status == ControllerStatus.LOST and not u.any()
-        assert circle.call("step", target)[0] == ControllerStatus.LOST  # until it is initialised
+        circle.state[place] ^= 1 << 30
+        assert (
+            circle.call("step", target)[0] == ControllerStatus.LOST
+        )  # until it is initialised, also where the bit flips back
 
 
 HOSTILE = """

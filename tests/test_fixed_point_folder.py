@@ -46,6 +46,7 @@ def test_devices_without_a_controller_in_integers_are_refused_with_the_reason():
         "more drives than axes": stage(),
         "given at the start": load_device(SCENARIOS / "devices" / "mems_hexapod_run_time.toml"),
         "an effect of the device remembers": effect_device(creep),
+        "cannot be kept by drives": effect_device({"kind": "heat_crosstalk", "at": "1X", "share": "0.05"}),
     }
     for why, device in devices.items():
         with pytest.raises(NoFixedPoint, match=why):

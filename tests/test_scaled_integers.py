@@ -48,3 +48,15 @@ def test_integer_polynomials_are_off_by_no_more_than_they_say(low):
     assert max(map(abs, integers.coefficients)) < 2**31
     with pytest.raises(DoesNotFit):
         integer_polynomial(polynomial, (bits_in, 29), ends)
+
+
+def test_a_middle_that_the_argument_cannot_say_is_in_the_bound():
+    v = ca.SX.sym("v")
+    polynomial = proven_polynomial(ca.Function("f", [v], [ca.exp(v)]), 1.1, 2.0, 1e-8)
+    integers = integer_polynomial(polynomial, (9, 24), (564, 1024))  # 1.55 * 2^9 = 793.6
+    exact = np.polynomial.Polynomial(polynomial.coefficients)
+    off = [
+        abs(integers(p) - exact((p * 2.0**-9 - polynomial.centre) / polynomial.half) * 2.0**24)
+        for p in range(564, 1025)
+    ]
+    assert 0.8 * integers.off < max(off) <= integers.off
