@@ -14,7 +14,7 @@ from ctrlgen import build_model, load_device
 from ctrlgen.app.look_console import described, look
 from ctrlgen.core.errors import InputError
 from ctrlgen.recordings.formats import read_table
-from ctrlgen.recordings.look.answers import Answers, read_answers
+from ctrlgen.recordings.look.answers import Answers, layout_option, read_answers
 from ctrlgen.recordings.look.column_facts import table_facts
 from ctrlgen.recordings.look.proposal import propose
 from ctrlgen.recordings.reader import load_recordings
@@ -208,3 +208,7 @@ def test_a_question_about_a_column_is_told_and_its_answer_reads_it(tmp_path, cap
             propose([facts], axis, options("--column", "reading.axis=y"))
         read = table_facts(read_table(file, None, options("--layout", key).layout)).column("y [nm]")
         assert read.missing == 2 and read.question is None
+    asked = table_facts(read_table(tmp_path / "-9999.csv")).column("y [nm]").question.asked(layout_option)
+    assert asked.endswith("--layout 'missing = []' if it is a reading")
+    kept = table_facts(read_table(tmp_path / "-9999.csv", None, options("--layout", "missing = []").layout))
+    assert kept.column("y [nm]").missing == 0

@@ -113,12 +113,6 @@ def _affine(unit: str) -> tuple[float, float]:
     return one - zero, zero
 
 
-def _check_known(unit: str) -> None:
-    """Raises ValueError for an unknown unit."""
-    if (unit or "1") not in KNOWN:
-        _unit(unit)
-
-
 def to_si(value: float, unit: str) -> float:
     """`value` in `unit` as an SI number; temperatures in degC become kelvin."""
     scale, offset = _affine(unit)
@@ -206,7 +200,6 @@ def parse(text: object, unit: str) -> float:
         value, written = (float(text) if abs(text) < LARGEST_OTHER else math.inf), ""
     if not math.isfinite(value):
         raise ValueError(f"{reprlib.repr(text)} is not a finite number")
-    _check_known(written)
     absolute = unit in ("degC", "degF", "K")
     if (written == "" and unit != "1") or (absolute and "delta" in written) or not same_dimension(written, unit):
         if written == "":
@@ -250,7 +243,6 @@ def _bounds_text(unit: str, low: float | None, high: float | None, low_open: boo
 def _own_unit(text: object) -> str:
     """The unit that a number is written in, one that begins at zero. Raises ValueError."""
     unit = written_unit(str(text))
-    _check_known(unit)
     if to_si(0.0, unit):
         raise ValueError(f"{text!r} does not count from zero; write it in a unit that does, such as K")
     return unit
@@ -333,7 +325,6 @@ def read_quantity(unit: str | None, given: Any) -> Quantity:
     if unit is None:
         value = given.get("value") if isinstance(given, dict) else given
         unit = written_unit(str(value))
-        _check_known(unit)
     return _reader(unit, None, None, False)(given)
 
 
