@@ -18,7 +18,7 @@ from ctrlgen.diagnosis.report.answer import unlikely_rival
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection
 from ctrlgen.effects.gain import SensorGain
 from ctrlgen.estimation.fit import Fitter
-from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, hypotheses, nominal_physics
 from ctrlgen.estimation.noise import estimate_noise
 from ctrlgen.estimation.size_odds import known_deviation, odds_of_size, of_sensor, prior_odds, size_of
 from ctrlgen.estimation.structure import Structure
@@ -102,6 +102,13 @@ def test_a_size_is_judged_by_what_is_stated_or_usual(fits):
         compare.samples = lambda *_: 1.0
         left.fitted = None
         assert compare.criterion(left, None) == pytest.approx(np.log(2) - 2 * prior_odds(fit))
+
+
+def test_a_scale_of_all_channels_that_are_read_is_one_cause_more():
+    for read in (COMPONENTS[3:], COMPONENTS[5:]):
+        observed = tuple(f"reading.{c}" for c in read)
+        offered = hypotheses(DEVICE, nominal_physics(DEVICE), observed, None, False, (SensorGain,))
+        assert [h.at for h in offered if of_sensor(h)] == [*read, *(["all"] if len(read) > 1 else [])]
 
 
 def test_the_answer_tells_what_fits_alike_and_is_unlikely_of_its_size(fits):
