@@ -126,7 +126,7 @@ def test_the_answer_tells_what_fits_alike_and_is_unlikely_of_its_size(fits):
     assert said() == ""
     assert said(rival) == (
         "; the readings alone do not tell it from a wrong mechanism:height, which would be off by "
-        f"{of_height:.2g} of its usual deviations, and sensor_gain at sensor:delta_z is by {of_scale:.2g}"
+        f"{of_height:.2g} of its usual deviations, the one named by {of_scale:.2g}"
     )
 
 

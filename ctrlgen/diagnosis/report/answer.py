@@ -172,8 +172,8 @@ def _rivals(diagnosis: Diagnosis) -> str:
 
 
 def unlikely_rival(diagnosis: Diagnosis) -> str:
-    """'; the readings alone do not tell it from a wrong mechanism:height, which would be off by 30 of its usual deviations, and
-    sensor_gain at sensor:delta_z is by 1.2', where what is known beforehand decides."""
+    """'; the readings alone do not tell it from a wrong mechanism:height, which would be off by 30 of its usual deviations,
+    the one named by 1.2', where what is known beforehand decides."""
     main, search = diagnosis.findings[0], diagnosis.search
     alike = dict(zip(search.chosen.causes, search.unlikely, strict=False)).get(main.cause)
     if not alike:
@@ -182,7 +182,7 @@ def unlikely_rival(diagnosis: Diagnosis) -> str:
     there = size_of(rival.fit, next(i for i, c in enumerate(rival.causes) if c == rival.cause))
     if there is None or rival.cause is None:
         return ""
-    own = "" if here is None else f", and {cause_noun(main.cause)} is by {number(here[0], 2)}"
+    own = "" if here is None else f", the one named by {number(here[0], 2)}"
     name, size = cause_noun(rival.cause), number(there[0], 2)
     kind = "stated" if there[1].stated else "usual"
     return (
