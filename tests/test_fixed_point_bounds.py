@@ -10,7 +10,9 @@ import pytest
 from conftest import SCENARIOS
 
 from ctrlgen import build_model, load_device
-from ctrlgen.controller import fixed_point as fixed
+from ctrlgen.controller import fixed_maps
+from ctrlgen.controller.fixed_errors import Bits, error_bounds
+from ctrlgen.controller.fixed_maps import NoFixedPoint, RealMaps, real_maps
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.numerics.proven_polynomial import ProvenPolynomial
 
@@ -21,7 +23,7 @@ SLOPES, PROVED = (
 PLACES = [1, 0]
 M = np.array([[2.0, 0.5], [-1.0, 4.0]])
 A, B = np.diag([0.5, 0.8]), np.array([[0.3, 0.0], [0.0, 0.4]])
-BITS = fixed.Bits(*(np.array(bits) for bits in ([9, 8], [10, 11], [7, 9], [8, 10])))
+BITS = Bits(*(np.array(bits) for bits in ([9, 8], [10, 11], [7, 9], [8, 10])))
 COUNTS = np.array([2.0, 3.0]), np.array([5.0, 4.0]), np.array([6.0, 7.0])  # roundings of displacement, state and drive
 CUT = np.array([9.0, 11.0])  # counts of a drive, cut off at its limit
 
@@ -33,8 +35,8 @@ def test_a_linear_device_is_off_by_the_whole_bound_where_every_error_has_its_wor
         for i, k, off in zip(PLACES, SLOPES, PROVED, strict=True)
     )
     settle, step = np.linalg.inv(B) @ (np.eye(2) - A), np.linalg.inv(B) @ np.hstack([-A, np.eye(2)])
-    real = fixed._RealMaps(M, state, (settle, np.zeros(2)), (step, np.zeros(2)), A, B)
-    off = fixed._off(real, BITS, COUNTS, CUT)
+    real = RealMaps(M, state, (settle, np.zeros(2)), (step, np.zeros(2)), A, B)
+    off = error_bounds(real, BITS, COUNTS, CUT)
     bits = BITS.displacement, BITS.state, BITS.drive, BITS.drive, BITS.target
     e_z, e_s, e_u, e_cut, e_t = (c * 2.0**-b for c, b in zip((*COUNTS, CUT, np.full(2, 0.5)), bits, strict=True))
     signs = [np.array(s) for s in product((-1.0, 1.0), repeat=2)]
@@ -62,13 +64,13 @@ def test_a_linear_device_is_off_by_the_whole_bound_where_every_error_has_its_wor
 def test_a_polynomial_that_serves_one_mode_alone_is_refused(monkeypatch):
     device = load_device(SCENARIOS / "devices" / "mems_hexapod.toml")
     kernels = controller_of(build_model(device), "pose", 1e-3).kernels
-    of_rest = fixed._real_maps(kernels).state
+    of_rest = real_maps(kernels).state
     (place, polynomial), *others = of_rest
     for changed in (
         (place + 1, polynomial),
         (place, replace(polynomial, coefficients=polynomial.coefficients * (1 + 1e-9))),
     ):
         answers = iter([of_rest, (changed, *others)])
-        monkeypatch.setattr(fixed, "state_polynomials", lambda *_, given=answers, **__: next(given))
-        with pytest.raises(fixed.NoFixedPoint, match="do not follow from one displacement each"):
-            fixed._real_maps(kernels)
+        monkeypatch.setattr(fixed_maps, "state_polynomials", lambda *_, given=answers, **__: next(given))
+        with pytest.raises(NoFixedPoint, match="do not follow from one displacement each"):
+            real_maps(kernels)

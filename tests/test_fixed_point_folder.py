@@ -11,7 +11,8 @@ from conftest import SCENARIOS, effect_device
 from three_stacks import stage
 
 from ctrlgen import InputError, build_model, load_device, load_scenario
-from ctrlgen.controller.fixed_point import NoFixedPoint, fixed_point
+from ctrlgen.controller.fixed_maps import NoFixedPoint
+from ctrlgen.controller.fixed_point import fixed_point
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.firmware.folder import generate
 from ctrlgen.firmware.package import verify_package

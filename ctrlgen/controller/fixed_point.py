@@ -18,15 +18,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import ceil, log2
 
-import casadi as ca
 import numpy as np
 
 from ctrlgen.controller.contraction import FOREVER
 from ctrlgen.controller.feedforward import Controller
+from ctrlgen.controller.fixed_errors import Bits, Off, error_bounds
+from ctrlgen.controller.fixed_maps import NoFixedPoint, RealMaps, real_maps
 from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.controller.motion_feedforward import MotionKernels
-from ctrlgen.controller.quick_state import state_polynomials
-from ctrlgen.numerics.proven_polynomial import ProvenPolynomial
 from ctrlgen.numerics.scaled_integers import (
     LARGEST,
     DoesNotFit,
@@ -43,33 +42,6 @@ SHARE_BITS = 28  # of shares of composite limits: their sum, eight directions be
 FINEST = 4  # parts of the way that a lag goes in a sample, by which the halving stops: what is left delays a jump by a quarter at most
 ROUNDED = 1e-6  # of a drive's range: what roundings of states may come to
 TRIALS = (4, 16)  # fewest and most
-
-
-class NoFixedPoint(Exception):
-    """Why a controller cannot be made in integers."""
-
-
-@dataclass(frozen=True)
-class Bits:
-    """Of each number of the interface: V counts 2^-bits of its unit."""
-
-    target: np.ndarray
-    displacement: np.ndarray
-    state: np.ndarray
-    drive: np.ndarray
-
-
-@dataclass(frozen=True)
-class Off:
-    """Bounds, SI: `displacement` (n,), `state` (n_s,) and `drive` (n_u,) of an answer, against real numbers and the same target; `stage`
-    (n,), the displacement of a device as described under these drives, against the target; `target` (n,), what rounding a target to
-    integers makes of the displacement."""
-
-    target: np.ndarray
-    displacement: np.ndarray
-    state: np.ndarray
-    drive: np.ndarray
-    stage: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -110,7 +82,7 @@ def fixed_point(controller: Controller) -> FixedPoint:
     if (why := _why_not(controller)) is not None:
         raise NoFixedPoint(why)
     try:
-        return _scaled(controller, _real_maps(kernels))
+        return _scaled(controller, real_maps(kernels))
     except DoesNotFit:
         raise NoFixedPoint("its numbers are too far apart for integers of 32 bits") from None
 
@@ -147,54 +119,7 @@ def _why_not(controller: Controller) -> str | None:
     return None
 
 
-@dataclass(frozen=True)
-class _RealMaps:
-    """z = M t, s_k = f_k(z), u = settle s + settle_0 = step (x, s) + step_0, x+ = by_state x + by_drive u + constant."""
-
-    M: np.ndarray
-    state: tuple[tuple[int, ProvenPolynomial], ...]
-    settle: tuple[np.ndarray, np.ndarray]
-    step: tuple[np.ndarray, np.ndarray]
-    by_state: np.ndarray
-    by_drive: np.ndarray
-
-
-def _real_maps(kernels: ControllerKernels) -> _RealMaps:
-    """Those of a device without reasons against them. Raises NoFixedPoint where one is of another kind."""
-    m, M, moving = kernels.nominal, kernels.target_directions, kernels.moving
-    assert M is not None and moving is not None
-    found = [state_polynomials(k.state, *m.z_bounds, even_cheap=True) for k in kernels.modes]
-    of_rest, of_motion = found
-    if not of_rest or not of_motion or not _same(of_rest, of_motion):
-        raise NoFixedPoint("its states do not follow from one displacement each by a polynomial whose error is proved")
-    settle = _affine(kernels.static.drive, ("state",))
-    step = _affine(moving.drive, ("x", "state"))
-    advance = _affine(moving.advance, ("x", "drive"))
-    if settle is None or step is None or advance is None:
-        raise NoFixedPoint("its drives are not linear in its states")
-    n = m.n_states
-    return _RealMaps(M, of_rest, settle, step, advance[0][:, :n], advance[0][:, n:])
-
-
-def _same(first: tuple[tuple[int, ProvenPolynomial], ...], second: tuple[tuple[int, ProvenPolynomial], ...]) -> bool:
-    return all(
-        i == j and np.array_equal(p.coefficients, q.coefficients) for (i, p), (j, q) in zip(first, second, strict=True)
-    )
-
-
-def _affine(kernel: ca.Function, of: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray] | None:
-    """Slope and value at zero of a kernel in its arguments `of`; None where it is not affine, or depends on another."""
-    arguments = {name: ca.SX.sym(name, *kernel.size_in(name)) for name in kernel.name_in()}
-    result = kernel(*arguments.values())
-    own = ca.vertcat(*(arguments[name] for name in of))
-    others = ca.vertcat(*(value for name, value in arguments.items() if name not in of))
-    slope = ca.jacobian(result, own)
-    if ca.depends_on(result, others) or ca.depends_on(slope, own):
-        return None
-    return ca.evalf(slope).full(), ca.evalf(ca.substitute(result, own, ca.SX.zeros(own.numel()))).full().ravel()
-
-
-def _scaled(controller: Controller, real: _RealMaps) -> FixedPoint:
+def _scaled(controller: Controller, real: RealMaps) -> FixedPoint:
     """The integers of real maps. Raises DoesNotFit, and NoFixedPoint where a place could not be kept."""
     m, contraction = controller.kernels.nominal, controller.kernels.contraction
     assert contraction is not None
@@ -225,7 +150,7 @@ def _scaled(controller: Controller, real: _RealMaps) -> FixedPoint:
     step = integer_rows(*real.step, (np.tile(bits.state, 2), bits.drive), twice, twice)
     excess = _excess(real, m.u_bounds, x_ends * 2.0**-bits.state)
     slack = np.ceil(np.maximum(settle.off, step.off) + excess * 2.0**bits.drive) + 1
-    off = _off(real, bits, (displacement.off, off_state, np.maximum(settle.off, step.off)), slack)
+    off = error_bounds(real, bits, (displacement.off, off_state, np.maximum(settle.off, step.off)), slack)
     bound, limit = _bound(controller.kernels, bits, z_ends, off.stage)
     return FixedPoint(
         bits,
@@ -264,7 +189,7 @@ def _ends(low: np.ndarray, high: np.ndarray, bits: np.ndarray) -> np.ndarray:
     )
 
 
-def _state_ends(real: _RealMaps, z_low: np.ndarray, z_high: np.ndarray) -> np.ndarray:
+def _state_ends(real: RealMaps, z_low: np.ndarray, z_high: np.ndarray) -> np.ndarray:
     """(2, n_s) lowest and highest states of displacements in range: the polynomials rise or fall all over it."""
     ends = []
     for i, p in real.state:
@@ -273,7 +198,7 @@ def _state_ends(real: _RealMaps, z_low: np.ndarray, z_high: np.ndarray) -> np.nd
     return np.array(ends).T
 
 
-def _excess(real: _RealMaps, u_bounds: tuple[np.ndarray, np.ndarray], x_ends: np.ndarray) -> np.ndarray:
+def _excess(real: RealMaps, u_bounds: tuple[np.ndarray, np.ndarray], x_ends: np.ndarray) -> np.ndarray:
     """(n_u,) by how much drives that keep a state in range where it is may be beyond their limits: for roundings of states. Raises
     NoFixedPoint where it is more."""
     n = x_ends.shape[1]
@@ -285,23 +210,6 @@ def _excess(real: _RealMaps, u_bounds: tuple[np.ndarray, np.ndarray], x_ends: np
     if np.any(excess > ROUNDED * (u_bounds[1] - u_bounds[0])):
         raise NoFixedPoint("a displacement in range cannot be kept by drives within their limits")
     return excess
-
-
-def _off(real: _RealMaps, bits: Bits, rounding: tuple[np.ndarray, np.ndarray, np.ndarray], slack: np.ndarray) -> Off:
-    """The bounds from the roundings of displacement, state and drive, in counts."""
-    z, s, u = (off * 2.0**-b for off, b in zip(rounding, (bits.displacement, bits.state, bits.drive), strict=True))
-    n, places = len(s), [i for i, _ in real.state]
-    flattest, steepest, proved = (
-        np.array([getattr(p, name) for _, p in real.state]) for name in ("flattest", "steepest", "off")
-    )
-    state = s + flattest * proved + steepest * z[places]
-    gain = np.abs(real.by_state)
-    to_state = np.linalg.solve(np.eye(n) - gain, np.abs(real.by_drive) @ (u + slack * 2.0**-bits.drive))
-    stage = z.copy()
-    np.add.at(stage, places, proved + (s + to_state) / flattest)
-    by_both = np.abs(real.step[0])
-    drive = u + np.maximum(np.abs(real.settle[0]) @ state, by_both[:, :n] @ state + by_both[:, n:] @ state)
-    return Off(np.abs(real.M) @ (0.5 * 2.0**-bits.target), z, state, drive, stage)
 
 
 def _bound(

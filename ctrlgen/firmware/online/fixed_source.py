@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from ctrlgen.controller.feedforward import Controller
-from ctrlgen.controller.fixed_point import FixedPoint, NoFixedPoint, fixed_point
+from ctrlgen.controller.fixed_maps import NoFixedPoint
+from ctrlgen.controller.fixed_point import FixedPoint, fixed_point
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import base_unit
 from ctrlgen.firmware.c.real import Real
