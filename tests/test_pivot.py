@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from ctrlgen import InputError
 from ctrlgen.path_timing.retimed import retimed
-from ctrlgen.physics.pivot import about
+from ctrlgen.physics.pivot import about, can_turn
 from ctrlgen.physics.screw import TWIST
 from ctrlgen.trajectory.problem import PathProblem
 from ctrlgen.trajectory.scenario import load_scenario, model_of
@@ -57,6 +57,17 @@ def test_derivatives_are_those_of_the_moved_pose():
     # central differences: h^2 of the third and fourth derivative, roundings of 1e-17 over h^2
     assert np.allclose(tables[1], (stated(t + h) - stated(t - h)) / (2 * h), atol=1e-9)
     assert np.allclose(tables[2], (stated(t + h) - 2 * stated(t) + stated(t - h)) / h**2, atol=1e-8)
+
+
+def test_the_third_derivative_is_exact_near_no_rotation():
+    """Through theta = 0 at the speed w about z, d^3/dt^3 (R - I) r = w^3 (sin a r - cos a z x r) across z."""
+    w, r = 3.0, ARM[:2]
+    for angle in (0.0, 1e-15, 1e-9, 1e-5):
+        tables = np.zeros((4, 1, 6))
+        tables[0, 0, 2], tables[1, 0, 2] = angle, w
+        third = w**3 * (np.sin(angle) * r - np.cos(angle) * np.array([-r[1], r[0]]))
+        # a few roundings of w^3 times the arm
+        assert np.allclose(about(TWIST, tables, ARM)[3, 0, 3:], [*-third, 0], rtol=0, atol=1e-15)
 
 
 def written(folder, device, lines, path='kind = "poses"\npoints = [{ theta_z = "0.1 deg" }, { delta_x = "3 um" }]'):
@@ -123,12 +134,18 @@ def test_a_path_between_its_samples_is_about_the_pivot_too(tmp_path, monkeypatch
     assert np.allclose(asked[0][2], problem.samples[-1], rtol=0, atol=1e-17)
 
 
-def test_what_cannot_turn_is_refused(tmp_path):
+def test_what_cannot_turn_is_refused_where_it_is_read(tmp_path):
+    line, axis = 'kind = "line"\nend = {}', SCENARIOS / "devices/flexure_axis.toml"
+    with pytest.raises(InputError, match="pivot: turns a pose about a point, and what is followed is the pose axis"):
+        written(tmp_path, axis, 'pivot = ["5 mm", "0 mm", "0 mm"]\npoints = 3', line)
+    with pytest.raises(InputError, match="what is followed is the displacement"):
+        written(tmp_path, HEXAPOD, 'follow = "displacement"\npivot = ["5 mm", "0 mm", "0 mm"]\npoints = 3', line)
+    assert can_turn(("theta_z", "delta_x")) and not can_turn(("theta_z", "delta_z")) and not can_turn(TWIST[3:])
+
+
+def test_more_than_a_turn_about_a_pivot_is_refused(tmp_path):
     scenario = written(
-        tmp_path,
-        SCENARIOS / "devices/flexure_axis.toml",
-        'pivot = ["5 mm", "0 mm", "0 mm"]\npoints = 3',
-        'kind = "line"\nend = {}',
+        tmp_path, HEXAPOD, 'pivot = ["5 mm", "0 mm", "0 mm"]', 'kind = "poses"\npoints = [{ theta_z = "361 deg" }]'
     )
-    with pytest.raises(InputError, match="pivot: turns a pose about a point, and what is followed is"):
+    with pytest.raises(InputError, match="path: turns by 361 deg"):
         _ = scenario.bind(model_of(scenario)).samples

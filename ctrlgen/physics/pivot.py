@@ -3,11 +3,10 @@
 A signal states the body's rotation vector theta and the displacement delta of one point. Where the body turns by R = exp(theta x) and the
 point that was at `arm` from it at home, the pivot, is displaced by delta_p, the stated point is displaced by
 
-    delta = delta_p - (R - I) arm,   (R - I) arm = s c (theta x arm) + s^2/2 theta x (theta x arm),
+    delta = delta_p - (R - I) arm
 
-s = sin(a/2)/(a/2), c = cos(a/2), a = |theta|: Rodrigues' formula in half angles, which subtracts nothing near theta = 0. Exact for every
-rotation vector; the arm is fixed at home, in the axes of the pose. Rotations that a signal does not have are taken as zero, displacements
-that it does not have are not asked for.
+(`ctrlgen.physics.screw.turned`), exact for every rotation vector up to a full turn; the arm is fixed at home, in the axes of the pose.
+Rotations that a signal does not have are taken as zero, displacements that it does not have are not asked for.
 
 Source: M. D. Shuster, A survey of attitude representations, J. Astronaut. Sci. 41 (1993) 439, rotation vector.
 """
@@ -20,22 +19,13 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
-from ctrlgen.physics.screw import TWIST, Matrix
-
-STILL = 1e-30  # rad^2, added to a^2 so that no quotient is 0/0; in s and c it is below the rounding of 1
-
-
-def turned(theta: Matrix, arm: Matrix) -> Matrix:
-    """(R - I) arm (3,) [m] for a rotation vector `theta` (3,) [rad] and an `arm` (3,) [m]."""
-    half = ca.sqrt(ca.dot(theta, theta) + STILL) / 2
-    s, c = ca.sin(half) / half, ca.cos(half)
-    across = ca.cross(theta, arm)
-    return s * c * across + s**2 / 2 * ca.cross(theta, across)
+from ctrlgen.physics.screw import TWIST, Matrix, turned
 
 
 def can_turn(channels: Sequence[str]) -> bool:
-    """Whether a pose with these channels has a rotation, and a displacement that depends on the point."""
-    return any(name in channels for name in TWIST[:3]) and any(name in channels for name in TWIST[3:])
+    """Whether a pose with these channels has a rotation and a displacement that depends on the point: along another axis."""
+    axes = [[name[-1] for name in names if name in channels] for names in (TWIST[:3], TWIST[3:])]
+    return any(turn != along for turn in axes[0] for along in axes[1])
 
 
 def of_stated_point(channels: Sequence[str], pose: Matrix, pivot: Matrix) -> Matrix:

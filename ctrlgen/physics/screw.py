@@ -9,6 +9,7 @@ Every function takes CasADi SX, DM or plain numbers.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import Literal, TypeAlias, get_args
 
@@ -39,16 +40,35 @@ def rotation_to(axis: Matrix) -> Matrix:
     return ca.horzcat(axis, y, ca.cross(axis, y))
 
 
-def rotation_vector(theta: Matrix) -> Matrix:
-    """R = I + (sin a/a) S + (1 - cos a)/a^2 S^2, a = |theta| [rad], S = [theta x], shape (3, 3).
+FULL_TURN = 2 * math.pi  # rad, the largest rotation vector for which `turned` holds
+_TERMS = 16  # of each series: at a full turn the next one is 5e-20 of the sum
 
-    The rotation by a about theta (Rodrigues). 1e-30 is added to a^2, so that value and derivative exist at theta = 0;
-    1 - cos a is written 2 sin^2(a/2), which does not cancel.
+
+def turned(theta: Matrix, vectors: Matrix) -> Matrix:
+    """(R - I) `vectors` for a rotation vector `theta` (3,) [rad] of at most a full turn, shape (3, n) as the vectors:
+
+    (R - I) r = s c theta x r + s^2/2 theta x (theta x r),   s = sin(a/2)/(a/2), c = cos(a/2), a = |theta|:
+
+    Rodrigues' formula in half angles, which subtracts nothing near theta = 0. s and c are their power series in (a/2)^2, exact to
+    rounding with all derivatives: roots and quotients would spoil those near theta = 0, the third one by its own size.
     """
-    S = ca.skew(theta)
-    a = ca.sqrt(ca.sumsqr(theta) + 1e-30)
-    half = ca.sin(a / 2) / a
-    return ca.DM.eye(3) + ca.sin(a) / a * S + 2 * half**2 * ca.mtimes(S, S)
+    square, S = ca.dot(theta, theta) / 4, ca.skew(theta)
+    s, c = (_series([(-1) ** k / math.factorial(2 * k + odd) for k in range(_TERMS)], square) for odd in (1, 0))
+    across = ca.mtimes(S, vectors)
+    return s * c * across + s**2 / 2 * ca.mtimes(S, across)
+
+
+def _series(coefficients: Sequence[float], x: Matrix) -> Matrix:
+    """The polynomial of these coefficients, lowest first."""
+    value = coefficients[-1]
+    for coefficient in reversed(coefficients[:-1]):
+        value = value * x + coefficient
+    return value
+
+
+def rotation_vector(theta: Matrix) -> Matrix:
+    """R, shape (3, 3): the rotation by |theta| [rad] about theta, see `turned`."""
+    return ca.DM.eye(3) + turned(theta, ca.DM.eye(3))
 
 
 def rotation_to_second_order(theta: Matrix) -> Matrix:

@@ -16,7 +16,8 @@ from ctrlgen.devices import Signal
 from ctrlgen.model.inverse_dynamics import inverse_dynamics, relative_degrees
 from ctrlgen.model.model import Model
 from ctrlgen.model.quasi_static import natural_modes, quasi_static
-from ctrlgen.physics.pivot import about, can_turn
+from ctrlgen.physics.pivot import about
+from ctrlgen.physics.screw import FULL_TURN, TWIST
 from ctrlgen.trajectory.frame import Frame
 from ctrlgen.trajectory.inverse.choice import choose_inverse
 from ctrlgen.trajectory.inverse.clock import Clock, Sampled, Settled
@@ -224,9 +225,12 @@ class PathProblem:
         if self.file.pivot is None:
             return tables
         channels = self.signal.channels
-        if self.file.follow != "pose" or not can_turn(channels):
-            what = f"turns a pose about a point, and what is followed is {', '.join(channels)}; leave it out"
-            raise InputError(self.source, [Fault("pivot", what)])
+        turn = np.linalg.norm(tables[0][:, [k for k, name in enumerate(channels) if name in TWIST[:3]]], axis=1).max()
+        if turn > FULL_TURN:
+            what = (
+                f"turns by {show(turn, 'deg')}, and a pose about a pivot by at most {show(FULL_TURN, 'deg')}; turn less"
+            )
+            raise InputError(self.source, [Fault("path", what)])
         return about(channels, tables, np.array([x.si for x in self.file.pivot]))
 
     @property

@@ -20,6 +20,7 @@ from ctrlgen.devices import Device, files_of, load_device
 from ctrlgen.effects import Place
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.model import Model
+from ctrlgen.physics.pivot import can_turn
 from ctrlgen.trajectory.inverse.clock import Clock, Sampled
 from ctrlgen.trajectory.paths import Poses
 from ctrlgen.trajectory.problem import PathProblem
@@ -114,6 +115,7 @@ class Scenario(Shown):
 
     def on(self, device: Device) -> Scenario:
         """The same on another device, with the loads of this scenario. Raises InputError where it cannot have them."""
+        check_pivot(device, self.file, self.path)
         return replace(self, device=loaded(device, self.file, self.path))
 
     def bind(self, model: Model) -> PathProblem:
@@ -129,6 +131,17 @@ def loaded(device: Device, file: ScenarioFile, path: Path) -> Device:
         return device.loaded(file.load, file.gravity)
     except ValueError as error:
         raise InputError(path, [Fault("load", str(error))]) from None
+
+
+def check_pivot(device: Device, file: ScenarioFile, path: Path) -> None:
+    """Raises InputError where what a scenario's `file`, read from `path`, has followed cannot turn about its pivot."""
+    if file.pivot is None:
+        return
+    pose = device.told_physics(device.values()).components
+    if file.follow != "pose" or not can_turn(pose):
+        followed = f"the pose {', '.join(pose)}" if file.follow == "pose" else f"the {file.follow}"
+        what = f"turns a pose about a point, and what is followed is {followed}; leave it out"
+        raise InputError(path, [Fault("pivot", what)])
 
 
 def check_tightened(scenario: Scenario, model: Model) -> None:
@@ -201,6 +214,7 @@ def load_scenario(path: Path | str, device: Device | Path | str | None = None) -
     if isinstance(file.path, Poses) and file.path.file:
         poses = file_path.parent / file.path.file
         inputs["poses"] = Input(poses, read_text(poses))
+    check_pivot(device, file, file_path)
     name = file_path.resolve().parent.name if file_path.name == FILE else file_path.stem
     try:
         return Scenario(_identifier(name), file_path, file, loaded(device, file, file_path), inputs)
