@@ -7,9 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from axis_records import AXIS, fitter_of
+from scipy.stats import norm
 
 from ctrlgen.diagnosis.report.answer import where
-from ctrlgen.diagnosis.selection.edge_intervals import moved_by_form, out_to_visited
+from ctrlgen.diagnosis.selection.edge_intervals import edge_intervals, moved_by_form, out_to_visited
 from ctrlgen.diagnosis.selection.finding_region import region_of
 from ctrlgen.diagnosis.selection.findings import Estimate, estimated_values, finding_estimates
 from ctrlgen.effects import Effect
@@ -106,5 +107,9 @@ def test_a_finding_tells_its_edge_no_more_narrowly_than_that():
         assert min(np.abs(visited - told.ci95[0])) < 1e-6 and min(np.abs(visited - told.ci95[1])) < 1e-6
         depth = edge - ways[:, -1]
         # a damper has a ramp; a spring grows from nothing
-        unsure = 2 * moved_by_form(depth, 0.05) * 1e6 if kind == "stiffness_below" else 0.0
-        assert told.ci95[1] - told.ci95[0] >= unsure and visited[-1] > told.ci95[1]
+        unsure = norm.ppf(0.975) * moved_by_form(depth, 0.05) * 1e6 if kind == "stiffness_below" else 0.0
+        assert told.ci95[1] - told.ci95[0] >= 2 * unsure and visited[-1] > told.ci95[1]
+        (by_form,) = edge_intervals(fitter, fit, {path: (5.0, 5.0) for path in estimated_values(fit)}).values()
+        assert by_form == pytest.approx(out_to_visited((5.0 - unsure, 5.0 + unsure), visited))
+        # a place is between it and where one standard deviation would end
+        assert not unsure or by_form[1] > out_to_visited((0.0, 5.0 + unsure / 2), visited)[1]

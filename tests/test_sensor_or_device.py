@@ -2,31 +2,38 @@
 
 from __future__ import annotations
 
+import tomllib
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from axis_records import SETTLING
+from conftest import AXIS_FILE
 from sensor_or_device import DEVICE, LAWS, Specimen, drawn, recorded
 
 from battery.plant_hexapod import COMPONENTS
+from ctrlgen.core.files import validate
 from ctrlgen.core.units import Quantity
+from ctrlgen.devices.axis import Axis
 from ctrlgen.devices.usual_deviation import usual_deviation
 from ctrlgen.diagnosis.diagnose import diagnose_recording
 from ctrlgen.diagnosis.evidence.other_readings import other_readings, read_by_another, read_turned
 from ctrlgen.diagnosis.report.answer import unlikely_rival
-from ctrlgen.diagnosis.selection.model_selection import ModelSelection
+from ctrlgen.diagnosis.selection.model_selection import ModelSelection, scored
+from ctrlgen.diagnosis.selection.rivals import rivals
 from ctrlgen.effects.gain import SensorGain
-from ctrlgen.estimation.fit import Fitter
-from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, hypotheses, nominal_physics
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, hypotheses, nominal_physics, numbers
 from ctrlgen.estimation.noise import estimate_noise
-from ctrlgen.estimation.size_odds import known_deviation, odds_of_size, of_sensor, prior_odds, size_of
+from ctrlgen.estimation.size_odds import known_deviation, odds_of_size, of_sensor, prior_odds, size_odds, size_of
 from ctrlgen.estimation.structure import Structure
 
 GAIN = 0.006
 EVERY, OF_Z = (Hypothesis("sensor_gain", f"sensor:{c}", c) for c in ("all", "delta_z"))
 LEVERS = Hypothesis("lever_ratio", "stage:all", "all")
 HEIGHT = Hypothesis(PARAMETER, "mechanism:height", path="hexapod.height")
+GAINS = {"position_gain": "60 1/s", "velocity_gain": "20 V/(m/s)", "integral_gain": "0 V/(m*s)"}
+IN_LOOP = validate(Axis, tomllib.loads(AXIS_FILE.read_text()) | {"loop": GAINS}, "device")
 
 
 @pytest.fixture(scope="module")
@@ -102,6 +109,36 @@ def test_a_size_is_judged_by_what_is_stated_or_usual(fits):
         compare.samples = lambda *_: 1.0
         left.fitted = None
         assert compare.criterion(left, None) == pytest.approx(np.log(2) - 2 * prior_odds(fit))
+
+
+def test_what_fits_alike_and_is_unlikelier_of_its_size_is_told_and_nothing_likelier(fits, monkeypatch):
+    fitter, ours, theirs = fits["delta_z"]
+    module = "ctrlgen.diagnosis.selection.rivals"
+    of_sensor_, of_height = (scored(fitter, fit, fit.structure.causes[0]) for fit in (ours, theirs))
+    trials = SimpleNamespace(
+        selection=SimpleNamespace(ranked=list, advantage=lambda *_: np.inf), objections=lambda *_: {}, screen=None
+    )
+    for name, found in (("counterparts", []), ("_as_plainer", []), ("explains_alike_but_for_odds", True)):
+        monkeypatch.setattr(f"{module}.{name}", lambda *_, found=found: found)
+    for named, other, told in ((of_sensor_, of_height, (of_height,)), (of_height, of_sensor_, ())):
+        monkeypatch.setattr(f"{module}.replacements", lambda *_, other=other: [other])
+        assert rivals(trials, named, 0) == ((), told)
+
+
+def test_a_number_that_is_set_is_wrong_by_a_slip_of_the_pen_alone():
+    """A gain of a digital loop is what the controller computes with; the mass is stated to 5 %."""
+    fits = []
+    for path, size, odds in (("mechanics.mass", pytest.approx(1.0), 0.0), ("loop.position_gain", np.inf, -4.6)):
+        nominal = next(number.si for p, _, number in numbers(IN_LOOP) if p == path)
+        begun = Structure(IN_LOOP).with_cause(Hypothesis(PARAMETER, "axis", path=path), {"value": 1.05 * nominal})
+        for start, z, ln in ((begun.restarted(0, {"value": nominal}), 0, 0), (begun, size, odds)):
+            fit = Fit(start, start.start, (), 0.0, 1, np.zeros(0), np.eye(len(start.start)), 0.0)
+            assert size_of(fit, 0)[0] == z and size_odds(fit) == pytest.approx(ln, abs=1e-9)
+        fits.append(SimpleNamespace(fit=fit, causes=begun.causes, cause=begun.causes[0]))
+    chosen, rival = fits
+    search = SimpleNamespace(chosen=chosen, unlikely=((rival,),))
+    told = unlikely_rival(SimpleNamespace(findings=(chosen,), search=search))
+    assert told.endswith("which is set and not measured, the one named by 1")
 
 
 def test_a_scale_of_all_channels_that_are_read_is_one_cause_more():

@@ -11,7 +11,7 @@ class Section(BaseModel):
     """A table of a device file. Unknown keys are faults; nothing changes after loading. The docstring below a key describes it.
 
     `domain` is the part of the device to which a report assigns its numbers; `relative_sd` their relative standard deviation
-    where the file states none; None where any deviation from the file would be a finding.
+    where the file states none; None where any deviation from the file would be a finding, 0 where they are set and not measured.
     """
 
     domain: ClassVar[str] = "mechanism"

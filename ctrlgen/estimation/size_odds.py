@@ -8,14 +8,14 @@ law whose row in the priors has a `deviation`,
 Of two causes that fit alike, sizes a_1 and a_2 have standard errors in one proportion to them, so that the ratio of their likelihoods,
 integrated over the size, is p(z_1) z_1 / (p(z_2) z_2). p is Student's of four degrees of freedom: what is stated of a deviation is itself
 known to about a half. p z is largest at z = 1, below which size speaks against nothing. One number in a hundred is wrong by any
-size, as by a slip of the pen.
+size, as by a slip of the pen: that alone is left of a number that is set and not measured, such as a gain of a digital loop (s = 0).
 Source: D. J. C. MacKay, Neural Comput. 4 (1992) 415 (Occam factors); K. L. Lange, R. Little, J. Taylor, J. Am. Stat. Assoc. 84 (1989) 881.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import log
+from math import inf, log
 
 from ctrlgen.devices import Device
 from ctrlgen.devices.usual_deviation import usual_deviation
@@ -31,7 +31,7 @@ FREEDOM = 4.0
 
 @dataclass(frozen=True)
 class Deviation:
-    """Standard deviation `sd` [SI] of a size, and whether the device file states it."""
+    """Standard deviation `sd` [SI] of a size, 0 of a number that is set and not measured; and whether the device file states it."""
 
     sd: float
     stated: bool
@@ -40,7 +40,9 @@ class Deviation:
 def known_deviation(cause: Hypothesis, device: Device) -> Deviation | None:
     """By how much what a cause says is wrong is usually off; None where nothing is known of it."""
     if cause.effect == PARAMETER:
-        number = next(number for path, _, number in numbers(device) if path == cause.path)
+        section, number = next((section, number) for path, section, number in numbers(device) if path == cause.path)
+        if number.sd is None and section.relative_sd == 0.0:
+            return Deviation(0.0, False)
         sd = nuisances(device).get(cause.path) or usual_deviation(number)
         return Deviation(sd, bool(number.sd)) if sd else None
     amplitude = cause.law.amplitude()
@@ -53,13 +55,14 @@ def known_deviation(cause: Hypothesis, device: Device) -> Deviation | None:
 
 
 def size_of(fit: Fit, k: int) -> tuple[float, Deviation] | None:
-    """The size of cause k in standard deviations, and these; None where nothing is known of them."""
+    """The size of cause k in standard deviations, infinite where these are 0, and these; None where nothing is known of them."""
     known = known_deviation(fit.structure.causes[k], fit.structure.device)
     if known is None:
         return None
     for unknown, value in zip(fit.structure.free_parameters, fit.theta, strict=True):
         if unknown.cause == k and unknown.amplitude:
-            return abs(float(value) - unknown.nominal) / known.sd, known
+            off = abs(float(value) - unknown.nominal)
+            return (off / known.sd if known.sd else inf if off else 0.0), known
     return None
 
 
@@ -67,6 +70,8 @@ def odds_of_size(z: float) -> float:
     """ln of how many times less likely a size of z standard deviations is than the likeliest."""
     if z <= 1:
         return 0.0
+    if z == inf:
+        return ONE_IN_A_HUNDRED
     tail = log(z) - (FREEDOM + 1) / 2 * log((1 + z * z / FREEDOM) / (1 + 1 / FREEDOM))
     return max(tail, ONE_IN_A_HUNDRED)
 

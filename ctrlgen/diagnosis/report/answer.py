@@ -182,12 +182,12 @@ def unlikely_rival(diagnosis: Diagnosis) -> str:
     there = size_of(rival.fit, next(i for i, c in enumerate(rival.causes) if c == rival.cause))
     if there is None or rival.cause is None:
         return ""
-    own = "" if here is None else f", the one named by {number(here[0], 2)}"
-    name, size = cause_noun(rival.cause), number(there[0], 2)
+    own = "" if here is None or not here[1].sd else f", the one named by {number(here[0], 2)}"
     kind = "stated" if there[1].stated else "usual"
-    return (
-        f"; the readings alone do not tell it from {name}, which would be off by {size} of its {kind} deviations{own}"
+    off = (
+        f"would be off by {number(there[0], 2)} of its {kind} deviations" if there[1].sd else "is set and not measured"
     )
+    return f"; the readings alone do not tell it from {cause_noun(rival.cause)}, which {off}{own}"
 
 
 def _any(causes: Sequence[Hypothesis]) -> str:
