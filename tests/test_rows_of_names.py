@@ -42,5 +42,5 @@ def test_a_second_row_of_names_is_told(tmp_path):
 def test_a_row_of_types_is_told_whichever_side_of_the_units_it_stands(tmp_path, rows):
     file = tmp_path / "log.csv"
     file.write_text("\n".join(["Time,Drive,Position", *rows, ROWS]))
-    told = f"line {2 + rows.index('FLOAT64,REAL,REAL')} holds neither names nor units"
+    told = f"line {2 + rows.index('FLOAT64,REAL,REAL')} (FLOAT64, REAL, REAL) holds neither names nor units"
     assert told in read_table(file).notes

@@ -11,7 +11,7 @@ from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import same_dimension, to_si
 from ctrlgen.recordings.formats import read_table
 from ctrlgen.recordings.formats.measurement_table import Clock, MeasurementTable, Numbers
-from ctrlgen.recordings.formats.unit_texts import unit_of
+from ctrlgen.recordings.formats.unit_texts import scaled_unit, unclear_factor, unit_of
 from ctrlgen.recordings.recorded_files import sha256
 from ctrlgen.recordings.schema import Column, RecordingFile, RecordTable
 
@@ -27,6 +27,8 @@ class RecordedColumns:
         self.notes: list[str] = []
         self.files: dict[str, MeasurementTable | None] = {}
         self.clocks: dict[str, Clock] = {}
+        self.used: dict[str, list[str]] = {}
+        self.differing = False
 
     def signals(self, columns: dict[str, Column]) -> dict[str, np.ndarray]:
         """The columns (n,) in SI by signal, without those that cannot be read."""
@@ -50,9 +52,14 @@ class RecordedColumns:
         except InputError as error:
             self.faults += [Fault(where, f"{file} {fault.what}") for fault in error.faults]
             return None
-        if column.scale == 1 and contradicts(table.unit(name), scale, column.unit):
-            what = f"{file} says {table.unit(name)}, recording.toml says {column.unit}; correct the one that is wrong"
-            self.faults.append(Fault(where, what))
+        self.used.setdefault(file, []).append(name)
+        if not self.differing and (differing := table.differing_times(self.used[file])):
+            self.differing = True
+            self.faults.append(Fault(where, f"{file} {differing}"))
+        if column.scale == 1 and (fault := _other_unit(table.unit(name), scale, column.unit)):
+            self.faults.append(
+                Fault(where, f"{file} says {table.unit(name)}, recording.toml says {column.unit}; {fault}")
+            )
         if signal and name in table.clocks and not column.sample_rate:
             self.clocks[signal] = table.clocks[name]
         self._note(file, table, column, given)
@@ -131,6 +138,17 @@ class RecordedColumns:
 
 def _is_reading(signal: str) -> bool:
     return not signal.startswith("drive.")
+
+
+def _other_unit(stated: str | None, scale: tuple[float, float], unit: str) -> str:
+    """What to do about a unit that differs from the one given; empty where it does not."""
+    if stated is not None and (several := scaled_unit(stated)) is not None:
+        factor, single = several
+        same = same_dimension(single, unit) and np.isclose(factor * to_si(1.0, single), scale[0], rtol=1e-9, atol=0)
+        return "" if same else f'write scale = {factor:g}, unit = "{single}"'
+    if stated is not None and unclear_factor(stated):
+        return "write scale = 10 or scale = 0.1 (for ten), as its numbers are meant"
+    return "correct the one that is wrong" if contradicts(stated, scale, unit) else ""
 
 
 def contradicts(stated: str | None, scale: tuple[float, float], unit: str) -> bool:

@@ -15,6 +15,7 @@ from ctrlgen.core.errors import InputError
 from ctrlgen.recordings.formats.checked_files import check_size, fault
 from ctrlgen.recordings.formats.long_form import widened
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
+from ctrlgen.recordings.formats.split_seconds import with_whole_time
 from ctrlgen.recordings.formats.written_layout import Layout
 
 Reader = Callable[[Path, Layout], dict[str, MeasurementTable]]
@@ -60,6 +61,9 @@ OBJECTS = (b'{"', b"[{", b"{\n", b"{\r")
 """First characters of JSON that a logger has written under the ending of a text."""
 FOREIGN = {
     b"\xd0\xcf\x11\xe0": "is a workbook of Excel before 2007; save it as .xlsx or .csv",
+    b"CDF": "is netCDF 3; write it as netCDF 4: nccopy -k nc4 old.nc new.nc",
+    b"SQLite format 3": "is a data base, as ROS 2 bags are; export its topics as CSV",
+    b"RIFF": "is sound (WAV); export its samples as CSV",
     b"\x1f\x8b": "is compressed by gzip; unpack it",
     b"<?xml": "is XML, such as a header of DIAdem (.tdm); export it as TDMS or CSV",
 }
@@ -82,7 +86,7 @@ def read_table(path: Path, which: int | str | None = None, layout: Layout | None
     try:
         check_size(path, path.stat().st_size)
         reader: Reader = import_module(f"ctrlgen.recordings.formats.{module}").read
-        return widened(_chosen(path, reader(path, layout or Layout()), which))
+        return with_whole_time(widened(_chosen(path, reader(path, layout or Layout()), which)))
     except InputError:
         raise
     except RecursionError:

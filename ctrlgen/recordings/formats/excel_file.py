@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import datetime
+import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
 
 from ctrlgen.core.errors import InputError
 from ctrlgen.recordings.formats.checked_files import check_archive, fault, package
+from ctrlgen.recordings.formats.layout_question import Ambiguous, AmbiguousFile
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
 from ctrlgen.recordings.formats.text_file import tables_of_text
 from ctrlgen.recordings.formats.written_layout import Layout
 
+COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
+THREE = re.compile(r"^[+-]?\d{1,3},\d{3}$")
+NUMBER = re.compile(r"[+-]?(\d+|\d{1,3}(\.\d{3})+)(,\d*)?([eE][+-]?\d+)?")
 HEAD = 4096  # bytes of a part in which a document type would stand
 
 
@@ -25,11 +31,14 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
     faults: list[InputError] = []
     typed = layout.model_copy(update={"separator": "tab", "encoding": None})
     for sheet in book.worksheets:
-        text = "\n".join("\t".join(map(_text, row)) for row in sheet.iter_rows(values_only=True))
-        if not text.strip():
+        rows = list(sheet.iter_rows(values_only=True))
+        if not any(cell is not None for row in rows for cell in row):
             continue
+        comma = _has_decimal_comma(path, rows, layout)
+        text = "\n".join("\t".join(_text(cell, comma) for cell in row) for row in rows)
+        plain = typed.model_copy(update={"decimal": "."}) if comma else typed
         try:
-            found = tables_of_text(path, text, typed)
+            found = tables_of_text(path, text, plain, ("decimal comma in cells of text",) if comma else ())
         except InputError as error:
             faults.append(error)
             continue
@@ -53,8 +62,24 @@ def _check_parts(path: Path) -> None:
                         )
 
 
-def _text(value: Any) -> str:
-    """A cell as text: numbers with all their digits, dates as ISO 8601."""
+def _has_decimal_comma(path: Path, rows: Sequence[tuple[Any, ...]], layout: Layout) -> bool:
+    """Whether numbers that stand as text in a sheet have a decimal comma; numbers proper have no mark at all.
+
+    Raises `AmbiguousFile` where every such cell has its comma before exactly three digits.
+    """
+    cells = [cell.strip() for row in rows for cell in row if isinstance(cell, str) and COMMA.fullmatch(cell.strip())]
+    if layout.decimal is not None or not cells:
+        return layout.decimal == ","
+    if any(not THREE.search(cell) or cell.lstrip("+-").startswith("0") for cell in cells):
+        return True
+    what = f"holds {cells[0]!r} as text, and no cell tells whether its comma is a decimal one"
+    raise AmbiguousFile(path, Ambiguous(what, {'decimal = ","': "", 'decimal = "."': ""}))
+
+
+def _text(value: Any, comma: bool) -> str:
+    """A cell as text: numbers with all their digits, those with a decimal `comma` with a point, dates as ISO 8601."""
+    if comma and isinstance(value, str) and (NUMBER.fullmatch(value.strip())):
+        return value.strip().replace(".", "").replace(",", ".")
     if value is None:
         return ""
     if isinstance(value, (datetime.datetime, datetime.date, datetime.time)):

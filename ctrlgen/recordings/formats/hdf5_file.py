@@ -11,6 +11,7 @@ from ctrlgen.core.counts import number_of
 from ctrlgen.recordings.formats.checked_files import check_size, fault, package
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
 from ctrlgen.recordings.formats.nested_columns import columns_of
+from ctrlgen.recordings.formats.unapplied import unapplied
 from ctrlgen.recordings.formats.written_layout import Layout
 
 UNITS = ("unit", "units", "Unit", "Units", "UNIT")
@@ -38,7 +39,7 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
             return
         attributes = {key: _attribute(node, key) for key in (*UNITS, *FILL, "scale_factor", "add_offset")}
         value, said = _applied(node[()], attributes, name)
-        notes.extend(said)
+        notes.extend([*said, *unapplied(name, ((key, _attribute(node, key)) for key in node.attrs))])
         for column in columns_of(value, name, "/"):
             columns[column.name] = column.values
             notes.extend([column.note] if column.note else [])

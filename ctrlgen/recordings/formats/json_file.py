@@ -39,12 +39,60 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
         )
     except json.JSONDecodeError as error:
         raise fault(path, f"is no JSON: line {error.lineno}: {error.msg}; export it again") from None
-    if isinstance(content, list):
-        content = _of_rows(content) if content and all(isinstance(row, dict) for row in content) else {"data": content}
+    content = _as_columns(content)
     columns, units, aliases, said = collected(columns_of(content))
     return {
         "data": MeasurementTable(path, columns, units, notes=(*notes, *said), aliases=aliases, missing=layout.missing)
     }
+
+
+def _as_columns(content: Any) -> Any:
+    """What a JSON file holds as columns by name: rows, a matrix with names, or numbers by row as pandas writes all three."""
+    if isinstance(content, list):
+        rows = bool(content) and all(isinstance(row, dict) for row in content)
+        return _of_rows([_flat(row) for row in content]) if rows else {"data": content}
+    if (
+        isinstance(content, dict)
+        and len(content) > 1
+        and all(isinstance(part, dict) and part for part in content.values())
+    ):
+        first = next(iter(content.values()))
+        if all(list(part) == list(first) for part in content.values()) and not any(map(_is_nested, first.values())):
+            by_row = {name: [row[name] for row in content.values()] for name in first}
+            return (
+                by_row if len(content) > len(first) else {name: list(part.values()) for name, part in content.items()}
+            )
+    return _with_names(content)
+
+
+def _with_names(content: Any) -> Any:
+    """The same with every matrix of rows that stands beside the names of its columns as these columns."""
+    if isinstance(content, list):
+        return [_with_names(part) for part in content]
+    if not isinstance(content, dict):
+        return content
+    names = content.get("columns")
+    key = next((key for key in ("data", "values", "rows") if isinstance(content.get(key), list)), None)
+    if key is not None and isinstance(names, list) and names and all(isinstance(name, str) for name in names):
+        rows = content[key]
+        if len(set(names)) == len(names) and all(isinstance(row, list) and len(row) == len(names) for row in rows):
+            return {name: [row[k] for row in rows] for k, name in enumerate(names)}
+    return {name: _with_names(part) for name, part in content.items()}
+
+
+def _is_nested(value: Any) -> bool:
+    return isinstance(value, (dict, list))
+
+
+def _flat(row: dict[str, Any], above: str = "") -> dict[str, Any]:
+    """A row with the values of its inner objects as `outer.inner`."""
+    flat: dict[str, Any] = {}
+    for name, value in row.items():
+        inner = _flat(value, f"{above}{name}.") if isinstance(value, dict) else {f"{above}{name}": value}
+        if twice := sorted(set(inner) & set(flat)):
+            raise ValueError(f"two keys would be named {twice[0]!r}; rename one")
+        flat |= inner
+    return flat
 
 
 def _of_rows(rows: list[dict[str, Any]]) -> dict[str, list[Any]]:

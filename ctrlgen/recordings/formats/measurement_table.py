@@ -12,7 +12,7 @@ import numpy as np
 
 from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError
-from ctrlgen.recordings.formats import number_cells, over_range, time_stamps
+from ctrlgen.recordings.formats import number_cells, over_range, time_stamps, wrapped_counters
 from ctrlgen.recordings.formats.layout_question import Ambiguous, AmbiguousFile
 from ctrlgen.recordings.formats.number_cells import NumberStyle
 from ctrlgen.recordings.formats.unit_texts import bare_name, split_name
@@ -41,6 +41,8 @@ class MeasurementTable:
     `units`: those that the file itself states. `lines`: the line number of each row in a text file. `notes`: what was interpreted to
     read the file, one line each. `aliases`: further names of columns. `nameless`: columns that have no name of their own, by their
     number from 0. `clocks`: of channels whose time axis the file states.
+    `own_times`: the column of time of each column, where channels have times that differ.
+    `time_parts`: columns that are one time together, which is a column of its own.
     `style`: how numbers are written as text. `missing`: numbers and texts that the reader says are no reading,
     None where nothing is said. `stated_rate`: words of the file that state how often rows were read, and the rate [Hz].
     """
@@ -53,6 +55,8 @@ class MeasurementTable:
     aliases: Mapping[str, str] = field(default_factory=dict)
     nameless: frozenset[int] = frozenset()
     clocks: Mapping[str, Clock] = field(default_factory=dict)
+    time_parts: frozenset[str] = frozenset()
+    own_times: Mapping[str, str] = field(default_factory=dict)
     style: NumberStyle = field(default_factory=NumberStyle)
     missing: tuple[str | int | float, ...] | None = None
     stated_rate: tuple[str, float] | None = None
@@ -123,6 +127,12 @@ class MeasurementTable:
             f"{name}: {number_of(m.readings, 'reading is', 'readings are')} {m.text} ({self._first(m.row)}), {m.meaning}; left out"
             for m in marks
         ]
+        if (again := wrapped_counters.wrapped(values)) is not None:
+            times = number_of(len(again.rows), "time")
+            notes.append(
+                f"{name}: jumps from one end of {again.words} to the other {times} ({self._first(int(again.rows[0]))}), as numbers do that "
+                f"begin again: write it unwrapped (numpy.unwrap with period={again.size:g}), or these rows are jumps of the reading"
+            )
         return Numbers(values, tuple(notes))
 
     def time(self, name: str, unit: str, scale: float = 1.0) -> Numbers:
@@ -149,11 +159,21 @@ class MeasurementTable:
             values, notes = time_stamps.from_first(column, unit, scale)
         except ValueError as error:
             raise self.fault(f"column {name!r} {error}") from None
-        return Numbers(values, notes)
+        values, told = wrapped_counters.unwrapped_clock(values, float(column[0]) if len(column) else 0.0)
+        return Numbers(values, (*notes, f"{name}: {told}") if told else notes)
 
     def _exact(self, name: str, column: np.ndarray) -> np.ndarray:
         """Cells of text as numbers, those of a long epoch as the whole numbers that they are."""
         return self.numbers(name) if not number_cells.are_whole(column) else np.array([int(c) for c in column])
+
+    def differing_times(self, names: Sequence[str]) -> str:
+        """What is wrong where columns of these names have times that differ; empty where they have one."""
+        used = {name: self.own_times[name] for name in names if name in self.own_times}
+        if len(set(used.values())) < 2:
+            return ""
+        listed = ", ".join(f"{name} has {time}" for name, time in used.items() if name != time)
+        mend = "export them at one rate, or each to its own file, named by `file` of its column"
+        return f"holds channels that each have a time of their own, and these differ ({listed}); {mend}"
 
     def _bad_cells(self, name: str, bad: Sequence[tuple[int, str]]) -> InputError:
         words = list(dict.fromkeys(text for _, text in bad))

@@ -14,7 +14,26 @@ from ctrlgen.recordings.formats.written_layout import Layout
 
 MOST_LISTED = 5  # bad cells of a column that a message lists; the others are counted
 MISSING = frozenset(
-    {"", "nan", "na", "n/a", "null", "none", "-nan", "nan(ind)", "-nan(ind)", "1.#qnan", "#n/a", "<na>", "nat"}
+    [
+        "",
+        "nan",
+        "na",
+        "n/a",
+        "null",
+        "none",
+        "-nan",
+        "nan(ind)",
+        "-nan(ind)",
+        "1.#qnan",
+        "-1.#qnan",
+        "1.#ind",
+        "-1.#ind",
+        "#n/a",
+        "<na>",
+        "nat",
+        "n. def.",
+        "n.def.",
+    ]
 )
 """Words of programs for a number that is not there."""
 OVER = frozenset(
@@ -64,6 +83,9 @@ OVER = frozenset(
             "-infinity",
             "1.#inf",
             "-1.#inf",
+            "unendlich",
+            "+unendlich",
+            "-unendlich",
         ),
         *("invalid", "bad", "err", "error", "#nv", "#num!", "#value!", "#div/0!", "#ref!", "#name?"),
     ]
@@ -71,9 +93,10 @@ OVER = frozenset(
 """Words of instruments for a reading beyond their range, or lost."""
 WHOLE = re.compile(r"[+-]?\d{1,18}", re.ASCII)
 DATE = r"(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}|\d{1,2}[-./ ][A-Z][a-z]{2,8}[-./, ]+\d{4})"
-CLOCK = r"\d{1,3}:\d{2}(:\d{2})?([.,:]\d+)?(\s*[AaPp]\.?[Mm]\.?)?"
+CLOCK = r"(?:\d+ days? )?\d{1,3}:\d{2}(:\d{2})?([.,:;]\d+)?(\s*[AaPp]\.?[Mm]\.?)?"
+ZONES = "(?:UTC|GMT|WES?T|BST|CES?T|MEZ|MESZ|EES?T|[ECMP][SD]T|[JK]ST)"
 TIME = re.compile(
-    rf"{DATE}|({DATE}[T ,;]\s*)?{CLOCK}\s*(Z|UTC|[+-]\d{{2}}:?\d{{2}})?|\d{{8}}T\d{{6}}([.,]\d+)?Z?", re.ASCII
+    rf"{DATE}|({DATE}[T ,;]\s*)?{CLOCK}\s*(Z|{ZONES}|[+-]\d{{2}}:?\d{{2}})?|\d{{8}}T\d{{6}}([.,]\d+)?Z?", re.ASCII
 )
 EXPONENT = r"([eEdD][+-]?\d{1,3})?"
 GROUPS = "[.,'\u2019 \u00a0\u202f\u2009]"
@@ -81,6 +104,8 @@ ANY = re.compile(rf"(?=[+\u2212-]?[.,]?\d)[+\u2212-]?(\d+|\d{{1,3}}({GROUPS}\d{{
 """A number in some style."""
 OPEN = re.compile("[,'\u2019\u00a0\u202f\u2009]|\\d \\d|[.]\\d*[.]")
 """What in cells may be a decimal comma or stand between thousands."""
+AFTER_SIGN = re.compile(r"(?<=^[+\u2212-])[ ]+(?=[\d.,])")
+"""Blanks between a sign and its number, which some loggers write to fill a column."""
 BLANKS = ("\u00a0", "\u202f", "\u2009", " ")
 
 
@@ -122,7 +147,7 @@ class Cells:
 
 def is_number(cell: str) -> bool:
     """Whether a cell is a number in some style."""
-    return ANY.fullmatch(cell) is not None
+    return ANY.fullmatch(without_gap(cell)) is not None
 
 
 def has_unit(cell: str) -> bool:
@@ -132,7 +157,18 @@ def has_unit(cell: str) -> bool:
 
 def is_reading(cell: str) -> bool:
     """Whether a cell stands in a column of numbers: a number, a time, or a word for a missing or lost one."""
-    return is_number(cell) or cell.lower() in MISSING or cell.lower() in OVER or bool(TIME.fullmatch(cell))
+    return is_number(cell) or _word(cell) in MISSING or _word(cell) in OVER or bool(TIME.fullmatch(cell))
+
+
+def _word(cell: str) -> str:
+    """A cell in small letters, without the zeros that Microsoft's library prints behind a word: 1.#INF00."""
+    low = cell.lower()
+    return re.sub(r"(#[a-z]+)0+$", r"\1", low) if "#" in low else low
+
+
+def without_gap(cell: str) -> str:
+    """A cell without the blanks between its sign and its number."""
+    return AFTER_SIGN.sub("", cell) if cell[1:2] == " " else cell
 
 
 def are_whole(cells: np.ndarray) -> bool:
@@ -149,11 +185,12 @@ def to_numbers(cells: np.ndarray, style: NumberStyle, missing: Sequence[str | in
             values[k] = np.nan if given is None else float(given)
             continue
         cell = given.strip()
-        if cell in own or cell.lower() in MISSING:
+        if cell in own or _word(cell) in MISSING:
             continue
+        cell = without_gap(cell)
         if pattern.fullmatch(cell):
             values[k] = float(style.plain(cell))
-        elif cell.lower() in OVER:
+        elif _word(cell) in OVER:
             words.setdefault(cell, []).append(k)
         elif cell.lower() in ("true", "false"):
             values[k], truths = cell.lower() == "true", True
@@ -174,7 +211,7 @@ def style_of(columns: Iterable[Sequence[str]], layout: Layout, separator: str) -
         return NumberStyle(dates=layout.dates), []
     votes = _Votes()
     for column in columns:
-        votes.count([cell.strip() for cell in column])
+        votes.count([without_gap(cell.strip()) for cell in column])
     decimal = layout.decimal or votes.decimal(separator)
     other = "." if decimal == "," else ","
     grouped = other if votes.seen[other] else ("'" if votes.seen["'"] else "blank" if votes.seen["blank"] else "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -13,6 +14,8 @@ HUGE = 9e29  # no reading in any unit: SCPI says 9.9e37 and 9.91e37, others 1e30
 COUNTS = (-9999, 9999, -99999, 99999, -999, -9999.99, 99999.9, 999999, -999999, 9999999, -32768, 32767, 65535, -2147483648, 2147483647,
           4294967295, 8388607, -8388608, 16777215, -999.25, -1e20, 1e20)  # fmt: skip
 """Numbers that loggers and converters write for none; some are readings, so they count only where they are far from all else."""
+NINES = re.compile(r"-?9+\.?9*")
+FEWEST_NINES = 4  # of a number that fills the display of a sensor: 99.99
 NEAR = 0.25  # spans: one of `COUNTS` that repeats and stands between this and `FAR` beyond all others may be either, and is asked
 FAR = 10.0  # spans of all other readings between them and one of `COUNTS`: no motion leaves its range so far and returns at once
 
@@ -43,9 +46,10 @@ def without_marks(
         for number in np.unique(kept[np.abs(kept) >= HUGE])[:50]:
             kept = _left_out(kept, kept == number, "over range", marks)
         kept = _left_out(kept, np.abs(kept) >= HUGE, "over range", marks)
-    for number in COUNTS if missing is None else ():
+    known = (*COUNTS, *_full_displays(kept)) if missing is None else ()
+    for number in known:
         chosen = kept == number
-        spans = _beyond(kept[~np.isin(kept, COUNTS)], number) if chosen.any() else 0.0
+        spans = _beyond(kept[~np.isin(kept, known)], number) if chosen.any() else 0.0
         if spans > FAR:
             kept = _left_out(kept, chosen, "far from all others: a mark for none", marks)
         elif spans > NEAR and np.sum(chosen) > 1:
@@ -54,6 +58,16 @@ def without_marks(
             )
             raise Ambiguous(told, {f"missing = [{number:g}]": "if it is a mark", "missing = []": "if it is a reading"})
     return kept, marks
+
+
+def _full_displays(values: np.ndarray) -> list[float]:
+    """The ends of a range that are nothing but nines, such as 99.9999, as a display shows them that is full."""
+    finite = values[np.isfinite(values)]
+    ends = (float(finite.min()), float(finite.max())) if len(finite) else ()
+    texts = ((end, f"{end:.10g}") for end in ends)
+    return [
+        end for end, text in texts if text.count("9") >= FEWEST_NINES and NINES.fullmatch(text) and end not in COUNTS
+    ]
 
 
 def _is_float(text: str) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 from ctrlgen.recordings.formats.checked_files import check_size, package
 from ctrlgen.recordings.formats.measurement_table import Clock, MeasurementTable
 from ctrlgen.recordings.formats.nested_columns import columns_of
+from ctrlgen.recordings.formats.unapplied import unapplied
 from ctrlgen.recordings.formats.written_layout import Layout
 
 UNSET = 1.0  # s: the time between readings of a waveform whose programmer did not set it
@@ -28,6 +29,7 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
             for column in columns_of(np.asarray(channel[:]), f"{group.name}/{channel.name}"):
                 columns[column.name] = column.values
                 given = channel.properties
+                notes += unapplied(column.name, given.items())
                 if given.get("unit_string"):
                     units[column.name] = str(given["unit_string"])
                 if given.get("wf_increment") == UNSET:

@@ -23,6 +23,10 @@ DECLARED = (
     re.compile(r"^Separator\s+(Tab|Comma|Semicolon)\s*$", re.IGNORECASE),  # LabVIEW
     re.compile(r"^#\s*SEPARATOR\s*=\s*(\d+)\s*$"),  # GCS of Physik Instrumente: the code of the character
 )
+LONGEST_NAME = 40  # lines over which the names of one header may go
+STARTS_WITH_NUMBER = re.compile(r'\s*"?[+-]?[.,]?\d')
+INSIDE = re.compile(r"\d\s*[,;\t ]")  # a number and more: (12.3) alone is how accountants write -12.3
+BRACKETS = {("[", "]"), ("(", ")"), ("{", "}")}
 NAMED = {"tab": "\t", "comma": ",", "semicolon": ";"}
 
 
@@ -58,6 +62,30 @@ def width_of(line: str, separator: str) -> int:
 def stray_quotes(lines: Sequence[str]) -> list[int]:
     """Numbers from 1 of the lines with a quote that is opened and not closed: a reader would take the next lines for its cell."""
     return [k for k, line in enumerate(lines, 1) if '"' in line and line.count('"') % 2]
+
+
+def whole_lines(lines: Sequence[str]) -> list[str]:
+    """Lines without what programs add to them: a name that goes on in the next lines of its quotes becomes one line, empty ones keep the
+    numbers of the lines below; brackets around every row are left out."""
+    whole = list(lines)
+    stray = [k - 1 for k in stray_quotes(lines)]
+    if len(stray) == 2 and stray[1] - stray[0] <= LONGEST_NAME:
+        first, last = stray
+        joined = " ".join(part.strip() for part in lines[first : last + 1])
+        if not any(STARTS_WITH_NUMBER.match(line) for line in lines[first : last + 1]) and not _holds_rows(
+            lines[:first]
+        ):
+            whole[first : last + 1] = [*([""] * (last - first)), joined]
+    filled = [line.strip() for line in whole if line.strip() and not is_comment(line)]
+    if len(filled) > 1 and all(
+        (line[0], line.rstrip(",")[-1]) in BRACKETS and INSIDE.search(line.rstrip(",")[1:-1]) for line in filled
+    ):
+        whole = [line if is_comment(line) else line.strip().rstrip(",")[1:-1] for line in whole]
+    return whole
+
+
+def _holds_rows(lines: Sequence[str]) -> bool:
+    return sum(bool(STARTS_WITH_NUMBER.match(line)) for line in lines) > 1
 
 
 def separator_of(lines: Sequence[str], layout: Layout) -> str:

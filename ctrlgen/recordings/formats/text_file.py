@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -14,27 +16,19 @@ from ctrlgen.recordings.formats import number_cells
 from ctrlgen.recordings.formats.checked_files import fault
 from ctrlgen.recordings.formats.layout_question import Ambiguous, AmbiguousFile
 from ctrlgen.recordings.formats.measurement_table import Clock, MeasurementTable
-from ctrlgen.recordings.formats.number_cells import NumberStyle
+from ctrlgen.recordings.formats.number_cells import TIME, NumberStyle
 from ctrlgen.recordings.formats.rows_of_signals import lies_on_its_side, on_its_side
 from ctrlgen.recordings.formats.stated_rate import stated_rate
 from ctrlgen.recordings.formats.text_blocks import MOST_LISTED, Block, blocks_of, kind_of
-from ctrlgen.recordings.formats.text_cells import cells_of, separator_of, stray_quotes
+from ctrlgen.recordings.formats.text_cells import cells_of, separator_of, stray_quotes, whole_lines
 from ctrlgen.recordings.formats.text_encoding import decoded
-from ctrlgen.recordings.formats.text_header import header_of
+from ctrlgen.recordings.formats.text_header import LONGEST_SHOWN, header_of
 from ctrlgen.recordings.formats.units_in_cells import without_units
 from ctrlgen.recordings.formats.written_layout import Layout
 
 STYLED = 1000  # rows, the first and others evenly over the table, by which the style of its numbers is known
-TIMES = {
-    "x_value",
-    "time",
-    "t",
-    "zeit",
-    "x",
-    "time [s]",
-    "time (s)",
-    "timestamp",
-}  # names of columns of time, in small letters
+TIMES = {"time", "t", "zeit", "timestamp", "x_value"}  # words of names of columns of time, in small letters
+NAMED = re.compile(r"\s*[A-Za-z_]\w*\s*[:=]\s*[+-]?[\d.]+([eE][+-]?\d+)?[,;\s]+[A-Za-z_]\w*\s*[:=]\s*[+-]?[\d.]+")
 NAMES = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "blanks"}
 EMPTY = sorted(
     {spelling for word in number_cells.MISSING for spelling in (word, word.upper(), word.capitalize(), "NaN", "NaT")}
@@ -54,6 +48,7 @@ def read_text_tables(path: Path, layout: Layout) -> list[MeasurementTable]:
 def tables_of_text(path: Path, text: str, layout: Layout, notes: Sequence[str] = ()) -> list[MeasurementTable]:
     """The tables of a text whose lines end with a line feed; `notes` of what was interpreted before. Raises InputError."""
     lines = text.split("\n")
+    lines = whole_lines(lines)
     if stray := stray_quotes(lines):
         listed = ", ".join(f"line {k}" for k in stray[:MOST_LISTED]) + (", ..." if len(stray) > MOST_LISTED else "")
         raise fault(
@@ -69,6 +64,9 @@ def tables_of_text(path: Path, text: str, layout: Layout, notes: Sequence[str] =
             rows = [k for k, line in enumerate(lines, 1) if kind_of(line, separator) == "row"]
             if len(rows) == 1 and len(cells_of(lines[rows[0] - 1], separator)) > 1:
                 raise fault(path, f"holds a single row of numbers, line {rows[0]}; is the file complete? Record longer")
+            if named := next((line for line in lines if NAMED.match(line)), None):
+                what = f"writes names beside the numbers of its rows, such as {named.strip()[:LONGEST_SHOWN]!r}"
+                raise fault(path, f"{what}; write the names once, above the columns, and rows of numbers alone")
             what = f"holds no rows of numbers (cells separated by {NAMES.get(separator, repr(separator))})"
             raise Ambiguous(what, {'separator = ";"': "(for one) with its separator, or export the numbers as text"})
         return [_table(path, lines, block, separator, layout, notes) for block in blocks]
@@ -101,8 +99,11 @@ def _table(
     units |= of_cells
     unique = _unique(names)
     cut = [f"line {block.cut + 1}, the last, ends before its last cell; left out"] if block.cut is not None else []
+    cut += _between(lines, rows)
     cut += [f"line {k + 1}, below the table, is no row of it; left out" for k in block.below]
-    times = header.times or _times_of(names)
+    times = header.times or _times_of(names, columns)
+    own = {} if len({names[k] for k in times.values()}) < 2 or header.sample_times else _differing(times, columns)
+    times = {} if own else times
     clocks = _clocks(times, columns, header.sample_times)
     return MeasurementTable(
         path,
@@ -119,17 +120,60 @@ def _table(
         nameless=frozenset(k for k, name in enumerate(names) if not name),
         aliases={names[0]: unique[0]} if times and not clocks else {},  # one time under several names
         clocks={unique[k]: clock for k, clock in clocks.items()},
+        own_times={unique[k]: unique[time] for k, time in own.items()},
         style=style,
         missing=layout.missing,
         stated_rate=stated_rate([lines[k] for k in block.above]),
     )
 
 
-def _times_of(names: Sequence[str]) -> dict[int, int]:
-    """The column of time of each column where every second one is time under one name; empty for other tables."""
-    every = {name.lower() for name in names[::2]}
-    paired = len(names) > 2 and len(names) % 2 == 0 and len(every) == 1 and every <= TIMES
-    return {k + 1: k for k in range(0, len(names), 2)} if paired else {}
+def _between(lines: Sequence[str], rows: Sequence[int]) -> list[str]:
+    """Notes of remarks and of empty lines between rows, behind which the table goes on as if nothing had been there."""
+    steps = [(a, b) for a, b in pairwise(rows) if b - a > 1]
+    if len(steps) > len(rows) // 2:  # a program that writes two ends of every line
+        return []
+    said = []
+    for a, b in steps[:MOST_LISTED]:
+        remark = next((lines[k].strip() for k in range(a + 1, b) if lines[k].strip()), "")
+        what = (
+            f"{remark[:LONGEST_SHOWN]!r} stands"
+            if remark
+            else f"{number_of(b - a - 1, 'empty line')} stand{'s' * (b == a + 2)}"
+        )
+        said.append(
+            f"{what} between rows, after line {a + 1}: read as one table; where another run begins, say so by `rows`"
+        )
+    more = len(steps) - MOST_LISTED
+    return said + ([f"so do {number_of(more, 'other line')} further on"] if more > 0 else [])
+
+
+def _times_of(names: Sequence[str], columns: Sequence[np.ndarray]) -> dict[int, int]:
+    """The column of time of each column where every second one is a time; empty for other tables."""
+    every = names[::2]
+    paired = len(names) > 2 and len(names) % 2 == 0 and all(map(_names_a_time, every))
+    if not paired or not all(_rises(columns[k]) for k in range(0, len(names), 2)):
+        return {}
+    return {k + 1: k for k in range(0, len(names), 2)}
+
+
+def _names_a_time(name: str) -> bool:
+    return name.lower() == "x" or bool(TIMES & set(re.split(r"[^a-z_]+|_(?!value)", name.lower())))
+
+
+def _rises(column: np.ndarray) -> bool:
+    """Whether numbers rise from row to row as far as they go; texts may be dates."""
+    if column.dtype.kind == "O":
+        return all(cell is None or TIME.fullmatch(cell) for cell in column[:STYLED])
+    known = column[np.isfinite(column.astype(float))]
+    return len(known) > 1 and bool(np.all(np.diff(known) > 0))
+
+
+def _differing(times: dict[int, int], columns: Sequence[np.ndarray]) -> dict[int, int]:
+    """The column of time of each column, itself for those, where they differ; empty where they are the same."""
+    first = columns[min(times.values())]
+    if all(np.array_equal(first, columns[k]) for k in times.values()):
+        return {}
+    return times | {k: k for k in times.values()}
 
 
 def _clocks(times: dict[int, int], columns: list[np.ndarray], sample_times: dict[int, float]) -> dict[int, Clock]:

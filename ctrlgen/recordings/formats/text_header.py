@@ -16,10 +16,25 @@ from ctrlgen.recordings.formats.written_layout import Layout
 
 HEAD = 20  # rows of a table by which its columns of numbers are known
 REMARKS = {"comment", "comments", "remark", "remarks", "note", "notes", ""}
-NAME_LABELS, UNIT_LABELS = {"name", "names"}, {"unit", "units", "einheit", "einheiten"}
+NAME_LABELS = {"name", "names", "trace name", "channel name", "signal name"}
+FACTOR_LABELS = {
+    "factor",
+    "faktor",
+    "scale",
+    "scaling",
+    "gain",
+    "slope",
+    "multiplier",
+    "offset",
+    "skalierung",
+    "verst\u00e4rkung",
+}
+UNIT_LABELS = {"unit", "units", "einheit", "einheiten", "vunit"}
 DECLARED_NAME = re.compile(r"^\s*#\s*NAME(\d+)\s*=\s*(.+?)\s*$")  # GCS arrays of Physik Instrumente
 DECLARED_TIME = re.compile(r"^\s*#\s*SAMPLE_TIME\s*=\s*([\d.eE+-]+)\s*$")
+DATES = re.compile("time|date|zeit|datum", re.IGNORECASE)
 WORD_WITH_UNIT = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?")
+LONGEST_SHOWN = 60  # characters of a line that a note shows
 PAIRED = 2  # header rows in which every second cell repeats a key, as TwinCAT Scope writes them
 
 
@@ -116,10 +131,15 @@ def _rows_above(
             bool(numeric) and all(is_reading(cells[i]) for i in numeric) and any(is_number(cells[i]) for i in numeric)
         )
         spoilt = any(is_number(cells[i]) for i in numeric) and any(named[n + 1 :]) and not _with_units(cells)
-        if is_comment(lines[k]) or not (whole or spoilt):
+        if is_comment(lines[k]) or _of_factors(cells) or not (whole or spoilt):
             break
         own.insert(0, k)
     return tuple(own)
+
+
+def _of_factors(cells: Sequence[str]) -> bool:
+    """Whether a row says in its first cell that it scales the columns."""
+    return cells[0].strip("[]():").lower() in FACTOR_LABELS and any(map(is_number, cells[1:]))
 
 
 def _with_units(cells: Sequence[str]) -> bool:
@@ -148,6 +168,10 @@ def _names_and_units(candidates: Sequence[tuple[int, list[str]]]) -> Header:
         names_at, above = names_at + 1, []
     line, names = candidates[names_at]
     notes = [f"names in line {line + 1}"] if line else []
+    if not all(names) and _is_text(above) and all(a or n for a, n in zip(above, names, strict=True)):
+        notes.append(f"columns without a name there are named by line {candidates[names_at + 1][0] + 1}")
+        names = [name or other for name, other in zip(names, above, strict=True)]
+        above = []
     if any(map(is_number, names)):
         notes = [f"line {line + 1} ({', '.join(names)}) is taken as the columns' names"]
     units = _units_behind(names)
@@ -156,16 +180,25 @@ def _names_and_units(candidates: Sequence[tuple[int, list[str]]]) -> Header:
         units |= {
             k: c.strip("[](){} ") for k, c in enumerate(candidates[at][1]) if c and not is_number(c) and unit_of(c)
         }
-    passed = [k + 1 for n, (k, _) in enumerate(candidates[: max(names_at, at or 0)]) if n not in (names_at, at)]
-    if passed:
-        lines = f"line {passed[0]} holds" if len(passed) == 1 else f"lines {', '.join(map(str, passed))} hold"
-        notes.append(f"{lines} neither names nor units")
+    passed = [(k + 1, c) for n, (k, c) in enumerate(candidates[: max(names_at, at or 0)]) if n not in (names_at, at)]
+    notes += [
+        f"line {k} ({_shown(cells)}) is not applied: write its factors as `scale` of the columns"
+        if _of_factors(cells)
+        else f"line {k} ({_shown(cells)}) holds neither names nor units"
+        for k, cells in passed
+    ]
     found = _grouped(names, above)
     if found == names and at is not None and _is_text(above):
         notes.append(f"above them stands {', '.join(filter(None, above))}")
         found = [name or other for name, other in zip(names, above, strict=True)]
         found = found if len(set(found)) == len(found) else names
     return Header(tuple(found), units, notes=tuple(notes))
+
+
+def _shown(cells: Sequence[str]) -> str:
+    """Cells as a note shows them."""
+    shown = ", ".join(filter(None, cells))
+    return shown if len(shown) <= LONGEST_SHOWN else f"{shown[:LONGEST_SHOWN]}..."
 
 
 def _is_text(cells: Sequence[str]) -> bool:
@@ -185,7 +218,12 @@ def _tells_more(above: Sequence[str], names: Sequence[str]) -> bool:
 def _is_units(cells: list[str], above: list[str]) -> bool:
     """Whether a row under one of names states units."""
     texts = [c for c in cells if not is_number(c)]
-    return is_unit_row(texts) and not is_unit_row(above) and not all(is_number(c) for c in above if c)
+    dated = {
+        k for k, c in enumerate(cells) if DATES.fullmatch(c) and DATES.search(above[k])
+    }  # the word stands for a unit
+    rest = [c for k, c in enumerate(cells) if k not in dated and not is_number(c)]
+    units = is_unit_row(rest if len(rest) > len(dated) else texts)
+    return units and not is_unit_row(above) and not all(is_number(c) for c in above if c)
 
 
 def _grouped(names: list[str], above: list[str]) -> list[str]:

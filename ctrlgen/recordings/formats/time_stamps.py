@@ -9,7 +9,7 @@ import numpy as np
 
 from ctrlgen.core.counts import number_of
 from ctrlgen.recordings.formats.layout_question import Ambiguous
-from ctrlgen.recordings.formats.number_cells import CLOCK, DATE, MISSING
+from ctrlgen.recordings.formats.number_cells import CLOCK, DATE, MISSING, ZONES
 
 DAY = 86400.0
 HOUR = 3600.0
@@ -17,15 +17,30 @@ EVEN = 0.25  # of a step: how exactly an hour's jump must be an hour and one ste
 SINCE_1970 = (9.46e8, 2.5e9)  # seconds: the years 2000 to 2049; those since 1904, of LabVIEW, are more
 CENTURY = 4.1e9  # seconds: more is no time since a start, nor since 1904
 EPOCHS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
-DAYS = (36526.0, 54789.0)  # days since 1900 as spreadsheets count them: the years 2000 to 2049
-SHORTEST_STEP = 1e-6  # seconds: no recorder that has run for half a day goes on in shorter steps
-FILETIME = (1.2e17, 1.7e17)  # hundreds of nanoseconds since 1601: the years 1981 to 2139
-STAMP = re.compile(rf"({DATE})?[T ,;]*({CLOCK})?\s*(Z|UTC|[+-]\d{{2}}:?\d{{2}})?", re.ASCII)
+SHORTEST_STEP = 1e-6  # seconds: no recorder that has run for some hours goes on in shorter steps
+SHORT_STEP = 1e-3  # seconds: nor one that has run for a week
+DAYS = {  # the years 2000 to 2049 in days, and the shortest step of a row that they would be in seconds
+    "since 1970, as Matplotlib counts them": (10957.0, 29220.0, SHORTEST_STEP),
+    "since 1900, as spreadsheets write dates": (36526.0, 54789.0, SHORTEST_STEP),
+    "since the year 0, as MATLAB's datenum counts them": (730486.0, 748749.0, SHORT_STEP),
+    "since 4713 BC, as Julian dates are": (2451544.0, 2469808.0, SHORT_STEP),
+}
+HUNDREDS = {
+    "1601": (1.2e17, 1.7e17),
+    "the year 1": (6.1e17, 6.7e17),
+}  # of nanoseconds: of Windows and of .NET, 1934 and later
+STAMP = re.compile(rf"({DATE})?[T ,;]*({CLOCK})?\s*(Z|{ZONES}|[+-]\d{{2}}:?\d{{2}})?", re.ASCII)
 BASIC = re.compile(r"^(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)(\d\d)", re.ASCII)  # ISO 8601 without marks
-THOUSANDTHS = re.compile(r"(\d[T ]\d{1,2}:\d{2}:\d{2}):(\d{3})(?!\d)", re.ASCII)  # behind a date; of instruments
+THOUSANDTHS = re.compile(r"(\d[T ]\d{1,2}:\d{2}:\d{2})[:;](\d{3})(?!\d)", re.ASCII)  # behind a date; of instruments
+ZONE = re.compile(rf"\s+({ZONES})$", re.ASCII)
+EAST = {
+    "UTC": 0, "GMT": 0, "WET": 0, "WEST": 1, "BST": 1, "CET": 1, "MEZ": 1, "CEST": 2, "MESZ": 2, "EET": 2, "EEST": 3, "EST": -5, "EDT": -4,
+    "CST": -6, "CDT": -5, "MST": -7, "MDT": -6, "PST": -8, "PDT": -7, "JST": 9, "KST": 9,
+}  # fmt: skip
+"""Hours east of Greenwich of zones by their letters. Of those that two countries use only the difference to summer time matters here."""
 # of a column; _time as InfluxDB writes it
 TIME_NAME = re.compile(
-    r"^_?(t|time|zeit|tijd|temps|tempo|timestamp|time.?stamp|clock|datetime|date|elapsed.*|sekunden|seconds?|secs?)(?![a-z])",
+    r"^_*(t|ts|x_value|millis|micros|time|zeit|tijd|temps|tempo|timestamp|time.?stamp|clock|datetime|date|elapsed.*|sekunden|seconds?|secs?)(?![a-z])",
     re.IGNORECASE,
 )
 PARTS = re.compile(r"(\d{1,4})[-./](\d{1,2})[-./](\d{1,4})", re.ASCII)
@@ -60,8 +75,11 @@ def seconds(column: np.ndarray, dates: str | None) -> Stamps | None:
 def _dates(cells: list[str], first: str, dates: str | None) -> Stamps:
     """Dates with a time of day. A zone is subtracted; without one, summer time shows as a jump of an hour."""
     iso = re.match(r"\d{4}[-/.]?\d{2}[-/.]?\d{2}", first)
-    said, zoned = ("time is ISO 8601" if iso else "time is dates"), bool(re.search(r"(Z|UTC|[+-]\d{2}:?\d{2})$", first))
-    texts = [re.sub(r"(\d),(\d+)", r"\1.\2", re.sub(r"\s+(?=[+-]\d\d)", "", c.replace(" UTC", "Z"))) for c in cells]
+    said, zoned = (
+        ("time is ISO 8601" if iso else "time is dates"),
+        bool(re.search(rf"(Z|{ZONES}|[+-]\d{{2}}:?\d{{2}})$", first)),
+    )
+    texts = [re.sub(r"(\d),(\d+)", r"\1.\2", re.sub(r"\s+(?=[+-]\d\d)", "", ZONE.sub(_offset, c))) for c in cells]
     notes: tuple[str, ...] = ()
     if iso:
         texts = [re.sub(r"^(\d{4})[/.](\d{2})[/.](\d{2})[ T]?", r"\1-\2-\3T", c) for c in texts]
@@ -73,6 +91,10 @@ def _dates(cells: list[str], first: str, dates: str | None) -> Stamps:
         instants = _parsed(texts, "mixed")
     stamps = _instants(instants, said, notes)
     return stamps if zoned else _without_summer_time(stamps)
+
+
+def _offset(zone: re.Match[str]) -> str:
+    return f"{EAST[zone[1]]:+03d}:00"
 
 
 def _order(texts: list[str], first: str, match: re.Match[str], dates: str | None) -> tuple[str, tuple[str, ...]]:
@@ -95,6 +117,7 @@ def _order(texts: list[str], first: str, match: re.Match[str], dates: str | None
     clock += ":%S" if rest.count(":") > 1 else ""
     clock += ".%f" if any(re.search(r":\d+\.\d", c) for c in texts) else ""
     clock += " %p" if hour == "%I" else ""
+    clock += "%z" if re.search(r"[+-]\d{2}:?\d{2}$", texts[0]) else ""
     return f"{day}-{year}{clock}", ((f"dates have the {dates.replace(' first', '')} first",) if dates else ())
 
 
@@ -155,7 +178,9 @@ def _times_of_day(cells: list[str]) -> Stamps:
         if cell.lower() in MISSING:
             continue
         match = re.fullmatch(
-            r"(\d{1,3}):(\d{2})(?::(\d{2}))?(?:[.,:](\d+))?\s*([AaPp])?\.?[Mm]?\.?\s*Z?", cell, re.ASCII
+            r"(?:(\d+) days? )?(\d{1,3}):(\d{2})(?::(\d{2}))?(?:[.,:;](\d+))?\s*([AaPp])?\.?[Mm]?\.?\s*Z?",
+            cell,
+            re.ASCII,
         )
         if match is None:
             raise ValueError(f"holds {cell!r} in row {k}, which is no time of day; write hours:minutes:seconds")
@@ -163,15 +188,16 @@ def _times_of_day(cells: list[str]) -> Stamps:
             raise ValueError(
                 f"holds {cell!r}, whose last part is no thousandths of a second; write hours:minutes:seconds.fraction"
             )
-        if match[3] is None and match[4] is None:
+        days, first, second, third, fraction, half = match.groups()
+        if third is None and fraction is None:
             raise ValueError(
                 f"holds {cell!r}, which may be hours and minutes or minutes and seconds; write hours:minutes:seconds"
             )
-        first, second, third = int(match[1]), int(match[2]), int(match[3] or 0)
-        if match[5] and match[3] is not None:
-            first = first % 12 + (12 if match[5] in "Pp" else 0)
-        whole = 3600 * first + 60 * second + third if match[3] is not None else 60 * first + second
-        time = whole + float(f"0.{match[4] or 0}")
+        high, low = int(first), int(second)
+        if half and third is not None:
+            high = high % 12 + (12 if half in "Pp" else 0)
+        whole = 3600 * high + 60 * low + int(third) if third is not None else 60 * high + low
+        time = DAY * int(days or 0) + whole + float(f"0.{fraction or 0}")
         if time + carried < last - DAY / 2:
             carried += DAY
             notes.append(f"midnight passes before row {k}")
@@ -192,11 +218,12 @@ def from_first(column: np.ndarray, unit: str, scale: float) -> tuple[np.ndarray,
     values, size = (column - finite[0]).astype(float), float(finite[0])
     if unit not in EPOCHS:
         return values, ()
-    if unit == "s" and scale == 1 and are_days(column.astype(float)):
-        what = f"begins at {size:.10g} and goes on in steps far below a microsecond: days since 1900, as spreadsheets write dates"
+    if unit == "s" and scale == 1 and (since := days_since(column.astype(float))):
+        what = f"begins at {size:.10g} and goes on in steps far too short for seconds: days {since}"
         raise ValueError(f'{what}: write unit = "day"')
-    if FILETIME[0] < size < FILETIME[1] and scale / EPOCHS[unit] > 2e-7:
-        raise ValueError('holds hundreds of nanoseconds since 1601: write scale = 100, unit = "ns"')
+    since = next((year for year, (low, high) in HUNDREDS.items() if low < size < high), "")
+    if since and scale / EPOCHS[unit] > 2e-7:
+        raise ValueError(f'holds hundreds of nanoseconds since {since}: write scale = 100, unit = "ns"')
     fitting = [name for name in EPOCHS if _in_epoch(size, name)]
     if not fitting or scale != 1:
         return values, ()
@@ -207,16 +234,17 @@ def from_first(column: np.ndarray, unit: str, scale: float) -> tuple[np.ndarray,
     return values, (f"time is {unit} since 1970; from {instant}",) if unit in fitting else ()
 
 
-def are_days(values: np.ndarray) -> bool:
-    """Whether numbers are the dates of a spreadsheet, days since 1900, which are too close for seconds."""
+def days_since(values: np.ndarray) -> str:
+    """Since when numbers count days, as programs write dates, where they are too close for seconds; empty where they do not."""
     known = values[np.isfinite(values)]
     steps = np.diff(known[:1000])
-    return len(steps) > 1 and DAYS[0] < known[0] < DAYS[1] and 0 < float(np.median(steps)) < SHORTEST_STEP
+    step = float(np.median(steps)) if len(steps) > 1 else 0.0
+    return next((since for since, (low, high, short) in DAYS.items() if 0 < step < short and low < known[0] < high), "")
 
 
 def epoch_unit(values: np.ndarray) -> str | None:
     """The unit in which numbers are times since 1970, of the years 2000 to 2049, or days of a spreadsheet; None where they are not."""
-    if are_days(values):
+    if len(values) and days_since(values):
         return "day"
     return next((unit for unit in EPOCHS if len(values) and _in_epoch(float(values[0]), unit)), None)
 

@@ -13,6 +13,9 @@ PLAIN = re.compile(
     r"^(?P<name>.*[^\W_])(?:[_\s]+|\s+in\s+)(?P<unit>[mun\u00b5\u03bc]s|[mun\u00b5\u03bcp]m|[mkun\u00b5\u03bc][VA]|[mun\u00b5\u03bc]rad|rad|deg[CF]?|[kM]?Hz)$"
 )
 """A unit after a blank or an underscore, of those that are no usual end of a name: time_ms, but not x_m or phase A."""
+BESIDE = re.compile(
+    r"(?P<unit>[^\W\d]\w*)\s*[*x\u00d7]\s*(?=\d)[\d.eE^+-]+|[*x\u00d7]\s*(?=\d)[\d.eE^+-]+\s*(?P<behind>[^\W\d]\w*)"
+)
 WORDS = {
     "second": "s", "seconds": "s", "sec": "s", "secs": "s", "sekunde": "s", "sekunden": "s", "millisecond": "ms",
     "milliseconds": "ms", "msec": "ms", "microseconds": "us", "usec": "us", "volt": "V", "vdc": "V", "volts": "V", "millivolt": "mV",
@@ -22,7 +25,13 @@ WORDS = {
     "newton": "N", "newtons": "N", "hertz": "Hz", "watt": "W", "watts": "W", "kelvin": "K", "arcsec": "arcsecond",
     "radian": "rad", "radians": "rad", "hz": "Hz", "khz": "kHz", "%": "percent",
 }  # fmt: skip
-LETTERS = {"C": "degC", "g": "g_0"}  # of a log: neither coulombs nor grams
+LETTERS = {
+    "C": "degC", "g": "g_0", "mil": "thou", "mils": "thou",  # of a log: neither coulombs nor grams nor a mil of angle
+    "S": "s", "MS": "ms", "US": "us", "MM": "mm", "UM": "um",  # in capitals: no log is in siemens
+    "Nm": "N*m", "mNm": "mN*m", "Ncm": "N*cm", "Nmm": "N*mm", "kNm": "kN*m",
+}  # fmt: skip
+SCALED = re.compile(r"(?P<number>\d*\.?\d+(?:[eE][+-]?\d{1,2})?|10\^[+-]?\d{1,2})\s*[*\u00b7]?\s*(?P<unit>[^\W\d].*)")
+"""A unit of so many others: numbers in 0.1 ms, in 1e-6 m."""
 SIGNS = {"µ": "u", "μ": "u", "²": "^2", "³": "^3", "·": "*", "°": "deg", "Ω": "ohm"}
 STRANGE = re.compile(r"[^\w/*^%().\s+-]|\^.*\^|\*\*|\d{2}")  # no unit of a log; a tower of powers has no end
 COUNTS = {"sequence", "sample", "samples", "point", "points", "index", "count", "counts", "row", "nr", "no."}
@@ -56,6 +65,23 @@ def unit_of(text: str) -> str | None:
     return bare
 
 
+def scaled_unit(text: str) -> tuple[float, str] | None:
+    """A unit of so many others: `0.1 ms` is (0.1, "ms"); None for any other text."""
+    bare = text.strip().strip("[](){}<>").strip()
+    match = SCALED.fullmatch(bare) if len(bare) <= LONGEST else None
+    unit = None if match is None else unit_of(match["unit"])
+    if match is None or unit is None or unit == "1":
+        return None
+    number = float(match["number"].replace("10^", "1e"))
+    return (number, unit) if number > 0 else None
+
+
+def unclear_factor(text: str) -> bool:
+    """Whether a unit stands beside a factor that may multiply or divide it: `nm x 10`."""
+    match = BESIDE.fullmatch(text.strip().strip("[](){}<>").strip()) if len(text) <= LONGEST else None
+    return match is not None and unit_of(match["unit"] or match["behind"]) is not None
+
+
 def is_unit_cell(text: str) -> bool:
     """Whether a cell of a row of units may be one: a unit, a word for none, or anything in brackets."""
     bare = text.strip()
@@ -75,14 +101,20 @@ def is_unit_row(cells: list[str]) -> bool:
 def split_name(name: str) -> tuple[str, str | None]:
     """A name and the unit behind it: 'Channel 1 (mV)' is 'Channel 1' in mV; the unit as it stands there, None where there is none."""
     if match := BEHIND.match(name):
-        square = name.rstrip().endswith("]")
-        if square or (match["unit"] not in LETTERS_OF_NAMES and unit_of(match["unit"]) is not None):
+        square, unit = name.rstrip().endswith("]"), match["unit"]
+        stated = unit_of(unit) is not None or scaled_unit(unit) is not None
+        if square or (unit not in LETTERS_OF_NAMES and stated and not _is_of_a_node(name, unit)):
             return match["name"].strip(), match["unit"] or None
     if match := PLAIN.match(name):
         return match["name"].removesuffix(" in").strip(), match["unit"]
     if (match := SLASH.match(name)) and match["unit"] not in LETTERS_OF_NAMES and is_unit_cell(match["unit"]):
         return match["name"].strip(), match["unit"]
     return name, None
+
+
+def _is_of_a_node(name: str, unit: str) -> bool:
+    """Whether a name is a voltage or a current of a circuit's node, as SPICE writes them: V(in) is no inch."""
+    return name[:2] in ("V(", "I(") and base_unit(unit_of(unit) or "1") != name[0]
 
 
 def bare_name(name: str) -> str:

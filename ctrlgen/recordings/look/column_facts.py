@@ -12,10 +12,12 @@ from ctrlgen.core.units import same_dimension, to_si
 from ctrlgen.recordings.formats.layout_question import Ambiguous, AmbiguousFile
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
 from ctrlgen.recordings.formats.time_stamps import TIME_NAME, epoch_unit
-from ctrlgen.recordings.formats.unit_texts import BASES, NAMES, bare_name, unit_of
+from ctrlgen.recordings.formats.unit_texts import BASES, NAMES, bare_name, scaled_unit, unit_of
 from ctrlgen.recordings.look.answers import NOTHING, Answers
 
 SUFFIX = re.compile(r"^(?P<name>.*[A-Za-z0-9)])[_.](?P<unit>[A-Za-z%]{1,4})$")  # of a name: drive_V, time.ms
+CLOCKS = {"millis": "ms", "micros": "us", "ms": "ms", "us": "us", "msec": "ms", "usec": "us"}
+"""Names of columns that are units of time, of microcontrollers among others."""
 GAP = 1.5  # steps between two rows from which rows are missing
 END = 1e-9  # of the range: rounding of a file
 CLIPPED = 20  # rows at an end, in runs of three and more, from which it is told
@@ -28,19 +30,26 @@ SMOOTH = 0.1  # median of second differences over that of first ones, of a drive
 
 @dataclass(frozen=True)
 class ColumnFacts:
-    """One column: `unit` as the file states it or its name ends, None where neither does; `values` (n,), NaN where there is no number,
-    None where the column is text or cannot be read before its `question` is answered; `notes`: what was interpreted."""
+    """One column: `unit` as the file states it or its name ends, None where neither does; `values` (n,) in it, NaN where there is no
+    number, None where the column is text or cannot be read before its `question` is answered; `notes`: what was interpreted; `scale`: of
+    the file's numbers to `unit`, where it states a multiple of a unit."""
 
     name: str
     unit: str | None
     values: np.ndarray | None
     notes: tuple[str, ...] = ()
     question: Ambiguous | None = None
+    scale: float = 1.0
 
     @property
     def bare(self) -> str:
         """The name without its unit."""
         return bare_name(self.name)
+
+    @property
+    def last(self) -> str:
+        """The name without its unit and without the groups that it is in."""
+        return re.split(r"[./]", self.bare)[-1]
 
     @property
     def finite(self) -> np.ndarray:
@@ -124,18 +133,22 @@ def named(table: MeasurementTable, column: str) -> str:
 
 def _facts(table: MeasurementTable, name: str) -> ColumnFacts:
     stated = table.units.get(name)
-    unit = _suffix(name) if stated is None else unit_of(stated)
+    several = scaled_unit(table.unit(name) or "")
+    scale, unit = several or (1.0, _suffix(name) if stated is None else unit_of(stated))
     try:
         read = table.reading(name)
     except AmbiguousFile as error:
-        return ColumnFacts(name, unit, None, question=error.question)
+        return ColumnFacts(name, unit, None, question=error.question, scale=scale)
     except InputError:  # it holds text
-        return ColumnFacts(name, unit, None)
-    return ColumnFacts(name, unit, read.values, read.notes)
+        return ColumnFacts(name, unit, None, scale=scale)
+    return ColumnFacts(name, unit, read.values if scale == 1 else scale * read.values, read.notes, scale=scale)
 
 
 def _suffix(name: str) -> str | None:
-    """The unit that a name ends in, such as `V` of drive_V; of the letters that are also indices or axes none is taken."""
+    """The unit that a name ends in, such as `V` of drive_V, or is itself, such as `micros`; of the letters that are also indices or axes
+    none is taken."""
+    if name.lower() in CLOCKS:
+        return CLOCKS[name.lower()]
     match = SUFFIX.match(name)
     if match is None or (match["unit"].lower() in NAMES - {"s"} and match["unit"] not in ("V", "A", "N", "W", "s")):
         return None
@@ -148,29 +161,44 @@ def _time(table: MeasurementTable, columns: tuple[ColumnFacts, ...], chosen: str
 
     Raises `AmbiguousFile` for dates that can be read two ways.
     """
-    named = [c for c in columns if TIME_NAME.match(c.bare)]
+    named = [c for c in columns if TIME_NAME.match(c.bare)] or [c for c in columns if TIME_NAME.match(c.last)]
     dated = [c for c in columns if c.values is None]
     of_unit = [c for c in columns if c.unit is not None and same_dimension(c.unit, "s")]
+    found = []
     for column in dict.fromkeys(chosen or c.name for c in (*named, *dated, *of_unit, *columns[: bool(chosen)])):
-        facts = next(c for c in columns if c.name == column)
-        unit, stamps = facts.unit or epoch_unit(facts.finite) or "s", facts.values is None
-        if not same_dimension(unit, "s") or (facts.question is not None and not chosen):
-            continue
-        try:
-            seconds = table.time(column, "s" if stamps else unit).values * (1.0 if stamps else to_si(1.0, unit))
-        except AmbiguousFile:
-            raise
-        except InputError:
-            continue
-        steps = np.diff(seconds[np.isfinite(seconds)])
-        if len(steps) < 2 or not np.median(steps) > 0:
-            continue
-        step = float(np.median(steps))
-        even = steps[np.abs(steps / step - 1) < GAP - 1]
-        gaps = tuple((int(k), round(float(steps[k] / step)) - 1) for k in np.flatnonzero(steps > GAP * step))
-        jitter = float(np.sqrt(np.mean((even - step) ** 2))) if len(even) else 0.0
-        return TimeFacts(column, "s" if stamps else unit, stamps, step, jitter, gaps, int(np.sum(steps <= 0)))
-    return None
+        time = _time_in(table, next(c for c in columns if c.name == column), bool(chosen))
+        if time is not None and not time.backward:
+            return time
+        found += [] if time is None else [time]
+    return found[0] if found else None
+
+
+def _time_in(table: MeasurementTable, facts: ColumnFacts, chosen: bool) -> TimeFacts | None:
+    """The time in one column; None where it holds none. Raises `AmbiguousFile`."""
+    unit, stamps = facts.unit or epoch_unit(facts.finite) or "s", facts.values is None
+    if not same_dimension(unit, "s") or (facts.question is not None and not chosen):
+        return None
+    try:
+        size = 1.0 if stamps else to_si(1.0, unit) * facts.scale
+        seconds = table.time(facts.name, "s" if stamps else unit, facts.scale).values * size
+    except AmbiguousFile:
+        raise
+    except InputError:
+        return None
+    steps = np.diff(seconds[np.isfinite(seconds)])
+    if len(steps) < 2 or not np.median(steps) > 0:
+        return None
+    step = float(np.median(steps))
+    even = steps[np.abs(steps / step - 1) < GAP - 1]
+    gaps = tuple((int(k), round(float(steps[k] / step)) - 1) for k in np.flatnonzero(steps > GAP * step))
+    jitter = float(np.sqrt(np.mean((even - step) ** 2))) if len(even) else 0.0
+    return TimeFacts(facts.name, "s" if stamps else unit, stamps, step, jitter, gaps, int(np.sum(steps <= 0)))
+
+
+def is_a_time(column: ColumnFacts) -> bool:
+    """Whether a column is named as a time and rises from row to row."""
+    named = TIME_NAME.match(column.bare) or TIME_NAME.match(column.last)
+    return bool(named) and column.moves and bool(np.all(np.diff(column.finite) > 0))
 
 
 def rests(drives: np.ndarray) -> list[tuple[int, int]]:

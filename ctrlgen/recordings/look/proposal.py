@@ -17,7 +17,7 @@ from ctrlgen.core.units import parse, same_dimension, to_si
 from ctrlgen.model.model import Model
 from ctrlgen.recordings.alike_units import size_of
 from ctrlgen.recordings.look.answers import NOTHING, Answers, layout_option
-from ctrlgen.recordings.look.column_facts import ColumnFacts, TableFacts, between_samples, named
+from ctrlgen.recordings.look.column_facts import ColumnFacts, TableFacts, between_samples, is_a_time, named
 from ctrlgen.recordings.look.oddities import fitting_units, implausible_range
 from ctrlgen.recordings.moved import Stretch, moved_of
 from ctrlgen.recordings.plausibility import implausible
@@ -139,7 +139,8 @@ def propose(tables: Sequence[TableFacts], model: Model, answers: Answers = NOTHI
     """The recording that files with the same columns are of a device. Its first file decides which column is what, where `answers` do
     not; they name what `tables` were read with. Raises InputError for an answer that names no signal or column."""
     first = tables[0]
-    taken = {first.time.column} if first.time is not None else set()
+    taken = {c.name for c in first.columns if first.time is not None and (c.name == first.time.column or is_a_time(c))}
+    taken |= first.table.time_parts
     columns = [c for c in first.columns if c.moves and c.name not in taken]
     signals = [name for name in signal_units(model) if name.partition(".")[0] in ("drive", "reading")]
     chosen = _chosen(model, first, signals, answers)
@@ -166,9 +167,23 @@ def propose(tables: Sequence[TableFacts], model: Model, answers: Answers = NOTHI
         asked.append(f"no column is a time: {says}")
     if any(name not in found for name in signals):  # which an unread column may be
         asked += [c.question.asked(layout_option) for c in first.columns if c.question is not None]
+    _check_lengths(first, matches)
     remarks = _remarks(model, first, matches, answers)
     left = [c.name for c in first.columns if c.moves and c.name not in {*taken, *(m.column for m in matches)}]
     return Proposal(model, tuple(tables), tuple(matches), tuple(left), tuple(asked), tuple(remarks), answers)
+
+
+def _check_lengths(facts: TableFacts, matches: Sequence[Match]) -> None:
+    """Raises InputError where the columns of signals, or the time, have other numbers of rows than one another, or other times."""
+    names = [m.column for m in matches] + ([facts.time.column] if facts.time is not None else [])
+    if differing := facts.table.differing_times(names):
+        raise facts.table.fault(differing)
+    sizes = {name: len(facts.table.columns[name]) for name in names}
+    if len(set(sizes.values())) > 1:
+        listed = ", ".join(f"{name} {size}" for name, size in sizes.items())
+        raise facts.table.fault(
+            f"has columns of different numbers of rows ({listed}); export them together, at one rate"
+        )
 
 
 def _chosen(model: Model, facts: TableFacts, signals: Sequence[str], answers: Answers) -> list[Match]:

@@ -31,12 +31,18 @@ def recording_toml(proposal: Proposal, folder: Path, title: str) -> str:
     lines.append("[columns]")
     for match in proposal.matches:
         why = f" # {'; '.join(match.why)}" if match.why else ""
-        lines.append(f'"{match.signal}" = {{ column = {toml(match.column)}, unit = "{match.unit}" }}{why}')
+        lines.append(f'"{match.signal}" = {_column(proposal.tables[0], match.column, match.unit)}{why}')
     lines += [f"# not used: {', '.join(proposal.left)}"] if proposal.left else []
     lines += [f"# to be answered: {question}" for question in proposal.missing]
     lines += [f"# odd: {remark}" for remark in proposal.remarks]
     # names of columns stand in comments, too, where nothing escapes what is not shown
     return "\n".join("".join(c if c.isprintable() else " " for c in line) for line in lines) + "\n"
+
+
+def _column(facts: TableFacts, name: str, unit: str) -> str:
+    """A column as recording.toml names it, with its scale where the file states a multiple of a unit."""
+    scale = facts.column(name).scale
+    return f'{{ column = {toml(name)}, unit = "{unit}"' + (f", scale = {scale:g} }}" if scale != 1 else " }")
 
 
 def _record(proposal: Proposal, facts: TableFacts, folder: Path, role: str) -> list[str]:
@@ -52,7 +58,7 @@ def _record(proposal: Proposal, facts: TableFacts, folder: Path, role: str) -> l
     elif facts.time is None:
         head.append('sample_rate = "1 kHz" # assumed: no column is a time')
     else:
-        head.append(f'time = {{ column = {toml(facts.time.column)}, unit = "{facts.time.unit}" }}')
+        head.append(f"time = {_column(facts, facts.time.column, facts.time.unit)}")
     known = proposal.drives_of(facts)
     if not known:
         return ["[[record]]", *head, f'role = "{role}"', ""]

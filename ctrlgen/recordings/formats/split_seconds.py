@@ -1,0 +1,50 @@
+"""Time in two columns, whole seconds and their fraction: a stamp of ROS, a date with milliseconds beside it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from ctrlgen.core.errors import InputError
+from ctrlgen.recordings.formats.measurement_table import MeasurementTable
+from ctrlgen.recordings.formats.unit_texts import bare_name
+
+FRACTIONS = (
+    (re.compile(r"(ms|msecs?|millis?|milli(tm|secs?|seconds?))", re.IGNORECASE), 1e3),
+    (re.compile(r"(us|usecs?|micros?|micro(secs?|seconds?))", re.IGNORECASE), 1e6),
+    (re.compile(r"(ns|nsecs?|nanos?|nano(secs?|seconds?))", re.IGNORECASE), 1e9),
+)
+"""Names of columns of a fraction, and how many of it are a second."""
+
+
+def with_whole_time(table: MeasurementTable) -> MeasurementTable:
+    """The table with one column of time more, at its end, where a column of whole seconds has that of their fraction behind it."""
+    names = list(table.columns)
+    for before, name in pairwise(names):
+        last = re.split(r"[./]", bare_name(name))[-1]
+        size = next((size for pattern, size in FRACTIONS if pattern.fullmatch(last)), 0.0)
+        if size and (time := _joined(table, before, name, size)) is not None:
+            whole = f"time ({before} + {name})"
+            note = f"{whole}: {before} holds whole seconds and {name} what is over, read as one time"
+            columns = {**table.columns, whole: time}
+            units, parts = {**table.units, whole: "s"}, frozenset((before, name))
+            return replace(table, columns=columns, units=units, notes=(*table.notes, note), time_parts=parts)
+    return table
+
+
+def _joined(table: MeasurementTable, before: str, name: str, size: float) -> np.ndarray | None:
+    """Seconds since the first row (n,), rounded to the fraction; None where the two columns are no parts of one time."""
+    try:
+        whole, over = table.time(before, "s").values, table.numbers(name)
+    except InputError:
+        return None
+    if len(whole) != len(over) or len(over) < 2 or not (np.isfinite(whole).all() and np.isfinite(over).all()):
+        return None
+    parts = np.all(whole == np.round(whole)) and over.min() >= 0 and over.max() < size
+    falls = np.diff(over) < 0
+    if not parts or not falls.any() or not np.all(np.diff(whole)[falls] > 0):
+        return None
+    return np.asarray(np.round(whole + (over - over[0]) / size, 9))
