@@ -6,11 +6,12 @@ holds at a sample with the probability p where M - z_p u(M) > 0, z_p the quantil
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Literal
 
+import casadi as ca
 import numpy as np
 import scipy
 
@@ -59,49 +60,27 @@ class Slopes:
 
 
 def slopes_of_limits(path: UncertainPath, linear: Propagated) -> Slopes:
-    """How the stated numbers act on the limits themselves, by devices with one of them changed by its standard deviation. Raises
-    InputError for a number that acts on neither motion nor limits."""
+    """How the stated numbers act on the limits themselves, by each of them changed by its standard deviation. Raises InputError for a
+    number that acts on neither motion nor limits."""
     names = [name for line in path.uncertainties.lines for name in line.paths]
     kinds = [line.kind for line in path.uncertainties.lines for _ in line.paths]
     sds, n = path.uncertainties.sds, len(names)
     numbers = [i for i in range(n) if kinds[i] == "number" and not names[i].startswith("effect[")]
-    values = {path_: number.si for path_, number in path.model.device.quantities()}
     channels = len(path.channels)
     slopes = Slopes(np.zeros((channels, n)), np.zeros((channels, n)), np.zeros((path.n, channels, n)))
-    before = _bounds(path, path.model)
-    trace = path.solution.trace
-
-    def model_with(columns: Sequence[int]) -> Model:
-        return build_model(changed(path.model.device, {names[i]: values.get(names[i], 0.0) + sds[i] for i in columns}))
-
-    def same(bounds: np.ndarray, others: np.ndarray) -> bool:
-        return np.allclose(bounds, others, rtol=SAME, atol=0.0)
-
-    def moved(columns: Sequence[int], after: np.ndarray) -> list[int]:
-        """Those of the columns, with which the bounds are those `after`, that change one: by halving, for a model takes its time."""
-        if not columns or same(after, before):
-            return []
-        if len(columns) == 1:
-            return list(columns)
-        first, second = columns[: len(columns) // 2], columns[len(columns) // 2 :]
-        bounds = _bounds(path, model_with(first))
-        if same(bounds, after):
-            return moved(first, after)
-        return moved(first, bounds) + moved(
-            second, after if same(bounds, before) else _bounds(path, model_with(second))
-        )
-
-    idle, faults = [i for i in numbers if names[i] in path.idle], list[Fault]()
-    moving = [i for i in numbers if i not in idle]
-    for i in {*moved(moving, _bounds(path, model_with(moving))), *idle}:
-        other = model_with([i])
-        after = _bounds(path, other)
-        with np.errstate(invalid="ignore"):  # what has no bound stays without
-            slopes.lower[:, i], slopes.upper[:, i] = np.nan_to_num((after - before) / sds[i])
-        if i in idle and channels:
-            values_of = [_limited(path, model, trace.x, trace.z) for model in (path.solution.model, other)]
-            slopes.direct[:, :, i] = (values_of[1] - values_of[0]) / sds[i]
-        if i in idle and not (slopes.lower[:, i].any() or slopes.upper[:, i].any() or slopes.direct[:, :, i].any()):
+    bounds, limited = _Bounds(path, names, sds), _limited(path)
+    before, as_described, faults = bounds.stated([]), limited(bounds.p([])), list[Fault]()
+    idle = [i for i in numbers if names[i] in path.idle]
+    unstated = {*bounds.unstated([i for i in numbers if i not in idle]), *(i for i in idle if bounds.unstated([i]))}
+    for i in numbers:
+        after = bounds.built([i]) if i in unstated else bounds.stated([i])
+        if not _same(after, before):
+            with np.errstate(invalid="ignore"):  # what has no bound stays without
+                slopes.lower[:, i], slopes.upper[:, i] = np.nan_to_num((after - before) / sds[i])
+        if i not in idle:
+            continue
+        slopes.direct[:, :, i] = (limited(bounds.p([i])) - as_described) / sds[i]
+        if not (slopes.lower[:, i].any() or slopes.upper[:, i].any() or slopes.direct[:, :, i].any()):
             faults.append(
                 Fault(f'numbers."{names[i]}"', "acts on neither motion nor limits of this device; leave it out")
             )
@@ -111,18 +90,70 @@ def slopes_of_limits(path: UncertainPath, linear: Propagated) -> Slopes:
     return slopes
 
 
+def _same(bounds: np.ndarray, others: np.ndarray) -> bool:
+    return np.allclose(bounds, others, rtol=SAME, atol=0.0)
+
+
+class _Bounds:
+    """The bounds (2, channels) of a path's limits where some columns, the numbers `names`, are changed by their `sds`."""
+
+    def __init__(self, path: UncertainPath, names: list[str], sds: np.ndarray) -> None:
+        self.path, self.names, self.sds = path, names, sds
+        self._places = {name: k for k, name in enumerate((*path.free, *path.idle))}
+        m = path.model
+        formulas = {limit.name: formula for limit, formula in zip(m.limits, m.bounds_formulas, strict=True)}
+        sides = [
+            ca.SX(none if formulas[limit.name][side] is None else formulas[limit.name][side])
+            for side, none in enumerate((-np.inf, np.inf))
+            for limit, _ in path.channels
+        ]
+        self._formulas = ca.Function("bounds", [m.p], [ca.vertcat(ca.SX(0, 1), *sides)])
+        self._values = {name: number.si for name, number in m.device.quantities()}
+
+    def p(self, columns: Sequence[int]) -> np.ndarray:
+        """The numbers of the path's model."""
+        p = self.path.model.p_nominal.copy()
+        for i in columns:
+            p[self._places[self.names[i]]] += self.sds[i]
+        return p
+
+    def stated(self, columns: Sequence[int]) -> np.ndarray:
+        """By the formulas that a device may state of its bounds."""
+        return np.asarray(self._formulas(self.p(columns)).full().reshape(2, -1))
+
+    @lru_cache  # noqa: B019 - lives as long as one table of slopes
+    def _of(self, columns: tuple[int, ...]) -> np.ndarray:
+        described = {self.names[i]: self._values.get(self.names[i], 0.0) + self.sds[i] for i in columns}
+        return _bounds(self.path, build_model(changed(self.path.model.device, described)))
+
+    def built(self, columns: Sequence[int]) -> np.ndarray:
+        """By a device with those numbers, which takes its time: its bounds may follow numbers without a formula."""
+        return self._of(tuple(columns))
+
+    def unstated(self, columns: Sequence[int]) -> list[int]:
+        """Those of the columns which change bounds otherwise than by a formula, by halving."""
+        if not columns or _same(self.built(columns), self.stated(columns)):
+            return []
+        if len(columns) == 1:
+            return list(columns)
+        middle = len(columns) // 2
+        return self.unstated(columns[:middle]) + self.unstated(columns[middle:])
+
+
 def _bounds(path: UncertainPath, model: Model) -> np.ndarray:
-    """The lower and upper bounds (2, channels); infinite where there is none."""
+    """The lower and upper bounds (2, channels) of a `model`; infinite where there is none."""
     by_name = {limit.name: limit for limit in model.limits}
     limits = [by_name[limit.name] for limit, _ in path.channels]
     return np.array([limit.bounds for limit in limits]).reshape(-1, 2).T
 
 
-def _limited(path: UncertainPath, model: Model, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """The limited quantities (n, channels) of a `model` at the path's states."""
-    values = model.limited_values(x, z, path.drive[path.before :])
-    named = {limit.name: its for limit, its in zip(model.limits, values, strict=True)}
-    return np.hstack([named[limit.name] for limit in path.limits])
+def _limited(path: UncertainPath) -> Callable[[np.ndarray], np.ndarray]:
+    """p -> the limited quantities (n, channels) at the path's states, of a device with those of these numbers that act on limits alone."""
+    m, n, free, trace, drive = path.model, path.n, len(path.free), path.solution.trace, path.drive[path.before :]
+    y = ca.vertcat(ca.SX(0, 1), *(limit.expr for limit in path.limits))
+    y = ca.substitute(y, path.q, path.q_nominal)
+    along = ca.Function("limited", [m.x, m.z, m.u, path.p_idle], [ca.densify(y)], {"cse": True}).map(n)
+    return lambda p: along(trace.x.T, trace.z.T, drive.T, np.tile(p[free:, None], (1, n))).full().T
 
 
 @dataclass(frozen=True)

@@ -172,11 +172,18 @@ def _made_slopes(path: UncertainPath, name: str) -> ca.Function:
     c = ca.SX.sym("c", constants.numel_out(0))
     of_sample = path.of_sample[name]
     value = of_sample(S, u, c)
-    by_c = ca.Function("by_q", [path.q], [ca.jacobian(constants(path.q), path.q)])(path.q_nominal)
     at = constants(path.q_nominal)
+    by_c = _derivatives(constants, path.q_nominal, at)
     derivatives = [ca.jacobian(value, S), ca.jacobian(value, u), ca.mtimes(ca.jacobian(value, c), by_c)]
     numbers = ca.substitute(derivatives, [c], [ca.SX(at)])
     return ca.Function(f"{name}_slopes", [S, u], [ca.densify(d) for d in numbers], {"cse": True})
+
+
+def _derivatives(f: ca.Function, q: np.ndarray, value: ca.DM) -> ca.DM:
+    """df/dq at one q, where f has the `value`, a direction after the other: f is long, and the formulas of its Jacobian take far longer
+    to write down than to evaluate."""
+    forward = f.forward(1)
+    return ca.horzcat(ca.DM(f.numel_out(0), 0), *(forward(q, value, direction) for direction in np.eye(len(q))))
 
 
 def _along(

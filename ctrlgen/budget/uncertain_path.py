@@ -19,8 +19,7 @@ import scipy
 
 from ctrlgen.budget.uncertainty import AMBIENT, Uncertainties
 from ctrlgen.devices import Limit
-from ctrlgen.devices.quantities import shared_path
-from ctrlgen.model.assembly import build_model, movable
+from ctrlgen.model.assembly import model_of_numbers
 from ctrlgen.model.discretisation import NEWTON_STEPS, balanced, one_step_map, settling_time
 from ctrlgen.model.model import Model
 from ctrlgen.numerics.batched_evaluation import Recursion
@@ -35,25 +34,33 @@ class UncertainPath:
     """The path of `solution`, with the `free` numbers of its device and the surroundings as symbols.
 
     `columns` (m,): the place of each column of the uncertainties in q = (numbers, surroundings, common gain, channel gains), several
-    for one where it is the same for all. `idle` are the numbers that act on limits alone, or on nothing.
+    for one where it is the same for all. `idle` are the numbers that act on limits alone, or on nothing: in p of the `model` behind those
+    that are `free`.
     """
 
     def __init__(self, solution: Solution, uncertainties: Uncertainties) -> None:
         self.solution, self.uncertainties = solution, uncertainties
         scenario, device = solution.scenario, solution.model.device
         stated = [path for line in uncertainties.lines if line.kind == "number" for path in line.paths]
-        able = set(movable(device))
-        self.idle = tuple(path for path in stated if shared_path(path) not in able)
-        self.moving = tuple(path for path in stated if shared_path(path) in able)
-        ambients = tuple(path for path in able if path.endswith(AMBIENT) and path not in self.moving)
-        self.free = (*self.moving, *sorted(ambients))
+        surrounded = sorted(path for path, _ in device.quantities() if path.endswith(AMBIENT) and path not in stated)
         self.rise = ca.SX.sym("surroundings")
-        self.model = _warmed(build_model(device, self.free, self.rise), self.free, self.rise)
+        model = model_of_numbers(device, (*stated, *surrounded), self.rise)
+        self.idle = tuple(path for path in stated if path not in model.moved_by)
+        self.moving = tuple(path for path in stated if path in model.moved_by)
+        self.free = (*self.moving, *(path for path in surrounded if path in model.moved_by))
+        first = [i for i, path in enumerate((*stated, *surrounded)) if path in self.free]
+        order = [*first, *(i for i in range(model.p.numel()) if i not in first)]
+        model = replace(
+            model, p=ca.vertcat(ca.SX(0, 1), *(model.p[i] for i in order)), p_nominal=model.p_nominal[order]
+        )
+        self.model = _warmed(model, self.free, self.rise)
         clock = scenario.clock
         self.sample_time = inf if isinstance(clock, Settled) else clock.sample_time
         m = self.model
-        self.state, self.q = ca.vertcat(m.x, m.z), ca.vertcat(m.p, self.rise)
-        self.q_nominal = np.append(m.p_nominal, 0.0)
+        n, p = len(self.free), ca.vertsplit(m.p)
+        self.state, self.q = ca.vertcat(m.x, m.z), ca.vertcat(*p[:n], self.rise)
+        self.p_idle = ca.vertcat(ca.SX(0, 1), *p[n:])
+        self.q_nominal = np.append(m.p_nominal[:n], 0.0)
         self.signal = m.signals[scenario.file.follow]
         self.limits = tuple(limit for limit in m.limits if not self._commanded(limit))
         self.constants: dict[str, ca.Function] = {}
@@ -96,7 +103,8 @@ class UncertainPath:
 
     def _add(self, name: str, value: ca.SX) -> None:
         """A part (S, v, c) -> value, with c(q) what depends on q alone."""
-        (expression,), symbols, values = ca.extract_parametric([value], self.q, {"extract_trivial": True})
+        moved = ca.substitute(value, self.p_idle, self.model.p_nominal[len(self.free) :])
+        (expression,), symbols, values = ca.extract_parametric([moved], self.q, {"extract_trivial": True})
         c = ca.vertcat(ca.SX(0, 1), *symbols)
         given = [self.state, self.model.u, c]
         self.constants[name] = ca.Function(f"{name}_constants", [self.q], [ca.vertcat(ca.SX(0, 1), *values)])

@@ -44,6 +44,28 @@ def build_model(
     path that is no parameter or acts on nothing, an effect that does not fit the device, and a restoring force that
     does not rise over the stroke.
     """
+    _check_free(device, free)
+    model = _assemble(device, free, NO_RISE if ambient is None else ambient, sample_time, per_record, apart)
+    outside = {f"effect[{k}].{e.amplitude().name}" for k, e in enumerate(device.effect) if e.shifts_drive or k in apart}
+    idle = [path for path in free if path not in model.moved_by and path not in outside]
+    if idle:
+        what = "appears in no equation of motion (a limit, a material of the wires' stress): it cannot be free"
+        raise InputError(device.name, [Fault(path, what) for path in idle])
+    _check_stiffness(model)
+    return model
+
+
+def model_of_numbers(device: Device, free: Sequence[str], ambient: ca.SX) -> Model:
+    """The model of `device` with the numbers `free` as symbols, those too that act on limits alone, or on nothing (see `Model.moved_by`);
+    `ambient` as for `build_model`. Raises as that, but for a path that acts on nothing."""
+    _check_free(device, free)
+    model = _assemble(device, free, ambient, sample_time=None, per_record=False)
+    _check_stiffness(model)
+    return model
+
+
+def _check_free(device: Device, free: Sequence[str]) -> None:
+    """Refuses what is no parameter of the device, or a count. Raises InputError."""
     nominal = dict(device.quantities())
     unknown = [
         path for path in free if path not in (nominal if path == shared_path(path) else _deviations(device, path))
@@ -53,14 +75,6 @@ def build_model(
     counts = [path for path in free if nominal[shared_path(path)].whole]
     if counts:
         raise InputError(device.name, [Fault(path, "is a count and cannot be free") for path in counts])
-    model = _assemble(device, free, NO_RISE if ambient is None else ambient, sample_time, per_record, apart)
-    outside = {f"effect[{k}].{e.amplitude().name}" for k, e in enumerate(device.effect) if e.shifts_drive or k in apart}
-    idle = [path for path in free if path not in model.moved_by and path not in outside]
-    if idle:
-        what = "appears in no equation of motion (a limit, a material of the wires' stress): it cannot be free"
-        raise InputError(device.name, [Fault(path, what) for path in idle])
-    _check_stiffness(model)
-    return model
 
 
 def _deviations(device: Device, path: str) -> tuple[str, ...]:
