@@ -122,6 +122,12 @@ def written(effect: type[Effect], where: Channel, values: dict[str, float]) -> d
     return {"kind": effect.kind, "at": "all" if effect.place is Place.POSE else where.name, **texts}
 
 
+def partner_unit(effect: type[Effect]) -> str:
+    """Of the other channel of a pair."""
+    alike = effect.partner_unit == "channel" and isinstance(effect.channel_unit, str)
+    return effect.channel_unit if alike else effect.partner_unit or "m"
+
+
 class Law:
     """One effect's law alone, on channel `index` of six, walked along given signals; everything of typical size 1.
 
@@ -135,9 +141,12 @@ class Law:
 
     def __init__(self, effect: type[Effect], h: float, index: int = INDEX, still: bool = False) -> None:
         self.effect, self.h = effect, h
-        self.where = Channel("1X", place_unit(effect), 1.0, "m", 1.0, "1Y", effect.partner_unit or "m", 1.0)
+        self.where = Channel("1X", place_unit(effect), 1.0, "m", 1.0, "1Y", partner_unit(effect), 1.0)
+        alike = effect.partner_unit == "channel"
         self.index = 1 if effect.channel_unit == "rad" else index
-        self.partner = 4 if effect.channel_unit == "rad" else self.PARTNER
+        self.partner = {"rad": 2 if alike else 4, "m": 3 if alike else self.PARTNER}.get(
+            effect.channel_unit, self.PARTNER
+        )
         memory = ca.SX.sym("memory", len(effect.states))
         signals = ca.SX.sym("signals", self.PER_CHANNEL + len(self.ALONE))
         p = ca.SX.sym("p", len(effect.params))

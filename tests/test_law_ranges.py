@@ -88,10 +88,14 @@ def test_the_laws_of_two_channels_and_those_with_a_clock_are_these():
     couplings = {"stiffness_coupling", "damping_coupling", "inertia_coupling"}
     empirical = {"empirical_history", "empirical_position", "empirical_speed"}
     two = {"abbe_arm", "coupling", "link_compliance", "swapped"} | couplings | empirical
-    assert {k for k, law in library if law.pairs} == two
+    mirrors = {"autocollimator", "face_tilt", "mirror_tilt"}
+    assert {k for k, law in library if law.pairs} == two | mirrors
     finer = {"weighted_displacement_hysteresis", "weighted_drive_hysteresis"}
     finer |= {"stribeck_above", "stribeck_after", "stribeck_below"}
-    assert {k for k, law in library if not prior_of(law).suspected} == empirical | finer | {"zero_per_record"}
+    assert {k for k, law in library if not prior_of(law).suspected} == empirical | finer | mirrors | {
+        "plane_mirror",
+        "zero_per_record",
+    }
     clocked = {
         "coulomb_after",
         "degradation",

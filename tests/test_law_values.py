@@ -24,13 +24,14 @@ def signals(rng: np.random.Generator, kind: str) -> SimpleNamespace:
     every, other = rng.uniform(-1, 1, 6), rng.uniform(-1, 1, 6)
     index = 4 if Effect.library[kind].channel_unit != "rad" else 1
     names = [state.name for state in Effect.library[kind].states]
+    turns = index == 1 and Effect.library[kind].partner_unit == "channel"
     return SimpleNamespace(
         value=every[index],
         rate=None,
         second_rate=None,
         all=every,
         index=index,
-        partner=5 - index,
+        partner=2 if turns else 5 - index,
         ambient=rng.uniform(-3, 3),
         sample_time=H,
         temperature_at_rest=0.3,

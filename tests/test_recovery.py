@@ -193,7 +193,13 @@ def test_of_a_reading_that_moves_in_the_warmth_alone():
     recover(fitter, AXIS, "temperature_sensitivity_above", planted)
 
 
-STATED = {"zero_per_record"}
+STATED = {
+    "zero_per_record",
+    "autocollimator",
+    "face_tilt",
+    "mirror_tilt",
+    "plane_mirror",
+}  # the mirrors: tests/test_mirrors.py
 # found in tests/test_finer_forms.py
 FINER = {
     "weighted_displacement_hysteresis",

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 from numpy import abs, cos, cross, exp, sign, sin, sqrt, tanh
 from scipy.interpolate import BSpline
+from scipy.spatial.transform import Rotation
 
 import ctrlgen.effects  # noqa: F401  fills the library
 from ctrlgen.effects import Effect
@@ -74,6 +75,23 @@ def gripping(s, p):
     )
     e = s.displacement - plays
     return -p.force * np.sum(sign(e) * np.maximum(abs(e) - p.slack / 2, 0)) / r.sum()
+
+
+def met(s, p):
+    """Where the beam through the point that is read meets the plane that turned and moved with the platform."""
+    a = s.index - 3
+    n = Rotation.from_rotvec(np.ravel(s.all[:3])).as_matrix()[:, a]
+    stands = np.ravel(s.all[3:]) + n * p.position  # a point of the plane
+    return p.share * (n @ stands / n[a] - p.position - s.value)
+
+
+def collimated(s, p):
+    """The face that looks along the partner's axis, drawn as a vector and turned."""
+    a, b = s.index, s.partner
+    c = 3 - a - b
+    n = Rotation.from_rotvec(np.ravel(s.all[:3])).apply(np.eye(3)[b])
+    away = np.cross(np.eye(3)[a], np.eye(3)[b])[c]  # where a small turn about a takes it
+    return p.share * (np.arctan2(away * n[c], n[b]) - s.value)
 
 
 WEIGHTS = {f"c{j}": float(np.cos(3 * j)) for j in range(1, 18)}
@@ -161,6 +179,7 @@ LAWS = {
             lambda s, p: -p.share * (weighted(s, p, s.value) - 0.7 * s.value),
         ),
     ),
+    "autocollimator": ({}, collimated),
     "asymmetric_gain": ({}, lambda s, p: p.gain * abs(s.value)),
     "asymmetric_hysteresis": (
         {"reach": 0.3, "skew": 0.6},
@@ -271,6 +290,7 @@ LAWS = {
         lambda s, p: p.size * bends((1 + s.velocities[s.partner] / np.hypot(s.velocities[s.partner], 0.3)) / 2),
     ),
     "end_stop": ({"gap": -0.4, "power": 1.5}, stop),
+    "face_tilt": ({}, lambda s, p: -p.tilt * s.all[s.partner]),
     "expansion": ({}, lambda s, p: p.slope * (s.temperature - s.temperature_at_rest) * s.value),
     "finite_rotation": ({}, lambda s, p: p.share * s.second_order_kinematics()[s.index]),
     "force_step": (EVENT, lambda s, p: p.force * event(s, p)),
@@ -296,6 +316,8 @@ LAWS = {
         lambda s, p: p.share * (s.w - s.value),
         lambda s, p: {"w": s.v / 0.06, "v": (s.value - s.w - 1.4 * s.v) / 0.06},
     ),
+    "mirror_tilt": ({}, lambda s, p: p.tilt * s.all[s.partner]),
+    "plane_mirror": ({"position": 0.4}, met),
     "payload": ({"lean": 0.4}, lambda s, p: p.share * (sin(s.value + 0.4) - sin(0.4))),
     "quadratic_damping": ({}, lambda s, p: -p.damping * s.velocity**2 * sign(s.velocity)),
     "quantisation": ({"quantum": 0.03}, lambda s, p: p.share * (0.03 * round(s.value / 0.03) - s.value)),

@@ -74,5 +74,19 @@ def print_jacobian(found: MeasuredJacobian) -> None:
         cells = [f"{v:.4g} {e.unit}" for v in (e.mean_before, e.mean_after, e.max_after)]
         table.add_row(f"{e.part}, {e.poses}", *cells)
     show_table(table)
+    if record.home:
+        table = table_of(
+            ("home", "left"), ("drift a pose", "right"), ("repeatability", "right"), ("95 % interval", "right")
+        )
+        for h in record.home:
+            low, high = h.repeatability_interval
+            drift = f"{h.drift:.3g} {h.unit}{', taken out' if h.taken_out else ''}"
+            table.add_row(h.channel, drift, f"{h.repeatability:.3g} {h.unit}", f"{low:.3g} ... {high:.3g} {h.unit}")
+        show_table(table)
+    for share in record.instruments:
+        feigned = (
+            f"{share.name}, one sd: poses off by {share.rotation_deg:.2g} deg, {share.translation_um:.2g} um at most"
+        )
+        out.print(feigned, markup=False, soft_wrap=True)
     for note in found.recording.notes:
         out.print(note, markup=False, soft_wrap=True, style="yellow")

@@ -16,10 +16,12 @@ import numpy as np
 
 from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.budget.uncertainty import Uncertainties
+from ctrlgen.model.read_poses import ReadPoses
 from ctrlgen.numerics.batched_evaluation import evaluate
 from ctrlgen.trajectory.playback import playback_tolerance
 
 BLOCK = 500  # samples whose Jacobians are kept at once
+OF_SENSOR = ("sensor_scale", "sensor_zero", "sensor_law")  # kinds of lines that act through no state
 SIGNIFICAND = 24  # bits of a number in single precision
 
 
@@ -46,7 +48,7 @@ class Propagated:
         """(m, n_y) the sensitivity of the followed signal at one sample by what is stated of the sensor, zero by all else: it acts through
         no state, so that draws are exact with it."""
         kinds = [line.kind for line in path.uncertainties.lines for _ in line.paths]
-        columns = np.array([kind in ("sensor_scale", "sensor_zero") for kind in kinds])
+        columns = np.array([kind in OF_SENSOR for kind in kinds])
         return np.where(columns[:, None], self.sensitivity["pose"][sample].T, 0.0)
 
 
@@ -143,9 +145,13 @@ def _columns(path: UncertainPath) -> np.ndarray:
 
 
 def _add_sensor(path: UncertainPath, nominal: np.ndarray, sensitivity: np.ndarray) -> None:
-    """What the scale and the zero of a sensor make of the followed signal that was brought to its readings: `sensitivity` (n, n_y, m)."""
+    """What scale, zero and laws of a sensor make of the followed signal that was brought to its readings: `sensitivity` (n, n_y, m)."""
     k = 0
     for line in path.uncertainties.lines:
+        if line.kind == "sensor_law":
+            read = ReadPoses(path.model.device, line.paths)
+            places = [[number.path for number in read.numbers].index(name) for name in line.paths]
+            sensitivity[:, :, k : k + len(places)] = read.slopes(nominal)[:, :, places]
         for name in line.paths:
             if line.kind in ("sensor_scale", "sensor_zero"):
                 i = path.signal.channels.index(name)

@@ -6,7 +6,7 @@ import difflib
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
@@ -30,6 +30,7 @@ from ctrlgen.core.units import (
 from ctrlgen.devices.quantities import shared_path
 from ctrlgen.devices.section import Section
 from ctrlgen.model.model import Model
+from ctrlgen.model.read_poses import ReadPoses, sensor_numbers
 from ctrlgen.trajectory.playback import ANGLE_TOLERANCE, LENGTH_TOLERANCE, playback_tolerance
 from ctrlgen.trajectory.scenario import Input, Scenario
 
@@ -119,7 +120,7 @@ class Uncertain:
     """
 
     name: str
-    kind: Literal["number", "surroundings", "gain", "channel_gain", "sensor_scale", "sensor_zero"]
+    kind: Literal["number", "surroundings", "gain", "channel_gain", "sensor_scale", "sensor_zero", "sensor_law"]
     paths: tuple[str, ...]
     sds: tuple[float, ...]
     text: str
@@ -199,6 +200,7 @@ class _Reader:
         for path, number in self.numbers.items():
             if number.sd and path not in self._taken:
                 self._add(path, (path,), (number.sd,), "", number.source or FROM_DEVICE)
+        self.lines = [self._of_sensor_law(scenario, line) for line in self.lines]
         if file.surroundings is not None:
             sd = self._absolute("surroundings.sd", file.surroundings.sd, "degC", "1 K")
             stated = file.surroundings
@@ -218,6 +220,17 @@ class _Reader:
         )
         self._check_drive(scenario, model)
         self._check_correlations()
+
+    def _of_sensor_law(self, scenario: Scenario, line: Uncertain) -> Uncertain:
+        """The line, told apart where its numbers are of sensor laws: they move no open-loop drive, but drives learnt and numbers calibrated
+        with the sensor carry their error. A law of something else than the pose leaves it as it is."""
+        if scenario.file.follow != "pose" or not sensor_numbers(self.device).issuperset(line.paths):
+            return line
+        try:
+            ReadPoses(self.device, line.paths)
+        except InputError:
+            return line
+        return replace(line, kind="sensor_law")
 
     def _sensor(self, scenario: Scenario, model: Model) -> None:
         """What drives learnt and numbers calibrated with the sensor carry of its error: a share of each channel, and its zero."""
@@ -344,7 +357,8 @@ class _Reader:
             self.faults.append(Fault("surroundings", what))
 
     def _check_correlations(self) -> None:
-        single = {line.name for line in self.lines if len(line.paths) == 1 and line.kind == "number"}
+        numbers = ("number", "sensor_law")
+        single = {line.name for line in self.lines if len(line.paths) == 1 and line.kind in numbers}
         for k, pair in enumerate(self.file.correlation):
             for name in pair.between:
                 if name not in single:

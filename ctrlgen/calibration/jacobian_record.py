@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
+from ctrlgen.calibration.home_returns import HomeReturns
 from ctrlgen.calibration.measured_jacobian import MeasuredJacobian
 from ctrlgen.core.units import from_si
 from ctrlgen.model.assembly import build_model
@@ -48,6 +49,29 @@ class ErrorEntry(Keys):
     sd_of_size: float = Field(description="Standard deviation of their absolute values, as S0 Table 3 has it.")
 
 
+class HomeEntry(Keys):
+    """What the returns to home say of one component."""
+
+    channel: str = Field(description="Component of the pose.")
+    unit: str = Field(description="Unit of the six numbers; of the drift, a pose.")
+    drift: float = Field(description="Drift of home from one pose to the next.")
+    drift_interval: tuple[float, float] = Field(description="95 % interval of the drift.")
+    taken_out: bool = Field(
+        description="Whether the interval leaves zero out: then the drift was taken out of every pose."
+    )
+    repeatability: float = Field(description="Standard deviation of home about its drift.")
+    repeatability_interval: tuple[float, float] = Field(description="95 % interval of the repeatability.")
+
+
+class InstrumentEntry(Keys):
+    """What one standard deviation of something that is not known exactly of the instruments makes of the calibrated poses."""
+
+    name: str = Field(description="What is not known exactly.")
+    source: str = Field(description="Where its standard deviation comes from.")
+    rotation_deg: float = Field(description="Norm of the largest rotation error.")
+    translation_um: float = Field(description="Norm of the largest translation error.")
+
+
 class JacobianRecord(Origin):
     """Result of `ctrlgen calibrate --jacobian`: a Jacobian from settled poses."""
 
@@ -65,6 +89,13 @@ class JacobianRecord(Origin):
     few: list[FewEntry] = Field(description="What was fitted instead of all entries; empty otherwise.")
     norms: list[NormEntry] = Field(description="One entry a set of poses and part.")
     errors: list[ErrorEntry] = Field(description="One entry a set of poses and component.")
+    home_returns: int = Field(
+        description="Returns to home that drift and repeatability are from; 0 where they are too few."
+    )
+    home: list[HomeEntry] = Field(description="One entry a component; empty where there are too few returns.")
+    instruments: list[InstrumentEntry] = Field(
+        description="What the instruments may feign; empty where nothing is stated of them."
+    )
 
 
 def jacobian_record(found: MeasuredJacobian) -> JacobianRecord:
@@ -85,6 +116,17 @@ def jacobian_record(found: MeasuredJacobian) -> JacobianRecord:
         few=[FewEntry(name=n.name, unit=n.unit, value=n.value, sd=n.sd) for n in found.few],
         norms=[_norm(which, part, unit, b, a) for which, b, a in sets_of(found) for part, unit in PARTS],
         errors=[_error(which, k, a) for which, _, a in sets_of(found) for k in range(6)],
+        home_returns=0 if found.home is None else len(found.home.order),
+        home=[] if found.home is None else [_home(k, found.home) for k in range(6)],
+        instruments=[
+            InstrumentEntry(
+                name=share.name,
+                source=share.source,
+                rotation_deg=float(from_si(share.rotation, "deg")),
+                translation_um=float(from_si(share.translation, "um")),
+            )
+            for share in found.instruments
+        ],
     )
 
 
@@ -111,6 +153,24 @@ def _norm(which: str, part: str, unit: str, before: PoseErrors, after: PoseError
     (b, b_max), (a, a_max) = norms_of(before, part, unit), norms_of(after, part, unit)
     numbers = {"mean_before": b, "mean_after": a, "max_before": b_max, "max_after": a_max}
     return NormEntry(poses=which, part=part, unit=unit, **numbers)
+
+
+def _home(k: int, home: HomeReturns) -> HomeEntry:
+    unit = UNITS[k]
+
+    def pair(interval: np.ndarray) -> tuple[float, float]:
+        low, high = (float(from_si(float(end), unit)) for end in interval)
+        return low, high
+
+    return HomeEntry(
+        channel=CHANNELS[k],
+        unit=unit,
+        drift=float(from_si(float(home.drift[k]), unit)),
+        drift_interval=pair(home.drift_interval[k]),
+        taken_out=bool(home.drifts[k]),
+        repeatability=float(from_si(float(home.repeatability[k]), unit)),
+        repeatability_interval=pair(home.repeatability_interval[k]),
+    )
 
 
 def _error(which: str, k: int, errors: PoseErrors) -> ErrorEntry:

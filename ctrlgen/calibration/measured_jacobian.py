@@ -7,6 +7,10 @@ device's own J_0,
 
 g: gain and sense of each drive; rho, d: turn of the frame in which poses are read and the place of the point that is read; s: turns per
 length, which is 1/size of the device. Records with the role fit are fitted, those held out say how well J holds.
+
+T_j are the poses that readings imply under the sensor laws of the device file. Returns to home are no poses of their own: they are one
+pose, read again. They tell drift, which is taken out where its interval leaves zero out, and repeatability; their mean is one row at zero
+drive. As many rows they would make the errors of J as small as home is repeatable, whatever the other poses leave.
 """
 
 from __future__ import annotations
@@ -20,12 +24,15 @@ import casadi as ca
 import numpy as np
 from scipy.optimize import least_squares
 
+from ctrlgen.calibration.home_returns import HomeReturns, at_home, home_returns
+from ctrlgen.calibration.instrument_share import InstrumentShare, instrument_shares
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.devices import Device, load_device
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.noise import estimate_noise
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.model.assembly import build_model
+from ctrlgen.model.read_poses import ReadPoses
 from ctrlgen.physics.screw import adjoint, rotation_vector
 from ctrlgen.recordings.calibration import calibrate_jacobian
 from ctrlgen.recordings.plausibility import with_plausibility
@@ -59,7 +66,8 @@ class MeasuredJacobian:
     """A calibrated Jacobian, SI: `jacobian` (channels, drives) with `sd`, and the pose `offset` (channels,) read at zero drive.
 
     `few`: what was fitted instead of all entries, empty otherwise. `before` and `after`: errors of the described device and with the
-    Jacobian, over all poses in order; `held_out` (n,) True where a pose was not fitted. `condition`: of the fitted drives.
+    Jacobian, over all poses in order, home left out; `held_out` (n,) True where a pose was not fitted. `condition`: of the fitted drives.
+    `home`: of the returns to it, None where there are fewer than three. `instruments`: what these may feign.
     """
 
     device: Device
@@ -73,6 +81,8 @@ class MeasuredJacobian:
     after: PoseErrors
     held_out: np.ndarray
     condition: float
+    home: HomeReturns | None
+    instruments: tuple[InstrumentShare, ...]
 
     @property
     def numbers(self) -> int:
@@ -94,21 +104,18 @@ def calibrate_poses(
     if recording.kind != "poses" or tuple(recording.channels) != wanted:
         what = f'must be settled poses (kind = "poses") of {", ".join(CHANNELS)}; a Jacobian is calibrated from these'
         raise InputError(recording.title, [Fault("recording", what)])
-    fitter = Fitter(recording, estimate_noise(recording, 0.0))
-    nominal = fitter.fit(Structure(described), steps=0)
-    records = [r for r in recording.records if r.role in ("fit", "hold_out")]
-    drive, observed, expected = (
-        np.vstack(parts)
-        for parts in zip(*((r.drive, _complete(r), fitter.predict(nominal, r)) for r in records), strict=True)
+    taken = _poses_of(described, recording)
+    fitted = ~taken.held_out
+    drive, poses = (
+        np.vstack([x[fitted], at_zero])
+        for x, at_zero in ((taken.drive, taken.drive_at_home), (taken.pose, taken.pose_at_home))
     )
-    held_out = np.concatenate([np.full(len(r.drive), r.role == "hold_out") for r in records])
-    fitted = ~held_out
-    every = calibrate_jacobian(drive[fitted], observed[fitted], offset=True)
+    every = calibrate_jacobian(drive, poses, offset=True)
     jacobian, sd, offset = every.jacobian, every.sd, every.offset
     few: tuple[FittedNumber, ...] = ()
     if numbers is JacobianNumbers.FEW:
-        described_jacobian = np.linalg.lstsq(drive, expected, rcond=None)[0].T
-        jacobian, sd, offset, few = _few(described, described_jacobian, drive[fitted], observed[fitted])
+        described_jacobian = np.linalg.lstsq(taken.drive, taken.expected, rcond=None)[0].T
+        jacobian, sd, offset, few = _few(described, described_jacobian, drive, poses)
     if sd is None or offset is None:
         raise InputError(recording.title, [Fault("poses", "are as many as unknowns; record one more to judge them by")])
     return MeasuredJacobian(
@@ -119,16 +126,64 @@ def calibrate_poses(
         sd,
         offset,
         few,
-        PoseErrors(observed - expected),
-        PoseErrors(observed - drive @ jacobian.T - offset),
-        held_out,
+        PoseErrors(taken.pose - taken.expected),
+        PoseErrors(taken.pose - taken.drive @ jacobian.T - offset),
+        taken.held_out,
         every.condition,
+        taken.home,
+        instrument_shares(described, taken.instruments, drive, poses),
+    )
+
+
+@dataclass(frozen=True)
+class _Poses:
+    """What a recording holds: of the poses away from home `drive` (n, n_u), implied `pose` and `expected` one (n, 6), and which are
+    `held_out`; at home one row of zeros and the mean pose, or none."""
+
+    drive: np.ndarray
+    pose: np.ndarray
+    expected: np.ndarray
+    held_out: np.ndarray
+    drive_at_home: np.ndarray
+    pose_at_home: np.ndarray
+    home: HomeReturns | None
+    instruments: ReadPoses
+
+
+def _poses_of(device: Device, recording: Recording) -> _Poses:
+    """Every pose of the records, drift taken out. Raises InputError where a pose lacks a reading."""
+    fitter = Fitter(recording, estimate_noise(recording, 0.0))
+    nominal, instruments = fitter.fit(Structure(device), steps=0), ReadPoses(device)
+    parts, order = list[tuple[np.ndarray, ...]](), np.zeros(0)
+    for record in recording.records:
+        read = record.valid.any(axis=1)  # the others belong to another part of a divided record
+        at = record.time[read]
+        order = np.append(order, at if not np.isin(at, order).any() else at - at.min() + order.max() + 1)
+        roles = np.full(read.sum(), record.role)
+        parts.append((record.drive[read], _complete(record)[read], fitter.predict(nominal, record)[read], roles))
+    drive, read, expected = (np.vstack(part) for part in list(zip(*parts, strict=True))[:3])
+    role = np.concatenate([part[3] for part in parts])
+    pose, still = instruments.poses(read), at_home(drive)
+    home = home_returns(order[still], pose[still])
+    if home is not None:
+        pose = pose - home.drifted(order)
+    mean = pose[still].mean(axis=0, keepdims=True) if still.any() else np.zeros((0, pose.shape[1]))
+    away = ~still & (role != "rest")
+    return _Poses(
+        drive[away],
+        pose[away],
+        instruments.poses(expected)[away],
+        role[away] == "hold_out",
+        np.zeros((len(mean), drive.shape[1])),
+        mean,
+        home,
+        instruments,
     )
 
 
 def _complete(record: Record) -> np.ndarray:
-    """The readings of a record. Raises InputError where a pose lacks one."""
-    lacking = np.flatnonzero(~record.valid.all(axis=1))
+    """The readings of a record. Raises InputError where a pose lacks one of them."""
+    lacking = np.flatnonzero(~record.valid.all(axis=1) & record.valid.any(axis=1))
     if lacking.size:
         raise InputError(record.name, [Fault(f"pose {lacking[0] + 1}", "lacks a reading; remove the pose")])
     return record.observed

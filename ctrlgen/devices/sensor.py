@@ -13,10 +13,11 @@ from dataclasses import dataclass, replace
 from math import pi
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from ctrlgen.core.errors import Fault
-from ctrlgen.core.units import In, Quantity, from_si, same_dimension
+from ctrlgen.core.units import In, Quantity, from_si, same_dimension, show
 from ctrlgen.devices.section import Section
 from ctrlgen.physics import sensor_models
 
@@ -32,6 +33,8 @@ NUMBERS = (
     "low",
     "high",
 )
+READINGS, READING_TIME = 40.0, 30.0
+"""Readings that S0 section 3.1 averages at a pose, and the seconds that they take."""
 Volt = Annotated[Quantity, In("V")]
 PositiveVolt = Annotated[Quantity, In("V", positive=True)]
 
@@ -214,10 +217,47 @@ class InterferometerSensor(_Mounted):
         return SensorFigures("interferometer", self.adc.adc().step / slope, noise, None, None, None)
 
 
-AnySensor = Annotated[DisplacementSensor | InterferometerSensor, Field(discriminator="kind")]
+class AutocollimatorSensor(Section):
+    """Electronic autocollimator on a face of the moved body (S0 section 3.2). It reads one rotation; which, and of which face, decides how
+    the other two show in it: the laws `autocollimator` and `face_tilt`."""
+
+    kind: Literal["autocollimator"]
+    """An autocollimator, which reads an angle."""
+    at: str
+    """Channel of the pose that is read, a rotation such as `theta_x`."""
+    accuracy: Annotated[Quantity, In("deg", positive=True)]
+    """Bound of a reading's error, either sign, such as "7e-5 deg"; half the width of an even distribution (GUM 4.3.7)."""
+    range: Annotated[Quantity, In("deg", positive=True)]
+    """Measuring range from end to end, home in its middle, such as "0.55 deg"."""
+    rate: Annotated[Quantity, In("Hz", positive=True)] | None = None
+    """Readings a second. Left out: 40 in 30 s (S0 section 3.1)."""
+
+    @property
+    def reading_rate(self) -> float:
+        """Readings a second [Hz]."""
+        return READINGS / READING_TIME if self.rate is None else self.rate.si
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Lowest and highest angle that it reads [rad]."""
+        return -self.range.si / 2, self.range.si / 2
+
+    def read(self, angle: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Readings (n,) [rad] of `angle` (n,): each off by an even draw within the accuracy, of which S0 says no more. Raises ValueError
+        beyond the range."""
+        low, high = self.ends
+        if angle.min(initial=0.0) < low or angle.max(initial=0.0) > high:
+            reached = " to ".join(show(v, "deg") for v in (angle.min(), angle.max()))
+            raise ValueError(
+                f"the angle goes from {reached}, but the range is {show(low, 'deg')} to {show(high, 'deg')}"
+            )
+        return np.asarray(angle + rng.uniform(-self.accuracy.si, self.accuracy.si, angle.shape))
 
 
-def mounting_faults(sensors: Sequence[_Mounted], channels: Sequence[str], units: Sequence[str]) -> list[Fault]:
+AnySensor = Annotated[DisplacementSensor | InterferometerSensor | AutocollimatorSensor, Field(discriminator="kind")]
+
+
+def mounting_faults(sensors: Sequence[AnySensor], channels: Sequence[str], units: Sequence[str]) -> list[Fault]:
     """Faults of the sensors' mounting: an unknown channel, an arm that is missing or has no meaning."""
     faults, unit_of = [], dict(zip(channels, units, strict=True))
     for k, sensor in enumerate(sensors):
@@ -226,6 +266,10 @@ def mounting_faults(sensors: Sequence[_Mounted], channels: Sequence[str], units:
             faults.append(Fault(f"{where}.at", f"{sensor.at!r} is not one of {', '.join(channels)}"))
             continue
         is_rotation = same_dimension(unit_of[sensor.at], "rad")
+        if isinstance(sensor, AutocollimatorSensor):
+            if not is_rotation:
+                faults.append(Fault(f"{where}.at", f"{sensor.at} is a translation; an autocollimator reads a rotation"))
+            continue
         if is_rotation and sensor.arm is None:
             faults.append(
                 Fault(f"{where}.arm", f'is missing: {sensor.at} is a rotation; write for example arm = "20 mm"')
@@ -235,12 +279,18 @@ def mounting_faults(sensors: Sequence[_Mounted], channels: Sequence[str], units:
     return faults
 
 
-def describe(sensor: DisplacementSensor | InterferometerSensor, unit: str) -> str:
+def describe(sensor: AnySensor, unit: str) -> str:
     """One line of text with `sensor.figures()` in the channel's `unit`."""
-    figures = sensor.figures()
 
     def text(value: float) -> str:
         return f"{from_si(value, unit):.4g}"
+
+    if isinstance(sensor, AutocollimatorSensor):
+        low, high = sensor.ends
+        return (
+            f"{sensor.at} [{unit}] by autocollimator: within {text(sensor.accuracy.si)}, {text(low)} ... {text(high)}"
+        )
+    figures = sensor.figures()
 
     filtered = "" if figures.filtered is None else f" ({text(figures.filtered)} filtered)"
     span = (

@@ -314,6 +314,15 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
                 "A smoother of what no law reaches: `shares.empirical_terms` gives it its numbers.", suspected=False
             ),
         ),
+        # Stated of an instrument, never suspected: what they add is that of `frame_rotation_x` and the like, which are --------------
+        **dict.fromkeys(
+            ("autocollimator", "face_tilt", "mirror_tilt", "plane_mirror"),
+            LawPrior(
+                "Known of the set-up, or bounded by the instrument's maker; readings alone cannot tell it from a turned frame or from "
+                "finite rotations of the platform.",
+                suspected=False,
+            ),
+        ),
         # One amplitude and no shape: the default ------------------------------------------------------------------------------
         **dict.fromkeys(
             (

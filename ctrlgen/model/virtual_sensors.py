@@ -1,4 +1,5 @@
-"""Virtual sensors: what the sensors of a device record of a simulated motion, pose -> sensor, amplifier, ADC -> volts."""
+"""Virtual sensors: what the sensors of a device record of a simulated motion, pose -> sensor, amplifier, ADC -> volts; of an
+autocollimator angles."""
 
 from __future__ import annotations
 
@@ -8,14 +9,15 @@ import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import show
-from ctrlgen.devices.sensor import InterferometerSensor
+from ctrlgen.devices.sensor import AutocollimatorSensor, InterferometerSensor
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import Trace
 
 
 @dataclass(frozen=True)
 class SensorReadings:
-    """One sensor's recording: `time` (n,) [s] at its ADC's rate, `volts` (n,), and `value` (n,) of `channel` in SI.
+    """One sensor's recording: `time` (n,) [s] at its ADC's rate, `volts` (n,), and `value` (n,) of `channel` in SI. An autocollimator
+    has a rate of its own, and no volts (None).
 
     `value` is computed from the volts with the sensitivity and the position of pose 0 at calibration temperature, as a
     user does; None for an interferometer, whose fringes have to be counted.
@@ -23,7 +25,7 @@ class SensorReadings:
 
     channel: str
     time: np.ndarray
-    volts: np.ndarray
+    volts: np.ndarray | None
     value: np.ndarray | None
 
 
@@ -41,11 +43,17 @@ def simulate_sensors(
     signal, records, faults = model.signals["reading"], [], []
     for k, sensor in enumerate(model.device.sensor):
         channel = signal.channels.index(sensor.at)
-        rate = sensor.adc.adc().rate
+        rate = sensor.reading_rate if isinstance(sensor, AutocollimatorSensor) else sensor.adc.adc().rate
         span = trace.time[-1] - trace.time[0]
         time = trace.time[0] + np.arange(int(span * rate * (1 + 1e-12)) + 1) / rate
         reading = np.interp(time, trace.time, trace.signals["reading"][:, channel])
         rng = np.random.default_rng([seed, k])
+        if isinstance(sensor, AutocollimatorSensor):
+            try:
+                records.append(SensorReadings(sensor.at, time, None, sensor.read(reading, rng)))
+            except ValueError as fault:
+                faults.append(Fault(f"sensor[{k}], {sensor.at}", str(fault)))
+            continue
         if isinstance(sensor, InterferometerSensor):
             volts = sensor.interferometer().read(reading * sensor.lever, rng, sensor.adc.adc())
             records.append(SensorReadings(sensor.at, time, volts, None))

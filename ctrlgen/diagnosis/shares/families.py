@@ -127,6 +127,7 @@ FAMILY_OF = {
     **dict.fromkeys(("abbe_arm", "bow", "cubic_sensor", "finite_rotation", "frame_rotation_x"), Family.GEOMETRY),
     **dict.fromkeys(("frame_rotation_y", "frame_rotation_z", "raised_point", "screw_motion"), Family.GEOMETRY),
     **dict.fromkeys(("local_error", "rectified", "stitching_error"), Family.GEOMETRY),
+    **dict.fromkeys(("autocollimator", "face_tilt", "mirror_tilt", "plane_mirror"), Family.GEOMETRY),
     **dict.fromkeys(("cogging", "cyclic", "quantisation"), Family.PERIODIC),
     **dict.fromkeys(("expansion", "second_pole", "temperature_sensitivity", "thermal_lag"), Family.THERMAL),
     "temperature_sensitivity_above": Family.THERMAL,
