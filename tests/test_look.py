@@ -16,7 +16,8 @@ from ctrlgen import build_model, load_device
 from ctrlgen.app.look_console import described, look
 from ctrlgen.core.errors import InputError
 from ctrlgen.recordings.formats import read_table
-from ctrlgen.recordings.look.column_facts import between_samples, rests, table_facts
+from ctrlgen.recordings.formats.unit_texts import split_name, unit_of
+from ctrlgen.recordings.look.column_facts import between_samples, rests, settled, table_facts
 from ctrlgen.recordings.look.oddities import table_oddities
 from ctrlgen.recordings.look.proposal import propose
 from ctrlgen.recordings.look.proposed_file import recording_toml
@@ -183,6 +184,46 @@ def test_rests_are_where_no_drive_moves():
     drive[300:, 0] = 1.0
     drive[450:, 1] = np.linspace(0, 1, 150)
     assert rests(drive) == [(0, 151), (299, 451)]
+
+
+def test_a_drive_that_stands_still_is_no_rest_while_a_reading_moves():
+    """What settles is left out of the rest; what still moves at its end, or has too few rows left, is no rest: a tank that fills."""
+    t, noise = np.arange(600.0), np.random.default_rng(0).normal(0, 1, 600)
+    assert settled(noise[:, None], 0, 600) == 0
+    swing = 300 * np.exp(-t / 30) * np.cos(t / 9) + noise
+    assert 100 <= settled(np.column_stack([noise, swing]), 0, 600) <= 250
+    assert settled((100 * np.exp(-t / 300) + noise)[:, None], 0, 600) is None
+    assert settled(noise[:, None], 450, 600) is None
+
+
+def test_a_rest_of_the_drive_in_which_the_reading_settles_is_fitted(axis, tmp_path):
+    t, u, y = motion(1)
+    u[-300:], y[-300:] = 1.0, 50 * np.exp(-np.arange(300) / 200)
+    (tmp_path / "log.csv").write_text("time (s),drive (V),position (um)\n" + rows(t, u, y))
+    (written,) = described([tmp_path / "log.csv"], AXIS_FILE)
+    assert [(r.role, len(r.time)) for r in load_recordings([written], axis).records if r.role == "rest"] == []
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("speed rad/s", "rad/s"),
+        ("omega / rad/s", "rad/s"),
+        ("v mm/s", "mm/s"),
+        ("a (m/s2)", "m/s^2"),
+        ("M [Nm]", "N*m"),
+        ("U / mV", "mV"),
+    ],
+)
+def test_a_unit_behind_a_name_may_have_a_stroke_of_its_own(name, unit):
+    stated = split_name(name)[1] or ""
+    assert unit_of(stated) == unit
+
+
+def test_speeds_and_accelerations_are_told_by_the_end_of_their_names(tmp_path):
+    (tmp_path / "log.csv").write_text("time_s,q_rad,qd_rad_s,qdd_rad_s2,v_mm_s\n" + rows(T, U, U, U, Y))
+    units = {c.name: c.unit for c in table_facts(read_table(tmp_path / "log.csv")).columns}
+    assert list(units.values())[1:] == ["rad", "rad/s", "rad/s^2", "mm/s"]
 
 
 def test_six_drives_are_told_apart_by_their_names(tmp_path):

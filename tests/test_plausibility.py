@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from conftest import DEVICES, RECORDINGS, SCENARIOS
 
-from ctrlgen import build_model, load_device, simulate
+from ctrlgen import build_model, load_device, simulate, user_device
 from ctrlgen.app.check_files import check
 from ctrlgen.core.errors import InputError
 from ctrlgen.core.units import from_si
 from ctrlgen.recordings.formats import read_table
 from ctrlgen.recordings.look.column_facts import table_facts
 from ctrlgen.recordings.look.proposal import propose
-from ctrlgen.recordings.moved import moved
-from ctrlgen.recordings.plausibility import implausible, with_plausibility
+from ctrlgen.recordings.moved import Stretch, moved, moved_of
+from ctrlgen.recordings.plausibility import early, implausible, order_notes, with_plausibility
 from ctrlgen.recordings.reader import load_recordings
 
 N = 1200
@@ -228,3 +228,43 @@ def test_nothing_is_told_of_a_recording_that_is_right():
         notes = with_plausibility(recording, model).notes[len(recording.notes) :]
         said |= {str(file): notes} if notes else {}
     assert read >= 4 and not said
+
+
+def test_a_reading_that_its_own_loop_answers_is_not_told_as_early():
+    """A controller answers what is read, the more where friction makes it lag; a reading that is shifted is told all the same."""
+    step, m, c, rub = 2e-3, 0.02, 0.25, 0.35
+    t = step * np.arange(3000)
+    wanted = 0.3 * (np.sin(2 * np.pi * 0.3 * t) + np.sin(2 * np.pi * 0.55 * t) + np.sin(2 * np.pi * 1.1 * t))
+    u, y = np.zeros(len(t)), np.zeros(len(t))
+    x, v = 0.0, 0.0
+    for k in range(len(t)):
+        u[k], y[k] = np.clip(14 * (wanted[k] - x) - 0.25 * v, -12, 12), x
+        for _ in range(10):
+            push = 0.6 * u[k] - c * v
+            free = push - rub * np.sign(v if v else push)
+            after = v + 0.1 * step * free / m if v or abs(push) > rub else 0.0
+            v = 0.0 if after * v < 0 else after
+            x += 0.1 * step * v
+
+    servo = user_device(
+        "servo",
+        parameters={"m": f"{m} kg*m^2", "c": f"{c} N*m*s", "k": "0.6 N*m/V"},
+        drive={"u": "12 V"},
+        axes={"x": "90 deg"},
+        mass=lambda p: p.m,
+        force=lambda u, p: p.k * u.u,
+        restoring_force=lambda d: 0 * d.x,
+        damping_force=lambda v, p: p.c * v.x,
+    )
+
+    def seen(device, name, drive, reading):
+        stretch = Stretch(drive[:, None], reading[:, None], step, False)
+        return moved_of(build_model(device), ((f"drive.{name[0]}", "V"),), ((f"reading.{name[1]}", "rad"),), [stretch])
+
+    assert early(u, y)  # by the drive alone
+    assert not order_notes(seen(servo, "ux", u, y))
+    flexure, names = load_device(DEVICES / "flexure_axis.toml"), ("axis", "axis")
+    steps = np.repeat(np.random.default_rng(1).normal(size=100), 30)
+    follows = seen(flexure, names, steps, steps).system.responses(steps[:, None], step, False)[:, 0, 0]
+    assert not order_notes(seen(flexure, names, steps, follows))
+    assert order_notes(seen(flexure, names, steps, np.roll(follows, -20)))

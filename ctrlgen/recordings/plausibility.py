@@ -50,11 +50,20 @@ def implausible(seen: Moved) -> list[str]:
 
 
 def order_notes(seen: Moved) -> list[str]:
-    """Of a single drive: the readings that come before it."""
+    """Of a single drive: the readings that come before it, and before what the model makes of it. A swing that follows by a quarter of a
+    period, as a position follows a drive of the speed, is with the other sign a quarter early, and a drive in a loop follows its reading.
+    """
     first = seen.stretches[0]
     if len(seen.drives) != 1 or not np.isfinite(first.step):
         return []
     rows = {name: early(first.u[:, 0], first.y[:, i]) for i, (name, _) in enumerate(seen.readings)}
+    if any(rows.values()):
+        own = seen.system.responses(first.u, first.step, first.linear)[:, :, 0]
+        rows = {
+            name: by
+            for i, (name, by) in enumerate(rows.items())
+            if by and (not np.isfinite(own[:, i]).all() or early(own[:, i], first.y[:, i]))
+        }
     return [
         f"{name} comes before its drive by {number_of(by, 'row')}: are the columns those of one clock? `later` shifts one"
         for name, by in rows.items()

@@ -8,6 +8,10 @@ from functools import cache
 from ctrlgen.core.units import base_unit, to_si
 
 BEHIND = re.compile(r"^(?P<name>.*?)[\s_,:;/-]*[\[({<]\s*(?P<unit>[^\[\](){}<>]*?)\s*[\])}>]\s*$")
+RATE = re.compile(
+    r"^(?P<name>.*[^\s/])\s*[\s/]\s*(?P<unit>(?:[mun\u00b5\u03bcck]?m|[mun\u00b5\u03bc]?rad|deg|in|rev|1|l|K|N|V|A)/(?:ms|s\^?2|s\u00b2|s|min|h))$"
+)
+"""A unit with a stroke of its own, after a blank or the stroke of DIN 1313: speed rad/s, v / mm/s. The second is no unit of its own."""
 SLASH = re.compile(r"^(?P<name>.*?\S)\s*/\s*(?P<unit>[^\s/]{1,8})$")  # of DIN 1313: U / mV
 PLAIN = re.compile(
     r"^(?P<name>.*[^\W_])(?:[_\s]+|\s+in\s+)(?P<unit>[mun\u00b5\u03bc]s|[mun\u00b5\u03bcp]m|[mkun\u00b5\u03bc][VA]|[mun\u00b5\u03bc]rad|rad|deg[CF]?|[kM]?Hz)$"
@@ -32,6 +36,7 @@ LETTERS = {
 }  # fmt: skip
 SCALED = re.compile(r"(?P<number>\d*\.?\d+(?:[eE][+-]?\d{1,2})?|10\^[+-]?\d{1,2})\s*[*\u00b7]?\s*(?P<unit>[^\W\d].*)")
 """A unit of so many others: numbers in 0.1 ms, in 1e-6 m."""
+POWER = re.compile(r"(?<=[A-Za-z])[23]\b")  # of a unit: m/s2, mm2
 SIGNS = {"µ": "u", "μ": "u", "²": "^2", "³": "^3", "·": "*", "°": "deg", "Ω": "ohm"}
 STRANGE = re.compile(r"[^\w/*^%().\s+-]|\^.*\^|\*\*|\d{2}")  # no unit of a log; a tower of powers has no end
 COUNTS = {"sequence", "sample", "samples", "point", "points", "index", "count", "counts", "row", "nr", "no."}
@@ -56,6 +61,7 @@ def unit_of(text: str) -> str | None:
     bare = LETTERS.get(bare) or WORDS.get(bare.lower(), bare)
     for sign, plain in SIGNS.items():
         bare = bare.replace(sign, plain)
+    bare = POWER.sub(lambda power: f"^{power[0]}", bare)
     if not bare or not re.search(r"[A-Za-z%]", bare) or STRANGE.search(bare):
         return None
     try:
@@ -106,6 +112,8 @@ def split_name(name: str) -> tuple[str, str | None]:
         if square or (unit not in LETTERS_OF_NAMES and stated and not _is_of_a_node(name, unit)):
             return match["name"].strip(), match["unit"] or None
     if match := PLAIN.match(name):
+        return match["name"].removesuffix(" in").strip(), match["unit"]
+    if match := RATE.match(name):
         return match["name"].removesuffix(" in").strip(), match["unit"]
     if (match := SLASH.match(name)) and match["unit"] not in LETTERS_OF_NAMES and is_unit_cell(match["unit"]):
         return match["name"].strip(), match["unit"]

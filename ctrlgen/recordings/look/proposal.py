@@ -113,7 +113,14 @@ class Proposal:
 
     def drives_of(self, facts: TableFacts) -> list[np.ndarray]:
         """The columns of drives in one table."""
-        names = {m.column for m in self.matches if m.signal.startswith("drive.")}
+        return self._of("drive.", facts)
+
+    def readings_of(self, facts: TableFacts) -> list[np.ndarray]:
+        """The columns of readings in one table."""
+        return self._of("reading.", facts)
+
+    def _of(self, role: str, facts: TableFacts) -> list[np.ndarray]:
+        names = {m.column for m in self.matches if m.signal.startswith(role)}
         return [c.values for c in facts.columns if c.name in names and c.values is not None]
 
     @property

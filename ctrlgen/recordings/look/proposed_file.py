@@ -9,7 +9,7 @@ import numpy as np
 
 from ctrlgen.core.escaping import toml
 from ctrlgen.core.file_format import FORMAT
-from ctrlgen.recordings.look.column_facts import TableFacts, rests
+from ctrlgen.recordings.look.column_facts import TableFacts, rests, settled
 from ctrlgen.recordings.look.proposal import Proposal
 
 
@@ -64,8 +64,10 @@ def _record(proposal: Proposal, facts: TableFacts, folder: Path, role: str) -> l
         return ["[[record]]", *head, f'role = "{role}"', ""]
     head.append(f"between_samples = {proposal.between_samples}")
     n = len(known[0])
-    ends = [(a, b) for a, b in rests(np.column_stack(known)) if (a == 0) != (b == n)]
-    begin, end = max((b for a, b in ends if a == 0), default=0), min((a for a, b in ends if b == n), default=n)
+    readings = np.column_stack(proposal.readings_of(facts) or [np.zeros(n)])
+    ends = [(settled(readings, a, b), a, b) for a, b in rests(np.column_stack(known)) if (a == 0) != (b == n)]
+    still = [(a, b, start) for start, a, b in ends if start is not None]
+    begin, end = max((b for a, b, _ in still if a == 0), default=0), min((s for _, b, s in still if b == n), default=n)
     lines = [
         "[[record]]",
         *head,
@@ -73,13 +75,13 @@ def _record(proposal: Proposal, facts: TableFacts, folder: Path, role: str) -> l
         *([f"rows = [{begin}, {end}]"] if (begin, end) != (0, n) else []),
         "",
     ]
-    for a, b in ((0, begin), (end, n)):
-        if b > a:
-            lines += [
-                "[[record]] # nothing moves: it gives the noise",
-                *head,
-                'role = "rest"',
-                f"rows = [{a}, {b}]",
-                "",
-            ]
+    for a, b, start in still:
+        before = ", after it has settled" if start > a else ""
+        lines += [
+            f"[[record]] # nothing moves{before}: it gives the noise",
+            *head,
+            'role = "rest"',
+            f"rows = [{start}, {b}]",
+            "",
+        ]
     return lines
