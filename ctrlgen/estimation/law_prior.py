@@ -33,6 +33,8 @@ class ParameterPrior:
     plausible_range: of an amplitude: a fit that ends outside is another cause under this law's name, and is rejected.
     usual: of a shape: the value of the plain form of the law, which is taken where the fit does not exclude it: what the records to fit
         leave open, records that go farther show.
+    again_at_low: of a positive shape: a fit is begun again at its lower bound, and that is kept where both kinds of records together want
+        it: what records to fit hardly tell, held-out records do (`selection.begun_again`).
     fixed_range: of an amplitude: the law is present or absent. Its amplitude is set to the middle of the range, not fitted.
     deviation: of an amplitude: its standard deviation among devices whose file states none (`estimation.size_odds`).
     at_bound: of a shape: what the law is where this ends at a bound. A fit that ends there is rejected, as one is of which the records
@@ -50,12 +52,17 @@ class ParameterPrior:
     at_low_bound: str = ""
     proportional: bool = False
     usual: float | None = None
+    again_at_low: bool = False
     deviation: float | None = None
 
 
 def peaks(*multiples: float) -> ParameterPrior:
     """Start values in multiples of the peak in the recording."""
     return ParameterPrior(multiples, scales_with_peak=True)
+
+
+CREEPING = ParameterPrior((1e-4, 0.1), scales_with_peak=True, again_at_low=True)
+"""Of the speed below which a contact creeps under a lasting load."""
 
 
 @dataclass(frozen=True)

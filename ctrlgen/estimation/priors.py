@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 from ctrlgen.devices.usual_deviation import ASSUMED_SCALE
 from ctrlgen.effects import Effect
-from ctrlgen.estimation.law_prior import ONE_IN_A_HUNDRED, ONE_IN_TEN, LawPrior, ParameterPrior, peaks
+from ctrlgen.estimation.law_prior import CREEPING, ONE_IN_A_HUNDRED, ONE_IN_TEN, LawPrior, ParameterPrior, peaks
 from ctrlgen.estimation.priors_in_a_region import IN_A_REGION
 from ctrlgen.estimation.priors_of_a_lag import HYSTERESIS, OF_A_LAG
 
@@ -221,7 +221,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             _DRY_FRICTION,
             model_form_error=0.02,
             family="dry friction",
-            parameters={"reach": peaks(3e-4, 3e-3, 0.03), "smoothing": peaks(1e-4, 0.1)},
+            parameters={"reach": peaks(3e-4, 3e-3, 0.03), "smoothing": CREEPING},
         ),
         **IN_A_REGION,
         **OF_A_LAG,

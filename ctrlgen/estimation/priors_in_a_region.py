@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from ctrlgen.estimation.law_prior import ONE_IN_A_HUNDRED, ONE_IN_TEN, LawPrior, ParameterPrior, peaks
+from ctrlgen.estimation.law_prior import CREEPING, ONE_IN_A_HUNDRED, ONE_IN_TEN, LawPrior, ParameterPrior, peaks
 
 _REASON = (
     "A law in one part of the motion is rarer than one everywhere, and is suspected where most of the residual is. Neither the law nor "
@@ -25,7 +25,7 @@ def _edge(suggested: str) -> dict[str, ParameterPrior]:
 
 
 def _friction(where: dict[str, ParameterPrior], log_prior_odds: float) -> LawPrior:
-    contact = {"reach": peaks(3e-4, 3e-3, 0.03), "smoothing": peaks(1e-4, 0.1)}
+    contact = {"reach": peaks(3e-4, 3e-3, 0.03), "smoothing": CREEPING}
     return LawPrior(
         _REASON,
         log_prior_odds=log_prior_odds,

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ctrlgen.diagnosis.selection.begun_again import begun_again
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.diagnosis.selection.shifts import best_shift
@@ -202,7 +203,7 @@ def restart_elsewhere(
             trials.note_failure(cause, error)
             continue
         candidate = trials.begun_better(candidate, promising)
-    return candidate
+    return begun_again(trials, candidate, before.causes)
 
 
 def fit_other_clocks(

@@ -17,6 +17,7 @@ import numpy as np
 from ctrlgen.core.counts import number_of
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.selection.attribution import attribute
+from ctrlgen.diagnosis.selection.begun_again import begun_again
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round
 from ctrlgen.diagnosis.selection.candidates import finer_forms, fit_candidates, restart_elsewhere
 from ctrlgen.diagnosis.selection.confusable import explains_alike
@@ -86,7 +87,11 @@ class Searcher:
 
     def _settled(self, current: CandidateModel) -> CandidateModel:
         """The same model fitted to its end under its own errors, without the causes that it then does not need."""
-        return without_needless(self.trials, self.trials.with_errors(self.trials.converged(current)))
+        return without_needless(self.trials, self._converged(current))
+
+    def _converged(self, current: CandidateModel) -> CandidateModel:
+        """The same model fitted to its end under its own errors, where shapes may be that the records to fit hardly tell too."""
+        return self.trials.with_errors(begun_again(self.trials, self.trials.converged(current)))
 
     def best_settled(self, current: CandidateModel) -> CandidateModel:
         """The model `_settled`, and what then explains better in the place of one of its causes: none of them is an alternative of it.
@@ -171,7 +176,7 @@ class Searcher:
             if same is not None and explains_alike(trials.selection, same, current):
                 # no better than when it was there before
                 return current
-            current = trials.with_noise_update(trials.with_errors(trials.converged(current)))
+            current = trials.with_noise_update(self._converged(current))
             visited.append(current)
 
     def _in_finer_form(self, current: CandidateModel) -> CandidateModel:

@@ -142,6 +142,9 @@ class SearchSettings:
     """Other shapes of a law from which it is fitted again, those that begin best: the valleys of one law. Judgement."""
     near_restarts: int = 2
     """The same of shapes that differ in one number. Judgement."""
+    same_start: float = 10.0
+    """Multiple of a positive shape's lower bound up to which a fit that is begun again there begins where it is. Judgement: of shapes
+    over decades, one."""
     beside_clocks: int = 4
     """Candidates, the best first, beside which an offset of the clocks is tried: each such trial is a fit. Judgement."""
     subset_share: float = 0.1
