@@ -21,6 +21,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
+from ctrlgen.core.compiled_templates import cache_folder
 from ctrlgen.core.counts import number_of
 
 FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off", "-w")
@@ -200,8 +201,7 @@ def _with_locals(parts: list[list[str]]) -> list[str]:
 
 def _library(code: str) -> Path:
     digest = hashlib.sha256("\0".join((code, str(compiler()), *FLAGS)).encode()).hexdigest()[:32]
-    root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(root) / "ctrlgen" / f"{digest}.so"
+    return cache_folder() / f"{digest}.so"
 
 
 def _compile(code: str, path: Path) -> bool:

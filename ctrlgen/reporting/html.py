@@ -13,9 +13,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import jinja2
 from markupsafe import Markup, escape
 
+from ctrlgen.core.compiled_templates import environment as templates
 from ctrlgen.core.counts import number_of
 
 SHARED = Path(__file__).resolve().parent  # what several pages include
@@ -81,13 +81,7 @@ def coded(text: str) -> Markup:
 
 def render(template: Path, **values: Any) -> str:
     """The page of the file `template`. Raises jinja2.UndefinedError for a value that is missing."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader([template.resolve().parent, SHARED]),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = templates([template.resolve().parent, SHARED], autoescape=True, trim_blocks=True, lstrip_blocks=True)
     environment.globals["page"] = PageParts()
     environment.filters["coded"] = coded
     environment.filters["number_of"] = number_of

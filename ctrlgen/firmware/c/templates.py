@@ -9,6 +9,7 @@ from typing import Any
 
 import jinja2
 
+from ctrlgen.core.compiled_templates import environment as templates
 from ctrlgen.core.escaping import c_comment, c_format, kconfig, markdown, markdown_code, one_line
 from ctrlgen.core.files import write_text
 from ctrlgen.core.shipped_files import shipped
@@ -59,13 +60,8 @@ def render(template: str, context: dict[str, Any]) -> str:
 @cache
 def _environment() -> jinja2.Environment:
     """Where the templates are read, each of them once."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(codegen_folder() / "templates"),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
+    folder = codegen_folder() / "templates"
+    environment = templates(folder, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
     environment.globals |= {"abi": ABI, "hertz": hertz}
     environment.filters |= {
         "c_comment": c_comment,

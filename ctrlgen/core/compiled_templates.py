@@ -1,0 +1,63 @@
+"""Templates of pages, C and new files, compiled once: what jinja2 makes of a template is kept in the user's cache folder.
+
+Compiling the templates of one scenario takes as long as solving its path. A folder that cannot be written is no error.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+import tempfile
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from jinja2.bccache import Bucket
+
+
+def cache_folder() -> Path:
+    """The folder of what can be made again: $XDG_CACHE_HOME/ctrlgen, or ~/.cache/ctrlgen."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "ctrlgen"
+
+
+def environment(folders: Path | Sequence[Path], **options: Any) -> jinja2.Environment:
+    """Where the templates of the `folders` are read with jinja2's `options`; a name that a template does not get is an error."""
+    return jinja2.Environment(
+        loader=jinja2.FileSystemLoader(folders),
+        undefined=jinja2.StrictUndefined,
+        bytecode_cache=_Cache(options),
+        **options,
+    )
+
+
+class _Cache(jinja2.BytecodeCache):
+    """Compiled templates by the content of the template, the options and jinja2's version; jinja2 itself looks at the content alone."""
+
+    def __init__(self, options: dict[str, Any]) -> None:
+        self._made_with = f"{jinja2.__version__} {sorted(options.items())!r}"
+
+    def get_source_checksum(self, source: str) -> str:
+        """Of all that the compiled template depends on."""
+        return hashlib.sha256(f"{self._made_with}\0{source}".encode()).hexdigest()
+
+    def load_bytecode(self, bucket: Bucket) -> None:
+        """Fills `bucket` where there is a file; jinja2 leaves it empty where that is of another checksum."""
+        with suppress(OSError, EOFError, pickle.UnpicklingError), self._path(bucket).open("rb") as file:
+            bucket.load_bytecode(file)
+
+    def dump_bytecode(self, bucket: Bucket) -> None:
+        """Writes a file that appears as a whole or not at all."""
+        path = self._path(bucket)
+        with suppress(OSError):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryDirectory(dir=path.parent) as folder:
+                written = Path(folder, path.name)
+                written.write_bytes(bucket.bytecode_to_string())
+                written.replace(path)
+
+    def _path(self, bucket: Bucket) -> Path:
+        """The `key` is of the template's name and folder, so that a changed one takes the place of the one before."""
+        return cache_folder() / "templates" / f"{bucket.key}.pyc"

@@ -1,0 +1,46 @@
+"""Compiled templates are kept in the cache folder; what is kept never differs from what the template says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import jinja2
+import pytest
+
+from ctrlgen.core.compiled_templates import environment
+
+
+def rendered(folder: Path, **options: bool) -> str:
+    return environment(folder, **options).get_template("page").render(x="<")
+
+
+def test_a_kept_template_is_used_and_one_with_other_text_or_options_is_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    page = tmp_path / "page"
+    page.write_text("first {{ x }}")
+    assert rendered(tmp_path) == "first <"
+    (kept,) = (tmp_path / "cache").rglob("*.pyc")
+
+    compiled = list[str]()
+    plain = jinja2.Environment.compile
+    monkeypatch.setattr(jinja2.Environment, "compile", lambda *a, **k: compiled.append("once") or plain(*a, **k))
+    assert rendered(tmp_path) == "first <"
+    assert not compiled
+    assert rendered(tmp_path, autoescape=True) == "first &lt;"  # the same text and file, another option
+    page.write_text("second {{ x }}")
+    assert rendered(tmp_path, autoescape=True) == "second &lt;"
+    kept.write_bytes(kept.read_bytes()[:40])  # damaged
+    assert rendered(tmp_path, autoescape=True) == "second &lt;"
+    assert len(compiled) == 3
+    assert list((tmp_path / "cache").rglob("*.*")) == [kept]  # a template has one file, and nothing half written stays
+
+
+def test_a_cache_folder_that_cannot_be_written_is_no_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    (tmp_path / "page").write_text("{{ x }}")
+    assert rendered(tmp_path) == "<"
+    with pytest.raises(jinja2.UndefinedError):
+        environment(tmp_path).get_template("page").render()
