@@ -11,6 +11,30 @@ from ctrlgen.firmware.c.toolchains import FLAGS
 from ctrlgen.firmware.folder import CFolder
 
 UNSURE = int(ControllerStatus.UNSURE)
+# Stand-ins: the four CMake functions of Zephyr that a module calls, and what a sketch of Arduino calls
+ZEPHYR = """cmake_minimum_required(VERSION 3.16)
+project(app C)
+add_library(interface INTERFACE)
+function(zephyr_include_directories)
+  target_include_directories(interface INTERFACE ${ARGN})
+endfunction()
+function(zephyr_library_named name)
+  add_library(${name} STATIC)
+  target_link_libraries(${name} PUBLIC interface)
+  set(ZEPHYR_CURRENT_LIBRARY ${name} PARENT_SCOPE)
+endfunction()
+function(zephyr_library_sources)
+  target_sources(${ZEPHYR_CURRENT_LIBRARY} PRIVATE ${ARGN})
+endfunction()
+"""
+ARDUINO = """#include <cstdio>
+struct {
+    void begin(long) {}
+    void print(int v) { std::printf("%d", v); }
+    void print(const char *t) { std::printf("%s", t); }
+    void println(const char *t) { std::puts(t); }
+} Serial;
+"""
 STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+import gzip
+import json
 import shutil
 import subprocess
 from itertools import pairwise
@@ -23,6 +25,7 @@ from ctrlgen.verification.emulation import Machine
 from ctrlgen.verification.rules import STRICT
 
 NAME = "device_online_q31"
+NAMES = {"online": NAME, "selftest": "device_selftest_q31", "vectors": "device_vectors_q31"}
 WITHIN = 12_000  # instructions of a Cortex-M0+ on the circle, which takes 16,400 in emulated float: the goal
 
 
@@ -34,9 +37,17 @@ class InC:
         self.model = build_model(self.scenario.device)
         self.controller = controller_of(self.model, self.scenario.file.follow, self.scenario.sample_time)
         self.fixed = fixed_point(self.controller)
-        context = fixed_context(self.scenario, self.controller, NAME)
-        self.header, self.source = (write(f"fixed.{kind}", context, folder / f"{NAME}.{kind}") for kind in "hc")
-        self.init = f"{NAME}_init_{context['build']}"
+        command = self.scenario.bind(self.model).targets
+        self.context = fixed_context(self.scenario, self.controller, command, NAMES)
+        for template, name in (
+            ("fixed", NAME),
+            ("fixed_selftest", NAMES["selftest"]),
+            ("fixed_vectors", NAMES["vectors"]),
+        ):
+            for kind in "hc":
+                write(f"{template}.{kind}", self.context, folder / f"{name}.{kind}")
+        self.source = folder / f"{NAME}.c"
+        self.init = f"{NAME}_init_{self.context['build']}"
         library = folder / "fixed.so"
         subprocess.run(["gcc", *STRICT, "-Werror", "-O1", "-shared", "-fPIC", "-o", library, self.source], check=True)
         self.library = ctypes.CDLL(str(library))
@@ -210,85 +221,38 @@ def test_nothing_is_promised_while_the_device_settles_cools_or_is_lost(circle):
         )  # until it is initialised, also where the bit flips back
 
 
-HOSTILE = """
-#include "%(name)s.h"
-#include <stdio.h>
-static uint64_t seed = 88172645463325252ULL;
-static uint32_t draw(void)
-{
-    seed ^= (seed & 0x7FFFFFFFFFFFFULL) << 13U;
-    seed ^= seed >> 7U;
-    seed ^= (seed & 0x7FFFFFFFFFFFULL) << 17U;
-    return (uint32_t)(seed >> 32U);
-}
-static int32_t any(void)
-{
-    const uint32_t digits = draw() %% 32U;
-    const int64_t value = (int64_t)(draw() >> digits) - (int64_t)(0x80000000U >> digits);
-    return (int32_t)value;
-}
-int main(void)
-{
-    static const int32_t LOW[] = { %(low)s };
-    static const int32_t HIGH[] = { %(high)s };
-    static %(name)s_state state;
-    %(name)s_output out;
-    int32_t target[%(m)d];
-    unsigned long seen = 0UL;
-    long k;
-    int i;
-    %(name)s_init(&state);
-    for (k = 0; k < %(calls)ld; k++) {
-        const uint32_t what = draw() %% 64U;
-        uint32_t status;
-        for (i = 0; i < %(m)d; i++) {
-            target[i] = any();
-        }
-        if (what == 0U) {
-            state.x[draw() %% %(n_s)dU] = any();
-        } else if (what == 1U) {
-            state.z[draw() %% %(n)dU] = any();
-        } else if (what == 2U) {
-            state.unsure = draw();
-        } else if (what == 3U) {
-            (void)%(name)s_forget(&state);
-        }
-        status = ((what & 8U) != 0U) ? %(name)s_settle(&state, (what == 9U) ? NULL : target, &out) : %(name)s_step(&state, target, &out);
-        seen |= status;
-        for (i = 0; i < %(nu)d; i++) {
-            if ((out.drive[i] < LOW[i]) || (out.drive[i] > HIGH[i])) {
-                printf("drive %%d: %%d\\n", i, out.drive[i]);
-                return 1;
-            }
-        }
-        if (((status & %(U)s_LOST) != 0U) || (state.cooling > 3U)) {
-            %(name)s_init(&state);
-        }
-    }
-    printf("%%lu\\n", seen);
-    return 0;
-}
-"""
+def test_the_test_on_the_target_takes_every_branch_and_finds_a_wrong_number(circle, tmp_path):
+    for program in ("gcc", "gcov"):
+        if not shutil.which(program):
+            pytest.skip(f"{program} is missing: what the shipped test enters was not counted")
+    write("fixed_test.c", circle.context, tmp_path / "run.c")
+    text, folder = circle.source.read_text(), circle.source.parent
+    others = [tmp_path / "run.c", *(folder / f"{NAMES[piece]}.c" for piece in ("selftest", "vectors"))]
 
+    def told(changed, *flags):
+        (tmp_path / f"{NAME}.c").write_text(changed)
+        words = ["gcc", *STRICT, "-O0", *flags, "-I", folder, f"{NAME}.c", *others, "-o", "run"]
+        subprocess.run(words, cwd=tmp_path, check=True)
+        return subprocess.run(["./run"], cwd=tmp_path, capture_output=True, text=True)
 
-@pytest.mark.long
-@pytest.mark.skipif(shutil.which("clang") is None, reason="needs clang")
-def test_hostile_calls_find_no_undefined_behaviour_and_no_drive_beyond_its_limit(circle, tmp_path):
-    fixed = circle.fixed
-    low, high = (", ".join(str(int(v)) for v in end) for end in fixed.drive_ends)
-    sizes = {"m": len(fixed.bits.target), "n": circle.n, "n_s": circle.n_s, "nu": circle.n_u, "calls": 1_000_000}
-    main = tmp_path / "hostile.c"
-    main.write_text(
-        "#include <stddef.h>\n" + HOSTILE % ({"name": NAME, "U": NAME.upper(), "low": low, "high": high} | sizes)
-    )
-    words = ["-std=c99", "-O1", "-g", "-fsanitize=undefined,integer,address", "-fno-sanitize-recover=all"]
-    program = tmp_path / "hostile"
-    subprocess.run(["clang", *words, "-I", circle.source.parent, main, circle.source, "-o", program], check=True)
-    done = subprocess.run([program], capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
-    every = ControllerStatus.DISPLACEMENT | ControllerStatus.COMPOSITE | ControllerStatus.DRIVE
-    every |= ControllerStatus.INPUT | ControllerStatus.LOST | ControllerStatus.UNSURE
-    assert int(done.stdout) == every
+    calls = circle.context["calls"]
+    assert told(text, "--coverage").stdout == f"{calls} of {calls} vectors agree\n"
+    words = ["gcov", "--json-format", "--branch-probabilities", f"run-{NAME}.gcda"]
+    subprocess.run(words, cwd=tmp_path, check=True, capture_output=True)
+    report = json.loads(gzip.decompress((tmp_path / f"run-{NAME}.gcov.json.gz").read_bytes()))
+    (file,) = (f for f in report["files"] if f["file"].endswith(f"{NAME}.c"))
+    assert all(f["execution_count"] for f in file["functions"]) and len(file["functions"]) > 10
+    assert [line["line_number"] for line in file["lines"] if any(not b["count"] for b in line["branches"])] == []
+    wide = f"is_near(wide[i], {NAME.upper()}_Z_LOW[i]"
+    for right, wrong in (
+        (str(circle.fixed.displacement.coefficients[0][3]), str(circle.fixed.displacement.coefficients[0][3] + 4096)),
+        ("state->unsure -= 1U;", "state->unsure -= 0U;"),
+        ("state->ready = 0U;", ""),
+        (wide, wide.replace("[i]", "[0]")),
+        ("total += (share < 0) ? -share : share;", "total += share;"),
+    ):
+        assert right in text
+        assert told(text.replace(right, wrong)).returncode == 1, right
 
 
 @pytest.mark.long

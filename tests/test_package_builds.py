@@ -8,7 +8,7 @@ import subprocess
 
 import pytest
 from conftest import SCENARIOS
-from package_programs import STRICT, everything, run
+from package_programs import ARDUINO, STRICT, ZEPHYR, everything, run
 
 from ctrlgen import __version__, build_model, generate, load_scenario
 from ctrlgen.firmware.c.real import Real
@@ -50,23 +50,6 @@ def test_two_packages_are_subdirectories_of_one_cpp_project(packages, cmake, cpp
     run(cmake, "-S", tmp_path, "-B", tmp_path / "b")
     run(cmake, "--build", tmp_path / "b")
     assert re.search(r"100% tests passed.* out of 1\b", run("ctest", "--test-dir", tmp_path / "b"))
-
-
-ZEPHYR = """cmake_minimum_required(VERSION 3.16)
-project(app C)
-add_library(interface INTERFACE)
-function(zephyr_include_directories)
-  target_include_directories(interface INTERFACE ${ARGN})
-endfunction()
-function(zephyr_library_named name)
-  add_library(${name} STATIC)
-  target_link_libraries(${name} PUBLIC interface)
-  set(ZEPHYR_CURRENT_LIBRARY ${name} PARENT_SCOPE)
-endfunction()
-function(zephyr_library_sources)
-  target_sources(${ZEPHYR_CURRENT_LIBRARY} PRIVATE ${ARGN})
-endfunction()
-"""
 
 
 @pytest.mark.parametrize("real", list(Real))
@@ -166,10 +149,7 @@ def test_the_arduino_sketch_builds_and_passes_with_a_stand_in_for_the_board(pack
     """A library without src/ is built from the C at its root, not from its subfolders."""
     c = packages["circle20"]
     assert not (c.path / "src").exists() and not (c.path / "utility").exists()
-    (tmp_path / "Arduino.h").write_text(
-        '#include <cstdio>\nstruct { void begin(long) {} void print(int v) { std::printf("%d", v); }\n'
-        'void print(const char *t) { std::printf("%s", t); } void println(const char *t) { std::puts(t); } } Serial;\n'
-    )
+    (tmp_path / "Arduino.h").write_text(ARDUINO)
     (sketch,) = c.path.glob("examples/*/*.ino")
     assert sketch.stem == sketch.parent.name
     (tmp_path / "sketch.cpp").write_text(

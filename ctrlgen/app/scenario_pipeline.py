@@ -46,7 +46,11 @@ from ctrlgen.verification.tracking import tracking_errors
 
 Progress = Callable[[str], None]
 STEPS = 8  # calls of `progress` in `run`: model, solve, C, four builds, report
-VERIFY_STEPS = 27  # in `verify` with every tool installed: also reference, errors, six cores, three boards, four analysers, two fuzzers
+# in `verify` with every tool installed: also reference, errors, six arithmetics of cores by two compilers, four boards, four analysers, two
+# fuzzers, the page
+VERIFY_STEPS = 32
+# of the controller in integers: two builds; in `verify` also five cores by two compilers and three boards
+INTEGER_STEPS, INTEGER_VERIFY_STEPS = 2, 15
 
 
 @dataclass(frozen=True, repr=False)
@@ -76,6 +80,16 @@ class Outcome(Reported):
 
 def quiet(_: str) -> None:
     """Reports no progress."""
+
+
+def steps(scenario: Scenario) -> int:
+    """Calls of `progress` in `run`."""
+    return STEPS + INTEGER_STEPS * scenario.file.fixed_point
+
+
+def verify_steps(scenario: Scenario) -> int:
+    """Calls of `progress` in `verify` where every tool is installed."""
+    return VERIFY_STEPS + INTEGER_VERIFY_STEPS * scenario.file.fixed_point
 
 
 def solve_scenario(scenario: Scenario | Path | str, progress: Progress = quiet) -> Solution:

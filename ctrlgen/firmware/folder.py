@@ -15,15 +15,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ctrlgen.controller.feedforward import Controller
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.core.shown import Shown
 from ctrlgen.firmware.c.deviations import deviations_context
 from ctrlgen.firmware.c.misra import CPPCHECK
-from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.real import Arithmetic, Integers, Real
 from ctrlgen.firmware.c.templates import write
 from ctrlgen.firmware.online.checksum import checked_context
-from ctrlgen.firmware.online.fixed_source import ARITHMETIC, fixed_context
+from ctrlgen.firmware.online.fixed_source import fixed_context
 from ctrlgen.firmware.online.online import online_context
 from ctrlgen.firmware.online.vectors import played_vectors, self_test_calls, vectors
 from ctrlgen.firmware.package import PIECES, owners, write_package
@@ -41,12 +43,13 @@ class CFolder(Shown):
 
     path: Path
     name: str
-    online: dict[Real, str]
+    # In integers too where the scenario asks for it; so are its test and its vectors
+    online: dict[Arithmetic, str]
     player: dict[Real, str]
-    selftest: dict[Real, str]
-    vectors: dict[Real, str]
+    selftest: dict[Arithmetic, str]
+    vectors: dict[Arithmetic, str]
     # The symbol that the header's `..._init` calls
-    init: dict[Real, str]
+    init: dict[Arithmetic, str]
     compression: dict[Real, Compression]
     operations: int
     worst_operations: int
@@ -56,9 +59,6 @@ class CFolder(Shown):
     state_words: int = 1
     # The online controller with a checksum over its state, where the scenario asks for it
     checked: dict[Real, str] = field(default_factory=dict)
-    # The online controller in integers of 32 bits and its symbol that `..._init` calls; empty where the scenario asks for none
-    fixed: str = ""
-    fixed_init: str = ""
 
     def facts(self) -> dict[str, object]:
         """What it is, in a few words."""
@@ -70,12 +70,17 @@ class CFolder(Shown):
             "at worst": self.worst_operations,
         }
 
-    def sources(self, real: Real) -> list[Path]:
-        """The C of the library in one arithmetic."""
-        pieces = (self.online, self.checked, self.player, self.selftest, self.vectors)
-        return [self.path / f"{names[real]}.c" for names in pieces if names]
+    @property
+    def arithmetics(self) -> tuple[Arithmetic, ...]:
+        """Those in which there is a controller."""
+        return tuple(self.online)
 
-    def runner(self, real: Real) -> Path:
+    def sources(self, real: Arithmetic) -> list[Path]:
+        """The C of the library in one arithmetic."""
+        pieces: tuple[Mapping[Any, str], ...] = (self.online, self.checked, self.player, self.selftest, self.vectors)
+        return [self.path / f"{names[real]}.c" for names in pieces if real in names]
+
+    def runner(self, real: Arithmetic) -> Path:
         """The program that prints what the test of reference vectors finds; for a computer."""
         return self.path / "test" / f"test_{self.name}_{real.suffix}.c"
 
@@ -103,7 +108,7 @@ def generate(
         piece: {real: f"{owner}_{piece}_{real.suffix}" for real in Real} for piece, owner in owners(scenario).items()
     }
     checked = {real: f"{scenario.controller_name}_checked_{real.suffix}" for real in Real if scenario.file.checksum}
-    fixed = _fixed(scenario, controller)
+    fixed = _fixed(scenario, controller, targets)
     compression = compress(played) if played else {}
     left_out = () if solution is None else solution.left_out
     contexts, written = {}, []
@@ -128,45 +133,57 @@ def generate(
                 written.append(write(f"{template}.{kind}", context, out / f"{of[template]}.{kind}"))
         written.append(write("test.c", contexts[real], out / "test" / f"test_{scenario.name}_{real.suffix}.c"))
     if fixed is not None:
-        written += [write(f"fixed.{kind}", fixed, out / f"{fixed['prefix']}.{kind}") for kind in ("h", "c")]
+        written += _write_fixed(fixed, out, scenario.name)
     of_c = {path.name: path.read_text(encoding="utf-8") for path in written}
     written.append(write("DEVIATIONS.md", {"cppcheck": CPPCHECK, **deviations_context(of_c)}, out / "DEVIATIONS.md"))
     write_package(out, scenario, contexts, figures or {}, written)
     cost = contexts[Real.FLOAT]["cost"]
-    pieces = names if played else names | {"player": {}}
+    init = {real: f"{names['online'][real]}_init_{contexts[real]['build']}" for real in Real}
+    integers = {} if fixed is None else {Integers.Q31: fixed}
     return CFolder(
         out,
         scenario.name,
-        pieces["online"],
-        pieces["player"],
-        pieces["selftest"],
-        pieces["vectors"],
-        {real: f"{names['online'][real]}_init_{contexts[real]['build']}" for real in Real},
+        names["online"] | {real: c["prefix"] for real, c in integers.items()},
+        names["player"] if played else {},
+        names["selftest"] | {real: c["selftest"] for real, c in integers.items()},
+        names["vectors"] | {real: c["vectors"] for real, c in integers.items()},
+        init | {real: f"{c['prefix']}_init_{c['build']}" for real, c in integers.items()},
         compression,
         operations=cost["step"],
         worst_operations=cost["worst"],
         given_numbers=contexts[Real.FLOAT]["given_numbers"],
         state_words=len(contexts[Real.FLOAT]["words"]),
         checked=checked,
-        fixed="" if fixed is None else fixed["prefix"],
-        fixed_init="" if fixed is None else f"{fixed['prefix']}_init_{fixed['build']}",
     )
 
 
-def _fixed(scenario: Scenario, controller: Controller) -> dict[str, Any] | None:
+def _fixed(scenario: Scenario, controller: Controller, targets: np.ndarray) -> dict[str, Any] | None:
     """The context of the controller in integers; None where the scenario does not ask for it."""
     if not scenario.file.fixed_point:
         return None
-    return fixed_context(scenario, controller, f"{owners(scenario)['online']}_online_{ARITHMETIC}")
+    names = {piece: f"{owner}_{piece}_{Integers.Q31.suffix}" for piece, owner in owners(scenario).items()}
+    return fixed_context(scenario, controller, targets, names)
 
 
-def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Real, path: Path) -> None:
+def _write_fixed(context: dict[str, Any], out: Path, name: str) -> list[Path]:
+    """The controller in integers and the test of it."""
+    pieces = {"fixed": "prefix", "fixed_selftest": "selftest", "fixed_vectors": "vectors"}
+    written = [
+        write(f"{template}.{kind}", context, out / f"{context[piece]}.{kind}")
+        for template, piece in pieces.items()
+        for kind in ("h", "c")
+    ]
+    return [*written, write("fixed_test.c", context, out / "test" / f"test_{name}_{Integers.Q31.suffix}.c")]
+
+
+def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Arithmetic, path: Path) -> None:
     """The program that `ctrlgen.verification` builds around one pair of controllers."""
     controller = controller_of(model, scenario.file.follow, scenario.sample_time)
     context = {
         "real": real,
         "online": folder.online[real],
-        "player": folder.player.get(real),
+        "prefix": folder.online[real],
+        "player": None if isinstance(real, Integers) else folder.player.get(real),
         "n": len(model.axes),
         "nu": model.u.numel(),
         "nx": model.x.numel(),
@@ -176,4 +193,4 @@ def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Real,
         "rate": scenario.sample_time is not None,
         "estimated": controller.kernels.contraction is not None,
     }
-    write("harness.c", context, path)
+    write("fixed_harness.c" if isinstance(real, Integers) else "harness.c", context, path)

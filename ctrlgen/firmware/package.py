@@ -54,9 +54,13 @@ def write_package(
     """
     inputs = input_files(scenario)
     context = _context(scenario, contexts, figures, inputs)
-    sketch = f"{scenario.name}_selftest"
     written = [*c, *(write(template, context, out / name) for template, name in TEMPLATES.items())]
-    written.append(write("package/selftest.ino", context, out / "examples" / sketch / f"{sketch}.ino"))
+    sketches = {f"{scenario.name}_selftest": f"{scenario.name}_selftest_{Real.FLOAT.suffix}"}
+    if context["fixed"]:
+        sketches[context["fixed"]["selftest"]] = context["fixed"]["selftest"]
+    for sketch, tested in sketches.items():
+        context_of = context | {"tested": tested}
+        written.append(write("package/selftest.ino", context_of, out / "examples" / sketch / f"{sketch}.ino"))
     texts = {f"device/{path}": text for path, text in inputs.items()}
     texts |= {f"figures/{name}.svg": svg for name, svg in figures.items()}
     texts["library.json"] = json.dumps(_platformio(context), indent=2) + "\n"
@@ -218,7 +222,12 @@ def _platformio(context: dict[str, Any]) -> dict[str, Any]:
         "keywords": ["control", "feedforward", "inverse", "flexure", "positioning"],
         "authors": [{"name": "ctrlgen"}],
         "headers": [
-            f"{context['owners'][piece]}_{piece}_f32.h" for piece in context["pieces"] if piece in ("online", "player")
+            *(
+                f"{context['owners'][piece]}_{piece}_f32.h"
+                for piece in context["pieces"]
+                if piece in ("online", "player")
+            ),
+            *([f"{context['fixed']['prefix']}.h"] if context["fixed"] else []),
         ],
         "frameworks": "*",
         "platforms": "*",

@@ -36,7 +36,7 @@ def bits_for(size: float, most: int) -> int:
     return bits if size * 2.0**bits <= most else bits - 1
 
 
-def _shifted(value: int, shift: int) -> int:
+def shifted(value: int, shift: int) -> int:
     """value / 2^shift, halves up, as the C has it."""
     return (value + (1 << (shift - 1))) >> shift
 
@@ -56,7 +56,7 @@ class IntegerRows:
         given = [int(v) for v in arguments]
         return np.array(
             [
-                _shifted(sum(c * v for c, v in zip(row, given, strict=True)) + o, self.shift)
+                shifted(sum(c * v for c, v in zip(row, given, strict=True)) + o, self.shift)
                 for row, o in zip(self.coefficients, self.offset, strict=True)
             ]
         )
@@ -98,7 +98,7 @@ class IntegerPolynomial:
         """The integer that the C computes."""
         value = self.coefficients[0]
         for coefficient, shift in zip(self.coefficients[1:], self.shifts, strict=True):
-            value = _shifted(value * (int(argument) - self.centre), shift) + coefficient
+            value = shifted(value * (int(argument) - self.centre), shift) + coefficient
         return value
 
 

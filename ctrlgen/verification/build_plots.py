@@ -13,6 +13,7 @@ from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
 from ctrlgen.trajectory import playback
 from ctrlgen.trajectory.inverse.clock import Settled
 from ctrlgen.verification.build_record import BUDGET_CORE, BUDGETS, Build
+from ctrlgen.verification.emulated_target import Target
 from ctrlgen.verification.tolerances import ANGLE_LIMIT, LENGTH_LIMIT, rounded
 from ctrlgen.verification.tracking import Piece
 
@@ -84,12 +85,12 @@ def draw_instructions(build: Build) -> Figure:
         counts = {k: count for k, run in enumerate(runs) if (count := run.instructions[kind])}
         least, widest = min(counts.values()), max(*counts.values(), budget or 0)
         for k, count in counts.items():
-            over = budget is not None and runs[k].core == BUDGET_CORE and count > budget
+            over = budget is not None and _budgeted(runs[k]) and count > budget
             panel.barh(k, count, color=COLOURS[2] if over else COLOURS[0], height=0.62)
             panel.text(0.93 * count, k, str(count), va="center", ha="right", fontsize=8, color="white")
         if budget is not None:
             for k, run in enumerate(runs):
-                if run.core == BUDGET_CORE and run.real is Real.FLOAT:
+                if _budgeted(run):
                     panel.plot([budget, budget], [k - 0.5, k + 0.5], color="#222222", lw=1.2, ls="--")
         panel.set_xscale("log")  # arithmetic in software takes tens of times as many
         panel.set_xlim(least / 10, 1.3 * widest)  # the shortest bar has room for its number
@@ -100,6 +101,10 @@ def draw_instructions(build: Build) -> Figure:
     axes[0][0].set_yticks(range(len(runs)), [run.short_name for run in runs], fontsize=8)
     axes[0][0].invert_yaxis()
     return figure
+
+
+def _budgeted(run: Target) -> bool:
+    return run.core == BUDGET_CORE and run.real is Real.FLOAT
 
 
 def _channels(build: Build, unit: str) -> list[int]:

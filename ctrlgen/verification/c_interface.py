@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from pydantic import Field
 
 from ctrlgen.controller.controller_step import ControllerStatus
@@ -51,7 +54,9 @@ class LimitEntry(Keys):
 class Interface(Keys):
     """What the generated C takes and gives, in SI units."""
 
-    functions: dict[str, list[str]] = Field(description="Signatures, by arithmetic.")
+    functions: dict[str, list[str]] = Field(
+        description="Signatures, by arithmetic; of integers the header says what they count."
+    )
     target: SignalChannels = Field(description="What the controller is given at each sample.")
     drive: SignalChannels = Field(description="What it returns.")
     actuator_state: SignalChannels | None = Field(
@@ -75,9 +80,10 @@ def interface(solution: Solution, c: CFolder) -> Interface:
         ControllerStatus.UNSURE: kernels.contraction is not None,
         ControllerStatus.CLOCK: kernels.contraction is not None,
     }
+    played: Mapping[Any, str] = c.player
     memory = [f"{name} [{unit}]" for name, unit in zip(m.x_names, m.x_units, strict=True)]
     return Interface(
-        functions={real.value: _functions(c.online[real], c.player.get(real)) for real in c.online},
+        functions={real.value: _functions(name, bool(c.player), played.get(real)) for real, name in c.online.items()},
         target=_channels(kernels.target),
         drive=drive,
         actuator_state=None if state is None else _channels(state),
@@ -105,8 +111,8 @@ def _limit(limit: Limit) -> LimitEntry:
     return LimitEntry(label=limit.label, lower=lower, upper=upper)
 
 
-def _functions(online: str, player: str | None) -> list[str]:
-    """The calls of one arithmetic; a player belongs to what is driven sample by sample."""
+def _functions(online: str, moving: bool, player: str | None) -> list[str]:
+    """The calls of one arithmetic; `moving`: the device is driven sample by sample."""
     played = [f"{player}_sample(index, drive)", f"{player}_at(time, drive)"] if player else []
-    stepped = [f"{online}_step(state, target, out)"] if player else []
+    stepped = [f"{online}_step(state, target, out)"] if moving else []
     return [f"{online}_init(state)", f"{online}_settle(state, target, out)", *stepped, *played]

@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import Field
 
-from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.real import Arithmetic
 from ctrlgen.reporting.result_file import Keys
 
 PATIENCE = 900.0  # s; a tool that takes longer is stopped
@@ -51,7 +51,7 @@ class Check:
 
     tool: str
     version: str
-    subjects: tuple[tuple[str, Real], ...]
+    subjects: tuple[tuple[str, Arithmetic], ...]
     state: CheckState
     findings: tuple[ToolFinding, ...] = ()
     note: str = ""
@@ -68,7 +68,7 @@ class Check:
 
 
 def finished(
-    tool: str, version: str, subjects: Sequence[tuple[str, Real]], findings: Sequence[ToolFinding], note: str = ""
+    tool: str, version: str, subjects: Sequence[tuple[str, Arithmetic]], findings: Sequence[ToolFinding], note: str = ""
 ) -> Check:
     """The check of a tool that ran; it failed where a finding is not permitted."""
     ordered = tuple(sorted(set(findings), key=lambda f: (f.file, f.line, f.rule, f.text)))
@@ -76,7 +76,7 @@ def finished(
     return Check(tool, version, tuple(subjects), state, ordered, note)
 
 
-def not_run(tool: str, subjects: Sequence[tuple[str, Real]], reason: str, version: str = "") -> Check:
+def not_run(tool: str, subjects: Sequence[tuple[str, Arithmetic]], reason: str, version: str = "") -> Check:
     """A check that did not run; `reason` also says what to do about it."""
     return Check(tool, version, tuple(subjects), CheckState.NOT_RUN, (), reason)
 

@@ -27,7 +27,8 @@ class ComparedProgram:
 
     @property
     def real(self) -> Real:
-        """The arithmetic in which the program computes."""
+        """The arithmetic in which the program computes, where it is one of real numbers."""
+        assert isinstance(self.build.real, Real)
         return self.build.real
 
     def run(self, mode: str, records: np.ndarray, width: int, start: tuple[np.ndarray, ...] = ()) -> np.ndarray:

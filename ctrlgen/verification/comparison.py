@@ -15,13 +15,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ctrlgen.core.tabular import Column, Tabular
-from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.real import Arithmetic, Integers
 from ctrlgen.firmware.c.toolchains import COMPILERS, find_compilers
 from ctrlgen.firmware.folder import CFolder, write_harness
 from ctrlgen.trajectory.solution import Solution
 from ctrlgen.verification.compared_program import ComparedProgram
 from ctrlgen.verification.comparison_entry import ComparisonEntry
 from ctrlgen.verification.host import HostBuild, build_host
+from ctrlgen.verification.integer_comparison import IntegerAnswers, integer_rows
 from ctrlgen.verification.online_comparison import online_rows
 from ctrlgen.verification.player_comparison import player_rows
 from ctrlgen.verification.reference import ReferenceAnswers
@@ -58,7 +59,7 @@ class Comparison(Tabular):
     @property
     def worst(self) -> tuple[ComparisonEntry, ...]:
         """Of each arithmetic, comparison and signal the worst build: a table short enough to read."""
-        groups: dict[tuple[Real, str, str, str], list[ComparisonEntry]] = defaultdict(list)
+        groups: dict[tuple[Arithmetic, str, str, str], list[ComparisonEntry]] = defaultdict(list)
         for row in self.rows:
             groups[(row.build.real, row.what, row.signal, row.unit)].append(row)
         return tuple(max(rows, key=lambda row: (not row.passed, row.worst)) for rows in groups.values())
@@ -79,17 +80,21 @@ def compare(
     Raises ToolError when a build or a run fails.
     """
     compilers = find_compilers()
-    builds = [HostBuild(compiler, real) for compiler in compilers for real in Real]
+    builds = [HostBuild(compiler, real) for compiler in compilers for real in folder.arithmetics]
     with tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch, ThreadPoolExecutor(max_workers=2) as pool:
-        for real in Real:
+        for real in folder.arithmetics:
             write_harness(folder, solution.scenario, solution.model, real, Path(scratch) / f"harness_{real.suffix}.c")
         programs = [pool.submit(build_host, build, folder, Path(scratch)) for build in builds]
         reference = reference or ReferenceAnswers(solution)  # while the compilers work
+        integers = IntegerAnswers(reference)
         rows: list[ComparisonEntry] = []
         for build, path in zip(builds, programs, strict=True):
             program = ComparedProgram(build, path.result(), reference)
-            rows += online_rows(program)
-            if (compression := folder.compression.get(build.real)) is not None:
-                rows += player_rows(program, compression)
+            if isinstance(build.real, Integers):
+                rows += integer_rows(program, integers)
+            else:
+                rows += online_rows(program)
+                if (compression := folder.compression.get(build.real)) is not None:
+                    rows += player_rows(program, compression)
             progress(str(build))
     return Comparison(tuple(rows), compilers, tuple(c for c in COMPILERS if c not in compilers))

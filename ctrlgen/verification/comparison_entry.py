@@ -21,6 +21,9 @@ class ComparisonKind(StrEnum):
     SHIPPED_TEST = "the folder's own test"
     EQUILIBRIA = "random targets, online C -> model - target"
     CHASED = "hostile sequence, online C - CasADi"
+    FOLLOWED_INTEGERS = "scenario, C in integers - whole numbers"
+    SETTLED_INTEGERS = "random targets, C in integers - whole numbers"
+    CHASED_INTEGERS = "hostile sequence, C in integers - whole numbers"
     EXCESS = "hostile sequence -> model: excess over a limit"
     RATE = "hostile sequence: change of a drive over its rate"
     OPTIMUM = "scenario, online C - IPOPT"
@@ -33,8 +36,14 @@ class ComparisonKind(StrEnum):
 
     @property
     def is_controller(self) -> bool:
-        """Whether the C is held to the controller evaluated by CasADi."""
-        return self in (ComparisonKind.FOLLOWED, ComparisonKind.SETTLED, ComparisonKind.CHASED)
+        """Whether the C is held to the controller evaluated by CasADi, or in whole numbers by Python."""
+        return self in CONTROLLER
+
+
+CONTROLLER = (
+    *(ComparisonKind.FOLLOWED, ComparisonKind.SETTLED, ComparisonKind.CHASED),
+    *(ComparisonKind.FOLLOWED_INTEGERS, ComparisonKind.SETTLED_INTEGERS, ComparisonKind.CHASED_INTEGERS),
+)
 
 
 class ComparisonEntry(Keys):

@@ -11,7 +11,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from ctrlgen.core.errors import ToolError
-from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.real import Arithmetic, Integers, Real
 from ctrlgen.verification.check import run_tool, version_of
 
 # No fused multiply-add: the same bits as on the computer. No unwinding: C needs none.
@@ -38,7 +38,8 @@ class Architecture(StrEnum):
 @dataclass(frozen=True)
 class Core:
     """A processor: Zig's target and CPU, flags of GNU's cross compiler, its name in Unicorn (None: the machine with every extension), the
-    arithmetics that are tried on it, its board in QEMU (None: none is tried), the most calls of a kind that are counted (None: all)."""
+    arithmetics of real numbers that are tried on it, its board in QEMU (None: none is tried), the most calls of a kind that are counted
+    (None: all)."""
 
     name: str
     architecture: Architecture
@@ -53,6 +54,10 @@ class Core:
     def compilers(self) -> tuple[str, ...]:
         """The cross compilers that know it."""
         return "zig", self.architecture.value
+
+    def tried(self, arithmetics: Sequence[Arithmetic]) -> list[Arithmetic]:
+        """Of these arithmetics those that are tried on it: integers on every core."""
+        return [real for real in arithmetics if isinstance(real, Integers) or real in self.reals]
 
 
 _HARD, _SOFT, _RISCV = "thumb-freestanding-eabihf", "thumb-freestanding-eabi", "riscv32-freestanding-none"

@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import Field, PlainSerializer, computed_field
 
 from ctrlgen.core.counts import number_of
-from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.real import Arithmetic
 from ctrlgen.reporting.result_file import Keys
 
 
@@ -26,7 +26,7 @@ class CallKind(StrEnum):
 STEPS = (CallKind.STEP_SCENARIO, CallKind.STEP_RANDOM, CallKind.STEP_HOSTILE)
 SETTLES = (CallKind.SETTLE_SCENARIO, CallKind.SETTLE_RANDOM)
 
-RealName = Annotated[Real, PlainSerializer(lambda real: real.value, return_type=str)]
+RealName = Annotated[Arithmetic, PlainSerializer(lambda real: real.value, return_type=str)]
 
 
 class CallCost(Keys):
@@ -46,7 +46,7 @@ class Target(Keys):
 
     core: str = Field(description="The emulated processor.")
     compiler: str = Field(description="Compiler and flags.")
-    real: RealName = Field(title="Real", description="Arithmetic: float or double.")
+    real: RealName = Field(title="Real", description="Arithmetic: float, double or integers.")
     costs: tuple[CallCost, ...] = Field(description="Instructions by kind of call.")
     stack: int = Field(description="Bytes of stack.")
     code: int = Field(description="Bytes of code.")
@@ -115,7 +115,7 @@ class StoppedTarget(Keys):
 
     core: str = Field(description="The emulated processor.")
     compiler: str = Field(description="Compiler and flags.")
-    real: RealName = Field(title="Real", description="Arithmetic: float or double.")
+    real: RealName = Field(title="Real", description="Arithmetic: float, double or integers.")
     words: str = Field(description="Why it stopped.")
 
     @property

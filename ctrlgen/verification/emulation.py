@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ctrlgen.core.errors import ToolError
-from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.real import Arithmetic, Integers, Real
 from ctrlgen.verification.cores import Architecture, Core
 
 PAGE = 0x1000
@@ -128,17 +128,17 @@ class Machine:
         if self._executed > MOST:
             self.emulator.emu_stop()
 
-    def reserve(self, count: int, real: Real) -> int:
+    def reserve(self, count: int, real: Arithmetic) -> int:
         """The address in RAM of space for `count` numbers."""
         address = self._next
         self._next += -(-count * real.bytes // 16) * 16
         return address
 
-    def write(self, address: int, values: np.ndarray, real: Real) -> None:
+    def write(self, address: int, values: np.ndarray, real: Arithmetic) -> None:
         """Writes the numbers `values` into RAM from `address` on."""
         self.emulator.mem_write(address, np.asarray(values, dtype=_dtype(real)).tobytes())
 
-    def read(self, address: int, count: int, real: Real) -> np.ndarray:
+    def read(self, address: int, count: int, real: Arithmetic) -> np.ndarray:
         """Numbers from RAM, as they are there."""
         return np.frombuffer(self.emulator.mem_read(address, count * real.bytes), dtype=_dtype(real))
 
@@ -169,5 +169,7 @@ class Machine:
         return -(-int(len(memory) - touched[0]) // 8) * 8 if len(touched) else 0
 
 
-def _dtype(real: Real) -> str:
+def _dtype(real: Arithmetic) -> str:
+    if isinstance(real, Integers):
+        return "<i4"
     return "<f4" if real is Real.FLOAT else "<f8"

@@ -10,7 +10,7 @@ import numpy as np
 
 from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import ToolError
-from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.real import Arithmetic
 from ctrlgen.firmware.c.toolchains import compile_c, find_compilers
 from ctrlgen.firmware.folder import CFolder, write_harness
 from ctrlgen.verification.reference import ReferenceAnswers
@@ -21,7 +21,7 @@ class HostBuild:
     """With what the C is built: a compiler of this computer, in one arithmetic."""
 
     compiler: str
-    real: Real
+    real: Arithmetic
 
     def __str__(self) -> str:
         return f"{self.compiler} {self.real.value}"
@@ -61,7 +61,7 @@ def run_host(
 class Host:
     """One arithmetic built by the first compiler there is; answers (n, 1 + width) begin with the status."""
 
-    def __init__(self, folder: CFolder, reference: ReferenceAnswers, real: Real, scratch: Path) -> None:
+    def __init__(self, folder: CFolder, reference: ReferenceAnswers, real: Arithmetic, scratch: Path) -> None:
         self.real, model = real, reference.model
         write_harness(folder, reference.scenario, model, real, scratch / f"harness_{real.suffix}.c")
         self._program = build_host(HostBuild(next(iter(find_compilers())), real), folder, scratch)

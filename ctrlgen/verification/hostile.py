@@ -17,8 +17,9 @@ from typing import Any
 import numpy as np
 
 from ctrlgen.controller.controller_step import ControllerStatus
+from ctrlgen.controller.fixed_point import fixed_point
 from ctrlgen.controller.motion_feedforward import controller_of
-from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.real import Arithmetic, Integers, Real
 from ctrlgen.firmware.c.templates import write
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.online.limit_tables import rates_in_c
@@ -60,14 +61,18 @@ def check_hostile(
     runs: int = RUNS,
     quick: bool = False,
 ) -> tuple[Check, ...]:
-    """The sanitizers over `runs` random calls, and libFuzzer over as many sequences or `FUZZ_SECONDS`, each in both arithmetics.
+    """The sanitizers over `runs` random calls, and libFuzzer over as many sequences or `FUZZ_SECONDS`, in every arithmetic.
 
     `quick`: not libFuzzer.
     """
     with tempfile.TemporaryDirectory(prefix="ctrlgen-") as name:
         scratch = Path(name)
-        for real in Real:
-            write("hostile.c", _context(folder, scenario, model, real), scratch / f"hostile_{real.suffix}.c")
+        for real in folder.arithmetics:
+            if isinstance(real, Integers):
+                template, context = "fixed_hostile.c", _in_integers(folder, scenario, model, real)
+            else:
+                template, context = "hostile.c", _context(folder, scenario, model, real)
+            write(template, context, scratch / f"hostile_{real.suffix}.c")
         progress(RANDOM)
         random = _random(folder, scratch, runs)
         progress(FUZZER)
@@ -113,8 +118,25 @@ def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> d
     }
 
 
-def _subjects(folder: CFolder) -> list[tuple[str, Real]]:
-    return [(path.name, real) for real in Real for path in folder.sources(real)]
+def _in_integers(folder: CFolder, scenario: Scenario, model: Model, real: Integers) -> dict[str, Any]:
+    controller = controller_of(model, scenario.file.follow, scenario.sample_time)
+    fixed = fixed_point(controller)
+    S = ControllerStatus
+    bits = S.DISPLACEMENT | S.DRIVE | S.INPUT | S.LOST | S.UNSURE | (S.COMPOSITE if fixed.bound else S.UNSURE)
+    return {
+        "prefix": folder.online[real],
+        "n": fixed.displacement_ends.shape[1],
+        "nu": fixed.drive_ends.shape[1],
+        "n_s": fixed.state_ends.shape[1],
+        "m": len(fixed.bits.target),
+        "u_low": fixed.drive_ends[0],
+        "u_high": fixed.drive_ends[1],
+        "bits": int(bits),
+    }
+
+
+def _subjects(folder: CFolder) -> list[tuple[str, Arithmetic]]:
+    return [(path.name, real) for real in folder.arithmetics for path in folder.sources(real)]
 
 
 def _build(compiler: str, flags: Sequence[str], sources: Sequence[Path], include: Path, program: Path) -> str:
@@ -146,7 +168,7 @@ def _random(folder: CFolder, scratch: Path, runs: int) -> Check:
         return not_run(tool, subjects, "; ".join([*against.values(), INSTALL]))
     findings: list[ToolFinding] = []
     notes = []
-    for real in Real:
+    for real in folder.arithmetics:
         sources = [scratch / f"hostile_{real.suffix}.c", *folder.sources(real)]
         for flags in (STOPPING, REPORTED):
             program = scratch / f"hostile_{real.suffix}"
@@ -174,7 +196,7 @@ def _fuzzed(folder: CFolder, scratch: Path, runs: int) -> Check:
         return not_run(tool, subjects, f"{problem}; {install}", version or "")
     findings: list[ToolFinding] = []
     notes = []
-    for real in Real:
+    for real in folder.arithmetics:
         program, corpus = scratch / f"fuzz_{real.suffix}", scratch / f"corpus_{real.suffix}"
         corpus.mkdir()
         rng = np.random.default_rng(SEED)

@@ -155,9 +155,9 @@ def _hostile_rows(program: ComparedProgram) -> list[ComparisonEntry]:
         rows += _controller_rows(program, ComparisonKind.CHASED, chased, ref.chased, ties=True)
     if not m.inertial:  # where jumping targets take a mass, no drive can decide any more
         allowed = EXCESS_LIMIT[real] if m.x.numel() == m.n_states else EXCESS_LIMIT_WITH_MEMORY
-        excess = _excess(m, drives, ref.sample_time, cold[0])
-        excess[1:][_limited_by_rate(chased[:, 0])] = 0.0
-        rows.append(entry_of(program.build, ComparisonKind.EXCESS, "share of its bound", "1", excess, allowed))
+        over = excess(m, drives, ref.sample_time, cold[0])
+        over[1:][_limited_by_rate(chased[:, 0])] = 0.0
+        rows.append(entry_of(program.build, ComparisonKind.EXCESS, "share of its bound", "1", over, allowed))
     if (rate := ref.controller.rate) is not None:
         change = np.diff(np.vstack([cold[2], drives]), axis=0)
         over = np.maximum(np.maximum(change - rate.rise, rate.fall - change), 0.0) / m.u_scale
@@ -171,8 +171,8 @@ def _limited_by_rate(status: np.ndarray) -> np.ndarray:
     return ((bits & S.RATE) > 0) & ((bits & (S.DISPLACEMENT | S.COMPOSITE | S.STATE)) > 0)
 
 
-def _excess(model: Model, drives: np.ndarray, sample_time: float, x_0: np.ndarray) -> np.ndarray:
-    """(n, limits): how far the model driven so goes beyond each limit, over the bound's size; 0 where it is kept."""
+def excess(model: Model, drives: np.ndarray, sample_time: float, x_0: np.ndarray) -> np.ndarray:
+    """(n, limits): how far a model driven so goes beyond each limit, over the bound's size; 0 where it is kept."""
     along = simulate(model, drives, sample_time, x_0)
     u = np.vstack([drives[:1], drives])
     columns = []

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ctrlgen.core.errors import ToolError
-from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.real import Arithmetic
 from ctrlgen.firmware.c.templates import write
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.verification.check import Check, error_in, finished, not_run, run_tool, version_of
@@ -26,19 +26,19 @@ def check_on_boards(folder: CFolder, progress: Callable[[str], None] = lambda _:
     """The selftest of every arithmetic on every core's board; passed where every vector agrees."""
     compiler = Architecture.ARM_M.value
     missing = [remedy for tool, remedy in ((compiler, INSTALL[compiler]), (TOOL, REMEDY)) if not shutil.which(tool)]
-    subjects = tuple((folder.selftest[real], real) for real in Real)
+    subjects = tuple((folder.selftest[real], real) for real in folder.arithmetics)
     if missing:
         return (not_run(TOOL, subjects, "; ".join(missing)),)
     checks = []
     with tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch:
         for core, board in ((core, core.board) for core in CORES if core.board is not None):
-            for real in core.reals:
+            for real in core.tried(folder.arithmetics):
                 progress(f"{board}, {real.value}")
                 checks.append(_run(folder, core, board, real, compiler, Path(scratch)))
     return tuple(checks)
 
 
-def _run(folder: CFolder, core: Core, board: str, real: Real, compiler: str, scratch: Path) -> Check:
+def _run(folder: CFolder, core: Core, board: str, real: Arithmetic, compiler: str, scratch: Path) -> Check:
     subject = ((folder.selftest[real], real),)
     tool, version = f"{TOOL} -M {board} ({core.name}, {real.value})", version_of(TOOL) or ""
     for name in ("board.c", "board.ld"):

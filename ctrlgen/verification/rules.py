@@ -14,7 +14,7 @@ from pathlib import Path
 
 from ctrlgen.firmware.c.deviations import permits
 from ctrlgen.firmware.c.misra import CPPCHECK, rule_class
-from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.real import Arithmetic
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.verification.check import LEFT_OUT, Check, ToolFinding, finished, not_run, run_tool, version_of
 
@@ -72,7 +72,7 @@ ANALYZERS = (
 def check_rules(
     folder: CFolder, progress: Callable[[str], None] = lambda _: None, quick: bool = False
 ) -> tuple[Check, ...]:
-    """One Check a tool over all C of `folder`: controllers, players and tests in both arithmetics; `quick`: not cppcheck."""
+    """One Check a tool over all C of `folder`: controllers, players and tests in every arithmetic; `quick`: not cppcheck."""
     progress(MISRA)
     checks = [not_run(MISRA, _subjects(folder), LEFT_OUT) if quick else _misra(folder)]
     for analyzer in ANALYZERS:
@@ -81,17 +81,17 @@ def check_rules(
     return tuple(checks)
 
 
-def _files(folder: CFolder) -> list[tuple[Path, Real]]:
+def _files(folder: CFolder) -> list[tuple[Path, Arithmetic]]:
     """Every C file that is compiled, with its arithmetic."""
-    return [(path, real) for real in Real for path in (*folder.sources(real), folder.runner(real))]
+    return [(path, real) for real in folder.arithmetics for path in (*folder.sources(real), folder.runner(real))]
 
 
-def _subjects(folder: CFolder) -> list[tuple[str, Real]]:
+def _subjects(folder: CFolder) -> list[tuple[str, Arithmetic]]:
     return [(path.name, real) for path, real in _files(folder)]
 
 
 def _misra(folder: CFolder) -> Check:
-    """cppcheck over what may be one program: both arithmetics of the controllers, then each test with its controllers."""
+    """cppcheck over what may be one program: every arithmetic of the controllers, then each test with its controllers."""
     tool, subjects = MISRA, _subjects(folder)
     version = version_of("cppcheck")
     if version is None:
@@ -110,8 +110,8 @@ def _misra(folder: CFolder) -> Check:
             *("--quiet", "--enable=warning,style,performance,portability", "--error-exitcode=0"),
             *("--template={file}\t{line}\t{severity}\t{id}\t{message}", "-I", str(folder.path)),
         ]
-        programs = [[path for real in Real for path in folder.sources(real)]]
-        programs += [[folder.runner(real), *folder.sources(real)] for real in Real]
+        programs = [[path for real in folder.arithmetics for path in folder.sources(real)]]
+        programs += [[folder.runner(real), *folder.sources(real)] for real in folder.arithmetics]
         for files in programs:
             done = run_tool([*words, *map(str, files)])
             rows = [line.split("\t", 4) for line in done.stderr.splitlines() if line.count("\t") >= 4]

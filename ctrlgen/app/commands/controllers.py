@@ -27,8 +27,9 @@ def run(scenario: ScenarioPath, out_folder: OutFolder, device: OtherDevice = Non
     """
     from ctrlgen.app import scenario_pipeline as pipeline
 
-    with progress(pipeline.STEPS) as advance:
-        outcome = pipeline.run(_read(scenario, device), out_folder, advance)
+    asked = _read(scenario, device)
+    with progress(pipeline.steps(asked)) as advance:
+        outcome = pipeline.run(asked, out_folder, advance)
     from ctrlgen.app.scenario_console import print_comparison, print_solution
 
     print_solution(outcome)
@@ -96,8 +97,9 @@ def compare(scenario: ScenarioPath, device: OtherDevice = None) -> None:
     """
     from ctrlgen.app import scenario_pipeline as pipeline
 
-    with progress(pipeline.STEPS - 1) as advance:
-        outcome = pipeline.compare_only(_read(scenario, device), advance)
+    asked = _read(scenario, device)
+    with progress(pipeline.steps(asked) - 1) as advance:
+        outcome = pipeline.compare_only(asked, advance)
     from ctrlgen.app.scenario_console import print_comparison
 
     print_comparison(outcome)
@@ -128,8 +130,9 @@ def verify(
     """
     from ctrlgen.app import scenario_pipeline as pipeline
 
-    with progress(pipeline.VERIFY_STEPS) as advance:
-        build = pipeline.verify(_read(scenario, device), out_folder, advance, quick)
+    asked = _read(scenario, device)
+    with progress(pipeline.verify_steps(asked)) as advance:
+        build = pipeline.verify(asked, out_folder, advance, quick)
     from ctrlgen.app.scenario_console import print_build
 
     print_build(build)

@@ -1,10 +1,11 @@
-"""The two arithmetics of the generated C, and their numbers as text."""
+"""The arithmetics of the generated C, and their numbers as text."""
 
 from __future__ import annotations
 
 import math
 import sys
 from enum import Enum
+from typing import TypeAlias
 
 import numpy as np
 
@@ -84,3 +85,22 @@ class Real(Enum):
         if "." not in text and "e" not in text:
             text += ".0"
         return text + ("f" if self is Real.FLOAT else "")
+
+
+class Integers(Enum):
+    """The arithmetic of the controller for cores without a floating-point unit: integers of 32 bits, which count powers of two."""
+
+    Q31 = "integers"
+
+    @property
+    def suffix(self) -> str:
+        """Name suffix of files and functions."""
+        return "q31"
+
+    @property
+    def bytes(self) -> int:
+        """Size of a number."""
+        return 4
+
+
+Arithmetic: TypeAlias = Real | Integers

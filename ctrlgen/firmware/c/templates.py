@@ -26,6 +26,8 @@ SOURCES = {
     "online.c": "prefix",
     "checked.c": "prefix",
     "fixed.c": "prefix",
+    "fixed_selftest.c": "selftest",
+    "fixed_vectors.c": "vectors",
     "player.c": "prefix",
     "plant.c": "prefix",
     "selftest.c": "selftest",

@@ -1,4 +1,4 @@
-"""The context of fixed.c.j2 and fixed.h.j2: the controller in integers of 32 bits."""
+"""The contexts of the templates fixed*: the controller in integers of 32 bits, and the test of it that runs on the target."""
 
 from __future__ import annotations
 
@@ -12,17 +12,21 @@ from ctrlgen.controller.fixed_maps import NoFixedPoint
 from ctrlgen.controller.fixed_point import FixedPoint, fixed_point
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import base_unit
-from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.real import Integers, Real
+from ctrlgen.firmware.online.fixed_vectors import fixed_vectors
 from ctrlgen.firmware.online.online import build_of, header_context
 from ctrlgen.numerics.scaled_integers import IntegerRows
 from ctrlgen.trajectory.scenario import Scenario
 
-ARITHMETIC = "q31"  # suffix of files and functions
+WAITED, MISSING = 6, 5  # calls of fixed_selftest.c.j2 that wait, and those without a pointer
 TERMS, INDENT = 2, "\n        "  # of a sum, on a line
 
 
-def fixed_context(scenario: Scenario, controller: Controller, prefix: str) -> dict[str, Any]:
-    """The context of the templates. Raises InputError with the reason where a controller cannot be made in integers."""
+def fixed_context(
+    scenario: Scenario, controller: Controller, command: np.ndarray, names: Mapping[str, str]
+) -> dict[str, Any]:
+    """The context of the templates; `names` of the pieces online, selftest and vectors. Raises InputError with the reason where
+    there is none in integers."""
     try:
         fixed = fixed_point(controller)
     except NoFixedPoint as why:
@@ -33,11 +37,14 @@ def fixed_context(scenario: Scenario, controller: Controller, prefix: str) -> di
     n, n_s = header["n"], header["n_s"]
     return (
         header
-        | build_of(scenario, controller, ARITHMETIC)
+        | build_of(scenario, controller, Integers.Q31.suffix)
         | _numbers(fixed, header)
         | _ranges(fixed)
+        | _test(controller, fixed, command)
         | {
-            "prefix": prefix,
+            "prefix": names["online"],
+            "selftest": names["selftest"],
+            "vectors": names["vectors"],
             "real": Real.FLOAT,  # of a rate that is no whole number, in the header alone
             "sample_time": controller.kernels.sample_time,
             "settling": fixed.settling,
@@ -61,6 +68,16 @@ def fixed_context(scenario: Scenario, controller: Controller, prefix: str) -> di
             "off_target": fixed.off.target.max(),
         }
     )
+
+
+def _test(controller: Controller, fixed: FixedPoint, command: np.ndarray) -> dict[str, Any]:
+    """Reference vectors, what else the self test tries, and how many calls that are."""
+    given = fixed_vectors(controller, fixed, command)
+    n, n_s, n_u = (len(b) for b in (fixed.bits.displacement, fixed.bits.state, fixed.bits.drive))
+    rest = fixed.state_of(np.zeros(n, dtype=int))
+    counts = {"waited": WAITED, "spoilt": 2 * (n_s + n) + 1, "missing": MISSING}
+    calls = len(given["rows"]) + sum(counts.values())
+    return given | counts | {"calls": calls, "safe": [0] * (n_u + n) + [int(v) for v in rest]}
 
 
 def _numbers(fixed: FixedPoint, header: Mapping[str, Any]) -> dict[str, Any]:
