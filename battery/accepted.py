@@ -22,6 +22,7 @@ ACCEPTED: dict[str, tuple[str, ...]] = {
     "step": ("step", "force_step"),
     "frame_turn": ("frame_turn", "frame_rotation_z"),
     "low_pass": ("low_pass", "thermal_lag"),
+    "cogging": ("cogging", "cogging_of_slots"),
     "coulomb": ("coulomb",),
     "stribeck": ("stribeck",),
     "drive_gain": ("drive_gain", "sensor_gain", FORCE_CONSTANT),

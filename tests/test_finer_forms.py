@@ -1,7 +1,9 @@
 """A law that is found is tried in a finer form, with more numbers, where it leaves more than noise: hysteresis with free weights,
-friction in a region that falls with the speed."""
+friction in a region that falls with the speed, slots with a second harmonic, play that is worn."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -89,6 +91,74 @@ def test_friction_alike_at_every_speed_keeps_the_plain_law():
     assert not any(trials.selection.improves_enough(plain, t) for t in finer)
     for t in finer:
         assert [c.effect for c in simplified(trials, t).causes] == ["coulomb_after"]
+
+
+def reached(plain_kind: str, shape: dict[str, float], reading: Callable[[np.ndarray], np.ndarray]):
+    """The candidate of the plain law, the finer form beside it, and the trials; `shape` is where the plain law is fitted from."""
+    rng, parts, n = np.random.default_rng(1), [], 500
+    for k, role in enumerate(("fit", "hold_out")):
+        t = H * np.arange(n)
+        u = 0.7 * np.sin(2 * np.pi * (3 + k) * t) + 0.3 * np.sin(2 * np.pi * (7.3 - k) * t + 1)
+        parts.append(record(u, reading(u) + READ * rng.standard_normal(n), role))
+    fitter = fitter_of(AXIS, ("reading.axis",), ("um",), (READ,), "series", parts)
+    plain = Hypothesis(plain_kind, "stage:axis", "axis")
+    trials = Trials(fitter, Screen(fitter, [plain]), lambda _: None)
+    trials.screened(trials.fit(Structure(AXIS)))
+    found = trials.fit(Structure(AXIS).with_cause(plain, shape), plain, steps=40)
+    trials.use(fitter.with_errors_of(found.fit))
+    found = trials.fit(found.fit.restarted, plain, steps=40)
+    return trials, found, finer_forms(trials, found)
+
+
+def slotted(second: float) -> Callable[[np.ndarray], np.ndarray]:
+    """0.1 N every 25 um, and a second harmonic that is a quarter of its own period ahead."""
+
+    def force(time, q, v, memory):
+        p = 2 * np.pi * (q + v * H / 80) / 2.5e-5 + 0.7
+        return -0.1 * (np.sin(p) + second * np.sin(2 * p + 0.6)), memory
+
+    return lambda u: move(u, force, fine=40)
+
+
+def worn(wear: float) -> Callable[[np.ndarray], np.ndarray]:
+    """A play of 0.4 um at home whose width grows along the way, by `wear` of it in 50 um."""
+
+    def read(u: np.ndarray) -> np.ndarray:
+        q = move(u, fine=40)
+        half, w, out = 2e-7 * (1 + wear * q / 5e-5), 0.0, []
+        for place, h in zip(q.tolist(), half.tolist(), strict=True):
+            w = min(max(w, place - h), place + h)
+            out.append(w)
+        return np.array(out)
+
+    return read
+
+
+def test_slots_that_are_no_sine_and_play_that_is_worn_have_a_form_of_their_own():
+    slots = {"force": 0.1, "period": 2.5e-5, "phase": 0.7}
+    trials, plain, (finer,) = reached("cogging", slots, slotted(0.15))
+    assert [c.effect for c in finer.causes] == ["cogging_of_slots"] and trials.selection.improves_enough(plain, finer)
+    values = finer.fit.values(0)
+    assert values["force"] == pytest.approx(0.1, rel=0.02) and values["period"] == pytest.approx(2.5e-5, rel=1e-3)
+    second = values["sine"] + 1j * values["cosine"]
+    assert abs(second) == pytest.approx(0.15, rel=0.05) and np.angle(second) == pytest.approx(0.6, abs=0.1)
+    assert simplified(trials, finer).causes == finer.causes
+    trials, plain, (finer,) = reached("backlash", {"gap": 4e-7}, worn(0.4))
+    assert [c.effect for c in finer.causes] == ["worn_backlash"] and trials.selection.improves_enough(plain, finer)
+    values, L = finer.fit.values(0), AXIS.mechanics.stroke.si
+    assert values["gap"] == pytest.approx(4e-7, rel=0.02)
+    assert values["wear"] / L == pytest.approx(0.4 / 5e-5, rel=0.3)  # the slope at home of a form that levels off
+    assert simplified(trials, finer).causes == finer.causes
+
+
+@pytest.mark.long
+def test_a_sine_and_an_even_play_keep_the_plain_law():
+    slots = {"force": 0.1, "period": 2.5e-5, "phase": 0.7}
+    for kind, shape, reading in (("cogging", slots, slotted(0.0)), ("backlash", {"gap": 4e-7}, worn(0.0))):
+        trials, plain, finer = reached(kind, shape, reading)
+        assert not any(trials.selection.improves_enough(plain, t) for t in finer)
+        for t in finer:
+            assert [c.effect for c in simplified(trials, t).causes] == [kind]
 
 
 @pytest.mark.long

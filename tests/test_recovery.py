@@ -202,6 +202,8 @@ STATED = {
 }  # the mirrors: tests/test_mirrors.py
 # found in tests/test_finer_forms.py
 FINER = {
+    "cogging_of_slots",
+    "worn_backlash",
     "weighted_displacement_hysteresis",
     "weighted_drive_hysteresis",
     *(f"stribeck_{where}" for where in ("above", "after", "below")),

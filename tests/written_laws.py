@@ -194,6 +194,12 @@ LAWS = {
         {"period": 0.4, "phase": 0.9},
         lambda s, p: -p.force * sin(TWO_PI * s.displacement / 0.4 + 0.9),
     ),
+    "cogging_of_slots": (
+        {"period": 0.4, "phase": 0.9, "sine": 0.2, "cosine": -0.1},
+        lambda s, p: (
+            -p.force * (sin(s_ := TWO_PI * s.displacement / 0.4 + 0.9) + 0.2 * sin(2 * s_) - 0.1 * cos(2 * s_))
+        ),
+    ),
     "coulomb": ({"reach": 0.02, "smoothing": 0.3}, lambda s, p: -p.force * s.z, lambda s, p: {"z": dahl_rate(s, p)}),
     **{
         f"coulomb_{side}": (
@@ -373,6 +379,7 @@ LAWS = {
             lambda s, p: -p.share * (heavy_narrow(s, p) - 0.7 * s.value),
         ),
     ),
+    "worn_backlash": ({"wear": 0.4}, lambda s, p: 0.999 * (s.w + s.start * p.gap / 2 - s.displacement)),
     "zero_per_record": ({}, lambda s, p: p.share * s.zero),
     "vibration": ({"frequency": 3.0, "phase": 0.9}, lambda s, p: p.amplitude * sin(TWO_PI * 3 * s.t + 0.9)),
 }

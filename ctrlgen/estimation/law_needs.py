@@ -60,10 +60,13 @@ NEEDS: Mapping[str, LawNeeds] = MappingProxyType(
             "it needs a ferroelectric or iron", families=frozenset({"piezo", "electromagnetic"})
         ),
         # Slots, magnets and threads; a coil in an even gap and a stack on flexures have none
-        "cogging": LawNeeds(
-            "it needs a motor with poles or a part with a pitch",
-            actuators=_PERIODIC_ACTUATORS,
-            transmissions=_PERIODIC_PARTS,
+        **dict.fromkeys(
+            ("cogging", "cogging_of_slots"),
+            LawNeeds(
+                "it needs a motor with poles or a part with a pitch",
+                actuators=_PERIODIC_ACTUATORS,
+                transmissions=_PERIODIC_PARTS,
+            ),
         ),
         "heater_resistance": _HEATER,
         "heat_crosstalk": _HEATER,
@@ -74,7 +77,7 @@ NEEDS: Mapping[str, LawNeeds] = MappingProxyType(
             families=frozenset({"thermal", "electromagnetic", "electrostatic"}),
         ),
         **dict.fromkeys(
-            ("backlash", "backlash_above", "backlash_below"),
+            ("backlash", "backlash_above", "backlash_below", "worn_backlash"),
             LawNeeds("it needs a part with clearance", transmissions=_CLEARANCE),
         ),
         "cyclic": LawNeeds(

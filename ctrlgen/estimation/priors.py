@@ -44,6 +44,20 @@ _IN_BALANCE = (
 )
 _CREEP = "Forms of one relaxation spectrum; 1 %: judgement."
 
+_COGGING = LawPrior(
+    "Motors of a stage that is no flexure have it; harmonics: several at one place. Periods seen in the residual.",
+    repeatable=True,
+    parameters={
+        "period": ParameterPrior((1.0, 0.5, 0.25), start_from_data="spatial_periods"),
+        "phase": _starts((0.0, 90.0)),
+    },
+)
+_PLAY = LawPrior(
+    "Reversals between two samples are placed to 1 %: measured on simulated play.",
+    model_form_error=0.01,
+    parameters={"gap": peaks(1e-4, 1e-3, 0.01, 0.1, 0.3)},
+)
+
 PRIORS: Mapping[str, LawPrior] = MappingProxyType(
     {
         # Sensor ---------------------------------------------------------------------------------------------------------------
@@ -209,13 +223,12 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             family="hysteresis",
             parameters={"reach": _LOOP, "loop": _starts((0.55, 0.9))},
         ),
-        "cogging": LawPrior(
-            "Motors of a stage that is no flexure have it; harmonics: several at one place. Periods seen in the residual.",
-            repeatable=True,
-            parameters={
-                "period": ParameterPrior((1.0, 0.5, 0.25), start_from_data="spatial_periods"),
-                "phase": _starts((0.0, 90.0)),
-            },
+        "cogging": _COGGING,
+        "cogging_of_slots": replace(
+            _COGGING,
+            suspected=False,
+            refines=frozenset({"cogging"}),
+            parameters={**_COGGING.parameters, **dict.fromkeys(("sine", "cosine"), _starts((0.0,)))},
         ),
         "coulomb": LawPrior(
             _DRY_FRICTION,
@@ -277,10 +290,12 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             parameters={"breakaway": _starts((1.8,)), "speed": peaks(0.01, 0.05, 0.2), "reach": peaks(1e-3, 0.01)},
         ),
         # Displacement and pose ------------------------------------------------------------------------------------------------
-        "backlash": LawPrior(
-            "Reversals between two samples are placed to 1 %: measured on simulated play.",
-            model_form_error=0.01,
-            parameters={"gap": peaks(1e-4, 1e-3, 0.01, 0.1, 0.3)},
+        "backlash": _PLAY,
+        "worn_backlash": replace(
+            _PLAY,
+            suspected=False,
+            refines=frozenset({"backlash", "backlash_above", "backlash_below"}),
+            parameters={**_PLAY.parameters, "wear": _starts((-0.3, 0.3))},
         ),
         "creep": LawPrior(
             _CREEP,

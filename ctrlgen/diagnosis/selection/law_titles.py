@@ -37,6 +37,14 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
             ("electromagnetic", "A force that repeats along the way: cogging of the motor"),
             ("", "A force that repeats along the way"),
         ),
+        "cogging_of_slots": (
+            (
+                "screw",
+                "A force that repeats along the way, not as a sine: cogging of the motor, or ripple of the screw",
+            ),
+            ("electromagnetic", "A force that repeats along the way, not as a sine: cogging of the motor"),
+            ("", "A force that repeats along the way, not as a sine"),
+        ),
         "creep": (
             ("flexible", "A flexure or its glue keeps moving after the load has settled"),
             ("piezo", "A piezo, or its mount, keeps moving after the voltage has settled"),

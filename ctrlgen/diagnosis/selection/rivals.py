@@ -72,6 +72,8 @@ def _coarser(trials: Trials, current: CandidateModel, k: int) -> CandidateModel:
         common = {p.name for p in plain.law.params} & current.fit.values(k).keys()
         numbers = {name: current.fit.values(k)[name] for name in common}
         starts = [others.with_cause(plain, numbers | shape) for shape in plain.shapes(channel, DataHints(), numbers)]
+        if not starts:  # a region that no record suggests here
+            continue
         begun = min(starts, key=trials.fitter.rough_objective)
         fits += [trials.converged(t) for t in trials.tried(begun, plain)]
     sound = [t for t in fits if not trials.selection.improves_enough(t, current) and not trials.objections(t)]
