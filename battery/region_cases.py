@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 from itertools import cycle, islice
+from typing import Any
 
 import numpy as np
 
@@ -30,19 +31,24 @@ def make(wanted: tuple[str, ...], rng: Rng) -> rough_cases.Made:
     (name,) = wanted
 
     def once() -> rough_cases.Made:
-        bench = axis_cases.draw_bench(rng, SECONDS, ambient=True if name == "warm_reading" else None)
-        bench, planted, answer = rough_cases.on_axis(
-            bench, "axis", wanted, rng, SIZE, draw=lambda n: drawn(n, rng, bench)
-        )
-        if name == "stop_there" and planted[0].amplitude < SOFTEST * bench.axis.stiffness:
-            raise ValueError("a stop softer than the stage's own springs")
-        region = laws_region.region_of(planted[0])
-        samples = {role: samples_of(bench, take, planted) for role, take in zip(ROLES, _takes(bench), strict=True)}
-        _check(name, region, samples)
-        answer |= {"region": asdict(region), "samples": {role: _rounded(s) for role, s in samples.items()}}
+        bench, planted, answer = once_drawn(name, rng, SECONDS)
         return (lambda d: messy.write(d, bench, planted)), answer
 
     return rough_cases.until(once, wanted)
+
+
+def once_drawn(name: str, rng: Rng, seconds: float) -> tuple[Bench, list[Planted], dict[str, Any]]:
+    """A bench with a record to fit of `seconds`, what is planted, the law `name` first, and the answer. Raises ValueError where the law has
+    not its size, or its region is empty or all."""
+    bench = axis_cases.draw_bench(rng, seconds, ambient=True if name == "warm_reading" else None)
+    bench, planted, answer = rough_cases.on_axis(bench, "axis", (name,), rng, SIZE, draw=lambda n: drawn(n, rng, bench))
+    if name == "stop_there" and planted[0].amplitude < SOFTEST * bench.axis.stiffness:
+        raise ValueError("a stop softer than the stage's own springs")
+    region = laws_region.region_of(planted[0])
+    samples = {role: samples_of(bench, take, planted) for role, take in zip(ROLES, _takes(bench), strict=True)}
+    _check(name, region, samples)
+    answer |= {"region": asdict(region), "samples": {role: _rounded(s) for role, s in samples.items()}}
+    return bench, planted, answer
 
 
 ROLES = ("fit", "hold_out")
