@@ -18,8 +18,6 @@ ARGUED = {
     ("devices/run_time.py", "Value error, "): "the same",
     ("firmware/c/expression_graph.py", "1 / "): "C text that this file wrote: the formula of an operation",
     ("firmware/c/expression_graph.py", "(1 / "): "the same",
-    ("recordings/formats/text_file.py", "time [s]"): "how a logger heads its column of time",
-    ("recordings/formats/text_file.py", "time (s)"): "the same",
     ("recordings/formats/time_stamps.py", "month first"): "what recording.toml may say of dates",
 }
 
