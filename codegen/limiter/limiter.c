@@ -11,7 +11,7 @@
  * limit), DIRECT (every displacement is a matrix times the target, and a target that leads into the range is a command), BOUND_FIRST (the
  * cheap bound is known of the target), REDUNDANT (more drives than axes, of which GROUPS can be moved without a push), COUPLED (a displacement moves several
  * channels), MOVING (kernels for the next sample), MOTION (targets with derivatives), GIVEN (constants that are given at the
- * start), ESTIMATED (states that are stepped from sample to sample, which can be believed wrongly). SETTLE_DRIVE_LIMITED and STEP_DRIVE_LIMITED: drives beyond their limits can be needed. SETTLE_EXAMINED_FIRST and
+ * start), PIVOTED (targets of a pivot), ESTIMATED (states that are stepped from sample to sample, which can be believed wrongly). SETTLE_DRIVE_LIMITED and STEP_DRIVE_LIMITED: drives beyond their limits can be needed. SETTLE_EXAMINED_FIRST and
  * STEP_EXAMINED_FIRST: whether a state is lost is asked before it is used. STATE_BY_MODE and DRIVE_BY_MODE: the line search calls one
  * kernel to settle and another to step. U_BOUNDS_ONCE: one function alone reads the limits of drives.
  *
@@ -509,6 +509,10 @@ static uint32_t set_lost(limiter_state *state, limiter_output *out)
 #if MOTION
 
 #include "motion.c"
+#endif
+#if PIVOTED
+
+#include "pivot.c"
 #endif
 #if ESTIMATED
 

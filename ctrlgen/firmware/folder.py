@@ -27,6 +27,7 @@ from ctrlgen.firmware.c.templates import write
 from ctrlgen.firmware.online.checksum import checked_context
 from ctrlgen.firmware.online.fixed_source import fixed_context
 from ctrlgen.firmware.online.online import online_context
+from ctrlgen.firmware.online.stated_pivot import StatedPivot
 from ctrlgen.firmware.online.vectors import played_vectors, self_test_calls, vectors
 from ctrlgen.firmware.package import PIECES, owners, write_package
 from ctrlgen.firmware.player.compression import Compression, compress
@@ -192,5 +193,6 @@ def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Arith
         "rated": controller.rate is not None,
         "rate": scenario.sample_time is not None,
         "estimated": controller.kernels.contraction is not None,
+        "pivoted": StatedPivot(controller.kernels).acts,
     }
     write("fixed_harness.c" if isinstance(real, Integers) else "harness.c", context, path)

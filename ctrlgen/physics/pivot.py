@@ -38,14 +38,14 @@ def of_stated_point(channels: Sequence[str], pose: Matrix, pivot: Matrix) -> Mat
 
 @lru_cache(maxsize=16)
 def pivoted(channels: tuple[str, ...], order: int) -> ca.Function:
-    """(target (channels * (order + 1),), pivot (3,)) -> the same of the stated point: the pose, and by the chain rule its derivatives by
+    """(pose (channels * (order + 1),), pivot (3,)) -> the same of the stated point: the pose, and by the chain rule its derivatives by
     time, one after the other as the online controller takes them."""
     n, pivot = len(channels), ca.SX.sym("pivot", 3)
-    target = ca.SX.sym("target", n * (order + 1))
-    rows = [of_stated_point(channels, target[:n], pivot)]
+    pose = ca.SX.sym("pose", n * (order + 1))
+    rows = [of_stated_point(channels, pose[:n], pivot)]
     for k in range(order):
-        rows.append(ca.jtimes(rows[-1], target[: n * (k + 1)], target[n : n * (k + 2)]))
-    return ca.Function("about", [target, pivot], [ca.vertcat(*rows)], ["target", "pivot"], ["about"], {"cse": True})
+        rows.append(ca.jtimes(rows[-1], pose[: n * (k + 1)], pose[n : n * (k + 2)]))
+    return ca.Function("about", [pose, pivot], [ca.vertcat(*rows)], ["pose", "pivot"], ["about"], {"cse": True})
 
 
 def about(channels: tuple[str, ...], tables: np.ndarray, pivot: np.ndarray) -> np.ndarray:

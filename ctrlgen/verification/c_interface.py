@@ -11,7 +11,9 @@ from ctrlgen.controller.controller_step import ControllerStatus
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.core.units import base_unit, show
 from ctrlgen.devices import Limit, Signal
+from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import CFolder
+from ctrlgen.firmware.online.stated_pivot import StatedPivot
 from ctrlgen.reporting.result_file import Keys
 from ctrlgen.trajectory.solution import Solution
 
@@ -83,7 +85,12 @@ def interface(solution: Solution, c: CFolder) -> Interface:
     played: Mapping[Any, str] = c.player
     memory = [f"{name} [{unit}]" for name, unit in zip(m.x_names, m.x_units, strict=True)]
     return Interface(
-        functions={real.value: _functions(name, bool(c.player), played.get(real)) for real, name in c.online.items()},
+        functions={
+            real.value: _functions(
+                name, bool(c.player), played.get(real), about=isinstance(real, Real) and StatedPivot(kernels).acts
+            )
+            for real, name in c.online.items()
+        },
         target=_channels(kernels.target),
         drive=drive,
         actuator_state=None if state is None else _channels(state),
@@ -111,8 +118,9 @@ def _limit(limit: Limit) -> LimitEntry:
     return LimitEntry(label=limit.label, lower=lower, upper=upper)
 
 
-def _functions(online: str, moving: bool, player: str | None) -> list[str]:
-    """The calls of one arithmetic; `moving`: the device is driven sample by sample."""
+def _functions(online: str, moving: bool, player: str | None, *, about: bool) -> list[str]:
+    """The calls of one arithmetic; `moving`: the device is driven sample by sample, `about`: it takes the poses of pivots."""
     played = [f"{player}_sample(index, drive)", f"{player}_at(time, drive)"] if player else []
     stepped = [f"{online}_step(state, target, out)"] if moving else []
-    return [f"{online}_init(state)", f"{online}_settle(state, target, out)", *stepped, *played]
+    turned = [f"{online}_about(pivot, pose, target)"] if about else []
+    return [f"{online}_init(state)", f"{online}_settle(state, target, out)", *stepped, *turned, *played]

@@ -26,6 +26,7 @@ class ComparisonKind(StrEnum):
     CHASED_INTEGERS = "hostile sequence, C in integers - whole numbers"
     EXCESS = "hostile sequence -> model: excess over a limit"
     RATE = "hostile sequence: change of a drive over its rate"
+    ABOUT = "poses of pivots, online C - CasADi"
     OPTIMUM = "scenario, online C - IPOPT"
     ONLINE_PATH = "online C -> model - command"
     PLAYER_PATH = "player C -> model - command"

@@ -23,6 +23,7 @@ from ctrlgen.firmware.c.real import Arithmetic, Integers, Real
 from ctrlgen.firmware.c.templates import write
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.firmware.online.limit_tables import rates_in_c
+from ctrlgen.firmware.online.stated_pivot import FARTHEST, StatedPivot
 from ctrlgen.model.model import Model
 from ctrlgen.trajectory.inverse.clock import Sampled
 from ctrlgen.trajectory.scenario import Scenario
@@ -113,6 +114,8 @@ def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> d
         "x_typical": np.maximum(np.abs(nominal.rest), nominal.x_scale),
         "samples": samples,
         "closed": scenario.closed,
+        "pivot_limits": StatedPivot(kernels).limits if StatedPivot(kernels).acts else None,
+        "farthest": FARTHEST,
         "duration": samples * clock.sample_time if isinstance(clock, Sampled) else None,
         **rates_in_c(controller),
     }

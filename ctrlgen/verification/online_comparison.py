@@ -43,6 +43,7 @@ def online_rows(program: ComparedProgram) -> list[ComparisonEntry]:
         *_equilibrium_rows(program, settled),
         *(_hostile_rows(program) if moving else ()),
         *_optimum_rows(program, followed),
+        *_about_rows(program),
         *program.off_command(
             ComparisonKind.ONLINE_PATH,
             reached(ref, followed) - ref.path,
@@ -196,6 +197,26 @@ def _optimum_rows(program: ComparedProgram, followed: np.ndarray) -> list[Compar
     if program.real is Real.FLOAT:
         limit = max(limit, float_limit("drive", np.abs(solved).max(), ref))
     return [program.row(ComparisonKind.OPTIMUM, "drive", followed[:, ref.columns["drive"]] - solved, limit)]
+
+
+def _about_rows(program: ComparedProgram) -> list[ComparisonEntry]:
+    """Targets of the poses of pivots: status, and numbers over what roundings may change them by."""
+    ref, real = program.reference, program.real
+    if ref.turned is None:
+        return []
+    pivots, poses, accepted = ref.turned
+    pivots, poses = real.held(pivots), real.held(poses)
+    answer = program.run("about", np.hstack([pivots, poses]), poses.shape[1])
+    status = answer[:, :1] - np.where(accepted, 0, ControllerStatus.INPUT)[:, None]
+    off = answer[:, 1:].copy()  # of what is refused nothing is written
+    for k in np.flatnonzero(accepted):
+        difference = np.abs(off[k] - ref.pivot.function(poses[k], pivots[k]).full().ravel())
+        off[k] = difference / np.maximum(ref.pivot.rounding(poses[k], pivots[k], real), np.finfo(np.float32).tiny)
+    what = ComparisonKind.ABOUT
+    return [
+        entry_of(program.build, what, "status", "1", status, 0.0),
+        entry_of(program.build, what, "share of its rounding", "1", off, 1.0),
+    ]
 
 
 def _rates_act(ref: ReferenceAnswers) -> bool:

@@ -12,6 +12,7 @@ from ctrlgen.controller.controller_step import State, answer
 from ctrlgen.controller.feedforward import Controller
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.firmware.online.limit_tables import FLOAT_SLACK
+from ctrlgen.firmware.online.stated_pivot import FARTHEST, StatedPivot
 from ctrlgen.model.simulation import simulate, trace
 from ctrlgen.trajectory.solution import Solution
 
@@ -44,6 +45,25 @@ class ReferenceAnswers:
         self.followed = self._answers(self.command, self.start)
         self.hostile = self._hostile_targets(at_limits)
         self.chased = self._answers(self.hostile, self.controller.rest())
+
+    @cached_property
+    def turned(self) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+        """Pivots (n, 3), the poses (n, channels) that they have, and whether each is accepted (n,): the last few are no numbers, or just
+        beyond what is. None where the target of the controller has no pivot."""
+        if not self.pivot.acts:
+            return None
+        limits = np.concatenate([np.full(3, FARTHEST), self.pivot.limits])
+        poses, pivots = self.pivot.cases(RANDOM_TARGETS // 4, np.random.default_rng(22))
+        beyond = np.tile(np.concatenate([pivots[0], poses[0]]), (3 * len(limits), 1))
+        for k, limit in enumerate(limits):
+            beyond[3 * k : 3 * k + 3, k] = np.nan, limit * (1 + 1e-6), -np.inf
+        every = np.vstack([np.hstack([pivots, poses]), beyond])
+        return every[:, :3], every[:, 3:], np.arange(len(every)) < len(poses)
+
+    @cached_property
+    def pivot(self) -> StatedPivot:
+        """What the controller takes for the pose of a pivot."""
+        return StatedPivot(self.controller.kernels)
 
     @property
     def columns(self) -> dict[str, slice]:

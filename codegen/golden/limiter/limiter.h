@@ -85,6 +85,12 @@ uint32_t limiter_settle(limiter_state *state, const float target[LIMITER_TARGET_
 /* Drive that brings the device to target at the next sample, held until then. Call once a sample. */
 uint32_t limiter_step(limiter_state *state, const float target[LIMITER_TARGET_SIZE], limiter_output *out);
 
+/* The target of the pose that a pivot has: another point of the body, stated by its place at home seen from the point of the target, in the axes
+ * of the pose [m]. The body turns about it, and its displacement is that of the pivot: delta = delta_p - (R - I) pivot, exact for every rotation
+ * vector up to a full turn. target may be pose. INPUT, and nothing is written: a pointer is NULL, or a number
+ * NaN, infinite, absurdly large or an angle beyond a full turn. It takes no state; 99 operations. */
+uint32_t limiter_about(const float pivot[3], const float pose[LIMITER_TARGET_SIZE], float target[LIMITER_TARGET_SIZE]);
+
 /* Behind limiter_init where nothing is known of the device, as after a reset: it believes the states farthest from rest to which drives within
  * their limits can have led, so that a device that was heated is not heated beyond its limits. Status UNSURE, which clears itself in
  * 71 samples; LOST without limiter_init. */

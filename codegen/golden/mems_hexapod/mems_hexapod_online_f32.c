@@ -344,6 +344,48 @@ static float mems_hexapod_online_f32_target_bound(const float target[6])
     return (((t2 + t4) + t6) + t8) + 1.0020009e-06f;
 }
 
+/* Pose of the stated point where `pose` is that of the `pivot`: delta = delta_p - (R - I) pivot, R the rotation by
+ * theta. */
+static void mems_hexapod_online_f32_of_pivot(const float pose[6], const float pivot[3], float result[6])
+{
+    float next[6];
+    int i;
+    const float shared1 = ((pose[0] * pose[0]) + (pose[1] * pose[1])) + (pose[2] * pose[2]);
+    const float shared2 = (pose[1] * pivot[2]) - (pose[2] * pivot[1]);
+    const float shared3 = (pose[0] * pivot[1]) - (pose[1] * pivot[0]);
+    const float shared4 = (pose[2] * pivot[0]) - (pose[0] * pivot[2]);
+    const float shared5 = 0.25f * shared1;
+    const float t1 = ((1.1309962e-31f - (3.0403125e-35f * shared1)) * shared5) - 9.18369e-29f;
+    const float t2 = (((t1 * shared5) + 6.4469503e-26f) * shared5) - 3.8681703e-23f;
+    const float t3 = (((t2 * shared5) + 1.9572942e-20f) * shared5) - 8.220635e-18f;
+    const float t4 = (((t3 * shared5) + 2.8114574e-15f) * shared5) - 7.6471636e-13f;
+    const float t5 = (((t4 * shared5) + 1.6059044e-10f) * shared5) - 2.5052108e-08f;
+    const float t6 = (((t5 * shared5) + 2.7557319e-06f) * shared5) - 0.0001984127f;
+    const float t7 = (((t6 * shared5) + 0.008333334f) * shared5) - 0.16666667f;
+    const float shared6 = (t7 * shared5) + 1.0f;
+    const float t8 = ((3.279889e-30f - (9.4249695e-34f * shared1)) * shared5) - 2.4795963e-27f;
+    const float t9 = (((t8 * shared5) + 1.6117376e-24f) * shared5) - 8.896791e-22f;
+    const float t10 = (((t9 * shared5) + 4.1103176e-19f) * shared5) - 1.5619207e-16f;
+    const float t11 = (((t10 * shared5) + 4.7794773e-14f) * shared5) - 1.1470745e-11f;
+    const float t12 = (((t11 * shared5) + 2.0876756e-09f) * shared5) - 2.755732e-07f;
+    const float t13 = (((t12 * shared5) + 2.4801588e-05f) * shared5) - 0.0013888889f;
+    const float t14 = (((t13 * shared5) + 0.041666668f) * shared5) - 0.5f;
+    const float shared7 = shared6 * ((t14 * shared5) + 1.0f);
+    const float shared8 = 0.5f * (shared6 * shared6);
+    for (i = 0; i < 3; i++) {
+        next[i] = pose[i];
+    }
+    const float t15 = shared8 * ((pose[1] * shared3) - (pose[2] * shared4));
+    next[3] = pose[3] + ((shared7 * shared2) + t15);
+    const float t16 = shared8 * ((pose[2] * shared2) - (pose[0] * shared3));
+    next[4] = pose[4] + ((shared7 * shared4) + t16);
+    const float t17 = shared8 * ((pose[0] * shared4) - (pose[1] * shared2));
+    next[5] = pose[5] + ((shared7 * shared3) + t17);
+    for (i = 0; i < 6; i++) {
+        result[i] = next[i];
+    }
+}
+
 /* 1 if every displacement is inside its limits; 0 for NaN. */
 static int mems_hexapod_online_f32_displacement_inside(const float value[6])
 {
@@ -972,6 +1014,20 @@ uint32_t mems_hexapod_online_f32_step(mems_hexapod_online_f32_state *state, cons
         } else {
             status = mems_hexapod_online_f32_step_unusable(state, out);
         }
+    }
+    return status;
+}
+
+uint32_t mems_hexapod_online_f32_about(const float pivot[3], const float pose[6], float target[6])
+{
+    uint32_t status = MEMS_HEXAPOD_ONLINE_F32_INPUT;
+    if ((pivot == NULL) || (pose == NULL) || (target == NULL)) {
+        /* nothing is written */
+    } else if (((mems_hexapod_online_f32_bits_of(&pose[0]) & 0x7FFFFFFFU) <= 0x40C90FDBU) /* 6.2831855f */ && ((mems_hexapod_online_f32_bits_of(&pose[1]) & 0x7FFFFFFFU) <= 0x40C90FDBU) /* 6.2831855f */ && ((mems_hexapod_online_f32_bits_of(&pose[2]) & 0x7FFFFFFFU) <= 0x40C90FDBU) /* 6.2831855f */ && ((mems_hexapod_online_f32_bits_of(&pose[3]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ && ((mems_hexapod_online_f32_bits_of(&pose[4]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ && ((mems_hexapod_online_f32_bits_of(&pose[5]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ && ((mems_hexapod_online_f32_bits_of(&pivot[0]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */ && ((mems_hexapod_online_f32_bits_of(&pivot[1]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */ && ((mems_hexapod_online_f32_bits_of(&pivot[2]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */) {
+        mems_hexapod_online_f32_of_pivot(pose, pivot, target);
+        status = 0U;
+    } else {
+        /* nothing is written */
     }
     return status;
 }

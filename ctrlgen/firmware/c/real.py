@@ -53,6 +53,14 @@ class Real(Enum):
         sign = self.bits(-0.0)
         return 2 * sign - 1 - bits if bits & sign else bits | sign
 
+    def held(self, values: np.ndarray) -> np.ndarray:
+        """`values` as the arithmetic holds them: in float rounded, and what is too small for it, as roundings of a drive at home are, zero."""
+        if self is Real.DOUBLE:
+            return values
+        with np.errstate(over="ignore", under="ignore"):
+            single = np.array(values, dtype=np.float32).astype(float)
+        return np.where(np.abs(single) < float(np.finfo(np.float32).tiny), 0.0, single)
+
     @property
     def sign(self) -> str:
         """The bit of the sign, as a constant of C."""

@@ -38,8 +38,8 @@ def limit_context(controller: Controller, printer: Printer) -> dict[str, Any]:
         "u_safe": kernels.safe_drive,
         "input_limits": kernels.input_limits,
         "unlimited": UNLIMITED,
-        "lost_tests": [_magnitude_test(_member(i, m), most, real) for i, most in enumerate(controller.plausible)],
-        "usable_tests": [_magnitude_test(f"target[{i}]", most, real) for i, most in enumerate(kernels.input_limits)],
+        "lost_tests": [magnitude_test(_member(i, m), most, real) for i, most in enumerate(controller.plausible)],
+        "usable_tests": [magnitude_test(f"target[{i}]", most, real) for i, most in enumerate(kernels.input_limits)],
         **rates_in_c(controller),
         **_limits_in_c(controller, printer, real, u_slack),
     }
@@ -61,7 +61,7 @@ def _member(i: int, model: Model) -> str:
     return f"state->u[{i}]"
 
 
-def _magnitude_test(number: str, most: float, real: Real) -> str:
+def magnitude_test(number: str, most: float, real: Real) -> str:
     """C that holds where the magnitude of a `number` is at most `most`; not for NaN."""
     return (
         f"((bits_of(&{number}) & {real.magnitude}) <= {real.bits_literal(real.bits(most))}) /* {real.literal(most)} */"
@@ -72,7 +72,7 @@ def within_test(number: str, low: float, high: float, real: Real) -> str:
     """C that holds where a `number` in memory is within low ... high; not for NaN. It compares bits, which no option of a compiler makes
     a NaN pass; numbers of one sign are ordered as their bits are, others by `ordered`."""
     if low == -high:
-        return _magnitude_test(number, high, real)
+        return magnitude_test(number, high, real)
     bits = f"bits_of(&{number})"
     first, last = real.bits(low + 0.0), real.bits(high + 0.0)  # of a negative zero, zero
     if low < 0.0:

@@ -32,6 +32,7 @@ CALLS = {
     ),
     "advance": ("state z drive result", {"x": "state->x", "z": "z", "drive": "drive"}),
     "motion": ("target result", {"target": "target"}),
+    "about": ("pose pivot result", {"pose": "pose", "pivot": "pivot"}),
 }
 
 
@@ -81,6 +82,7 @@ def _features(context: Mapping[str, Any]) -> dict[str, int]:
         "COUPLED": context["nearest_slopes"] is not None,
         "MOVING": "step" in modes,
         "MOTION": bool(context["motion"]),
+        "PIVOTED": context["pivot"] is not None,
         "U_BOUNDS_ONCE": bounds_once(context),
         "REST_GIVEN": bool(context["rest_given"]),
         "CHANGING": context["changing"] is not None,
@@ -152,6 +154,8 @@ def _texts(context: Mapping[str, Any]) -> dict[str, str]:
     if context["nearest_slopes"] is not None:
         rows = ",\n".join(f"    {table(row)}" for row in context["nearest_slopes"].T)
         texts["NEAREST_SLOPES"] = f"{{\n{rows}\n}}"
+    if context["pivot"]:
+        texts["PIVOT_USABLE"] = context["pivot"]["usable"]
     for mode in limited_modes(context)[:1]:
         texts |= {f"LIMITED_{part}": f"{mode['name']}_{part}".upper() for part in ("STATE", "DRIVE")}
     return texts
@@ -228,6 +232,8 @@ def _assignments(assigned: Sequence[tuple[str, int]]) -> str:
 def _calls(context: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
     """Parameters and body of the macros that call kernels, each with the arguments that the kernel reads."""
     kernels = {"BALANCE": ("balance", context["balance"])}
+    if context["pivot"]:
+        kernels["OF_PIVOT"] = "about", context["pivot"]["kernel"]
     if context["shares"]:
         kernels["COMPOSITE_SHARES"] = "shares", context["shares"]
     for mode in context["modes"]:

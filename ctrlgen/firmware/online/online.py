@@ -24,6 +24,7 @@ from ctrlgen.firmware.online.limit_tables import limit_context
 from ctrlgen.firmware.online.limiter import bounds_once, limited_modes, limiter_macros, limiter_text
 from ctrlgen.firmware.online.printed_kernels import PrintedKernels, kernel_printer, printed_kernels, si_text
 from ctrlgen.firmware.online.start_constants import start_calls, start_context
+from ctrlgen.firmware.online.stated_pivot import pivot_context
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.version import __version__, program
 
@@ -39,6 +40,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     printed = printed_kernels(controller, printer)
     limits = limit_context(controller, printer)
     start = start_context(kernels, printer)
+    pivot = pivot_context(kernels, printer)
     context = (
         header_context(scenario, controller)
         | build_of(scenario, controller, real.value)
@@ -51,6 +53,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
             "kernels": printed.every,
             "modes": printed.modes,
             "motion": printed.motion,
+            "pivot": pivot,
             "balance": printed.balance,
             "shares": printed.shares,
             "bound": printed.bound,
@@ -73,9 +76,13 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
         }
     )
     called = printed.calls | ({"square_root"} if printed.shares else set()) | set(start_calls(start))
-    starting = [kernel for kernel in (start["derive"], start["changing"] and start["changing"]["kernel"]) if kernel]
+    others = [
+        kernel
+        for kernel in (start["derive"], start["changing"] and start["changing"]["kernel"], pivot and pivot["kernel"])
+        if kernel
+    ]
     texts = [elementary_text(called, real), printer.constants, printer.laws_text]
-    texts += [kernel.text for kernel in (*printed.every, *starting)]
+    texts += [kernel.text for kernel in (*printed.every, *others)]
     context["blocks"] = [text.strip("\n") for text in texts if text]
     context["tables"] = _tables(context)
     context["macros"] = limiter_macros(context)

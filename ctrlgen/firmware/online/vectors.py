@@ -13,6 +13,7 @@ from ctrlgen.controller.feedforward import Controller
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.templates import render
 from ctrlgen.firmware.online.limit_tables import FLOAT_SLACK
+from ctrlgen.firmware.online.stated_pivot import pivot_vectors
 from ctrlgen.firmware.online.vector_cases import Call, limiter_calls
 from ctrlgen.firmware.player.compression import Compression, SampleTable
 from ctrlgen.firmware.player.spline import Spline
@@ -45,7 +46,7 @@ def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str
     rows, tolerance, state = [], 0.0, controller.rest()
     rounding = 4 * real.epsilon
     for call in calls:
-        target = _representable(call.target, real)
+        target = real.held(call.target)
         before = controller.rest() if call.fresh else state
         step = controller.step(before, target, settle=call.settle)
         state = step.state
@@ -55,7 +56,7 @@ def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str
         rows.append(
             {
                 "target": target,
-                "drive": _representable(step.drive, real),
+                "drive": real.held(step.drive),
                 "status": int(step.status),
                 "how": how,
                 "exact": exact,
@@ -78,6 +79,7 @@ def vectors(controller: Controller, command: np.ndarray, real: Real) -> dict[str
         "unusable": UNUSABLE * command.shape[1],
         "beyond": min(len(command), VECTORS),
         "lost": sum(part.size for part in controller.rest()) + 1,
+        "turned": pivot_vectors(controller.kernels, real),
     }
 
 
@@ -93,8 +95,7 @@ def played_vectors(compression: Compression | None, samples: int, clock: Clock) 
     rounding = 16 * compression.real.epsilon * float(np.max(np.abs(drives)))
     return {
         "played": [
-            {"index": int(k), "drive": _representable(drive, compression.real)}
-            for k, drive in zip(indices, drives, strict=True)
+            {"index": int(k), "drive": compression.real.held(drive)} for k, drive in zip(indices, drives, strict=True)
         ],
         "played_unusable": UNUSABLE,
         "played_tolerance": max(rounding, float(np.finfo(np.float32).tiny)),
@@ -106,12 +107,17 @@ def self_test_calls(c: dict[str, Any]) -> dict[str, int]:
     """What the self test of a context counts: "online_calls" of the controller, and all "calls", with those of the player, its wrap or
     end and the refused ones among them."""
     estimate = render("selftest_estimate.c", c).count("count(outcome") if c["estimated"] else 0
-    online = len(c["rows"]) + 2 * c["unusable"] + 2 + 2 * c["lost"] + estimate
+    online = len(c["rows"]) + 2 * c["unusable"] + 2 + 2 * c["lost"] + estimate + _pivot_calls(c)
     player = 0
     if c["player"]:
         wraps = c["closed"] and c["whole"] < 2**32
         player = len(c["played"]) + len(c["timed"]) + 6 + wraps + c["played_unusable"]
     return {"online_calls": online, "calls": online + player}
+
+
+def _pivot_calls(c: dict[str, Any]) -> int:
+    """Calls with a pivot: those with reference answers; each number of a pose and of a pivot that is none; missing pointers."""
+    return len(c["turned"]) + c["m"] + 3 + 3 if c["turned"] else 0
 
 
 def _meetings(curve: SampleTable | Spline) -> Iterator[tuple[int, float]]:
@@ -142,16 +148,4 @@ def _timed(compression: Compression, indices: np.ndarray, samples: int, rate: fl
     fraction = (place - whole.astype(number)).astype(float)
     fraction = np.where(compression.closed | (whole < samples - 1), fraction, 0.0)
     drives = compression.drives(whole % samples, fraction)
-    return [
-        {"time": float(t), "drive": _representable(drive, compression.real)}
-        for t, drive in zip(times, drives, strict=True)
-    ]
-
-
-def _representable(values: np.ndarray, real: Real) -> np.ndarray:
-    """`values` as the arithmetic holds them: in float rounded, and those of a drive at home that rounding left, far below one, as zero."""
-    if real is Real.DOUBLE:
-        return values
-    with np.errstate(over="ignore", under="ignore"):
-        single = np.array(values, dtype=np.float32).astype(float)
-    return np.where(np.abs(single) < float(np.finfo(np.float32).tiny), 0.0, single)
+    return [{"time": float(t), "drive": compression.real.held(drive)} for t, drive in zip(times, drives, strict=True)]
