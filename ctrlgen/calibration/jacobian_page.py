@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from ctrlgen.calibration.device_file import NAME
+from ctrlgen.calibration.jacobian_device import device_text
 from ctrlgen.calibration.jacobian_record import PARTS, drives_of, jacobian_record, norms_of, sets_of
 from ctrlgen.calibration.measured_jacobian import MeasuredJacobian
 from ctrlgen.core.files import write_text
@@ -19,12 +21,10 @@ from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
 from ctrlgen.reporting.result_file import json_text
 
 PER_DRIVE = ("rad/m",) * 3 + ("m/m",) * 3
-REACH = 1.05
-"""Of the largest recorded drive: the range of a device that follows the Jacobian."""
 
 
 def write_jacobian(out: Path, found: MeasuredJacobian) -> None:
-    """Writes jacobian.csv (entries in rad/m and m/m), jacobian.json, device.calibrated.py, figures/errors.svg, calibration.html."""
+    """Writes jacobian.csv (entries in rad/m and m/m), jacobian.json, device.calibrated.toml, figures/errors.svg, calibration.html."""
     record = jacobian_record(found)
     with plt.rc_context(STYLE):
         figure = svg(draw_errors(found))
@@ -36,7 +36,7 @@ def write_jacobian(out: Path, found: MeasuredJacobian) -> None:
     ]
     write_text(out / "jacobian.csv", "\n".join(lines) + "\n")
     write_text(out / "jacobian.json", json_text(record))
-    write_text(out / "device.calibrated.py", device_text(found))
+    write_text(out / NAME, device_text(found))
     write_text(out / "figures" / "errors.svg", figure)
     page = render(
         Path(__file__).with_name("jacobian.html.j2"),
@@ -64,7 +64,7 @@ def _first_screen(found: MeasuredJacobian, figure: PageFigure) -> FirstScreen:
     answer = f"{found.numbers} numbers fitted to {int((~found.held_out).sum())} poses: {told[0][0]} {told[0][1]}."
     numbers = (*told, ("condition of the drives", f"{found.condition:.3g}"))
     steps = (
-        "Use `device.calibrated.py` in place of the device file: its controller in C follows this Jacobian.",
+        f"Use `{NAME}` in place of the device file: its controller in C follows this Jacobian.",
         "Is one channel's error a function of the drives? `ctrlgen diagnose` says what the device file leaves out.",
     )
     return FirstScreen((answer,), "ok" if better else "bad", figure, numbers, steps)
@@ -87,40 +87,3 @@ def draw_errors(found: MeasuredJacobian) -> Figure:
         axes.set_ylabel(f"norm of the {part} error [{unit}]")
     panels[0].legend(fontsize=8)
     return figure
-
-
-def device_text(found: MeasuredJacobian) -> str:
-    """A device file in Python whose pose is the Jacobian times the drives, each within what was recorded."""
-    names = drives_of(found)
-    records = np.vstack([r.drive for r in found.recording.records])
-    reach = REACH * np.abs(records).max(axis=0)
-    poses = REACH * np.abs(np.vstack([r.observed for r in found.recording.records])).max(axis=0)
-    rows = ",\n    ".join("[" + ", ".join(f"{x:.9g}" for x in row) + "]" for row in found.jacobian)
-    drive = ", ".join(f'"u_{n}": ("{-r:.6g} m", "{r:.6g} m")' for n, r in zip(names, reach, strict=True))
-    axes = ", ".join(f'"d_{n}": "{r:.6g} m"' for n, r in zip(names, reach, strict=True))
-    reading = ", ".join(
-        f'"{c}": "{r:.6g} {"rad" if k < 3 else "m"}"' for k, (c, r) in enumerate(zip(CHANNELS, poses, strict=True))
-    )
-    return f'''"""{found.device.name} by its measured Jacobian: pose = J drive, about the pose read at zero drive."""
-
-import casadi as ca
-
-import ctrlgen
-
-JACOBIAN = [  # rad/m and m/m; rows {", ".join(CHANNELS)}
-    {rows},
-]
-
-device = ctrlgen.user_device(
-    "{found.device.name}_measured",
-    title="a measured Jacobian of {found.device.name}",
-    source="ctrlgen calibrate --jacobian",
-    parameters={{}},
-    drive={{{drive}}},
-    axes={{{axes}}},
-    force=lambda u, p: u.vector,
-    restoring_force=lambda d, p: d.vector,
-    reading={{{reading}}},
-    pose=lambda d, p: ca.mtimes(ca.DM(JACOBIAN), d.vector),
-)
-'''

@@ -95,10 +95,14 @@ def calibrate_poses(
 ) -> MeasuredJacobian:
     """The Jacobian of the specimen whose settled poses `recordings` hold; `device` is the file that describes it.
 
-    Raises InputError for recordings that are no poses of six components, or poses that leave a combination of drives unmoved.
+    Raises InputError for a device of more than six drives, recordings that are no poses of six components, or poses that leave a
+    combination of drives unmoved.
     """
     described = load_device(device)
     model = build_model(described)
+    if (drives := len(model.signals["drive"].channels)) > len(CHANNELS):
+        what = f"has {drives} drives, more than a pose has components: a Jacobian is calibrated for {len(CHANNELS)} or fewer"
+        raise InputError(device, [Fault("drive", what)])
     recording = with_plausibility(load_recordings(list(recordings), model), model)
     wanted = tuple(f"reading.{channel}" for channel in CHANNELS)
     if recording.kind != "poses" or tuple(recording.channels) != wanted:

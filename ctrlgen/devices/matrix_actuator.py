@@ -6,6 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
+from ctrlgen.core.names import ChannelName
 from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.driven import Driven, PerDrive
 from ctrlgen.devices.place import Direction, Place
@@ -17,6 +18,8 @@ PUSHES = ("at", "along", "gain", "travel")
 class MatrixActuator(Driven):
     """`[[actuator]]`: one axis, named after it. Beside a Jacobian it has its name and the range of its drive alone."""
 
+    name: ChannelName
+    """Of the axis and its drive, such as "1x"."""
     at: Place | None = None
     """Where a force acts, in the frame of the point; its travel is that of this place."""
     along: Direction | None = None

@@ -214,7 +214,7 @@ def calibrate(
     the constants, ctrlgen diagnose says what the device file leaves out.
 
     With --jacobian the poses of a recording give the Jacobian, with its error analysis: jacobian.csv, jacobian.json,
-    calibration.html, and device.calibrated.py, a device that follows it. `few` are gain and sense of each drive, turn of the
+    calibration.html, and device.calibrated.toml, a stage by this matrix. `few` are gain and sense of each drive, turn of the
     frame and place of the point that is read, turns per length.
 
     Example:  ctrlgen calibrate scenarios/devices/mems_hexapod_run_time.toml scenarios/hexapod_specimen --out out/specimen

@@ -54,7 +54,7 @@ class Real(Enum):
         return 2 * sign - 1 - bits if bits & sign else bits | sign
 
     def held(self, values: np.ndarray) -> np.ndarray:
-        """`values` as the arithmetic holds them: in float rounded, and what is too small for it, as roundings of a drive at home are, zero."""
+        """`values` as the arithmetic holds them: in float rounded, and what is too small for it zero, such as a rounding at home."""
         if self is Real.DOUBLE:
             return values
         with np.errstate(over="ignore", under="ignore"):
