@@ -3,13 +3,11 @@
 uint32_t limiter_about(const real pivot[3], const real pose[M], real target[M])
 {
     uint32_t status = LIMITER_INPUT;
-    if ((pivot == NULL) || (pose == NULL) || (target == NULL)) {
-        /* nothing is written */
-    } else if (PIVOT_USABLE) {
-        OF_PIVOT(pose, pivot, target);
-        status = 0U;
-    } else {
-        /* nothing is written */
+    if ((pivot != NULL) && (pose != NULL) && (target != NULL)) {
+        if (PIVOT_USABLE) {
+            OF_PIVOT(pose, pivot, target);
+            status = 0U;
+        }
     }
     return status;
 }

@@ -486,11 +486,11 @@ static void of_pivot(const float pose[6], const float pivot[3], float result[6])
         next[i] = pose[i];
     }
     const float t15 = shared8 * ((pose[1] * shared3) - (pose[2] * shared4));
-    next[3] = pose[3] + ((shared7 * shared2) + t15);
+    next[3] = pose[3] - ((shared7 * shared2) + t15);
     const float t16 = shared8 * ((pose[2] * shared2) - (pose[0] * shared3));
-    next[4] = pose[4] + ((shared7 * shared4) + t16);
+    next[4] = pose[4] - ((shared7 * shared4) + t16);
     const float t17 = shared8 * ((pose[0] * shared4) - (pose[1] * shared2));
-    next[5] = pose[5] + ((shared7 * shared3) + t17);
+    next[5] = pose[5] - ((shared7 * shared3) + t17);
     for (i = 0; i < 6; i++) {
         result[i] = next[i];
     }

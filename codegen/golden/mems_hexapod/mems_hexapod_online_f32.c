@@ -376,11 +376,11 @@ static void mems_hexapod_online_f32_of_pivot(const float pose[6], const float pi
         next[i] = pose[i];
     }
     const float t15 = shared8 * ((pose[1] * shared3) - (pose[2] * shared4));
-    next[3] = pose[3] + ((shared7 * shared2) + t15);
+    next[3] = pose[3] - ((shared7 * shared2) + t15);
     const float t16 = shared8 * ((pose[2] * shared2) - (pose[0] * shared3));
-    next[4] = pose[4] + ((shared7 * shared4) + t16);
+    next[4] = pose[4] - ((shared7 * shared4) + t16);
     const float t17 = shared8 * ((pose[0] * shared4) - (pose[1] * shared2));
-    next[5] = pose[5] + ((shared7 * shared3) + t17);
+    next[5] = pose[5] - ((shared7 * shared3) + t17);
     for (i = 0; i < 6; i++) {
         result[i] = next[i];
     }
@@ -1021,13 +1021,11 @@ uint32_t mems_hexapod_online_f32_step(mems_hexapod_online_f32_state *state, cons
 uint32_t mems_hexapod_online_f32_about(const float pivot[3], const float pose[6], float target[6])
 {
     uint32_t status = MEMS_HEXAPOD_ONLINE_F32_INPUT;
-    if ((pivot == NULL) || (pose == NULL) || (target == NULL)) {
-        /* nothing is written */
-    } else if (((mems_hexapod_online_f32_bits_of(&pose[0]) & 0x7FFFFFFFU) <= 0x40C90FDBU) /* 6.2831855f */ && ((mems_hexapod_online_f32_bits_of(&pose[1]) & 0x7FFFFFFFU) <= 0x40C90FDBU) /* 6.2831855f */ && ((mems_hexapod_online_f32_bits_of(&pose[2]) & 0x7FFFFFFFU) <= 0x40C90FDBU) /* 6.2831855f */ && ((mems_hexapod_online_f32_bits_of(&pose[3]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ && ((mems_hexapod_online_f32_bits_of(&pose[4]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ && ((mems_hexapod_online_f32_bits_of(&pose[5]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ && ((mems_hexapod_online_f32_bits_of(&pivot[0]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */ && ((mems_hexapod_online_f32_bits_of(&pivot[1]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */ && ((mems_hexapod_online_f32_bits_of(&pivot[2]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */) {
-        mems_hexapod_online_f32_of_pivot(pose, pivot, target);
-        status = 0U;
-    } else {
-        /* nothing is written */
+    if ((pivot != NULL) && (pose != NULL) && (target != NULL)) {
+        if (((mems_hexapod_online_f32_bits_of(&pose[0]) & 0x7FFFFFFFU) <= 0x40C90FDBU) /* 6.2831855f */ && ((mems_hexapod_online_f32_bits_of(&pose[1]) & 0x7FFFFFFFU) <= 0x40C90FDBU) /* 6.2831855f */ && ((mems_hexapod_online_f32_bits_of(&pose[2]) & 0x7FFFFFFFU) <= 0x40C90FDBU) /* 6.2831855f */ && ((mems_hexapod_online_f32_bits_of(&pose[3]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ && ((mems_hexapod_online_f32_bits_of(&pose[4]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ && ((mems_hexapod_online_f32_bits_of(&pose[5]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ && ((mems_hexapod_online_f32_bits_of(&pivot[0]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */ && ((mems_hexapod_online_f32_bits_of(&pivot[1]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */ && ((mems_hexapod_online_f32_bits_of(&pivot[2]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */) {
+            mems_hexapod_online_f32_of_pivot(pose, pivot, target);
+            status = 0U;
+        }
     }
     return status;
 }
