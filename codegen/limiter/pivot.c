@@ -4,7 +4,7 @@ uint32_t limiter_about(const real pivot[3], const real pose[M], real target[M])
 {
     uint32_t status = LIMITER_INPUT;
     if ((pivot != NULL) && (pose != NULL) && (target != NULL)) {
-        if (PIVOT_USABLE) {
+        if (can_turn(pose, pivot) != 0) {
             OF_PIVOT(pose, pivot, target);
             status = 0U;
         }

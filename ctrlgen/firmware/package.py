@@ -195,8 +195,11 @@ def _vectors(contexts: Mapping[Real, dict[str, Any]]) -> dict[str, Any]:
     for real in Real:
         c = contexts[real]
         m, nu, count, played, timed = c["m"], c["nu"], len(c["rows"]), len(c["played"]), len(c["timed"])
-        row[real.value] = real.bytes * (count * (m + nu) + played * nu + timed * (nu + 1)) + 12 * count + 4 * played
+        turned = len(c["turned"])
+        numbers = count * (m + nu) + turned * (3 * m + 3) + played * nu + timed * (nu + 1)
+        row[real.value] = real.bytes * numbers + 12 * count + 4 * played
         formula = f"{count} x ({m} + {nu}) numbers and 3 x {count} integers of 4 B"
+        formula += f", {turned} x (3 x {m} + 3) numbers" if turned else ""
         formulas.append(
             formula + (f", {played} x {nu} + {timed} x {nu + 1} numbers and {played} indices of 4 B" if played else "")
         )

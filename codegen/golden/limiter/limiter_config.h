@@ -85,7 +85,6 @@ typedef float real;
         { -0.2363756f, -0.07558483f, -0.2363756f, -0.20494296f, 1.0f, 0.49971864f }, \
         { -0.45906138f, -0.25956145f, -0.16930602f, -0.25956145f, 1.1193434f, 1.0f } \
     }
-#define PIVOT_USABLE ((bits_of(&pose[0]) & 0x7FFFFFFFU) <= 0x40C90FDBU) /* 6.2831855f */ && ((bits_of(&pose[1]) & 0x7FFFFFFFU) <= 0x40C90FDBU) /* 6.2831855f */ && ((bits_of(&pose[2]) & 0x7FFFFFFFU) <= 0x40C90FDBU) /* 6.2831855f */ && ((bits_of(&pose[3]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ && ((bits_of(&pose[4]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ && ((bits_of(&pose[5]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ && ((bits_of(&pivot[0]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */ && ((bits_of(&pivot[1]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */ && ((bits_of(&pivot[2]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */
 #define LIMITED_STATE STEP_STATE
 #define LIMITED_DRIVE STEP_DRIVE
 #define KNOWN_TABLE { 0.00055f, 0.00055f, 0.00055f, 0.00055f, 0.00055f, 0.00055f }
@@ -527,6 +526,20 @@ static int is_usable(const float target[6])
         ((bits_of(&target[3]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ &&
         ((bits_of(&target[4]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ &&
         ((bits_of(&target[5]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */) ? 1 : 0;
+}
+
+/* 1 if a pose and its pivot are numbers of a plausible size, and angles at most a full turn. */
+static int can_turn(const float pose[6], const float pivot[3])
+{
+    return (((bits_of(&pose[0]) & 0x7FFFFFFFU) <= 0x40C90FDBU) /* 6.2831855f */ &&
+        ((bits_of(&pose[1]) & 0x7FFFFFFFU) <= 0x40C90FDBU) /* 6.2831855f */ &&
+        ((bits_of(&pose[2]) & 0x7FFFFFFFU) <= 0x40C90FDBU) /* 6.2831855f */ &&
+        ((bits_of(&pose[3]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ &&
+        ((bits_of(&pose[4]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ &&
+        ((bits_of(&pose[5]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ &&
+        ((bits_of(&pivot[0]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */ &&
+        ((bits_of(&pivot[1]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */ &&
+        ((bits_of(&pivot[2]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */) ? 1 : 0;
 }
 
 /* 1 if a number of the state is NaN, infinite or far beyond its range: 4 times the largest magnitude of it. Asked first where

@@ -419,6 +419,20 @@ static int mems_hexapod_online_f32_is_usable(const float target[6])
         ((mems_hexapod_online_f32_bits_of(&target[5]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */) ? 1 : 0;
 }
 
+/* 1 if a pose and its pivot are numbers of a plausible size, and angles at most a full turn. */
+static int mems_hexapod_online_f32_can_turn(const float pose[6], const float pivot[3])
+{
+    return (((mems_hexapod_online_f32_bits_of(&pose[0]) & 0x7FFFFFFFU) <= 0x40C90FDBU) /* 6.2831855f */ &&
+        ((mems_hexapod_online_f32_bits_of(&pose[1]) & 0x7FFFFFFFU) <= 0x40C90FDBU) /* 6.2831855f */ &&
+        ((mems_hexapod_online_f32_bits_of(&pose[2]) & 0x7FFFFFFFU) <= 0x40C90FDBU) /* 6.2831855f */ &&
+        ((mems_hexapod_online_f32_bits_of(&pose[3]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ &&
+        ((mems_hexapod_online_f32_bits_of(&pose[4]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ &&
+        ((mems_hexapod_online_f32_bits_of(&pose[5]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ &&
+        ((mems_hexapod_online_f32_bits_of(&pivot[0]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */ &&
+        ((mems_hexapod_online_f32_bits_of(&pivot[1]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */ &&
+        ((mems_hexapod_online_f32_bits_of(&pivot[2]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */) ? 1 : 0;
+}
+
 /* 1 if a number of the state is NaN, infinite or far beyond its range: 4 times the largest magnitude of it. Asked first where
  * displacements depend on the state or effects remember, else where a limit is met: until then it would show in the drives, or is
  * written anew. */
@@ -1022,7 +1036,7 @@ uint32_t mems_hexapod_online_f32_about(const float pivot[3], const float pose[6]
 {
     uint32_t status = MEMS_HEXAPOD_ONLINE_F32_INPUT;
     if ((pivot != NULL) && (pose != NULL) && (target != NULL)) {
-        if (((mems_hexapod_online_f32_bits_of(&pose[0]) & 0x7FFFFFFFU) <= 0x40C90FDBU) /* 6.2831855f */ && ((mems_hexapod_online_f32_bits_of(&pose[1]) & 0x7FFFFFFFU) <= 0x40C90FDBU) /* 6.2831855f */ && ((mems_hexapod_online_f32_bits_of(&pose[2]) & 0x7FFFFFFFU) <= 0x40C90FDBU) /* 6.2831855f */ && ((mems_hexapod_online_f32_bits_of(&pose[3]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ && ((mems_hexapod_online_f32_bits_of(&pose[4]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ && ((mems_hexapod_online_f32_bits_of(&pose[5]) & 0x7FFFFFFFU) <= 0x3DCCCCCDU) /* 0.1f */ && ((mems_hexapod_online_f32_bits_of(&pivot[0]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */ && ((mems_hexapod_online_f32_bits_of(&pivot[1]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */ && ((mems_hexapod_online_f32_bits_of(&pivot[2]) & 0x7FFFFFFFU) <= 0x447A0000U) /* 1000.0f */) {
+        if (mems_hexapod_online_f32_can_turn(pose, pivot) != 0) {
             mems_hexapod_online_f32_of_pivot(pose, pivot, target);
             status = 0U;
         }

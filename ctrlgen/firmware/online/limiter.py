@@ -154,8 +154,6 @@ def _texts(context: Mapping[str, Any]) -> dict[str, str]:
     if context["nearest_slopes"] is not None:
         rows = ",\n".join(f"    {table(row)}" for row in context["nearest_slopes"].T)
         texts["NEAREST_SLOPES"] = f"{{\n{rows}\n}}"
-    if context["pivot"]:
-        texts["PIVOT_USABLE"] = context["pivot"]["usable"]
     for mode in limited_modes(context)[:1]:
         texts |= {f"LIMITED_{part}": f"{mode['name']}_{part}".upper() for part in ("STATE", "DRIVE")}
     return texts

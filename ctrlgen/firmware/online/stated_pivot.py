@@ -85,7 +85,7 @@ def pivot_context(kernels: ControllerKernels, printer: Printer) -> Mapping[str, 
     tests += [magnitude_test(f"pivot[{i}]", FARTHEST, real) for i in range(3)]
     about = "Pose of the stated point where `pose` is that of the `pivot`: delta = delta_p - (R - I) pivot, R the rotation by theta."
     kernel: Kernel = printer.kernel(stated.function, "of_pivot", about, may_be_result=["pose", "pivot"])
-    return {"kernel": kernel, "usable": " && ".join(tests)}
+    return {"kernel": kernel, "usable": tests}
 
 
 def pivot_vectors(kernels: ControllerKernels, real: Real) -> list[dict[str, np.ndarray]]:
