@@ -9,7 +9,8 @@ from scipy.linalg import eigh
 
 from ctrlgen import InputError, build_model
 from ctrlgen.devices.mechanism.condensed import Condensed
-from ctrlgen.devices.mechanism.modes import condensed_modes, free_modes, summary
+from ctrlgen.devices.mechanism.mechanism_lines import summary
+from ctrlgen.devices.mechanism.modes import condensed_modes, free_modes
 
 RHO, E = 2330.0, 130e9
 DENSE = SILICON.replace('poisson = "0.28"', 'poisson = "0.28"\ndensity = "2330 kg/m^3"')

@@ -7,7 +7,7 @@ import time
 import pytest
 from mechanism_files import HEAD, loaded
 
-from ctrlgen.devices.mechanism.modes import summary
+from ctrlgen.devices.mechanism.mechanism_lines import summary
 
 MOST = 10.0  # s of processor time: twice what is wanted of `ctrlgen check`, on a machine that does other things
 

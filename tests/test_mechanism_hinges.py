@@ -9,7 +9,7 @@ from scipy.integrate import quad
 
 from ctrlgen import build_model
 from ctrlgen.devices.mechanism.condensed import Condensed
-from ctrlgen.devices.mechanism.modes import freedoms
+from ctrlgen.devices.mechanism.constraints import freedoms
 
 
 def test_a_circular_hinge_is_that_of_its_equations_in_the_plane_and_of_beam_theory_out_of_it(tmp_path):

@@ -12,7 +12,8 @@ from ctrlgen import InputError, build_model, run
 from ctrlgen.core.units import show
 from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.devices.mechanism.load_effects import load_lines
-from ctrlgen.devices.mechanism.modes import guyan_modes, summary
+from ctrlgen.devices.mechanism.mechanism_lines import summary
+from ctrlgen.devices.mechanism.modes import guyan_modes
 
 K, G = 24 * EI / L**3, 9.81  # of the parallelogram of two blades
 HEAVY = PARALLELOGRAM.replace(

@@ -8,7 +8,8 @@ from conftest import DEVICE
 from mechanism_files import HEAD, PARALLELOGRAM, REST, SILICON, blade, dm, loaded, with_values
 
 from ctrlgen.devices.mechanism.condensed import Condensed
-from ctrlgen.devices.mechanism.modes import freedoms, natural_frequencies
+from ctrlgen.devices.mechanism.constraints import freedoms
+from ctrlgen.devices.mechanism.modes import natural_frequencies
 
 
 def test_the_first_natural_frequency_of_a_parallelogram_is_that_of_its_mass_on_its_blades(tmp_path):

@@ -14,7 +14,7 @@ from mechanism_files import PARALLELOGRAM, blade, chain, dm, loaded, with_values
 import ctrlgen
 from ctrlgen import InputError, build_model, run
 from ctrlgen.devices.mechanism.condensed import Condensed
-from ctrlgen.devices.mechanism.modes import summary
+from ctrlgen.devices.mechanism.mechanism_lines import summary
 from ctrlgen.model.simulation import simulate
 
 TILT = '[[reading]]\nname = "tilt"\nbody = "stage"\nabout = [0, 0, 1]\n'

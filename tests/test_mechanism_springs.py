@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from ctrlgen import InputError, build_model, load_scenario, run, solve
 from ctrlgen.devices.mechanism.condensed import Condensed
-from ctrlgen.devices.mechanism.modes import freedoms
+from ctrlgen.devices.mechanism.constraints import freedoms
 from ctrlgen.model.assembly import movable
 
 K_BLADES = 24 * 130e9 * 8e-3 * 0.2e-3**3 / 12 / 20e-3**3  # of the parallelogram's two blades

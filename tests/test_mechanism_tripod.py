@@ -9,7 +9,8 @@ from mechanism_files import dm, with_values
 
 from ctrlgen import build_model, load_device
 from ctrlgen.devices.mechanism.condensed import Condensed
-from ctrlgen.devices.mechanism.modes import condensed_modes, freedoms
+from ctrlgen.devices.mechanism.constraints import freedoms
+from ctrlgen.devices.mechanism.modes import condensed_modes
 from ctrlgen.model.simulation import simulate
 
 TRIPOD = load_device(DEVICE.parent / "tripod.toml")

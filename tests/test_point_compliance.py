@@ -8,7 +8,7 @@ from command_line import ctrlgen as run_command
 from held_blades import EI, E, L, T, W
 from mechanism_files import PARALLELOGRAM, loaded
 
-from ctrlgen.devices.mechanism.modes import redundant_constraints
+from ctrlgen.devices.mechanism.constraints import redundant_constraints
 from ctrlgen.devices.mechanism.point_compliance import point_compliance
 
 

@@ -19,15 +19,10 @@ from ctrlgen.app.scenario_pipeline import compare_only, run
 from ctrlgen.core.edited_toml import with_moved_files
 from ctrlgen.core.matrix_file import LARGEST_FILE
 from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.devices.mechanism.constraints import freedoms
 from ctrlgen.devices.mechanism.force_readings import inertial
-from ctrlgen.devices.mechanism.modes import (
-    as_displacements,
-    body_matrices,
-    free_modes,
-    freedoms,
-    natural_frequencies,
-    summary,
-)
+from ctrlgen.devices.mechanism.mechanism_lines import summary
+from ctrlgen.devices.mechanism.modes import as_displacements, body_matrices, free_modes, natural_frequencies
 from ctrlgen.model.assembly import movable
 from ctrlgen.physics.stated_part import counted, extent, rigid_mass, rigid_motions
 

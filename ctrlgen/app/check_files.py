@@ -16,7 +16,7 @@ from ctrlgen.core.units import parse
 from ctrlgen.devices import Device, load_device
 from ctrlgen.devices.matrix import MatrixDevice
 from ctrlgen.devices.mechanism.mechanism import Mechanism
-from ctrlgen.devices.mechanism.modes import summary
+from ctrlgen.devices.mechanism.mechanism_lines import summary
 from ctrlgen.devices.mechanism.point_compliance import point_compliance
 from ctrlgen.devices.sensor import describe
 from ctrlgen.effects import laws

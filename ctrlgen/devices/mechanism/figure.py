@@ -14,12 +14,13 @@ from matplotlib.figure import Figure
 
 from ctrlgen.core.files import write_bytes
 from ctrlgen.devices.mechanism.condensed import nominal
+from ctrlgen.devices.mechanism.element_ends import element_ends
 from ctrlgen.devices.mechanism.mechanism import Mechanism
 from ctrlgen.physics.rigid_bodies import GROUND
 from ctrlgen.reporting.plots import COLOURS
 
 MM = 1e3  # per metre
-SHORT = 0.04  # of the mechanism's extent: an element without a length, an actuator's arrow is three times that
+ARROW = 0.12  # of the mechanism's extent: an actuator's
 
 
 def draw_mechanism(device: Mechanism, path: Path) -> None:
@@ -34,13 +35,9 @@ def draw_mechanism(device: Mechanism, path: Path) -> None:
 def mechanism_figure(device: Mechanism) -> Figure:
     """The mechanism as it is described, in mm."""
     c = nominal(device)
-    free = [np.array(ca.DM(ca.evalf(ca.SX(end)))).ravel() * MM for end in c.ends]
+    of_elements = element_ends(device)
+    fixed, free = ([place * MM for place in places] for places in (of_elements.starts, of_elements.ends))
     ports = [place * MM for s in device.placed_super_elements for place in s.places]
-    along = [np.array(ca.DM(ca.evalf(ca.SX(R))))[:, 0] for R in c.frames]
-    extent = max(float(np.ptp(np.array([*free, *ports]), axis=0).max()), 1e-3)
-    reaches = [e.section.reach(e.numbers(c.p)) for e in device.placed_elements]
-    lengths = [SHORT * extent if reach is None else reach * MM for reach in reaches]
-    fixed = [end - length * x for end, length, x in zip(free, lengths, along, strict=True)]
     output = np.array([x.si for x in device.output.at]) * MM
 
     figure = Figure(figsize=(8, 7))
@@ -66,7 +63,7 @@ def mechanism_figure(device: Mechanism) -> Figure:
         ax.text(*places.mean(axis=0), s.name, fontsize=6, color=COLOURS[0])
     for pushed, direction in zip(device.placed_actuators, c.directions, strict=True):
         tip = np.array(ca.DM(ca.evalf(ca.SX(c.point(pushed))))).ravel() * MM if c.pushes else free[c.element_of(pushed)]
-        arrow = 3 * SHORT * extent * np.array(ca.DM(ca.evalf(ca.SX(direction)))).ravel()
+        arrow = ARROW * of_elements.extent * MM * np.array(ca.DM(ca.evalf(ca.SX(direction)))).ravel()
         ax.quiver(*(tip - arrow), *arrow, color=COLOURS[2], lw=2, arrow_length_ratio=0.35)
         ax.text(*(tip - arrow), pushed.name, fontsize=8, color=COLOURS[2], fontweight="bold")
         if c.pushes and pushed.second != GROUND:

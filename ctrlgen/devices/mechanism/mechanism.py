@@ -24,6 +24,7 @@ from ctrlgen.devices.device_physics import DevicePhysics
 from ctrlgen.devices.load import GROUND_NAME, Gravity, Load, joined
 from ctrlgen.devices.mechanism.bent_beams import BentBeam, ThermalActuator
 from ctrlgen.devices.mechanism.condensed import MOST_STEPS, SPARE_STEPS, Condensed, nominal
+from ctrlgen.devices.mechanism.constraints import free_between_springs
 from ctrlgen.devices.mechanism.copies import Copied, CopiedParts, Placed
 from ctrlgen.devices.mechanism.flexures import Blade, CircularHinge, Strut, Wire, flexures_in_one_place
 from ctrlgen.devices.mechanism.force_readings import reach as load_reach
@@ -33,7 +34,7 @@ from ctrlgen.devices.mechanism.linear_range import second_order_faults, stiffene
 from ctrlgen.devices.mechanism.load_effects import load_faults
 from ctrlgen.devices.mechanism.mechanism_physics import mechanism_physics
 from ctrlgen.devices.mechanism.mode_shapes import mode_shapes
-from ctrlgen.devices.mechanism.modes import free_between_springs, guyan_modes, inertia_faults, inertia_remarks
+from ctrlgen.devices.mechanism.modes import guyan_modes, inertia_faults, inertia_remarks
 from ctrlgen.devices.mechanism.name_faults import name_faults
 from ctrlgen.devices.mechanism.ported_parts import Ported
 from ctrlgen.devices.mechanism.second_order import SecondOrder

@@ -9,6 +9,7 @@ import numpy as np
 from ctrlgen.core.mode_lines import Line, ModeShape
 from ctrlgen.devices.mechanism.condensed import nominal
 from ctrlgen.devices.mechanism.drawing import Drawing
+from ctrlgen.devices.mechanism.element_ends import element_ends
 from ctrlgen.devices.mechanism.internal_modes import highest_told
 from ctrlgen.devices.mechanism.modes import as_displacements, free_modes
 from ctrlgen.physics.rigid_bodies import GROUND
@@ -18,7 +19,6 @@ MOST = 12
 WITHOUT = 6
 """Modes where a file says nothing of inertia: those that `ctrlgen check` prints."""
 STATIONS = np.linspace(0.0, 1.0, 9)  # of a bent flexure, smooth to the eye
-SHORT = 0.04  # of the mechanism's size: an element without a length
 
 
 def mode_shapes(device: Drawing) -> tuple[ModeShape, ...]:
@@ -30,12 +30,8 @@ def mode_shapes(device: Drawing) -> tuple[ModeShape, ...]:
     below = highest_told(device)
     count = WITHOUT if below is None else max(1, int((modes.frequencies <= below).sum()))
     twists = modes.motions * as_displacements(device)[:, None]
-    c = nominal(device)
-    ends = [_numbers(end).ravel() for end in c.ends]
-    along = [_numbers(R)[:, 0] for R in c.frames]
-    reaches = [e.section.reach(e.numbers(c.p)) for e in device.placed_elements]
-    lengths = [SHORT * device.size if reach is None else float(reach) for reach in reaches]
-    starts = [end - length * x for end, length, x in zip(ends, lengths, along, strict=True)]
+    of_elements = element_ends(device)
+    starts, ends = of_elements.starts, of_elements.ends
     held: dict[int, list[np.ndarray]] = {i: [] for i in (GROUND, *range(len(device.bodies)))}
     for e, start, end in zip(device.placed_elements, starts, ends, strict=True):
         held[e.first].append(start)
@@ -43,7 +39,7 @@ def mode_shapes(device: Drawing) -> tuple[ModeShape, ...]:
     for s in device.placed_super_elements:
         for body, place in zip(s.bodies, s.places, strict=True):
             held[body].append(place)
-    held[device.bodies.index(device.output.body)].append(_numbers(c.output_point).ravel())
+    held[device.bodies.index(device.output.body)].append(_numbers(nominal(device).output_point).ravel())
     grounds = np.array(held.pop(GROUND)).reshape(-1, 3)
 
     def shape(k: int) -> ModeShape:
