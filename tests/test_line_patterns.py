@@ -9,12 +9,13 @@ import pytest
 from conftest import ROOT
 from told_apart import alike_in_chart, alike_in_drawing
 
+from ctrlgen.app.simulated import draw_signals, simulate_device
 from ctrlgen.reporting.chart import Chart, Curve, Panel
 from ctrlgen.reporting.chart_drawing import chart_svg, draw_chart
 from ctrlgen.reporting.line_patterns import DASHES, MARKS
 from ctrlgen.reporting.plots import STYLE, plt
 from ctrlgen.trajectory.solution_charts import chart_solution
-from ctrlgen.trajectory.solution_plots import draw_solution
+from ctrlgen.trajectory.solution_plots import draw_path, draw_solution
 
 
 def _chart(lines: int, points: bool, alike: bool = False) -> Chart:
@@ -40,6 +41,20 @@ def test_the_legend_of_twelve_lines_covers_no_data():
     legend, panel = figure.axes[0].get_legend().get_window_extent(), figure.axes[0].get_window_extent()
     assert legend.y0 >= panel.y1 and 0 <= legend.x0 < legend.x1 <= figure.bbox.x1
     plt.close(figure)
+
+
+def test_legends_of_a_path_and_of_what_was_simulated_stand_above_their_panels(circle):
+    moved = simulate_device(
+        ROOT / "scenarios" / "devices" / "mems_hexapod.toml", None, "1X=0.1W", duration=0.02, rate=1000.0
+    )
+    with plt.rc_context(STYLE):
+        for figure in (draw_path(circle), draw_signals(moved)):
+            figure.draw_without_rendering()
+            of_panels = [(panel.get_legend(), panel.get_window_extent()) for panel in figure.axes]
+            legends = [(legend.get_window_extent(), panel) for legend, panel in of_panels if legend is not None]
+            assert len(legends) > 1 and all(legend.y0 >= panel.y1 for legend, panel in legends)
+            assert all(-1 <= legend.x0 < legend.x1 <= figure.bbox.x1 + 1 for legend, _ in legends)
+            plt.close(figure)
 
 
 def test_dashes_of_a_drawing_are_as_long_as_those_of_the_page():

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.figure import Figure
 
 from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError
@@ -19,7 +20,7 @@ from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import Trace, simulate
 from ctrlgen.recordings.look.drive_file import DriveFile, read_drives
 from ctrlgen.reporting.line_patterns import dashes, mark
-from ctrlgen.reporting.plots import COLOURS, STYLE, image
+from ctrlgen.reporting.plots import COLOURS, STYLE, image, legend_above
 from ctrlgen.trajectory.unstated_modes import with_internal_modes
 
 MOST_SAMPLES = 2_000_000  # with a dozen signals these fill 200 MB
@@ -104,6 +105,12 @@ def table(result: Simulated) -> str:
 
 def draw(result: Simulated) -> bytes:
     """A panel a signal, over time; measured readings as dots."""
+    with plt.rc_context(STYLE):
+        return image(draw_signals(result), ".svg")
+
+
+def draw_signals(result: Simulated) -> Figure:
+    """The same as a figure."""
     roles: list[str] = [role for role in ("drive", "reading") if role in result.model.signals]
     roles += [r for r in result.trace.described if r not in (*roles, "pose")]
     with plt.rc_context(STYLE):
@@ -126,6 +133,6 @@ def draw(result: Simulated) -> bytes:
                 panel.plot(result.trace.time, told, lw=1.1, ls=dashes(i), color=colour, label=channel)
             panel.set_ylabel(f"{signal.label}\n[{signal.units[0]}]", fontsize=8)
             if len(signal.channels) > 1:
-                panel.legend(fontsize=7, ncols=6, loc="upper right")
+                legend_above(panel, size=7)
         axes[-1, 0].set_xlabel("time [s]")
-        return image(figure, ".svg")
+        return figure

@@ -14,6 +14,7 @@ import matplotlib
 if "MPLBACKEND" not in os.environ and "matplotlib.pyplot" not in sys.modules:
     matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatterMathtext, LogFormatterSciNotation
@@ -50,6 +51,14 @@ def plain_powers(label: str) -> str:
     """'10⁻³' for '$\\mathdefault{10^{-3}}$', '2×10⁻³' for one with a factor."""
     label = label.replace("$\\mathdefault{", "").replace("}$", "").replace("\\times", "\u00d7")
     return re.sub(r"\^\{([^}]*)\}", lambda found: found[1].translate(RAISED), label)
+
+
+def legend_above(panel: Axes, size: float = 8, columns: int = 6) -> None:
+    """The legend of a panel above it, where it hides no data; columns of at most as many entries."""
+    handles, labels = panel.get_legend_handles_labels()
+    panel.legend(
+        handles, labels, fontsize=size, ncols=min(columns, len(labels)), loc="lower center", bbox_to_anchor=(0.5, 1.0)
+    )
 
 
 def svg(figure: Figure) -> str:

@@ -12,7 +12,7 @@ from matplotlib.patches import Ellipse
 
 from ctrlgen.core.units import from_si, show_difference
 from ctrlgen.reporting.line_patterns import dashes, mark
-from ctrlgen.reporting.plots import COLOURS, STYLE, svg
+from ctrlgen.reporting.plots import COLOURS, STYLE, legend_above, svg
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE
 from ctrlgen.trajectory.metrics import force_parts
 from ctrlgen.trajectory.solution import Solution
@@ -67,19 +67,18 @@ def draw_path(solution: Solution) -> Figure:
         left.set_aspect("equal", adjustable="datalim")
     left.set_xlabel("time [s]" if alone else f"{signal.channels[shown[0]]} [{unit}]")
     left.set_ylabel(f"{signal.channels[shown[-1]]} [{unit}]")
-    left.legend(loc="center" if closed else "best", fontsize=8)
+    legend_above(left)
     fine = FINER.get(unit, unit)
     tolerance = from_si(FEASIBILITY_TOLERANCE * signal.scale[most], fine)
     for k, (i, colour) in enumerate(zip(alike, (COLOURS[0], COLOURS[2], COLOURS[4]), strict=False)):
         off = from_si(reached[:, i] - command[:, i], fine)
         right.plot(time, off, color=colour, ls=dashes(k), lw=1, label=signal.channels[i])
-    right.axhspan(-tolerance, tolerance, color="#f0f0f0", zorder=0)
+    right.axhspan(-tolerance, tolerance, color="#f0f0f0", zorder=0, label=f"tolerance of {tolerance:.3g} {fine}")
     span = max(1.3 * tolerance, 1.1 * max(abs(limit) for limit in right.get_ylim()))
     right.set_ylim(-span, span)
     right.set_xlabel("time [s]")
     right.set_ylabel(f"modelled - commanded [{fine}]")
-    right.set_title(f"grey: tolerance of {tolerance:.3g} {fine}", fontsize=8)
-    right.legend(fontsize=8, ncols=3, loc="upper right")
+    legend_above(right, columns=4)
     return figure
 
 
