@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from conftest import ROOT
 from logger_files import T, U, X, rows
 
-from ctrlgen.app.look_console import _read
+from ctrlgen.app.look_console import described, look
 from ctrlgen.core.errors import InputError
 from ctrlgen.devices import load_device
 from ctrlgen.model.assembly import build_model
@@ -17,13 +18,14 @@ from ctrlgen.recordings.look.answers import NOTHING, Answers
 from ctrlgen.recordings.look.column_facts import TableFacts, TimeFacts, table_facts
 from ctrlgen.recordings.look.proposal import propose
 
+STAGE = ROOT / "tests" / "logs" / "stage.toml"
 NO_TIME = 'no column is a time: state sample_rate, or kind = "poses" (--time COLUMN, --rate 1kHz or --poses)'
 CLOCK = [0, 1, 2, 3.5, 4.5, 5.75, 8.75, 8.25, 9.25]  # steps 1, 1, 1.5, 1, 1.25, 3, -0.5, 1
 
 
 @pytest.fixture(scope="module")
 def axis():
-    return build_model(load_device("tests/logs/stage.toml"))
+    return build_model(load_device(STAGE))
 
 
 def facts_of(folder, text: str, answers: Answers = NOTHING) -> TableFacts:
@@ -43,6 +45,7 @@ def test_the_time_of_a_table_with_its_step_its_gaps_and_its_falls(tmp_path):
     three = time_of(tmp_path, "time,x", [0, 1, 2], [0, 1, 2])
     assert three is not None and (three.step, three.jitter, three.gaps, three.backward) == (1.0, 0.0, (), 0)
     assert time_of(tmp_path, "time,x", [0, 1], [0, 1]) is None
+    assert time_of(tmp_path, "time,x", [0, 1, 11], [0, 1, 2]).jitter == 0.0  # neither step is near their median
     assert time_of(tmp_path, "time,x", [0, 0, 0, 1], [0, 1, 2, 3]) is None  # stands still in most rows
     stamps = facts_of(tmp_path, "k (s),stamp\n" + "".join(f"{k},2024-03-05T10:00:{2 * k:02d}\n" for k in range(9))).time
     assert stamps == TimeFacts("stamp", "s", True, 2.0, 0.0, (), 0)
@@ -56,6 +59,7 @@ def test_which_column_is_the_time(tmp_path):
         ("time,b (ms)", (down, up), "b (ms)"),  # one that rises before one that falls
         ("time,elapsed", (down, down), "time"),
         ("time (V),x", (up, up), None),
+        ("time (V),elapsed", (up, down), "elapsed"),
         ("time,log.time", (up, up), "time"),
         ("log.time,x", (up, up), "log.time"),
         ("a,b", (up, up), None),
@@ -116,17 +120,17 @@ def test_a_question_and_its_answers_are_one_sentence():
     assert str(Ambiguous("what", {"a = 1": ""}).of_column("x")) == "column 'x' what: write layout = { a = 1 }"
 
 
-def test_a_file_that_asks_names_the_option_and_the_command_that_takes_it(tmp_path):
+def test_a_file_that_asks_names_the_option_and_the_command_that_takes_it(tmp_path, capsys):
     file, apart = tmp_path / "log.csv", tmp_path / "apart.csv"
     file.write_text("0,15\n0,25\n0,35\n")
     apart.write_text("X_Value\tu\tX_Value\tx\n0\t1\t0\t2\n1\t2\t2\t3\n2\t3\t4\t4\n")
-    for path, look_at, said in (
-        (file, "", ["log.csv"]),
-        (file, "ctrlgen look log.csv", ["log.csv", "then"]),
-        (apart, "ctrlgen look apart.csv", ["apart.csv"]),  # no option answers
+    for path, diagnosed, said in (
+        (file, False, ["log.csv"]),
+        (file, True, ["log.csv", "then"]),
+        (apart, True, ["apart.csv"]),  # no option answers
     ):
         with pytest.raises(InputError) as error:
-            _read(path, NOTHING, look_at)
+            described([path], STAGE) if diagnosed else look([path], None, None, None)
         assert [fault.where for fault in error.value.faults] == said
         if path is file:
             assert (
@@ -135,6 +139,8 @@ def test_a_file_that_asks_names_the_option_and_the_command_that_takes_it(tmp_pat
             )
     assert error.value.faults[0].what.startswith("holds channels that each have a time of their own")
     file.write_text("t,u\n0,1\n1,2\n2,3\nt,v\n0,4\n1,5\n2,6\n")
-    assert list(_read(file, Answers(table=2)).table.columns) == ["t", "v"]
+    look([file], None, None, None, Answers(table=2))
     file.write_text("t;u\n1;1,234\n2;2,345\n3;3,456\n")
-    assert _read(file, Answers(layout=Layout(decimal=","))).column("u").finite.tolist() == [1.234, 2.345, 3.456]
+    look([file], None, None, None, Answers(layout=Layout(decimal=",")))
+    printed = capsys.readouterr().out
+    assert "v       not stated" in printed and "1.234" in printed and "3.456" in printed
