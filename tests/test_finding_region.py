@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from axis_records import AXIS, fitter_of
+from region_edges import found
 from scipy.stats import norm
 
 from ctrlgen.diagnosis.report.answer import where
@@ -113,3 +114,10 @@ def test_a_finding_tells_its_edge_no_more_narrowly_than_that():
         assert by_form == pytest.approx(out_to_visited((5.0 - unsure, 5.0 + unsure), visited))
         # a place is between it and where one standard deviation would end
         assert not unsure or by_form[1] > out_to_visited((0.0, 5.0 + unsure / 2), visited)[1]
+
+
+@pytest.mark.long
+def test_intervals_of_ends_hold_those_of_the_independent_plant():
+    """One case of each law that is not of its own form there; docs/evidence.md counts more of them."""
+    for name in ("friction_there", "friction_from", "damping_fast", "knee"):
+        assert found(name, 1).covered == (True,), name
