@@ -10,7 +10,7 @@ from statistics import median
 
 import numpy as np
 
-from benchmarks import casadi_c, least_squares
+from benchmarks import casadi_c, least_squares, table
 from benchmarks.measure import Line, Note, interleave, timed
 from benchmarks.samples import NEAR, NEAR_FLOAT, Disagreement, Samples
 from benchmarks.timed_c import Program, build, generated
@@ -44,6 +44,8 @@ def run(repeat: int) -> list[Line | Note]:
             except (RuntimeError, Disagreement) as error:  # CasADi cannot write it, or gcc cannot build it
                 results.append(Note(f"{title}: not available: {str(error).splitlines()[0]}"))
 
+        tables = {real: table.build_table(samples, real, folder / "table") for real in Real}
+
         circle, reachable = samples.command, samples.reachable()
         beyond = {"beyond limits": samples.beyond(), "jumps beyond limits": samples.jumps()}
         for name, (real, program) in ours.items():
@@ -57,11 +59,14 @@ def run(repeat: int) -> list[Line | Note]:
         samples.check_circle(least_squares.NAME, scipy_circle())
         samples.check(least_squares.NAME, scipy_reachable(), reachable)
 
+        results.append(_table_note(samples, tables[Real.DOUBLE], reachable, beyond))
         sets = {"circle": circle, "random path": reachable, **beyond}
         contenders: dict[tuple[str, str], Callable[[], float]] = {}
         for where, targets in sets.items():
             for name, (_, program) in ours.items():
                 contenders[where, name] = partial(_time, program, targets, PASSES)
+            for real, program in tables.items():
+                contenders[where, f"{table.NAME}, {real.value}"] = partial(_time, program, targets, PASSES)
             for name, program in peers.items():
                 if where not in beyond or name == casadi_c.NEWTON:
                     contenders[where, name] = partial(_time, program, targets, SLOW_PASSES)
@@ -70,7 +75,9 @@ def run(repeat: int) -> list[Line | Note]:
         contenders["random path", least_squares.NAME] = timed(scipy_reachable, len(reachable))
         seconds = interleave(contenders, repeat)
     for where in sets:
-        for name in ours:
+        for name, (real, _) in ours.items():
+            by_hand = f"{table.NAME}, {real.value}"
+            results.append(_line(name, where, by_hand, seconds[where, name], seconds[where, by_hand], aim=False))
             for peer in (*peers, IPOPT, least_squares.NAME):
                 if (where, peer) in seconds:
                     results.append(_line(name, where, peer, seconds[where, name], seconds[where, peer]))
@@ -83,8 +90,15 @@ def _time(program: Program, targets: np.ndarray, passes: int) -> float:
     return program.run(targets, passes)[1]
 
 
-def _line(name: str, where: str, peer: str, ours: list[float], theirs: list[float]) -> Line:
-    return Line(f"{name}, {where}", ours, peer, theirs, median(theirs))
+def _line(name: str, where: str, peer: str, ours: list[float], theirs: list[float], aim: bool = True) -> Line:
+    return Line(f"{name}, {where}", ours, peer, theirs, median(theirs) if aim else None)
+
+
+def _table_note(samples: Samples, program: Program, reachable: np.ndarray, beyond: dict[str, np.ndarray]) -> Note:
+    """What the table is off, and which limits it passes."""
+    off = max(table.off(samples, program.run(t, 0)[0], t) for t in (samples.command, reachable))
+    passed = "; ".join(f"{where}: {table.passed(samples, program.run(t, 0)[0])}" for where, t in beyond.items())
+    return Note(f"{table.NAME}: {1e9 * off:.2g} nm off; {table.KEEPS}, and passes, {passed}")
 
 
 def _check_ours(

@@ -9,7 +9,7 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
-from benchmarks import casadi_c
+from benchmarks import casadi_c, table
 from benchmarks.measure import Count, Note
 from benchmarks.samples import NEAR, NEAR_FLOAT, Disagreement, Samples
 from ctrlgen.controller.controller_step import ControllerStatus
@@ -51,6 +51,8 @@ def run(repeat: int) -> list[Count | Note]:
                     else:
                         aim = WITHIN if single else None
                         found.append(Count(f"online C, circle, {where}", circle, how, theirs, aim))
+            by_hand = _table(samples, core, real, scratch)
+            found.append(Count(f"online C, circle, {where}", circle, f"{table.NAME}; {table.KEEPS}", by_hand))
             aim = AT_WORST if single else None
             found.append(Count(f"online C, jumps beyond limits, {where}", jumps, "online C, circle", circle, aim))
     return found
@@ -78,6 +80,21 @@ def _ours(samples: Samples, c: CFolder, core: Core, real: Real, scratch: Path) -
     if any(status for status, _ in circle) or any(status & lost for status, _ in jumps):
         raise Disagreement("the circle meets a limit, or the controller is lost, on the emulated core")
     return max(count for _, count in circle), max(count for _, count in jumps)
+
+
+def _table(samples: Samples, core: Core, real: Real, scratch: Path) -> int:
+    """Instructions of the table's longest call on the circle."""
+    source = table.write(samples, real, scratch / "table")
+    name, program, n = source.stem, scratch / f"{source.stem}.elf", samples.axes
+    cross_compile(COMPILER, core, [source], source.parent, f"{name}_step", program)
+    machine = Machine(core, program)
+    state, target, out = (machine.reserve(count, real) for count in (n, n, 3 * n))
+    machine.write(state, samples.model.rest, real)
+    counted = []
+    for wanted in samples.command:
+        machine.write(target, wanted, real)
+        counted.append(machine.call(f"{name}_step", state, target, out)[1])
+    return max(counted)
 
 
 def _peer(
