@@ -18,6 +18,7 @@ from one_kernel import print_function
 from package_programs import build
 
 from ctrlgen import CtrlgenError, __version__, build_model, load_scenario
+from ctrlgen.controller import named_inverse
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.firmware.c.elementary import elementary_text
 from ctrlgen.firmware.c.real import Real
@@ -340,3 +341,13 @@ def test_the_cmake_project_builds_and_its_test_passes(folder, tmp_path):
         done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
         assert done.returncode == 0, done.stdout + done.stderr
     assert "100% tests passed" in done.stdout
+
+
+def test_formulas_that_nobody_could_read_are_left_out_and_the_numbers_stay(monkeypatch):
+    scenario = load_scenario(SCENARIOS / "rrr_circle")
+    found = []
+    for most in (named_inverse.MOST_OPERATIONS, 0):
+        monkeypatch.setattr(named_inverse, "MOST_OPERATIONS", most)
+        found.append(named_inverse.named_inverses(scenario.device, "pose", None))
+    assert found[0].static is not None and found[0].numbers
+    assert found[1].static is None and not found[1].numbers and found[1].model.axes == found[0].model.axes

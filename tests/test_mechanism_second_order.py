@@ -202,6 +202,8 @@ def test_a_reading_of_second_order_is_seen_from_the_body_on_which_its_sensor_sta
     sensors += '[[reading]]\nname = "level"\nbody = "b"\nagainst = "a"\nabout = [1, 2, -2]\n'
     c = Condensed(*with_values(loaded(tmp_path, jointed() + sensors)))
     expanded, exact, d = SecondOrder(c), ExactJoints(c), np.array([0.8, -0.5]) * 2e-4
+    at = ca.SX.sym("d", 2)  # a gradient in the drawing's symbols takes seconds: it is made once
+    assert expanded.restoring_force(at) is expanded.restoring_force(at)
 
     def read(sign: float) -> np.ndarray:
         q = ca.SX(exact.held(sign * d)[0])

@@ -11,11 +11,15 @@ from ctrlgen.model.assembly import symbolic_model
 from ctrlgen.model.inverse import Inverse, invert
 from ctrlgen.model.model import Model
 
+MOST_OPERATIONS = 100_000
+"""Of the forces' balance with its numbers as symbols. Shipped devices have up to 4,500, drawn hexapods 11,000; three million, of hexapods
+whose flexures stretch where they are held, take minutes and gigabytes to invert, and their formulas would fill a book."""
+
 
 @dataclass(frozen=True)
 class NamedInverses:
     """Kernels for equilibria and for the next sample with an argument "p" more, their `model`, and value and path of each number of p.
-    Of a model with more drives than axes there are none."""
+    Of a model with more drives than axes there are none, and of one with formulas beyond `MOST_OPERATIONS` no numbers either."""
 
     static: Inverse | None
     moving: Inverse | None
@@ -24,8 +28,11 @@ class NamedInverses:
 
 
 def named_inverses(device: Device, follow: str, sample_time: float | None) -> NamedInverses:
-    """The inverses of `device` for the signal named `follow` with formulas."""
-    return _inverses(symbolic_model(device), follow, sample_time)
+    """The inverses of `device` for the signal named `follow` with formulas; without any where nobody could read them."""
+    model = symbolic_model(device)
+    if ca.n_nodes(model.balance) > MOST_OPERATIONS and not device.given_at_start:
+        return NamedInverses(None, None, symbolic_model(device, ()), [])
+    return _inverses(model, follow, sample_time)
 
 
 def given_inverses(device: Device, follow: str, sample_time: float | None) -> NamedInverses:

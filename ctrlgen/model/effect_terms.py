@@ -71,7 +71,6 @@ class EffectTerms:
         self.displacement, self.velocity, self.acceleration = displacement, velocity, acceleration
         reach = REACH * physics.displacement_scale
         self.within_reach = ca.fmin(ca.fmax(displacement, -reach), reach)
-        self.restoring_force = physics.restoring_force(self.within_reach)
         self.mechanism_displacement = displacement  # with the effects' terms, once these are added
         self.signals_before: dict[Place, list[tuple[float, ca.SX]]] = {}  # (order, the signal before its terms)
         self.members: list[Member] = []
@@ -172,6 +171,11 @@ class EffectTerms:
             "temperature": None if heater is None else heater.expr[i],
             "temperature_at_rest": None if heater is None else self.physics.rest[i],
         }
+
+    @cached_property
+    def restoring_force(self) -> ca.SX:
+        """What the stages take within their reach; large for a mechanism of second order, hence built only for a law of an axis."""
+        return self.physics.restoring_force(self.within_reach)
 
     @property
     def imposed_acceleration(self) -> ca.SX | None:

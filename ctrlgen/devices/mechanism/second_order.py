@@ -82,6 +82,8 @@ class SecondOrder:
         self.I, self.J = [i for i, _ in self.pairs], [j for _, j in self.pairs]
         self.weight = ca.DM([1.0 if i == j else 2.0 for i, j in self.pairs])
         self.first_order = [plain(T[:, : self.n]) for T in c.twists]
+        # Of a mechanism whose numbers are symbols a gradient takes ten seconds, and a model asks for it at one d several times
+        self._forces: dict[Callable[[Matrix], Matrix] | None, list[tuple[Matrix, Matrix]]] = {}
 
     @cached_property
     def parts(self) -> list[tuple[Matrix, tuple[Segment, ...], Matrix | None]]:
@@ -116,11 +118,18 @@ class SecondOrder:
 
     def restoring_force(self, d: Matrix, more: Callable[[Matrix], Matrix] | None = None) -> Matrix:
         """(n,): what the axes are pulled home with beside K d: dV_3/dd, and that of the energy that there is `more`, of d."""
-        x = ca.SX.sym("d", self.n)
-        V = ca.mtimes([x.T, self.cubic, self.products(x)])
-        if more is not None:
-            V += more(x)
-        return ca.substitute(ca.gradient(V, x), x, d)
+        known = self._forces.setdefault(more, [])
+        if not known:
+            x = ca.SX.sym("d", self.n)
+            V = ca.mtimes([x.T, self.cubic, self.products(x)])
+            if more is not None:
+                V += more(x)
+            known.append((x, ca.gradient(V, x)))
+        for at, force in known:
+            if ca.is_equal(ca.SX(at), ca.SX(d)):
+                return force
+        known.append((d, ca.substitute(known[0][1], known[0][0], d)))
+        return known[-1][1]
 
     @cached_property
     def output(self) -> Matrix:
