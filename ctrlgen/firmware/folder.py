@@ -25,6 +25,8 @@ from ctrlgen.firmware.c.misra import CPPCHECK
 from ctrlgen.firmware.c.real import Arithmetic, Integers, Real
 from ctrlgen.firmware.c.templates import write
 from ctrlgen.firmware.online.checksum import checked_context
+from ctrlgen.firmware.online.corrected import corrected_context, corrections_of
+from ctrlgen.firmware.online.correction_vectors import correction_vectors
 from ctrlgen.firmware.online.fixed_source import fixed_context
 from ctrlgen.firmware.online.online import online_context
 from ctrlgen.firmware.online.stated_pivot import StatedPivot
@@ -60,6 +62,8 @@ class CFolder(Shown):
     state_words: int = 1
     # The online controller with a checksum over its state, where the scenario asks for it
     checked: dict[Real, str] = field(default_factory=dict)
+    # The online controller with a learnt correction of its targets, where the scenario asks for it
+    corrected: dict[Real, str] = field(default_factory=dict)
 
     def facts(self) -> dict[str, object]:
         """What it is, in a few words."""
@@ -78,7 +82,10 @@ class CFolder(Shown):
 
     def sources(self, real: Arithmetic) -> list[Path]:
         """The C of the library in one arithmetic."""
-        pieces: tuple[Mapping[Any, str], ...] = (self.online, self.checked, self.player, self.selftest, self.vectors)
+        pieces: tuple[Mapping[Any, str], ...] = (
+            *(self.online, self.checked, self.corrected),
+            *(self.player, self.selftest, self.vectors),
+        )
         return [self.path / f"{names[real]}.c" for names in pieces if real in names]
 
     def runner(self, real: Arithmetic) -> Path:
@@ -109,6 +116,8 @@ def generate(
         piece: {real: f"{owner}_{piece}_{real.suffix}" for real in Real} for piece, owner in owners(scenario).items()
     }
     checked = {real: f"{scenario.controller_name}_checked_{real.suffix}" for real in Real if scenario.file.checksum}
+    corrections = corrections_of(scenario, controller.kernels)
+    corrected = {real: f"{scenario.controller_name}_corrected_{real.suffix}" for real in Real if corrections}
     fixed = _fixed(scenario, controller, targets)
     compression = compress(played) if played else {}
     left_out = () if solution is None else solution.left_out
@@ -121,7 +130,11 @@ def generate(
             compression.get(real), len(command), scenario.clock
         )
         contexts[real] = samples | online | of | reference | {"solved": solution is not None, "left_out": left_out}
-        contexts[real] |= {"checked": checked.get(real)}
+        contexts[real] |= {"checked": checked.get(real), "corrected": corrected.get(real)}
+        added = corrected_context(scenario, corrections, online, corrected[real], real) if corrections else None
+        contexts[real] |= {
+            "correction": correction_vectors(corrections, added, real) if corrections and added else None
+        }
         contexts[real] |= self_test_calls(contexts[real]) | {"fixed": fixed}
         by_template = {"online": online, "selftest": contexts[real], "vectors": contexts[real]}
         if played:
@@ -129,6 +142,9 @@ def generate(
         if checked:
             of["checked"] = checked[real]
             by_template["checked"] = checked_context(online, checked[real])
+        if added:
+            of["corrected"] = corrected[real]
+            by_template["corrected"] = added
         for template, context in by_template.items():
             for kind in ("h", "c"):
                 written.append(write(f"{template}.{kind}", context, out / f"{of[template]}.{kind}"))
@@ -155,6 +171,7 @@ def generate(
         given_numbers=contexts[Real.FLOAT]["given_numbers"],
         state_words=len(contexts[Real.FLOAT]["words"]),
         checked=checked,
+        corrected=corrected,
     )
 
 
@@ -180,11 +197,15 @@ def _write_fixed(context: dict[str, Any], out: Path, name: str) -> list[Path]:
 def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Arithmetic, path: Path) -> None:
     """The program that `ctrlgen.verification` builds around one pair of controllers."""
     controller = controller_of(model, scenario.file.follow, scenario.sample_time)
+    corrections = corrections_of(scenario, controller.kernels)
     context = {
         "real": real,
         "online": folder.online[real],
         "prefix": folder.online[real],
         "player": None if isinstance(real, Integers) else folder.player.get(real),
+        "corrected": None if isinstance(real, Integers) else folder.corrected.get(real),
+        "numbers": corrections.count if corrections else 0,
+        "measured": corrections.channels if corrections else 0,
         "n": len(model.axes),
         "nu": model.u.numel(),
         "nx": model.x.numel(),

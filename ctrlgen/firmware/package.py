@@ -178,6 +178,14 @@ def _memory(c: dict[str, Any], contexts: Mapping[Real, dict[str, Any]]) -> list[
     if c["checked"]:
         formula = f"`sizeof({c['checked']}_state)` is 4 B more than the state (8 B in double), 256 constants of 4 B; only if it is called"
         rows.append({"what": "checksum", "float": 4 + 1024, "double": 8 + 1024, "formula": formula})
+    if c["corrected"]:
+        numbers, terms, sums = c["correction"]["numbers"], len(c["correction"]["terms"]), c["correction"]["sums"]
+        formula = f"`sizeof({c['corrected']}_table)` = {numbers} numbers and 2 words, RAM, one a device"
+        rows.append(_counted("correction", numbers, 8, formula))
+        formula = f"`sizeof({c['corrected']}_run)` = {numbers + 5 * terms + sums} numbers and {terms + 4} words, RAM, only to learn"
+        # words in an odd number are filled up in double
+        rows.append(_counted("its learning", numbers + 5 * terms + sums, 4 * (terms + 4), formula))
+        rows[-1]["double"] += 4 * (terms % 2)
     if c["played"]:
         forms = "; ".join(
             f"{real.value}: {kept.kind}, {kept.size}" for real, kept in zip(Real, chosen, strict=True) if kept

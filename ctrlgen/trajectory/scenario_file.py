@@ -12,6 +12,7 @@ from ctrlgen.devices.load import Gravity, Load
 from ctrlgen.devices.place import Place
 from ctrlgen.devices.section import Section
 from ctrlgen.physics.euler_angles import Order
+from ctrlgen.trajectory.correction_section import CorrectionSection
 from ctrlgen.trajectory.inverse.clock import Clock, Sampled, Settled
 from ctrlgen.trajectory.paths import PathKind, Poses
 from ctrlgen.trajectory.shaping import Shaping
@@ -101,6 +102,9 @@ class ScenarioFile(Section):
     fixed_point: bool = False
     """Whether the C has a third online controller, in integers of 32 bits with a proven error, for cores without a floating-point unit
     (Cortex-M0+). For actuators with a lag whose displacements are linear in the target; refused for others, with the reason."""
+    correction: tuple[CorrectionSection, ...] = ()
+    """`[[correction]]` tables: the C has a library beside the controller, `..._corrected`, that adds a bounded correction to the commanded
+    channels and learns it from measured runs: cogging, the pitch of a screw or an encoder. Left out: it has not."""
     outcome: Literal["solved", "unreachable"] = "solved"
     """Whether a trajectory is expected to exist; `unreachable` passes where none does."""
     load: tuple[Load, ...] = ()

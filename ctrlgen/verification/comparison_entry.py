@@ -33,6 +33,8 @@ class ComparisonKind(StrEnum):
     CURVE = "player C - its curve"
     PLAYED_OPTIMUM = "player C - IPOPT"
     PLAYED_ROOT = "player C - Newton's method"
+    CORRECTED = "corrected targets, C - CasADi"
+    LEARNT = "numbers of corrections after runs, C - reference"
     BETWEEN = "player C a quarter on - its curve"
 
     @property

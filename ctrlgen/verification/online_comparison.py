@@ -14,6 +14,7 @@ from ctrlgen.model.simulation import simulate, trace
 from ctrlgen.numerics.newton import newton_solver
 from ctrlgen.verification.compared_program import ComparedProgram
 from ctrlgen.verification.comparison_entry import ComparisonEntry, ComparisonKind, entry_of
+from ctrlgen.verification.correction_comparison import correction_rows
 from ctrlgen.verification.reference import ReferenceAnswers
 from ctrlgen.verification.tolerances import (
     ANGLE_LIMIT,
@@ -40,6 +41,7 @@ def online_rows(program: ComparedProgram) -> list[ComparisonEntry]:
         *_controller_rows(program, ComparisonKind.FOLLOWED, followed, ref.followed),
         *_controller_rows(program, ComparisonKind.SETTLED, settled, ref.settled, far),
         program.shipped_test(),
+        *correction_rows(program),
         *_equilibrium_rows(program, settled),
         *(_hostile_rows(program) if moving else ()),
         *_optimum_rows(program, followed),

@@ -30,20 +30,20 @@ class Deviation:
 DEVIATIONS = (
     Deviation(
         "2.5",
-        ("*_online_???.h", "*_player_f??.h", "*_selftest_???.h", "*_vectors_???.h"),
+        ("*_online_???.h", "*_corrected_f??.h", "*_player_f??.h", "*_selftest_???.h", "*_vectors_???.h"),
         "constants of an interface that its own source does not read",
         "The caller uses them: number of the interface, version, device, rate, sizes, number of samples, status values, tolerances.",
     ),
     Deviation(
         "19.2",
-        ("*_online_f??.c", "*_plant_f??.c"),
+        ("*_online_f??.c", "*_corrected_f??.c", "*_plant_f??.c"),
         "the unions in square_root(), exponential() and logarithm(), by which the exponent of a number is halved, set or read",
         "C99 defines the result of reading the other member, both members have the same size, and it avoids a library call.",
         r"_(square_root|exponential|logarithm)\(",
     ),
     Deviation(
         "19.2",
-        ("*_online_f??.c", "*_player_f??.c", "*_selftest_f??.c", "*_plant_f??.c"),
+        ("*_online_f??.c", "*_corrected_f??.c", "*_player_f??.c", "*_selftest_f??.c", "*_plant_f??.c"),
         "the union in bits_of(), by which the bits of a number are read",
         "Whether a number is one is asked of its bits: options of compilers permit them to leave comparisons with NaN out, never "
         "those of integers. C99 defines the result of reading the other member, and both members have the same size.",
@@ -55,6 +55,13 @@ DEVIATIONS = (
         "the union in number_at(), by which a number is read from its bits",
         "C99 defines the result of reading the other member, and both members have the same size whatever the order of bytes.",
         "number_at",
+    ),
+    Deviation(
+        "19.2",
+        ("*_corrected_f??.c",),
+        "the unions of a stored number and its bits",
+        "C99 defines the result of reading the other member, and both members have the same size whatever the order of bytes.",
+        "float number; uint32_t bits",
     ),
     Deviation(
         "19.2",

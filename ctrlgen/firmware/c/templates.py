@@ -25,6 +25,7 @@ ABI = 3
 SOURCES = {
     "online.c": "prefix",
     "checked.c": "prefix",
+    "corrected.c": "prefix",
     "fixed.c": "prefix",
     "fixed_selftest.c": "selftest",
     "fixed_vectors.c": "vectors",

@@ -106,13 +106,20 @@ def played_vectors(compression: Compression | None, samples: int, clock: Clock) 
 def self_test_calls(c: dict[str, Any]) -> dict[str, int]:
     """What the self test of a context counts: "online_calls" of the controller, and all "calls", with those of the player, its wrap or
     end and the refused ones among them."""
-    estimate = render("selftest_estimate.c", c).count("count(outcome") if c["estimated"] else 0
-    online = len(c["rows"]) + 2 * c["unusable"] + 2 + 2 * c["lost"] + estimate + _pivot_calls(c)
+    estimate, correction = (
+        _counts(c, name) if c[of] else 0 for name, of in (("estimate", "estimated"), ("correction", "correction"))
+    )
+    online = len(c["rows"]) + 2 * c["unusable"] + 2 + 2 * c["lost"] + estimate + _pivot_calls(c) + correction
     player = 0
     if c["player"]:
         wraps = c["closed"] and c["whole"] < 2**32
         player = len(c["played"]) + len(c["timed"]) + 6 + wraps + c["played_unusable"]
-    return {"online_calls": online, "calls": online + player}
+    return {"online_calls": online, "calls": online + player, "correction_calls": correction}
+
+
+def _counts(c: dict[str, Any], part: str) -> int:
+    """Calls that a part of the self test counts."""
+    return render(f"selftest_{part}.c", c | {"lit": c["real"].literal}).count("count(outcome")
 
 
 def _pivot_calls(c: dict[str, Any]) -> int:
