@@ -11,6 +11,7 @@ from axis_records import AXIS, NOISE, fine, record
 from conftest import AXIS_FILE
 from scipy.interpolate import CubicSpline
 
+from ctrlgen import user_device
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.diagnose import diagnose_recording
@@ -105,7 +106,6 @@ def test_what_acts_behind_a_delay_or_on_it_in_a_loop_keeps_the_samples_in_the_mo
     for causes, places in (((LATE,), (0,)), ((LATE, digits), ())):
         device = Structure(AXIS, causes, starts[: len(causes)]).expanded_device
         assert effects_apart(device, nominal_physics(device)) == places
-    assert LATE.bounds(LATE.law.amplitude(), LATE.channel_on(AXIS)) == (0.0, 0.5)
     looped = validate(Device.library["axis"], tomllib.loads(AXIS_FILE.read_text()) | {"loop": LOOP}, "looped.toml")
     physics = nominal_physics(looped)
     late, *_ = hypotheses(looped, physics, ("reading.axis",), H, False, [Effect.library["delay"]])
@@ -164,3 +164,26 @@ def test_shifts_are_tried_a_sample_apart_and_farther_the_longer_they_are():
     assert np.all(np.diff(tried) <= np.maximum(1, tried[:-1] / 8))
     assert shifts_tried(H, 0.0, 3.4 * H) == pytest.approx([H, 2 * H, 3 * H])
     assert shifts_tried(H, 0.0, 0.4 * H) == pytest.approx([0.4 * H])
+
+
+@pytest.mark.parametrize(("sample_time", "longest"), [(1e-3, 0.5), (1.0, 100.0), (5.0, 500.0)])
+def test_a_process_that_is_read_every_few_seconds_may_be_late_by_minutes(sample_time, longest):
+    """All its readings at once: the dead time of the drive."""
+    tanks = user_device(
+        "tanks",
+        parameters={"rate": "0.01 1/s"},
+        drive={"pump": "1 V"},
+        axes={"first": "1 cm", "second": "1 cm"},
+        state={"a": "1 cm", "b": "1 cm"},
+        rates=lambda u, x, p: [p.rate * (0.01 * u.pump - x.a), p.rate * (x.a - x.b)],
+        force=lambda x: [x.a, x.b],
+        restoring_force=lambda d: d.vector,
+    )
+    there = [
+        h
+        for h in hypotheses(tanks, nominal_physics(tanks), ("reading.first", "reading.second"), sample_time, False)
+        if h.effect == "delay"
+    ]
+    assert [h.location for h in there] == ["sensor:first", "sensor:second", "sensor:all"]
+    for h in there:
+        assert h.bounds(h.law.amplitude(), h.channel_on(tanks)) == (0.0, longest)

@@ -26,7 +26,7 @@ class Delay(Effect):
     order = 3
     requires = frozenset({"sample_time"})
     source = "T. I. Laakso et al., IEEE Signal Processing Magazine 13 (1996) 30: splitting the unit delay"
-    params = (Param("delay", "ms", (0.0, 500.0), "age of the reading", off=0.0),)
+    params = (Param("delay", "ms", (0.0, 3.6e6), "age of the reading", off=0.0),)  # an hour: dead time of a process
     moves_in_time = True
     states = _kept(1)  # of a delay that is off
     apart = True

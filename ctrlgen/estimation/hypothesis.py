@@ -30,6 +30,8 @@ DOMAIN = {
     Place.POSE: "mechanism",
     Place.SENSOR: "sensor",
 }
+SECONDS_LATE, SAMPLES_LATE = 0.5, 100.0
+"""Up to which a reading is taken to be late: a camera, a bus; samples where these are slow, the dead time of a process. Judgement."""
 PARAMETER = "parameter"
 NOTHING: Mapping[str, float] = MappingProxyType({})
 DEVICES_KEPT = 8
@@ -58,7 +60,7 @@ class Hypothesis:
     count: how many of the same effect a structure has there already, where the effect is repeatable.
     highest: frequency [Hz] up to which samples are told from their aliases; infinite for settled poses, which have no clock.
     machine_odds: ln of how many times commoner the law is in a machine of these parts than in any.
-    longest: delay [s] that is looked for; finite in the reading of a loop, where each sample of it is a state of the simulation.
+    longest: delay [s] that is looked for: shortest in the reading of a loop, where each sample of it is a state of the simulation.
     longest_period: way [SI] of a law that repeats along one, up to which the records show that it does.
     """
 
@@ -211,8 +213,10 @@ def _of_law(
     domain = prior.domain or DOMAIN[law.place]
     highest = CANDIDATE_TERMS.highest_frequency / sample_time if sample_time else float("inf")
     longest = float("inf")
-    if law.apart and sample_time and in_loop(physics):
-        longest = CANDIDATE_TERMS.samples_in_loop * sample_time
+    if law.apart and sample_time:
+        longest = max(SAMPLES_LATE * sample_time, SECONDS_LATE)
+        if in_loop(physics):
+            longest = CANDIDATE_TERMS.samples_in_loop * sample_time
     places = channels(physics, law.place)
     seen = {channel.removeprefix("reading.") for channel in observed}
     if law.place is Place.SENSOR:
@@ -230,7 +234,7 @@ def _of_law(
     for channel in () if prior.acts_on_all else fitting:
         yield Hypothesis(law.kind, f"{domain}:{channel.name}", channel.name, highest=highest, longest=longest)
     if prior.of_one_reference and len(fitting) > 1:
-        yield Hypothesis(law.kind, f"{domain}:all", "all", highest=highest)
+        yield Hypothesis(law.kind, f"{domain}:all", "all", highest=highest, longest=longest)
     if len(places) < every:
         return
     if prior.acts_on_all or (len(fitting) > 1 and law.place is not Place.SENSOR):

@@ -79,7 +79,11 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             acts_on_all=True,
             domain="recording",
         ),
-        "delay": LawPrior("Error of the interpolation between samples; 0.1 %: judgement.", model_form_error=0.001),
+        "delay": LawPrior(
+            "Error of the interpolation between samples; 0.1 %: judgement. One recorder, or the dead time of the drive, is late for all.",
+            model_form_error=0.001,
+            of_one_reference=True,
+        ),
         "drift": LawPrior(
             "What drifts also wanders; 10 %: judgement. As rare as an event: it follows any residual that has a slow part.",
             log_prior_odds=ONE_IN_A_HUNDRED,
