@@ -16,6 +16,7 @@ from ctrlgen.learning.implied_pose import ImpliedPose
 from ctrlgen.learning.learning_options import LearningOptions
 from ctrlgen.learning.learning_page import verdict
 from ctrlgen.learning.lifted import Lifted
+from ctrlgen.learning.run_errors import RunErrors
 from ctrlgen.learning.run_gate import belonging
 from ctrlgen.learning.runs import Run, Runs, in_time
 from ctrlgen.learning.sensor_budget import Feigned, SensorBudget, sensor_budget
@@ -283,3 +284,50 @@ def test_in_noise_it_says_how_many_repetitions_are_needed_and_these_are_enough(c
         (note,) = (note for note in found.notes if "repetitions" in note)
         periods = int(note.split("about ")[1].split()[0])
     assert asked and periods < 200 and after < 0.5 * before
+
+
+def runs_of(circle: Solution, rng: np.random.Generator, *parts: tuple[float, np.ndarray]) -> tuple[Lifted, Runs]:
+    """Runs of three periods under the circle's drives times a number, that read the model's own pose and another deviation (n, 6)."""
+    lifted, noise = Lifted(circle), np.repeat([1e-7, 2e-10], 3)
+    runs = []
+    for k, (share, off) in enumerate(parts):
+        drive = circle.drive * share
+        y = np.tile(lifted.run(drive) + off, (3, 1, 1)) + noise * rng.standard_normal((3, lifted.n, 6))
+        runs.append(Run((f"{k}",), drive, y))
+    return lifted, Runs(tuple(runs), np.full(6, np.nan), np.ones(6, bool), ())
+
+
+def test_a_run_whose_zero_was_taken_out_says_nothing_of_it_and_wins_nothing_by_it(circle, rng):
+    """All runs are 50 nm too far in x, and the first 40 nm off at the third harmonic. The zero of the second is 400 nm off: with it the
+    50 nm go, and read as the first has them. The third has a larger third harmonic than the second, which a zero does not hide."""
+    k = 2 * np.pi * np.arange(200) / 200
+    x, third = np.eye(6)[3], np.sin(3 * k)[:, None] * np.eye(6)[4]
+    parts = [
+        (1.0, 5e-8 * x + 4e-8 * third),
+        (1.0001, 4.5e-7 * x + 1e-8 * third),
+        (1.0002, 5e-8 * x + 2e-8 * third),
+    ]
+    lifted, runs = runs_of(circle, rng, *parts)
+    found = belonging(runs, lifted, "t")
+    assert [len(run.hidden) for run in found.runs] == [0, 1, 0]
+    job = RunErrors(lifted, found, LearningOptions())
+    for run, (share, _) in enumerate(parts):
+        moved = lifted.run(circle.drive * share).mean(axis=0) - circle.command.mean(axis=0)
+        assert job.result(run).error[:, 3].mean() == pytest.approx(5e-8 + moved[3], abs=1e-9)
+    assert job.base == 1 and job.is_worse(2, 1) and job.is_worse(0, 2)
+
+
+def test_what_a_sensor_may_feign_of_what_learning_has_left_is_not_learnt(circle, rng):
+    """The first run reads 5 % of scale too much and is believed; the second less than 1 % in z, which a scale good to 0.5 % may feign
+    alone: no step by it."""
+    y = circle.command * np.array([0, 0, 0, 1, 1, 1])
+    lifted, runs = runs_of(circle, rng, (1.0, 0.05 * y), (0.949, 0.05 * y))
+    job = RunErrors(lifted, runs, LearningOptions())
+    lines = tuple(Feigned(f"{i}", "", "", 0.005 * y * np.eye(6)[i]) for i in (3, 4, 5))
+    sensor = SensorBudget(lines, 2.0, job.scale)
+    read = (lifted.run(circle.drive * 0.949) + 0.05 * y - circle.command)[:, 3:]
+    left = job.leave_to(sensor)[:, 3:]
+    assert job.base == 1
+    of_scale = [np.sum(of * y[:, 3:], axis=0) / np.sum(y[:, 3:] ** 2, axis=0) for of in (read, left)]
+    within = np.abs(of_scale[0]) < 0.01
+    assert within.any() and of_scale[1][within] == pytest.approx(of_scale[0][within], rel=0.02)

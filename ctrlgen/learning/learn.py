@@ -160,12 +160,7 @@ def learn_from(
     left_to_sensor = job.leave_to(sensor)
     results = tuple(job.result(j) for j in range(len(job.runs)))
     base = job.base
-    worse = [
-        r
-        for r in results[base + 1 :]
-        if r.cost - results[base].cost > options.worse * np.hypot(r.cost_se, results[base].cost_se)
-    ]
-    step = 0.5 ** len(worse)
+    step = 0.5 ** sum(job.is_worse(j, base) for j in range(base + 1, len(results)))
     progress("next drives")
     c, se = job.repeating(base)
     kept = job.spectrum.shrinkage(c, se, job.repeated[base].freedom)

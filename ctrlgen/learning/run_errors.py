@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ctrlgen.budget.contributors import groups_of
+from ctrlgen.learning.hidden_parts import along, orthonormal, told, without
 from ctrlgen.learning.learning_options import LearningOptions
 from ctrlgen.learning.lifted import Lifted
 from ctrlgen.learning.repeatability import LAMBDA, Repeated, Spectrum
@@ -51,18 +52,41 @@ class RunErrors:
         for run in self.runs:
             e, share = errors(run, lifted)
             self.repeated.append(self.spectrum.repeated(e / self.scale, runs.noise / self.scale, share))
+        self.hidden = [orthonormal(run.hidden, self.spectrum) for run in self.runs]
+        models = [self.spectrum.coefficients(y / self.scale) for y in self.y]
+        self.repeated = told(self.repeated, models, self.hidden)
 
     @property
     def base(self) -> int:
         """The run with the least error, without the noise in it."""
-        return int(np.argmin([r.energy(np.ones(len(self.scale)))[0] for r in self.repeated]))
+        best = 0
+        for j in range(1, len(self.runs)):
+            now, then = self._compared(best, j)
+            best = j if then[0] < now[0] else best
+        return best
+
+    def is_worse(self, j: int, base: int) -> bool:
+        """Whether run j is worse than run `base` beyond the noise of both."""
+        now, then = self._compared(base, j)
+        return then[0] - now[0] > self.options.worse * np.sqrt(now[1] + then[1])
+
+    def _compared(self, *pair: int) -> list[tuple[float, float]]:
+        """Sum of squares of the errors of two runs and its variance, without what one of them hides."""
+        Q = orthonormal([part for j in pair for part in self.runs[j].hidden], self.spectrum)
+        return [without(self.repeated[j], Q).energy(np.ones(len(self.scale))) for j in pair]
 
     def leave_to(self, sensor: SensorBudget) -> np.ndarray:
-        """(n, n_y) [SI] what of the readings' deviation from the model is the sensor's; taken out of every run."""
-        c, se = self.repeating(self.base)
-        kept = self.spectrum.shrinkage(c, se, self.repeated[self.base].freedom)
-        left = sensor.of_sensor(self.spectrum.samples(kept * c) * self.scale)
+        """(n, n_y) [SI] what of the error that the base run read is the sensor's; taken out of every run.
+
+        Of the base run and not of the described drives: what was learnt so far has left an error that the sensor may feign alone."""
+        base = self.base
+        c, se = self.repeating(base)
+        kept = self.spectrum.shrinkage(c, se, self.repeated[base].freedom)
+        moved = self.y[base] - self.lifted.solution.command
+        left = sensor.of_sensor(self.spectrum.samples(kept * c) * self.scale + moved * self.observed)
         off = self.spectrum.coefficients(left / self.scale)
+        read = c + self.spectrum.coefficients(moved * self.observed / self.scale)
+        off = off + along(self.hidden[base], read - off)  # no step in what this run does not tell
         self.repeated = [replace(r, mean=r.mean - off) for r in self.repeated]
         return left
 

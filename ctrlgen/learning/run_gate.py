@@ -18,6 +18,7 @@ import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import show
+from ctrlgen.learning.hidden_parts import hidden_by
 from ctrlgen.learning.lifted import Lifted
 from ctrlgen.learning.response import regressed
 from ctrlgen.learning.runs import Run, Runs, errors, in_time, root_mean_square
@@ -59,7 +60,8 @@ def belonging(runs: Runs, lifted: Lifted, source: str) -> Runs:
     late, i_clock = np.array([s.late for s in seen]), 0
     if not lifted.static:
         i_clock = int(np.argmin(np.abs(late - (np.median(late) if len(seen) > 2 else 0.0))))
-    kept, zeros, notes, faults = list(runs.runs), np.zeros((len(seen), len(names))), list(runs.notes), list[Fault]()
+    kept, notes, faults = list(runs.runs), list(runs.notes), list[Fault]()
+    zeros, delays = np.zeros((len(seen), len(names))), np.zeros(len(seen))
     i_path = _typical(seen, runs, lifted)
     for j, run in enumerate(runs.runs):
         left = _against(seen[j], seen[i_path], runs, lifted)[2]
@@ -85,10 +87,25 @@ def belonging(runs: Runs, lifted: Lifted, source: str) -> Runs:
             notes.append(
                 f"{run.name}: its zero is off that of {runs.runs[0].name}, {off}; taken out. A drift of sensor or stage is not learnt."
             )
-        kept[j] = replace(run, y=y - zeros[j])
+        kept[j], delays[j] = replace(run, y=y - zeros[j]), tau
     if faults:
         raise InputError(source, faults)
+    untold = (zeros != 0) | _at_odds(seen, zeros != 0, runs, lifted)
+    for j, zero in enumerate(untold):
+        rate = np.zeros(seen[j].model.shape) if lifted.static else rate_of(lifted, seen[j].model)
+        kept[j] = replace(kept[j], hidden=hidden_by(zero, delays[j], rate))
     return replace(runs, runs=tuple(kept), notes=tuple(notes))
+
+
+def _at_odds(seen: list[_Seen], known: np.ndarray, runs: Runs, lifted: Lifted) -> np.ndarray:
+    """(runs, n_y) where a later run has another zero than a further one whose drives are so near that no answer of the device explains it,
+    although neither is `known` to be off the first: of both that one which is at odds with more runs, and both where these are as many."""
+    odds = np.zeros((len(seen), len(seen), known.shape[1]), bool)
+    for j in range(2, len(seen)):
+        for i in range(1, j):
+            odds[i, j] = odds[j, i] = (_against(seen[j], seen[i], runs, lifted)[0] != 0) & ~known[i] & ~known[j]
+    count = odds.sum(axis=1)
+    return np.asarray(np.any(odds & (count[:, None] >= count[None, :]), axis=1))
 
 
 def _seen(run: Run, runs: Runs, lifted: Lifted) -> _Seen:

@@ -35,12 +35,14 @@ SETTLED = 4.0  # times the variance between periods, by which the first may diff
 @dataclass(frozen=True, eq=False)
 class Run:
     """The same drives (n, n_u) [SI], as often as they were repeated: readings `y` (m, n, n_y) of the followed signal, NaN where there is
-    none; `names` of the records, and how many first `unsettled` periods were left out."""
+    none; `names` of the records, how many first `unsettled` periods were left out, and the deviations (n, n_y), in typical sizes, of
+    which it can say nothing because its zero or clock was taken out (`hidden_parts`)."""
 
     names: tuple[str, ...]
     drive: np.ndarray
     y: np.ndarray
     unsettled: int = 0
+    hidden: tuple[np.ndarray, ...] = ()
 
     @property
     def name(self) -> str:
@@ -121,7 +123,8 @@ def merged(runs: Runs, lifted: Lifted) -> Runs:
         if joined and _alike(joined[-1].drive, run.drive, lifted):
             last = joined[-1]
             y = np.concatenate([last.y, run.y])
-            joined[-1] = Run((*last.names, *run.names), last.drive, y, last.unsettled + run.unsettled)
+            unsettled, hidden = last.unsettled + run.unsettled, (*last.hidden, *run.hidden)
+            joined[-1] = Run((*last.names, *run.names), last.drive, y, unsettled, hidden)
         else:
             joined.append(run)
     return replace(runs, runs=tuple(joined))
