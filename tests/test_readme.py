@@ -36,6 +36,12 @@ def test_the_printed_output_is_the_programs(tmp_path, compiler):
     # Which compilers there are
     tools = re.compile(r"built strictly with [\w, ]+;|(not installed: not run)|\d+ of \d+ comparisons")
     assert [tools.sub("", line) for line in shown] == [tools.sub("", line) for line in printed if "not run" not in line]
+    if "not run" not in done.stdout:
+        (compared,) = re.findall(r"(\d+) of \d+ comparisons", done.stdout)
+        assert (
+            f" {compared} comparisons of the generated C" in README
+            and f"{compared} of {compared} comparisons" in FIRMWARE
+        )
 
 
 def test_the_python_example_names_what_exists():
