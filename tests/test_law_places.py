@@ -86,10 +86,12 @@ def test_the_cogging_of_a_motor_is_found_with_its_pitch():
     device, recording = cogging_motor()
     found = diagnose_recording(device, recording, jobs=0)
     first = found.findings[0]
-    assert found.verdict is Verdict.EXPLAINED and {f.effect for f in found.findings} == {"cogging"}
+    assert found.verdict is Verdict.EXPLAINED and {f.effect for f in found.findings} == {"cogging_of_slots"}
     period = first.parameters["period"]
     assert to_si(period.value, period.unit) == pytest.approx(0.024, rel=1e-3)
     assert first.parameters["force"].value == pytest.approx(1.5, rel=0.01)
+    second = np.hypot(first.parameters["sine"].value, first.parameters["cosine"].value)
+    assert second == pytest.approx(0.3 / 1.5, abs=0.0035)  # 4 sd: 0.05 N / 1.5 N * sqrt(2 / 3000)
 
 
 def servo_fit(readings, effect: str, start: dict[str, float]) -> tuple[Fitter, Fit]:
