@@ -28,6 +28,7 @@ from ctrlgen.devices import Device
 from ctrlgen.diagnosis.evidence.chance_by_luck import doubted, with_chances
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.evidence.supporting_analyses import run_supporting_analyses
+from ctrlgen.diagnosis.needed_memory import refuse_what_memory_cannot_hold
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.dead_channels import without_dead_channels
 from ctrlgen.diagnosis.selection.direct_detection import directly_detected_findings
@@ -87,7 +88,8 @@ def diagnose_recording(
     Deterministic for a given `seed`, whatever the number of processes, `jobs`: one per core unless given, 0 for this one alone.
     `progress` is called with a sentence before each step. Fits that the `checkpoint` holds are not repeated. `laws` restricts the
     hypotheses to the effects of these names and the device's own parameters.
-    Raises InputError where no record has the role fit or hold_out, where no channel varies, or for an unknown effect.
+    Raises InputError where no record has the role fit or hold_out, where no channel varies, for an unknown effect, or where memory
+    does not hold the recording.
     """
     # Those of an earlier diagnosis only take memory
     compiled_simulator.cache_clear()
@@ -109,6 +111,7 @@ def _diagnose(
     jobs: int,
 ) -> Diagnosis:
     effects = selected_laws(laws)
+    refuse_what_memory_cannot_hold(recording)
     device = _in_units_of_the_reader(device, recording)
     recording = _relative_ambient(_with_both_roles(recording))
     step("noise")
