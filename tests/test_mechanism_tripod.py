@@ -10,7 +10,7 @@ from mechanism_files import dm, with_values
 from ctrlgen import build_model, load_device
 from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.devices.mechanism.constraints import freedoms
-from ctrlgen.devices.mechanism.modes import condensed_modes
+from ctrlgen.devices.mechanism.modes import Modes, compared, condensed_modes
 from ctrlgen.model.simulation import simulate
 
 TRIPOD = load_device(DEVICE.parent / "tripod.toml")
@@ -33,6 +33,20 @@ def test_the_tripod_has_the_stiffness_and_the_modes_of_its_wires_and_springs():
     assert [m.frequency for m in modes] == pytest.approx(wanted, rel=1e-9)
     assert [m.whole for m in modes] == pytest.approx(wanted, rel=1e-9)  # the platform is rigid: nothing is lost
     assert left_out is not None and left_out > 10 * wanted[1]
+
+
+def test_condensed_modes_are_no_faster_modes_and_modes_of_equal_frequency_are_one():
+    """Masses on springs of their own: two at 87 Hz, one at 93 Hz. Held to two of their motions, a model has the square means of what it mixes."""
+    whole = np.array([87.0, 87.0, 93.0])
+    full = Modes(whole, np.eye(3), np.eye(3))
+    part = np.sqrt([0.5, 0.5, 0.34, 0.66])
+    mixed = np.array([[part[0], part[1], 0.0], [-part[2] * part[0], part[2] * part[1], part[3]]]).T
+    own = np.sqrt(whole**2 @ mixed**2)
+    modes, left_out = compared(Modes(own, mixed, np.eye(3)), full)
+    # The first is of both modes at 87 Hz in any basis; the second lies below the 93 Hz that it has 0.66 of
+    assert [m.whole for m in modes] == [87.0, None] and own[1] < 93 and left_out == 87
+    modes, left_out = compared(Modes(whole, np.eye(3)[:, [1, 0, 2]], np.eye(3)), full)
+    assert [m.whole for m in modes] == [87.0, 87.0, 93.0] and left_out is None
 
 
 def test_equal_currents_lift_the_platform_and_the_gauges_read_it():

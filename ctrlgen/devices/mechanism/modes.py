@@ -8,6 +8,7 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 import scipy
+from scipy.optimize import linear_sum_assignment
 
 from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import show
@@ -21,6 +22,7 @@ INERT = 1e-9  # of the largest mass of an axis, below which rounding moves it an
 MASSLESS = 1e-13  # of the largest mass of all bodies: rounding of a motion without any
 FAR = 0.1  # of a frequency: as far as mass and stiffness of a drawing are from the built one's, roughly
 LIKE = 0.5  # of the modal assurance criterion: below it a condensed mode is no single mode
+EQUAL = 1e-4  # of a frequency: half-power width of a resonance in metal (damping ratio 5e-5), closer than which two modes are one
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,15 +165,24 @@ class CondensedMode:
 def condensed_modes(device: Drawing, whole: Modes | None = None) -> tuple[tuple[CondensedMode, ...], float | None]:
     """How far the modes of the bodies moving as at rest are from their modes, and the first mode [Hz] that is left out."""
     full, reduced = whole or free_modes(device), guyan_modes(device)
-    if not len(reduced.frequencies):
-        return (), None
-    like = reduced.likeness(full)
-    partner = like.argmax(axis=1)
+    return compared(reduced, full) if len(reduced.frequencies) else ((), None)
+
+
+def compared(reduced: Modes, full: Modes) -> tuple[tuple[CondensedMode, ...], float | None]:
+    """Each mode of a `reduced` model with that of the `full` one that it is like, no two with the same, and the first [Hz] that none is like.
+
+    Modes of equal frequency, whose directions are any, count together. A motion that is held to some shapes is never slower than the slowest
+    mode that it has a share of (Rayleigh): where it is slower than a mode, others share the motion, and it is not like that one alone.
+    """
+    f, own = full.frequencies, reduced.frequencies
+    equal = np.abs(f[:, None] - f) <= EQUAL * f
+    like = np.where(f <= (1 + EQUAL) * own[:, None], reduced.likeness(full) @ equal, 0.0)
+    _, partner = linear_sum_assignment(like, maximize=True)
+    alike = like[np.arange(len(own)), partner] > LIKE
     modes = tuple(
-        CondensedMode(float(f), float(full.frequencies[k]) if of[k] > LIKE else None)
-        for f, of, k in zip(reduced.frequencies, like, partner, strict=True)
+        CondensedMode(float(g), float(f[k]) if alone else None) for g, k, alone in zip(own, partner, alike, strict=True)
     )
-    return modes, next((float(f) for k, f in enumerate(full.frequencies) if k not in partner), None)
+    return modes, next((float(g) for k, g in enumerate(f) if k not in partner[alike]), None)
 
 
 def inertia_remarks(device: Drawing) -> list[str]:
