@@ -27,7 +27,7 @@ MAY_IMPORT = {
     "numerics": "core",
     "reporting": "core",
     "physics": "core numerics",
-    "effects": "core",
+    "effects": "core physics",
     "devices": f"{FOUNDATION} physics effects",
     "devices.mechanism": DEVICES,
     "devices.user": DEVICES,
