@@ -59,7 +59,7 @@ def test_its_folder_holds_a_matrix_device_that_follows_it(every, tmp_path):
     assert np.allclose([[e.sd for e in row] for row in device.jacobian], every.sd, rtol=1e-2)  # three digits
     largest = np.abs(np.vstack([r.drive for r in every.recording.records])).max(axis=0)
     assert np.allclose([a.high.si for a in device.actuator], 1.05 * largest, rtol=1e-5)
-    assert (tmp_path / "jacobian.csv").read_text().startswith("component,1x,2x,2y,3x,3y,1y")
+    assert (tmp_path / "jacobian.csv").read_text().startswith("component,1x,2x,2y,3x,3y,1y\ntheta_x [rad/m],")
     page = (tmp_path / "calibration.html").read_text()
     assert "42 numbers fitted to 24 poses" in page and "device.calibrated.toml" in page
 
@@ -68,7 +68,7 @@ def stage_of(J: np.ndarray) -> str:
     """A device file of a stage by its Jacobian in um and urad per volt, of which it follows as many directions as it has drives."""
     k = J.shape[1]
     rows = [[f"{x:.9g} {'urad' if i < 3 else 'um'}/V" for x in row] for i, row in enumerate(J)]
-    actuators = "".join(f'[[actuator]]\nname = "p{i}"\nlow = "-20 V"\nhigh = "120 V"\n' for i in range(k))
+    actuators = "".join(f'[[actuator]]\nname = "p{i}"\nlow = "-20 V"\nhigh = "100 V"\n' for i in range(k))
     followed, read = ([*CHANNELS[:k]], [*CHANNELS[k:]])
     return (
         f'kind = "matrix"\nname = "stage"\ntitle = "t"\nsource = "s"\ndirections = {[*CHANNELS]}\njacobian = {rows}\n'
@@ -101,7 +101,15 @@ def test_the_controller_on_a_jacobian_of_planted_poses_leads_the_specimen(drives
     found = calibrate_poses(tmp_path / "stage.toml", [tmp_path])
     assert np.all(np.abs(found.jacobian - 1e-6 * true) < 5 * found.sd)
     jacobian_page.write_jacobian(tmp_path / "found", found)
+    heads = [line.split(",")[0] for line in (tmp_path / "found/jacobian.csv").read_text().splitlines()[1:]]
+    assert heads == [*(f"{name} [rad/V]" for name in CHANNELS[:3]), *(f"{name} [m/V]" for name in CHANNELS[3:])]
     device = load_device(tmp_path / "found/device.calibrated.toml")
+    allowed = np.clip(
+        1.05 * np.array([u.min(axis=0), u.max(axis=0)]), -20, 100
+    )  # a little more than recorded, of what is allowed
+    assert np.allclose([[a.low.si, a.high.si] for a in device.actuator], allowed.T, rtol=1e-5) and np.any(
+        allowed == 100
+    )
     assert device.channels == CHANNELS[:drives] and device.readings == CHANNELS[drives:]
     end = ", ".join(f'{c} = "20 urad"' for c in CHANNELS[:3])
     path = f'[path]\nkind = "line"\nend = {{ {end} }}\n'

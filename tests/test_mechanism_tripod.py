@@ -36,7 +36,7 @@ def test_the_tripod_has_the_stiffness_and_the_modes_of_its_wires_and_springs():
 
 
 def test_condensed_modes_are_no_faster_modes_and_modes_of_equal_frequency_are_one():
-    """Masses on springs of their own: two at 87 Hz, one at 93 Hz. Held to two of their motions, a model has the square means of what it mixes."""
+    """Masses on springs of their own: two at 87 Hz, one at 93 Hz. A model held to two of their motions has square means of these."""
     whole = np.array([87.0, 87.0, 93.0])
     full = Modes(whole, np.eye(3), np.eye(3))
     part = np.sqrt([0.5, 0.5, 0.34, 0.66])

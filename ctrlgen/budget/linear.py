@@ -149,7 +149,7 @@ def _add_sensor(path: UncertainPath, nominal: np.ndarray, sensitivity: np.ndarra
     k = 0
     for line in path.uncertainties.lines:
         if line.kind == "sensor_law":
-            read = ReadPoses(path.model.device, line.paths)
+            read = ReadPoses(path.model.device, line.paths, pose_alone=True)
             places = [[number.path for number in read.numbers].index(name) for name in line.paths]
             sensitivity[:, :, k : k + len(places)] = read.slopes(nominal)[:, :, places]
         for name in line.paths:

@@ -227,7 +227,7 @@ class _Reader:
         if scenario.file.follow != "pose" or not sensor_numbers(self.device).issuperset(line.paths):
             return line
         try:
-            ReadPoses(self.device, line.paths)
+            ReadPoses(self.device, line.paths, pose_alone=True)
         except InputError:
             return line
         return replace(line, kind="sensor_law")

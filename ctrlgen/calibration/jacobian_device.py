@@ -10,7 +10,8 @@ from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.pose_errors import CHANNELS
 
 REACH = 1.05
-"""Of the largest recorded drive to either side: the range of the drives. Of what is beyond nothing was measured."""
+"""Of the largest recorded drive to either side: the range of the drives, so that a recorded pose is not at its end; no farther than the
+described device goes, unless a drive was recorded there. Of what is beyond nothing was measured."""
 PER_DIRECTION = {"theta": "urad", "delta": "um"}
 
 
@@ -44,8 +45,11 @@ def device_text(found: MeasuredJacobian) -> str:
     read = [name for name in CHANNELS if name not in followed]
     lines += [f"readings = {read}".replace("'", '"')] if read else []
     drives = np.vstack([np.zeros(len(drive.channels)), *(r.drive for r in found.recording.records)])
-    for name, unit, column in zip(drive.channels, drive.units, drives.T, strict=True):
-        low, high = (value_text(REACH * end, unit, digits=6) for end in (column.min(), column.max()))
+    (least, most), (low_end, high_end) = (drives.min(axis=0), drives.max(axis=0)), model.u_bounds
+    lowest = np.minimum(least, np.maximum(REACH * least, low_end))
+    highest = np.maximum(most, np.minimum(REACH * most, high_end))
+    for name, unit, *ends in zip(drive.channels, drive.units, lowest, highest, strict=True):
+        low, high = (value_text(end, unit, digits=6) for end in ends)
         lines += [
             "",
             "[[actuator]]",

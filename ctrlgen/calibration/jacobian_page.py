@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from ctrlgen.calibration.device_file import NAME
 from ctrlgen.calibration.jacobian_device import device_text
-from ctrlgen.calibration.jacobian_record import PARTS, drives_of, jacobian_record, norms_of, sets_of
+from ctrlgen.calibration.jacobian_record import PARTS, drives_of, jacobian_record, norms_of, sets_of, units_of
 from ctrlgen.calibration.measured_jacobian import MeasuredJacobian
 from ctrlgen.core.files import write_text
 from ctrlgen.core.units import from_si
@@ -20,19 +20,18 @@ from ctrlgen.reporting.page_figure import FirstScreen, PageFigure
 from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
 from ctrlgen.reporting.result_file import json_text
 
-PER_DRIVE = ("rad/m",) * 3 + ("m/m",) * 3
-
 
 def write_jacobian(out: Path, found: MeasuredJacobian) -> None:
-    """Writes jacobian.csv (entries in rad/m and m/m), jacobian.json, device.calibrated.toml, figures/errors.svg, calibration.html."""
+    """Writes jacobian.csv (entries in SI), jacobian.json, device.calibrated.toml, figures/errors.svg, calibration.html."""
     record = jacobian_record(found)
     with plt.rc_context(STYLE):
         figure = svg(draw_errors(found))
     names = drives_of(found)
+    units = units_of(found)
     lines = ["component," + ",".join(names)]
     lines += [
         f"{c} [{u}]," + ",".join(f"{x:.9g}" for x in row)
-        for c, u, row in zip(CHANNELS, PER_DRIVE, found.jacobian, strict=True)
+        for c, u, row in zip(CHANNELS, units, found.jacobian, strict=True)
     ]
     write_text(out / "jacobian.csv", "\n".join(lines) + "\n")
     write_text(out / "jacobian.json", json_text(record))
@@ -44,7 +43,7 @@ def write_jacobian(out: Path, found: MeasuredJacobian) -> None:
         drives=names,
         channels=CHANNELS,
         entries=[list(map(with_deviation, *rows)) for rows in zip(found.jacobian, found.sd, strict=True)],
-        per_drive=PER_DRIVE,
+        per_drive=units,
         first=_first_screen(found, PageFigure(figure, "Norm of the error of every pose", CAPTION)),
         title=found.device.title,
     )

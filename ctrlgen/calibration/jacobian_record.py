@@ -7,7 +7,7 @@ from pydantic import Field
 
 from ctrlgen.calibration.home_returns import HomeReturns
 from ctrlgen.calibration.measured_jacobian import MeasuredJacobian
-from ctrlgen.core.units import from_si
+from ctrlgen.core.units import base_unit, from_si
 from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.pose_errors import CHANNELS, PoseErrors
 from ctrlgen.reporting.result_file import Keys, Number, Origin, origin
@@ -133,6 +133,13 @@ def jacobian_record(found: MeasuredJacobian) -> JacobianRecord:
 def drives_of(found: MeasuredJacobian) -> tuple[str, ...]:
     """Names of the drives, in the order of the Jacobian's columns."""
     return tuple(build_model(found.device).signals["drive"].channels)
+
+
+def units_of(found: MeasuredJacobian) -> tuple[str, ...]:
+    """SI units of the Jacobian's rows, such as rad/V; of drives of several kinds, rad per SI unit of the drive."""
+    of_drives = {base_unit(unit) for unit in build_model(found.device).signals["drive"].units}
+    per = of_drives.pop() if len(of_drives) == 1 else "SI"
+    return tuple(f"{unit}/{per}" for unit in ("rad",) * 3 + ("m",) * 3)
 
 
 def sets_of(found: MeasuredJacobian) -> list[tuple[str, PoseErrors, PoseErrors]]:

@@ -42,11 +42,12 @@ class SensorNumber:
 
 
 class ReadPoses:
-    """The sensor laws of a device, as functions of its pose. `acts`: whether there are any; `numbers`: those with a stated sd."""
+    """The sensor laws of a device, as functions of its pose with the points that are read beside it. `acts`: whether there are any;
+    `numbers`: those with a stated sd."""
 
-    def __init__(self, device: Device, uncertain: Collection[str] = ()) -> None:
-        """`uncertain`: paths of further numbers of sensor laws that count among `numbers`. Raises InputError where a sensor law reads
-        something else than the pose."""
+    def __init__(self, device: Device, uncertain: Collection[str] = (), pose_alone: bool = False) -> None:
+        """`uncertain`: paths of further numbers of sensor laws that count among `numbers`. `pose_alone`: without the points beside the
+        pose. Raises InputError where a sensor law reads something else."""
         laws = [(k, e) for k, e in enumerate(device.effect) if e.place is Place.SENSOR]
         self.acts = bool(laws)
         self.numbers = tuple(
@@ -68,8 +69,10 @@ class ReadPoses:
         terms = EffectTerms(device, physics, values, z, still, still, none, None, False)
         if terms.faults:
             raise InputError(device.name, terms.faults)
-        pose = ca.SX.sym("pose", len(physics.components))
+        pose = ca.SX.sym("pose", len(physics.readings[0]))
         reading = terms.added(Place.SENSOR, pose)
+        count = len(physics.components) if pose_alone else pose.numel()
+        pose, reading = pose[:count], reading[:count]
         q = ca.vertcat(ca.SX(0, 1), *symbols.values())
         foreign = [
             s
@@ -82,7 +85,7 @@ class ReadPoses:
         at = ca.DM([dict(device.quantities())[number.path].si for number in self.numbers])
         parts = (reading, ca.jacobian(reading, pose), ca.jacobian(reading, q))
         self._at = ca.Function("read", [pose], [ca.densify(ca.substitute(part, q, at)) for part in parts])
-        self._size = np.array(physics.pose_scale)
+        self._size = np.array(physics.readings[2][:count])
 
     def readings(self, poses: np.ndarray) -> np.ndarray:
         """(n, channels) [SI] what is read of `poses` (n, channels)."""

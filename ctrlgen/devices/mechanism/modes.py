@@ -169,10 +169,10 @@ def condensed_modes(device: Drawing, whole: Modes | None = None) -> tuple[tuple[
 
 
 def compared(reduced: Modes, full: Modes) -> tuple[tuple[CondensedMode, ...], float | None]:
-    """Each mode of a `reduced` model with that of the `full` one that it is like, no two with the same, and the first [Hz] that none is like.
+    """Each mode of a `reduced` model with that of the `full` one that it is like, no two with the same; the first [Hz] that none is like.
 
-    Modes of equal frequency, whose directions are any, count together. A motion that is held to some shapes is never slower than the slowest
-    mode that it has a share of (Rayleigh): where it is slower than a mode, others share the motion, and it is not like that one alone.
+    Modes of equal frequency, whose directions are any, count together. A motion that is held to some shapes is never slower than the
+    slowest mode in it (Rayleigh): where it is slower than a mode, others share the motion, and it is not like that one alone.
     """
     f, own = full.frequencies, reduced.frequencies
     equal = np.abs(f[:, None] - f) <= EQUAL * f
