@@ -264,6 +264,13 @@ def test_whatever_a_sensor_says_no_more_than_the_bound_is_added_and_limits_hold(
             assert c("target", c.table, target, corrected) == 0
             assert np.all(np.abs(corrected[:2] - target) <= bounds * 1.001 + 1e-7 * np.abs(target))
         assert np.max(np.abs(c.play(np.vstack([targets, at_limit]))[0])) <= 100
+    for far in (3e38, -3e38, 1e30):  # a period of which is no number in float
+        target, reading = np.array([0, far], np.float32), np.array([3e-7, far], np.float32)
+        assert c("target", c.table, target, corrected) == 0
+        assert abs(corrected[0]) <= bounds[0] and corrected[1] == target[1]
+        c("begin", c.run, c.table)
+        assert all(c("learn", c.run, target, reading) == 0 for _ in range(100))
+        assert c("end", c.run, c.table) == 0 and np.any(c.values(corrections.count))
     nothing = CorrectionLearning.begin(corrections).after_run(targets, np.full(targets.shape, np.nan))
     assert nothing[1] == CorrectionStatus.INPUT | CorrectionStatus.SHORT and not nothing[0].values.any()
 
@@ -351,7 +358,8 @@ def test_the_c_is_the_reference_and_breaks_no_rule(tmp_path):
             str(row.what) for row in compared.rows
         }
         checks = check_rules(folder)
-        assert checks and all(check.state != "failed" for check in checks), [check.findings for check in checks]
+        for check in checks:  # an analyzer that gives up has not passed
+            assert check.state == "passed" or "missing" in check.note, (check.findings, check.note)
 
 
 @pytest.mark.long

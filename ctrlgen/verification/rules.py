@@ -58,7 +58,7 @@ class Analyzer:
 # -O0: an optimiser removes what it should find; the rest lets it come to the end of a controller
 GCC = (
     *("-fanalyzer", "-fanalyzer-call-summaries", "--param=analyzer-bb-explosion-factor=100"),
-    *("--param=analyzer-max-enodes-per-program-point=64", f"-W{GAVE_UP}", *STRICT, "-O0", "-c", "-o", "/dev/null"),
+    *("--param=analyzer-max-enodes-per-program-point=256", f"-W{GAVE_UP}", *STRICT, "-O0", "-c", "-o", "/dev/null"),
 )
 CLANG = ("--analyze", "--analyzer-output", "text", "-Xclang", "-analyzer-werror", *STRICT)
 TIDILY = ("--quiet", f"--config={{Checks: '{','.join(TIDY)}'}}")
