@@ -13,7 +13,7 @@ from ctrlgen.devices import load_device
 from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.formats import read_table
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
-from ctrlgen.recordings.formats.unit_texts import unit_of
+from ctrlgen.recordings.formats.unit_texts import scaled_unit, unit_of
 from ctrlgen.recordings.formats.wrapped_counters import wrapped
 from ctrlgen.recordings.look.column_facts import table_facts
 from ctrlgen.recordings.look.proposal import propose
@@ -238,3 +238,18 @@ def test_numbers_of_a_sheet_are_not_read_with_the_comma_of_its_texts(tmp_path):
             1.25,
             3.125,
         ]
+
+
+def test_ordinary_names_are_not_taken_for_multiples_of_a_unit_or_for_times(tmp_path, axis):
+    """A measuring range, a temperature and a voltage whose letters also mean a multiple, a time and microseconds."""
+    table = table_of(tmp_path, "t (s),CH1 (10 V),CH2 [50 um]\n" + rows(",", T, U, X))
+    assert [(c.scale, c.values.max()) for c in table_facts(table).columns[1:]] == [(1.0, max(U)), (1.0, max(X))]
+    assert [scaled_unit(text) for text in ("100 ns", "0.25 um", "1e3 rpm")] == [
+        (100.0, "ns"),
+        (0.25, "um"),
+        (1e3, "rpm"),
+    ]
+    assert [unit_of(text) for text in ("NM", "nm", "Us", "MV")] == [None, "nm", None, "mV"]
+    table = table_of(tmp_path, "time (s),Us,T1 (um)\n" + rows(",", T, U, T))
+    proposal = propose([table_facts(table)], axis)
+    assert {m.signal: m.column for m in proposal.matches} == {"drive.axis": "Us", "reading.axis": "T1 (um)"}

@@ -31,7 +31,7 @@ WORDS = {
 }  # fmt: skip
 LETTERS = {
     "C": "degC", "g": "g_0", "mil": "thou", "mils": "thou",  # of a log: neither coulombs nor grams nor a mil of angle
-    "S": "s", "MS": "ms", "US": "us", "MM": "mm", "UM": "um",  # in capitals: no log is in siemens
+    "S": "s", "MS": "ms", "US": "us", "MM": "mm", "UM": "um", "MV": "mV", "MA": "mA",  # in capitals: no log is in siemens or megavolts
     "Nm": "N*m", "mNm": "mN*m", "Ncm": "N*cm", "Nmm": "N*mm", "kNm": "kN*m",
 }  # fmt: skip
 SCALED = re.compile(r"(?P<number>\d*\.?\d+(?:[eE][+-]?\d{1,2})?|10\^[+-]?\d{1,2})\s*[*\u00b7]?\s*(?P<unit>[^\W\d].*)")
@@ -72,14 +72,18 @@ def unit_of(text: str) -> str | None:
 
 
 def scaled_unit(text: str) -> tuple[float, str] | None:
-    """A unit of so many others: `0.1 ms` is (0.1, "ms"); None for any other text."""
+    """A unit of so many others: `0.1 ms` is (0.1, "ms"); None for any other text.
+
+    A plain number from 1 on is one of time alone: elsewhere it is rather a measuring range, `10 V` of an input, than a unit.
+    """
     bare = text.strip().strip("[](){}<>").strip()
     match = SCALED.fullmatch(bare) if len(bare) <= LONGEST else None
     unit = None if match is None else unit_of(match["unit"])
     if match is None or unit is None or unit == "1":
         return None
     number = float(match["number"].replace("10^", "1e"))
-    return (number, unit) if number > 0 else None
+    is_power = match["number"].startswith("10^") or "e" in match["number"].lower()
+    return (number, unit) if 0 < number < 1 or is_power or (number > 0 and base_unit(unit) == "s") else None
 
 
 def unclear_factor(text: str) -> bool:

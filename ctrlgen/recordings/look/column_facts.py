@@ -17,7 +17,7 @@ from ctrlgen.recordings.look.answers import NOTHING, Answers
 
 SUFFIX = re.compile(r"^(?P<name>.*[A-Za-z0-9)])[_.](?P<unit>[A-Za-z%]{1,4})$")  # of a name: drive_V, time.ms
 CLOCKS = {"millis": "ms", "micros": "us", "ms": "ms", "us": "us", "msec": "ms", "usec": "us"}
-"""Names of columns that are units of time, of microcontrollers among others."""
+"""Names of columns that are units of time, of microcontrollers among others; those of two letters as they stand: Us is a voltage."""
 RATE_SUFFIX = re.compile(
     r"^.*[A-Za-z0-9)][_.](?P<of>[mun]?m|[mu]?rad|deg)_(?:per_)?s(?P<square>2?)$"
 )  # of a name: v_mm_s, qdd_rad_s2
@@ -154,9 +154,8 @@ def _facts(table: MeasurementTable, name: str) -> ColumnFacts:
 def _suffix(name: str) -> str | None:
     """The unit that a name ends in, such as `V` of drive_V, or is itself, such as `micros`; of the letters that are also indices or axes
     none is taken."""
-    if name.lower() in CLOCKS:
-        return CLOCKS[name.lower()]
-    """The unit that a name ends in, such as `V` of drive_V; of the letters that are also indices or axes none is taken."""
+    if (clock := CLOCKS.get(name if len(name) == len("ms") else name.lower())) is not None:
+        return clock
     if rate := RATE_SUFFIX.match(name):
         return f"{rate['of']}/s" + ("^2" if rate["square"] else "")
     match = SUFFIX.match(name)
@@ -206,9 +205,10 @@ def _time_in(table: MeasurementTable, facts: ColumnFacts, chosen: bool) -> TimeF
 
 
 def is_a_time(column: ColumnFacts) -> bool:
-    """Whether a column is named as a time and rises from row to row."""
+    """Whether a column is named as a time, in no other unit (T of a temperature), and rises from row to row."""
     named = TIME_NAME.match(column.bare) or TIME_NAME.match(column.last)
-    return bool(named) and column.moves and bool(np.all(np.diff(column.finite) > 0))
+    timed = column.unit is None or same_dimension(column.unit, "s")
+    return bool(named) and timed and column.moves and bool(np.all(np.diff(column.finite) > 0))
 
 
 def rests(drives: np.ndarray) -> list[tuple[int, int]]:
