@@ -1,13 +1,12 @@
 """Templates of pages, C and new files, compiled once: what jinja2 makes of a template is kept in the user's cache folder.
 
-Compiling the templates of one scenario takes as long as solving its path. A folder that cannot be written is no error.
+Compiling the templates of one scenario takes as long as solving its path. No folder, or one that cannot be written, is no error.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
-import pickle
 import tempfile
 from collections.abc import Sequence
 from contextlib import suppress
@@ -17,10 +16,15 @@ from typing import Any
 import jinja2
 from jinja2.bccache import Bucket
 
+DIGEST = hashlib.sha256().digest_size
 
-def cache_folder() -> Path:
-    """The folder of what can be made again: $XDG_CACHE_HOME/ctrlgen, or ~/.cache/ctrlgen."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "ctrlgen"
+
+def cache_folder() -> Path | None:
+    """The folder of what can be made again: $XDG_CACHE_HOME/ctrlgen, or ~/.cache/ctrlgen; None for a user without a home."""
+    try:
+        return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "ctrlgen"
+    except RuntimeError:  # as in a container with a number for a user
+        return None
 
 
 def environment(folders: Path | Sequence[Path], **options: Any) -> jinja2.Environment:
@@ -34,7 +38,10 @@ def environment(folders: Path | Sequence[Path], **options: Any) -> jinja2.Enviro
 
 
 class _Cache(jinja2.BytecodeCache):
-    """Compiled templates by the content of the template, the options and jinja2's version; jinja2 itself looks at the content alone."""
+    """Compiled templates by the content of the template, the options and jinja2's version; jinja2 itself looks at the content alone.
+
+    A file begins with the SHA-256 of the rest, so that nothing damaged or foreign is read as code.
+    """
 
     def __init__(self, options: dict[str, Any]) -> None:
         self._made_with = f"{jinja2.__version__} {sorted(options.items())!r}"
@@ -44,20 +51,27 @@ class _Cache(jinja2.BytecodeCache):
         return hashlib.sha256(f"{self._made_with}\0{source}".encode()).hexdigest()
 
     def load_bytecode(self, bucket: Bucket) -> None:
-        """Fills `bucket` where there is a file; jinja2 leaves it empty where that is of another checksum."""
-        with suppress(OSError, EOFError, pickle.UnpicklingError), self._path(bucket).open("rb") as file:
-            bucket.load_bytecode(file)
+        """Fills `bucket` where there is a whole file; jinja2 leaves it empty where that is of another checksum."""
+        path, kept = self._path(bucket), b""
+        with suppress(OSError):
+            kept = b"" if path is None else path.read_bytes()
+        digest, code = kept[:DIGEST], kept[DIGEST:]
+        if hashlib.sha256(code).digest() == digest:
+            bucket.bytecode_from_string(code)
 
     def dump_bytecode(self, bucket: Bucket) -> None:
         """Writes a file that appears as a whole or not at all."""
-        path = self._path(bucket)
+        path, code = self._path(bucket), bucket.bytecode_to_string()
+        if path is None:
+            return
         with suppress(OSError):
             path.parent.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryDirectory(dir=path.parent) as folder:
                 written = Path(folder, path.name)
-                written.write_bytes(bucket.bytecode_to_string())
+                written.write_bytes(hashlib.sha256(code).digest() + code)
                 written.replace(path)
 
-    def _path(self, bucket: Bucket) -> Path:
+    def _path(self, bucket: Bucket) -> Path | None:
         """The `key` is of the template's name and folder, so that a changed one takes the place of the one before."""
-        return cache_folder() / "templates" / f"{bucket.key}.pyc"
+        folder = cache_folder()
+        return None if folder is None else folder / "templates" / f"{bucket.key}.pyc"

@@ -72,13 +72,14 @@ class Compilable:
         self.function = function
         self.seconds = 0.0  # spent in the virtual machine so far
         self._code: str | None = None
+        self._folder = cache_folder()
         self._settled = compiler() is None
         self._loop: Callable[..., int] | None = None
 
     def spent(self, seconds: float, expected: float = 0.0) -> bool:
         """Counts `seconds` of the virtual machine, where it would take the `expected` ones beside; whether `function` has been replaced
         by its library."""
-        if self._settled:
+        if self._settled or self._folder is None:
             return False
         self.seconds += seconds
         if self._code is None:
@@ -86,11 +87,12 @@ class Compilable:
                 return False
             self._code = c_code(self.function)
         price = len(self._code) * SECONDS_PER_CHARACTER
-        path = _library(self._code)
-        if not path.exists() and (self.seconds + expected < price or len(self._code) > LONGEST):
+        path = self._folder / _library(self._code)
+        kept = os.access(path, os.R_OK)  # where a folder above is another user's, `exists` is an error
+        if not kept and (self.seconds + expected < price or len(self._code) > LONGEST):
             return False
         self._settled = True
-        if not path.exists() and not _compile(self._code, path):
+        if not kept and not _compile(self._code, path):
             return False
         name, self._code = self.function.name(), ""
         self.function = ca.external(name, str(path))
@@ -199,9 +201,9 @@ def _with_locals(parts: list[list[str]]) -> list[str]:
     return pieces[::-1]
 
 
-def _library(code: str) -> Path:
+def _library(code: str) -> str:
     digest = hashlib.sha256("\0".join((code, str(compiler()), *FLAGS)).encode()).hexdigest()[:32]
-    return cache_folder() / f"{digest}.so"
+    return f"{digest}.so"
 
 
 def _compile(code: str, path: Path) -> bool:

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import jinja2
 import numpy as np
 
 from ctrlgen.app.new_files.questions import KINDS, Answer, answers
+from ctrlgen.core.compiled_templates import environment
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import write_text
 from ctrlgen.core.names import C_NAME, checked
@@ -193,15 +193,11 @@ def reachable(model: Model) -> Reach:
 
 
 def _render(template: str, **values: object) -> str:
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).resolve().parent),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=False,  # TOML; every value is a number with a unit or an identifier
+    # TOML, unescaped: every value is a number with a unit or an identifier
+    templates = environment(
+        Path(__file__).resolve().parent, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True
     )
-    return environment.get_template(template).render(**values)
+    return templates.get_template(template).render(**values)
 
 
 def _absent(file: Path) -> None:
