@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +11,12 @@ from scipy.signal import lfilter
 
 from ctrlgen import build_model, load_scenario, solve, user_device
 from ctrlgen.learning.learn import learn_from
+from ctrlgen.learning.learning_options import LearningOptions
 from ctrlgen.learning.lifted import Lifted
 from ctrlgen.learning.norm_optimal import drive_scale
 from ctrlgen.learning.repeatability import Spectrum
 from ctrlgen.learning.response import Change, regressed, response
+from ctrlgen.learning.run_errors import RunErrors
 from ctrlgen.learning.runs import Run, Runs, first_differs
 
 
@@ -102,8 +105,26 @@ def test_what_a_device_leaves_unexplained_is_its_share_without_the_noise(tmp_pat
     moved = lifted.run(then) - lifted.run(u)
     for noise, known in ((1e-9, 1e-3), (0.6e-6, 0.1)):
         y = 0.7 * moved + noise * rng.standard_normal(moved.shape)
-        found = response(lifted, [Change(u, then, y, np.full(2, noise), np.ones(2, bool))])
+        change = Change(u, then, y, np.full(2, noise), np.ones(2, bool), np.zeros((0, lifted.n, 2)))
+        found = response(lifted, [change])
         assert found.unexplained == pytest.approx(0.09 / 0.49, abs=known)
+
+
+def test_how_a_drive_acts_is_told_by_what_no_run_hides(tmp_path, rng):
+    """Drive b acts the other way; both drives changed on the mean too, but the second run's zeros are not known."""
+    lifted = plate(tmp_path)
+    u, n = lifted.solution.drive, lifted.n
+    then = u + 3 + rng.standard_normal(u.shape)
+    first = lifted.run(u)
+    second = lifted.run(u + (then - u) * np.array([1, -1]))
+    second -= (second - first).mean(axis=0)
+    seen = [y + 1e-12 * rng.standard_normal((3, n, 2)) for y in (first, second)]
+    runs = of((u, then), seen)
+    hidden = tuple(np.ones((n, 1)) * row for row in np.eye(2))
+    later = replace(runs.runs[1], hidden=hidden)
+    found = RunErrors(lifted, replace(runs, runs=(runs.runs[0], later)), LearningOptions()).response(2)
+    assert found is not None and found.gain == pytest.approx([1, -1], abs=1e-6)
+    assert list(found.reasons) == ["drive.b"]
 
 
 def test_noise_of_both_runs_is_no_other_answer_of_the_device(tmp_path, rng):

@@ -7,7 +7,8 @@ regressed on that,
 
 by least squares over all samples and channels of all pairs of runs, with the standard error of g that holds for correlated e (W. K. Newey,
 K. D. West, Econometrica 55 (1987) 703). g_i = 1 is the device as described, -1 one that moves the other way. Learning with the
-sensitivities as described brings the error down only where 0 < g_i < 2.
+sensitivities as described brings the error down only where 0 < g_i < 2. What one of the two runs hides (`ctrlgen.learning.hidden_parts`) is
+left out on both sides.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from itertools import combinations
 import numpy as np
 from scipy.stats import norm
 
+from ctrlgen.learning.hidden_parts import along
 from ctrlgen.learning.lifted import Lifted
 
 CONFIDENCE = 0.999  # with which an actuator must contradict before learning refuses
@@ -45,13 +47,19 @@ class Response:
 @dataclass(frozen=True)
 class Change:
     """From one run to the next: drives `u` and `then` (n, n_u), the observed change `y` (n, n_y) of the signal and its noise `sd` (n_y,)
-    per sample; `observed` (n_y,)."""
+    per sample; `observed` (n_y,); `hidden` (k, n, n_y), orthonormal in typical sizes: the directions that one of the two runs hides."""
 
     u: np.ndarray
     then: np.ndarray
     y: np.ndarray
     sd: np.ndarray
     observed: np.ndarray
+    hidden: np.ndarray
+
+    def shown(self, y: np.ndarray, scale: np.ndarray) -> np.ndarray:
+        """What both runs show of a change (n, n_y) [SI], in typical sizes `scale` (n_y,): of the channels that were observed."""
+        scaled = y / scale * self.observed
+        return np.asarray((scaled - along(self.hidden, scaled))[:, self.observed])
 
 
 def response(lifted: Lifted, changes: Sequence[Change]) -> Response | None:
@@ -63,8 +71,8 @@ def response(lifted: Lifted, changes: Sequence[Change]) -> Response | None:
     for change in changes:
         du, base = change.then - change.u, lifted.run(change.u)
         parts = [lifted.run(change.u + du * unit) - base for unit in np.eye(du.shape[1])]
-        X.append(np.stack(parts, axis=2)[:, change.observed] / scale[change.observed, None])
-        seen.append(change.y[:, change.observed] / scale[change.observed])
+        X.append(np.stack([change.shown(part, scale) for part in parts], axis=2))
+        seen.append(change.shown(change.y, scale))
     size = np.sqrt(sum(np.sum(x**2, axis=(0, 1)) for x in X))
     moved = size > MOVED * max(size.max(), 1e-300)
     gain, se = np.full(len(size), np.nan), np.full(len(size), np.nan)
@@ -118,7 +126,7 @@ def _exchanged(
         left = 0.0
         for change, y in zip(changes, seen, strict=True):
             moved = lifted.run(change.then[:, order]) - lifted.run(change.u[:, order])
-            left += float(np.sum((y - (moved / scale)[:, change.observed]) ** 2))
+            left += float(np.sum((y - change.shown(moved, scale)) ** 2))
         if left - noise < least:
             least, best = left - noise, pair
     return best

@@ -72,8 +72,12 @@ class RunErrors:
 
     def _compared(self, *pair: int) -> list[tuple[float, float]]:
         """Sum of squares of the errors of two runs and its variance, without what one of them hides."""
-        Q = orthonormal([part for j in pair for part in self.runs[j].hidden], self.spectrum)
+        Q = self._hidden_by(*pair)
         return [without(self.repeated[j], Q).energy(np.ones(len(self.scale))) for j in pair]
+
+    def _hidden_by(self, *pair: int) -> np.ndarray:
+        """(k, n, n_y) an orthonormal basis, of coefficients, of what one of two runs hides."""
+        return orthonormal([part for j in pair for part in self.runs[j].hidden], self.spectrum)
 
     def leave_to(self, sensor: SensorBudget) -> np.ndarray:
         """(n, n_y) [SI] what of the error that the base run read is the sensor's; taken out of every run.
@@ -178,10 +182,12 @@ class RunErrors:
         """What the changes among the first `count` runs say."""
         n, changes = self.lifted.n, list[Change]()
         for j in range(1, count):
-            a, b = self.repeated[j - 1], self.repeated[j]
+            Q = self._hidden_by(j - 1, j)
+            a, b = (without(self.repeated[i], Q) for i in (j - 1, j))
             sd = np.sqrt(np.sum(a.se**2 + b.se**2, axis=0) / n) * self.scale
             y = self.spectrum.samples(b.mean - a.mean) * self.scale
-            changes.append(Change(self.runs[j - 1].drive, self.runs[j].drive, y, sd, self.observed))
+            hidden = np.array([self.spectrum.samples(q) for q in Q]).reshape(-1, n, len(self.scale))
+            changes.append(Change(self.runs[j - 1].drive, self.runs[j].drive, y, sd, self.observed, hidden))
         return response(self.lifted, changes)
 
     def repeating(self, base: int) -> tuple[np.ndarray, np.ndarray]:

@@ -93,7 +93,7 @@ def belonging(runs: Runs, lifted: Lifted, source: str) -> Runs:
     untold = (zeros != 0) | _at_odds(seen, zeros != 0, runs, lifted)
     for j, zero in enumerate(untold):
         rate = np.zeros(seen[j].model.shape) if lifted.static else rate_of(lifted, seen[j].model)
-        kept[j] = replace(kept[j], hidden=hidden_by(zero, delays[j], rate))
+        kept[j] = replace(kept[j], hidden=hidden_by(zero, delays[j], rate * runs.observed))
     return replace(runs, runs=tuple(kept), notes=tuple(notes))
 
 
