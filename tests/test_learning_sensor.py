@@ -14,7 +14,7 @@ from ctrlgen.devices.changed_numbers import changed
 from ctrlgen.effects import read_effect
 from ctrlgen.learning.implied_pose import ImpliedPose
 from ctrlgen.learning.learning_options import LearningOptions
-from ctrlgen.learning.learning_page import verdict
+from ctrlgen.learning.learning_page import verdict, write_learning
 from ctrlgen.learning.lifted import Lifted
 from ctrlgen.learning.run_errors import RunErrors
 from ctrlgen.learning.run_gate import belonging
@@ -135,9 +135,11 @@ def test_a_scale_of_the_sensor_is_not_learnt_where_the_stage_is_right(circle, tm
     found = learn(circle.scenario, bench.runs)
     before, after = bench.error(circle.drive), bench.error(found.next.drive)
     assert before < 1e-9 and after < 5e-9  # noise of five periods
-    assert "The true error may be up to" in verdict(found) and any(
-        "are left to it" in words for words in sensor_words(found)
-    )
+    words = " ".join(sensor_words(found))
+    assert "The true error may be up to" in verdict(found) and "are left to it" in words
+    assert found.stop == "what is left of the error may be the sensor's" and "state it as [sensor]" in words
+    write_learning(tmp_path / "out", found)
+    assert "Where the sensor is known better, state it" in (tmp_path / "out" / "learning.html").read_text()
     assert found.of_group(found.left_to_sensor, found.groups[0]) == pytest.approx(
         0.008 * np.hypot(10, 20) * 1e-6, rel=0.05
     )

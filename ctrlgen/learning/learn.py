@@ -165,7 +165,9 @@ def learn_from(
     c, se = job.repeating(base)
     kept = job.spectrum.shrinkage(c, se, job.repeated[base].freedom)
     repeating = job.spectrum.samples(kept * c) * job.scale
-    stop = job.nothing_left(base) or (job.stalled(base) if len(results) - 1 - base >= options.most_stalls else "")
+    stop = job.nothing_left(base, left_to_sensor) or (
+        job.stalled(base) if len(results) - 1 - base >= options.most_stalls else ""
+    )
     now, u = results[base].drive, results[base].drive
     if not stop:
         u = _step(lifted, Wanted(lifted.solution.command - repeating, job.weights, now), step, job.most(now), options)

@@ -9,7 +9,7 @@ from ctrlgen.learning.learn import Learning
 from ctrlgen.learning.learning_plots import draw_learning, learning_charts
 from ctrlgen.learning.learning_record import learning_record
 from ctrlgen.learning.run_errors import RunResult
-from ctrlgen.learning.sensor_words import sensor_words
+from ctrlgen.learning.sensor_words import left_to_sensor, sensor_words
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.page_figure import FirstScreen, PageFigure, page_figures
 from ctrlgen.reporting.result_file import json_text
@@ -63,6 +63,11 @@ def first_screen(learning: Learning, figure: PageFigure) -> FirstScreen:
             "Keep the drives of the best run (`drives.csv`).",
             "If that is not enough, diagnose a run: `ctrlgen diagnose`.",
         ]
+        if any(left_to_sensor(learning, g) for g in learning.groups):
+            steps.insert(
+                1,
+                "Where the sensor is known better, state it: `[sensor]` in uncertainty.toml. The same runs then go on.",
+            )
     else:
         steps = [
             "Run `drives.csv` on the stage, repeated a few times.",

@@ -206,10 +206,15 @@ class RunErrors:
         largest, first_step = np.abs(now).max(axis=0), self.options.first_step
         return (first_step if len(self.runs) == 1 else 1.0) * np.maximum(largest, first_step * largest.max())
 
-    def nothing_left(self, base: int) -> str:
-        """Why nothing is left to learn; empty where there is."""
-        left, _ = self._left(base)
-        return "" if left[:, self.observed].any() else "what is left of the error is not distinguishable from noise"
+    def nothing_left(self, base: int, left_to_sensor: np.ndarray) -> str:
+        """Why nothing is left to learn; empty where there is. `left_to_sensor` (n, n_y) [SI] was taken out of every run."""
+        if self._left(base)[0][:, self.observed].any():
+            return ""
+        r = self.repeated[base]
+        read = r.mean + self.spectrum.coefficients(left_to_sensor / self.scale)
+        if self.spectrum.shrinkage(read, r.se, r.freedom)[:, self.observed].any():
+            return "what is left of the error may be the sensor's"
+        return "what is left of the error is not distinguishable from noise"
 
     def stalled(self, base: int) -> str:
         """Why no further step is tried."""
