@@ -30,7 +30,7 @@ class NamedInverses:
 def named_inverses(device: Device, follow: str, sample_time: float | None) -> NamedInverses:
     """The inverses of `device` for the signal named `follow` with formulas; without any where nobody could read them."""
     model = symbolic_model(device)
-    if ca.n_nodes(model.balance) > MOST_OPERATIONS and not device.given_at_start:
+    if ca.n_nodes(model.balance) > MOST_OPERATIONS:
         return NamedInverses(None, None, symbolic_model(device, ()), [])
     return _inverses(model, follow, sample_time)
 
