@@ -204,6 +204,8 @@ def test_a_reading_of_second_order_is_seen_from_the_body_on_which_its_sensor_sta
     expanded, exact, d = SecondOrder(c), ExactJoints(c), np.array([0.8, -0.5]) * 2e-4
     at = ca.SX.sym("d", 2)  # a gradient in the drawing's symbols takes seconds: it is made once
     assert expanded.restoring_force(at) is expanded.restoring_force(at)
+    more = expanded.restoring_force(at, lambda x: x[0] ** 4) - expanded.restoring_force(at)
+    assert dm(ca.substitute(more, at, ca.DM([0.5, 0.0]))).ravel() == pytest.approx([0.5, 0.0], rel=1e-9)  # 4 x^3
 
     def read(sign: float) -> np.ndarray:
         q = ca.SX(exact.held(sign * d)[0])

@@ -17,6 +17,7 @@ from ctrlgen.budget.uncertain_path import UncertainPath
 from ctrlgen.budget.uncertainty import load_uncertainties
 from ctrlgen.calibration import jacobian_page
 from ctrlgen.calibration.home_returns import home_returns
+from ctrlgen.calibration.instrument_share import instrument_shares
 from ctrlgen.calibration.measured_jacobian import calibrate_poses
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
@@ -111,6 +112,21 @@ def test_the_laws_read_what_rays_do(rng):
     assert np.abs(back - poses).max() < 1e-15
 
 
+def test_a_law_of_a_reading_beside_the_pose_is_taken_out_and_is_none_of_the_pose(rng):
+    """A gauge of the tripod, whose pose is (theta_x, theta_y, delta_z), that sees 3 mrad of another gauge's motion."""
+    table = tomllib.loads((SCENARIOS / "devices" / "tripod.toml").read_text())
+    lean = law("mirror_tilt", "gauge_2", "gauge_1", tilt={"value": "3 mrad", "sd": "1 mrad", "source": "test"})
+    tripod = validate(Device.library["mechanism"], {**table, "effect": [lean]}, "tripod")
+    moved = rng.uniform(-1, 1, (4, 6)) * 100 * UM
+    whole, alone = ReadPoses(tripod), ReadPoses(tripod, pose_alone=True)
+    read = moved + 3e-3 * moved[:, [3]] * np.eye(6)[4]
+    assert np.allclose(whole.readings(moved), read, rtol=0, atol=1e-18) and np.allclose(
+        whole.poses(read), moved, rtol=0, atol=1e-18
+    )
+    assert np.allclose(whole.slopes(moved)[:, 4, 0], -moved[:, 3], rtol=1e-12)
+    assert np.array_equal(alone.readings(moved[:, :3]), moved[:, :3]) and not alone.slopes(moved[:, :3]).any()
+
+
 def recording(folder, read: np.ndarray, drive: np.ndarray, held: int, noise: bool = False) -> None:
     """A recording of settled poses, the last `held` held out."""
     text = ",".join([*DRIVES, *COMPONENTS]) + "\n"
@@ -182,6 +198,14 @@ def test_leans_of_the_faces_are_fitted_with_their_standard_deviations(tmp_path, 
     fit = fitter.fit(Structure(cube, free=free))
     sd = np.sqrt(np.diag(fit.covariance))
     assert np.all(np.abs(fit.theta - [true[k] for k in places]) < 4 * sd) and np.all(sd < 5e-5)
+
+
+def test_an_autocollimator_may_feign_its_accuracy_at_the_largest_angle(rng):
+    """Evenly distributed within 7e-5 deg (GUM 4.3.7), and taken over whole by a fit to angles that are linear in the drives."""
+    cube, drive = device([]), rng.uniform(-0.2e-3, 0.2e-3, (30, 6))
+    shares = instrument_shares(cube, ReadPoses(cube), drive, drive @ planted(rng).T)
+    assert [s.rotation for s in shares] == pytest.approx([7e-5 * DEG / np.sqrt(3)] * 3, rel=1e-9)
+    assert max(s.translation for s in shares) < 1e-18
 
 
 def _poses(model, drive: np.ndarray) -> np.ndarray:
