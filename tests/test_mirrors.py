@@ -19,6 +19,7 @@ from ctrlgen.calibration import jacobian_page
 from ctrlgen.calibration.home_returns import home_returns
 from ctrlgen.calibration.instrument_share import instrument_shares
 from ctrlgen.calibration.measured_jacobian import calibrate_poses
+from ctrlgen.core.errors import InputError
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
 from ctrlgen.estimation.fit import Fitter
@@ -125,6 +126,40 @@ def test_a_law_of_a_reading_beside_the_pose_is_taken_out_and_is_none_of_the_pose
     )
     assert np.allclose(whole.slopes(moved)[:, 4, 0], -moved[:, 3], rtol=1e-12)
     assert np.array_equal(alone.readings(moved[:, :3]), moved[:, :3]) and not alone.slopes(moved[:, :3]).any()
+
+
+def test_what_an_instrument_may_feign_is_what_another_one_would_have_implied(rng):
+    """A lean that is one sd larger than stated."""
+    drive = rng.uniform(-1e-4, 1e-4, (30, 6))
+    poses = drive @ planted(rng).T
+
+    def leaning_mirror(tilt: str) -> ReadPoses:
+        return ReadPoses(device([law("mirror_tilt", "delta_y", "delta_x", tilt={"value": tilt, "sd": "0.1 mrad"})]))
+
+    stated, larger = leaning_mirror("1 mrad"), leaning_mirror("1.1 mrad")
+    off = larger.poses(stated.readings(poses)) - poses
+    assert off[:, 4] == pytest.approx(-1e-4 * poses[:, 3], rel=1e-6)
+    assert stated.deviations(poses)[0] == pytest.approx(off, abs=1e-9 * np.abs(off).max())
+    # It grows with the pose, which is linear in the drives: the Jacobian takes it over whole
+    share = instrument_shares(device([]), stated, drive, poses)[0]
+    assert share.translation == pytest.approx(1e-4 * np.abs(poses[:, 3]).max()) and share.rotation < 1e-12
+
+
+def test_an_autocollimator_reads_within_its_accuracy_and_range(rng):
+    seen = device([]).sensor[0]
+    off = seen.read(np.full(10_000, 1e-3), rng) - 1e-3
+    assert np.abs(off).max() <= 7e-5 * DEG and np.std(off) == pytest.approx(7e-5 * DEG / np.sqrt(3), rel=0.03)
+    assert seen.reading_rate == pytest.approx(40 / 30)
+    assert seen.read(np.array([-0.2749, 0.2749]) * DEG, rng).shape == (2,)
+    for beyond in (-0.2751, 0.2751):
+        with pytest.raises(ValueError, match=r"the range is -0\.275 deg to 0\.275 deg"):
+            seen.read(np.array([0.0, beyond]) * DEG, rng)
+
+
+def test_readings_that_say_nothing_of_the_pose_are_refused(rng):
+    dead = ReadPoses(device([law("stuck", "delta_x", share="1", level="0 um")]))
+    with pytest.raises(InputError, match="says nothing of the pose"):
+        dead.poses(dead.readings(drawn(rng)))
 
 
 def recording(folder, read: np.ndarray, drive: np.ndarray, held: int, noise: bool = False) -> None:

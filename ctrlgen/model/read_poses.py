@@ -92,11 +92,12 @@ class ReadPoses:
         return self._parts(poses)[0]
 
     def poses(self, readings: np.ndarray) -> np.ndarray:
-        """(n, channels) [SI] the poses that `readings` (n, channels) imply. Raises InputError where Newton's method finds none."""
+        """(n, channels) [SI] the poses that `readings` (n, channels) imply. Raises InputError where Newton's method finds none, or a
+        reading says nothing of the pose."""
         found = readings.copy()
         for _ in range(STEPS if self.acts and len(readings) else 0):
             seen, slope, _ = self._parts(found)
-            step = np.linalg.solve(slope, (readings - seen)[:, :, None])[:, :, 0]
+            step = _solved(slope, (readings - seen)[:, :, None])[:, :, 0]
             found = found + step
             if np.all(np.abs(step) <= CLOSE * np.maximum(self._size, np.abs(found))):
                 return found
@@ -114,7 +115,7 @@ class ReadPoses:
     def slopes(self, poses: np.ndarray) -> np.ndarray:
         """(n, channels, numbers) [SI] what the implied poses change by with each of `numbers`, -(dh/dp)^-1 dh/dn."""
         _, slope, by_number = self._parts(poses)
-        return -np.linalg.solve(slope, by_number)
+        return -_solved(slope, by_number)
 
     def _parts(self, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         n, width = poses.shape
@@ -124,3 +125,14 @@ class ReadPoses:
             for m, columns in ((slope, width), (by_number, len(self.numbers)))
         )
         return seen, by_pose, by_each
+
+
+def _solved(slope: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """slope^-1 right at each pose. Raises InputError where a reading does not change with the pose."""
+    try:
+        return np.asarray(np.linalg.solve(slope, right))
+    except np.linalg.LinAlgError:
+        what = (
+            "a reading says nothing of the pose, as that of a channel that is stuck; leave out its law, or correct it"
+        )
+        raise InputError("sensor laws", [Fault("effect", what)]) from None
