@@ -351,6 +351,11 @@ def test_the_phi_functions_are_their_series(a):
     size = max(1.0, abs(a))  # a matrix as large as this loses so many digits
     for found, value in zip(phi_matrices(M, 3), exact, strict=True):
         assert np.abs(found - value).max() < 1e-13 * size * max(1.0, np.abs(value).max())
+    apart = np.zeros((4, 4))  # states that neither move nor push stand between them
+    apart[np.ix_([0, 2], [0, 2])] = M
+    for k, (found, value) in enumerate(zip(phi_matrices(apart, 3), exact, strict=True)):
+        assert np.array_equal(found[1::2, 1::2], np.eye(2) / factorial(k)) and not found[::2, 1::2].any()
+        assert np.abs(found[::2, ::2] - value).max() < 1e-13 * size * max(1.0, np.abs(value).max())
     h, v = 0.1, np.eye(2)[0]
     halvings = max(0, int(np.ceil(np.log2(np.abs(M).sum(axis=1).max()))))
     for k in range(3):

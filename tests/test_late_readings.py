@@ -13,6 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from ctrlgen import user_device
 from ctrlgen.core.files import validate
+from ctrlgen.core.units import Quantity
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.diagnose import diagnose_recording
 from ctrlgen.diagnosis.selection.candidates import fit_other_clocks
@@ -23,7 +24,7 @@ from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis, hypotheses, nominal_physics
-from ctrlgen.estimation.late_readings import LateSlopes, effects_apart
+from ctrlgen.estimation.late_readings import LateSlopes, effects_apart, settling_time_of
 from ctrlgen.estimation.noise import Noise, NoiseSource
 from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.estimation.structure import Structure
@@ -111,6 +112,11 @@ def test_what_acts_behind_a_delay_or_on_it_in_a_loop_keeps_the_samples_in_the_mo
     late, *_ = hypotheses(looped, physics, ("reading.axis",), H, False, [Effect.library["delay"]])
     assert late.bounds(late.law.amplitude(), late.channel_on(looped)) == (0.0, 8 * H)
     assert effects_apart(Structure(looped, (late,), ({"delay": 2e-3},)).expanded_device, physics) == ()
+
+
+def test_the_noise_is_looked_for_without_building_a_delay_of_minutes():
+    late = AXIS.model_copy(update={"effect": (Effect.library["delay"]("axis", {"delay": Quantity(600.0, "600 s")}),)})
+    assert settling_time_of(late) == settling_time_of(AXIS) > 0
 
 
 def late_recording(tau: float, n: int = 1500, seed: int = 3) -> Recording:

@@ -14,6 +14,7 @@ from written_laws import H
 
 import ctrlgen.effects  # noqa: F401  fills the library
 from ctrlgen import build_model, load_device, simulate
+from ctrlgen.core.errors import InputError
 from ctrlgen.core.files import validate
 from ctrlgen.core.units import Quantity
 from ctrlgen.devices import Device
@@ -84,6 +85,17 @@ def test_a_delay_keeps_as_many_samples_as_it_takes(samples, states):
     assert len(late.kept(H, free=False)) == states
     assert len(late.kept(H, free=True)) >= 2 * states  # a fit may double it
     assert len(late.kept(None, free=True)) == len(late.kept(float("inf"), free=True)) == 15
+
+
+def test_a_delay_of_more_samples_than_a_model_can_keep_is_refused_at_once():
+    table = tomllib.loads(AXIS_FILE.read_text()) | {"effect": [{"kind": "delay", "at": "axis", "delay": "1000 s"}]}
+    late = validate(Device.library["axis"], table, "late.toml")
+    with pytest.raises(
+        InputError, match=r"1000 s is 1000000 samples of 0.001 s.* write 1 s or less, or sample every 1 s"
+    ):
+        build_model(late, sample_time=1e-3)
+    assert build_model(late, sample_time=100.0).x.numel() >= 3 * 10
+    assert build_model(late, sample_time=1e-3, apart=(0,)).x.numel() < 3
 
 
 def test_a_plant_whose_reading_is_late_by_forty_samples_is_what_it_was_forty_samples_ago():

@@ -29,14 +29,14 @@ from ctrlgen.devices.usual_deviation import ASSUMED_SCALE
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.free_parameters import FreeParameter
 from ctrlgen.estimation.isolated_outliers import mark_outliers
+from ctrlgen.estimation.late_readings import settling_time_of
 from ctrlgen.estimation.noise import estimate_noise
 from ctrlgen.estimation.noise_update import update_guessed_noise
 from ctrlgen.estimation.robust_covariance import widening
-from ctrlgen.estimation.settings import DISCREPANCY, NOISE_UPDATE, SIMULATION, STATISTICS
+from ctrlgen.estimation.settings import DISCREPANCY, NOISE_UPDATE, STATISTICS
 from ctrlgen.estimation.simulator import compiled_simulator
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.model.assembly import build_model, movable, symbolic_model
-from ctrlgen.model.discretisation import settling_time
 from ctrlgen.recordings.plausibility import suspected, with_plausibility
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recording import Recording
@@ -185,7 +185,7 @@ def _calibration(
     constants, acting = device.given_at_start, set(movable(device))
     chosen = [c for c in constants if c.path in acting]
     progress("noise")
-    settling = settling_time(build_model(device, sample_time=SIMULATION.settling_sample_time))
+    settling = settling_time_of(device)
     usable, notes = _usable(device, recording, settling)
     fitter = _weighed(Fitter(usable, estimate_noise(usable, settling)), specimen(device, chosen))
     fit, told = _told(fitter, device, chosen, progress)

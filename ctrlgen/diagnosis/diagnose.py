@@ -50,16 +50,16 @@ from ctrlgen.estimation.drive_clock import STAMPS, TOLD, stamp_deviation
 from ctrlgen.estimation.fit import Fitter, forget_predictions
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, hypotheses, nominal_physics, selected_laws
 from ctrlgen.estimation.isolated_outliers import mark_outliers
+from ctrlgen.estimation.late_readings import settling_time_of
 from ctrlgen.estimation.law_needs import not_offered, refusals, usual, with_odds
 from ctrlgen.estimation.noise import Noise, estimate_noise
 from ctrlgen.estimation.noise_update import correct_stated_noise, update_guessed_noise
 from ctrlgen.estimation.profile_likelihood import profiles
 from ctrlgen.estimation.residual_tests import run_residual_tests
-from ctrlgen.estimation.settings import NOISE_UPDATE, SIMULATION
+from ctrlgen.estimation.settings import NOISE_UPDATE
 from ctrlgen.estimation.simulator import compiled_simulator
 from ctrlgen.estimation.spikes import find_spikes, marking_notes
-from ctrlgen.model.assembly import build_model, movable
-from ctrlgen.model.discretisation import settling_time
+from ctrlgen.model.assembly import movable
 from ctrlgen.recordings.recording import Recording
 from ctrlgen.reporting.numbers import number
 
@@ -209,7 +209,7 @@ def _with_both_roles(recording: Recording) -> Recording:
 
 def noise_before_fits(device: Device, recording: Recording) -> Noise:
     """The noise of every channel, before any fit."""
-    return estimate_noise(recording, settling_time(build_model(device, sample_time=SIMULATION.settling_sample_time)))
+    return estimate_noise(recording, settling_time_of(device))
 
 
 def _with_noise(device: Device, fitter: Fitter) -> Fitter:

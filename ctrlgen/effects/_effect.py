@@ -162,7 +162,7 @@ class Effect:
 
     def kept(self, sample_time: float | None, free: bool) -> tuple[State, ...]:
         """The states at this sample time [s], of which a law that looks back by samples needs more the shorter it is; `free`: its
-        amplitude may be moved from the file's."""
+        amplitude may be moved from the file's. Raises ValueError, of its amplitude, where they are too many to build."""
         return self.states
 
     def after_sample(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:

@@ -20,6 +20,9 @@ import numpy as np
 from ctrlgen.devices import Device, DevicePhysics
 from ctrlgen.effects import Place
 from ctrlgen.estimation.hypothesis import in_loop
+from ctrlgen.estimation.settings import SIMULATION
+from ctrlgen.model.assembly import build_model
+from ctrlgen.model.discretisation import settling_time
 from ctrlgen.model.effect_terms import channels
 from ctrlgen.model.model import Model
 
@@ -36,6 +39,12 @@ def effects_apart(device: Device, physics: DevicePhysics) -> tuple[int, ...]:
         return not any("all" in (e.at, law.at) or e.at == law.at for e in behind)
 
     return tuple(k for k, law in enumerate(device.effect) if law.apart and last(k))
+
+
+def settling_time_of(device: Device) -> float:
+    """Time [s] in which a device settles, without its delays, whose many states change once a sample and have no rate."""
+    apart = [k for k, law in enumerate(device.effect) if law.apart]
+    return settling_time(build_model(device, sample_time=SIMULATION.settling_sample_time, apart=apart))
 
 
 class Signals(NamedTuple):

@@ -212,7 +212,7 @@ class SimulationSettings:
     pose_newton_steps: int = 8
     """Newton steps a settled pose: poses lie farther apart than samples."""
     settling_sample_time: float = 1e-3
-    """Sample time [s] of the model from which the settling time is read. A delay by samples does not change that time."""
+    """Sample time [s] of the model from which the settling time is read, delays left out of it."""
     shortest_spline: int = 4
     """Samples that a cubic spline through a drive needs."""
     parametric_operations: int = 500

@@ -106,7 +106,12 @@ class EffectTerms:
             self.faults += [Fault(f"effect[{k}].{name}", text) for name, text in faults_at(effect, channel)]
             if k in self.apart:
                 continue
-            kept = effect.kept(self.sample_time, isinstance(getattr(values, effect.amplitude().name), ca.SX))
+            amplitude = effect.amplitude().name
+            try:
+                kept = effect.kept(self.sample_time, isinstance(getattr(values, amplitude), ca.SX))
+            except ValueError as error:
+                self.faults.append(Fault(f"effect[{k}].{amplitude}", str(error)))
+                continue
             states = {
                 s.name: ca.SX.sym(f"{effect.kind}_{k}_{s.name}_{names[i]}") if self._unknown(s) else ca.SX(0)
                 for s in kept

@@ -22,9 +22,17 @@ SERIES_BELOW = 1.0
 def phi_matrices(M: np.ndarray, count: int) -> list[np.ndarray]:
     """[phi_0, ..., phi_count] of a matrix M (n, n), each (n, n); M may be singular.
 
-    They are the first row of blocks of the exponential of one larger matrix, eq. (2.11).
+    They are the first row of blocks of the exponential of one larger matrix, eq. (2.11); 1/k! of what M neither moves nor is moved by,
+    which is left out of it: its size goes into the time by the third power.
     """
     n = len(M)
+    moving = M.any(axis=0) | M.any(axis=1)
+    if not moving.all():
+        phi = [np.eye(n) / factorial(k) for k in range(count + 1)]
+        if moving.any():
+            for whole, part in zip(phi, phi_matrices(M[np.ix_(moving, moving)], count), strict=True):
+                whole[np.ix_(moving, moving)] = part
+        return phi
     large = np.zeros(((count + 1) * n, (count + 1) * n))
     large[:n, :n] = M
     for k in range(count):
