@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import pytest
+from pydantic import BaseModel
 
+from ctrlgen.core.errors import InputError
+from ctrlgen.core.files import validate
 from ctrlgen.core.units import split_unit
+from ctrlgen.devices.tested_axis import Mass
+from ctrlgen.devices.travel import TravelOrTurn
 from ctrlgen.effects import Channel, Param, State, faults_at, read_effect
 
 # A drive of typically 50 V beside a heater of 0.2 W, on a stage that travels 20 um: no power of one is another's.
@@ -96,3 +101,14 @@ def test_a_missing_parameter_is_named_with_an_example():
 def test_every_fault_of_a_table_is_named_at_once():
     with pytest.raises(ValueError, match=r"at is missing.*delay is missing"):
         read_effect({"kind": "delay"})
+
+
+def test_a_number_of_one_of_two_units_is_told_by_its_key_alone():
+    class File(BaseModel):
+        mass: Mass
+        travel: TravelOrTurn
+
+    for travel, place in (("3 V", "travel"), (["3 V", "1 um"], "travel[0]")):
+        with pytest.raises(InputError) as error:
+            validate(File, {"mass": "3 V", "travel": travel}, "file.toml")
+        assert {"mass", place} <= {fault.where for fault in error.value.faults} <= {"mass", place, "travel[1]"}

@@ -13,6 +13,7 @@ from conftest import DEVICES, SCENARIOS
 
 import ctrlgen
 from ctrlgen import diagnose, load_device
+from ctrlgen.app.check_files import check
 from ctrlgen.core.errors import InputError
 from ctrlgen.devices.machine import FAMILIES, ActuatorName, Machine, MachineParts, SensorName, TransmissionName
 from ctrlgen.diagnosis.report.answer import sentence
@@ -103,9 +104,23 @@ def test_what_is_not_known_refuses_nothing():
     assert not not_offered(["cyclic"], parts(sensor="capacitive", transmission=("screw",), actuator="voice coil"))
     direct = parts(sensor="capacitive", transmission=("flexure",), actuator="voice coil")
     assert list(not_offered(["cyclic", "backlash"], direct)) == ["cyclic", "backlash"]
-    assert refusals(not_offered(["butterfly"], direct)) == (
+    assert refusals(not_offered(["butterfly"], direct)) == [
         "butterfly: it needs a ferroelectric, and its actuator is a voice coil"
-    )
+    ]
+    assert [
+        line.split(":")[0] for line in refusals(not_offered(["backlash", "butterfly", "worn_backlash"], direct))
+    ] == [
+        "backlash, worn_backlash",
+        "butterfly",
+    ]
+
+
+def test_check_says_each_reason_on_a_line_of_its_own(tmp_path, capsys):
+    machine = '[machine]\nactuator = "voice coil"\nsensor = "capacitive"\ntransmission = ["flexure"]\n'
+    (tmp_path / "axis.toml").write_text((DEVICES / "flexure_axis.toml").read_text() + machine)
+    check(tmp_path / "axis.toml")
+    told = [line for line in capsys.readouterr().out.splitlines() if "not offered in a diagnosis:" in line]
+    assert len(told) > 1 and all(line.count("it needs") == 1 for line in told)
 
 
 def test_parts_are_inferred_from_kind_and_units():

@@ -139,8 +139,8 @@ def _check_device(file: Path, figure: Path | None, point: str | None) -> None:
     physics = device.physics(device.values())
     parts, there = device.parts(physics), available(physics)
     out.print(f"  machine: {parts.text}", markup=False, soft_wrap=True)
-    if refused := not_offered([name for name, law in sorted(laws().items()) if law.requires <= there], parts):
-        out.print(f"  not offered in a diagnosis: {refusals(refused)}", markup=False, soft_wrap=True)
+    for line in refusals(not_offered([name for name, law in sorted(laws().items()) if law.requires <= there], parts)):
+        out.print(f"  not offered in a diagnosis: {line}", markup=False, soft_wrap=True)
     for row in usual(parts):
         out.print(f"  usual: {row.text}", markup=False, soft_wrap=True)
     for remark in device.remarks():

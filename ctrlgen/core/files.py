@@ -129,10 +129,13 @@ def _faults(model: type[BaseModel], details: Any) -> list[Fault]:
     return [Fault(f"{place}.{fault.where}" if place else fault.where, fault.what) for fault in found.faults]
 
 
+READERS = ("function-before[", "function-after[")  # how pydantic names branches of a union that read their value
+
+
 def _location(model: type[BaseModel], loc: Sequence[Any]) -> list[Any]:
     """Keys and numbers of entries on the way to a place, without the names of the branches of unions."""
-    tags = {"function-before", "one number", "two numbers", *_tags(model)}
-    return [part for k, part in enumerate(loc) if not (part in tags and (k > 0 or part == "function-before"))]
+    tags = {"one number", "two numbers", *_tags(model)}
+    return [part for k, part in enumerate(loc) if not (k > 0 and part in tags) and not str(part).startswith(READERS)]
 
 
 def _place(model: type[BaseModel], loc: Sequence[Any]) -> str:

@@ -148,7 +148,7 @@ def _diagnose(
     left, failed = ((), ()) if enough else _empirical_terms(search, shares)
     spikes = find_spikes(search.fitter, search.chosen.fit, known)
     told = (*marking_notes(live.recording, search.fitter.recording), *(s.sentence for s in spikes))
-    told_of_machine = [NOT_OFFERED.format(refusals(refused))] if refused else []
+    told_of_machine = [NOT_OFFERED.format("; ".join(refusals(refused)))] if refused else []
     if brought := [f"{law.kind} ({law.package})" for law in effects if law.package]:
         told_of_machine.append(f"laws of other packages were considered too: {', '.join(brought)}")
     told_of_machine += [f"usual: {row.text}" for row in usual(parts)]

@@ -161,9 +161,9 @@ def with_odds(hypothesis: Hypothesis, parts: MachineParts) -> Hypothesis:
     return replace(hypothesis, machine_odds=THREE_TO_ONE) if commoner else hypothesis
 
 
-def refusals(refused: Mapping[str, str]) -> str:
-    """Refused laws in one line, those of one reason together: 'butterfly: it needs a ferroelectric, and its actuator is a stepper'."""
+def refusals(refused: Mapping[str, str]) -> list[str]:
+    """Refused laws, those of one reason together: 'butterfly: it needs a ferroelectric, and its actuator is a stepper'."""
     by_reason: dict[str, list[str]] = {}
     for law, why in refused.items():
         by_reason.setdefault(why, []).append(law)
-    return "; ".join(f"{', '.join(laws)}: {why}" for why, laws in by_reason.items())
+    return [f"{', '.join(laws)}: {why}" for why, laws in by_reason.items()]
