@@ -186,13 +186,19 @@ def test_the_true_error_falls_to_a_tenth_in_two_runs_and_never_rises(both, compi
     folder, corrections, mark = both
     c, plant, targets = InC(folder, Real.FLOAT, tmp_path, compiler), Plant(rng), sweep()
     c("begin", c.run, c.table)
-    errors = []
+    errors, learning = [], CorrectionLearning.begin(corrections)
+    bounds = np.concatenate([np.full(of.basis.count, of.bound) for of in corrections.each])
     for k in range(6):
         drives, status = c.play(targets)
         truth = plant.truth(drives)
         assert status == 0, k
         errors.append(about_mean(truth, targets))
-        assert c.learn(targets, plant.reading(truth)) & ~CorrectionStatus.WORSE == 0
+        readings = plant.reading(truth)
+        assert c.learn(targets, readings) & ~CorrectionStatus.WORSE == 0
+        if k < 2:  # later runs differ by noise, and may be worse to float and not to double; sums round once a sample
+            learning, _ = learning.after_run(np.float32(targets).astype(float), np.float32(readings).astype(float))
+            off = np.abs(c.values(corrections.count) - learning.values) / bounds
+            assert np.max(off) < len(targets) * np.finfo(np.float32).eps
     assert np.all(errors[2] < errors[0] / 10)
     floor = np.array([5e-10, 5e-8])  # a twentieth of the sensor's noise, which the best of such runs differ by
     assert all(np.all(after <= np.maximum(before, errors[2]) + floor) for before, after in pairwise(errors))
@@ -281,12 +287,21 @@ def test_a_device_that_answers_the_wrong_way_is_gone_back_from(both, compiler, t
     c("begin", c.run, c.table)
     worst = []
     for k in range(8):
-        corrected = np.array([np.linalg.norm(c.values(both[1].count))])
-        worst.append(float(corrected[0]))
+        worst.append(float(np.linalg.norm(c.values(both[1].count))))
         added = c.play(targets)[0] @ JACOBIAN.T - targets
         status = c.learn(targets, targets - added + error(targets[:, 1]))
         assert status == CorrectionStatus.WORSE * (k % 2)
     assert worst[::2] == [0, 0, 0, 0] and np.all(np.diff(worst[1::2]) < -0.4 * np.array(worst[1:-2:2]))
+    # a step is halved after a worse run, and doubled again after a better one
+    learning = CorrectionLearning.begin(both[1])
+    c.c.begin(at(c.table), at(c.state))
+    c("begin", c.run, c.table)
+    for share, gain in ((0.5, 0.8), (1.0, 0.4), (0.5, 0.4), (0.25, 0.8)):
+        readings = targets + share * error(targets[:, 1])
+        c.learn(targets, readings)
+        learning, _ = learning.after_run(targets, readings)
+        assert np.all(learning.gain == gain)
+        assert c.values(both[1].count) == pytest.approx(learning.values, rel=1e-9, abs=1e-15)
 
 
 def test_a_flipped_bit_is_told_and_nothing_is_added(both, compiler, tmp_path):
@@ -309,6 +324,11 @@ def test_a_flipped_bit_is_told_and_nothing_is_added(both, compiler, tmp_path):
         assert c("check", c.table) == CorrectionStatus.UNUSED, bit
         assert c("target", c.table, target, corrected) == CorrectionStatus.UNUSED and np.array_equal(corrected, target)
         c.table[:] = good
+    c.table[4 * 41 : 4 * 42].view(np.float32)[:] = np.nan  # of the other correction
+    assert c("target", c.table, target, corrected) == CorrectionStatus.UNUSED and np.array_equal(corrected, target)
+    assert c("check", c.table) == CorrectionStatus.UNUSED
+    c("begin", c.run, c.table)
+    assert c("learn", c.run, target, target) == CorrectionStatus.LOST
     beyond = np.frombuffer(stored(mark, np.full(42, 6e-7)), np.uint8).copy()
     assert c("load", c.table, beyond, len(learnt)) == CorrectionStatus.UNUSED
     with pytest.raises(ValueError, match="damaged"):
