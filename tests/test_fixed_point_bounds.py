@@ -59,6 +59,13 @@ def test_a_linear_device_is_off_by_the_whole_bound_where_every_error_has_its_wor
             seen("drive", settle @ s + of_u * e_u)
     for name, size in worst.items():
         assert np.allclose(getattr(off, name), size, rtol=1e-12), name
+    # what a state is off is a displacement by the flattest slope of its polynomial, and the other way round by the steepest
+    curved = tuple((i, replace(p, flattest=k / 2, steepest=3 * k)) for (i, p), k in zip(state, SLOPES, strict=True))
+    of_curved = error_bounds(replace(real, state=curved), BITS, COUNTS, CUT)
+    by_place = np.zeros(2)
+    by_place[PLACES] = PROVED
+    assert np.allclose(of_curved.stage, e_z + by_place + 2 * (off.stage - e_z - by_place), rtol=1e-12)
+    assert np.allclose(of_curved.state, off.state + SLOPES * (2 * e_z[PLACES] - PROVED / 2), rtol=1e-12)
 
 
 def test_a_polynomial_that_serves_one_mode_alone_is_refused(monkeypatch):
