@@ -174,7 +174,7 @@ class Corrections:
 
 @dataclass(frozen=True)
 class CorrectionLearning:
-    """What is known after `runs`: the numbers in use, `values` (count,), and the best ones that a run has measured, `kept`; by correction
+    """What is known after runs: the numbers in use, `values` (count,), and the best ones that a run has measured, `kept`; by correction
     the mean square error `cost` [SI] of these, the `gain` now, and whether the numbers in use are still to be tried (`trial`)."""
 
     corrections: Corrections
@@ -183,12 +183,11 @@ class CorrectionLearning:
     cost: np.ndarray
     gain: np.ndarray
     trial: np.ndarray
-    runs: int = 0
 
     @classmethod
-    def begin(cls, corrections: Corrections, values: np.ndarray | None = None) -> CorrectionLearning:
-        """Before the first run; without `values` nothing is added."""
-        v, n = np.zeros(corrections.count) if values is None else values, len(corrections.each)
+    def begin(cls, corrections: Corrections) -> CorrectionLearning:
+        """Before the first run: nothing is added."""
+        v, n = np.zeros(corrections.count), len(corrections.each)
         gains = np.array([c.gain for c in corrections.each])
         return cls(corrections, v, v, np.zeros(n), gains, np.zeros(n, bool))
 
@@ -216,7 +215,7 @@ class CorrectionLearning:
         cost, gain, trial = (np.array(part) for part in list(zip(*out, strict=True))[2:])
         if np.any(self.trial & ~trial):
             status |= CorrectionStatus.WORSE
-        return replace(self, values=values, kept=kept, cost=cost, gain=gain, trial=trial, runs=self.runs + 1), status
+        return replace(self, values=values, kept=kept, cost=cost, gain=gain, trial=trial), status
 
     def _term(self, k: int, over: np.ndarray, e: np.ndarray) -> tuple[np.ndarray, np.ndarray, float, float, bool]:
         """Values, kept, cost, gain and trial of correction `k` after a run with errors e (n,)."""
@@ -229,7 +228,3 @@ class CorrectionLearning:
         phi = c.phi.map(len(over))(over[None]).full().T
         step = -gain * (phi.T @ (e - np.mean(e))) / c.steepness(phi)
         return c.within(v, step), v, cost, gain, True
-
-    def best(self) -> np.ndarray:
-        """(count,) the numbers of the best run: what is stored."""
-        return self.kept if self.runs else self.values
