@@ -70,7 +70,11 @@ def test_a_number_that_acts_on_a_limit_alone_makes_it_uncertain(tmp_path):
     )
     scenario = load_scenario(tmp_path, device)
     solution = solve(scenario, build_model(device))
-    found = budget_of(solution, load_uncertainties(scenario, solution.model), probability=0.99, draws=4000)
+    uncertainties = load_uncertainties(scenario, solution.model)
+    path = UncertainPath(solution, uncertainties)
+    (k,) = (k for k, (limit, _) in enumerate(path.channels) if limit.name == "stress")
+    assert slopes_of_limits(path, propagate(path)).direct[0, k, 0] == pytest.approx(20e-6)  # d(c x)/dc, with its sign
+    found = budget_of(solution, uncertainties, probability=0.99, draws=4000)
     (stress,) = (s for s in found.safeties if s.limit.name == "stress" and s.side == "upper")
     assert stress.margin == pytest.approx(2e6) and stress.sd == pytest.approx(1e6, rel=1e-6)
     assert stress.probability == pytest.approx(0.97725, abs=1e-5) and stress.kept == pytest.approx(-0.3263e6, rel=1e-3)
