@@ -14,7 +14,7 @@ from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.formats import read_table
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
 from ctrlgen.recordings.formats.unit_texts import scaled_unit, unit_of
-from ctrlgen.recordings.formats.wrapped_counters import wrapped
+from ctrlgen.recordings.formats.wrapped_counters import unwrapped_clock, wrapped
 from ctrlgen.recordings.look.column_facts import table_facts
 from ctrlgen.recordings.look.proposal import propose
 from ctrlgen.recordings.look.proposed_file import recording_toml
@@ -253,3 +253,18 @@ def test_ordinary_names_are_not_taken_for_multiples_of_a_unit_or_for_times(tmp_p
     table = table_of(tmp_path, "time (s),Us,T1 (um)\n" + rows(",", T, U, T))
     proposal = propose([table_facts(table)], axis)
     assert {m.signal: m.column for m in proposal.matches} == {"drive.axis": "Us", "reading.axis": "T1 (um)"}
+
+
+def test_a_clock_goes_on_only_by_its_own_step_and_not_from_its_first_row():
+    run = 500.0 * np.arange(1, 132)  # to 65500: begun again it would go on by 536
+    again = np.tile(run, 2)
+    assert unwrapped_clock(again - run[0], run[0])[1] == ""
+    for late, told in ((100, True), (200, False)):  # a quarter of a step is 125
+        clock = np.r_[40000.0 + 500 * np.arange(51), (65500 + late) % 65536 + 500 * np.arange(51)]
+        values, note = unwrapped_clock(clock - clock[0], clock[0])
+        assert bool(note) == told and (np.diff(values).min() > 0) == told
+
+
+def test_whole_seconds_and_their_fraction_count_from_the_first_row(tmp_path):
+    values = table_of(tmp_path, FILES["ROS 2"]).columns["time (stamp.sec + stamp.nanosec)"]
+    assert values == pytest.approx(1e-3 * np.arange(N), abs=1e-9)
