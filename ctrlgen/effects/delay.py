@@ -1,15 +1,11 @@
 """A reading that is late by a fixed time."""
 
-from math import ceil
-
 import casadi as ca
 
 from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
+from ctrlgen.effects._kept_samples import samples_in
 
 FREE_SAMPLES = 4  # kept beyond twice the file's delay where the delay is free
-MOST_SAMPLES = (
-    1000  # kept in a model, each three states: 20 s and 1.5 GB to build and discretise, by the second power of them
-)
 SIZES = {"y": ("channel", 1.0), "r": ("channel/s", 10.0), "c": ("channel/s^2", 100.0)}
 
 
@@ -35,13 +31,7 @@ class Delay(Effect):
     apart = True
 
     def kept(self, sample_time: float | None, free: bool) -> tuple[State, ...]:
-        age = ceil(self.values["delay"].si / (sample_time or float("inf")))
-        if age > MOST_SAMPLES:
-            late, step = self.values["delay"].text, sample_time or float("inf")
-            raise ValueError(
-                f"{late} is {age} samples of {step:.4g} s, which the model keeps one by one; write {MOST_SAMPLES * step:.4g} s or "
-                f"less, or sample every {self.values['delay'].si / MOST_SAMPLES:.4g} s or more"
-            )
+        age = samples_in(self.values["delay"], sample_time)
         return _kept(max(2 * age + FREE_SAMPLES if free else age, 1))
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
