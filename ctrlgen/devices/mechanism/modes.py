@@ -8,7 +8,6 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 import scipy
-from scipy.optimize import linear_sum_assignment
 
 from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import show
@@ -177,7 +176,7 @@ def compared(reduced: Modes, full: Modes) -> tuple[tuple[CondensedMode, ...], fl
     f, own = full.frequencies, reduced.frequencies
     equal = np.abs(f[:, None] - f) <= EQUAL * f
     like = np.where(f <= (1 + EQUAL) * own[:, None], reduced.likeness(full) @ equal, 0.0)
-    _, partner = linear_sum_assignment(like, maximize=True)
+    _, partner = scipy.optimize.linear_sum_assignment(like, maximize=True)
     alike = like[np.arange(len(own)), partner] > LIKE
     modes = tuple(
         CondensedMode(float(g), float(f[k]) if alone else None) for g, k, alone in zip(own, partner, alike, strict=True)
