@@ -15,6 +15,7 @@ from ctrlgen.core.errors import InputError
 from ctrlgen.recordings.formats.checked_files import check_size, fault
 from ctrlgen.recordings.formats.long_form import widened
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
+from ctrlgen.recordings.formats.sparse_rows import gathered
 from ctrlgen.recordings.formats.split_seconds import with_whole_time
 from ctrlgen.recordings.formats.written_layout import Layout
 
@@ -65,6 +66,10 @@ FOREIGN = {
     b"SQLite format 3": "is a data base, as ROS 2 bags are; export its topics as CSV",
     b"RIFF": "is sound (WAV); export its samples as CSV",
     b"\x1f\x8b": "is compressed by gzip; unpack it",
+    b"LOGG": "is a log of a CAN bus (BLF); decode it with the data base of the bus (DBC), to CSV or MDF",
+    b"#ROSBAG": "is a bag of ROS; print a topic as a table: rostopic echo -b run.bag -p /topic > log.csv",
+    b"\x89MCAP": "is a bag of ROS 2 (MCAP); play it, and print a topic as a table: ros2 topic echo --csv /topic > log.csv",
+    b"ULog\x01": "is a log of PX4; convert it: ulog2csv log.ulg",
     b"<?xml": "is XML, such as a header of DIAdem (.tdm); export it as TDMS or CSV",
 }
 """First bytes of files that no reader here takes, and what to do."""
@@ -86,7 +91,7 @@ def read_table(path: Path, which: int | str | None = None, layout: Layout | None
     try:
         check_size(path, path.stat().st_size)
         reader: Reader = import_module(f"ctrlgen.recordings.formats.{module}").read
-        return with_whole_time(widened(_chosen(path, reader(path, layout or Layout()), which)))
+        return with_whole_time(gathered(widened(_chosen(path, reader(path, layout or Layout()), which))))
     except InputError:
         raise
     except RecursionError:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from ctrlgen.recordings.formats import number_cells, time_stamps
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
-from ctrlgen.recordings.formats.unit_texts import bare_name, unit_of
+from ctrlgen.recordings.formats.unit_texts import bare_name, is_unit_row, unit_of
 
 MOST_SIGNALS = 200
 MOST_COLUMNS = 12  # among which such a table is sought
@@ -27,6 +28,7 @@ def widened(table: MeasurementTable) -> MeasurementTable:
     """
     found = _parts(table)
     if found is None:
+        _check_mixed(table)
         return table
     names, time, value, unit = found
     signals = list(dict.fromkeys(table.columns[names]))
@@ -71,6 +73,8 @@ def _parts(table: MeasurementTable) -> tuple[str, str, str, str | None] | None:
     if not any(map(_begins_with_a_word, table.columns.values())):
         return None
     telling = _telling(table) if 4 < len(table.columns) <= MOST_COLUMNS else list(table.columns)
+    if len(telling) == 4 and sum(_holds_words(table.columns[name]) for name in telling) == 1:
+        telling = _telling(table)
     if len(telling) not in (3, 4) or table.clocks:
         return None
     words = [name for name in telling if _holds_words(table.columns[name])]
@@ -80,15 +84,31 @@ def _parts(table: MeasurementTable) -> tuple[str, str, str, str | None] | None:
     if len(names) != 1 or len(others) != 2 or len(units) > 1:
         return None
     signals = len(set(table.columns[names[0]]))
+    if is_unit_row(list(dict.fromkeys(table.columns[names[0]]))):  # of an instrument that changes its range
+        return None
     if not 2 <= signals <= min(MOST_SIGNALS, len(table.columns[names[0]]) // 2):
         return None
     timed = [name for name in others if time_stamps.TIME_NAME.match(bare_name(name))] or [
         name for name in others if _is_stamp(table.columns[name])
     ]
+    timed = timed or [name for name in others if _is_epoch(table.columns[name])]
     if len(timed) != 1:
         return None
     value = next(name for name in others if name != timed[0])
     return names[0], timed[0], value, units[0] if units else None
+
+
+def _check_mixed(table: MeasurementTable) -> None:
+    """Raises InputError for a table of names and their readings alone: several signals in one column, and no time that tells which rows
+    are of one instant."""
+    if len(table.columns) != 2 or not any(map(_begins_with_a_word, table.columns.values())):
+        return
+    words = [name for name in table.columns if _holds_words(table.columns[name])]
+    cells = [str(cell) for cell in table.columns[words[0]]] if len(words) == 1 else []
+    changing = float(np.mean([a != b for a, b in pairwise(cells)])) if len(cells) > 1 else 0.0
+    if 2 <= len(set(cells)) <= min(MOST_SIGNALS, len(cells) // 2) and changing >= CHANGING:
+        told = f"column {words[0]!r} names its signal ({', '.join(sorted(set(cells))[:5])})"
+        raise table.fault(f"holds one reading a row and no time: {told}; log each with a time stamp")
 
 
 def _begins_with_a_word(column: Column) -> bool:
@@ -123,6 +143,11 @@ def _is_stamp(column: Column) -> bool:
         return time_stamps.seconds(column, "day first") is not None
     except ValueError:
         return False
+
+
+def _is_epoch(column: Column) -> bool:
+    """Whether numbers are times since 1970, as of exporters that name no column."""
+    return column.dtype.kind in "iuf" and time_stamps.epoch_unit(column.astype(float)) not in (None, "day")
 
 
 def _comparable(column: Column) -> Column:

@@ -20,6 +20,7 @@ from ctrlgen.core.errors import InputError
 from ctrlgen.recordings.formats import number_cells, text_file
 from ctrlgen.recordings.formats.checked_files import LARGEST
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
+from ctrlgen.recordings.formats.named_lines import are_named
 from ctrlgen.recordings.formats.text_blocks import Block
 from ctrlgen.recordings.formats.text_cells import separator_of
 from ctrlgen.recordings.formats.text_encoding import decoded_bytes
@@ -111,6 +112,8 @@ def _plan(path: Path, file: BinaryIO, layout: Layout) -> _Plan:
     try:
         text, notes = decoded_bytes(path, content, layout.encoding)
         if any(note.startswith("encoding") for note in notes):  # two bytes a character
+            raise _Otherwise
+        if are_named(text.split("\n")):
             raise _Otherwise
         tables = text_file.tables_of_text(path, text, layout, notes)
     except InputError:

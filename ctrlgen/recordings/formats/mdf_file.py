@@ -10,11 +10,13 @@ import numpy as np
 
 from ctrlgen.core.counts import number_of
 from ctrlgen.recordings.formats.checked_files import fault, package
-from ctrlgen.recordings.formats.measurement_table import MeasurementTable
+from ctrlgen.recordings.formats.measurement_table import Clock, MeasurementTable
 from ctrlgen.recordings.formats.nested_columns import columns_of
 from ctrlgen.recordings.formats.written_layout import Layout
 
 LISTED = 4  # channels that tell a raster from the others
+EVEN = 1e-3  # of its step: as far as a raster may be off a clock
+TOGETHER = "all rasters, each channel on its own clock"
 
 
 @dataclass
@@ -55,7 +57,8 @@ class _Raster:
 
 
 def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
-    """A table a raster: its channels by name, `time` is the master channel. A file of one raster is one table."""
+    """A table a raster: its channels by name, `time` is the master channel; where all are even, also one table of them all. A file of one
+    raster is one table."""
     asammdf = package("asammdf", path)
     rasters: list[_Raster] = []
     with asammdf.MDF(path) as file:
@@ -67,4 +70,29 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
             same.take(path, signal)
     if not rasters:
         return {"data": MeasurementTable(path, {}, {}, missing=layout.missing)}
-    return {raster.title: raster.table(path, layout) for raster in rasters}
+    tables = {raster.title: raster.table(path, layout) for raster in rasters}
+    return tables | _together(path, rasters, layout)
+
+
+def _together(path: Path, rasters: list[_Raster], layout: Layout) -> dict[str, MeasurementTable]:
+    """One table of the channels of several even rasters, each on its own clock; none where a raster is uneven or a name occurs twice."""
+    names = [name for raster in rasters for name in raster.columns if name != "time"]
+    if len(rasters) < 2 or len(set(names)) < len(names) or not all(map(_is_even, rasters)):
+        return {}
+    n = max(len(raster.clock) for raster in rasters)
+    columns, units, clocks = dict[str, np.ndarray](), dict[str, str](), dict[str, Clock]()
+    for raster in rasters:
+        clock = Clock(float(raster.clock[0]), float(np.median(np.diff(raster.clock))))
+        for name, values in {f"time of {raster.title}": raster.clock, **raster.columns}.items():
+            if name == "time" or values.dtype.kind not in "iufb":
+                continue
+            columns[name] = np.concatenate([values.astype(float), np.full(n - len(values), np.nan)])
+            units |= {name: unit} if (unit := raster.units.get(name, "" if name in raster.columns else "s")) else {}
+            clocks |= {name: clock} if name in raster.columns else {}
+    notes = tuple(note for raster in rasters for note in raster.notes)
+    return {TOGETHER: MeasurementTable(path, columns, units, notes=notes, clocks=clocks, missing=layout.missing)}
+
+
+def _is_even(raster: _Raster) -> bool:
+    steps = np.diff(raster.clock)
+    return len(steps) > 1 and bool(np.all(np.abs(steps - np.median(steps)) < EVEN * np.median(steps)))

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +20,7 @@ from ctrlgen.recordings.formats.number_cells import NumberStyle
 from ctrlgen.recordings.formats.unit_texts import bare_name, split_name
 
 MOST_LISTED = 20  # columns that a message lists
+TOGETHER = 0.5  # of the rows of the scarcer of two columns: both are filled in so many where they are sampled together
 
 
 class Clock(NamedTuple):
@@ -170,10 +173,23 @@ class MeasurementTable:
         """What is wrong where columns of these names have times that differ; empty where they have one."""
         used = {name: self.own_times[name] for name in names if name in self.own_times}
         if len(set(used.values())) < 2:
-            return ""
+            return self._filled_apart(names)
         listed = ", ".join(f"{name} has {time}" for name, time in used.items() if name != time)
         mend = "export them at one rate, or each to its own file, named by `file` of its column"
         return f"holds channels that each have a time of their own, and these differ ({listed}); {mend}"
+
+    def _filled_apart(self, names: Sequence[str]) -> str:
+        """What is wrong where two columns of these names are hardly ever filled in one row; empty where they are."""
+        columns = {name: np.asarray(self.columns[name]) for name in dict.fromkeys(names)}
+        filled = {name: np.isfinite(column) for name, column in columns.items() if column.dtype.kind == "f"}
+        for (a, has), (b, also) in combinations(filled.items(), 2):
+            fewest = min(has.sum(), also.sum())
+            if fewest > 1 and len(has) == len(also) and np.sum(has & also) < TOGETHER * fewest:
+                told = f"fills {a} in {number_of(int(has.sum()), 'row')} and {b} in {also.sum()}, hardly ever the same"
+                return (
+                    f"{told}; export them resampled to one time, or each to its own file, named by `file` of its column"
+                )
+        return ""
 
     def _bad_cells(self, name: str, bad: Sequence[tuple[int, str]]) -> InputError:
         words = list(dict.fromkeys(text for _, text in bad))
@@ -182,6 +198,9 @@ class MeasurementTable:
         key = ", ".join(f'"{word}"' for word in words[: number_cells.MOST_LISTED]).replace("\\", "\\\\")
         what = f"column {name!r} holds text that is no number in {len(bad)} of {number_of(len(self.columns[name]), 'row')} ({listed}{more})"
         if any(number_cells.has_unit(text) for _, text in bad):
+            if all(re.fullmatch(r"[^a-z]*m", text) for text in words):
+                mend = "metres, or thousandths? Write the unit of its numbers into its name: 'x (m)', 'x (V)' for thousandths of it"
+                return self.fault(f"{what}: {mend}")
             return self.fault(f"{what}; numbers stand alone: write the unit into the name, such as 'x (um)'")
         if len(bad) == len(self.columns[name]):
             return self.fault(f"{what}; name another column")

@@ -17,8 +17,10 @@ from ctrlgen.recordings.formats.text_cells import cells_of, is_comment, width_of
 FEWEST_ROWS = 2  # of a table among other text
 FOOTED = 20  # rows before a footer that must begin with a number
 MOST_LISTED = 5  # bad lines that a message lists
-STRICT = re.compile(r"[\s\d.,;:|+\-\u2212/'\"eEdDTZ]*\d[\s\d.,;:|+\-\u2212/'\"eEdDTZ]*")
-"""A line that holds nothing but numbers, times and separators."""
+STRICT = re.compile(
+    r"(?:[\s\d.,;:|+\-\u2212/'\"]++|(?<=[\d.])[eEdD](?=[+\-\d])|(?<=\d)T(?=\d)|(?<=\d)Z(?![A-Za-z\d]))++"
+)
+"""A line that holds nothing but numbers, times and separators: a letter is an exponent or part of a time, not T1 of a name."""
 Kind = Literal["blank", "remark", "row", "mixed", "text"]
 
 

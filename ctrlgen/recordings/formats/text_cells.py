@@ -26,6 +26,12 @@ DECLARED = (
 LONGEST_NAME = 40  # lines over which the names of one header may go
 STARTS_WITH_NUMBER = re.compile(r'\s*"?[+-]?[.,]?\d')
 INSIDE = re.compile(r"\d\s*[,;\t ]")  # a number and more: (12.3) alone is how accountants write -12.3
+RULE = re.compile(r"[\s|+:=\-]*(?:-{2,}|={2,})[\s|+:=\-]*")
+"""A line that is drawn between the names of a printed table and its rows: |---|---|."""
+DRAWN = str.maketrans({**dict.fromkeys("\u2502\u2506\u2551", "|"), **dict.fromkeys("\u2500\u2550\u2501", "-"),
+                       **dict.fromkeys("\u250c\u252c\u2510\u251c\u253c\u2524\u2514\u2534\u2518\u255e\u256a\u2561", "+")})  # fmt: skip
+"""Signs of which tables are drawn."""
+ARROW = re.compile(r"^\s*(\d[\d:.,]*)\s*->\s*(?=\S)")  # of Arduino's monitor, behind the time at which a line came in
 BRACKETS = {("[", "]"), ("(", ")"), ("{", "}")}
 NAMED = {"tab": "\t", "comma": ",", "semicolon": ";"}
 
@@ -66,8 +72,8 @@ def stray_quotes(lines: Sequence[str]) -> list[int]:
 
 def whole_lines(lines: Sequence[str]) -> list[str]:
     """Lines without what programs add to them: a name that goes on in the next lines of its quotes becomes one line, empty ones keep the
-    numbers of the lines below; brackets around every row are left out."""
-    whole = list(lines)
+    numbers of the lines below; brackets around every row, the lines that a table is drawn with and the arrow behind a time are left out."""
+    whole = _undrawn(lines)
     stray = [k - 1 for k in stray_quotes(lines)]
     if len(stray) == 2 and stray[1] - stray[0] <= LONGEST_NAME:
         first, last = stray
@@ -82,6 +88,20 @@ def whole_lines(lines: Sequence[str]) -> list[str]:
     ):
         whole = [line if is_comment(line) else line.strip().rstrip(",")[1:-1] for line in whole]
     return whole
+
+
+def _undrawn(lines: Sequence[str]) -> list[str]:
+    """Lines of a printed table without what it is drawn with, and with a blank for an arrow that stands in every line."""
+    bars = sum("|" in line or "\u2502" in line or "\u2506" in line for line in lines)
+    filled = sum(bool(line.strip()) for line in lines)
+    if bars > filled / 2:
+        lines = [line.translate(DRAWN) for line in lines]
+        lines = ["" if RULE.fullmatch(line) and ("|" in line or "+" in line) else line for line in lines]
+    arrows = sum(bool(ARROW.match(line)) for line in lines)
+    if arrows > filled / 2:
+        mark = Counter(c for line in lines for c in ARROW.sub("", line) if c in ";,\t").most_common(1)
+        lines = [ARROW.sub(rf"\1{mark[0][0] if mark else ' '}", line) for line in lines]
+    return list(lines)
 
 
 def _holds_rows(lines: Sequence[str]) -> bool:

@@ -14,16 +14,20 @@ import numpy as np
 from ctrlgen.core.counts import number_of
 from ctrlgen.recordings.formats import number_cells
 from ctrlgen.recordings.formats.checked_files import fault
+from ctrlgen.recordings.formats.foreign_text import foreign
+from ctrlgen.recordings.formats.header_rows import LONGEST_SHOWN
 from ctrlgen.recordings.formats.layout_question import Ambiguous, AmbiguousFile
 from ctrlgen.recordings.formats.measurement_table import Clock, MeasurementTable
+from ctrlgen.recordings.formats.named_lines import named_table
 from ctrlgen.recordings.formats.number_cells import TIME, NumberStyle
 from ctrlgen.recordings.formats.rows_of_signals import lies_on_its_side, on_its_side
 from ctrlgen.recordings.formats.stated_rate import stated_rate
 from ctrlgen.recordings.formats.text_blocks import MOST_LISTED, Block, blocks_of, kind_of
 from ctrlgen.recordings.formats.text_cells import cells_of, separator_of, stray_quotes, whole_lines
 from ctrlgen.recordings.formats.text_encoding import decoded
-from ctrlgen.recordings.formats.text_header import LONGEST_SHOWN, header_of
-from ctrlgen.recordings.formats.units_in_cells import without_units
+from ctrlgen.recordings.formats.text_header import header_of
+from ctrlgen.recordings.formats.unapplied import unapplied_columns
+from ctrlgen.recordings.formats.units_in_cells import without_prefixes, without_units
 from ctrlgen.recordings.formats.written_layout import Layout
 
 STYLED = 1000  # rows, the first and others evenly over the table, by which the style of its numbers is known
@@ -48,6 +52,10 @@ def read_text_tables(path: Path, layout: Layout) -> list[MeasurementTable]:
 def tables_of_text(path: Path, text: str, layout: Layout, notes: Sequence[str] = ()) -> list[MeasurementTable]:
     """The tables of a text whose lines end with a line feed; `notes` of what was interpreted before. Raises InputError."""
     lines = text.split("\n")
+    if (told := foreign(lines)) and not layout.header:
+        raise fault(path, told)
+    if (of_names := named_table(path, lines, notes, layout)) is not None:
+        return [of_names]
     lines = whole_lines(lines)
     if stray := stray_quotes(lines):
         listed = ", ".join(f"line {k}" for k in stray[:MOST_LISTED]) + (", ..." if len(stray) > MOST_LISTED else "")
@@ -95,6 +103,7 @@ def _table(
     if not any(header.names) and lies_on_its_side(columns):
         return on_its_side(path, columns, (*said, *header.notes, *notes), layout, style)
     names, units = list(header.names), dict(header.units)
+    columns, prefixes = without_prefixes(columns, units)
     columns, of_cells = without_units(columns)
     units |= of_cells
     unique = _unique(names)
@@ -115,6 +124,8 @@ def _table(
             *header.notes,
             *notes,
             *(f"{unique[k]}: its cells end in {unit}, its unit" for k, unit in of_cells.items()),
+            *(f"{unique[k]}: its cells end in {', '.join(p)}, read as prefixes of SI" for k, p in prefixes.items()),
+            *unapplied_columns(unique, columns),
             *cut,
         ),
         nameless=frozenset(k for k, name in enumerate(names) if not name),

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
+
+import numpy as np
+
+from ctrlgen.core.units import same_dimension
+from ctrlgen.recordings.formats.unit_texts import unit_of
 
 FACTOR = re.compile(
     r"(^|[ _.])(gain|scale|scaling|factor|slope|multiplier|conversion|sensitivity)($|[ _.])", re.IGNORECASE
 )
 APPLIED = ("scale_factor",)  # which the CF conventions define
+MOST_UNITS = 6
+"""Units among which an instrument changes."""
 NI_SCALE = "NI_"  # begins the properties of scales that the reader of TDMS applies
 
 
@@ -26,5 +33,24 @@ def unapplied(name: str, attributes: Iterable[tuple[str, Any]]) -> list[str]:
         if number != 1:
             said.append(
                 f"{name}: {key} = {number:g} stands beside it and is not applied; where its numbers lack it, write scale = {number:g}"
+            )
+    return said
+
+
+def unapplied_columns(names: Sequence[str], columns: Sequence[np.ndarray]) -> list[str]:
+    """A note for each column that states units, or a factor, that change from row to row: of an instrument that changes its range."""
+    said = []
+    for name, column in zip(names, columns, strict=True):
+        if column.dtype.kind == "O":
+            cells = list(dict.fromkeys(cell for cell in column if isinstance(cell, str)))
+            units = [unit_of(cell) for cell in cells] if 1 < len(cells) <= MOST_UNITS else [None]
+            first = units[0]
+            if first is not None and all(unit is not None and same_dimension(unit, first) for unit in units):
+                said.append(
+                    f"{name}: states units that differ from row to row ({', '.join(cells)}), not applied: write one"
+                )
+        elif FACTOR.search(name) and len(known := np.unique(column[np.isfinite(column.astype(float))])) > 1:
+            said.append(
+                f"{name}: goes from {known[0]:g} to {known[-1]:g} and is not applied, should numbers beside it lack it"
             )
     return said

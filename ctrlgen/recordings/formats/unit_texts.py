@@ -20,6 +20,8 @@ PLAIN = re.compile(
 BESIDE = re.compile(
     r"(?P<unit>[^\W\d]\w*)\s*[*x\u00d7]\s*(?=\d)[\d.eE^+-]+|[*x\u00d7]\s*(?=\d)[\d.eE^+-]+\s*(?P<behind>[^\W\d]\w*)"
 )
+SAID = re.compile(r"^(?P<name>.*?)(?:^|\s+)in\s+(?P<unit>[^\s()\[\]]{1,12})$")
+"""A unit after a word: C1 in V, Zeit in s, and the `in s` of a column of time."""
 WORDS = {
     "second": "s", "seconds": "s", "sec": "s", "secs": "s", "sekunde": "s", "sekunden": "s", "millisecond": "ms",
     "milliseconds": "ms", "msec": "ms", "microseconds": "us", "usec": "us", "volt": "V", "vdc": "V", "volts": "V", "millivolt": "mV",
@@ -115,6 +117,8 @@ def split_name(name: str) -> tuple[str, str | None]:
         stated = unit_of(unit) is not None or scaled_unit(unit) is not None
         if square or (unit not in LETTERS_OF_NAMES and stated and not _is_of_a_node(name, unit)):
             return match["name"].strip(), match["unit"] or None
+    if (match := SAID.match(name)) and match["unit"] not in LETTERS_OF_NAMES and is_unit_cell(match["unit"]):
+        return match["name"].strip() or name, match["unit"]
     if match := PLAIN.match(name):
         return match["name"].removesuffix(" in").strip(), match["unit"]
     if match := RATE.match(name):

@@ -27,6 +27,11 @@ CLIPPED = 20  # rows at an end, in runs of three and more, from which it is told
 RUN = 3
 REST = 100  # rows: a shorter rest says nothing of the noise
 STILL = 1e-6  # of the range of a drive: held still
+COUNT_NAME = re.compile(
+    r"^(#|n|no\.?|nr\.?|row|idx|seq|record|rn|scan|index|number|counter|count|sample|point|reading ?#|messung)s?\W*$",
+    re.IGNORECASE,
+)
+"""Names of columns that number the rows."""
 NOISE_REST = 200  # rows: the shortest record at rest from which a diagnosis takes the noise
 SETTLED = 2.0  # standard deviations of a rest's end, from which a tenth of the rest that scatters by more about it still settles
 NORMAL_MEDIAN = 0.6745  # standard deviations: the median size of normal noise
@@ -209,6 +214,24 @@ def is_a_time(column: ColumnFacts) -> bool:
     named = TIME_NAME.match(column.bare) or TIME_NAME.match(column.last)
     timed = column.unit is None or same_dimension(column.unit, "s")
     return bool(named) and timed and column.moves and bool(np.all(np.diff(column.finite) > 0))
+
+
+def counted_step(facts: TableFacts) -> float:
+    """The step [s] of a time without a stated unit that counts in whole numbers: it may be ticks, or rows. 0 for any other."""
+    if facts.time is None or facts.time.stamps:
+        return 0.0
+    column = facts.column(facts.time.column)
+    counts = bool(np.all(column.finite == np.round(column.finite)))
+    return facts.time.step if column.unit is None and counts and epoch_unit(column.finite) is None else 0.0
+
+
+def is_a_count(column: ColumnFacts) -> bool:
+    """Whether a column numbers the rows, or is a time since 1970 beside the one that is used: no signal of a device."""
+    steps = np.diff(column.finite)
+    if len(steps) < 2 or column.unit not in (None, "1"):
+        return False
+    numbered = COUNT_NAME.search(column.last) is not None and bool(np.all(steps == steps[0])) and steps[0] == 1
+    return numbered or (bool(np.all(steps >= 0)) and epoch_unit(column.finite) not in (None, "day"))
 
 
 def rests(drives: np.ndarray) -> list[tuple[int, int]]:

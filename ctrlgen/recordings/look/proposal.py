@@ -17,7 +17,15 @@ from ctrlgen.core.units import parse, same_dimension, to_si
 from ctrlgen.model.model import Model
 from ctrlgen.recordings.alike_units import size_of
 from ctrlgen.recordings.look.answers import NOTHING, Answers, layout_option
-from ctrlgen.recordings.look.column_facts import ColumnFacts, TableFacts, between_samples, is_a_time, named
+from ctrlgen.recordings.look.column_facts import (
+    ColumnFacts,
+    TableFacts,
+    between_samples,
+    counted_step,
+    is_a_count,
+    is_a_time,
+    named,
+)
 from ctrlgen.recordings.look.oddities import fitting_units, implausible_range
 from ctrlgen.recordings.moved import Stretch, moved_of
 from ctrlgen.recordings.plausibility import implausible
@@ -147,7 +155,7 @@ def propose(tables: Sequence[TableFacts], model: Model, answers: Answers = NOTHI
     not; they name what `tables` were read with. Raises InputError for an answer that names no signal or column."""
     first = tables[0]
     taken = {c.name for c in first.columns if first.time is not None and (c.name == first.time.column or is_a_time(c))}
-    taken |= first.table.time_parts
+    taken |= first.table.time_parts | {c.name for c in first.columns if is_a_count(c)}
     columns = [c for c in first.columns if c.moves and c.name not in taken]
     signals = [name for name in signal_units(model) if name.partition(".")[0] in ("drive", "reading")]
     chosen = _chosen(model, first, signals, answers)
@@ -172,6 +180,11 @@ def propose(tables: Sequence[TableFacts], model: Model, answers: Answers = NOTHI
         if stated is not None:
             says = f"the file says {stated[0]!r} (--rate {stated[1]:.9g}Hz, else --time COLUMN or --poses)"
         asked.append(f"no column is a time: {says}")
+    elif first.time is not None and answers.rate is None and (step := counted_step(first)):
+        name = first.time.column
+        asked.append(
+            f"time is column {name!r}: the file states no unit, s is assumed, {step:g} s from row to row (--unit {name}=s)"
+        )
     if any(name not in found for name in signals):  # which an unread column may be
         asked += [c.question.asked(layout_option) for c in first.columns if c.question is not None]
     _check_lengths(first, matches)

@@ -1,0 +1,153 @@
+"""Rows of names and of units above a table: which line is which, and what is told of the others."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
+
+from ctrlgen.recordings.formats.number_cells import is_number
+from ctrlgen.recordings.formats.unit_texts import is_unit_cell, is_unit_row, split_name, unit_of
+
+NAME_LABELS = {"name", "names", "trace name", "channel name", "signal name"}
+FACTOR_LABELS = {
+    "factor",
+    "faktor",
+    "scale",
+    "scaling",
+    "gain",
+    "slope",
+    "multiplier",
+    "offset",
+    "skalierung",
+    "verst\u00e4rkung",
+}
+UNIT_LABELS = {"unit", "units", "einheit", "einheiten", "vunit"}
+DATES = re.compile("time|date|zeit|datum", re.IGNORECASE)
+LONGEST_SHOWN = 60  # characters of a line that a note shows
+
+
+@dataclass(frozen=True)
+class Header:
+    """Names of a table's columns, '' for one without; units by number of column; rows above the block that belong to it; the declared
+    sample time [s] of each column, and its column of time where it has one of its own; whether the block's first row holds the names."""
+
+    names: tuple[str, ...]
+    units: dict[int, str] = field(default_factory=dict)
+    more_rows: tuple[int, ...] = ()
+    notes: tuple[str, ...] = ()
+    sample_times: dict[int, float] = field(default_factory=dict)
+    times: dict[int, int] = field(default_factory=dict)
+    in_first_row: bool = False
+
+
+def of_factors(cells: Sequence[str]) -> bool:
+    """Whether a row says in its first cell that it scales the columns."""
+    return cells[0].strip("[]():").lower() in FACTOR_LABELS and any(map(is_number, cells[1:]))
+
+
+def with_units(cells: Sequence[str]) -> bool:
+    """Whether all that is no number in a row is a unit: one of units with some numbers of the logger beside them."""
+    texts = [c for c in cells if c and not is_number(c)]
+    return bool(texts) and all(is_unit_cell(c) or unit_of(c) for c in texts)
+
+
+def names_and_units(candidates: Sequence[tuple[int, list[str]]], numeric: Collection[int]) -> Header:
+    """Names and units of rows above a table, nearest first; `numeric`: its columns of numbers, which alone have a unit."""
+    if not candidates:
+        return Header(())
+    labels = {cells[0].rstrip(":").lower(): n for n, (_, cells) in reversed(list(enumerate(candidates)))}
+    at = next((labels[word] for word in UNIT_LABELS if word in labels), None)
+    names_at = next((labels[word] for word in NAME_LABELS if word in labels and at is not None), None)
+    if at is None:
+        at = next(
+            (
+                n
+                for n in range(min(2, len(candidates) - 1))
+                if _is_units(candidates[n][1], candidates[n + 1][1], numeric)
+            ),
+            None,
+        )
+    if at is None and not any(map(is_number, candidates[0][1])):  # units above the names
+        at = next((n for n in range(1, min(4, len(candidates))) if is_unit_row(candidates[n][1])), None)
+        alike = len(set(candidates[0][1])) == 1 < len(candidates[0][1])  # the rate of every column, which names none
+        names_at = names_at if at is None or alike else 0
+    names_at = names_at if names_at is not None else 0 if at is None else min(at + 1, len(candidates) - 1)
+    above = candidates[names_at + 1][1] if names_at + 1 < len(candidates) and names_at + 1 != at else []
+    if at is not None and _tells_more(above, candidates[names_at][1]):
+        names_at, above = names_at + 1, []
+    line, names = candidates[names_at]
+    notes = [f"names in line {line + 1}"] if line else []
+    if not all(names) and _is_text(above) and all(a or n for a, n in zip(above, names, strict=True)):
+        notes.append(f"columns without a name there are named by line {candidates[names_at + 1][0] + 1}")
+        names = [name or other for name, other in zip(names, above, strict=True)]
+        above = []
+    if any(map(is_number, names)):
+        notes = [f"line {line + 1} ({', '.join(names)}) is taken as the columns' names"]
+    units = units_behind(names)
+    if at is not None and at != names_at:
+        notes.append(f"line {candidates[at][0] + 1} holds units")
+        units |= {
+            k: c.strip("[](){} ") for k, c in enumerate(candidates[at][1]) if c and not is_number(c) and unit_of(c)
+        }
+    passed = [(k + 1, c) for n, (k, c) in enumerate(candidates[: max(names_at, at or 0)]) if n not in (names_at, at)]
+    notes += [
+        f"line {k} ({_shown(cells)}) is not applied: write its factors as `scale` of the columns"
+        if of_factors(cells)
+        else f"line {k} ({_shown(cells)}) holds neither names nor units"
+        for k, cells in passed
+    ]
+    found = _grouped(names, above)
+    if found == names and at is not None and _is_text(above):
+        notes.append(f"above them stands {', '.join(filter(None, above))}")
+        found = [name or other for name, other in zip(names, above, strict=True)]
+        found = found if len(set(found)) == len(found) else names
+    return Header(tuple(found), units, notes=tuple(notes))
+
+
+def _shown(cells: Sequence[str]) -> str:
+    """Cells as a note shows them."""
+    shown = ", ".join(filter(None, cells))
+    return shown if len(shown) <= LONGEST_SHOWN else f"{shown[:LONGEST_SHOWN]}..."
+
+
+def _is_text(cells: Sequence[str]) -> bool:
+    return any(cells) and not any(map(is_number, cells))
+
+
+def _tells_more(above: Sequence[str], names: Sequence[str]) -> bool:
+    """Whether a row names every column by a text of its own, and the row below it, such as one of types, does not."""
+    return (
+        _is_text(above)
+        and all(above)
+        and len(set(above)) == len(above)
+        and len({n for n in names if n}) < sum(map(bool, names))
+    )
+
+
+def _is_units(cells: list[str], above: list[str], numeric: Collection[int]) -> bool:
+    """Whether a row under one of names states units: above columns of numbers; a word such as Time may stand for that of dates."""
+    dated = {k for k, c in enumerate(cells) if DATES.fullmatch(c) and DATES.search(above[k])}
+    texts = {k for k, c in enumerate(cells) if not is_number(c)}
+    stated = set(numeric) if set(numeric) - dated and texts >= set(numeric) else texts
+    rest = [cells[k] for k in sorted(stated - dated)]
+    units = is_unit_row(rest if len(rest) > len(dated) else [cells[k] for k in sorted(texts)])
+    return units and not is_unit_row(above) and not all(is_number(c) for c in above if c)
+
+
+def _grouped(names: list[str], above: list[str]) -> list[str]:
+    """Names that repeat, with the group that stands above them where that tells them apart."""
+    filled = [n for n in names if n]
+    if len(set(filled)) == len(filled) or not above or all(map(is_number, above)):
+        return names
+    groups, group = [], ""
+    for cell in above:
+        group = cell or group
+        groups.append(group)
+    whole = [f"{group}.{name}" if name and group else name for group, name in zip(groups, names, strict=True)]
+    return whole if len({n for n in whole if n}) == len(filled) else names
+
+
+def units_behind(names: Sequence[str]) -> dict[int, str]:
+    """The unit behind each name that has one, by number of column."""
+    return {k: unit for k, name in enumerate(names) if (unit := split_name(name)[1]) is not None}
