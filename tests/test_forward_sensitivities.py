@@ -8,9 +8,12 @@ import casadi as ca
 import numpy as np
 import pytest
 from conftest import AXIS_FILE
+from play_records import SERVO
 
 from ctrlgen import load_device
+from ctrlgen.devices.servo import Servo
 from ctrlgen.estimation import sample_equations
+from ctrlgen.estimation.forward_sensitivities import reached_entries, shortest_jacobian
 from ctrlgen.estimation.hypothesis import hypotheses, nominal_physics
 from ctrlgen.estimation.settings import SIMULATION
 from ctrlgen.estimation.simulator import Simulator
@@ -107,6 +110,39 @@ def test_carried_slopes_are_those_of_the_whole_sample(monkeypatch, tmp_path, eff
     assert np.allclose(y, r.simulate(moved, p), rtol=0, atol=1e-12 * np.abs(y).max())
     alone = r.sensitivities(moved, p, by_free=False)[1]
     agree(alone, Y[:, :, len(p) :])
+
+
+def test_slopes_of_plays_before_creep_are_few_and_those_of_the_whole_sample():
+    device, shapes = (
+        Servo(**SERVO, transducer={"gain": "1 um/V", "drive_limit": "100 V"}),
+        {
+            "butterfly": {"reach": 40.0, "taper": 0.5, "linear": 0.0, "share": 0.3},
+            "log_creep": {"tau": 0.01, "decades": 2.0, "gain": 0.1},
+            "home_offset": {"offset": 1e-6},
+        },
+    )
+    structure = Structure(device)
+    for h in hypotheses(device, nominal_physics(device), ("reading.axis",), H, False):
+        if h.effect in shapes:
+            structure = structure.with_cause(h, shapes[h.effect])
+    free, p = [unknown.path for unknown in structure.free_parameters], structure.start
+    r = Simulator(structure.device_with_causes, free, ("reading.axis",), H, linear=True)
+    whole = record(60.0)
+    rows = {name: getattr(whole, name)[:20] for name in ("time", "drive", "observed", "valid")}
+    moved = replace(whole, **rows)
+    Y, wanted = r.sensitivities(moved, p)[1], differentiated(r, moved, p)
+    assert np.allclose(Y, wanted, rtol=0, atol=1e-10 * np.abs(wanted).max(axis=(0, 1)))
+    # an offset of the reading moves no state, and creep no play
+    reached = reached_entries(r.equations, len(free), r.free_initial_states)
+    offset, gain = (free.index(next(f for f in free if f.endswith(name))) for name in (".offset", ".gain"))
+    plays = [k for k, name in enumerate(r.model.x_names) if "_play" in name]
+    assert not reached.has_nz(offset, r.n_s - 1) and offset not in reached.row()
+    assert len(plays) == 8 and not any(reached.has_nz(gain, k) for k in plays)
+    q = r.equations
+    usual, short = (f(q.following, q.given[0]) for f in (ca.jacobian, shortest_jacobian))
+    operations = [ca.Function("J", q.given, [J]).n_instructions() for J in (usual, short)]
+    assert operations[1] < 0.6 * operations[0]
+    assert short.sparsity() == usual.sparsity()
 
 
 class Counted:

@@ -10,10 +10,11 @@ derivatives of N at the points where the step evaluates it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import casadi as ca
+import numpy as np
 
 from ctrlgen.estimation.sample_equations import SampleEquations
 from ctrlgen.model.integrators import ExponentialRungeKutta, ImplicitRadau
@@ -22,6 +23,12 @@ from ctrlgen.model.integrators import ExponentialRungeKutta, ImplicitRadau
 POINTS = 4
 # Operations up to which a step is written out number by number: beyond, the compiler takes longer than the products of matrices.
 LONGEST_WRITTEN = 6_000
+# The same of a whole sample in balance, whose derivatives are mostly its own operations: 14,000 of them, of plays before creep, take
+# two thirds of the time, and the compiler no longer.
+LONGEST_SAMPLE = 20_000
+# Operations of a value from which on its derivatives are taken in both directions: of a shorter one they are few in either. Judgement.
+LONG = 100
+REVERSE = {"helper_options": {"ad_weight": 1.0, "ad_weight_sp": 1.0}}
 LARGEST_WRITTEN = 6  # rows of a matrix whose inverse is written out: a few hundred operations
 
 Step = Callable[[ca.MX, ca.MX, list[ca.MX]], tuple[ca.MX, ca.MX]]
@@ -44,7 +51,7 @@ def forward_sensitivities(
 
     if equations.steps is None:
         values = [equations.following, equations.y]
-        one = ca.Function("one", equations.given, [*values, *_transposed_jacobians(values, symbols)])
+        one = ca.Function("one", equations.given, [*values, *_transposed_jacobians(values, symbols)], {"cse": True})
         following, y, *by = one(*given)
         return following, chain(*by[: len(symbols)]), y, chain(*by[len(symbols) :])
     m = equations.model
@@ -61,9 +68,44 @@ def forward_sensitivities(
     return following, T, y, Y
 
 
+def reached_entries(equations: SampleEquations, k: int, initial: Sequence[int]) -> ca.Sparsity:
+    """Which entries of T (k + n_i, n_s) can differ from zero, of the first `k` parameters, all or none, and of the `initial` states that
+    are free, by their places (n_i,) in S. Most laws act on the states of few others: an offset of a reading moves none, a drive those of
+    its own stage."""
+    by_state, by_constant = (_pattern(ca.jacobian_sparsity(equations.following, equations.given[i])) for i in (0, 4))
+    moved = np.zeros((k + len(initial), len(by_state)), dtype=bool)
+    if k:
+        moved[:k] = (by_constant @ _pattern(equations.constants.sparsity_out(1))).T
+    moved[k + np.arange(len(initial)), list(initial)] = True
+    known = 0
+    while (count := int(np.count_nonzero(moved))) > known:
+        moved, known = moved | (moved @ by_state.T), count
+    rows, columns = np.nonzero(moved)
+    return ca.Sparsity.triplet(*moved.shape, rows.tolist(), columns.tolist())
+
+
+def _pattern(sparsity: ca.Sparsity) -> np.ndarray:
+    entries = np.zeros(sparsity.shape, dtype=bool)
+    entries[sparsity.row(), sparsity.get_col()] = True
+    return entries
+
+
 def _transposed_jacobians(values: list[ca.SX], symbols: list[ca.SX]) -> list[ca.SX]:
     """(d value/d symbol)', sparse, of each value by each symbol in turn."""
-    return [ca.sparsify(ca.jacobian(value, symbol)).T for value in values for symbol in symbols]
+    return [ca.sparsify(shortest_jacobian(value, symbol)).T for value in values for symbol in symbols]
+
+
+def shortest_jacobian(value: ca.SX, symbol: ca.SX) -> ca.SX:
+    """d value/d symbol in the direction that takes fewer operations. CasADi counts directions alone: where many lags follow one signal,
+    the reverse one takes a third of the operations, because it carries no derivatives of that signal by everything."""
+    usual = ca.jacobian(value, symbol)
+    if min(usual.shape) < 2 or _operations(value) < LONG:
+        return usual
+    return min(usual, ca.jacobian(value, symbol, REVERSE), key=_operations)
+
+
+def _operations(value: ca.SX) -> int:
+    return int(ca.Function("f", ca.symvar(value), [value]).n_instructions())
 
 
 def _all_steps(
@@ -90,13 +132,14 @@ def _written_out(step: Step, T: ca.MX, seed: ca.MX, given: list[ca.MX]) -> ca.Fu
     return written_out(ca.Function("step", like, list(step(like[0], like[1], like[2:]))))
 
 
-def written_out(one: ca.Function) -> ca.Function:
-    """The function number by number where that is short: as machine code it takes half the time of products of small matrices."""
+def written_out(one: ca.Function, longest: int = LONGEST_WRITTEN) -> ca.Function:
+    """The function number by number where that is at most so many operations: as machine code it takes half the time of products of
+    small matrices."""
     try:
         written = one.expand()
     except RuntimeError:  # it solves a system that is too large for that
         return one
-    return written if written.n_instructions() <= LONGEST_WRITTEN else one
+    return written if written.n_instructions() <= longest else one
 
 
 def _implicit_step(equations: SampleEquations, steps: ImplicitRadau, c_varies: bool) -> Step:

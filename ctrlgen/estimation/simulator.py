@@ -16,7 +16,13 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.devices import Device
-from ctrlgen.estimation.forward_sensitivities import forward_sensitivities, written_out
+from ctrlgen.estimation.forward_sensitivities import (
+    LONGEST_SAMPLE,
+    forward_sensitivities,
+    reached_entries,
+    shortest_jacobian,
+    written_out,
+)
 from ctrlgen.estimation.hypothesis import nominal_physics
 from ctrlgen.estimation.late_readings import LateReading, effects_apart, late_readings, read_late, unknown_samples
 from ctrlgen.estimation.moved_drive import with_drive_at
@@ -55,7 +61,7 @@ class Simulator:
         self.model: Model = build_model(device, free, self.ambient, look_back, per_record=True, apart=apart)
         self.late, self._rates = late_readings(self.model, apart, self.free, self.channels)
         self.poses = not self.model.inertial and (poses or np.isinf(sample_time))
-        self._with_sensitivities: dict[bool, Recursion] = {}
+        self._with_sensitivities: dict[bool, tuple[Recursion, ca.Sparsity]] = {}
         self._by_pattern: dict[tuple[Any, ...], ca.Function] = {}
         self.n_x, self.n_s = self.model.x.numel(), self.model.x.numel() + self.model.z.numel()
 
@@ -141,7 +147,7 @@ class Simulator:
     def _jacobians(self) -> ca.Function:
         """S, u, u+, ambient, c -> F_S, F_c, H_S, H_c, a sample differentiated as a whole."""
         q = self.equations
-        jacobians = [ca.jacobian(value, by) for value in (q.following, q.y) for by in (q.given[0], q.given[4])]
+        jacobians = [shortest_jacobian(value, by) for value in (q.following, q.y) for by in (q.given[0], q.given[4])]
         return ca.Function("jacobians", q.given, jacobians)
 
     def _jacobians_by_steps(self, pattern: ca.Sparsity) -> ca.Function:
@@ -165,9 +171,15 @@ class Simulator:
         x[list(m.clocks)] = record.time[0] if np.isfinite(self.sample_time) else 0.0
         if m.inertial or self.poses:
             return np.concatenate([x, 0.0 * m.z_scale])
+        z = self._balance(x, m.z_scale, record.drive[0], p, self.ambient_of(record)[0])
+        return np.concatenate([x, z.full().ravel()])
+
+    @cached_property
+    def _balance(self) -> ca.Function:
+        """x, z, u, p, ambient -> the displacement (n_axes,) in balance, from z."""
+        m = self.model
         z = balanced(m, m.x, m.u, SIMULATION.start_newton_steps)
-        balance = ca.Function("balance", [m.x, m.z, m.u, m.p, self.ambient], [z])
-        return np.concatenate([x, balance(x, m.z_scale, record.drive[0], p, self.ambient_of(record)[0]).full().ravel()])
+        return ca.Function("balance", [m.x, m.z, m.u, m.p, self.ambient], [z])
 
     @staticmethod
     def ambient_of(record: Record) -> np.ndarray:
@@ -204,11 +216,12 @@ class Simulator:
         record = self.aligned(record, p)
         c, c_p = self._with_rates.constants(p)
         k, n_i, n_y, n = len(self.free) * by_free, len(self.free_initial_states), len(self.channels), len(record.time)
+        recursion, reached = self._recursion_with_sensitivities(by_free)
         T_0 = np.zeros((k + n_i, self.n_s))
         T_0[k + np.arange(n_i), list(self.free_initial_states)] = 1.0
-        first = np.concatenate([self.starting_state(record, p, start), T_0.ravel(order="F")])
+        first = np.concatenate([self.starting_state(record, p, start), T_0[reached.row(), reached.get_col()]])
         constant = (np.reshape(v, (1, -1)) for v in (c.full(), np.array(c_p.nonzeros())))
-        values = self._recursion_with_sensitivities(by_free).run(first, *self.inputs(record), *constant)[1]
+        values = recursion.run(first, *self.inputs(record), *constant)[1]
         rows = n_y + self._rates.numel()
         values, Y = values[:, :rows], values[:, rows:].reshape(n, rows, k + n_i)
         y, slopes = values[:, :n_y], Y[:, :n_y]
@@ -229,8 +242,8 @@ class Simulator:
     def _compiled_by_free(self) -> bool:
         """Whether the recursion with all derivatives is compiled already: compiling that without those by the parameters would take
         longer than the whole one does more."""
-        recursion = self._with_sensitivities.get(True)
-        return recursion is not None and recursion.one.is_compiled
+        known = self._with_sensitivities.get(True)
+        return known is not None and known[0].one.is_compiled
 
     def _by_clock(self, record: Record, p: np.ndarray, start: np.ndarray | None, clock: int) -> np.ndarray:
         """Derivative (n, n_y) of the readings by the offset of the clocks: a central difference over one sample."""
@@ -247,22 +260,24 @@ class Simulator:
         q = self._with_rates
         return Recursion(ca.Function("one", q.given, [ca.densify(q.following), ca.densify(q.y)]))
 
-    def _recursion_with_sensitivities(self, by_free: bool) -> Recursion:
-        """(S, T) -> (S+, T+), (y, Y), with the nonzeros of dc/dp as a further input."""
+    def _recursion_with_sensitivities(self, by_free: bool) -> tuple[Recursion, ca.Sparsity]:
+        """(S, T) -> (S+, T+), (y, Y), with the nonzeros of dc/dp as a further input; T by its entries that can differ from zero, and which
+        these are."""
         if by_free not in self._with_sensitivities:
             n_i, pattern = len(self.free_initial_states), self._with_rates.constants.sparsity_out(1)
             c_p = ca.MX.sym("c_p", pattern.nnz())
             seed = ca.MX(n_i, pattern.size1())
             if by_free:
                 seed = ca.vertcat(ca.MX(pattern, c_p).T, seed)
-            state = ca.MX.sym("state", self.n_s * (1 + seed.shape[0]))
+            reached = reached_entries(self._with_rates, len(self.free) * by_free, self.free_initial_states)
+            state = ca.MX.sym("state", self.n_s + reached.nnz())
             others = self._symbols_of(self._with_rates)[1:]
-            S, T = state[: self.n_s], ca.reshape(state[self.n_s :], seed.shape[0], self.n_s)
+            S, T = state[: self.n_s], ca.MX(reached, state[self.n_s :])
             following, T, y, Y = forward_sensitivities(self._with_rates, T, seed, [S, *others])
-            values = [ca.densify(ca.vertcat(a, ca.vec(b))) for a, b in ((following, T), (y, Y))]
-            one = ca.Function("one", [state, *others, c_p], values)
+            values = [ca.vertcat(following, ca.project(T, reached).nz[:]), ca.vertcat(y, ca.vec(ca.densify(Y)))]
+            one = ca.Function("one", [state, *others, c_p], [ca.densify(value) for value in values])
             whole = self._with_rates.steps is None
-            self._with_sensitivities[by_free] = Recursion(written_out(one) if whole else one)
+            self._with_sensitivities[by_free] = Recursion(written_out(one, LONGEST_SAMPLE) if whole else one), reached
         return self._with_sensitivities[by_free]
 
     @cached_property
