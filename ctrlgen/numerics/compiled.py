@@ -24,7 +24,7 @@ import numpy as np
 from ctrlgen.core.compiled_templates import cache_folder
 from ctrlgen.core.counts import number_of
 
-FLAGS = ("-O1", "-fPIC", "-shared", "-ffp-contract=off", "-w")
+FLAGS = ("-Og", "-fPIC", "-shared", "-ffp-contract=off", "-w")
 # Of generated C, for the compiler: measured with gcc 12 to 14 on steps of an axis and a hexapod.
 SECONDS_PER_CHARACTER = 4e-6
 # Characters of generated C above which it is compiled in parts: four seconds and not fifteen for a million.
