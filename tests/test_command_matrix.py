@@ -10,8 +10,10 @@ from typing import Any
 
 import pytest
 import tomlkit
+import typer
 from conftest import DEVICES, SCENARIOS
 
+from ctrlgen.app.commands.app import name_of, out_of
 from ctrlgen.app.commands.cli import app
 from ctrlgen.app.shipped_examples import examples
 from ctrlgen.core.errors import CtrlgenError
@@ -97,6 +99,45 @@ def test_every_command_refuses_files_of_other_kinds_in_words(command, tmp_path, 
         reason = tried(command, file, *second, *out)
         assert reason or capsys.readouterr().err, (kind, reason)
     assert not list(tmp_path.glob("out*"))
+
+
+def test_whatever_writes_a_folder_needs_no_name_for_it_and_takes_a_short_option():
+    found = {}
+    for name, command in typer.main.get_command(app).commands.items():  # type: ignore[attr-defined]
+        for option in command.params:
+            if "--out" in option.opts:
+                assert "-o" in option.opts and not option.required, name
+                found[name] = option.show_default or "nothing is written"
+    assert len(found) == 15
+    folders = {name: told for name, told in found.items() if "out/" in told}
+    assert set(folders) == {"run", "solve", "generate", "verify", "fmu", "workspace", "diagnose", "batch"}
+    for name, told in folders.items():
+        assert told.startswith(str(out_of(None, Path("some/NAME"), "" if name == "run" else name)))
+
+
+def test_the_name_of_a_folder_is_that_of_what_it_is_of(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = {
+        "a/circle": "circle",
+        "a/circle/scenario.toml": "circle",
+        "b/stage.toml": "stage",
+        "stage.v2.py": "stage.v2",
+    }
+    assert {file: name_of(Path(file)) for file in names} == names
+    assert name_of(Path()) == name_of(Path("scenario.toml")) == tmp_path.name
+    assert out_of(Path("x"), Path("b/stage.toml"), "workspace") == Path("x")
+
+
+def test_a_folder_that_nobody_named_is_told_and_replaces_nothing_of_somebody_else(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    words = "workspace", DEVICES / "flexure_axis.toml"
+    folder = Path("out", "flexure_axis_workspace")
+    assert tried(*words) == "" and (folder / "workspace.html").is_file()
+    assert capsys.readouterr().out.splitlines()[-1] == f"{folder}/workspace.html"
+    assert tried(*words) == ""  # over a result of its own
+    (folder / "notes.txt").touch()
+    assert "notes.txt, which ctrlgen did not make" in tried(*words)
+    assert tried(*words, "-o", "elsewhere") == "" and Path("elsewhere", "workspace.html").is_file()
 
 
 @pytest.mark.parametrize("path", slow(PATHS, QUICK), ids=named)

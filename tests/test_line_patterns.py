@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 
 import numpy as np
@@ -55,6 +56,17 @@ def test_legends_of_a_path_and_of_what_was_simulated_stand_above_their_panels(ci
             assert len(legends) > 1 and all(legend.y0 >= panel.y1 for legend, panel in legends)
             assert all(-1 <= legend.x0 < legend.x1 <= figure.bbox.x1 + 1 for legend, _ in legends)
             plt.close(figure)
+
+
+def test_no_legend_of_the_program_is_placed_inside_a_panel():
+    """Outside the figure's panels, or anchored at an edge of its own: what is placed `best` covers a curve where none is free."""
+    placed = []
+    for file in sorted((ROOT / "ctrlgen").rglob("*.py")):
+        for call in ast.walk(ast.parse(file.read_text())):
+            if isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute) and call.func.attr == "legend":
+                words = {word.arg: ast.unparse(word.value) for word in call.keywords}
+                placed.append((file.name, "bbox_to_anchor" in words or "outside" in words.get("loc", "")))
+    assert len(placed) > 5 and all(outside for _, outside in placed), placed
 
 
 def test_dashes_of_a_drawing_are_as_long_as_those_of_the_page():

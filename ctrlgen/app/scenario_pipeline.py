@@ -141,7 +141,7 @@ def verify(scenario: Scenario | Path | str, out: Path | str, progress: Progress 
         c = generate(solution.scenario, solution.model, draft / "c", solution, draw_solution(solution))
         progress("reference")
         reference = ReferenceAnswers(solution)
-        comparison = compare(c, solution, lambda build: progress(f"compared: {build}"), reference)
+        comparison = compare(c, solution, lambda build: progress(f"compared: {build}"), reference, "-O2")
         progress("error along the trajectory")
         errors = tracking_errors(c, reference)
         in_loop = run_in_loop(c, reference, lambda target: progress(f"emulated: {target}"))

@@ -29,7 +29,7 @@ from ctrlgen.path_timing.fastest_page import write_fastest
 from ctrlgen.path_timing.fastest_plots import draw_fastest
 from ctrlgen.recordings.recording import Recording
 from ctrlgen.reporting.line_patterns import dashes
-from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
+from ctrlgen.reporting.plots import COLOURS, STYLE, legend_above, plt, svg
 from ctrlgen.reporting.result_file import json_text
 from ctrlgen.trajectory.metrics import expectations
 from ctrlgen.trajectory.solution import Solution
@@ -104,7 +104,7 @@ def _lines(index: Any, columns: list[Any]) -> str:
         for k, column in enumerate(alike):
             ax.plot(index.values, column.values, lw=1, ls=dashes(k), color=COLOURS[k % len(COLOURS)], label=column.name)
         ax.set_ylabel(f"{role} [{unit}]")
-        ax.legend(fontsize=8, ncols=3, loc="best")
+        legend_above(ax)
     axes[-1, 0].set_xlabel(index.heading)
     return svg(figure)
 

@@ -18,7 +18,7 @@ from ctrlgen.reporting.chart import Chart, Curve, Panel
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.line_patterns import dashes, mark
 from ctrlgen.reporting.page_figure import FirstScreen, PageFigure, page_figures
-from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
+from ctrlgen.reporting.plots import COLOURS, STYLE, legend_over, plt, svg
 from ctrlgen.reporting.result_file import json_text
 from ctrlgen.trajectory.solution_charts import abscissa
 
@@ -116,7 +116,7 @@ def draw_band(budget: ErrorBudget) -> Figure:
     right.set_xlabel("sample" if static else "time [s]")
     right.set_ylabel(f"half width of the 95 % band [{group.unit}]")
     right.set_title("lines: first order" + ("" if budget.drawn is None else "; points: draws"), fontsize=8)
-    right.legend(fontsize=8, ncols=3, loc="best")
+    legend_over(figure, right)
     return figure
 
 

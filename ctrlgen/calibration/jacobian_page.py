@@ -17,7 +17,7 @@ from ctrlgen.recordings.pose_errors import CHANNELS
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.numbers import with_deviation
 from ctrlgen.reporting.page_figure import FirstScreen, PageFigure
-from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
+from ctrlgen.reporting.plots import COLOURS, STYLE, legend_over, plt, svg
 from ctrlgen.reporting.result_file import json_text
 
 
@@ -84,5 +84,5 @@ def draw_errors(found: MeasuredJacobian) -> Figure:
             axes.axvspan(at - 0.5, at + 0.5, color="#000000", alpha=0.05, lw=0)
         axes.set_xlabel("pose")
         axes.set_ylabel(f"norm of the {part} error [{unit}]")
-    panels[0].legend(fontsize=8)
+    legend_over(figure, panels[0])
     return figure

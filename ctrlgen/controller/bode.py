@@ -20,7 +20,7 @@ from ctrlgen.devices import Signal
 from ctrlgen.devices.structural_model import StructuralModel
 from ctrlgen.model.model import Model
 from ctrlgen.reporting.line_patterns import dashes
-from ctrlgen.reporting.plots import COLOURS, STYLE, image
+from ctrlgen.reporting.plots import COLOURS, STYLE, image, legend_over
 
 POINTS = 400  # frequencies, beside those of the poles
 DECADES = 2  # below the slowest pole and above it, and at least one above the fastest
@@ -148,8 +148,8 @@ def bode_figure(found: FrequencyResponse) -> Figure:
             "phase against the static response, strongest component of each drive [deg]", fontsize=9
         )
         grid["phase"].set_xlabel("frequency [Hz]")
-        grid["phase"].legend(ncols=3, fontsize=8)
+        legend_over(figure, grid["phase"], below=True)
         first = next((grid[name] for name in channels if grid[name].get_legend_handles_labels()[0]), None)
         if first is not None:
-            first.legend(ncols=3, fontsize=7)
+            legend_over(figure, first)
     return figure

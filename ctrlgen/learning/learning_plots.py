@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ctrlgen.core.units import difference, from_si
 from ctrlgen.learning.learn import Learning
 from ctrlgen.reporting.chart import Chart, Curve, Panel
 from ctrlgen.reporting.line_patterns import dashes
-from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
+from ctrlgen.reporting.plots import COLOURS, STYLE, legend_over, plt, svg
 from ctrlgen.trajectory.solution_charts import abscissa
 
 FAINTEST = 0.35  # of a colour: the oldest run in a figure
@@ -55,7 +54,7 @@ def draw_runs(learning: Learning) -> Figure:
         axes.set_xlim(0.5, last + (0.5 if learning.stop else 1.5))
         axes.set_xlabel("run")
         axes.set_ylabel(f"error, {g.name}, rms [{g.unit}]")
-    panels[0, 0].legend(fontsize=8)
+    legend_over(figure, panels[0, 0])
     return figure
 
 
@@ -81,7 +80,7 @@ def draw_along(learning: Learning) -> Figure:
         axes.set_yscale("log")
         axes.set_ylabel(f"|error|, {g.name} [{g.unit}]")
     panels[-1, 0].set_xlabel("sample" if static else "time [s]")
-    _legend_above(figure, panels[0, 0], SHOWN_RUNS + 1)
+    legend_over(figure, panels[0, 0])
     return figure
 
 
@@ -100,15 +99,10 @@ def draw_drives(learning: Learning) -> Figure:
         below.plot(at, difference(learning.next.drive[:, i] - now[:, i], unit), color=colour, ls=style, lw=1)
     above.set_ylabel(f"{drive.label} [{drive.units[0]}]")
     above.set_title("thin: best run so far; full: next", fontsize=8)
-    _legend_above(figure, above, len(drive.channels))
+    legend_over(figure, above)
     below.set_ylabel(f"next - best [{drive.units[0]}]")
     below.set_xlabel("sample" if static else "time [s]")
     return figure
-
-
-def _legend_above(figure: Figure, axes: Axes, columns: int) -> None:
-    """Outside the panels, which curves fill from edge to edge."""
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=columns, fontsize=8)
 
 
 def _shades(count: int) -> list[tuple[float, float, float, float]]:

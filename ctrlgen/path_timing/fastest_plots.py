@@ -10,7 +10,7 @@ from ctrlgen.core.units import difference, from_si, same_dimension, show
 from ctrlgen.path_timing.binding import Binding
 from ctrlgen.path_timing.fastest import FastestPath
 from ctrlgen.reporting.line_patterns import DASHED, DOTTED, dashes
-from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
+from ctrlgen.reporting.plots import COLOURS, STYLE, legend_above, legend_over, plt, svg
 
 SHOWN = 12  # limits
 UNBOUND = "#bbbbbb"
@@ -115,7 +115,7 @@ def _draw_speed(axes: Axes, motion: FastestPath, alike: list[int], unit: str) ->
     axes.set_xlabel("share of the path [%]")
     axes.set_ylabel(f"speed along the path [{unit}/s]")
     axes.set_ylim(0, ROOM * top)
-    axes.legend(fontsize=8)
+    legend_above(axes, columns=2)
 
 
 def _draw_binding(motion: FastestPath) -> Figure:
@@ -152,5 +152,5 @@ def _draw_drives(motion: FastestPath) -> Figure:
         axes.axhline(from_si(bound, signal.units[0]), color="#666666", lw=0.8, ls="--")
     axes.set_xlabel("time [ms]")
     axes.set_ylabel(f"drive [{signal.units[0]}]")
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", fontsize=7, ncols=6)
+    legend_over(figure, axes, size=7)
     return figure

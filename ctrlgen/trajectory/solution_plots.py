@@ -152,7 +152,7 @@ def draw_stage_force(solution: Solution) -> Figure:
     )
     axes.set_xlabel(f"displacement {solution.model.axes[axis]} [um]")
     axes.set_ylabel("force on the actuator bar [N]")
-    axes.legend()
+    legend_above(axes)
     return figure
 
 

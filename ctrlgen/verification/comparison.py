@@ -21,7 +21,7 @@ from ctrlgen.firmware.folder import CFolder, write_harness
 from ctrlgen.trajectory.solution import Solution
 from ctrlgen.verification.compared_program import ComparedProgram
 from ctrlgen.verification.comparison_entry import ComparisonEntry
-from ctrlgen.verification.host import HostBuild, build_host
+from ctrlgen.verification.host import TEST_LEVEL, HostBuild, build_host
 from ctrlgen.verification.integer_comparison import IntegerAnswers, integer_rows
 from ctrlgen.verification.online_comparison import online_rows
 from ctrlgen.verification.player_comparison import player_rows
@@ -74,8 +74,9 @@ def compare(
     solution: Solution,
     progress: Callable[[str], None] = lambda _: None,
     reference: ReferenceAnswers | None = None,
+    test_level: str = TEST_LEVEL,
 ) -> Comparison:
-    """Builds and runs `folder` with every compiler found; `reference`: where it was computed before.
+    """Builds and runs `folder` with every compiler found; `reference`: where it was computed before; `test_level` as of `build_host`.
 
     Raises ToolError when a build or a run fails.
     """
@@ -84,7 +85,7 @@ def compare(
     with tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch, ThreadPoolExecutor(max_workers=2) as pool:
         for real in folder.arithmetics:
             write_harness(folder, solution.scenario, solution.model, real, Path(scratch) / f"harness_{real.suffix}.c")
-        programs = [pool.submit(build_host, build, folder, Path(scratch)) for build in builds]
+        programs = [pool.submit(build_host, build, folder, Path(scratch), test_level) for build in builds]
         reference = reference or ReferenceAnswers(solution)  # while the compilers work
         integers = IntegerAnswers(reference)
         rows: list[ComparisonEntry] = []

@@ -15,6 +15,23 @@ from ctrlgen.firmware.c.toolchains import compile_c, find_compilers
 from ctrlgen.firmware.folder import CFolder, write_harness
 from ctrlgen.verification.reference import ReferenceAnswers
 
+# Of the code that asks and compares, which `verify` compiles like the rest: without optimisation that takes a fifth of the time. What is
+# asked is compiled at -O2 (`FLAGS`).
+TEST_LEVEL = "-O0"
+# What asks, as one source, each of the two programs under a name of its own: every start of a compiler takes as long as these files
+ASKING = """{tests}
+#define main harness
+#include "{harness}"
+#undef main
+#define main shipped_test
+#include "{runner}"
+#undef main
+int main(int count, char **words)
+{{
+    return ((count == 2) && (strcmp(words[1], "test") == 0)) ? shipped_test() : harness(count, words);
+}}
+"""
+
 
 @dataclass(frozen=True)
 class HostBuild:
@@ -27,19 +44,32 @@ class HostBuild:
         return f"{self.compiler} {self.real.value}"
 
 
-def build_host(build: HostBuild, folder: CFolder, scratch: Path) -> Path:
-    """The harness (`harness_{real}.c` in `scratch`) and the shipped test, linked with the same objects; returns the harness,
-    the test beside it. Raises ToolError with the compiler's words."""
+def build_host(build: HostBuild, folder: CFolder, scratch: Path, test_level: str = TEST_LEVEL) -> Path:
+    """The harness (`harness_{real}.c` in `scratch`) and the shipped test in one program, linked with the same objects of what computes;
+    `test_level`: what of the compiler's optimisation the code that only asks and compares gets. Raises ToolError with the compiler's words.
+    """
     compiler, real = build.compiler, build.real
     program = scratch / f"{compiler}_{real.suffix}"
     sources = folder.sources(real)
-    objects = [scratch / f"{compiler}_{source.stem}.o" for source in sources]
-    for source, target in zip(sources, objects, strict=True):
+    computing = [source for source in sources if source.stem not in {folder.selftest[real], folder.vectors[real]}]
+    objects = [scratch / f"{compiler}_{source.stem}.o" for source in computing]
+    for source, target in zip(computing, objects, strict=True):
         compile_c(compiler, folder.path, ["-c", str(source), "-o", str(target)])
-    linked = [*map(str, objects), "-o"]
-    compile_c(compiler, folder.path, [str(scratch / f"harness_{real.suffix}.c"), *linked, str(program)])
-    compile_c(compiler, folder.path, [str(folder.runner(real)), *linked, f"{program}_test"])
+    asking = scratch / f"{compiler}_asking_{real.suffix}.c"
+    tests = [source for source in sources if source not in computing]
+    included = "\n".join(f'#include "{source.resolve().as_posix()}"' for source in tests)
+    files = {"harness": scratch / f"harness_{real.suffix}.c", "runner": folder.runner(real)}
+    asking.write_text(
+        ASKING.format(tests=included, **{name: path.resolve().as_posix() for name, path in files.items()})
+    )
+    compile_c(compiler, folder.path, [test_level, str(asking), *map(str, objects), "-o", str(program)])
     return program
+
+
+def passes_shipped_test(program: Path) -> bool:
+    """Whether the test that the package contains passes, in a program of `build_host`."""
+    words = [str(program), "test"]
+    return subprocess.run(words, capture_output=True, text=True, check=False, start_new_session=True).returncode == 0
 
 
 def run_host(

@@ -101,9 +101,11 @@ def integer_rows(program: ComparedProgram, integers: IntegerAnswers) -> list[Com
         program.shipped_test(),
     ]
     drives = integers.in_si(chased)[:, ref.columns["drive"]]
-    beyond = excess(ref.model, drives, ref.sample_time, ref.controller.rest()[0])
+    beyond = ref.once(
+        "excess", drives, lambda drives: excess(ref.model, drives, ref.sample_time, ref.controller.rest()[0])
+    )
     rows.append(entry_of(program.build, ComparisonKind.EXCESS, "share of its bound", "1", beyond, _proved(integers)))
-    off = reached(ref, integers.in_si(followed)) - ref.path
+    off = ref.once("reached", integers.in_si(followed), lambda answers: reached(ref, answers)) - ref.path
     # The device is off in the displacement by what is proved, and the target by half a count
     in_target = np.abs(np.linalg.inv(np.asarray(ref.controller.kernels.target_directions)))
     most = in_target @ (integers.fixed.off.stage + integers.fixed.off.target)

@@ -48,7 +48,7 @@ def online_rows(program: ComparedProgram) -> list[ComparisonEntry]:
         *_about_rows(program),
         *program.off_command(
             ComparisonKind.ONLINE_PATH,
-            reached(ref, followed) - ref.path,
+            ref.once("reached", followed, lambda answers: reached(ref, answers)) - ref.path,
             max(ANGLE_LIMIT[program.real], ref.held_error),
             max(LENGTH_LIMIT[program.real], ref.held_error),
         ),
@@ -120,7 +120,7 @@ def _equilibrium_rows(program: ComparedProgram, settled: np.ndarray) -> list[Com
     if not plain.size:
         return rows
     wanted = ref.positions[plain]
-    off = _equilibria(ref, settled[plain]) - wanted
+    off = ref.once("equilibria", settled[plain], lambda answers: _equilibria(ref, answers)) - wanted
     for unit, span in program.followed_channels():
         limit = max((ANGLE_LIMIT if unit == "rad" else LENGTH_LIMIT)[real], rounded(real, wanted[:, span]))
         rows.append(program.row(ComparisonKind.EQUILIBRIA, ref.scenario.file.follow, off, limit, span))
@@ -158,7 +158,7 @@ def _hostile_rows(program: ComparedProgram) -> list[ComparisonEntry]:
         rows += _controller_rows(program, ComparisonKind.CHASED, chased, ref.chased, ties=True)
     if not m.inertial:  # where jumping targets take a mass, no drive can decide any more
         allowed = EXCESS_LIMIT[real] if m.x.numel() == m.n_states else EXCESS_LIMIT_WITH_MEMORY
-        over = excess(m, drives, ref.sample_time, cold[0])
+        over = ref.once("excess", drives, lambda drives: excess(m, drives, ref.sample_time, cold[0])).copy()
         over[1:][_limited_by_rate(chased[:, 0])] = 0.0
         rows.append(entry_of(program.build, ComparisonKind.EXCESS, "share of its bound", "1", over, allowed))
     if (rate := ref.controller.rate) is not None:

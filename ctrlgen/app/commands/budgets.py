@@ -9,7 +9,7 @@ import typer
 from rich.markup import escape
 
 from ctrlgen.app.budget_console import print_budget
-from ctrlgen.app.commands.app import ACCURACY_PANEL, OtherDevice, ScenarioPath, app
+from ctrlgen.app.commands.app import ACCURACY_PANEL, OtherDevice, ScenarioPath, app, out_option
 from ctrlgen.app.console import out, progress
 from ctrlgen.core.errors import Fault, InputError
 
@@ -21,11 +21,7 @@ def budget(
     scenario: ScenarioPath,
     out_folder: Annotated[
         Path | None,
-        typer.Option(
-            "--out",
-            help="Folder for budget.html, budget.json and figures; without it only the tables are printed.",
-            show_default=False,
-        ),
+        out_option(about="Folder for budget.html, budget.json and figures; without it only the tables are printed."),
     ] = None,
     uncertainty: Annotated[
         Path | None,
@@ -69,7 +65,7 @@ def budget(
     --finer names another description of the device, with the same drives and channels. Its difference along the path is known with its
     sign; it stands beside the band and is not combined with it.
 
-    Example:  ctrlgen budget scenarios/circle20 --out out/budget
+    Example:  ctrlgen budget scenarios/circle20 -o out/budget
     """
     from ctrlgen.budget.error_budget import error_budget
     from ctrlgen.core.files import check_folder, whole_folder

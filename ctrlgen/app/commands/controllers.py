@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from ctrlgen.app.commands.app import SCENARIO_PANEL, OtherDevice, OutFolder, ScenarioPath, app
+from ctrlgen.app.commands.app import SCENARIO_PANEL, OtherDevice, ScenarioPath, app, out_of, out_option
 from ctrlgen.app.console import out, progress
 
 if TYPE_CHECKING:
@@ -17,48 +17,58 @@ if TYPE_CHECKING:
 
 
 @app.command(rich_help_panel=SCENARIO_PANEL)
-def run(scenario: ScenarioPath, out_folder: OutFolder, device: OtherDevice = None) -> None:
+def run(
+    scenario: ScenarioPath,
+    out_folder: Annotated[Path | None, out_option("out/NAME")] = None,
+    device: OtherDevice = None,
+) -> None:
     """Solve a scenario, generate its C, compare the C with the model, and report.
 
     Leaves in --out: report.html (open this first), summary.json, trajectory.csv, figures/, and c/ with its
     CMake file and test. The exit status is 1 when anything is out of tolerance or unreachable.
 
-    Example:  ctrlgen run scenarios/circle20 --out out/circle20
+    Example:  ctrlgen run scenarios/circle20
     """
     from ctrlgen.app import scenario_pipeline as pipeline
 
+    folder = out_of(out_folder, scenario)
     asked = _read(scenario, device)
     with progress(pipeline.steps(asked)) as advance:
-        outcome = pipeline.run(asked, out_folder, advance)
+        outcome = pipeline.run(asked, folder, advance)
     from ctrlgen.app.scenario_console import print_comparison, print_solution
 
     print_solution(outcome)
     print_comparison(outcome)
-    out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'report.html'))}", soft_wrap=True)
+    out.print(f"[bold]report[/bold]  {escape(str(folder / 'report.html'))}", soft_wrap=True)
     _exit(outcome)
 
 
 @app.command(rich_help_panel=SCENARIO_PANEL)
-def solve(scenario: ScenarioPath, out_folder: OutFolder, device: OtherDevice = None) -> None:
+def solve(
+    scenario: ScenarioPath,
+    out_folder: Annotated[Path | None, out_option("out/NAME_solve")] = None,
+    device: OtherDevice = None,
+) -> None:
     """Solve a scenario for its drives (IPOPT) and report the margin to every limit; no C.
 
-    Example:  ctrlgen solve scenarios/raster --out out/raster
+    Example:  ctrlgen solve scenarios/raster
     """
     from ctrlgen.app import scenario_pipeline as pipeline
 
+    folder = out_of(out_folder, scenario, "solve")
     with progress(2) as advance:
-        outcome = pipeline.solve_into(_read(scenario, device), out_folder, advance)
+        outcome = pipeline.solve_into(_read(scenario, device), folder, advance)
     from ctrlgen.app.scenario_console import print_solution
 
     print_solution(outcome)
-    out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'report.html'))}", soft_wrap=True)
+    out.print(f"[bold]report[/bold]  {escape(str(folder / 'report.html'))}", soft_wrap=True)
     _exit(outcome)
 
 
 @app.command(rich_help_panel=SCENARIO_PANEL)
 def generate(
     scenario: ScenarioPath,
-    out_folder: OutFolder,
+    out_folder: Annotated[Path | None, out_option("out/NAME_generate")] = None,
     device: OtherDevice = None,
     player: Annotated[
         bool,
@@ -72,21 +82,24 @@ def generate(
     Leaves in --out a folder that drops into a firmware project as it is; its README.md says how. Where the online
     controller cannot do what the scenario asks, the error says why; --player then writes the player alone.
 
-    Example:  ctrlgen generate scenarios/circle20 --out out/c && cmake -S out/c -B out/build
+    Example:  ctrlgen generate scenarios/circle20 -o out/c && cmake -S out/c -B out/build
     """
     from ctrlgen.app import scenario_pipeline as pipeline
 
+    folder = out_of(out_folder, scenario, "generate")
     if player:
         with progress(2) as advance:
-            written = pipeline.player_into(_read(scenario, device), out_folder, advance)
+            written = pipeline.player_into(_read(scenario, device), folder, advance)
         for path in written:
             out.print(str(path), soft_wrap=True, markup=False)
+        _tell(folder)
         return
     with progress(2) as advance:
-        c = pipeline.generate_into(_read(scenario, device), out_folder, advance)
+        c = pipeline.generate_into(_read(scenario, device), folder, advance)
     for name in [*c.online.values(), *c.player.values()]:
-        out.print(f"{out_folder / name}.c", soft_wrap=True, markup=False)
+        out.print(f"{folder / name}.c", soft_wrap=True, markup=False)
     out.print(f"online controller: {c.operations} arithmetic operations a call, {c.worst_operations} at most")
+    _tell(folder)
 
 
 @app.command(rich_help_panel=SCENARIO_PANEL)
@@ -109,7 +122,7 @@ def compare(scenario: ScenarioPath, device: OtherDevice = None) -> None:
 @app.command(rich_help_panel=SCENARIO_PANEL)
 def verify(
     scenario: ScenarioPath,
-    out_folder: OutFolder,
+    out_folder: Annotated[Path | None, out_option("out/NAME_verify")] = None,
     quick: Annotated[
         bool,
         typer.Option(
@@ -126,17 +139,18 @@ def verify(
     c/. The exit status is 1 when any check failed. A missing tool is no failure: what it would have checked is listed as not run,
     with the command that installs it.
 
-    Example:  ctrlgen verify scenarios/circle20 --out out/verify
+    Example:  ctrlgen verify scenarios/circle20
     """
     from ctrlgen.app import scenario_pipeline as pipeline
 
+    folder = out_of(out_folder, scenario, "verify")
     asked = _read(scenario, device)
     with progress(pipeline.verify_steps(asked)) as advance:
-        build = pipeline.verify(asked, out_folder, advance, quick)
+        build = pipeline.verify(asked, folder, advance, quick)
     from ctrlgen.app.scenario_console import print_build
 
     print_build(build)
-    out.print(f"[bold]page[/bold]  {escape(str(out_folder / 'build.html'))}", soft_wrap=True)
+    out.print(f"[bold]page[/bold]  {escape(str(folder / 'build.html'))}", soft_wrap=True)
     if not build.passed:
         raise typer.Exit(1)
 
@@ -144,7 +158,7 @@ def verify(
 @app.command(rich_help_panel=SCENARIO_PANEL)
 def fmu(
     scenario: ScenarioPath,
-    out_folder: OutFolder,
+    out_folder: Annotated[Path | None, out_option("out/NAME_fmu")] = None,
     fmi: Annotated[int, typer.Option(help="Version of the FMI standard, 3 or 2.")] = 3,
     device: OtherDevice = None,
 ) -> None:
@@ -155,16 +169,22 @@ def fmu(
     C compiler. In a loop, step the controller first, pass its drives to the plant, then step the plant: a target is the
     value at the end of the step. With start_settled = true both start in equilibrium at their first inputs.
 
-    Example:  ctrlgen fmu scenarios/circle20 --out out/fmu
+    Example:  ctrlgen fmu scenarios/circle20
     """
     from ctrlgen.app import scenario_pipeline as pipeline
 
-    made = pipeline.fmus_into(_read(scenario, device), out_folder, fmi)
+    folder = out_of(out_folder, scenario, "fmu")
+    made = pipeline.fmus_into(_read(scenario, device), folder, fmi)
     for path in made.paths:
         out.print(str(path), soft_wrap=True, markup=False)
     out.print(f"FMI {fmi}.0, {'binaries for ' + made.binary if made.binary else 'no binaries'}", markup=False)
     if made.remark:
         out.print(made.remark, markup=False, soft_wrap=True)
+    _tell(folder)
+
+
+def _tell(folder: Path) -> None:
+    out.print(f"[bold]folder[/bold]  {escape(str(folder))}", soft_wrap=True)
 
 
 def _read(scenario: Path, device: Path | None) -> Scenario:

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from ctrlgen.app.commands.app import DEVICE_PANEL, DevicePath, OutFolder, app, as_picture
+from ctrlgen.app.commands.app import DEVICE_PANEL, DevicePath, app, as_picture, name_of, out_of, out_option
 from ctrlgen.app.console import err, out, progress
 from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError
@@ -57,8 +57,14 @@ def check(
 def bode(
     device: DevicePath,
     picture: Annotated[
-        Path, typer.Option("--out", help="The picture, .svg or .png, or the page, .html, to write.", show_default=False)
-    ],
+        Path | None,
+        typer.Option(
+            "--out",
+            "-o",
+            help="The picture, .svg or .png, or the page, .html, to write.",
+            show_default="NAME_bode.html",
+        ),
+    ] = None,
     at: Annotated[
         str | None,
         typer.Option(
@@ -73,7 +79,7 @@ def bode(
 ) -> None:
     """Draw the frequency response from every drive to the pose, linearised at a pose; a page of it zooms and shows its values.
 
-    Example:  ctrlgen bode scenarios/devices/mems_hexapod.toml --out bode.html --at delta_x=5um,delta_z=20um
+    Example:  ctrlgen bode scenarios/devices/mems_hexapod.toml --at delta_x=5um,delta_z=20um
     """
     from ctrlgen.controller.bode import draw_bode
     from ctrlgen.devices import load_device
@@ -84,7 +90,7 @@ def bode(
     if of not in ("pose", "reading"):
         raise InputError("--of", [Fault("of", f"{of!r} is neither pose nor reading")])
     model = build_model(load_device(device))
-    signal_ = model.signals["pose"]
+    picture, signal_ = picture or Path(f"{name_of(device)}_bode.html"), model.signals["pose"]
     pose = middle_pose(model) if at is None else Frame(signal_.channels, signal_.units).pose(at, "--at")
     if picture.suffix == ".html":
         from ctrlgen.controller.bode_page import write_bode_page
@@ -98,7 +104,7 @@ def bode(
 @app.command(rich_help_panel=DEVICE_PANEL)
 def workspace(
     device: DevicePath,
-    out_folder: OutFolder,
+    out_folder: Annotated[Path | None, out_option("out/NAME_workspace")] = None,
     at: Annotated[
         list[str] | None,
         typer.Option(
@@ -111,14 +117,15 @@ def workspace(
 
     Leaves workspace.html, workspace.svg and workspace.json in --out.
 
-    Example:  ctrlgen workspace scenarios/devices/mems_hexapod.toml --out out/workspace --at delta_z=20um
+    Example:  ctrlgen workspace scenarios/devices/mems_hexapod.toml --at delta_z=20um
     """
     from ctrlgen.app.scenario_console import print_workspace
     from ctrlgen.app.scenario_pipeline import map_workspace
     from ctrlgen.devices import load_device
 
-    print_workspace(map_workspace(load_device(device), at or [], out_folder))
-    out.print(str(out_folder / "workspace.html"), soft_wrap=True, markup=False)
+    folder = out_of(out_folder, device, "workspace")
+    print_workspace(map_workspace(load_device(device), at or [], folder))
+    out.print(str(folder / "workspace.html"), soft_wrap=True, markup=False)
 
 
 @app.command(rich_help_panel=DEVICE_PANEL)
@@ -135,7 +142,7 @@ def simulate(
     duration: Annotated[float, typer.Option(help="Of a step, in seconds; the first tenth is at rest.")] = 1.0,
     rate: Annotated[float, typer.Option(help="Of a step, in samples a second.", min=1e-3)] = 1000.0,
     out_folder: Annotated[
-        Path | None, typer.Option("--out", help="Folder for signals.csv and signals.svg.", show_default=False)
+        Path | None, out_option(about="Folder for signals.csv and signals.svg; without it only the ranges are printed.")
     ] = None,
 ) -> None:
     """Drive a device as a file says, or by a step, from rest: the range of every signal, and what was measured beside it.
@@ -178,7 +185,7 @@ def reproduce(
     ] = None,
     json_: Annotated[bool, typer.Option("--json", help="Print the rows as a JSON list instead of a table.")] = False,
     page: Annotated[
-        Path | None, typer.Option("--out", help="Also write a page (.html) with the figures.", show_default=False)
+        Path | None, typer.Option("--out", "-o", help="Also write a page (.html) with the figures.", show_default=False)
     ] = None,
     differing: Annotated[
         bool, typer.Option("--differing", help="Show only rows that differ or cannot be computed.")

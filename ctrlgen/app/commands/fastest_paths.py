@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from ctrlgen.app.commands.app import ACCURACY_PANEL, OtherDevice, ScenarioPath, app
+from ctrlgen.app.commands.app import ACCURACY_PANEL, OtherDevice, ScenarioPath, app, out_option
 from ctrlgen.app.console import out, progress
 from ctrlgen.app.fastest_console import print_fastest
 
@@ -18,11 +18,9 @@ def fastest(
     scenario: ScenarioPath,
     out_folder: Annotated[
         Path | None,
-        typer.Option(
-            "--out",
-            help="Folder for fastest.html, fastest.json, figures, the set-points as a scenario and the player in C; without it only "
-            "the tables are printed.",
-            show_default=False,
+        out_option(
+            about="Folder for fastest.html, fastest.json, figures, the set-points as a scenario and the player in C; without it only "
+            "the tables are printed."
         ),
     ] = None,
     sample_rate: Annotated[
@@ -45,7 +43,7 @@ def fastest(
     In --out, scenario/ is an ordinary scenario of the set-points, for ctrlgen run, budget and verify, and player/ its C; with
     --frequency, at_frequency/ holds the same of the largest path.
 
-    Example:  ctrlgen fastest scenarios/circle20 --frequency "50 Hz" --out out/fastest
+    Example:  ctrlgen fastest scenarios/circle20 --frequency "50 Hz" -o out/fastest
     """
     from ctrlgen.core.files import check_folder, whole_folder
     from ctrlgen.path_timing.fastest import fastest as fastest_path

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from ctrlgen.app.commands.app import ACCURACY_PANEL, OtherDevice, ScenarioPath, app
+from ctrlgen.app.commands.app import ACCURACY_PANEL, OtherDevice, ScenarioPath, app, out_option
 from ctrlgen.app.console import out, progress
 from ctrlgen.app.learning_console import print_learning
 
@@ -26,10 +26,8 @@ def learn(
     ],
     out_folder: Annotated[
         Path | None,
-        typer.Option(
-            "--out",
-            help="Folder for learning.html, drives.csv, learning.json, figures and the player's C; without it only the table is printed.",
-            show_default=False,
+        out_option(
+            about="Folder for learning.html, drives.csv, learning.json, figures and the player's C; without it only the table is printed."
         ),
     ] = None,
     device: OtherDevice = None,
@@ -50,7 +48,7 @@ def learn(
 
     With --device device.next.toml it goes on from what a diagnosis has explained, and learns only what is left.
 
-    Example:  ctrlgen learn scenarios/lever_circle scenarios/lever_runs/run_a.toml scenarios/lever_runs/run_b.toml --out out/learn
+    Example:  ctrlgen learn scenarios/lever_circle scenarios/lever_runs/run_a.toml scenarios/lever_runs/run_b.toml -o out/learn
     """
     from ctrlgen.core.files import check_folder, whole_folder
     from ctrlgen.learning.learn import learn as learn_next

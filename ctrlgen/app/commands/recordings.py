@@ -13,10 +13,11 @@ from ctrlgen.app.commands.app import (
     BootstrapCount,
     DevicePath,
     JobCount,
-    OutFolder,
     SchedulerAddress,
     app,
     as_picture,
+    out_of,
+    out_option,
 )
 from ctrlgen.app.console import complain, counted, err, out, progress
 from ctrlgen.app.diagnosis_console import print_batch, print_bootstrap, print_diagnosis, print_explanation
@@ -86,7 +87,7 @@ def diagnose(
             show_default=False,
         ),
     ],
-    out_folder: OutFolder,
+    out_folder: Annotated[Path | None, out_option("out/NAME_diagnose, NAME of the recording")] = None,
     seed: Annotated[int, typer.Option(help="Seed of all random numbers; the same seed gives the same answer.")] = 0,
     laws: Annotated[
         str | None,
@@ -132,7 +133,7 @@ def diagnose(
     --explain backlash answers for one effect: where it was tried, from what
     starts, what it reached and why it was not taken.
 
-    Example:  ctrlgen diagnose scenarios/devices/meso_hexapod.toml scenarios/nist_hexapod --out out/nist
+    Example:  ctrlgen diagnose scenarios/devices/meso_hexapod.toml scenarios/nist_hexapod
     """
     from ctrlgen.app.look_console import described
     from ctrlgen.diagnosis.diagnosis_folder import Replicates, diagnose_into, unfinished
@@ -142,6 +143,7 @@ def diagnose(
         raise typer.BadParameter(
             "--scheduler only distributes the replicates of --bootstrap; add --bootstrap 200, or leave it out"
         )
+    folder = out_of(out_folder, recording[0], "diagnose")
     try:
         replicates = Replicates(bootstrap, scheduler, jobs) if bootstrap else None
         chosen = None if laws is None else [name.strip() for name in laws.split(",") if name.strip()]
@@ -149,9 +151,9 @@ def diagnose(
             selected_laws([explain])
         recording = described(recording, device)
         with progress() as advance:
-            result = diagnose_into(device, recording, out_folder, seed, advance, replicates, chosen, jobs)
+            result = diagnose_into(device, recording, folder, seed, advance, replicates, chosen, jobs)
     except KeyboardInterrupt:
-        kept = unfinished(out_folder)
+        kept = unfinished(folder)
         if kept.exists():
             err.print(
                 f"the fits made so far are in {escape(str(kept))}; the same command continues from them", soft_wrap=True
@@ -165,7 +167,7 @@ def diagnose(
         print_explanation(result, explain)
     if result.bootstrap is not None:
         print_bootstrap(result.bootstrap)
-    out.print(f"[bold]report[/bold]  {escape(str(out_folder / 'report.html'))}", soft_wrap=True)
+    out.print(f"[bold]report[/bold]  {escape(str(folder / 'report.html'))}", soft_wrap=True)
 
 
 @app.command(rich_help_panel=RECORDING_PANEL)
@@ -177,10 +179,8 @@ def calibrate(
     ],
     out_folder: Annotated[
         Path | None,
-        typer.Option(
-            "--out",
-            help="Folder for constants.h, constants.bin, constants.json and calibration.html; without it only tables are printed.",
-            show_default=False,
+        out_option(
+            about="Folder for constants.h, constants.bin, constants.json and calibration.html; without it only tables are printed."
         ),
     ] = None,
     scenario: Annotated[
@@ -217,7 +217,7 @@ def calibrate(
     calibration.html, and device.calibrated.toml, a stage by this matrix. `few` are gain and sense of each drive, turn of the
     frame and place of the point that is read, turns per length.
 
-    Example:  ctrlgen calibrate scenarios/devices/mems_hexapod_run_time.toml scenarios/hexapod_specimen --out out/specimen
+    Example:  ctrlgen calibrate scenarios/devices/mems_hexapod_run_time.toml scenarios/hexapod_specimen -o out/specimen
     """
     from ctrlgen.app.calibration_console import print_calibration
     from ctrlgen.calibration.budgets_compared import budgets
@@ -274,11 +274,12 @@ def batch(
         Path, typer.Argument(metavar="JOBS.toml", help="The list of diagnoses, see above.", show_default=False)
     ],
     out_folder: Annotated[
-        Path,
-        typer.Option(
-            "--out", help="Folder for one result folder per diagnosis, results.csv and batch.html.", show_default=False
+        Path | None,
+        out_option(
+            "out/NAME_batch, NAME of the list or of its folder",
+            "Folder for one result folder per diagnosis, results.csv and batch.html.",
         ),
-    ],
+    ] = None,
     seed: Annotated[
         int | None, typer.Option(help="Seed of all random numbers, instead of the list's.", show_default=False)
     ] = None,
@@ -306,18 +307,19 @@ def batch(
     On a cluster add the address of its dask.distributed scheduler, --scheduler
     tcp://HOST:8786.
 
-    Example:  ctrlgen batch scenarios/lever_runs/jobs.toml --out out/jobs
+    Example:  ctrlgen batch scenarios/lever_runs/jobs.toml
     """
     from ctrlgen.app.batch import load_batch, run_batch
 
+    folder = out_of(out_folder, list_, "batch")
     try:
         with counted("diagnosing") as told:
-            rows = run_batch(load_batch(list_, seed, bootstrap), out_folder, scheduler, jobs, told)
+            rows = run_batch(load_batch(list_, seed, bootstrap), folder, scheduler, jobs, told)
     except InputError as error:
         complain(error)
         raise typer.Exit(2) from None
     print_batch(rows)
-    out.print(f"[bold]table[/bold]  {escape(str(out_folder / 'results.csv'))}", soft_wrap=True)
-    out.print(f"[bold]page[/bold]   {escape(str(out_folder / 'batch.html'))}", soft_wrap=True)
+    out.print(f"[bold]table[/bold]  {escape(str(folder / 'results.csv'))}", soft_wrap=True)
+    out.print(f"[bold]page[/bold]   {escape(str(folder / 'batch.html'))}", soft_wrap=True)
     if any(row.state == "failed" for row in rows):
         raise typer.Exit(1)

@@ -17,7 +17,7 @@ from ctrlgen.devices.mechanism.condensed import nominal
 from ctrlgen.devices.mechanism.element_ends import element_ends
 from ctrlgen.devices.mechanism.mechanism import Mechanism
 from ctrlgen.physics.rigid_bodies import GROUND
-from ctrlgen.reporting.plots import COLOURS
+from ctrlgen.reporting.plots import COLOURS, legend_over
 
 MM = 1e3  # per metre
 ARROW = 0.12  # of the mechanism's extent: an actuator's
@@ -40,7 +40,7 @@ def mechanism_figure(device: Mechanism) -> Figure:
     ports = [place * MM for s in device.placed_super_elements for place in s.places]
     output = np.array([x.si for x in device.output.at]) * MM
 
-    figure = Figure(figsize=(8, 7))
+    figure = Figure(figsize=(8, 7), layout="constrained")
     ax = figure.add_subplot(projection="3d")
     joints: list[list[np.ndarray]] = [[] for _ in device.bodies]
     for e, a, b in zip(device.placed_elements, fixed, free, strict=True):
@@ -87,7 +87,7 @@ def mechanism_figure(device: Mechanism) -> Figure:
     ax.set_ylabel("y [mm]")
     ax.set_zlabel("z [mm]")
     ax.set_title(device.title, fontsize=10)
-    ax.legend(fontsize=8, loc="upper left")
+    legend_over(figure, ax)
     return figure
 
 

@@ -17,7 +17,7 @@ from ctrlgen.diagnosis.report.plot_shares import draw_shares
 from ctrlgen.diagnosis.report.plot_uncertainty import draw_confusability, draw_intervals, draw_profiles, draw_rivals
 from ctrlgen.diagnosis.report.residuals import AFTER, BEFORE, NOISE, WIDTH, Residuals
 from ctrlgen.reporting.line_patterns import DASHED, DOTTED, SOLID, dashes, mark
-from ctrlgen.reporting.plots import STYLE, svg
+from ctrlgen.reporting.plots import STYLE, legend_above, svg
 
 # columns of a long curve; of each the smallest and the largest sample are drawn
 POINTS = 700
@@ -152,7 +152,7 @@ def draw_spectrum(residuals: Residuals) -> Figure | None:
         panel.set_xlabel("frequency [Hz]")
         lowest = np.concatenate([density for label, density in curves if label != "before"])
         panel.set_ylim(bottom=0.4 * np.min(lowest[lowest > 0], initial=np.inf))
-        panel.legend(fontsize=8)
+        legend_above(panel)
     for panel in axes.flat[len(found) :]:
         panel.set_visible(False)
     return figure

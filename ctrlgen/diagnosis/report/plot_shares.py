@@ -11,7 +11,7 @@ from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.shares.design import Columns, Kind
 from ctrlgen.diagnosis.shares.shares_table import ChannelShares, SharesTable
 from ctrlgen.reporting.line_patterns import mark
-from ctrlgen.reporting.plots import COLOURS
+from ctrlgen.reporting.plots import COLOURS, legend_over
 
 WIDTH = 8.6
 # kinds of a channel that are shown, besides the selected ones
@@ -50,7 +50,9 @@ def draw_shares(table: SharesTable, units: dict[str, str] | None = None) -> Figu
     if panels:
         lower = grid[-1].subgridspec(1, len(panels))
         for k, (channel, kind) in enumerate(panels):
-            _residual(figure.add_subplot(lower[k]), table, channel, kind, (units or {}).get(channel.channel, ""))
+            panel = figure.add_subplot(lower[k])
+            _residual(panel, table, channel, kind, (units or {}).get(channel.channel, ""))
+        legend_over(figure, panel, below=True)
     return figure
 
 
@@ -111,7 +113,6 @@ def _residual(panel: Axes, table: SharesTable, channel: ChannelShares, kind: Kin
     panel.set_title(f"{channel.channel} over {kind.value}" + (f" [{unit}]" if unit else ""), fontsize=8)
     panel.locator_params(nbins=5)
     panel.tick_params(labelsize=7.5)
-    panel.legend(fontsize=7, markerscale=3, loc="best")
 
 
 def _abscissa(table: SharesTable, channel: ChannelShares, kind: Kind) -> tuple[np.ndarray, str, str]:
