@@ -24,6 +24,7 @@ from ctrlgen.app.commands import controllers  # noqa: F401, it registers the com
 from ctrlgen.app.commands.app import app
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.package import verify_package
+from ctrlgen.verification import hostile, in_loop, qemu, rules
 from ctrlgen.verification.build_page import write_build
 from ctrlgen.verification.build_record import BUDGETS, Build, record
 from ctrlgen.verification.check import Check, CheckState, ToolFinding, not_run
@@ -218,13 +219,13 @@ def test_what_did_not_run_is_listed_and_is_neither_passed_nor_failed(example, tm
 def stubbed(monkeypatch, compiler):
     """Everything but solving, generating and writing replaced by an answer at once."""
     monkeypatch.setattr(
-        pipeline,
+        in_loop,
         "run_in_loop",
         lambda *_: InLoop((), (), (NotRun(what="emulated cores", remedy="pip install unicorn pyelftools"),)),
     )
-    monkeypatch.setattr(pipeline, "check_on_boards", lambda *_: ())
-    monkeypatch.setattr(pipeline, "check_hostile", lambda *_, **__: ())
-    monkeypatch.setattr(pipeline, "check_rules", lambda *_, **__: ())
+    monkeypatch.setattr(qemu, "check_on_boards", lambda *_: ())
+    monkeypatch.setattr(hostile, "check_hostile", lambda *_, **__: ())
+    monkeypatch.setattr(rules, "check_rules", lambda *_, **__: ())
     return monkeypatch
 
 
@@ -232,7 +233,7 @@ def stubbed(monkeypatch, compiler):
 def test_a_failing_check_gives_status_1_and_the_page_is_written(stubbed, tmp_path):
     finding = refused("a.c", 3, "advisory", "15.1")
     failing = Check("cppcheck --addon=misra", "2.10", (), CheckState.FAILED, (finding,))
-    stubbed.setattr(pipeline, "check_rules", lambda *_, **__: (failing,))
+    stubbed.setattr(rules, "check_rules", lambda *_, **__: (failing,))
     out = tmp_path / "out"
     done = CliRunner().invoke(app, ["verify", str(SCENARIOS / "rrr_circle"), "--out", str(out)])
     assert done.exit_code == 1

@@ -12,8 +12,8 @@ from ctrlgen import InputError, build_model, load_device, simulate
 from ctrlgen.app.scenario_pipeline import map_workspace
 from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.controller.motion_feedforward import controller_of
-from ctrlgen.trajectory.solution_plots import draw_workspace
 from ctrlgen.trajectory.workspace import Workspace
+from ctrlgen.trajectory.workspace_plots import draw_workspace
 
 UM = 1e-6
 

@@ -1,4 +1,7 @@
-"""The pipeline of a scenario: solve, generate its C, compare, report. A result folder appears whole or not at all."""
+"""The pipeline of a scenario: solve, generate its C, compare, report. A result folder appears whole or not at all.
+
+What only one of the jobs needs is imported when it is done: all of it takes a tenth of `run`.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +11,8 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import matplotlib.pyplot as plt
-
-from ctrlgen.app.workspace_page import workspace_page
-from ctrlgen.app.workspace_summary import WorkspaceSummary, workspace_numbers
 from ctrlgen.budget.budget_section import budget_section
 from ctrlgen.budget.robust import solve
 from ctrlgen.core.errors import SolverError
@@ -21,28 +21,23 @@ from ctrlgen.core.steps import noted
 from ctrlgen.core.tabular import Reported
 from ctrlgen.devices import Device
 from ctrlgen.firmware.c.toolchains import find_compilers
-from ctrlgen.firmware.fmi.fmu import Fmus, write_fmus
 from ctrlgen.firmware.folder import CFolder, generate
 from ctrlgen.firmware.player_only import check_online, generate_player
 from ctrlgen.model.assembly import build_model
-from ctrlgen.reporting.plots import STYLE, svg
 from ctrlgen.trajectory.frame import Frame
 from ctrlgen.trajectory.metrics import ExpectationResult, expectations
 from ctrlgen.trajectory.scenario import Scenario, load_scenario, model_of
 from ctrlgen.trajectory.solution import Solution
-from ctrlgen.trajectory.solution_plots import draw_solution, draw_workspace
-from ctrlgen.trajectory.workspace import Workspace
-from ctrlgen.verification.build_page import write_build
-from ctrlgen.verification.build_record import Build
+from ctrlgen.trajectory.solution_plots import draw_solution
 from ctrlgen.verification.comparison import Comparison, compare
-from ctrlgen.verification.hostile import check_hostile
-from ctrlgen.verification.in_loop import run_in_loop
-from ctrlgen.verification.qemu import check_on_boards
 from ctrlgen.verification.reference import ReferenceAnswers
-from ctrlgen.verification.rules import check_rules
 from ctrlgen.verification.scenario_report import write_report
 from ctrlgen.verification.summary import passed
-from ctrlgen.verification.tracking import tracking_errors
+
+if TYPE_CHECKING:
+    from ctrlgen.app.workspace_summary import WorkspaceSummary
+    from ctrlgen.firmware.fmi.fmu import Fmus
+    from ctrlgen.verification.build_record import Build
 
 Progress = Callable[[str], None]
 STEPS = 8  # calls of `progress` in `run`: model, solve, C, four builds, report
@@ -131,6 +126,14 @@ def verify(scenario: Scenario | Path | str, out: Path | str, progress: Progress 
     are then listed as not run. Raises InputError, Unreachable, SolverError, ToolError (no C compiler, or one that refuses the
     C); whatever else fails is in `failures` of what is returned, and what did not run in `not_run`.
     """
+    from ctrlgen.verification.build_page import write_build
+    from ctrlgen.verification.build_record import Build
+    from ctrlgen.verification.hostile import check_hostile
+    from ctrlgen.verification.in_loop import run_in_loop
+    from ctrlgen.verification.qemu import check_on_boards
+    from ctrlgen.verification.rules import check_rules
+    from ctrlgen.verification.tracking import tracking_errors
+
     find_compilers()
     scenario = _with_online(scenario)
     with whole_folder(Path(out)) as draft:
@@ -189,6 +192,8 @@ def player_into(scenario: Scenario | Path | str, out: Path | str, progress: Prog
 def fmus_into(scenario: Scenario, out: Path, fmi: int) -> Fmus:
     """Writes controller and plant as FMI units; only of a robust scenario is the path solved, for the controller's limits. Raises as
     `write_fmus` and `solve_scenario`."""
+    from ctrlgen.firmware.fmi.fmu import write_fmus
+
     limited = None if scenario.file.robust is None else solve_scenario(scenario).model
     return write_fmus(scenario, out, fmi, limited)
 
@@ -220,6 +225,14 @@ def map_workspace(device: Device, poses: list[str], out: Path) -> WorkspaceSumma
     `poses` such as "delta_x=5um,delta_z=20um", channels left out being zero; without any, those of `Workspace.bases`. The
     balls and the extent are searched from the middle one of the list. Raises InputError.
     """
+    import matplotlib.pyplot as plt
+
+    from ctrlgen.app.workspace_page import workspace_page
+    from ctrlgen.app.workspace_summary import WorkspaceSummary, workspace_numbers
+    from ctrlgen.reporting.plots import STYLE, svg
+    from ctrlgen.trajectory.workspace import Workspace
+    from ctrlgen.trajectory.workspace_plots import draw_workspace
+
     model = build_model(device)
     workspace, signal = Workspace(model), model.signals["pose"]
     frame = Frame(signal.channels, signal.units)

@@ -33,8 +33,9 @@ from ctrlgen.reporting.plots import COLOURS, STYLE, legend_above, plt, svg
 from ctrlgen.reporting.result_file import json_text
 from ctrlgen.trajectory.metrics import expectations
 from ctrlgen.trajectory.solution import Solution
-from ctrlgen.trajectory.solution_plots import draw_solution, draw_workspace
+from ctrlgen.trajectory.solution_plots import draw_solution
 from ctrlgen.trajectory.workspace import Workspace
+from ctrlgen.trajectory.workspace_plots import draw_workspace
 from ctrlgen.verification.scenario_report import write_report
 
 

@@ -118,7 +118,7 @@ def in_blocks(one: ca.Function, state: np.ndarray, given: np.ndarray) -> np.ndar
     states = np.empty((len(given), len(state)))
     for a in range(0, len(given), BLOCK):
         block = given[a : a + BLOCK]
-        states[a : a + BLOCK] = one.mapaccum(len(block))(state, block.T).full().T
+        (states[a : a + BLOCK],) = evaluate(one.mapaccum(len(block)), state, block)
         state = states[a + len(block) - 1]
     return states
 

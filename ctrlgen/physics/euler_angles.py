@@ -15,7 +15,7 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy  # its spatial takes a while to import, and comes when it is used
 
 Order = Literal[
     "xyz intrinsic",
@@ -37,7 +37,7 @@ SINGULAR = 1e-6  # rad from where two of the angles are one: a rounding of 1e-16
 
 def rotation_vector_of(angles: np.ndarray, order: str) -> np.ndarray:
     """theta (..., 3) [rad] of `angles` (..., 3) [rad] about the axes of the `order`, one of `ORDERS`."""
-    return np.asarray(Rotation.from_euler(_sequence(order), angles).as_rotvec())
+    return np.asarray(scipy.spatial.transform.Rotation.from_euler(_sequence(order), angles).as_rotvec())
 
 
 def angles_of(theta: np.ndarray, order: str) -> np.ndarray:
@@ -45,7 +45,7 @@ def angles_of(theta: np.ndarray, order: str) -> np.ndarray:
 
     Raises ValueError where the first and the last of them turn about one line (gimbal lock).
     """
-    R = Rotation.from_rotvec(theta).as_matrix()
+    R = scipy.spatial.transform.Rotation.from_rotvec(theta).as_matrix()
     first, last = ("xyz".index(order[k]) for k in ((0, 2) if order.endswith("intrinsic") else (2, 0)))
     # the part of the last axis, turned, that is across the first: the cosine of the middle angle
     across = np.linalg.norm(np.delete(R[..., last], first, axis=-1), axis=-1)
@@ -54,7 +54,7 @@ def angles_of(theta: np.ndarray, order: str) -> np.ndarray:
             f"the middle angle of {order!r}, about {order[1]}, is at 90 deg to one side: the first and the last turn about one line there, "
             "and only their sum or difference is determined; choose another order"
         )
-    return np.asarray(Rotation.from_rotvec(theta).as_euler(_sequence(order)))
+    return np.asarray(scipy.spatial.transform.Rotation.from_rotvec(theta).as_euler(_sequence(order)))
 
 
 def _sequence(order: str) -> str:

@@ -1,48 +1,40 @@
-"""Figures of a solution as SVG: path, forces, temperatures, drives, margins, stage force law, workspace."""
+"""Figures of a solution as SVG: path, forces, temperatures, drives, margins, stage force law."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.patches import Ellipse
 
 from ctrlgen.core.units import from_si, show_difference
-from ctrlgen.reporting.line_patterns import dashes, mark
-from ctrlgen.reporting.plots import COLOURS, STYLE, legend_above, svg
+from ctrlgen.reporting.colours import COLOURS
+from ctrlgen.reporting.plain_drawing import Axes, Bar, Series, bars_svg, panels_svg
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE
 from ctrlgen.trajectory.metrics import force_parts
 from ctrlgen.trajectory.solution import Solution
-from ctrlgen.trajectory.workspace import ROUNDING, Ball, Workspace
+
+WIDTH = 8.2  # inches
+DOTS = 40  # of the modelled path, drawn on the commanded one
+FINER = {"um": "nm", "mm": "um", "rad": "urad", "mrad": "urad", "urad": "nrad"}
 
 
 def draw_solution(solution: Solution) -> dict[str, str]:
     """Every figure that applies to this solution: name -> SVG text."""
-    drawings: dict[str, Callable[[Solution], Figure]] = {"margins": draw_margins}
     state = solution.model.signals.get("state")
     signals = {"forces": "force", f"{state.name if state else 'state'}s": "state", "drives": "drive"}
-    with plt.rc_context(STYLE):
-        figures = {}
-        if solution.scenario.file.follow == "pose" and solution.scenario.sample_time:
-            figures["path"] = svg(draw_path(solution))
-        if solution.scenario.file.follow == "displacement" and "linear" in solution.model.force_parts:
-            figures["stage_force"] = svg(draw_stage_force(solution))
-        for name, role in signals.items():
-            if role not in solution.model.signals:
-                continue
-            figures[name] = svg(draw_signal(solution, role))
-        for name, draw in drawings.items():
-            figures[name] = svg(draw(solution))
-    return figures
+    figures = {}
+    if solution.scenario.file.follow == "pose" and solution.scenario.sample_time:
+        figures["path"] = draw_path(solution)
+    if solution.scenario.file.follow == "displacement" and "linear" in solution.model.force_parts:
+        figures["stage_force"] = draw_stage_force(solution)
+    figures |= {name: draw_signal(solution, role) for name, role in signals.items() if role in solution.model.signals}
+    return figures | {"margins": draw_margins(solution)}
 
 
-FINER = {"um": "nm", "mm": "um", "rad": "urad", "mrad": "urad", "urad": "nrad"}
+def draw_path(solution: Solution) -> str:
+    """`path_axes`, beside each other."""
+    return panels_svg(path_axes(solution), (1, 1.15), WIDTH, 3.9)
 
 
-def draw_path(solution: Solution) -> Figure:
+def path_axes(solution: Solution) -> tuple[Axes, Axes]:
     """Commanded path and modelled samples, and the error over time: the two channels of one unit that move most, one against the
     other, or one over time where it is alone."""
     signal = solution.model.signals["pose"]
@@ -52,163 +44,73 @@ def draw_path(solution: Solution) -> Figure:
     unit = signal.units[most]
     alike = [i for i, other in enumerate(signal.units) if other == unit]
     shown = sorted(sorted(alike, key=lambda i: -np.ptp(command[:, i]))[:2])
-    figure, (left, right) = plt.subplots(1, 2, figsize=(8.2, 3.9), width_ratios=(1, 1.15))
+    alone = len(shown) == 1
 
     def drawn(values: np.ndarray, every: int = 1, close: bool = False) -> list[np.ndarray]:
-        """What the left axes show of a signal."""
-        columns = [from_si(values[::every, i], unit) for i in shown]
+        """Abscissa and ordinate of a signal in the left panel."""
+        columns = [np.asarray(from_si(values[::every, i], unit)) for i in shown]
         columns = [np.append(c, c[0]) for c in columns] if close else columns
         return columns if len(columns) == 2 else [time[::every], *columns]
 
-    alone = len(shown) == 1
-    left.plot(*drawn(command, close=closed and not alone), color="#999999", lw=3, label="commanded")
-    left.plot(*drawn(reached, max(1, len(command) // 40)), ".", ms=5, color=COLOURS[2], label="modelled")
-    if not alone:
-        left.set_aspect("equal", adjustable="datalim")
-    left.set_xlabel("time [s]" if alone else f"{signal.channels[shown[0]]} [{unit}]")
-    left.set_ylabel(f"{signal.channels[shown[-1]]} [{unit}]")
-    legend_above(left)
+    left = Axes(
+        "time [s]" if alone else f"{signal.channels[shown[0]]} [{unit}]",
+        f"{signal.channels[shown[-1]]} [{unit}]",
+        (
+            Series("commanded", *drawn(command, close=closed and not alone), "#999999", width=3.0),
+            Series("modelled", *drawn(reached, max(1, len(command) // DOTS)), COLOURS[2], width=0.0, points=2.5),
+        ),
+        equal=not alone,
+    )
     fine = FINER.get(unit, unit)
-    tolerance = from_si(FEASIBILITY_TOLERANCE * signal.scale[most], fine)
-    for k, (i, colour) in enumerate(zip(alike, (COLOURS[0], COLOURS[2], COLOURS[4]), strict=False)):
-        off = from_si(reached[:, i] - command[:, i], fine)
-        right.plot(time, off, color=colour, ls=dashes(k), lw=1, label=signal.channels[i])
-    right.axhspan(-tolerance, tolerance, color="#f0f0f0", zorder=0, label=f"tolerance of {tolerance:.3g} {fine}")
-    span = max(1.3 * tolerance, 1.1 * max(abs(limit) for limit in right.get_ylim()))
-    right.set_ylim(-span, span)
-    right.set_xlabel("time [s]")
-    right.set_ylabel(f"modelled - commanded [{fine}]")
-    legend_above(right, columns=4)
-    return figure
+    tolerance = float(from_si(FEASIBILITY_TOLERANCE * signal.scale[most], fine))
+    off = {i: np.asarray(from_si(reached[:, i] - command[:, i], fine)) for i in alike}
+    errors = tuple(
+        Series(signal.channels[i], time, off[i], colour, k, 1.0)
+        for k, (i, colour) in enumerate(zip(alike, (COLOURS[0], COLOURS[2], COLOURS[4]), strict=False))
+    )
+    span = max(1.3 * tolerance, 1.15 * max(float(np.abs(s.y).max()) for s in errors))
+    band = -tolerance, tolerance, f"tolerance of {tolerance:.3g} {fine}"
+    label = f"modelled - commanded [{fine}]"
+    return left, Axes("time [s]", label, errors, band=band, y_range=(-span, span), columns=4)
 
 
-def draw_signal(solution: Solution, role: str) -> Figure:
+def draw_signal(solution: Solution, role: str) -> str:
     """The six channels of one signal over time, or over the samples of a static scenario (S1 Fig. 14(b) shows such forces)."""
     signal = solution.model.signals[role]
     values = solution.trace.signals[role]
     static = solution.scenario.sample_time is None
-    figure, axes = plt.subplots(figsize=(8.2, 3.2))
-    horizontal = np.arange(len(values)) if static else solution.trace.time
-    for i, channel in enumerate(signal.channels):
-        axes.plot(
-            horizontal,
-            from_si(values[:, i], signal.units[i]),
-            marker=mark(i) if static else "",
-            ls="" if static else dashes(i),
-            ms=4,
-            lw=1.3,
-            color=COLOURS[i % 6],
-            label=channel,
-        )
-    axes.set_xlabel("sample" if static else "time [s]")
-    if static:
-        axes.locator_params("x", integer=True)
-    axes.set_ylabel(f"{signal.label} [{signal.units[0]}]")
-    axes.legend(ncols=6, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, 1.14))
-    return figure
+    horizontal = np.arange(float(len(values))) if static else solution.trace.time
+    style = {"width": 0.0, "points": 4.0} if static else {}
+    series = tuple(
+        Series(channel, horizontal, np.asarray(from_si(values[:, i], signal.units[i])), COLOURS[i % 6], i, **style)
+        for i, channel in enumerate(signal.channels)
+    )
+    label = f"{signal.label} [{signal.units[0]}]"
+    return panels_svg((Axes("sample" if static else "time [s]", label, series, whole=static),), (1,), WIDTH, 3.2)
 
 
-def draw_margins(solution: Solution) -> Figure:
+def draw_margins(solution: Solution) -> str:
     """The share of each limit's range that is left where the solution comes closest to it."""
-    shown = [m for m in solution.margins if m.share is not None]
-    figure, axes = plt.subplots(figsize=(8.2, 0.5 + 0.42 * len(shown)))
-    for row, margin in enumerate(shown):
+    rows = []
+    for margin in (m for m in solution.margins if m.share is not None):
         share = 100 * max(margin.share or 0.0, 0.0)
-        axes.barh(row, share, color=COLOURS[2] if margin is solution.tightest else COLOURS[0], height=0.6)
         unit = margin.limit.unit
         value, bound = from_si(margin.value, unit), from_si(margin.limit.described(margin.bound), unit)
         reserved = f" less {show_difference(margin.reserve, unit, 3)} reserved" if margin.reserve else ""
-        axes.text(
-            share + 1,
-            row,
-            f"{share:.3g} %: {margin.channel} {value:.4g} of {bound:.4g} {unit}{reserved}",
-            va="center",
-            fontsize=8,
-        )
-    axes.set_yticks(range(len(shown)), [m.limit.label for m in shown])
-    axes.invert_yaxis()
-    axes.set_xlim(0, 150)
-    axes.set_xticks(range(0, 101, 20))
-    axes.set_xlabel("range left where the limit is approached most [%]")
-    return figure
+        text = f"{share:.3g} %: {margin.channel} {value:.4g} of {bound:.4g} {unit}{reserved}"
+        rows.append(Bar(margin.limit.label, share, COLOURS[2 if margin is solution.tightest else 0], text))
+    label = "range left where the limit is approached most [%]"
+    return bars_svg(rows, label, WIDTH, 0.5 + 0.42 * len(rows))
 
 
-def draw_stage_force(solution: Solution) -> Figure:
+def draw_stage_force(solution: Solution) -> str:
     """Linear and total force against displacement of the axis that moves most (S1 Fig. 13)."""
-    values = from_si(solution.trace.signals["displacement"], "um")
+    values = np.asarray(from_si(solution.trace.signals["displacement"], "um"))
     axis = int(np.argmax(np.ptp(values, axis=0)))
-    parts = force_parts(solution)
-    figure, axes = plt.subplots(figsize=(6.2, 3.6))
-    axes.plot(
-        values[:, axis], parts["linear"][:, axis], "s--", ms=4, color=COLOURS[0], label="linear force, S1 eq. (9)"
+    x, linear, total = (v[:, axis] for v in (values, force_parts(solution)["linear"], solution.trace.signals["force"]))
+    series = (
+        Series("linear force, S1 eq. (9)", x, linear, COLOURS[0], 1, points=4.0),
+        Series("linear + nonlinear, S1 eq. (12)", x, total, COLOURS[2], 0, points=4.0),
     )
-    axes.plot(
-        values[:, axis],
-        solution.trace.signals["force"][:, axis],
-        "o-",
-        ms=4,
-        color=COLOURS[2],
-        label="linear + nonlinear, S1 eq. (12)",
-    )
-    axes.set_xlabel(f"displacement {solution.model.axes[axis]} [um]")
-    axes.set_ylabel("force on the actuator bar [N]")
-    legend_above(axes)
-    return figure
-
-
-def draw_workspace(workspace: Workspace, bases: list[np.ndarray], ball: Ball) -> Figure:
-    """Slices of the workspace, one outline per base pose, with the side view through the ball and the ball itself."""
-    signal = workspace.model.signals["pose"]
-    if len(workspace.drawn) == 1:
-        return _draw_range(workspace, bases[len(bases) // 2])
-    x, y, *third = workspace.drawn
-    figure, panels = plt.subplots(1, 1 + len(third), figsize=(8.6, 4.2) if third else (4.8, 4.2), squeeze=False)
-    for base, colour in zip(bases, COLOURS[::2], strict=False):
-        k = third[0] if third else x  # the channel that tells the slices apart
-        at = base[k] if abs(base[k]) > ROUNDING * signal.scale[k] else 0.0
-        label = f"{signal.channels[k]} = {from_si(at, signal.units[k]):.4g} {signal.units[k]}"
-        _fill(panels[0][0], workspace, base, x, y, colour, label)
-    for up in third:
-        _fill(panels[0][1], workspace, ball.centre, x, up, COLOURS[0], "through the ball's centre")
-    for panel, up in reversed(list(zip(panels[0], (y, *third), strict=True))):
-        if x in ball.channels and up in ball.channels:
-            _outline_ball(panel, workspace, ball, x, up)
-            break
-    for panel, vertical in zip(panels[0], (y, *third), strict=True):
-        if signal.units[x] == signal.units[vertical]:
-            panel.set_aspect("equal", adjustable="datalim")
-        panel.set_xlabel(f"{signal.channels[x]} [{signal.units[x]}]")
-        panel.set_ylabel(f"{signal.channels[vertical]} [{signal.units[vertical]}]")
-        panel.legend(fontsize=8, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
-    return figure
-
-
-def _outline_ball(panel: Axes, workspace: Workspace, ball: Ball, x: int, y: int) -> None:
-    """The ball in two of its channels: an ellipse, as each radius is in the typical size of its channel."""
-    signal = workspace.model.signals["pose"]
-    centre = [from_si(ball.centre[i], signal.units[i]) for i in (x, y)]
-    radius = [from_si(ball.radius * signal.scale[i], signal.units[i]) for i in (x, y)]
-    panel.add_patch(Ellipse((centre[0], centre[1]), 2 * radius[0], 2 * radius[1], fill=False, color=COLOURS[2], lw=1.5))
-    panel.plot([], [], color=COLOURS[2], label=f"largest ball, radius {radius[0]:.3g} {signal.units[x]}")
-
-
-def _draw_range(workspace: Workspace, base: np.ndarray) -> Figure:
-    """How much of the nearest limit's range is left along the one channel, to both ends."""
-    signal, ends = workspace.model.signals["pose"], workspace.ranges(base)[0]
-    figure, panel = plt.subplots(figsize=(4.8, 3.6))
-    along = np.linspace(ends[0], ends[1], 201)
-    panel.plot(from_si(along, signal.units[0]), -100 * workspace.excess(along[:, None]), color=COLOURS[0])
-    for k, (end, name) in enumerate(zip(ends, workspace.bound_by(base)[0], strict=True)):
-        panel.plot([from_si(end, signal.units[0])], [0], mark(k), color=COLOURS[2], label=name)
-    panel.set_xlabel(f"{signal.channels[0]} [{signal.units[0]}]")
-    panel.set_ylabel("left of the nearest limit's range [%]")
-    panel.legend(fontsize=8, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
-    return figure
-
-
-def _fill(panel: Axes, workspace: Workspace, base: np.ndarray, x: int, y: int, colour: str, label: str) -> None:
-    """The slice through `base` in channels `x` and `y`."""
-    units = workspace.model.signals["pose"].units
-    edge = workspace.outline(base, x, y)
-    shown = from_si(edge[:, 0], units[x]), from_si(edge[:, 1], units[y])
-    panel.fill(*shown, facecolor=colour, edgecolor=colour, alpha=0.25, lw=1.5, label=label)
+    label = f"displacement {solution.model.axes[axis]} [um]"
+    return panels_svg((Axes(label, "force on the actuator bar [N]", series, columns=1),), (1,), 6.2, 3.6)
