@@ -64,8 +64,11 @@ def legend_above(panel: Axes, size: float = 8, columns: int = 6) -> None:
 def legend_over(figure: Figure, panel: Axes, columns: int = 6, size: float = 8, below: bool = False) -> None:
     """The legend of a panel above the whole figure, or `below` it: where panels have titles, or share their lines."""
     handles, labels = panel.get_legend_handles_labels()
-    edge, columns = "lower" if below else "upper", min(columns, len(labels))
-    figure.legend(handles, labels, fontsize=size, ncols=columns, loc=f"outside {edge} center")
+    columns = min(columns, len(labels))
+    if below:
+        figure.legend(handles, labels, fontsize=size, ncols=columns, loc="outside lower center")
+    else:
+        figure.legend(handles, labels, fontsize=size, ncols=columns, loc="outside upper center")
 
 
 def svg(figure: Figure) -> str:

@@ -6,6 +6,7 @@ import numpy as np
 
 from ctrlgen.core.units import from_si, show_difference
 from ctrlgen.reporting.colours import COLOURS
+from ctrlgen.reporting.line_patterns import LINE
 from ctrlgen.reporting.plain_drawing import Axes, Bar, Series, bars_svg, panels_svg
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE
 from ctrlgen.trajectory.metrics import force_parts
@@ -46,11 +47,11 @@ def path_axes(solution: Solution) -> tuple[Axes, Axes]:
     shown = sorted(sorted(alike, key=lambda i: -np.ptp(command[:, i]))[:2])
     alone = len(shown) == 1
 
-    def drawn(values: np.ndarray, every: int = 1, close: bool = False) -> list[np.ndarray]:
+    def drawn(values: np.ndarray, every: int = 1, close: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Abscissa and ordinate of a signal in the left panel."""
         columns = [np.asarray(from_si(values[::every, i], unit)) for i in shown]
         columns = [np.append(c, c[0]) for c in columns] if close else columns
-        return columns if len(columns) == 2 else [time[::every], *columns]
+        return (columns[0], columns[1]) if len(columns) == 2 else (time[::every], columns[0])
 
     left = Axes(
         "time [s]" if alone else f"{signal.channels[shown[0]]} [{unit}]",
@@ -80,10 +81,11 @@ def draw_signal(solution: Solution, role: str) -> str:
     values = solution.trace.signals[role]
     static = solution.scenario.sample_time is None
     horizontal = np.arange(float(len(values))) if static else solution.trace.time
-    style = {"width": 0.0, "points": 4.0} if static else {}
+    width, points = (0.0, 4.0) if static else (LINE, 0.0)
+    shown = (np.asarray(from_si(values[:, i], unit)) for i, unit in enumerate(signal.units))
     series = tuple(
-        Series(channel, horizontal, np.asarray(from_si(values[:, i], signal.units[i])), COLOURS[i % 6], i, **style)
-        for i, channel in enumerate(signal.channels)
+        Series(channel, horizontal, y, COLOURS[i % 6], i, width, points)
+        for i, (channel, y) in enumerate(zip(signal.channels, shown, strict=True))
     )
     label = f"{signal.label} [{signal.units[0]}]"
     return panels_svg((Axes("sample" if static else "time [s]", label, series, whole=static),), (1,), WIDTH, 3.2)

@@ -74,7 +74,8 @@ class ReferenceAnswers:
         key = what, given.tobytes()
         if key not in self._found:
             self._found[key] = found(given)
-        return self._found[key]  # type: ignore[no-any-return]
+        kept: T = self._found[key]
+        return kept
 
     @property
     def columns(self) -> dict[str, slice]:
