@@ -54,6 +54,16 @@ def test_a_line_is_drawn_to_scale_where_its_axes_say_and_interrupted_where_there
     assert line.min() > 0 and line[:, 0].max() < 6 * 72 and line[:, 1].max() < 3 * 72
 
 
+def test_a_long_line_keeps_its_peaks_and_its_ends():
+    x, y = np.linspace(0, 1, 50_000), np.zeros(50_000)
+    y[[23_457, 40_001]] = 1.0, -0.5
+    text = panels_svg((Axes("x", "y", (Series("a", x, y, "#0072b2"),)),), (1,), 6.0, 3.0)
+    (line,) = paths(text, "#0072b2")
+    assert len(line) < 3100 and np.all(np.diff(line[:, 0]) >= 0)
+    low, zero, high = line[:, 1].max(), line[0, 1], line[:, 1].min()
+    assert (zero - high) == pytest.approx(2 * (low - zero), abs=0.3) and line[-1, 1] == zero
+
+
 def test_both_axes_of_a_path_have_one_scale():
     turn = 2 * np.pi * X
     circle = Axes("x", "y", (Series("a", np.cos(turn), np.sin(turn), "#0072b2"),), equal=True)

@@ -23,6 +23,7 @@ SAMPLE = 26.0  # length of a line in a legend
 MARGIN = 0.05  # of the range of the values, free at each end of an axis
 APART = {"x": 62.0, "y": 34.0}  # between ticks, at least
 PLAIN = 1e-4, 1e5  # between these, numbers are written without a power of ten
+MOST, STRETCHES = 2400, 500  # places of a line that are all drawn; stretches of a longer one
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 EDGE, GRID = "#666666", "#e6e6e6"
 # What points look like, by the letters of `line_patterns`, in a square of -1 to 1
@@ -190,6 +191,10 @@ def _curve(series: Series, x: np.ndarray, y: np.ndarray) -> str:
     """The line through places, interrupted where there is no number, and the points on them."""
     parts, seen = [], np.isfinite(x) & np.isfinite(y)
     if series.width:
+        if len(x) > MOST and seen.all():
+            kept = _peaks(x, y)
+            x, y = x[kept], y[kept]
+            seen = np.ones(len(x), bool)
         begins = seen & ~np.concatenate([[False], seen[:-1]])
         d = "".join(
             f"{'M' if first else 'L'}{a:.1f} {b:.1f}"
@@ -211,6 +216,13 @@ def _curve(series: Series, x: np.ndarray, y: np.ndarray) -> str:
             for a, b in zip(x[seen].tolist(), y[seen].tolist(), strict=True)
         ]
     return "".join(parts)
+
+
+def _peaks(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """The places of a long curve that are drawn, in order: ends and extremes of stretches hardly wider than the line."""
+    rows = np.minimum(np.arange(STRETCHES * -(-len(x) // STRETCHES)), len(x) - 1).reshape(STRETCHES, -1)
+    extremes = [extreme(v[rows], axis=1) for v in (x, y) for extreme in (np.argmin, np.argmax)]
+    return np.unique([rows[:, 0], rows[:, -1], *(rows[np.arange(STRETCHES), k] for k in extremes)])
 
 
 def _range(values: Sequence[np.ndarray]) -> tuple[float, float]:
