@@ -83,7 +83,7 @@ def _holds_drawings() -> None:
         if getattr(module, "svg", None) is svg:
             module.svg = checked
 
-    plain = plain_drawing._whole
+    plain = plain_drawing.svg_text
 
     @wraps(plain)
     def whole(*args: Any) -> str:
@@ -91,7 +91,7 @@ def _holds_drawings() -> None:
         assert not (alike := alike_in_drawing(text)), f"told apart by their colour alone: {alike}"
         return text
 
-    plain_drawing._whole = whole
+    plain_drawing.svg_text = whole
 
 
 @pytest.fixture

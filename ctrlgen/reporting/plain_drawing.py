@@ -87,7 +87,7 @@ def panels_svg(panels: Sequence[Axes], widths: Sequence[float], width: float, he
     for number, (panel, share) in enumerate(zip(panels, shares, strict=True)):
         parts.append(_panel(panel, left, INCH * width * float(share), INCH * height, number))
         left += INCH * width * float(share)
-    return _whole(parts, INCH * width, INCH * height)
+    return svg_text(parts, INCH * width, INCH * height)
 
 
 def bars_svg(rows: Sequence[Bar], label: str, width: float, height: float) -> str:
@@ -108,7 +108,7 @@ def bars_svg(rows: Sequence[Bar], label: str, width: float, height: float) -> st
         parts.append(_text(left + scale * (row.length + 1), y + 0.35 * SMALL, row.text, SMALL, "start"))
     parts += [_line(left, top, left, bottom, EDGE), _line(left, bottom, w - GAP, bottom, EDGE)]
     parts.append(_text((left + w) / 2, bottom + 2.5 * SIZE, label, SIZE, "middle"))
-    return _whole(parts, w, h)
+    return svg_text(parts, w, h)
 
 
 def _panel(panel: Axes, left: float, width: float, height: float, number: int) -> str:
@@ -277,7 +277,8 @@ def _text(x: float, y: float, text: str, size: float, anchor: str, more: str = "
     return f'<text x="{x:.2f}" y="{y:.2f}" style="{style}"{more}>{html.escape(text, quote=False)}</text>'
 
 
-def _whole(parts: Sequence[str], width: float, height: float) -> str:
+def svg_text(parts: Sequence[str], width: float, height: float) -> str:
+    """The drawing that holds these parts, on white."""
     names = 'xmlns:xlink="http://www.w3.org/1999/xlink" xmlns="http://www.w3.org/2000/svg" version="1.1"'
     paper = f'<path d="M0 0H{width:.2f}V{height:.2f}H0Z" style="fill: #ffffff"/>'
     head = f'<svg {names} width="{width:.2f}pt" height="{height:.2f}pt" viewBox="0 0 {width:.2f} {height:.2f}">'
