@@ -34,6 +34,19 @@ TESTED = {
         "force": "20 N",
     },
 }
+TURNED = {
+    **TESTED,
+    "name": "turned",
+    "title": "a joint under test",
+    "mechanics": {
+        "mass": "1 kg*m^2",
+        "damping": "3 N*m*s/rad",
+        "stiffness": "20 N*m/rad",
+        "stroke": "90 deg",
+        "speed": "3 rad/s",
+        "force": "60 N*m",
+    },
+}
 PAIR = {
     **{key: TESTED[key] for key in ("title", "source")},
     "kind": "tested_axes",
@@ -47,9 +60,10 @@ every_effect = pytest.mark.parametrize("effect", Effect.library.values(), ids=Ef
 
 @cache
 def tables() -> tuple[dict, ...]:
-    """A device with heaters and no inertia, one with inertia, one whose motion is imposed, two of these."""
+    """A device with heaters and no inertia, one with inertia, one whose motion is imposed, along a way and about a joint, two of
+    these."""
     files = (DEVICE, AXIS_FILE)
-    return (*(tomllib.loads(path.read_text()) for path in files), TESTED, PAIR)
+    return (*(tomllib.loads(path.read_text()) for path in files), TESTED, TURNED, PAIR)
 
 
 def device_of(table: dict, *effects: dict) -> Device:

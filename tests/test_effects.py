@@ -140,7 +140,8 @@ def test_does_not_depend_on_the_choice_of_units(effect, rng):
     numbers = law.numbers(shape[rng.integers(len(shape))], size(effect, where, rng))
     memory = rng.uniform(0.5, 2, len(effect.states))
     every, held = rng.uniform(0.5, 2, 6), dict(zip(Law.ALONE, rng.uniform(0.5, 2, len(Law.ALONE)), strict=True))
-    units = {"displacement": "m", "velocity": "m/s", "force": "N", "state": "K", "ambient": "K", "time": "s"}
+    way = "rad" if effect.channel_unit == "N*m" else "m"
+    units = {"displacement": way, "velocity": "m/s", "force": "N", "state": "K", "ambient": "K", "time": "s"}
     every_unit = (
         ["rad"] * 3 + ["m"] * 3
         if "spatial" in effect.requires or (effect.pairs and effect.channel_unit)
@@ -148,6 +149,8 @@ def test_does_not_depend_on_the_choice_of_units(effect, rng):
     )
     if effect.partner_unit not in (None, "channel"):
         every_unit[law.partner] = effect.partner_unit
+    if effect.pairs and effect.place is Place.DRIVE and effect.partner_unit is None:
+        every_unit[law.partner] = where.partner_unit
     if effect.pairs and effect.place is Place.FORCE:  # by the motion of the other axis, in the amplitude's name
         every_unit = [MOTION[effect.amplitude().name]] * 6
     if effect.partner_place is Place.DISPLACEMENT:

@@ -72,7 +72,9 @@ class Channel:
         return replace(self, partner=other.name, partner_unit=other.unit, partner_scale=other.scale)
 
     def unit_of(self, number: Param | State) -> str:
-        """The unit of a law's number at this channel, such as 'N/um^3' for 'channel/travel^3'."""
+        """The unit of a law's number at this channel, such as 'N/um^3' for 'channel/travel^3'; '1' for what is per channel of its kind."""
+        if number.unit == "channel/partner" and self.unit == self.partner_unit:
+            return "1"
         units = dict(zip(PLACEHOLDERS, (self.unit, self.travel_unit, self.partner_unit), strict=True))
 
         def in_place(word: re.Match[str]) -> str:

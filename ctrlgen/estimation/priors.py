@@ -177,6 +177,11 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             "Between contacts that open (0.03) and an electronic crossover (1).",
             parameters={"rounding": _starts((0.3,))},
         ),
+        "drive_crosstalk": LawPrior(
+            "Rarer than a stage that carries its neighbour, which is just the same where drives are displacements: judgement.",
+            log_prior_odds=ONE_IN_TEN,
+            unless=frozenset({"displacement_command"}),
+        ),
         "degradation": LawPrior(
             "From a loss that ends within the recording to a steady one.",
             parameters={"levels_off": _starts((3.0, 30.0, 1e4))},
@@ -260,6 +265,9 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
         ),
         "force_step": LawPrior(
             _EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, of_time=True, domain="disturbance", parameters=_EVENT
+        ),
+        "gravity": LawPrior(
+            "Hanging, upright or out to either side.", parameters={"phase": _starts((-90.0, 0.0, 90.0, 180.0))}
         ),
         "hysteresis": LawPrior(
             HYSTERESIS + _IN_BALANCE,

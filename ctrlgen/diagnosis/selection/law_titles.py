@@ -68,6 +68,7 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
         "displacement_hysteresis": (
             ("piezo", "Hysteresis of the piezo, or of a joint behind it: the displacement lags"),
         ),
+        "drive_crosstalk": (("", "What is asked of one actuator acts at another one too"),),
         "drive_gain": (
             ("position", "An axis that goes farther, or less far, than it is told"),
             ("", "A drive that does more, or less, than it is told"),

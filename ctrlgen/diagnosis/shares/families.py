@@ -41,7 +41,7 @@ SPEAKS_FOR: dict[Kind, tuple[tuple[Family, ...], str]] = {
     ),
     Kind.POSITION: (
         (Family.ELASTIC, Family.GEOMETRY, Family.PERIODIC),
-        "a force that does not rise in proportion, a stop, the bow of a sensor, a few periods of a pitch are functions of the place alone",
+        "a force that does not rise in proportion, a weight on a joint, a stop, a bowed sensor, a few periods of a pitch go by place",
     ),
     Kind.SPEED: (
         (Family.DYNAMICS, Family.TIMING, Family.FRICTION),
@@ -111,6 +111,7 @@ FAMILY_OF = {
         Family.HYSTERESIS,
     ),
     **dict.fromkeys(("stiffening", "one_sided_stiffening", "end_stop", "link_load", "lost_motion"), Family.ELASTIC),
+    "gravity": Family.ELASTIC,
     **dict.fromkeys(("stiffness_above", "stiffness_below", "stiffness_beyond"), Family.ELASTIC),
     **dict.fromkeys(
         ("asymmetric_gain", "dead_zone", "drive_gain_beyond", "saturation", "heater_resistance"), Family.DRIVE
@@ -120,7 +121,7 @@ FAMILY_OF = {
         Family.GAIN,
     ),
     **dict.fromkeys(("reversed", "stuck", "payload"), Family.GAIN),
-    **dict.fromkeys(("coupling", "heat_crosstalk", "link_compliance", "swapped"), Family.CROSS_TALK),
+    **dict.fromkeys(("coupling", "drive_crosstalk", "heat_crosstalk", "link_compliance", "swapped"), Family.CROSS_TALK),
     **dict.fromkeys(("damping_coupling", "inertia_coupling", "stiffness_coupling"), Family.CROSS_TALK),
     **dict.fromkeys(("asymmetric_viscous", "quadratic_damping", "resonance"), Family.DYNAMICS),
     **dict.fromkeys(("creep", "log_creep"), Family.CREEP),
