@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import tomllib
+
 import numpy as np
 import pytest
 from axis_records import record
+from conftest import DEVICE
 from planted_poses import played
 from recovery import fitter_of
 
 import ctrlgen
+from ctrlgen import build_model, load_device, simulate
+from ctrlgen.core.errors import InputError
 from ctrlgen.core.files import validate
 from ctrlgen.core.units import to_si
 from ctrlgen.devices import Device
@@ -119,3 +124,28 @@ def test_a_hysteresis_of_which_no_play_follows_or_all_do_is_a_gain(reach):
     assert reason.endswith(("it is a gain", "it is a gain beside a smaller loop", "it is a single play, or a gain"))
     fitter, fit = servo_fit(played, "displacement_hysteresis", PLAYS | {"reach": 3e-5})
     assert objections(fitter.recording, fit) == {}
+
+
+def test_channels_that_measure_unlike_things_have_no_scale_in_common():
+    """Translations and angles of one pose: a scale of each kind, and one delay of all; each is written, read and acts so."""
+    device, names = load_device(DEVICE), ("theta_x", "theta_y", "delta_x", "delta_y")
+    offered = hypotheses(device, nominal_physics(device), tuple(f"reading.{c}" for c in names), 1e-3, False)
+    several = {(h.effect, h.at): h for h in offered if h.effect != PARAMETER and h.law.place is Place.SENSOR}
+    assert {at for law, at in several if law == "sensor_gain"} == {*names, "all in rad", "all in m"}
+    assert {at for law, at in several if law == "delay"} == {*names, "all"}
+    changed = Structure(device).with_cause(several["sensor_gain", "all in m"], {"gain": 0.1}).expanded_device
+    assert changed.effect[0].placed()["at"] == "all in m"
+    table = tomllib.loads(DEVICE.read_text())
+    y, scaled = (
+        simulate(build_model(validate(type(device), table | more, "device")), np.full((1, 6), 0.3), 1.0).signals[
+            "reading"
+        ][-1]
+        for more in ({}, {"effect": [{"kind": "sensor_gain", "at": "all in m", "gain": "0.1"}]})
+    )
+    assert scaled / y == pytest.approx([1, 1, 1, 1.1, 1.1, 1.1], rel=1e-12) and np.all(y != 0)
+    with pytest.raises(InputError, match="'all in parsec_s' is not one of"):
+        build_model(
+            validate(
+                type(device), table | {"effect": [{"kind": "delay", "at": "all in parsec_s", "delay": "1 ms"}]}, "d"
+            )
+        )

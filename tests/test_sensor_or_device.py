@@ -145,7 +145,7 @@ def test_a_scale_of_all_channels_that_are_read_is_one_cause_more():
     for read in (COMPONENTS[3:], COMPONENTS[5:]):
         observed = tuple(f"reading.{c}" for c in read)
         offered = hypotheses(DEVICE, nominal_physics(DEVICE), observed, None, False, (SensorGain,))
-        assert [h.at for h in offered if of_sensor(h)] == [*read, *(["all"] if len(read) > 1 else [])]
+        assert [h.at for h in offered if of_sensor(h)] == [*read, *(["all in m"] if len(read) > 1 else [])]
 
 
 def test_the_answer_tells_what_fits_alike_and_is_unlikely_of_its_size(fits):

@@ -14,7 +14,7 @@ import numpy as np
 
 from ctrlgen.core.units import Quantity
 from ctrlgen.devices.usual_deviation import ASSUMED_SCALE
-from ctrlgen.effects import Place
+from ctrlgen.effects import Place, means
 from ctrlgen.effects.gain import SensorGain
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.free_parameters import FreeParameter
@@ -24,7 +24,10 @@ from ctrlgen.estimation.structure import Structure
 def sensor_covariance(fitter: Fitter, fit: Fit) -> np.ndarray:
     """(k, k) [SI] covariance of the fitted constants that the scales of the sensor's channels make by themselves."""
     before = len(fit.structure.device.effect)
-    k, held = len(fit.theta), _held(fit.structure, fitter.recording.channels)
+    k, held = (
+        len(fit.theta),
+        _held(fit.structure, dict(zip(fitter.recording.channels, fitter.recording.units, strict=True))),
+    )
     if not held.free or len(held.free) == k:
         return np.zeros((k, k))
     sds = np.array([p.sd for p in held.free[k:]])
@@ -48,9 +51,9 @@ def _around(path: str, nominal: float, sd: float) -> FreeParameter:
     return FreeParameter(path, "1", nominal, nominal - 10 * sd, nominal + 10 * sd, sd, sd)
 
 
-def _held(structure: Structure, channels: tuple[str, ...]) -> Structure:
+def _held(structure: Structure, channels: dict[str, str]) -> Structure:
     """The structure with what is not known exactly of its sensor free beside its constants: numbers of its laws with a stated sd, and in
-    channels without such a law a scale."""
+    `channels` (with their units) without such a law a scale."""
     device, free = structure.device, list(structure.free or ())
     known = set[str]()
     for j, effect in enumerate(device.effect):
@@ -61,9 +64,9 @@ def _held(structure: Structure, channels: tuple[str, ...]) -> Structure:
                 known.add(effect.at)
                 free.append(_around(f"effect[{j}].{name}", number.si, number.sd))
     added = list[SensorGain]()
-    for channel in channels:
+    for channel, unit in channels.items():
         at = channel.partition(".")[2] or channel
-        if channel.startswith("reading.") and not known & {at, "all"}:
+        if channel.startswith("reading.") and not any(means(stated, at, unit) for stated in known):
             path = f"effect[{len(device.effect) + len(added)}].gain"
             added.append(SensorGain(at, {"gain": Quantity(0.0, "0")}))
             free.append(_around(path, 0.0, ASSUMED_SCALE))

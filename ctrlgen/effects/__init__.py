@@ -22,6 +22,7 @@ with an underscore are no laws: the law's interface, the reader of [[effect]] ta
 from importlib import import_module
 from pkgutil import iter_modules
 
+from ctrlgen.effects._channel_group import group, is_group, means
 from ctrlgen.effects._effect import Effect, Place
 from ctrlgen.effects._installed import Installed, LeftOut, installed, law_of, laws, load_laws
 from ctrlgen.effects._law_inputs import Expression, LawInputs, LawNumbers
@@ -51,9 +52,12 @@ __all__ = [
     "Side",
     "State",
     "faults_at",
+    "group",
     "installed",
+    "is_group",
     "law_of",
     "laws",
     "load_laws",
+    "means",
     "read_effect",
 ]

@@ -27,7 +27,9 @@ def read_effect(given: Any) -> Effect:
     faults = [f"unknown key {key!r} (has: {', '.join(keys[2:])})" for key in given if key not in keys]
     at, of = given.get("at"), given.get("of")
     if not isinstance(at, str):
-        faults.append(f'at is missing: name the {law.place.value} channel, such as at = "1X", or "all"')
+        faults.append(
+            f'at is missing: name the {law.place.value} channel, such as at = "1X", or "all", or such as "all in rad"'
+        )
     if law.pairs and not isinstance(of, str):
         faults.append(f'of is missing: name the other {law.place.value} channel, such as of = "1Y"')
     values = {}

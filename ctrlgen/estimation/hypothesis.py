@@ -4,6 +4,7 @@ number of the device that is off.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -15,7 +16,7 @@ from ctrlgen.core.units import Quantity
 from ctrlgen.devices import Device, DevicePhysics, InertialPhysics
 from ctrlgen.devices.quantities import walk
 from ctrlgen.devices.section import Section
-from ctrlgen.effects import Channel, Effect, Param, Place, laws
+from ctrlgen.effects import Channel, Effect, Param, Place, group, laws, means
 from ctrlgen.estimation.disturbance_inputs import unread_axes
 from ctrlgen.estimation.law_prior import LawPrior
 from ctrlgen.estimation.priors import DEFAULT, prior_of
@@ -56,7 +57,7 @@ class Hypothesis:
     """One effect at one place; or, where `effect` is "parameter", one number of the device, at `path`.
 
     location: where a report says it is, such as "actuator:1X".
-    at, of: the channel on which the effect acts, or "all"; for effects of pairs, the other channel.
+    at, of: the channel on which the effect acts, or several of them (`effects.means`); for effects of pairs, the other channel.
     count: how many of the same effect a structure has there already, where the effect is repeatable.
     highest: frequency [Hz] up to which samples are told from their aliases; infinite for settled poses, which have no clock.
     machine_odds: ln of how many times commoner the law is in a machine of these parts than in any.
@@ -113,13 +114,18 @@ class Hypothesis:
         return Effect.library[self.effect]
 
     def channel_on(self, device: Device) -> Channel:
-        """The channel of `device` at which the effect acts; the first one where it acts at all of them."""
+        """The channel of `device` at which the effect acts; the first one where it acts at several."""
         physics = nominal_physics(device)
-        every = {c.name: c for c in channels(physics, self.law.place)}
-        channel = next(iter(every.values())) if self.at == "all" else every[self.at]
+        channel = channels(physics, self.law.place)[self.acts_on(device)[0]]
         if self.of is None:
             return channel
         return channel.paired_with(next(c for c in partner_channels(physics, self.law) if c.name == self.of))
+
+    def acts_on(self, device: Device) -> list[int]:
+        """The places, among the channels of `device`, of those on which the effect acts."""
+        every = enumerate(channels(nominal_physics(device), self.law.place))
+        meant = [(i, c) for i, c in every if means(self.at, c.name, c.unit)]
+        return [i for i, c in meant if self.law.pairs or self.law.applies_to(c)] or [i for i, _ in meant]
 
     def shapes(
         self, channel: Channel, hints: DataHints, given: Mapping[str, float] = NOTHING
@@ -233,12 +239,21 @@ def _of_law(
     fitting = [channel for channel in places if law.applies_to(channel)]
     for channel in () if prior.acts_on_all else fitting:
         yield Hypothesis(law.kind, f"{domain}:{channel.name}", channel.name, highest=highest, longest=longest)
-    if prior.of_one_reference and len(fitting) > 1:
-        yield Hypothesis(law.kind, f"{domain}:all", "all", highest=highest, longest=longest)
-    if len(places) < every:
-        return
-    if prior.acts_on_all or (len(fitting) > 1 and law.place is not Place.SENSOR):
-        yield Hypothesis(law.kind, f"{domain}:all", "all", highest=highest)
+    whole = len(places) == every and (prior.acts_on_all or law.place is not Place.SENSOR)
+    for at in _together(law, physics, fitting) if prior.of_one_reference or whole else ():
+        yield Hypothesis(law.kind, f"{domain}:{at}", at, highest=highest, longest=longest)
+
+
+def _together(law: type[Effect], physics: DevicePhysics, fitting: Sequence[Channel]) -> list[str]:
+    """The `at` of channels at which one number of the law may act: all, or more than one of those that measure the same, since the scale
+    of an angle says nothing of that of a way; when things are is one for all."""
+    if prior_of(law).acts_on_all:
+        return ["all"]
+    if law.moves_in_time:
+        return ["all"] if len(fitting) > 1 else []
+    units = [c.unit for c in channels(physics, law.place) if law.applies_to(c)]
+    groups = Counter(group(units, channel.unit) for channel in fitting)
+    return [at for at, count in groups.items() if count > 1]
 
 
 def why_not_offered(

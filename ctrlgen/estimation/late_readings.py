@@ -18,7 +18,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.devices import Device, DevicePhysics
-from ctrlgen.effects import Place
+from ctrlgen.effects import Place, is_group, means
 from ctrlgen.estimation.hypothesis import in_loop
 from ctrlgen.estimation.settings import SIMULATION
 from ctrlgen.model.assembly import build_model
@@ -36,7 +36,7 @@ def effects_apart(device: Device, physics: DevicePhysics) -> tuple[int, ...]:
     def last(k: int) -> bool:
         law = device.effect[k]
         behind = [e for e in sensors if e.order > law.order or (e.order == law.order and e is not law)]
-        return not any("all" in (e.at, law.at) or e.at == law.at for e in behind)
+        return not any(is_group(e.at) or is_group(law.at) or e.at == law.at for e in behind)
 
     return tuple(k for k, law in enumerate(device.effect) if law.apart and last(k))
 
@@ -79,7 +79,8 @@ def late_readings(
 ) -> tuple[list[LateReading], ca.SX]:
     """The channels `observed` that are late by the effects left out, and the rates (m,) that they need beside the channels."""
     device = model.device
-    names = [c.name for c in channels(device.physics(device.values()), Place.SENSOR)]
+    sensors = channels(device.physics(device.values()), Place.SENSOR)
+    names, units = [c.name for c in sensors], {c.name: c.unit for c in sensors}
     late: list[LateReading] = []
     rates: list[ca.SX] = []
     for k in apart:
@@ -87,7 +88,7 @@ def late_readings(
         path = f"effect[{k}].{amplitude}"
         for row, channel in enumerate(observed):
             name = channel.removeprefix("reading.")
-            if name == channel or law.at not in ("all", name):
+            if name == channel or not means(law.at, name, units[name]):
                 continue
             seen = model.law_inputs(Place.SENSOR, names.index(name), None, {}, law.order)
             places = None

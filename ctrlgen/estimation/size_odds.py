@@ -19,7 +19,7 @@ from math import inf, log
 
 from ctrlgen.devices import Device
 from ctrlgen.devices.usual_deviation import usual_deviation
-from ctrlgen.effects import Place
+from ctrlgen.effects import Place, is_group, means
 from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.free_parameters import nuisances
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, numbers
@@ -46,12 +46,14 @@ def known_deviation(cause: Hypothesis, device: Device) -> Deviation | None:
         sd = nuisances(device).get(cause.path) or usual_deviation(number)
         return Deviation(sd, bool(number.sd)) if sd else None
     amplitude = cause.law.amplitude()
+    channel = cause.channel_on(device)
     for e in device.effect:
-        here = e.kind == cause.effect and e.at in (cause.at, "all")
+        same = e.at == cause.at or (is_group(e.at) and means(e.at, channel.name, channel.unit))
+        here = e.kind == cause.effect and same
         if here and (known := e.values[amplitude.name].sd):
             return Deviation(known, True)
     usual = cause.prior.of(amplitude).deviation
-    return None if usual is None else Deviation(cause.channel_on(device).si(usual, amplitude), False)
+    return None if usual is None else Deviation(channel.si(usual, amplitude), False)
 
 
 def size_of(fit: Fit, k: int) -> tuple[float, Deviation] | None:

@@ -15,7 +15,8 @@ import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import Quantity, base_unit, written_unit
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.devices import Signal
+from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, means
 from ctrlgen.learning.lifted import Lifted
 from ctrlgen.model.assembly import build_model
 from ctrlgen.numerics.batched_evaluation import evaluate
@@ -62,9 +63,9 @@ class ImpliedPose:
         self.lifted, m = lifted, lifted.model
         device, signal = lifted.solution.scenario.device, lifted.signal
         self.channels = signal.channels
-        self.late = _late(device.effect, signal.channels)
+        self.late = _late(device.effect, signal)
         effects = tuple(e for e in device.effect if not (e.place is Place.SENSOR and "sample_time" in e.requires))
-        self.numbers = tuple(_numbers(effects, signal.channels))
+        self.numbers = tuple(_numbers(effects, signal))
         of_pose = signal.channels == m.signals["pose"].channels
         self.acts = of_pose and any(e.place is Place.SENSOR for e in effects)
         if not self.acts:
@@ -168,23 +169,23 @@ class ImpliedPose:
         return e
 
 
-def _late(effects: tuple[Effect, ...], channels: tuple[str, ...]) -> np.ndarray:
+def _late(effects: tuple[Effect, ...], signal: Signal) -> np.ndarray:
     """(n_y,) [s] by which stated delays let readings come late; clocks that run ahead count against it."""
-    late = np.zeros(len(channels))
+    late = np.zeros(len(signal.channels))
     for e in effects:
         if e.place is Place.SENSOR and e.moves_in_time:
             age = e.values[e.amplitude().name].si
-            late[_acted(e, channels)] += -age if e.shifts_drive else age
+            late[_acted(e, signal)] += -age if e.shifts_drive else age
     return late
 
 
-def _acted(e: Effect, channels: tuple[str, ...]) -> list[int]:
-    return [i for i, c in enumerate(channels) if e.at in (c, "all")]
+def _acted(e: Effect, signal: Signal) -> list[int]:
+    return [i for i, (c, unit) in enumerate(zip(signal.channels, signal.units, strict=True)) if means(e.at, c, unit)]
 
 
-def _numbers(effects: tuple[Effect, ...], channels: tuple[str, ...]) -> list[SensorNumber]:
+def _numbers(effects: tuple[Effect, ...], signal: Signal) -> list[SensorNumber]:
     return [
-        SensorNumber(f"effect[{k}].{name}", written_unit(number.text), number.sd, tuple(_acted(e, channels)), e.kind)
+        SensorNumber(f"effect[{k}].{name}", written_unit(number.text), number.sd, tuple(_acted(e, signal)), e.kind)
         for k, e in enumerate(effects)
         if e.place is Place.SENSOR and not any(not (s.clock or s.per_record) for s in e.states)
         for name, number in e.values.items()

@@ -14,7 +14,7 @@ import casadi as ca
 from ctrlgen.core.errors import Fault
 from ctrlgen.core.units import same_dimension
 from ctrlgen.devices import BalancedPhysics, Device, DevicePhysics, ImposedPhysics, InertialPhysics
-from ctrlgen.effects import REQUIREMENTS, Channel, Effect, LawInputs, Place, State, faults_at
+from ctrlgen.effects import REQUIREMENTS, Channel, Effect, LawInputs, Place, State, faults_at, is_group, means
 
 # Typical displacements beyond which a law reads the stage's force at that end: a search may try values farther out, where
 # no stage goes and a restoring force may have no value (a root of a negative number).
@@ -85,7 +85,7 @@ class EffectTerms:
         for need in sorted(effect.requires - available(self.physics, sample_time=self.sample_time)):
             what = f"{effect.kind} does not fit this device: it needs {REQUIREMENTS[need]}"
             self.faults.append(Fault(f"effect[{k}].kind", what))
-        chosen = range(len(names)) if effect.at == "all" else [i for i, c in enumerate(names) if c == effect.at]
+        chosen = [i for i, c in enumerate(places) if means(effect.at, c.name, c.unit)]
         if not chosen:
             self.faults.append(Fault(f"effect[{k}].at", f"{effect.at!r} is not one of {', '.join(names)}, all"))
         partners = partner_channels(self.physics, effect)
@@ -100,7 +100,7 @@ class EffectTerms:
         for i, partner in pairs:
             channel = places[i] if partner is None else places[i].paired_with(partners[partner])
             if not effect.applies_to(channel):
-                if effect.at != "all":
+                if not is_group(effect.at):
                     self.faults.append(Fault(f"effect[{k}].at", f"{effect.kind} cannot act on {names[i]}: wrong unit"))
                 continue
             self.faults += [Fault(f"effect[{k}].{name}", text) for name, text in faults_at(effect, channel)]

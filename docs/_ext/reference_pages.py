@@ -299,7 +299,8 @@ def effects_page() -> str:
         "# Physical effects",
         "",
         "Each is one file in `ctrlgen/effects/`, written into a device file as an `[[effect]]` table with `kind`, `at` (the "
-        'channel it acts on, or `"all"`), `of` for effects that couple two channels, and its parameters. In a unit, '
+        'channel it acts on, or `"all"`, or those that measure one thing, such as `"all in rad"`), `of` for effects that couple two '
+        "channels, and its parameters. In a unit, "
         "`channel` stands for the unit of the signal the effect acts on, `travel` for that of the stage displacement and "
         "`partner` for that of the other channel.",
         "",

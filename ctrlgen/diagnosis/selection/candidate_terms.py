@@ -113,11 +113,9 @@ class CandidateTerms:
         seen: Callable[[Place, int], DataHints],
     ) -> Iterator[CandidateTerm]:
         law, where = h.law, h.channel_on(structure.device)
-        names = [c.name for c in channels(nominal_physics(structure.device), law.place)]
-        partner = names.index(h.of) if h.of else None
-        at: list[tuple[int, int | None]] = [
-            (i, partner) for i in (range(len(names)) if h.at == "all" else [names.index(h.at)])
-        ]
+        places = channels(nominal_physics(structure.device), law.place)
+        partner = [c.name for c in places].index(h.of) if h.of else None
+        at: list[tuple[int, int | None]] = [(i, partner) for i in h.acts_on(structure.device)]
         if law.symmetric and partner is not None:
             at += [(partner, i) for i, _ in at]
         amplitude = law.amplitude()

@@ -15,10 +15,9 @@ from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, REGIONS, SEARCH
 from ctrlgen.estimation.fit import Fit
-from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis, nominal_physics
+from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis
 from ctrlgen.estimation.settings import FIT
 from ctrlgen.estimation.structure import Structure
-from ctrlgen.model.effect_terms import channels
 
 
 def fit_candidates(trials: Trials, current: CandidateModel, screened: Screened) -> tuple[CandidateModel, ...]:
@@ -160,8 +159,7 @@ def finer_forms(trials: Trials, current: CandidateModel) -> tuple[CandidateModel
         return [branch.begun_better(t, starts[1:]) for t in fitted]
 
     def peaks(finer: Hypothesis) -> DataHints:
-        names = [c.name for c in channels(nominal_physics(current.fit.structure.device), finer.law.place)]
-        where = (finer.law.place, 0 if finer.at == "all" else names.index(finer.at))
+        where = (finer.law.place, finer.acts_on(current.fit.structure.device)[0])
         return DataHints((trials.screen.peaks or {}).get(where, {}))
 
     forms = [(k, finer) for k, cause in enumerate(current.causes) for finer in cause.finer]

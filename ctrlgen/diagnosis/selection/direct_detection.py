@@ -13,7 +13,7 @@ from ctrlgen.core.units import from_si
 from ctrlgen.diagnosis.selection.findings import Estimate, Finding
 from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.settings import DIRECT_DETECTION
-from ctrlgen.effects import Channel, Effect, Place
+from ctrlgen.effects import Channel, Effect, Place, means
 from ctrlgen.estimation.hypothesis import DOMAIN, Hypothesis, nominal_physics, selected_laws
 from ctrlgen.estimation.raw_readings import detect_directly
 from ctrlgen.model.effect_terms import channels
@@ -39,7 +39,7 @@ def directly_detected_findings(search: SearchResult, laws: Sequence[type[Effect]
             if (
                 seen is None
                 or seen[1] < DIRECT_DETECTION.noticed * fitter.noise.floor[i]
-                or {(law.kind, channel.name), (law.kind, "all")} & known
+                or any(kind == law.kind and means(at, channel.name, channel.unit) for kind, at in known)
             ):
                 continue
             findings.append(unfitted_finding(law, channel, seen[0]))

@@ -97,8 +97,7 @@ def along_region(motion: Mapping[Along, np.ndarray], fit: Fit, k: int) -> np.nda
     if cause.effect == PARAMETER or (where := cause.law.acts_in) is None:
         return None
     place: Place | None = _moved(cause.law.place)
-    names = [c.name for c in channels(nominal_physics(fit.structure.device), cause.law.place)]
-    i = 0 if cause.at == "all" else names.index(cause.at)
+    i = cause.acts_on(fit.structure.device)[0]
     if where.quantity in ("time", "temperature"):
         place, i = None, 0
     return motion.get((where.quantity, place, i))

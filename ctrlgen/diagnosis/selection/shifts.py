@@ -7,8 +7,9 @@ import numpy as np
 from ctrlgen.diagnosis.settings import SEARCH
 from ctrlgen.estimation.error_model import huber
 from ctrlgen.estimation.fit import Fit, Fitter
-from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.hypothesis import Hypothesis, nominal_physics
 from ctrlgen.estimation.least_squares import limited
+from ctrlgen.model.effect_terms import channels
 from ctrlgen.recordings.recording import Record
 
 
@@ -29,8 +30,9 @@ def best_shift(fitter: Fitter, fit: Fit, cause: Hypothesis, h: float) -> float:
     """
     device = fit.structure.device
     shifts = shifts_tried(h, *cause.bounds(cause.law.amplitude(), cause.channel_on(device)))
-    channels = fitter.recording.channels
-    rows = range(len(channels)) if cause.at == "all" else [channels.index(f"reading.{cause.at}")]
+    there = channels(nominal_physics(device), cause.law.place)
+    moved = {f"reading.{there[i].name}" for i in cause.acts_on(device)}
+    rows = [i for i, channel in enumerate(fitter.recording.channels) if channel in moved]
     left = np.zeros(len(shifts))
     for k, record in enumerate(fitter.fit_records):
         start = fit.initial_states[k] if fit.initial_states else None

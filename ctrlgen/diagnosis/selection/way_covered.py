@@ -18,8 +18,8 @@ def way_covered(recording: Recording, cause: Hypothesis, device: Device) -> floa
     """How far the reading, or the axis, of a cause that repeats along it goes in the records to fit [SI]; no end where none is read."""
     records = [r for r in recording.records if r.role == "fit"]
     channel = f"reading.{cause.at}"
-    if cause.law.place is Place.FORCE and isinstance(physics := nominal_physics(device), ImposedPhysics):
-        place = 0 if cause.at == "all" else physics.axes.index(cause.at)
+    if cause.law.place is Place.FORCE and isinstance(nominal_physics(device), ImposedPhysics):
+        place = cause.acts_on(device)[0]
         return float(max(np.ptp(r.drive[:, place]) for r in records))
     if channel not in recording.channels:
         return np.inf
