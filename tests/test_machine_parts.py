@@ -83,9 +83,26 @@ def test_a_machine_of_unknown_parts_is_told_in_neutral_words():
     ):
         said = title(Effect.library[name], MachineParts())
         assert not re.search("amplifier|flexure|" + "|".join(OWN_WORDS.values()), said), said
+    assert title(Effect.library["lever_ratio"], MachineParts()).startswith("Something behind the drive")
     assert "fringe" in title(Effect.library["cyclic"], parts(sensor="interferometer"))
     assert "told nothing" in title(Effect.library["drive_offset"], parts(actuator="pump"))
     assert "command" in title(Effect.library["drive_offset"], MachineParts(position=True))
+
+
+def test_what_repeats_or_has_clearance_is_named_by_every_part_that_may():
+    cyclic, play, weight = (Effect.library[kind] for kind in ("cyclic", "backlash", "payload"))
+    drive = parts(actuator="servo motor", transmission=("harmonic drive",), sensor="encoder")
+    assert title(cyclic, drive).endswith(
+        ": the harmonic drive (two a turn of its wave generator) or the encoder's pitch"
+    )
+    assert title(cyclic, parts(sensor="encoder")).endswith(": the encoder's pitch, or a pitch behind it")
+    assert title(cyclic, parts(actuator="stepper", sensor="encoder")).endswith(
+        ": the steps of the motor or the encoder's pitch"
+    )
+    assert title(play, drive) == "Play in the harmonic drive" and title(play, parts(sensor="encoder")) == play.title
+    joint = parts(actuator="servo motor", transmission=("cable",))
+    assert title(play, joint) == "Slack in the cable" and title(weight, joint).endswith("stretches the cable")
+    assert not any("cable" in title(law, drive) or "gear" in title(law, joint) for law in (cyclic, play, weight))
 
 
 def test_a_motor_is_no_ferroelectric_and_a_stack_has_no_heater():

@@ -8,7 +8,7 @@ import pytest
 from conftest import AXIS_FILE, effect_device
 from scipy.linalg import expm
 
-from ctrlgen import InputError, build_model, load_device, simulate
+from ctrlgen import InputError, build_model, load_device, simulate, user_device
 from ctrlgen.controller.linearisation import equilibrium, linearise
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.devices.mems_hexapod import matrices
@@ -241,6 +241,20 @@ def test_bounds_as_formulas_follow_free_numbers_and_the_nearer_of_two_limits(dev
 def test_a_device_that_softens_to_nothing_is_refused():
     with pytest.raises(InputError, match="does not rise"):
         build_model(effect_device({"kind": "stiffening", "at": "1X", "k3": "-1e-6 N/um^3"}))
+
+
+def test_where_a_force_does_not_rise_is_told_in_the_units_of_the_way():
+    """A rotor in rad/s, whose stroke is no length."""
+    rotor = user_device(
+        "fan",
+        parameters={"k": "1 (rad/s)/V"},
+        drive={"motor": "400 V"},
+        axes={"rotor": "400 rad/s"},
+        force=lambda u, p: p.k * u.motor,
+        restoring_force=lambda d: d.rotor - 1e-4 * d.rotor**3,
+    )
+    with pytest.raises(InputError, match=r"does not rise at -400 rad/s;"):
+        build_model(rotor)
 
 
 def test_two_effects_of_one_kind_keep_their_own_states():

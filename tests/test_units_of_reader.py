@@ -15,8 +15,25 @@ from ctrlgen.devices.reported_units import derived_unit, in_units_of
 from ctrlgen.diagnosis.report.answer import sentence
 from ctrlgen.diagnosis.report.diagnosis_record import Provenance, diagnosis_record
 from ctrlgen.diagnosis.report.html_report import page
+from ctrlgen.diagnosis.report.narrative import interval
 from ctrlgen.diagnosis.report.writeback import next_text
+from ctrlgen.diagnosis.selection.findings import Estimate
+from ctrlgen.reporting.numbers import sized, with_unit
 from ctrlgen.reporting.result_file import json_text
+
+
+def test_a_size_is_told_in_the_unit_in_which_it_is_read_best():
+    """Times by their size, quotients without a power of ten; readings and what is plain as they are."""
+    assert interval(Estimate(6085.0, (6050.0, 6119.0), "ms")) == "6.085 s (6.05 ... 6.119 s)"
+    assert interval(Estimate(0.0123, (0.0121, 0.0125), "s")) == "12.3 ms (12.1 ... 12.5 ms)"
+    assert interval(Estimate(3.63e-10, (3.4e-10, 3.8e-10), "N/um^3")) == "363 pN/um^3 (340 ... 380 pN/um^3)"
+    assert with_unit(-1.26e-7, "(N*m)/urad", 3) == "-126 (nN*m)/urad" and with_unit(2.5e9, "N/m") == "2.5 GN/m"
+    assert with_unit(0.0, "ms") == "0 ms" and with_unit(-3e-7, "s") == "-0.3 us" and with_unit(0.5, "1") == "0.5"
+    for unit in ("mm", "um", "deg", "V", "N", "1/K^2", "rad/s", "min"):
+        assert sized(unit, 2.5e-7) == (unit, 1.0)
+    for unit, size in (("ms", 6085.0), ("s", 2e-5), ("N/um^3", 3e-10), ("V/(m/s)", 4e7), ("(N*m)/rad", 3e-5)):
+        best, factor = sized(unit, size)
+        assert to_si(factor * size, best) == pytest.approx(to_si(size, unit), rel=1e-12)
 
 
 def told(units: str, drives: str):

@@ -250,6 +250,7 @@ def _check_stiffness(model: Model) -> None:
     for z, value in zip(stroke, values, strict=True):
         bad = np.flatnonzero(~(value < 0))  # NaN too
         if bad.size:
-            axis, displacement = model.axes[bad[0]], show(z[bad[0]], "um")
+            k = bad[0]
+            axis, displacement = model.axes[k], show(z[k], model.signals["displacement"].units[k])
             what = f"the restoring force of {axis} does not rise at {displacement}; soften less, or lower the stroke"
             raise InputError(model.name, [Fault("stiffness", what)])

@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
+
+# seconds of the units of a time, the largest that is no larger than it is read best
+TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 3: "k", 6: "M", 9: "G"}
+# at the beginning of a unit that is a quotient, without a prefix of its own; those of a reader's columns stay as they are
+_QUOTIENT = re.compile(r"(\(?)([NWVA]\b[^/]*/.+)")
 
 
 def number(value: float, digits: int = 4) -> str:
@@ -14,6 +21,30 @@ def number(value: float, digits: int = 4) -> str:
         return f"{value:.{digits - 1}e}"
     exact = f"{value:.{digits}g}"
     return f"{float(exact):.0f}" if "e" in exact else exact
+
+
+def sized(unit: str, size: float) -> tuple[str, float]:
+    """The unit in which a number as large as `size` [unit] is read best, and the factor into it: ("s", 1e-3) for 6085 ms,
+    ("pN/um^3", 1e12) for 3.6e-10 N/um^3; the unit itself where no other is better.
+
+    A time is told in s, ms or us by its size, a quotient with a prefix where `number` would write a power of ten.
+    """
+    if not (math.isfinite(size) and size):
+        return unit, 1.0
+    if unit in TIMES:
+        best = next((u for u, seconds in TIMES.items() if abs(size) * TIMES[unit] >= 0.9995 * seconds), "us")
+        return best, TIMES[unit] / TIMES[best]
+    quotient = _QUOTIENT.fullmatch(unit)
+    power = 3 * math.floor(math.log10(abs(size)) / 3)
+    if quotient is None or "e" not in number(size) or power not in PREFIXES:
+        return unit, 1.0
+    return f"{quotient[1]}{PREFIXES[power]}{quotient[2]}", 10.0**-power
+
+
+def with_unit(value: float, unit: str, digits: int = 4) -> str:
+    """A number with its unit, in that in which it is read best: '6.085 s' of 6085 ms; '0.5' of a plain number."""
+    best, factor = sized(unit, value)
+    return f"{number(factor * value, digits)} {best}".removesuffix(" 1")
 
 
 def with_deviation(value: float, sd: float) -> str:

@@ -17,7 +17,7 @@ from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.hypothesis import Hypothesis, nominal_physics, selected_laws, why_not_offered
 from ctrlgen.estimation.law_needs import not_offered
-from ctrlgen.reporting.numbers import number
+from ctrlgen.reporting.numbers import number, with_unit
 
 # attempts of one cause that are listed, the best first
 LISTED = 4
@@ -92,7 +92,7 @@ def _numbers(a: Attempt, h: Hypothesis) -> str:
     fit = a.candidate.fit
     k = next(k for k, c in enumerate(fit.structure.causes) if _key(c) == _key(h))
     return ", ".join(
-        f"{name} {number(float(from_si(a.started[k][name], unit)), 3)} -> {number(value, 4)}{'' if unit == '1' else f' {unit}'}"
+        f"{name} {with_unit(float(from_si(a.started[k][name], unit)), unit, 3)} -> {with_unit(value, unit)}"
         for name, (value, unit) in numbers_of_cause(fit, k).items()
         if name in a.started[k]
     )

@@ -14,7 +14,7 @@ from ctrlgen.diagnosis.selection.search_history import (
     search_history,
 )
 from ctrlgen.diagnosis.selection.search_result import SearchResult
-from ctrlgen.reporting.numbers import number
+from ctrlgen.reporting.numbers import number, with_unit
 
 
 def history_rows(search: SearchResult) -> list[dict[str, str]]:
@@ -87,8 +87,7 @@ def _numbers(search: SearchResult, refusal: Refusal) -> str:
 
 def quantity(e: NumberEntry) -> str:
     """'4.1 um'."""
-    value = "-" if e.value is None else number(e.value, 4)
-    return value if e.unit == "1" else f"{value} {e.unit}"
+    return f"- {e.unit}".removesuffix(" 1") if e.value is None else with_unit(e.value, e.unit)
 
 
 def worst_error(search: SearchResult, candidate: CandidateModel) -> tuple[str, NumberEntry]:

@@ -17,7 +17,7 @@ from ctrlgen.diagnosis.selection.search_history import held_out_error
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.hypothesis import PARAMETER
-from ctrlgen.reporting.numbers import number
+from ctrlgen.reporting.numbers import number, sized
 
 # refusals that are told
 NAMED = 3
@@ -52,8 +52,9 @@ def interval(e: Estimate) -> str:
     """'4.12 % (3.93 ... 4.31 %)': value and 95 % interval, to two digits of the interval's width."""
     ends = (e.value, *e.ci95)
     percent = e.unit == "1" and all(abs(v) < WIDE for v in ends)
-    unit = " %" if percent else "" if e.unit == "1" else f" {e.unit}"
-    value, low, high = (v * (100 if percent else 1) for v in ends)
+    best, factor = ("%", 100.0) if percent else sized(e.unit, e.value)
+    unit = "" if best == "1" else f" {best}"
+    value, low, high = (factor * v for v in ends)
     if not math.isfinite(high - low):
         return f"{number(value)}{unit} (this recording does not determine it)"
     # detected directly, or fixed by its definition

@@ -50,22 +50,9 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
             ("piezo", "A piezo, or its mount, keeps moving after the voltage has settled"),
             ("", "A displacement that goes on after the drive has settled"),
         ),
-        "cyclic": (
-            (
-                "interferometer",
-                "An error that repeats along the path: the interferometer's fringe, or a pitch behind it",
-            ),
-            ("resolver", "An error that repeats along the path: the resolver's period, or a pitch behind it"),
-            ("encoder", "An error that repeats along the path: the encoder's pitch, or one behind it"),
-            ("screw", "An error that repeats along the path: the screw's pitch"),
-            (
-                "harmonic drive",
-                "An error that repeats along the path: the harmonic drive's, two a turn of its wave generator",
-            ),
-            ("gear", "An error that repeats along the path: the pitch of the gear"),
-        ),
         "dead_zone": (("position", "An axis that ignores small commands"),),
         "displacement_hysteresis": (
+            ("cable", "Hysteresis of the cable: the joint lags"),
             ("piezo", "Hysteresis of the piezo, or of a joint behind it: the displacement lags"),
         ),
         "drive_crosstalk": (("", "What is asked of one actuator acts at another one too"),),
@@ -83,8 +70,21 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
             ("thermal", "A heater that is heated when it is told nothing"),
             ("pump", "A pump that delivers something when it is told nothing"),
             ("piezo", "An amplifier that gives a voltage when it is told none"),
-            ("electromagnetic", "An amplifier that drives the motor when it is told nothing"),
-            ("", "A drive that is off by a constant"),
+            (
+                "electromagnetic",
+                "An amplifier that drives the motor when it is told nothing, or a constant force such as a weight",
+            ),
+            ("", "A drive that is off by a constant, or a constant force such as a weight"),
+        ),
+        "lever_ratio": (
+            ("lever", "A lever whose arms are not as drawn"),
+            ("flexible", "A lever whose arms are not as drawn"),
+            ("", "Something behind the drive that goes farther, or less far, than the model says"),
+        ),
+        "lost_motion": (
+            ("lever", "A lever that bends under the force it transmits"),
+            ("flexible", "A lever that bends under the force it transmits"),
+            ("", "Something behind the drive that yields under the force it transmits"),
         ),
         "lost_beams": (
             ("thermal", "Beams that break at one moment"),
@@ -94,6 +94,14 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
         "one_sided_stiffening": (
             ("flexible", "A flexure that is bent or loaded already at home: stiffer to one side than to the other"),
             ("", "A stiffness that is larger to one side than to the other"),
+        ),
+        "payload": (
+            ("cable", "A weight on the joint whose moment stretches the cable"),
+            ("belt", "A weight whose moment stretches the belt"),
+            ("gear", "A weight, or an unbalanced mass, whose moment twists the gear"),
+            ("harmonic drive", "A weight, or an unbalanced mass, whose moment twists the harmonic drive"),
+            ("flexible", "A weight on the platform, whose moment bends the flexures"),
+            ("", "A weight, or an unbalanced mass, whose moment bends what carries it"),
         ),
         "reversed": (("position", "An axis that counts the other way round"),),
         "saturation": (
@@ -109,6 +117,7 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
             ("", "A share of the drive's action that builds up slowly"),
         ),
         "weighted_displacement_hysteresis": (
+            ("cable", "Hysteresis of the cable: the joint lags"),
             ("piezo", "Hysteresis of the piezo, or of a joint behind it: the displacement lags"),
             ("", "Hysteresis of a joint or guide between stage and mechanism: the displacement lags"),
         ),
@@ -121,7 +130,46 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
 )
 
 
+# What repeats along the way, and what has clearance, by the name of the part that does
+REPEATS: Mapping[str, str] = MappingProxyType(
+    {
+        "screw": "the screw's pitch",
+        "harmonic drive": "the harmonic drive (two a turn of its wave generator)",
+        "gear": "the teeth of the gear",
+        "belt": "the teeth of the belt",
+        "rack": "the teeth of the rack",
+        "stepper": "the steps of the motor",
+        "piezo motor": "the steps of the motor",
+        "interferometer": "the interferometer's fringe",
+        "resolver": "the resolver's period",
+        "encoder": "the encoder's pitch",
+    }
+)
+CLEARANCE: Mapping[str, str] = MappingProxyType(
+    {
+        "gear": "the gear",
+        "harmonic drive": "the harmonic drive",
+        "screw": "the nut",
+        "belt": "the belt",
+        "rack": "the rack",
+        "cable": "the cable",
+        "linkage": "the joints",
+    }
+)
+
+
 def title(law: type[Effect], parts: MachineParts) -> str:
     """The title of a law on a machine of these parts."""
     words = parts.words | {""}
+    if law.kind == "cyclic" and (those := _any_of(REPEATS, words)):
+        # where a sensor alone is stated, what stands behind it is not known
+        more = "" if words & REPEATS.keys() - {parts.sensor} or parts.transmission else ", or a pitch behind it"
+        return f"An error that repeats along the path: {those}{more}"
+    if law.kind == "backlash" and (those := _any_of(CLEARANCE, words)):
+        return f"{'Slack' if those == CLEARANCE['cable'] else 'Play'} in {those}"
     return next((text for word, text in TITLES.get(law.kind, ()) if word in words), law.title)
+
+
+def _any_of(texts: Mapping[str, str], words: frozenset[str]) -> str:
+    """Those of the texts whose part is among the words, joined by 'or'."""
+    return " or ".join(dict.fromkeys(text for word, text in texts.items() if word in words))

@@ -22,6 +22,7 @@ from ctrlgen.estimation.raw_readings import detect_directly
 from ctrlgen.estimation.settings import STATISTICS
 from ctrlgen.numerics.quantisation_step import quantisation_step
 from ctrlgen.recordings.recording import Record, Recording
+from ctrlgen.reporting.numbers import with_unit
 
 
 def objections(
@@ -70,7 +71,7 @@ def outside_its_range(fit: Fit, k: int) -> str | None:
             continue
 
         def shown(si: float, unit: str = u.unit) -> str:
-            return f"{from_si(si, unit):.3g} {unit}".removesuffix(" 1")
+            return with_unit(float(from_si(si, unit)), unit, 3)
 
         plausible = structure.plausible_range(u)
         if plausible and not plausible[0] <= value <= plausible[1]:
@@ -94,7 +95,7 @@ def _at_a_bound(fit: Fit, k: int) -> str | None:
         span = OBJECTIONS.shape_at_bound * (value if ways else u.high - u.low)
         low = prior.at_bound or prior.at_low_bound if value <= u.low + span else ""
         if other := low or (prior.at_bound if value >= u.high - span else ""):
-            return f"its {u.name} is at a bound of {from_si(float(value), u.unit):.3g} {u.unit}, where it is {other}"
+            return f"its {u.name} is at a bound of {with_unit(float(from_si(value, u.unit)), u.unit, 3)}, where it is {other}"
         if prior.at_bound and ways and np.linalg.norm(fit.J[:, i]) * value < OBJECTIONS.told_shape:
             return f"the records say nothing of its {u.name}; without one it is {prior.at_bound}"
     return "no loop is seen; without one it is a gain" if _has_no_loop(fit, k) else None
