@@ -83,6 +83,17 @@ def test_the_interval_is_the_one_that_is_reported(monkeypatch):
     assert may_be_plainer(fit, 0) is not None
 
 
+def test_a_number_that_stopped_at_its_bound_is_not_measured_and_a_fit_decides():
+    """One branch widens by as much as the law has, known as exactly as a bound is, the others by nothing: where the plainer law fits
+    alike it is told."""
+    numbers = {"share": 0.1, "reach": 1e-6, "taper": 0.5, "reversible": 0.0, "upper": 0.01, "lower": -0.6, "side": 0.0}
+    fit = fit_of("asymmetric_displacement_hysteresis", numbers, 0.05)
+    assert may_be_plainer(fit, 0) is None
+    assert may_be_plainer(fit, 0, bounds_tell=False).effect == "displacement_hysteresis"
+    measured = fit_of("asymmetric_displacement_hysteresis", numbers | {"lower": -0.5}, 0.05)
+    assert may_be_plainer(measured, 0, bounds_tell=False) is None
+
+
 def test_all_numbers_by_which_two_laws_differ_must_be_neutral():
     leaning = {"share": 0.1, "reach": 1e-6, "taper": 0.5, "reversible": 0.0, "upper": 0.0, "lower": 0.0, "side": 0.0}
     for name in ("upper", "lower", "side"):
@@ -124,6 +135,14 @@ def test_what_rubs_or_lags_alike_both_ways_is_named_by_the_plainer_law(law, monk
     assert may_be_plainer(general.fit, 0) == plain
     named = simplified(trials, general)
     assert named.causes == (plain,)
+    # a number that a fit of the same squares left at its bound is no asymmetry, however small its interval is there
+    places = [k for k, u in enumerate(general.fit.structure.free_parameters) if u.name == "lower"]
+    for k in places:
+        theta, J = general.fit.theta.copy(), general.fit.J.copy()
+        theta[k] = general.fit.structure.free_parameters[k].low
+        J[:, k] *= 1e6
+        stopped = replace(general, fit=replace(general.fit, theta=theta, J=J))
+        assert may_be_plainer(stopped.fit, 0) is None and simplified(trials, stopped).causes == (plain,)
     monkeypatch.setattr("ctrlgen.diagnosis.selection.rivals.replacements", lambda *_: [])
     assert [t.cause for t in rivals(trials, general, 0)[0]] == [plain]
     # nothing that the machine cannot have

@@ -7,15 +7,22 @@ from dataclasses import replace
 from scipy import stats
 
 from ctrlgen.estimation.fit import Fit
+from ctrlgen.estimation.free_parameters import FreeParameter
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 from ctrlgen.estimation.robust_covariance import robust_deviations
 from ctrlgen.estimation.settings import STATISTICS
 
+AT_BOUND = 1e-6
+"""Of its range, by which a number may be off its bound and is at it: what a fit that stops there leaves to rounding."""
 
-def may_be_plainer(fit: Fit, k: int) -> Hypothesis | None:
+
+def may_be_plainer(fit: Fit, k: int, bounds_tell: bool = True) -> Hypothesis | None:
     """The plainer law that cause k generalises (`Effect.plainer`), at the same place; None where there is none, or where one of the
-    numbers by which they differ has an interval without the value that it has in the plainer law. The interval is the one that is
-    reported, of the model, or of the sandwich where that is wider, at 95 % over all these numbers (Bonferroni)."""
+    numbers by which they differ has an interval without the value that it has in the plainer law.
+
+    The interval is the one that is reported, of the model, or of the sandwich where that is wider, at 95 % over all these numbers
+    (Bonferroni). Where `bounds_tell` is False a number that stopped at its bound, which is not measured, excludes nothing.
+    """
     cause = fit.structure.causes[k]
     if cause.effect == PARAMETER or cause.law.plainer is None:
         return None
@@ -24,8 +31,13 @@ def may_be_plainer(fit: Fit, k: int) -> Hypothesis | None:
     neutral = {p.name: channel.si(relation.where[p.name], p) for p in cause.law.params if p.name in relation.where}
     z = stats.norm.isf(stats.norm.sf(STATISTICS.z_95) / len(neutral))
     rows = zip(fit.structure.free_parameters, fit.theta, deviations, strict=True)
-    differs = (abs(v - neutral[u.name]) > z * sd for u, v, sd in rows if u.cause == k and u.name in neutral)
-    return None if any(differs) else replace(cause, effect=relation.kind)
+    there = ((u, v, sd) for u, v, sd in rows if u.cause == k and u.name in neutral)
+    told = ((u, v, sd) for u, v, sd in there if bounds_tell or not _at_bound(u, float(v)))
+    return None if any(abs(v - neutral[u.name]) > z * sd for u, v, sd in told) else replace(cause, effect=relation.kind)
+
+
+def _at_bound(number: FreeParameter, value: float) -> bool:
+    return min(value - number.low, number.high - value) <= AT_BOUND * (number.high - number.low)
 
 
 def plainer_start(fit: Fit, k: int, plain: Hypothesis) -> dict[str, float]:

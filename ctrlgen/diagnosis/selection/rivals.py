@@ -45,16 +45,16 @@ def simplified(trials: Trials, current: CandidateModel) -> CandidateModel:
         if coarser is not current:
             return simplified(trials, coarser)
         current = _in_usual_shape(trials, current, k)
-        for t in _as_plainer(trials, current, k):
+        for t in _as_plainer(trials, current, k, bounds_tell=False):
             if explains_alike(trials.selection, t, current) and not trials.objections(t, current.causes):
                 return simplified(trials, t)
     return current
 
 
-def _as_plainer(trials: Trials, current: CandidateModel, k: int) -> list[CandidateModel]:
+def _as_plainer(trials: Trials, current: CandidateModel, k: int, bounds_tell: bool = True) -> list[CandidateModel]:
     """The model with the plainer law that cause k may be in its place, begun where both are one; none where there is no such law, or
     this machine cannot have it."""
-    plain = may_be_plainer(current.fit, k)
+    plain = may_be_plainer(current.fit, k, bounds_tell)
     if plain not in trials.screen.hypotheses:
         return []
     begun = current.fit.restarted.without(k).with_cause(plain, plainer_start(current.fit, k, plain))
