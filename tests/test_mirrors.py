@@ -128,6 +128,18 @@ def test_a_law_of_a_reading_beside_the_pose_is_taken_out_and_is_none_of_the_pose
     assert np.array_equal(alone.readings(moved[:, :3]), moved[:, :3]) and not alone.slopes(moved[:, :3]).any()
 
 
+def test_poses_are_found_to_rounding_by_a_law_that_is_curved():
+    """A cubic law that moves readings by 5e-4 of the channel's size: one Newton step leaves 4e-10 of it, which is no rounding."""
+    poses = np.zeros((5, 6))
+    poses[:, 3] = 100 * UM * np.linspace(-1, 1, 5)
+    curved = ReadPoses(device([law("cubic_sensor", "delta_x", curvature="5e4 1/m^2")]))
+    read = curved.readings(poses)
+    assert read[:, 3] == pytest.approx(poses[:, 3] * (1 + 5e4 * poses[:, 3] ** 2), rel=1e-12)
+    assert np.abs(curved.poses(read) - poses).max() < 4 * np.finfo(float).eps * 100 * UM
+    with pytest.raises(InputError, match="no pose has these readings"):
+        curved.poses(np.full((1, 6), np.nan))
+
+
 def test_what_an_instrument_may_feign_is_what_another_one_would_have_implied(rng):
     """A lean that is one sd larger than stated."""
     drive = rng.uniform(-1e-4, 1e-4, (30, 6))

@@ -20,11 +20,8 @@ from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Pl
 from ctrlgen.learning.lifted import Lifted
 from ctrlgen.model.assembly import build_model
 from ctrlgen.numerics.batched_evaluation import evaluate
+from ctrlgen.numerics.newton import NoRoot, newton_rows
 
-STEPS = 8
-"""Newton steps at most. Laws of sensors are the identity and a few per cent: three reach rounding."""
-CLOSE = 1e-12
-"""Of a channel's typical size, by which a last step may still change the pose."""
 MOST_ERROR = 1e6
 """Typical sizes; bounds of a number that has none."""
 
@@ -149,24 +146,19 @@ class ImpliedPose:
 
     def _newton(self, S: np.ndarray, v: np.ndarray, wanted: np.ndarray, known: np.ndarray) -> np.ndarray:
         """(n, n_y) by how much the pose is off. Channels that were not `known` (n, n_y) are not."""
-        e, scale = np.zeros(wanted.shape), np.array(self.lifted.signal.scale)
-        both = known[:, :, None] & known[:, None, :]
-        for _ in range(STEPS):
+        both, size = known[:, :, None] & known[:, None, :], np.array(self.lifted.signal.scale)
+
+        def seen(e: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             value, slope = self._at(self._seen, S, v, e)
-            slope = np.where(both, slope, np.eye(len(scale)))
-            try:
-                step = np.linalg.solve(slope, np.where(known, wanted - value, 0.0)[:, :, None])[:, :, 0]
-            except np.linalg.LinAlgError:
-                step = np.full(e.shape, np.nan)
-            if not np.all(np.isfinite(step)):
-                what = (
-                    "says nothing of the pose by the sensor laws of the device: leave its column out, or correct them"
-                )
-                raise InputError(self.lifted.model.name, [Fault("effect", f"a reading {what}")])
-            e += step
-            if np.abs(step / scale).max() < CLOSE:
-                break
-        return e
+            return np.where(known, value, 0.0), np.where(both, slope, np.eye(len(size)))
+
+        try:
+            return newton_rows(seen, np.where(known, wanted, 0.0), np.zeros(wanted.shape), size)
+        except np.linalg.LinAlgError:
+            what = "a reading says nothing of the pose by the sensor laws of the device: leave its column out, or correct them"
+        except NoRoot:
+            what = "no pose has these readings under the sensor laws of the device: look at the numbers of the laws"
+        raise InputError(self.lifted.model.name, [Fault("effect", what)])
 
 
 def _late(effects: tuple[Effect, ...], signal: Signal) -> np.ndarray:

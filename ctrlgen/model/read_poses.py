@@ -17,11 +17,7 @@ from ctrlgen.devices import Device
 from ctrlgen.effects import Place
 from ctrlgen.model.effect_terms import EffectTerms
 from ctrlgen.numerics.batched_evaluation import evaluate
-
-STEPS = 8
-"""Newton steps at most. Laws of sensors are the identity and a few per cent: three reach rounding."""
-CLOSE = 1e-9
-"""Of a channel's typical size, by which a last step may still change the pose: the error that it leaves is its square."""
+from ctrlgen.numerics.newton import NoRoot, newton_rows
 
 
 def sensor_numbers(device: Device) -> frozenset[str]:
@@ -94,18 +90,15 @@ class ReadPoses:
     def poses(self, readings: np.ndarray) -> np.ndarray:
         """(n, channels) [SI] the poses that `readings` (n, channels) imply. Raises InputError where Newton's method finds none, or a
         reading says nothing of the pose."""
-        found = readings.copy()
-        for _ in range(STEPS if self.acts and len(readings) else 0):
-            seen, slope, _ = self._parts(found)
-            step = _solved(slope, (readings - seen)[:, :, None])[:, :, 0]
-            found = found + step
-            if np.all(np.abs(step) <= CLOSE * np.maximum(self._size, np.abs(found))):
-                return found
-        if self.acts and len(readings):
-            raise InputError(
-                "sensor laws", [Fault("effect", "no pose has these readings; look at the numbers of the laws")]
-            )
-        return found
+        if not (self.acts and len(readings)):
+            return readings.copy()
+        try:
+            return newton_rows(lambda poses: self._parts(poses)[:2], readings, readings, self._size)
+        except np.linalg.LinAlgError:
+            raise _dead() from None
+        except NoRoot:
+            what = "no pose has these readings; look at the numbers of the laws"
+            raise InputError("sensor laws", [Fault("effect", what)]) from None
 
     def deviations(self, poses: np.ndarray) -> list[np.ndarray]:
         """For each of `numbers` by how much the implied poses (n, channels) [SI] are off where it is one sd above what is stated."""
@@ -132,7 +125,9 @@ def _solved(slope: np.ndarray, right: np.ndarray) -> np.ndarray:
     try:
         return np.asarray(np.linalg.solve(slope, right))
     except np.linalg.LinAlgError:
-        what = (
-            "a reading says nothing of the pose, as that of a channel that is stuck; leave out its law, or correct it"
-        )
-        raise InputError("sensor laws", [Fault("effect", what)]) from None
+        raise _dead() from None
+
+
+def _dead() -> InputError:
+    what = "a reading says nothing of the pose, as that of a channel that is stuck; leave out its law, or correct it"
+    return InputError("sensor laws", [Fault("effect", what)])

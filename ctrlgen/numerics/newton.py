@@ -1,4 +1,4 @@
-"""Newton's method: a fixed number of steps written out as an expression, or iterated until it converges.
+"""Newton's method: a fixed number of steps written out as an expression, or iterated until it converges; of many rows at once.
 
 Written out it has no branches, can be differentiated, and prints as C whose running time is known. Two solvers of the
 library are no case of it and say why: `ctrlgen.model.inverse` takes the closed form of linear and quadratic equations,
@@ -7,9 +7,39 @@ library are no case of it and say why: `ctrlgen.model.inverse` takes the closed 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import casadi as ca
+import numpy as np
 
 CONVERGED = 1e-14  # residual and step, in units of order one: some tens of roundings
+
+STEPS = 8  # of many rows at once, at most: for maps near the identity three reach rounding
+CLOSE = (
+    1e-9  # of the size of an unknown, by which a last step may still change it: the error that it leaves is its square
+)
+
+
+class NoRoot(ValueError):
+    """Newton's method has found none."""
+
+
+def newton_rows(
+    at: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], wanted: np.ndarray, start: np.ndarray, size: np.ndarray
+) -> np.ndarray:
+    """(n, k) the unknowns at which `at` gives the values `wanted` (n, k), every row by itself, from `start` (n, k); k of a typical `size`.
+
+    `at`: unknowns (n, k) -> values (n, k) and slopes (n, k, k). Raises numpy.linalg.LinAlgError where a slope is singular, NoRoot where
+    `STEPS` do not suffice.
+    """
+    found = start
+    for _ in range(STEPS):
+        value, slope = at(found)
+        step = np.linalg.solve(slope, (wanted - value)[:, :, None])[:, :, 0]
+        found = found + step
+        if np.all(np.abs(step) <= CLOSE * np.maximum(size, np.abs(found))):
+            return found
+    raise NoRoot(f"Newton's method finds no root in {STEPS} steps")
 
 
 def newton_root(residual: ca.SX, unknown: ca.SX, start: ca.SX, steps: int) -> ca.SX:
