@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import casadi as ca
@@ -13,11 +14,26 @@ from benchmarks import casadi_c, table
 from benchmarks.measure import Count, Note
 from benchmarks.samples import NEAR, NEAR_FLOAT, Disagreement, Samples
 from ctrlgen.controller.controller_step import ControllerStatus
+from ctrlgen.controller.fixed_point import fixed_point
+from ctrlgen.controller.fixed_step import FixedController
 from ctrlgen.core.errors import ToolError
-from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.real import Arithmetic, Integers, Real
 from ctrlgen.firmware.folder import CFolder, generate
-from ctrlgen.verification.cores import BASE, INSTALL, M4F, M7, Core, cross_compile, cross_compilers
+from ctrlgen.verification.cores import (
+    BASE,
+    INSTALL,
+    M0_PLUS,
+    M3,
+    M4F,
+    M7,
+    RV32IMC,
+    Core,
+    cross_compile,
+    cross_compilers,
+)
 from ctrlgen.verification.emulation import MISSING, Machine, available
+from ctrlgen.verification.in_loop import WORDS_BEHIND
+from ctrlgen.verification.integer_comparison import numbers_of
 
 COMPILER = "arm-none-eabi-gcc"  # CasADi's C calls sqrt, which needs a library
 TOLERANCE = {Real.DOUBLE: casadi_c.TOLERANCE, Real.FLOAT: 2e-5}  # of scaled residuals: what single precision can meet
@@ -27,6 +43,7 @@ PEERS = {casadi_c.NEWTON: casadi_c.newton, casadi_c.SQP: casadi_c.sqp}
 REPAIRED = "#include <math.h>\n" + "".join(f"#define {f} {f}f\n" for f in ("sqrt", "fabs", "fmin", "fmax"))
 LIBRARIES = ("-Wl,--start-group", "-lm", "-lc", "-lnosys", "-lgcc", "-Wl,--end-group")
 WITHIN, AT_WORST = 700, 6000  # instructions of ours in float on a Cortex-M4F
+WITHIN_INTEGERS = 12_000  # in integers on a Cortex-M0+: a quarter of 1 kHz at 48 MHz
 
 
 def run(repeat: int) -> list[Count | Note]:
@@ -55,7 +72,58 @@ def run(repeat: int) -> list[Count | Note]:
             found.append(Count(f"online C, circle, {where}", circle, f"{table.NAME}; {table.KEEPS}", by_hand))
             aim = AT_WORST if single else None
             found.append(Count(f"online C, jumps beyond limits, {where}", jumps, "online C, circle", circle, aim))
+        found += _in_integers(samples, scratch / "integers")
     return found
+
+
+def _in_integers(samples: Samples, into: Path) -> list[Count | Note]:
+    """The controller in integers on cores without a floating-point unit, beside that in emulated float: the longest step of the first
+    samples of the circle, as many as `ctrlgen verify` counts there, and of as many jumps."""
+    asked = samples.scenario.file.model_copy(update={"fixed_point": True})
+    c = generate(replace(samples.scenario, file=asked), samples.model, into, samples.solution)
+    counter = FixedController(fixed_point(samples.controller))
+    before, rest = samples.command[-1], samples.controller.rest()
+    settled = samples.controller.step(rest, before, settle=True).state
+    at = counter.at(counter.counts(before[None])[0])
+    found: list[Count | Note] = []
+    for core in (M3, M0_PLUS, RV32IMC):
+        compiler = core.architecture.value
+        if compiler not in cross_compilers():
+            found.append(Note(f"target: {core.name} not run; {INSTALL[compiler]}"))
+            continue
+        counts: dict[tuple[str, Arithmetic], int] = {}
+        for where, targets in (("circle", samples.command), ("jumps beyond limits", samples.jumps())):
+            targets = targets[: core.calls]
+            start = settled if where == "circle" else rest
+            counts[where, Real.FLOAT] = _longest(c, core, Real.FLOAT, targets, np.concatenate(start))
+            numbers = np.concatenate(numbers_of(at if where == "circle" else counter.rest()))
+            counts[where, Integers.Q31] = _longest(c, core, Integers.Q31, counter.counts(targets), numbers)
+            ours = f"online C in integers, {where}, {core.name}"
+            within = WITHIN_INTEGERS if core is M0_PLUS and where == "circle" else None
+            by_float = counts[where, Real.FLOAT]
+            found.append(Count(ours, counts[where, Integers.Q31], "online C, float in software", by_float, within))
+    return found
+
+
+def _longest(c: CFolder, core: Core, real: Arithmetic, targets: np.ndarray, start: np.ndarray) -> int:
+    """Instructions of the longest step over `targets` from the state `start`."""
+    name, compiler = c.online[real], core.architecture.value
+    program = c.path / f"{name}_{core.name}.elf"
+    if not program.exists():
+        cross_compile(compiler, core, [c.path / f"{name}.c"], c.path, c.init[real], program)
+    machine = Machine(core, program)
+    words = max(c.state_words, WORDS_BEHIND)
+    state, target, out = (machine.reserve(n, real) for n in (len(start) + words, targets.shape[1], 3 * len(start)))
+    machine.call(c.init[real], state)
+    machine.write(state, start, real)
+    counted = []
+    for wanted in targets:
+        machine.write(target, wanted, real)
+        status, count = machine.call(f"{name}_step", state, target, out)
+        if status & (ControllerStatus.LOST | ControllerStatus.INPUT):
+            raise Disagreement(f"{name} is lost on the emulated {core.name}")
+        counted.append(count)
+    return max(counted)
 
 
 def _ours(samples: Samples, c: CFolder, core: Core, real: Real, scratch: Path) -> tuple[int, int]:
