@@ -30,7 +30,8 @@ HALVINGS = 8  # of a step of harmonics that would leave the bound
 SAMPLES_PER_NUMBER = 2  # of a run, at least: fewer say nothing of what lies between them
 MOST_SAMPLES = 65536  # of a run: what sums in float hold to a thousandth
 REFUSED = 10  # one sample in so many may be refused of a run: single spikes; more, and the rest is not the way that other runs took
-FAR = 4.0  # bounds by which an error may differ from the first of its run: twice what any correction could explain
+EARLY = 7  # first samples of a run, the median of whose errors the others are taken from: three spikes among them do no harm
+FAR = 4.0  # bounds by which an error may differ from that median: twice what any correction could explain
 
 
 class CorrectionStatus(IntFlag):
@@ -156,7 +157,7 @@ class Corrections:
     @property
     def fewest(self) -> int:
         """Samples of a run from which is learnt."""
-        return SAMPLES_PER_NUMBER * max(c.basis.count for c in self.each)
+        return max(EARLY, SAMPLES_PER_NUMBER * max(c.basis.count for c in self.each))
 
     def parts(self, values: np.ndarray) -> list[np.ndarray]:
         """The numbers (count,) of each correction."""
@@ -198,19 +199,17 @@ class CorrectionLearning:
         targets = targets[:, : self.corrections.channels]
         errors = measured - targets
         usable = np.isfinite(errors).all(axis=1)
-        if usable.any():
-            off = errors - errors[np.argmax(usable)]
-            usable &= np.all([np.abs(off[:, c.of]) <= FAR * c.bound for c in every], axis=0)
+        if usable.sum() < EARLY:
+            return self, (status if usable.all() else CorrectionStatus.INPUT) | CorrectionStatus.SHORT
+        off = errors - np.median(errors[usable][:EARLY], axis=0)
+        usable &= np.all([np.abs(off[:, c.of]) <= FAR * c.bound for c in every], axis=0)
         refused = np.sum(~usable & (np.cumsum(usable) < MOST_SAMPLES))
         usable &= np.cumsum(usable) <= MOST_SAMPLES
         if not usable.all():
             status |= CorrectionStatus.INPUT
         if usable.sum() < self.corrections.fewest or REFUSED * refused > usable.sum():
             return self, status | CorrectionStatus.SHORT
-        out = [
-            self._term(k, targets[usable, c.over], errors[usable, c.of] - errors[np.argmax(usable), c.of])
-            for k, c in enumerate(every)
-        ]
+        out = [self._term(k, targets[usable, c.over], off[usable, c.of]) for k, c in enumerate(every)]
         values, kept = (np.concatenate(parts) for parts in list(zip(*out, strict=True))[:2])
         cost, gain, trial = (np.array(part) for part in list(zip(*out, strict=True))[2:])
         if np.any(self.trial & ~trial):

@@ -17,11 +17,13 @@ from typing import Any
 import numpy as np
 
 from ctrlgen.controller.controller_step import ControllerStatus
+from ctrlgen.controller.correction import Corrections
 from ctrlgen.controller.fixed_point import fixed_point
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.firmware.c.real import Arithmetic, Integers, Real
 from ctrlgen.firmware.c.templates import write
 from ctrlgen.firmware.folder import CFolder
+from ctrlgen.firmware.online.corrected import corrections_of
 from ctrlgen.firmware.online.limit_tables import rates_in_c
 from ctrlgen.firmware.online.stated_pivot import FARTHEST, StatedPivot
 from ctrlgen.model.model import Model
@@ -91,6 +93,7 @@ def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> d
     bits |= ControllerStatus.RATE if controller.rate else bits
     estimated = kernels.contraction is not None
     bits |= ControllerStatus.UNSURE | ControllerStatus.CLOCK if estimated else bits
+    corrections = corrections_of(scenario, kernels)
     samples, clock = len(scenario.bind(model).samples), scenario.clock
     return {
         "real": real,
@@ -118,6 +121,22 @@ def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> d
         "farthest": FARTHEST,
         "duration": samples * clock.sample_time if isinstance(clock, Sampled) else None,
         **rates_in_c(controller),
+        **(_corrected(folder.corrected[real], corrections) if corrections else {"corrected": None}),
+    }
+
+
+def _corrected(name: str, corrections: Corrections) -> dict[str, Any]:
+    """Of corrections: what may be added to each number of a target, less than nothing where there is no bound (of derivatives), and what
+    each number of a table may be."""
+    most = np.zeros(corrections.channels * (corrections.order + 1))
+    for c in corrections.each:
+        most[c.of] = c.bound
+        most[c.of + corrections.channels :: corrections.channels] = -1.0
+    return {
+        "corrected": name,
+        "most_added": most,
+        "most_of_number": np.concatenate([np.full(c.basis.count, c.bound) for c in corrections.each]),
+        "measured": corrections.channels,
     }
 
 

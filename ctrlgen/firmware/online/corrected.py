@@ -17,6 +17,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.controller.correction import (
+    EARLY,
     FAR,
     HALVINGS,
     HARMONIC_SHARE,
@@ -171,6 +172,7 @@ def corrected_context(
         "fewest": corrections.fewest,
         "most": MOST_SAMPLES,
         "far": FAR,
+        "early": EARLY,
         "refused": REFUSED,
         "most_answer": 2 / max(c.gain for c in corrections.each),
         "harmonic_share": HARMONIC_SHARE,

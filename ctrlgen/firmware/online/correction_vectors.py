@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ctrlgen.controller.correction import CorrectionLearning, Corrections
+from ctrlgen.controller.correction import EARLY, CorrectionLearning, Corrections
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.online.corrected import stored
 
@@ -32,6 +32,7 @@ def correction_vectors(corrections: Corrections, context: Mapping[str, Any], rea
         "rows": list(zip(targets, expected, strict=True)),
         "near": tolerance(corrections, values, targets, real),
         "samples": samples,
+        "early": EARLY,
         "errors": ERRORS,
         "learnt": learnt,
         "learnt_near": max(off, float(np.finfo(np.float32).tiny)),
