@@ -41,8 +41,7 @@ def objections(
                 reasons[k] = reason
             continue
         reason = (
-            outside_its_range(fit, k)
-            or _at_a_bound(fit, k)
+            another_law(fit, k)
             or _on_the_lattice(recording, fit, k)
             or (None if exact else _of_another_kind(recording, fit, k))
         )
@@ -80,6 +79,12 @@ def outside_its_range(fit: Fit, k: int) -> str | None:
         if value >= u.high - span or (value <= u.low + span and u.low != u.nominal):
             return f"{u.name} is at its bound of {shown(float(value))}"
     return None
+
+
+def another_law(fit: Fit, k: int) -> str | None:
+    """Why cause k, whatever it was when it was accepted, is now another law: its numbers are not those of its own, or tell of no such
+    law; None where it is not."""
+    return outside_its_range(fit, k) or _at_a_bound(fit, k)
 
 
 def _at_a_bound(fit: Fit, k: int) -> str | None:

@@ -11,6 +11,7 @@ largest |z| is judged against simulations of that. |cos| near one says what this
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 
@@ -62,9 +63,16 @@ class Screen:
 
     def __init__(self, fitter: Fitter, hypotheses: list[Hypothesis], seed: int = 0) -> None:
         self.fitter, self.hypotheses, self.seed = fitter, hypotheses, seed
+        self.stated = tuple(hypotheses)
         self.peaks: Peaks | None = None
         self.motion: dict[Along, np.ndarray] = {}
         self.laws: dict[Timing, LawTerms] = {}
+
+    def without(self, barred: Callable[[Hypothesis], bool]) -> Screen:
+        """The same screen, its laws as compiled, that suspects none of those `barred`."""
+        part = copy.copy(self)
+        part.hypotheses = [h for h in self.hypotheses if not barred(h)]
+        return part
 
     def in_regions(self, fit: Fit, locations: Collection[str]) -> Screened:
         """The laws in a region at `locations`, their edges at quantiles of the motion, whether or not a region stands out there; and
@@ -118,7 +126,7 @@ class Screen:
         """The terms of the hypotheses' laws for records of one timing."""
         if timing not in self.laws:
             channels = self.fitter.recording.channels
-            self.laws[timing] = law_terms(fit.structure.device, self.hypotheses, channels, timing)
+            self.laws[timing] = law_terms(fit.structure.device, self.stated, channels, timing)
         return self.laws[timing]
 
     def _follow(self, fit: Fit) -> Peaks:

@@ -9,6 +9,7 @@ although it scores better is kept with its reason.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -23,9 +24,10 @@ from ctrlgen.diagnosis.selection.candidates import finer_forms, fit_candidates, 
 from ctrlgen.diagnosis.selection.confusable import explains_alike
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.not_taken import not_taken
+from ctrlgen.diagnosis.selection.other_laws import stands_for_another, takes_over
 from ctrlgen.diagnosis.selection.precedence import acting_first, everywhere_first, one_loop_first
 from ctrlgen.diagnosis.selection.pruning import all_pruned, no_worse, without_needless
-from ctrlgen.diagnosis.selection.rivals import acting_instead, rivals, simplified, swapped
+from ctrlgen.diagnosis.selection.rivals import acting_instead, replacements, rivals, simplified, swapped
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
 from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.selection.supported import supported
@@ -65,8 +67,11 @@ class Searcher:
             current = self._settled(current)
             if np.allclose(noise.floor, before.floor, rtol=SEARCH.same_noise, atol=0):
                 break
-        current = self.clocked(self._finely_stepped(self.best_settled(current)))
-        current = acting_instead(trials, simplified(trials, current))
+        current = self._in_plainest_form(self.clocked(self._finely_stepped(self.best_settled(current))))
+        found = self.without_other_laws(current, rounds)
+        trials = self.trials
+        if found is not current:
+            current = self._in_plainest_form(self.clocked(self._finely_stepped(found)))
         # its numbers are not bent by the errors of a better model
         nominal = scored(trials.fitter, trials.fitter.described(device)[1])
         current, account = supported(trials, nominal, current, trials.screen.seed)
@@ -99,6 +104,47 @@ class Searcher:
         current = self._settled(current)
         better = swapped(self.trials, current, len(current.causes))
         return current if better is current else self._settled(better)
+
+    def _in_plainest_form(self, current: CandidateModel) -> CandidateModel:
+        return acting_instead(self.trials, simplified(self.trials, current))
+
+    def without_other_laws(self, current: CandidateModel, rounds: list[Round]) -> CandidateModel:
+        """The model without the causes that were accepted for what their names say, and by now stand for something else
+        (`other_laws`), where another that is sound explains alike, or nearly; `SEARCH.most_searches_without` of them at most."""
+        doubtful = [c for k, c in enumerate(current.causes) if stands_for_another(current.fit, k)]
+        for cause in doubtful[: SEARCH.most_searches_without]:
+            if cause in current.causes and stands_for_another(current.fit, k := current.causes.index(cause)):
+                current = self._without_other_law(current, k, rounds)
+        return current
+
+    def _without_other_law(self, current: CandidateModel, k: int, rounds: list[Round]) -> CandidateModel:
+        """The model with what is sound and explains alike, or nearly, in the place of cause k; as it is where nothing does. A rival
+        that does so alone comes first, then what a search finds that does not suspect the cause: a hysteresis of which all lags is a
+        play, and what it gave beside that, such as a gain, is a cause of its own, which no rival alone can have."""
+        whole, other, again = self.trials, copy.copy(self), list(rounds)
+        alone = [t for t in replacements(whole, current, k) if takes_over(whole, t, current, k)]
+        other.trials = whole.without_kin(current.causes[k])
+        begun = alone or other._bare(current, k)
+        found = other._searched_on(begun[0], current, again) if begun else None
+        if found is None or not takes_over(other.trials, found, current, k):
+            whole.log += [replace(a, round=len(rounds)) for a in other.trials.log]
+            return current
+        other.trials.log[:0] = whole.log
+        other.trials.suspecting_again(whole.screen)
+        self.trials, self.markings, rounds[:] = other.trials, other.markings, again
+        return found
+
+    def _bare(self, current: CandidateModel, k: int) -> list[CandidateModel]:
+        """The model without cause k; none where such a device cannot be simulated."""
+        self.trials.step(f"searching without {current.causes[k].effect} at {current.causes[k].location}")
+        return self.trials.tried(current.fit.restarted.without(k), None, steps=FIT.max_steps)
+
+    def _searched_on(self, begun: CandidateModel, current: CandidateModel, rounds: list[Round]) -> CandidateModel:
+        """What a search finds that begins with a model, where that one is worse than `current`, with one cause more than this at most."""
+        found = self._settled(begun)
+        if self.trials.selection.advantage(current, found) <= 0:
+            return found
+        return self._settled(self.forward_rounds(found, rounds, len(current.causes) + 1))
 
     def _finely_stepped(self, current: CandidateModel) -> CandidateModel:
         """The same model fitted and judged with as many steps of its integrator as it needs, where those of the search do not suffice:
@@ -150,10 +196,11 @@ class Searcher:
         self._learn_mismatch(scored(trials.fitter, trials.fitter.described(current.fit.structure.device)[1]))
         return trials.with_noise_update(trials.with_errors(trials.converged(current)))
 
-    def forward_rounds(self, current: CandidateModel, rounds: list[Round]) -> CandidateModel:
-        """Forward rounds from `current`, with swaps in between, until nothing more is justified; appends each to `rounds`."""
+    def forward_rounds(self, current: CandidateModel, rounds: list[Round], most: int | None = None) -> CandidateModel:
+        """Forward rounds from `current`, with swaps in between, until nothing more is justified, or there are the `most` causes;
+        appends each to `rounds`."""
         trials, visited = self.trials, [current]
-        most = SEARCH.most_causes[trials.fitter.recording.kind]
+        most = min(SEARCH.most_causes[trials.fitter.recording.kind], np.inf if most is None else most)
         while True:
             trials.step(f"screening, {number_of(len(current.causes), 'cause')} so far")
             trials.new_round(len(rounds) + 1)
@@ -172,8 +219,8 @@ class Searcher:
                 return current
             kept = sum(c in current.causes for c in best.causes)
             current = without_needless(trials, swapped(trials, best, kept))
-            same = next((v for v in visited if frozenset(v.causes) == frozenset(current.causes)), None)
-            if same is not None and explains_alike(trials.selection, same, current):
+            before = (v for v in visited if frozenset(v.causes) == frozenset(current.causes))
+            if any(explains_alike(trials.selection, v, current) for v in before):
                 # no better than when it was there before
                 return current
             current = trials.with_noise_update(self._converged(current))

@@ -69,6 +69,25 @@ class Trials:
         self.screens.clear()
         self.bare.clear()
 
+    def without_kin(self, cause: Hypothesis) -> Trials:
+        """A copy of these trials, which learns for itself, that suspects neither `cause` nor a law of its family at its place."""
+
+        def is_kin(h: Hypothesis) -> bool:
+            family = h.family is not None and (h.family, h.at) == (cause.family, cause.at)
+            return family or (h.effect, h.location, h.path) == (cause.effect, cause.location, cause.path)
+
+        branch = copy.copy(self)
+        branch.screen = self.screen.without(is_kin)
+        branch.fitted, branch.screens, branch.bare, branch.latest = dict(self.fitted), {}, {}, None
+        branch.refused, branch.failed, branch.log = [], [], []
+        return branch
+
+    def suspecting_again(self, screen: Screen) -> None:
+        """Goes on with a `screen` of other hypotheses."""
+        screen.fitter, self.screen, self.latest = self.fitter, screen, None
+        self.screens.clear()
+        self.bare.clear()
+
     def each(
         self,
         function: Callable[[Trials, Item], Result],

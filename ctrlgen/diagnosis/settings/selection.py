@@ -128,6 +128,9 @@ class SearchSettings:
     bound_slack: float = 9.0
     """Difference of the criterion by which a rival may be worse than what explains alike, where the amplitude of the cause is at the
     end of its range, or may be zero: three standard deviations more. Judgement."""
+    most_searches_without: int = 2
+    """Causes that have come to stand for something else, at most, without which is searched again: each search costs about as much
+    as the first. Judgement."""
     nearly_best: float = 0.9
     """Share of what the best candidate explains from which on another is fitted to the end before both are compared."""
     longest_shift: int = 64
