@@ -6,7 +6,7 @@ import tomllib
 
 import numpy as np
 import pytest
-from axis_records import record
+from axis_records import AXIS, axis_fitter, record
 from conftest import DEVICE
 from planted_poses import played
 from recovery import fitter_of
@@ -37,6 +37,23 @@ def gantry():
         speed={"x": "1 m/s", "y": "1 m/s"},
         needed_force=lambda d, v, a, p: [p.m * a.x + p.c * v.x + p.k * d.x, p.m * a.y + p.c * v.y],
     )
+
+
+def test_a_friction_in_proportion_to_the_speed_is_damping():
+    """At the highest speed at which it creeps, and where the speeds recorded do not tell that one from its force; a sharp contact, which
+    they do not tell from a sharper one, is friction."""
+    fitter, _ = axis_fitter(n=800).described(AXIS)
+    friction = Hypothesis("coulomb", "stage:axis", "axis")
+
+    def against(force: float, smoothing: float) -> str:
+        start = {"force": force, "reach": 1e-8, "smoothing": smoothing}
+        fit = fitter.fit(Structure(AXIS).with_cause(friction, start), steps=0)
+        return objections(fitter.recording, fit).get(0, "")
+
+    assert "bound of 1e+05 um/s, where it is viscous damping" in against(4.0, 0.1)
+    assert "do not tell its smoothing from its size" in against(0.3, 0.08)
+    assert not against(0.3, 1e-5)
+    assert not against(0.3, 1e-3)
 
 
 def test_a_displacement_that_no_force_depends_on_has_no_law():

@@ -35,6 +35,14 @@ def test_a_shape_parameter_has_somewhere_to_start_inside_its_bounds(law):
 
 
 @every_law
+def test_every_shape_states_what_the_law_is_at_its_bounds(law):
+    """A law that is never suspected ends at none; one of another package may state it in its own row."""
+    prior = prior_of(law)
+    shapes = {p.name for p in law.params if p.off is None}
+    assert set(prior.at_bounds) == (shapes if prior.suspected or prior.refines else set())
+
+
+@every_law
 def test_only_an_amplitude_is_fixed_or_limited_to_what_is_plausible(law):
     for p in law.params:
         prior = prior_of(law).of(p)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from math import exp, log
 
 from ctrlgen.effects import Param
+from ctrlgen.estimation.shape_bounds import ShapeBounds
 
 ONE_IN_TEN = -2.3  # ln(1/10)
 ONE_IN_A_HUNDRED = -4.6
@@ -37,8 +38,6 @@ class ParameterPrior:
         it: what records to fit hardly tell, held-out records do (`selection.begun_again`).
     fixed_range: of an amplitude: the law is present or absent. Its amplitude is set to the middle of the range, not fitted.
     deviation: of an amplitude: its standard deviation among devices whose file states none (`estimation.size_odds`).
-    at_bound: of a shape: what the law is where this ends at a bound. A fit that ends there is rejected, as one is of which the records
-        do not tell the shape. at_low_bound: the same of the lower bound alone.
     proportional: of a shape: it adds a part in proportion to the signal, and what the law adds is nothing else where there is no loop.
     """
 
@@ -48,8 +47,6 @@ class ParameterPrior:
     only_from_data: bool = False
     plausible_range: tuple[float, float] | None = None
     fixed_range: tuple[float, float] | None = None
-    at_bound: str = ""
-    at_low_bound: str = ""
     proportional: bool = False
     usual: float | None = None
     again_at_low: bool = False
@@ -84,6 +81,7 @@ class LawPrior:
         the motion comes first where it explains nearly as much.
     domain: where a finding is reported to be; by default what the law's place says.
     parameters: by name; one that is not listed gets `default_starts`.
+    at_bounds: what the law is where a shape ends at a bound, by name (`shape_bounds`).
     """
 
     reason: str = "Default: as common as a wrong gain, its form exact."
@@ -100,6 +98,7 @@ class LawPrior:
     of_time: bool = False
     domain: str | None = None
     parameters: Mapping[str, ParameterPrior] = field(default_factory=dict)
+    at_bounds: Mapping[str, ShapeBounds] = field(default_factory=dict)
 
     @property
     def is_pitch(self) -> bool:

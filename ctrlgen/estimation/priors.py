@@ -17,6 +17,7 @@ from ctrlgen.effects import Effect
 from ctrlgen.estimation.law_prior import CREEPING, ONE_IN_A_HUNDRED, ONE_IN_TEN, LawPrior, ParameterPrior, peaks
 from ctrlgen.estimation.priors_in_a_region import IN_A_REGION
 from ctrlgen.estimation.priors_of_a_lag import HYSTERESIS, OF_A_LAG
+from ctrlgen.estimation.shape_bounds import AT_BOUNDS
 
 
 def prior_of(law: type[Effect]) -> LawPrior:
@@ -28,8 +29,7 @@ DEFAULT = LawPrior()
 _starts = ParameterPrior  # shorthand: _starts((0.1, 1.0)) is a parameter with these start values alone
 
 
-# a force that slips after no way is dry friction, and one that never slips a spring
-_LOOP = ParameterPrior((0.01, 0.03, 0.1, 0.3, 1.0), at_bound="dry friction, or a spring")
+_LOOP = ParameterPrior((0.01, 0.03, 0.1, 0.3, 1.0))
 
 
 _EVENT = {"moment": ParameterPrior(start_from_data="moments"), "rise": peaks(1.0)}  # it may happen at any time
@@ -58,7 +58,7 @@ _PLAY = LawPrior(
     parameters={"gap": peaks(1e-4, 1e-3, 0.01, 0.1, 0.3)},
 )
 
-PRIORS: Mapping[str, LawPrior] = MappingProxyType(
+_ROWS: Mapping[str, LawPrior] = MappingProxyType(
     {
         # Sensor ---------------------------------------------------------------------------------------------------------------
         "bow": LawPrior("No sensor is bent by its first even term alone; 5 %: judgement.", model_form_error=0.05),
@@ -378,4 +378,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             DEFAULT,
         ),
     }
+)
+PRIORS: Mapping[str, LawPrior] = MappingProxyType(
+    {kind: replace(row, at_bounds=AT_BOUNDS.get(kind, {})) for kind, row in _ROWS.items()}
 )

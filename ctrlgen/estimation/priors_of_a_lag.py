@@ -10,17 +10,17 @@ from ctrlgen.estimation.law_prior import ONE_IN_TEN, LawPrior, ParameterPrior
 HYSTERESIS = (
     "Forms of one loop. 2 %: nature leaves about a fiftieth of a loop beside any of them, judged on simulated cases."
 )
-_TAPER = ParameterPrior((0.5,), at_low_bound="a single play, or a gain")
+_TAPER = ParameterPrior((0.5,))
 
 
 def _reach(*multiples: float, peaks: bool = False) -> ParameterPrior:
-    """Start values of the way after which plays follow: where none does, or all do at once, what is left is proportional."""
-    return ParameterPrior(multiples, scales_with_peak=peaks, at_bound="a gain")
+    """Start values of the way after which plays follow."""
+    return ParameterPrior(multiples, scales_with_peak=peaks)
 
 
 def _reversible(*values: float) -> ParameterPrior:
     """Start values of the part of a loop that is none."""
-    return ParameterPrior(values, at_bound="a gain beside a smaller loop", proportional=True)
+    return ParameterPrior(values, proportional=True)
 
 
 _ASYMMETRIC_LAG = LawPrior(

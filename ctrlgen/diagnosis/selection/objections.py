@@ -92,18 +92,30 @@ def _at_a_bound(fit: Fit, k: int) -> str | None:
     structure, cause = fit.structure, fit.structure.causes[k]
     if cause.effect == PARAMETER:
         return None
-    priors = {p.name: cause.prior.of(p) for p in cause.law.params}
     for i, (u, value) in enumerate(zip(structure.free_parameters, fit.theta, strict=True)):
-        if u.cause != k or u.name not in priors:
+        stated = cause.prior.at_bounds.get(u.name)
+        if u.cause != k or stated is None:
             continue
-        prior, ways = priors[u.name], u.low > 0
+        ways = u.low > 0
         span = OBJECTIONS.shape_at_bound * (value if ways else u.high - u.low)
-        low = prior.at_bound or prior.at_low_bound if value <= u.low + span else ""
-        if other := low or (prior.at_bound if value >= u.high - span else ""):
+        if other := (stated.low if value <= u.low + span else "") or (stated.high if value >= u.high - span else ""):
             return f"its {u.name} is at a bound of {with_unit(float(from_si(value, u.unit)), u.unit, 3)}, where it is {other}"
-        if prior.at_bound and ways and np.linalg.norm(fit.J[:, i]) * value < OBJECTIONS.told_shape:
-            return f"the records say nothing of its {u.name}; without one it is {prior.at_bound}"
+        told, beside = (value * size for size in _told(fit, k, i))
+        if stated.untold and ways and told < OBJECTIONS.told_shape:
+            return f"the records say nothing of its {u.name}; without one it is {stated.untold}"
+        if stated.as_size and ways and beside < OBJECTIONS.told_shape <= told:
+            return f"the records do not tell its {u.name} from its size; where they do not it is {stated.as_size}"
     return "no loop is seen; without one it is a gain" if _has_no_loop(fit, k) else None
+
+
+def _told(fit: Fit, k: int, i: int) -> tuple[float, float]:
+    """How much all readings depend on number i, per its unit in standard deviations, and how much beside what the size of its cause k
+    does."""
+    slope, free = fit.J[:, i], fit.structure.free_parameters
+    rest = slope
+    for size in (fit.J[:, j] for j, u in enumerate(free) if u.cause == k and u.amplitude):
+        rest = rest - size * (size @ rest) / max(float(size @ size), 1e-300)
+    return float(np.linalg.norm(slope)), float(np.linalg.norm(rest))
 
 
 def _has_no_loop(fit: Fit, k: int) -> bool:

@@ -196,11 +196,11 @@ class Searcher:
         self._learn_mismatch(scored(trials.fitter, trials.fitter.described(current.fit.structure.device)[1]))
         return trials.with_noise_update(trials.with_errors(trials.converged(current)))
 
-    def forward_rounds(self, current: CandidateModel, rounds: list[Round], most: int | None = None) -> CandidateModel:
+    def forward_rounds(self, current: CandidateModel, rounds: list[Round], most: float = np.inf) -> CandidateModel:
         """Forward rounds from `current`, with swaps in between, until nothing more is justified, or there are the `most` causes;
         appends each to `rounds`."""
         trials, visited = self.trials, [current]
-        most = min(SEARCH.most_causes[trials.fitter.recording.kind], np.inf if most is None else most)
+        most = min(SEARCH.most_causes[trials.fitter.recording.kind], most)
         while True:
             trials.step(f"screening, {number_of(len(current.causes), 'cause')} so far")
             trials.new_round(len(rounds) + 1)
