@@ -106,6 +106,7 @@ class Searcher:
         return current if better is current else self._settled(better)
 
     def _in_plainest_form(self, current: CandidateModel) -> CandidateModel:
+        """The model with the plainest laws, and those that act with the motion, that explain alike."""
         return acting_instead(self.trials, simplified(self.trials, current))
 
     def without_other_laws(self, current: CandidateModel, rounds: list[Round]) -> CandidateModel:
