@@ -50,7 +50,7 @@ def test_a_friction_in_proportion_to_the_speed_is_damping():
         fit = fitter.fit(Structure(AXIS).with_cause(friction, start), steps=0)
         return objections(fitter.recording, fit).get(0, "")
 
-    assert "bound of 1e+05 um/s, where it is viscous damping" in against(4.0, 0.1)
+    assert "bound of 100000 um/s, where it is viscous damping" in against(4.0, 0.1)
     assert "do not tell its smoothing from its size" in against(0.3, 0.08)
     assert not against(0.3, 1e-5)
     assert not against(0.3, 1e-3)

@@ -94,6 +94,7 @@ AT_BOUNDS: Mapping[str, Mapping[str, ShapeBounds]] = {
     "drive_hysteresis": {"reach": _GAIN, "taper": _SINGLE_PLAY},
     "end_stop": {"gap": ITSELF, "power": ITSELF},
     "force_step": _EVENT,
+    "gravity": {"phase": ITSELF},
     "hysteresis": {"reach": _SLIPS, "taper": ITSELF},
     "local_error": {"position": ITSELF, "length": ITSELF, "rounding": ITSELF},
     "log_creep": {"tau": ITSELF, "decades": ITSELF},
