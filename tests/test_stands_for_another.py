@@ -54,7 +54,7 @@ def test_a_search_that_finds_nothing_sound_leaves_all_as_it_was(searched, monkey
     rounds, before = [], searcher.trials
     fitter, tried = before.fitter, len(before.log)
     monkeypatch.setattr(search, "takes_over", lambda *_: False)
-    monkeypatch.setattr(Searcher, "_searched_on", lambda self, begun, *_: self.trials.use(replace(fitter)) or begun)
+    monkeypatch.setattr(Searcher, "searched_on", lambda self, begun, *_: self.trials.use(replace(fitter)) or begun)
     assert searcher.without_other_laws(loop, rounds) is loop
     assert searcher.trials is before and before.fitter is fitter and rounds == []
     assert before.screen.hypotheses == [LOOP, BACKLASH, GAIN] and len(before.log) > tried

@@ -126,7 +126,7 @@ class Searcher:
         alone = [t for t in replacements(whole, current, k) if takes_over(whole, t, current, k)]
         other.trials = whole.without_kin(current.causes[k])
         begun = alone or other._bare(current, k)
-        found = other._searched_on(begun[0], current, again) if begun else None
+        found = other.searched_on(begun[0], current, again) if begun else None
         if found is None or not takes_over(other.trials, found, current, k):
             whole.log += [replace(a, round=len(rounds)) for a in other.trials.log]
             return current
@@ -140,7 +140,7 @@ class Searcher:
         self.trials.step(f"searching without {current.causes[k].effect} at {current.causes[k].location}")
         return self.trials.tried(current.fit.restarted.without(k), None, steps=FIT.max_steps)
 
-    def _searched_on(self, begun: CandidateModel, current: CandidateModel, rounds: list[Round]) -> CandidateModel:
+    def searched_on(self, begun: CandidateModel, current: CandidateModel, rounds: list[Round]) -> CandidateModel:
         """What a search finds that begins with a model, where that one is worse than `current`, with one cause more than this at most."""
         found = self._settled(begun)
         if self.trials.selection.advantage(current, found) <= 0:
