@@ -19,6 +19,7 @@ from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.devices import Signal
 from ctrlgen.model.inverse_dynamics import InverseDynamics, inverse_dynamics
+from ctrlgen.model.led_modes import led
 from ctrlgen.model.model import Model
 from ctrlgen.model.state_vector import TYPICAL_RATE
 
@@ -26,7 +27,10 @@ from ctrlgen.model.state_vector import TYPICAL_RATE
 @dataclass(frozen=True)
 class MotionKernels(ControllerKernels):
     """The kernels of one device with inertia. A target is (channels * (order + 1),): first the followed signal, then its first derivative
-    by time, and so on. Raises InputError for a device with states that a target does not determine, such as memories of effects."""
+    by time, and so on; where it `leads_modes` of the bodies, two more (`ctrlgen.model.led_modes`). Raises InputError for a device with
+    states that a target does not determine, such as memories of effects, and where there are no modes to lead."""
+
+    leads_modes: bool = False
 
     def __post_init__(self) -> None:
         if self.dynamics.internal:
@@ -37,7 +41,8 @@ class MotionKernels(ControllerKernels):
     @cached_property
     def dynamics(self) -> InverseDynamics:
         """The inverse dynamics of the nominal model, from the followed signal."""
-        return inverse_dynamics(self.nominal, self.follow)
+        own = inverse_dynamics(self.nominal, self.follow)
+        return own.after(led(self.nominal, self.follow, own.order)) if self.leads_modes else own
 
     @property
     def _step_time(self) -> None:
@@ -151,8 +156,8 @@ class MotionController(Controller):
 
 
 @lru_cache(maxsize=4)  # generation and each check of what was generated ask for the same one; its kernels take long
-def controller_of(model: Model, follow: str, sample_time: float | None) -> Controller:
-    """The feedforward controller of a device; one with inertia takes derivatives too."""
+def controller_of(model: Model, follow: str, sample_time: float | None, leads_modes: bool = False) -> Controller:
+    """The feedforward controller of a device; one with inertia takes derivatives too, two more where it `leads_modes` of bodies."""
     if model.inertial:
-        return MotionController(MotionKernels(model, follow, sample_time))
+        return MotionController(MotionKernels(model, follow, sample_time, leads_modes))
     return Controller(ControllerKernels(model, follow, sample_time))

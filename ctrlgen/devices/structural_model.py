@@ -86,14 +86,27 @@ class StructuralModel:
 
     def response(self, force: np.ndarray, step: float, held: bool) -> np.ndarray:
         """(k, channels) pose under the forces (k, n), `step` [s] apart, which are `held` or linear between, from rest under the first."""
+        return np.asarray(self.motion(force, step, held) @ self.output.T)
+
+    def at_rest(self, force: np.ndarray) -> np.ndarray:
+        """(channels,) pose under the forces (n,) that do not change."""
+        return np.asarray(self.output @ np.linalg.solve(self.stiffness, np.eye(len(self.mass))[:, : self.axes] @ force))
+
+    def motion(
+        self, force: np.ndarray, step: float, held: bool, closed: bool = False, before: np.ndarray | None = None
+    ) -> np.ndarray:
+        """(k, n + m) q under the same, or from rest under the forces `before` (n,); of `closed` forces, which repeat, the periodic one."""
         from scipy.signal import lsim  # takes long to import
 
         k, n = len(self.mass), self.axes
         inverse = np.linalg.inv(self.mass)
         A = np.block([[np.zeros((k, k)), np.eye(k)], [-inverse @ self.stiffness, -inverse @ self.damping]])
         B = np.vstack([np.zeros((k, n)), inverse[:, :n]])
-        C = np.hstack([self.output, np.zeros_like(self.output)])
-        x = np.concatenate([np.linalg.solve(self.stiffness, np.eye(k)[:, :n] @ force[0]), np.zeros(k)])
-        time = step * np.arange(len(force))
-        system = (A, B, C, np.zeros((len(C), n)))
-        return np.reshape(lsim(system, force, time, x, interp=not held)[1], (len(force), len(C)))
+        forces = np.vstack([force, force[:1]]) if closed else force
+        time, system = step * np.arange(len(forces)), (A, B, np.eye(2 * k), np.zeros((2 * k, n)))
+        first = force[0] if before is None else before
+        x = np.concatenate([np.linalg.solve(self.stiffness, np.eye(k)[:, :n] @ first), np.zeros(k)])
+        if closed:
+            end = lsim(system, forces, time, 0 * x, interp=not held)[2][-1]
+            x = np.linalg.solve(np.eye(2 * k) - scipy.linalg.expm(A * time[-1]), end)
+        return np.reshape(lsim(system, forces, time, x, interp=not held)[2], (len(forces), 2 * k))[: len(force), :k]

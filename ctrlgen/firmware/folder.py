@@ -107,7 +107,7 @@ def generate(
     out = Path(out)
     check_tightened(scenario, model)
     check_online(scenario, model)
-    controller = controller_of(model, scenario.file.follow, scenario.sample_time)
+    controller = controller_of(model, scenario.file.follow, scenario.sample_time, scenario.file.leads_modes)
     played = solution if scenario.sample_time else None
     problem = scenario.bind(model)
     command = problem.samples if solution is None else solution.command
@@ -196,7 +196,7 @@ def _write_fixed(context: dict[str, Any], out: Path, name: str) -> list[Path]:
 
 def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Arithmetic, path: Path) -> None:
     """The program that `ctrlgen.verification` builds around one pair of controllers."""
-    controller = controller_of(model, scenario.file.follow, scenario.sample_time)
+    controller = controller_of(model, scenario.file.follow, scenario.sample_time, scenario.file.leads_modes)
     corrections = corrections_of(scenario, controller.kernels)
     context = {
         "real": real,

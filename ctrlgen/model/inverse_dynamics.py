@@ -22,7 +22,7 @@ Source: A. Isidori, Nonlinear Control Systems, 3rd ed. (1995), section 5.1.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -40,8 +40,8 @@ NONE = ca.SX(0, 1)  # a vector without components
 class InverseDynamics:
     """`kernel` (channels, order + 1), the target and its derivatives by time [SI], -> x (n_x,), z (n_axes,), u (n_u,).
 
-    `degrees`: the relative degree of each channel; `order` the largest. `internal`: places in (x, z) of the states that the target
-    does not determine; the kernel leaves them at rest.
+    `degrees`: the relative degree of each channel. `internal`: places in (x, z) of the states that the target does not determine; the
+    kernel leaves them at rest.
     """
 
     kernel: ca.Function
@@ -50,8 +50,15 @@ class InverseDynamics:
 
     @property
     def order(self) -> int:
-        """The number of derivatives of the target that are needed."""
-        return max(self.degrees)
+        """The number of derivatives of the target that are needed: the largest relative degree, or what a kernel `after` takes."""
+        return self.kernel.size2_in(0) - 1
+
+    def after(self, first: ca.Function) -> InverseDynamics:
+        """The same of the target that `first` makes of another one, (channels, .) both."""
+        target = first.sx_in(0)
+        results = self.kernel(first(target))
+        kernel = ca.Function("inverse_dynamics", [target], list(results), ["target"], ["x", "z", "u"], {"cse": True})
+        return replace(self, kernel=kernel)
 
 
 def relative_degrees(model: Model, follow: str) -> tuple[int, ...]:

@@ -54,6 +54,11 @@ class Trace(Tabular, Drawn):
         )
 
 
+def first_samples(of: Trace, n: int) -> Trace:
+    """The first n samples of a trace."""
+    return Trace(of.time[:n], {k: v[:n] for k, v in of.signals.items()}, of.x[:n], of.z[:n], of.described)
+
+
 def trace(model: Model, time: np.ndarray, x: np.ndarray, z: np.ndarray, u: np.ndarray) -> Trace:
     """Every signal at given states x (n, n_x), displacements z (n, n_axes) and drives u (n, n_u), SI."""
     values = model.evaluate.map(len(time))(x.T, z.T, u.T, np.tile(model.p_nominal[:, None], (1, len(time))))

@@ -18,7 +18,7 @@ from ctrlgen.core.units import show
 from ctrlgen.devices import Limit
 from ctrlgen.model.model import Model
 from ctrlgen.model.quasi_static import natural_modes
-from ctrlgen.model.simulation import Trace, periodic_start, simulate
+from ctrlgen.model.simulation import Trace, first_samples, periodic_start, simulate
 from ctrlgen.trajectory.infeasibility import FEASIBILITY_TOLERANCE, check_feasible, unreachable
 from ctrlgen.trajectory.intersample import between_samples
 from ctrlgen.trajectory.inverse.clock import in_time
@@ -29,6 +29,7 @@ from ctrlgen.trajectory.problem import PathProblem
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.trajectory.scenario_file import MOST_SAMPLES
 from ctrlgen.trajectory.solution import Solution, closest_margins
+from ctrlgen.trajectory.unstated_modes import moved_with_modes
 
 SHOWN = 3  # limits that a message names
 Progress = Callable[[str], None]
@@ -40,6 +41,8 @@ def solve_nominal(scenario: Scenario, model: Model, progress: Progress) -> Solut
     problem = scenario.bind(model)
     if scenario.file.feedforward == "static":
         return _led_statically(scenario, problem, progress)
+    if scenario.file.leads_modes:
+        return _led_with_modes(scenario, problem, progress)
     needed = check_feasible(problem)
     if problem.order:
         return _held(scenario, problem, progress)
@@ -51,11 +54,31 @@ def solve_nominal(scenario: Scenario, model: Model, progress: Progress) -> Solut
 def _led_statically(scenario: Scenario, problem: PathProblem, progress: Progress) -> Solution:
     """The drives of a device with inertia that would follow if it stood in balance, and what it does under them: an open path from rest at
     its start, a closed one in its periodic motion. A drive that acts without lag fits the middle of the sample for which it is held."""
-    needed, model, h = check_feasible(problem), problem.model, in_time(problem.clock).sample_time
-    u, velocities = np.clip(needed.u, *model.u_bounds), np.zeros(model.v.numel())
+    needed, velocities = check_feasible(problem), np.zeros(problem.model.v.numel())
     x, z, _ = problem.in_balance.inverse.at_rest(problem.samples[0])
-    start = np.concatenate([x, velocities, z])
-    iterations = 0
+    found = _led_by(scenario, problem, needed, np.concatenate([x, velocities, z]), progress)
+    return replace(found, between_samples=_error_between_samples(problem, found.trace, found.drive))
+
+
+def _led_with_modes(scenario: Scenario, problem: PathProblem, progress: Progress) -> Solution:
+    """The drives of the online controller that leads modes of the bodies, each that of the middle of the sample for which it is held, and
+    what axes and pose with these modes do under them. States and displacements of the trace are those of the model."""
+    needed, model = check_feasible(problem), problem.model
+    held = problem.inverse.trajectory(problem.motion_after(0.5))
+    if (error := unreachable(problem, held)) is not None:
+        raise error
+    found = _led_by(scenario, problem, held, np.concatenate([needed.x[0], needed.z[0]]), progress)
+    moved = moved_with_modes(model, found.trace, found.drive, problem.closed)
+    margins = tuple(closest_margins(model, moved.x, moved.z, found.drive, held.before))
+    return replace(found, trace=replace(found.trace, signals=moved.signals), margins=margins)
+
+
+def _led_by(
+    scenario: Scenario, problem: PathProblem, needed: InverseTrajectory, start: np.ndarray, progress: Progress
+) -> Solution:
+    """What a device with inertia does under drives that are given: an open path from `start`, a closed one in its periodic motion."""
+    model, h = problem.model, in_time(problem.clock).sample_time
+    u, iterations = np.clip(needed.u, *model.u_bounds), 0
     if problem.closed:
         progress(f"periodic motion, {len(u)} samples")
         start, iterations = periodic_start(model, u, h, start)
@@ -63,17 +86,16 @@ def _led_statically(scenario: Scenario, problem: PathProblem, progress: Progress
     n, after = len(u), 0 if problem.closed else _one_period(model, x, z, u[-1], h)
     held = np.vstack([u, np.tile(u[-1:], (after, 1))])
     reached = simulate(model, held, h, x, z)
-    samples = _first(reached, n)
+    samples = first_samples(reached, n)
     broken = violations(model, samples.x, samples.z, u, before=needed.before)
     if broken := broken or violations(model, reached.x[:-1], reached.z[:-1], held):
         names = "; ".join(f"{v.limit.label} at sample {v.worst}" for v in broken[:SHOWN])
         raise SolverError(
-            f"without inertia feedforward the stage overshoots its limits ({names}); shape the path, slow it down, or leave out "
-            'feedforward = "static"'
+            f"so led the stage overshoots its limits ({names}); shape the path, slow it down, or leave out "
+            f'feedforward = "{scenario.file.feedforward}"'
         )
     margins = tuple(closest_margins(model, samples.x, samples.z, u, needed.before))
-    between = _error_between_samples(problem, samples, u)
-    return Solution(scenario, model, problem.samples, samples, u, margins, iterations, (), between)
+    return Solution(scenario, model, problem.asked, samples, u, margins, iterations, ())
 
 
 def _one_period(model: Model, x: np.ndarray, z: np.ndarray, u: np.ndarray, sample_time: float) -> int:
@@ -105,14 +127,7 @@ def _held(scenario: Scenario, problem: PathProblem, progress: Progress) -> Solut
 def _driven(problem: PathProblem, needed: InverseTrajectory, u: np.ndarray) -> Trace:
     """The samples of the model under the drives u (n, n_u), by the shipped integrator."""
     reached = simulate(problem.model, u, in_time(problem.clock).sample_time, needed.x[0], needed.z[0])
-    return _first(reached, len(u))
-
-
-def _first(trace: Trace, n: int) -> Trace:
-    """The first n samples of a trace."""
-    return Trace(
-        trace.time[:n], {k: v[:n] for k, v in trace.signals.items()}, trace.x[:n], trace.z[:n], trace.described
-    )
+    return first_samples(reached, len(u))
 
 
 def _error_between_samples(problem: PathProblem, samples: Trace, u: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 
 from ctrlgen.core.counts import number_of
@@ -14,13 +15,14 @@ from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import Quantity, read_quantity, show, written_unit
 from ctrlgen.devices import Signal
 from ctrlgen.model.inverse_dynamics import inverse_dynamics, relative_degrees
+from ctrlgen.model.led_modes import MORE, led
 from ctrlgen.model.model import Model
 from ctrlgen.model.quasi_static import natural_modes, quasi_static
 from ctrlgen.physics.pivot import about
 from ctrlgen.physics.screw import FULL_TURN, TWIST
 from ctrlgen.trajectory.frame import Frame
 from ctrlgen.trajectory.inverse.choice import choose_inverse
-from ctrlgen.trajectory.inverse.clock import Clock, Sampled, Settled
+from ctrlgen.trajectory.inverse.clock import Clock, Sampled, Settled, in_time
 from ctrlgen.trajectory.inverse.motion import Motion
 from ctrlgen.trajectory.inverse.path_inverse import PathInverse
 from ctrlgen.trajectory.paths import PathKind, Poses
@@ -91,7 +93,13 @@ class PathProblem:
 
     @cached_property
     def samples(self) -> np.ndarray:
-        """(n, channels) [SI] the commanded samples."""
+        """(n, channels) [SI] the samples that the model follows: those that are asked for, or where modes of the bodies are led, those of
+        the model condensed to its axes."""
+        return self.asked if self._led is None else self.motion.position
+
+    @cached_property
+    def asked(self) -> np.ndarray:
+        """(n, channels) [SI] the samples that the scenario asks for."""
         samples = self._unshaped if self.file.shaping is None else self._positions(len(self._unshaped), 0.0)
         if isinstance(self.clock, Sampled) and len(samples) < 2:
             what = "has one sample, but motion in time needs two or more; for one pose leave out sample_rate"
@@ -115,21 +123,41 @@ class PathProblem:
         if not isinstance(self.clock, Sampled):
             what = f'is missing: {self.model.name} has inertia, what it needs depends on time; write sample_rate = "1 kHz" and duration'
             raise InputError(self.source, [Fault("sample_rate", what)])
-        n, order = len(self.samples), self.order
+        n, order = len(self.asked), self._followed
         least = LEAST_CLOSED if self.closed else order + 1
         if n < least:
             what = f"has {number_of(n, 'sample')}; {self.model.name}, which has inertia, takes {least} or more"
             raise InputError(self.source, [Fault("path", f"{what}: raise sample_rate, or make the path longer")])
         self._check_smoothness(order)
-        tables = self._tables(order, np.arange(n) + after)
-        rates = self.clock.sample_time ** -np.arange(1.0, order + 1)
+        asked = self.asked_after(after)
+        if self._led is None:
+            return asked
+        led = np.stack([self._led(target).full() for target in asked.stacked()])
+        return Motion(led[:, :, 0], np.moveaxis(led[:, :, 1:], -1, 0), self.closed)
+
+    def asked_after(self, after: float) -> Motion:
+        """The motion that the scenario asks for, with as many derivatives as the controller takes, so many samples `after` each: with
+        `feedforward = "modes"` not that of the condensed model, which `motion_after` gives."""
+        order = self._followed
+        tables = self._tables(order, np.arange(len(self.asked)) + after)
+        rates = in_time(self.clock).sample_time ** -np.arange(1.0, order + 1)
         return Motion(tables[0], tables[1:] * rates[:, None, None], self.closed)
+
+    @property
+    def _followed(self) -> int:
+        """How many derivatives of the asked path the drive follows."""
+        return self.order if self._led is None else self.order + MORE
+
+    @cached_property
+    def _led(self) -> ca.Function | None:
+        """The target of the condensed model of the asked one; None where they are the same."""
+        return led(self.model, self.follow, self.order) if self.file.leads_modes else None
 
     @cached_property
     def targets(self) -> np.ndarray:
         """(n, channels * (order + 1)) what the online controller is given: with inertia position, then derivatives, at the middle of the
         time for which each drive is held; in balance the samples."""
-        motion = self.motion_after(0.5) if self.order else self.motion
+        motion = self.asked_after(0.5) if self.order else self.motion
         return np.hstack([motion.position, *motion.derivatives])
 
     def positions(self, after: float) -> np.ndarray:
@@ -240,7 +268,7 @@ class PathProblem:
 
     def _check_smoothness(self, order: int) -> None:
         """Refuses a path whose derivative of this order jumps, so that the drive would."""
-        path, samples, name = self._path, self.samples, self.model.name
+        path, samples, name = self._path, self.asked, self.model.name
         if isinstance(path, Poses):
             rest = (samples[:1].repeat(order + 1, axis=0), samples[-1:].repeat(order + 1, axis=0))
             before, after = (samples, samples) if self.closed else rest
@@ -265,7 +293,7 @@ class PathProblem:
         if isinstance(path, Poses):
             return path.model_copy(update={"folder": self.source.parent})
         if path.smooth is None and self.order:
-            return path.model_copy(update={"smooth": self.order + SMOOTHER})
+            return path.model_copy(update={"smooth": self._followed + SMOOTHER})
         return path
 
     def _on_path(self, evaluate: Callable[[PathKind, Frame, int], np.ndarray]) -> np.ndarray:

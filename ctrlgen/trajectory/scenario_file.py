@@ -95,9 +95,10 @@ class ScenarioFile(Section):
     """The commanded path; its `kind` chooses the shape."""
     shaping: Shaping | None = None
     """`[shaping]`: the path is shaped so that it leaves a mode of the device at rest. Left out: it is not."""
-    feedforward: Literal["inertia", "static"] = "inertia"
-    """Of a device with inertia. `inertia`: the drives that move its masses along the path. `static`: those that would if it stood in
-    balance at every moment, without inertia and damping; it then follows as well as it does, and vibrates.
+    feedforward: Literal["inertia", "modes", "static"] = "inertia"
+    """Of a device with inertia. `inertia`: the drives that move its masses along the path. `modes`: of a mechanism with [dynamics], those
+    that bend its bodies beside its axes too, to the fourth derivative of the path, which the C takes with its target. `static`: those
+    that would if it stood in balance at every moment, without inertia and damping; it then follows as well as it does, and vibrates.
     """
     fixed_point: bool = False
     """Whether the C has a third online controller, in integers of 32 bits with a proven error, for cores without a floating-point unit
@@ -116,6 +117,11 @@ class ScenarioFile(Section):
     """Left out: the limits hold for the device as described, and may be broken by one whose numbers differ."""
     expect: tuple[Expectation, ...] = ()
     """`[[expect]]` tables: values that the solution must have."""
+
+    @property
+    def leads_modes(self) -> bool:
+        """Whether the drives lead modes of the bodies beside the axes."""
+        return self.feedforward == "modes"
 
     @property
     def clock(self) -> Clock:

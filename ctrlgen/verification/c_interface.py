@@ -72,7 +72,7 @@ class Interface(Keys):
 def interface(solution: Solution, c: CFolder) -> Interface:
     """The arguments and results of the C, in SI, and the values that its status can have."""
     model, scenario = solution.model, solution.scenario
-    controller = controller_of(model, scenario.file.follow, scenario.sample_time)
+    controller = controller_of(model, scenario.file.follow, scenario.sample_time, scenario.file.leads_modes)
     kernels, m = controller.kernels, controller.kernels.nominal
     state, drive, rated = m.signals.get("state"), _channels(m.signals["drive"]), controller.rate is not None
     can = {

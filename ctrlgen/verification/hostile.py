@@ -84,7 +84,7 @@ def check_hostile(
 
 
 def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> dict[str, Any]:
-    controller = controller_of(model, scenario.file.follow, scenario.sample_time)
+    controller = controller_of(model, scenario.file.follow, scenario.sample_time, scenario.file.leads_modes)
     kernels, nominal = controller.kernels, controller.kernels.nominal
     bits = ControllerStatus.DISPLACEMENT | ControllerStatus.DRIVE | ControllerStatus.INPUT | ControllerStatus.LOST
     bits |= (ControllerStatus.STATE if nominal.n_states else bits) | (
@@ -141,7 +141,7 @@ def _corrected(name: str, corrections: Corrections) -> dict[str, Any]:
 
 
 def _in_integers(folder: CFolder, scenario: Scenario, model: Model, real: Integers) -> dict[str, Any]:
-    controller = controller_of(model, scenario.file.follow, scenario.sample_time)
+    controller = controller_of(model, scenario.file.follow, scenario.sample_time, scenario.file.leads_modes)
     fixed = fixed_point(controller)
     S = ControllerStatus
     bits = S.DISPLACEMENT | S.DRIVE | S.INPUT | S.LOST | S.UNSURE | (S.COMPOSITE if fixed.bound else S.UNSURE)

@@ -25,7 +25,7 @@ def player_rows(program: ComparedProgram, compression: Compression) -> list[Comp
     # the time itself is rounded: that much of the steepest change from sample to sample
     steep = 4 * epsilon * 2 * len(k) * np.abs(np.diff(solved, axis=0)).max()
     solver = ComparisonKind.PLAYED_ROOT if ref.model.inertial else ComparisonKind.PLAYED_OPTIMUM
-    off = ref.once("played", played, lambda drives: reached_under(ref, drives)) - ref.path
+    off = ref.once("played", played, lambda drives: reached_under(ref, drives)) - ref.played_path
     return [
         *program.off_command(ComparisonKind.PLAYER_PATH, off, ANGLE_TOLERANCE, LENGTH_TOLERANCE),
         program.row(ComparisonKind.CURVE, "drive", played - compression.drives(k), near),

@@ -15,8 +15,9 @@ from ctrlgen.controller.feedforward import Controller
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.firmware.online.limit_tables import FLOAT_SLACK
 from ctrlgen.firmware.online.stated_pivot import FARTHEST, StatedPivot
-from ctrlgen.model.simulation import simulate, trace
+from ctrlgen.model.simulation import trace
 from ctrlgen.trajectory.solution import Solution
+from ctrlgen.trajectory.unstated_modes import followed_under
 
 T = TypeVar("T")
 RANDOM_TARGETS = 1000
@@ -31,7 +32,9 @@ class ReferenceAnswers:
     def __init__(self, solution: Solution) -> None:
         self.solution, self.model, self.scenario = solution, solution.model, solution.scenario
         self._found: dict[tuple[str, bytes], Any] = {}
-        self.controller = controller_of(self.model, self.scenario.file.follow, self.scenario.sample_time)
+        self.controller = controller_of(
+            self.model, self.scenario.file.follow, self.scenario.sample_time, self.scenario.file.leads_modes
+        )
         self.random, at_limits = self._random_targets(INSIDE), self._random_targets(0.0)
         if self.controller.rate is not None:  # fewer, each until the drives have come there, or nearly
             calls = min(self.controller.rate.samples(*self.model.u_bounds), MOST_CALLS)
@@ -97,13 +100,20 @@ class ReferenceAnswers:
         return self.scenario.sample_time
 
     @cached_property
+    def played_path(self) -> np.ndarray:
+        """(samples, channels) [SI] along which the solved drives lead: the command, or near it where they lead modes of bodies."""
+        if not self.scenario.file.leads_modes:
+            return self.path
+        return followed_under(self.scenario, self.model, self.solution.drive, *self.start[:2])
+
+    @cached_property
     def held_error(self) -> float:
         """What online drives may leave in the followed signal [SI] because each is held for a sample: twice what those of CasADi leave,
         with inertia; 0 without."""
         if not self.model.inertial:
             return 0.0
         drives = self.followed[:, self.columns["drive"]]
-        moved = simulate(self.model, drives, self.sample_time, *self.start[:2]).signals[self.scenario.file.follow]
+        moved = followed_under(self.scenario, self.model, drives, *self.start[:2])
         return 2 * float(np.abs(moved - self.path).max())
 
     @property
@@ -207,7 +217,7 @@ class ReferenceAnswers:
             return []
         if self.scenario.closed:
             return [solution.drive[-1]]
-        untimed = controller_of(self.model, self.scenario.file.follow, None)
+        untimed = controller_of(self.model, self.scenario.file.follow, None, self.scenario.file.leads_modes)
         start = np.zeros(len(untimed.kernels.target.channels))
         start[: solution.command.shape[1]] = solution.command[0]
         return [untimed.step(untimed.rest(), start, settle=True).drive]

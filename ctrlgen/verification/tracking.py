@@ -10,7 +10,8 @@ import numpy as np
 
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import CFolder
-from ctrlgen.model.simulation import simulate, trace
+from ctrlgen.model.simulation import trace
+from ctrlgen.trajectory.unstated_modes import followed_under
 from ctrlgen.verification.host import Host
 from ctrlgen.verification.reference import ReferenceAnswers
 
@@ -38,8 +39,7 @@ def reached(ref: ReferenceAnswers, followed: np.ndarray) -> np.ndarray:
 
 def reached_under(ref: ReferenceAnswers, drives: np.ndarray) -> np.ndarray:
     """(n, channels) of the followed signal [SI]: the model simulated under `drives` (samples, axes) from the first sample solved."""
-    first = ref.solution.trace
-    return simulate(ref.model, drives, ref.sample_time, first.x[0], first.z[0]).signals[ref.scenario.file.follow]
+    return followed_under(ref.scenario, ref.model, drives, *ref.start[:2])
 
 
 def tracking_errors(folder: CFolder, ref: ReferenceAnswers) -> dict[Piece, dict[Real, np.ndarray]]:

@@ -139,7 +139,7 @@ def write_fmus(scenario: Scenario, out: Path, fmi: int = 3, limited: Model | Non
 def _controller_unit(scenario: Scenario, model: Model, sample_time: float, folder: Path) -> _Unit:
     """The online controller's C in `folder`, and the unit around it."""
     check_online(scenario, model)
-    controller = controller_of(model, scenario.file.follow, sample_time)
+    controller = controller_of(model, scenario.file.follow, sample_time, scenario.file.leads_modes)
     m, core = controller.kernels.nominal, f"{scenario.controller_name}_online_{Real.DOUBLE.suffix}"
     context = online_context(scenario, controller, Real.DOUBLE, core)
     for end in ("h", "c"):

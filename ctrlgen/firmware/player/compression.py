@@ -25,11 +25,11 @@ from ctrlgen.devices.limit import ranges
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.player.spline import Spline, fit
 from ctrlgen.model.model import Model
-from ctrlgen.model.simulation import simulate
 from ctrlgen.reporting.result_file import Keys, Number
 from ctrlgen.trajectory.inverse.clock import in_time
 from ctrlgen.trajectory.playback import ANGLE_TOLERANCE, LENGTH_TOLERANCE
 from ctrlgen.trajectory.solution import Solution
+from ctrlgen.trajectory.unstated_modes import followed_under
 
 TOLERANCE_SHARE = 0.8  # of the tolerances; the rest is left to compilers that fuse a product and a sum
 INSTRUCTION_BUDGET = 150  # of one sample, Cortex-M4F
@@ -242,7 +242,10 @@ def _error(solution: Solution, drives: np.ndarray) -> tuple[float, float]:
     else:
         wanted = np.vstack([command, command[-1:]])
     try:
-        reached = simulate(m, drives, in_time(scenario.clock).sample_time, start.x[0], start.z[0]).signals[role]
+        if scenario.file.leads_modes:  # which leaves something: the player is to do as the solution does
+            solved = np.vstack([solution.drive, solution.drive]) if scenario.closed else solution.drive
+            wanted = followed_under(scenario, m, solved, start.x[0], start.z[0])
+        reached = followed_under(scenario, m, drives, start.x[0], start.z[0])
     except SolverError:
         return np.inf, np.inf
     worst = np.abs(reached - wanted).max(axis=0)
