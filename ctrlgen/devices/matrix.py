@@ -36,10 +36,9 @@ from ctrlgen.devices.stated_matrix import matrix_faults, symmetric_note
 from ctrlgen.devices.travel import ends_of
 from ctrlgen.numerics.symmetric_solve import solve_symmetric
 from ctrlgen.physics.rigid_bodies import point_force
-from ctrlgen.physics.screw import TWIST, WRENCH, Matrix, TwistComponent, WrenchComponent
+from ctrlgen.physics.screw import TWIST, WRENCH, Matrix, TwistComponent, WrenchComponent, told_in
 
 CONJUGATE = dict(zip(TWIST, (*WRENCH[3:], *WRENCH[:3]), strict=True))
-TOLD = {"theta": "urad", "delta": "um"}
 NEAREST = 1e-3  # m: arm of a force whose moment counts as large as itself
 FAINT = 1e-9  # of a force, below which rounding of its direction makes a component
 MOVED = 1e-6  # of the largest motion, below which rounding moves a direction
@@ -243,7 +242,7 @@ class MatrixDevice(Device):
             )
         for name, row in zip(self.directions, m.rows, strict=True):
             per = [
-                show(x, f"{TOLD[name.split('_')[0]]}/{'um' if self.pushes else a.drive_unit}") + f" per {a.name}"
+                show(x, f"{told_in(name)}/{'um' if self.pushes else a.drive_unit}") + f" per {a.name}"
                 for x, a in zip(row, self.actuator, strict=True)
             ]
             lines.append(f"{name}: {', '.join(per)}")
@@ -262,7 +261,7 @@ class MatrixDevice(Device):
             zip(self.directions, np.abs(self._motion(self.values()).rows * self._travels).sum(axis=1), strict=True)
         )
         followed, read = ([self.directions.index(name) for name in names] for names in (self.channels, self.readings))
-        units = {name: TOLD[name.split("_")[0]] for name in TWIST}
+        units = {name: told_in(name) for name in TWIST}
         travel_unit = "um" if self.pushes else sections[0].drive_unit
 
         def limits(signal: SimpleNamespace) -> list[Limit]:

@@ -23,6 +23,11 @@ Matrix: TypeAlias = ca.SX | ca.DM
 Scalar: TypeAlias = float | ca.SX
 
 
+def told_in(component: str) -> str:
+    """The unit in which a component of a twist is told: 'urad' of a turn, 'um' of a displacement."""
+    return "urad" if component.startswith("theta") else "um"
+
+
 def rotation_z(angle: Scalar) -> Matrix:
     """[Z(angle)], rotation about z, shape (3, 3). Source: S1 section 2.2."""
     c, s = ca.cos(angle), ca.sin(angle)

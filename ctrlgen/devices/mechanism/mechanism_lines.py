@@ -17,6 +17,7 @@ from ctrlgen.devices.mechanism.point_compliance import point_compliance
 from ctrlgen.devices.mechanism.ported_parts import part_line
 from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.devices.travel import farthest
+from ctrlgen.physics.screw import told_in
 
 NAMED = 8  # elements in a line
 STILL = 1e-9  # m/m or rad/m: of the motion per actuator, below which it is rounding
@@ -57,8 +58,7 @@ def summary(device: Drawing) -> list[str]:
             loaded = ", ".join(show(float(f), "Hz") for f in guyan_modes(device, under_loads=True).frequencies)
             lines.append(f"the same under the constant loads: {loaded}")
     seen = ca.vertcat(c.jacobian, c.reading_motion)[:, : len(device.placed_actuators)]
-    units = ["urad" if name.startswith("theta") else "um" for name in device.output.channels]
-    units += [r.section.unit for r in device.placed_readings]
+    units = [told_in(name) for name in device.output.channels] + [r.section.unit for r in device.placed_readings]
     names = [*device.output.channels, *(r.name for r in device.placed_readings)]
     for channel, told, row in zip(names, units, ca.DM(ca.evalf(ca.SX(seen))).full(), strict=True):
         unit = f"{told}/um"
@@ -78,7 +78,7 @@ def _second_order_lines(c: Condensed) -> list[str]:
     units = {r.name: r.section.unit for r in c.device.placed_readings}
     names = (*c.device.output.channels, *units)
     shown = (
-        f"{name} {show(value, units.get(name, 'urad' if name.startswith('theta') else 'um'))}"
+        f"{name} {show(value, units.get(name, told_in(name)))}"
         for name, value in zip(names, (*(output @ reach), *second.sensed_reach()), strict=True)
     )
     return [f"second order at the largest travels, at most: {', '.join(shown)}"]

@@ -18,7 +18,7 @@ from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.devices.mechanism.stretching import Stretching
 from ctrlgen.devices.travel import ends_of, farthest
 from ctrlgen.physics.damping import modal_damping
-from ctrlgen.physics.screw import WRENCH
+from ctrlgen.physics.screw import WRENCH, told_in
 
 
 def mechanism_physics(c: Condensed) -> DevicePhysics:
@@ -57,7 +57,7 @@ def mechanism_physics(c: Condensed) -> DevicePhysics:
     common: dict[str, Any] = dict(
         axes=axes,
         components=channels,
-        pose_units=tuple("urad" if name.startswith("theta") else "um" for name in channels),
+        pose_units=tuple(map(told_in, channels)),
         pose_scale=device.channel_scale,
         drive=acting.drive,
         state=acting.state,

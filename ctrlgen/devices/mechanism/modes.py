@@ -19,6 +19,7 @@ from ctrlgen.physics.rigid_bodies import GROUND
 
 INERT = 1e-9  # of the largest mass of an axis, below which rounding moves it and no body
 MASSLESS = 1e-13  # of the largest mass of all bodies: rounding of a motion without any
+ROUNDING = 1e-8  # of a frequency: what two eigenvalue problems of one structure differ by; a mode that is condensed differs by more
 FAR = 0.1  # of a frequency: as far as mass and stiffness of a drawing are from the built one's, roughly
 LIKE = 0.5  # of the modal assurance criterion: below it a condensed mode is no single mode
 EQUAL = 1e-4  # of a frequency: half-power width of a resonance in metal (damping ratio 5e-5), closer than which two modes are one
@@ -158,6 +159,8 @@ class CondensedMode:
         if self.whole is None:
             return f"{show(self.frequency, 'Hz')} (no single mode of the whole)"
         off = 100 * (self.frequency / self.whole - 1)
+        if abs(off) < 100 * ROUNDING:
+            return f"{show(self.frequency, 'Hz')} (that of the bodies)"
         return f"{show(self.frequency, 'Hz')} ({off:+.2g} % of {show(self.whole, 'Hz')})"
 
 
