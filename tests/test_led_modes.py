@@ -7,7 +7,7 @@ import pytest
 import scipy.linalg
 from conftest import DEVICE
 from mechanism_files import dm, loaded
-from test_internal_modes import K1, K2, M1, M2, MASS, STIFFNESS, damping, two_masses
+from two_masses import K1, K2, M1, M2, MASS, STIFFNESS, damping, two_masses
 
 from ctrlgen import InputError, build_model, load_scenario, solve
 from ctrlgen.app.scenario_pipeline import compare_only
