@@ -145,6 +145,20 @@ def test_slopes_of_plays_before_creep_are_few_and_those_of_the_whole_sample():
     assert short.sparsity() == usual.sparsity()
 
 
+def test_slopes_by_a_single_initial_state_are_there():
+    device = Servo(**SERVO)
+    h = next(
+        h for h in hypotheses(device, nominal_physics(device), ("reading.axis",), H, False) if h.effect == "backlash"
+    )
+    structure = Structure(device).with_cause(h, {"gap": 4e-5})
+    free, p = [unknown.path for unknown in structure.free_parameters], structure.start
+    r = Simulator(structure.device_with_causes, free, ("reading.axis",), H)
+    assert len(r.free_initial_states) == 1
+    moved = record(1e-6)  # within the gap
+    alone, Y = (r.sensitivities(moved, p, by_free=by_free)[1] for by_free in (False, True))
+    agree(alone, Y[:, :, len(p) :])
+
+
 class Counted:
     """A cubic whose slope nearly vanishes where the fit starts, so that its first steps go too far; keeps what is asked."""
 
