@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from benchmarks import budget, diagnosis, job, long_recording, mechanism, online, target, trajectory
+from benchmarks import budget, diagnosis, job, long_recording, mechanism, online, target, topp, trajectory
 from benchmarks.measure import Count, Line, Note, print_table
 from benchmarks.samples import Disagreement
 
@@ -15,6 +15,7 @@ BENCHMARKS = {
     "target": target,
     "job": job,
     "mechanism": mechanism,
+    "topp": topp,
     "budget": budget,
     "diagnosis": diagnosis,
     "long_recording": long_recording,
