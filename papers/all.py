@@ -7,11 +7,14 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import matplotlib.pyplot as plt
+
 from ctrlgen.budget.robust import solve
 from ctrlgen.core.files import write_text
 from ctrlgen.model.assembly import build_model
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.page_figure import FirstScreen, PageFigure, page_figures
+from ctrlgen.reporting.plots import STYLE, svg
 from ctrlgen.reporting.result_file import origin
 from ctrlgen.trajectory.scenario import load_scenario
 from ctrlgen.trajectory.solution_plots import draw_path, draw_signal, draw_stage_force
@@ -46,10 +49,11 @@ def _s1_figures() -> dict[str, str]:
     """Fig. 13 from the stage sweep, Fig. 14(a) and (b) from the circle: our own solutions."""
     drawn = {}
     sweep, circle = (load_scenario(SCENARIOS / name) for name in ("xy_stage_force", "circle20"))
-    drawn["Fig. 13, linear and nonlinear force"] = draw_stage_force(solve(sweep, build_model(sweep.device)))
-    solution = solve(circle, build_model(circle.device))
-    drawn["Fig. 14(a), the circle"] = draw_path(solution)
-    drawn["Fig. 14(b), the six forces"] = draw_signal(solution, "force")
+    with plt.rc_context(STYLE):
+        drawn["Fig. 13, linear and nonlinear force"] = svg(draw_stage_force(solve(sweep, build_model(sweep.device))))
+        solution = solve(circle, build_model(circle.device))
+        drawn["Fig. 14(a), the circle"] = svg(draw_path(solution))
+        drawn["Fig. 14(b), the six forces"] = svg(draw_signal(solution, "force"))
     return drawn
 
 

@@ -18,7 +18,6 @@ from ctrlgen import build_model, generate, load_device, load_scenario, solve
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.diagnosis_record import Provenance, diagnosis_record
 from ctrlgen.firmware.folder import CFolder
-from ctrlgen.reporting import plain_drawing
 from ctrlgen.trajectory.solution_plots import draw_solution
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -82,16 +81,6 @@ def _holds_drawings() -> None:
     for module in list(sys.modules.values()):
         if getattr(module, "svg", None) is svg:
             module.svg = checked
-
-    plain = plain_drawing.svg_text
-
-    @wraps(plain)
-    def whole(*args: Any) -> str:
-        text = plain(*args)
-        assert not (alike := alike_in_drawing(text)), f"told apart by their colour alone: {alike}"
-        return text
-
-    plain_drawing.svg_text = whole
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from ctrlgen.reporting.chart_drawing import chart_svg, draw_chart
 from ctrlgen.reporting.line_patterns import DASHES, MARKS
 from ctrlgen.reporting.plots import STYLE, plt
 from ctrlgen.trajectory.solution_charts import chart_solution
-from ctrlgen.trajectory.solution_plots import draw_solution
+from ctrlgen.trajectory.solution_plots import draw_path, draw_solution
 
 
 def _chart(lines: int, points: bool, alike: bool = False) -> Chart:
@@ -44,18 +44,18 @@ def test_the_legend_of_twelve_lines_covers_no_data():
     plt.close(figure)
 
 
-def test_the_legends_of_what_was_simulated_stand_above_their_panels():
+def test_legends_of_a_path_and_of_what_was_simulated_stand_above_their_panels(circle):
     moved = simulate_device(
         ROOT / "scenarios" / "devices" / "mems_hexapod.toml", None, "1X=0.1W", duration=0.02, rate=1000.0
     )
     with plt.rc_context(STYLE):
-        figure = draw_signals(moved)
-        figure.draw_without_rendering()
-        of_panels = [(panel.get_legend(), panel.get_window_extent()) for panel in figure.axes]
-        legends = [(legend.get_window_extent(), panel) for legend, panel in of_panels if legend is not None]
-        assert len(legends) > 1 and all(legend.y0 >= panel.y1 for legend, panel in legends)
-        assert all(-1 <= legend.x0 < legend.x1 <= figure.bbox.x1 + 1 for legend, _ in legends)
-        plt.close(figure)
+        for figure in (draw_path(circle), draw_signals(moved)):
+            figure.draw_without_rendering()
+            of_panels = [(panel.get_legend(), panel.get_window_extent()) for panel in figure.axes]
+            legends = [(legend.get_window_extent(), panel) for legend, panel in of_panels if legend is not None]
+            assert len(legends) > 1 and all(legend.y0 >= panel.y1 for legend, panel in legends)
+            assert all(-1 <= legend.x0 < legend.x1 <= figure.bbox.x1 + 1 for legend, _ in legends)
+            plt.close(figure)
 
 
 def test_no_legend_of_the_program_is_placed_inside_a_panel():

@@ -13,7 +13,7 @@ import ctrlgen
 from ctrlgen.core.errors import InputError
 from ctrlgen.core.units import to_si
 from ctrlgen.diagnosis.selection.verdict import Verdict
-from ctrlgen.trajectory.solution_plots import path_axes
+from ctrlgen.trajectory.solution_plots import draw_path
 
 INERTIA, WEIGHT, DAMPING, MOTOR = 2e-4, 0.02, 4e-4, 0.015
 STEP = 2e-3
@@ -318,9 +318,9 @@ def test_a_mirror_that_tilts_is_led_along_a_path_and_drawn_in_its_own_unit(tmp_p
     file.write_text(f'title = "tilt"\ndevice = "mirror"\nsample_rate = "1 kHz"\nduration = "0.1 s"\n{path}')
     solution = ctrlgen.solve(ctrlgen.load_scenario(file, device), ctrlgen.build_model(device))
     assert solution.drive[-1] == pytest.approx([2.0 * (k + 1) for k in range(len(axes))], rel=1e-6)
-    left, right = path_axes(solution)
-    assert [left.x_label, left.y_label] == labels and right.y_label == "modelled - commanded [urad]"
-    assert left.series[0].y[-1] == pytest.approx(15.0 * len(axes), rel=1e-6)
+    left, right = draw_path(solution).axes
+    assert [left.get_xlabel(), left.get_ylabel()] == labels and right.get_ylabel() == "modelled - commanded [urad]"
+    assert left.lines[0].get_ydata()[-1] == pytest.approx(15.0 * len(axes), rel=1e-6)
 
 
 def gantry(**other):
