@@ -272,7 +272,7 @@ class Simulator:
             reached = reached_entries(self._with_rates, len(self.free) * by_free, self.free_initial_states)
             state = ca.MX.sym("state", self.n_s + reached.nnz())
             others = self._symbols_of(self._with_rates)[1:]
-            S, T = state[: self.n_s], ca.MX(reached, state[self.n_s :])
+            S, T = state[: self.n_s], ca.MX(reached, ca.vec(state[self.n_s :]))  # of none, a row otherwise
             following, T, y, Y = forward_sensitivities(self._with_rates, T, seed, [S, *others])
             carried = ca.vec(ca.project(T, reached)).nz[:]  # of a single row, nz alone would be a row
             values = [ca.vertcat(following, carried), ca.vertcat(y, ca.vec(ca.densify(Y)))]
