@@ -82,3 +82,28 @@ KNOWN: Mapping[str, tuple[float, float, str]] = {
     "1/K^2": (1.0, 0.0, "1 / K ** 2"),
 }
 """Text of a unit: (scale, offset, its unit of SI), where SI = scale * value + offset."""
+UNCLEAR = {
+    **{f"{p}Nm": f"{p}N*m, newton metres" for p in ("", "m", "u", "k")},
+    **{word: "thou for a thousandth of an inch, mrad for an angle" for word in ("mil", "mils")},
+    "pct": "%",
+    "cts": "count",
+    "Gs": "gauss",
+    "as": "arcsecond",
+    "kn": "kN, or knot",
+    "mu": "um",
+    "px": "um, by the size of a pixel",
+    "ue": "microstrain",
+}
+"""Words that pint reads as something else than a file means (Nm as an inverse viscosity, cts as a weight, px as a quarter of a millimetre),
+and what to write."""
+UNKNOWN = {
+    "rev": "turn",
+    "RPM": "rpm",
+    "Ncm": "N*cm",
+    "Nmm": "N*mm",
+    "Torr": "torr",
+    "Ohm": "ohm",
+    "dps": "deg/s",
+    "inc": "count",
+}
+"""Words that pint does not know, and what to write."""

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from annotated_types import GroupedMetadata
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
-from ctrlgen.core.known_units import KNOWN
+from ctrlgen.core.known_units import KNOWN, UNCLEAR, UNKNOWN
 
 if TYPE_CHECKING:
     import pint
@@ -79,6 +79,10 @@ def _check_unit(text: str) -> None:
         raise ValueError(f"a unit of {len(text)} letters is not one I know; write one such as um or N/um")
     if not _UNIT.fullmatch(text):
         raise ValueError(f"{reprlib.repr(text)} is not a unit I know")
+    if word := next((word for word in re.findall(_WORD, text) if word in UNCLEAR), None):
+        raise ValueError(f"{word!r} in a unit can mean several things; write {UNCLEAR[word]}")
+    if word := next((word for word in re.findall(_WORD, text) if word in UNKNOWN), None):
+        raise ValueError(f"{word!r} is not a unit I know; write {UNKNOWN[word]}")
     powers = _POWER.findall(text)
     if len(powers) < len(re.findall(r"\^|\*\*", text)) or any(float(power or 0) > LARGEST_POWER for power in powers):
         raise ValueError(
@@ -105,9 +109,13 @@ def _affine(unit: str) -> tuple[float, float]:
         return known[:2]
     base = _unit(unit)
     try:
-        zero, one = (float(_registry().Quantity(value, base).to_base_units().magnitude) for value in (0.0, 1.0))
+        zero, one, two = (
+            float(_registry().Quantity(value, base).to_base_units().magnitude) for value in (0.0, 1.0, 2.0)
+        )
     except (OverflowError, ZeroDivisionError):
-        zero = one = math.nan
+        zero = one = two = math.nan
+    if abs(two - 2 * one + zero) > 1e-9 * (abs(one) + abs(zero)):  # decibels
+        raise ValueError(f"{unit!r} is a logarithm; write the ratio that it stands for")
     if not math.isfinite(one) or not SMALLEST < abs(one - zero) < 1 / SMALLEST:
         raise ValueError(f"{unit!r} is too large or too small a unit to reckon with")
     return one - zero, zero

@@ -1,4 +1,4 @@
-"""A stage with one axis and inertia, m q'' + c q' + k q = k_f u, open loop or closed loop."""
+"""A stage with one axis and inertia, linear or rotary, m q'' + c q' + k q = k_f u, open loop or closed loop."""
 
 from __future__ import annotations
 
@@ -16,43 +16,76 @@ from ctrlgen.devices.limit import Limit
 from ctrlgen.devices.machine import MachineParts
 from ctrlgen.devices.section import Section
 from ctrlgen.devices.signal import AxisSignal, Signal
-from ctrlgen.devices.travel import Travel, ends_of, farthest
+from ctrlgen.devices.travel import TravelOrTurn, ends_of, farthest, travel_unit
 
-ForceConstant = Annotated[Quantity, In("N/V", positive=True)] | Annotated[Quantity, In("N/A", positive=True)]
+Mass = Annotated[Quantity, In("kg", positive=True)] | Annotated[Quantity, In("kg*m^2", positive=True)]
+Damping = Annotated[Quantity, In("N*s/m", low=0.0)] | Annotated[Quantity, In("N*m*s/rad", low=0.0)]
+Stiffness = Annotated[Quantity, In("N/um", low=0.0)] | Annotated[Quantity, In("N*m/rad", low=0.0)]
+ForceConstant = (
+    Annotated[Quantity, In("N/V", positive=True)]
+    | Annotated[Quantity, In("N/A", positive=True)]
+    | Annotated[Quantity, In("N*m/V", positive=True)]
+    | Annotated[Quantity, In("N*m/A", positive=True)]
+)
+VelocityGain = Annotated[Quantity, In("V/(m/s)", low=0.0)] | Annotated[Quantity, In("V*s/rad", low=0.0)]
+IntegralGain = Annotated[Quantity, In("V/(m*s)", low=0.0)] | Annotated[Quantity, In("V/(rad*s)", low=0.0)]
+LINEAR = {"mass": "kg", "damping": "N*s/m", "stiffness": "N/um"}
+ROTARY = {"mass": "kg*m^2", "damping": "N*m*s/rad", "stiffness": "N*m/rad"}
+"""Units of the numbers of an axis that moves, and of one that turns."""
 
 
 class Mechanics(Section):
-    """The moving mass and its flexures; with zero stiffness the axis integrates."""
+    """The moving mass and its flexures; with zero stiffness the axis integrates.
+
+    An axis is rotary where its `stroke` is an angle; the other numbers are then an inertia, N*m*s/rad and N*m/rad.
+    """
 
     domain: ClassVar[str] = "stage"
     relative_sd: ClassVar[float | None] = 0.1
 
-    mass: Annotated[Quantity, In("kg", positive=True)]
-    """Moving mass m."""
-    damping: Annotated[Quantity, In("N*s/m", low=0.0)]
+    mass: Mass
+    """Moving mass m, or moment of inertia."""
+    damping: Damping
     """Viscous damping c: the force -c q' opposes the velocity."""
-    stiffness: Annotated[Quantity, In("N/um", low=0.0)]
+    stiffness: Stiffness
     """Stiffness k of the flexures: the force -k q pulls toward q = 0."""
-    stroke: Travel
-    """Largest displacement to either side of q = 0, or its ends, such as ["-10 um", "60 um"]; a limit of trajectories and of the generated
-    controller."""
+    stroke: TravelOrTurn
+    """Largest displacement to either side of q = 0, or its ends, such as ["-10 um", "60 um"] or ["-30 deg", "30 deg"]; a limit of
+    trajectories and of the generated controller. An angle makes the axis rotary."""
+
+    @property
+    def rotary(self) -> bool:
+        """Whether the displacement is an angle."""
+        return same_dimension(travel_unit(self.stroke), "rad")
+
+    @model_validator(mode="after")
+    def _one_kind_of_motion(self) -> Mechanics:
+        faults = [
+            f"{key} = {getattr(self, key).text!r} should be in {unit}"
+            for key, unit in (ROTARY if self.rotary else LINEAR).items()
+            if not same_dimension(written_unit(getattr(self, key).text), unit)
+        ]
+        if faults:
+            kind, dimension = ("rotary", "an angle") if self.rotary else ("linear", "a length")
+            raise ValueError(f"the axis is {kind}, because its stroke is {dimension}: {'; '.join(faults)}")
+        return self
 
 
 class Actuator(Section):
-    """A motor whose force is proportional to its drive, in volt or ampere."""
+    """A motor whose force, or torque, is proportional to its drive, in volt or ampere."""
 
     domain: ClassVar[str] = "actuator"
     relative_sd: ClassVar[float | None] = 0.1
 
     force_constant: ForceConstant
-    """Force per drive k_f; its unit decides whether the drive is a voltage or a current."""
+    """Force or torque per drive k_f; its unit decides whether the drive is a voltage or a current."""
     drive_limit: Annotated[Quantity, In("V", positive=True)] | Annotated[Quantity, In("A", positive=True)]
     """Largest drive of either sign, in volt or ampere as in `force_constant`."""
 
     @model_validator(mode="after")
     def _driven_by_one_quantity(self) -> Actuator:
         constant, limit = written_unit(self.force_constant.text), written_unit(self.drive_limit.text)
-        if not same_dimension(f"({constant})*({limit})", "N"):
+        if not any(same_dimension(f"({constant})*({limit})", force) for force in ("N", "N*m")):
             raise ValueError(
                 f"force_constant in {constant} gives no force of a drive_limit in {limit}; write both in volt or in ampere"
             )
@@ -72,9 +105,9 @@ class Loop(Section):
     """What y is: the recorded reading with all its errors, or the displacement q, seen by an encoder of its own."""
     position_gain: Annotated[Quantity, In("1/s", positive=True)]
     """k_p: commanded velocity per position error."""
-    velocity_gain: Annotated[Quantity, In("V/(m/s)", low=0.0)]
+    velocity_gain: VelocityGain
     """k_v: drive per velocity error."""
-    integral_gain: Annotated[Quantity, In("V/(m*s)", low=0.0)]
+    integral_gain: IntegralGain
     """k_i: drive per integral of the position error; 0 for a controller without it."""
 
 
@@ -89,6 +122,29 @@ class Axis(Device):
     """The motor."""
     loop: Loop | None = None
     """The position controller; the drive of the device is then the reference position. Left out: open loop."""
+
+    @model_validator(mode="after")
+    def _moves_or_turns(self) -> Axis:
+        rotary, force, per = (
+            self.mechanics.rotary,
+            self.actuator.force_constant.text,
+            "rad" if self.mechanics.rotary else "m",
+        )
+        constant, drive = written_unit(force), written_unit(self.actuator.drive_limit.text)
+        wanted = {
+            "actuator.force_constant": (force, same_dimension(f"({constant})*({drive})", "N*m" if rotary else "N"))
+        }
+        if self.loop is not None:
+            for key, unit in (("velocity_gain", f"V*s/{per}"), ("integral_gain", f"V/({per}*s)")):
+                text = getattr(self.loop, key).text
+                wanted[f"loop.{key}"] = text, same_dimension(written_unit(text), unit)
+        faults = [f"{key} = {text!r}" for key, (text, fits) in wanted.items() if not fits]
+        if faults:
+            kind, dimension = ("rotary", "an angle") if rotary else ("linear", "a length")
+            raise ValueError(
+                f"the axis is {kind}, because its stroke is {dimension}: {', '.join(faults)} is of another axis"
+            )
+        return self
 
     def excluded_actuators(self) -> dict[str, str]:
         """A ceramic does not move a stage that nothing holds."""
@@ -106,12 +162,15 @@ class Axis(Device):
         ends = ends_of(self.mechanics.stroke)
         unit = written_unit(self.actuator.drive_limit.text)
         force_scale = largest * self.actuator.force_constant.si
+        length = travel_unit(self.mechanics.stroke) if self.mechanics.rotary else "um"
         u, closed = ca.SX.sym("u", 1), self.loop is not None
         volts = ("drive", "drive", axes, (unit,), "u_", u, (largest,))
         drive = (
-            Signal("reference", "reference position", axes, ("um",), "r_", u, (stroke,)) if closed else Signal(*volts)
+            Signal("reference", "reference position", axes, (length,), "r_", u, (stroke,)) if closed else Signal(*volts)
         )
-        integral = Signal("integral", "integral of the error", axes, ("um*s",), "i_", ca.SX.sym("i", 1), (stroke,))
+        integral = Signal(
+            "integral", "integral of the error", axes, (f"{length}*s",), "i_", ca.SX.sym("i", 1), (stroke,)
+        )
 
         def control_law(r: ca.SX, y: ca.SX, v: ca.SX, x: ca.SX) -> ca.SX:
             g = p.loop
@@ -122,7 +181,7 @@ class Axis(Device):
             bounds = ends if closed else (-largest, largest)
             return [
                 Limit("drive", f"commanded {drive.label}", axes, drive.units[0], signal.drive, *bounds),
-                Limit("stroke", "stage displacement", axes, "um", signal.displacement, *ends),
+                Limit("stroke", "stage displacement", axes, length, signal.displacement, *ends),
             ]
 
         loop = None
@@ -132,13 +191,15 @@ class Axis(Device):
         return InertialPhysics(
             axes=axes,
             components=axes,
-            pose_units=("um",),
+            pose_units=(length,),
             pose_scale=(stroke,),
             drive=drive,
             state=integral if closed else None,
             rest=(0.0,) if closed else (),
             displacement_scale=stroke,
+            travel_unit=length,
             force_scale=force_scale,
+            force_unit="N*m" if self.mechanics.rotary else "N",
             mass=(m.mass,),
             dynamics=lambda drive, x, d, v: (a.force_constant * drive, ca.SX(0, 1)),
             restoring_force=lambda d: m.stiffness * d,

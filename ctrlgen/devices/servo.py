@@ -1,4 +1,4 @@
-"""An axis without dynamics, whose position is its command, or proportional to its voltage: reading = G u."""
+"""An axis without dynamics, whose position is its command, or proportional to its drive: reading = G u."""
 
 from __future__ import annotations
 
@@ -18,36 +18,41 @@ from ctrlgen.devices.travel import TravelOrTurn, ends_of, farthest, travel_unit
 
 
 class Transducer(Section):
-    """What turns a voltage into the position: a piezo ceramic and its amplifier."""
+    """What turns the drive into the position: a piezo ceramic and its amplifier, a valve, a lead screw."""
 
     domain: ClassVar[str] = "actuator"
     relative_sd: ClassVar[float | None] = 0.1
 
-    gain: Annotated[Quantity, In("um/V", positive=True)] | Annotated[Quantity, In("rad/V", positive=True)]
-    """Position per voltage G."""
-    drive_limit: Annotated[Quantity, In("V", positive=True)]
-    """Largest voltage of either sign."""
+    gain: Annotated[Quantity, In(None, positive=True)]
+    """Position per drive G, such as "0.5 um/V", "2 mm/A", "10 um/%" or "3 um/N"."""
+    drive_limit: Annotated[Quantity, In(None, positive=True)]
+    """Largest drive of either sign, in the unit that `gain` divides by: V, A, N, %, rpm."""
 
 
 class Servo(Device):
     """Command -> position, without force or time; linear or rotary as the unit of `travel`, the largest excursion, says."""
 
     kind: Literal["servo"]
-    """An axis whose reading equals its command, or is proportional to its voltage."""
+    """An axis whose reading equals its command, or is proportional to its drive."""
     travel: TravelOrTurn
     """Largest excursion to either side of zero, or its ends, such as ["-10 deg", "60 deg"]; an angle makes the axis rotary, a length
     linear."""
 
     transducer: Transducer | None = None
-    """Makes the command a voltage. Left out: the command is the position."""
+    """Makes the command a voltage, a current or another drive. Left out: the command is the position."""
 
     @model_validator(mode="after")
     def _gain_of_one_dimension(self) -> Servo:
         if self.transducer is None:
             return self
-        unit, per_volt = travel_unit(self.travel), written_unit(self.transducer.gain.text)
-        if not same_dimension(f"({per_volt})*V", unit):
-            raise ValueError(f"transducer.gain in {per_volt} gives no position in {unit}, the unit of travel")
+        unit, gain, drive = (
+            travel_unit(self.travel),
+            *(written_unit(q.text) for q in (self.transducer.gain, self.transducer.drive_limit)),
+        )
+        if not same_dimension(f"({gain})*({drive})", unit):
+            raise ValueError(
+                f"transducer.gain in {gain} times a drive in {drive} gives no position in {unit}, the unit of travel"
+            )
         return self
 
     def physics(self, p: SimpleNamespace) -> BalancedPhysics:
@@ -58,7 +63,7 @@ class Servo(Device):
         drive = (
             Signal("command", "commanded position", axes, (unit,), "r_", u, (most,))
             if self.transducer is None
-            else Signal("drive", "drive", axes, ("V",), "u_", u, (most,))
+            else Signal("drive", "drive", axes, (written_unit(self.transducer.drive_limit.text),), "u_", u, (most,))
         )
 
         def limits(signal: SimpleNamespace) -> list[Limit]:

@@ -10,6 +10,7 @@ u drives, x the user's states, d displacements of the axes, v their velocities, 
 
 # Without postponed annotations: `Required` is read when `UserArguments` is made.
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar, Required, TypedDict, Unpack
 
@@ -116,8 +117,9 @@ class UserArguments(TypedDict, total=False):
     parameters: Required[Mapping[str, Any]]
     """"0.5 kg", ("0.5 kg", sd) or {value, sd, source, domain} by name: the diagnosis takes a number with an sd as uncertain, one
     without as exact until the data contradict it; its path is 'mechanism.NAME'."""
-    axes: Required[Mapping[str, Size]]
-    """Displacements with their largest size, {"x": "50 um"}, or range: they are kept within."""
+    axes: Mapping[str, Size]
+    """Displacements with their largest size, {"x": "50 um"}, or range: they are kept within. Left out where nothing moves, as in a tank or
+    an oven: the states that are read, by `reading`, or all, are then the axes, and no force is given."""
     drive: Mapping[str, Size]
     """Drives with their largest size, {"motor": "24 V"}, or range, {"stack": ("0 V", "150 V")}: they are kept within."""
     drive_rate: Mapping[str, Size]
@@ -164,11 +166,16 @@ class UserArguments(TypedDict, total=False):
 
 def user_device(name: str, **given: Unpack[UserArguments]) -> Device:
     """A device from the user's functions; `UserArguments` says what may be given. Raises InputError with every fault."""
-    known, needed = UserArguments.__annotations__, UserArguments.__required_keys__
+    known, needed = (
+        UserArguments.__annotations__,
+        UserArguments.__required_keys__ | (set() if "state" in given else {"axes"}),
+    )
     if wrong := [key for key in given if key not in known]:
         raise TypeError(f"user_device() has no argument {wrong[0]!r}; {suggestion(wrong[0], tuple(known))}")
     if missing := sorted(needed - given.keys()):
         raise TypeError(f"user_device() needs the arguments {', '.join(missing)}")
+    if "axes" not in given:
+        given = _of_process(given)
     read = ArgumentReader(name)
     tables, domains, units = read.parameters(given["parameters"])
     imposed = given.get("needed_force") is not None
@@ -226,6 +233,55 @@ def user_device(name: str, **given: Unpack[UserArguments]) -> Device:
         "machine": given.get("machine"),
     }
     return _validated(description, tables, {"name": name, **plain, "effect": tuple(given.get("effect", ()))}, read)
+
+
+@dataclass(frozen=True)
+class _StatesAsForce:
+    """The states of these names: with `_AxesAsForce` each axis is at its state, d = x."""
+
+    names: tuple[str, ...]
+
+    def __call__(self, x: Any) -> dict[str, Any]:
+        return {name: getattr(x, name) for name in self.names}
+
+
+@dataclass(frozen=True)
+class _AxesAsForce:
+    """The displacements of these axes."""
+
+    names: tuple[str, ...]
+
+    def __call__(self, d: Any) -> dict[str, Any]:
+        return {name: getattr(d, name) for name in self.names}
+
+
+def _of_process(given: UserArguments) -> UserArguments:
+    """The arguments of a device in which nothing moves: its states that are read are its axes, in balance where they are their states.
+
+    Raises TypeError where it has no states, or laws of a motion.
+    """
+    state, reading = given.get("state"), given.get("reading")
+    beside = [law for law in ARGUMENTS if law not in ("rates", "pose") and given.get(law) is not None]
+    if not isinstance(state, Mapping) or beside:
+        what = (
+            f"{beside[0]} is of axes; name them"
+            if beside
+            else "name them, or the states of a device in which nothing moves"
+        )
+        raise TypeError(f"user_device() needs the arguments axes: {what}")
+    names = tuple(name for name in (reading or state) if name in state)
+    if not names:
+        raise TypeError(f"user_device() needs axes, or readings that are states: {', '.join(state)}")
+    axes = {name: state[name] for name in names}
+    largest = axes[names[0]]
+    size = largest if isinstance(largest, str) else largest[1]
+    return {
+        "force_size": size,
+        **given,
+        "axes": axes,
+        "force": _StatesAsForce(names),
+        "restoring_force": _AxesAsForce(names),
+    }
 
 
 def _validated(

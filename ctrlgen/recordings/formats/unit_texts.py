@@ -29,10 +29,13 @@ WORDS = {
     "micron": "um", "microns": "um", "micrometer": "um", "micrometers": "um", "micrometre": "um", "nanometer": "nm",
     "degrees": "deg", "degree": "deg", "°": "deg", "°c": "degC", "ºc": "degC", "celsius": "degC",
     "newton": "N", "newtons": "N", "hertz": "Hz", "watt": "W", "watts": "W", "kelvin": "K", "arcsec": "arcsecond",
-    "radian": "rad", "radians": "rad", "hz": "Hz", "khz": "kHz", "%": "percent",
+    "rpm": "rpm", "r/min": "rpm", "rev/min": "rpm", "u/min": "rpm", "rev": "turn", "revs": "turn", "rev/s": "turn/s", "rps": "turn/s",
+    "dps": "deg/s", "%fs": "percent", "% fs": "percent", "%f.s.": "percent", "pct": "percent", "\u00e5": "angstrom",
+    "n.m": "N*m", "torr": "torr", "ohms": "ohm", "radian": "rad", "radians": "rad", "hz": "Hz", "khz": "kHz", "%": "percent",
 }  # fmt: skip
 LETTERS = {
     "C": "degC", "g": "g_0", "mil": "thou", "mils": "thou",  # of a log: neither coulombs nor grams nor a mil of angle
+    "Gs": "gauss", "as": "arcsecond", "px": "pixel", "ue": "microstrain", "\u00b5": "um", "\u03bc": "um", "Ohm": "ohm",
     "S": "s", "MS": "ms", "US": "us", "MM": "mm", "UM": "um", "MV": "mV", "MA": "mA",  # in capitals: no log is in siemens or megavolts
     "Nm": "N*m", "mNm": "mN*m", "Ncm": "N*cm", "Nmm": "N*mm", "kNm": "kN*m",
 }  # fmt: skip
@@ -41,7 +44,33 @@ SCALED = re.compile(r"(?P<number>\d*\.?\d+(?:[eE][+-]?\d{1,2})?|10\^[+-]?\d{1,2}
 POWER = re.compile(r"(?<=[A-Za-z])[23]\b")  # of a unit: m/s2, mm2
 SIGNS = {"µ": "u", "μ": "u", "²": "^2", "³": "^3", "·": "*", "°": "deg", "Ω": "ohm"}
 STRANGE = re.compile(r"[^\w/*^%().\s+-]|\^.*\^|\*\*|\d{2}")  # no unit of a log; a tower of powers has no end
-COUNTS = {"sequence", "sample", "samples", "point", "points", "index", "count", "counts", "row", "nr", "no."}
+COUNTS = {
+    "inc",
+    "incs",
+    "increments",
+    "ct",
+    "cts",
+    "lsb",
+    "digit",
+    "digits",
+    "step",
+    "steps",
+    "pulse",
+    "pulses",
+    "tick",
+    "ticks",
+    "sequence",
+    "sample",
+    "samples",
+    "point",
+    "points",
+    "index",
+    "count",
+    "counts",
+    "row",
+    "nr",
+    "no.",
+}
 NONE = {"", "-", "--", "1", "none", "n/a", "n.a.", "unitless", "a.u.", "arb", "arb.", "[]", "()", *COUNTS}
 BASES = {"m", "rad", "K", "N", "W", "V", "A", "s", "Hz", "Pa", "kg", "ohm", "1"}
 NAMES = {"t", "u", "x", "y", "z", "h", "a", "b", "d", "r", "c", "e", "f", "g", "i", "l", "p", "q", "v", "w"}

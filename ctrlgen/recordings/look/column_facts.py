@@ -32,6 +32,7 @@ COUNT_NAME = re.compile(
     re.IGNORECASE,
 )
 """Names of columns that number the rows."""
+JUMP = 0.25  # of its range: a reading does not go so far to its end in one row, a command does
 NOISE_REST = 200  # rows: the shortest record at rest from which a diagnosis takes the noise
 SETTLED = 2.0  # standard deviations of a rest's end, from which a tenth of the rest that scatters by more about it still settles
 NORMAL_MEDIAN = 0.6745  # standard deviations: the median size of normal noise
@@ -86,7 +87,9 @@ class ColumnFacts:
         for end in (y.min(), y.max()):
             at = np.abs(y - end) <= END * np.ptp(y)
             edges = np.flatnonzero(np.diff(np.concatenate([[0], at.astype(int), [0]])))
-            runs = np.diff(edges.reshape(-1, 2), axis=1)
+            begins = edges.reshape(-1, 2)[:, 0]
+            jumps = np.abs(y[begins] - y[begins - 1]) > JUMP * np.ptp(y)
+            runs = np.diff(edges.reshape(-1, 2), axis=1)[~(jumps & (begins > 0))]  # a square wave is commanded so
             runs = runs[(runs >= RUN) & (runs < REST)]  # what stands longer rests
             if len(runs) > 1 and runs.sum() >= CLIPPED:
                 ends.append(float(end))

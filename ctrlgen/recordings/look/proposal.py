@@ -27,21 +27,11 @@ from ctrlgen.recordings.look.column_facts import (
     named,
 )
 from ctrlgen.recordings.look.oddities import fitting_units, implausible_range
+from ctrlgen.recordings.look.signal_words import DRIVE_WORDS, READING_WORDS
 from ctrlgen.recordings.moved import Stretch, moved_of
 from ctrlgen.recordings.plausibility import implausible
 from ctrlgen.recordings.schema import signal_units
 
-# words of columns' names, in the languages of loggers; letters are whole words
-DRIVE_WORDS = frozenset((
-    "drive", "command", "commanded", "cmd", "com", "ref", "reference", "set", "setpoint", "sp", "target", "demand", "desired",
-    "soll", "stell", "input", "in", "u", "v", "volt", "voltage", "voltages", "current", "i", "ampere", "power", "out", "output",
-    "dac", "ao", "da", "ctrl", "control", "heater", "coil", "spannung", "strom", "force", "torque",
-))  # fmt: skip
-READING_WORDS = frozenset((
-    "reading", "read", "position", "pos", "actual", "act", "ist", "fb", "feedback", "sensor", "measured", "meas", "mess",
-    "measurement", "enc", "encoder", "cap", "capacitive", "adc", "ai", "ad", "displacement", "disp", "distance", "dist", "weg",
-    "y", "response", "interferometer", "lvdt", "laser", "probe", "gauge",
-))  # fmt: skip
 MEANINGS = {
     "V": frozenset(("volt", "voltage", "voltages", "spannung")),
     "A": frozenset(("current", "ampere", "amps", "strom")),
