@@ -13,8 +13,8 @@ import tomlkit
 import typer
 from conftest import DEVICES, SCENARIOS
 
-from ctrlgen.app.commands.app import name_of, out_of
 from ctrlgen.app.commands.cli import app
+from ctrlgen.app.commands.result_folder import name_of, out_of
 from ctrlgen.app.shipped_examples import examples
 from ctrlgen.core.errors import CtrlgenError
 
@@ -124,6 +124,8 @@ def test_the_name_of_a_folder_is_that_of_what_it_is_of(tmp_path, monkeypatch):
         "stage.v2.py": "stage.v2",
     }
     assert {file: name_of(Path(file)) for file in names} == names
+    Path("radius_1.5um").mkdir()
+    assert name_of(Path("radius_1.5um")) == "radius_1.5um"
     assert name_of(Path()) == name_of(Path("scenario.toml")) == tmp_path.name
     assert out_of(Path("x"), Path("b/stage.toml"), "workspace") == Path("x")
 
@@ -138,6 +140,24 @@ def test_a_folder_that_nobody_named_is_told_and_replaces_nothing_of_somebody_els
     (folder / "notes.txt").touch()
     assert "notes.txt, which ctrlgen did not make" in tried(*words)
     assert tried(*words, "-o", "elsewhere") == "" and Path("elsewhere", "workspace.html").is_file()
+
+
+def test_a_folder_that_nobody_named_keeps_the_result_of_another_file_of_its_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = (DEVICES / "flexure_axis.toml").read_text()
+    for place in ("a", "b"):
+        Path(place).mkdir()
+        Path(place, "stage.toml").write_text(text)
+    made = Path("out", "stage_workspace", "workspace.json")
+    assert tried("workspace", "a/stage.toml") == ""
+    before = made.stat().st_ino
+    reason = tried("workspace", "b/stage.toml")
+    assert f"holds the result of {tmp_path / 'a' / 'stage.toml'}; name another folder with -o" in reason
+    assert made.stat().st_ino == before
+    assert (
+        tried("workspace", "b/stage.toml", "-o", made.parent) == ""
+    )  # replaced where it is named, and is b's from then on
+    assert tried("workspace", "b/stage.toml") == "" and tried("workspace", "a/stage.toml")
 
 
 @pytest.mark.parametrize("path", slow(PATHS, QUICK), ids=named)

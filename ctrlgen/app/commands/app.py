@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.version import program
 
-USUAL = ("scenario.toml", "recording.toml", "device.toml", "jobs.toml")
-WHOLE = "Result folder; replaced as a whole when the work is done, never half written, and only where it holds a result alone."
 # the parts of `ctrlgen --help`, in their order
 PANELS = SCENARIO_PANEL, ACCURACY_PANEL, DEVICE_PANEL, RECORDING_PANEL, RESULT_PANEL = (
     "Drives and C of a scenario",
@@ -63,26 +61,6 @@ OtherDevice = Annotated[
         show_default=False,
     ),
 ]
-
-
-def out_option(default: str | None = None, about: str = WHOLE) -> Any:
-    """--out, -o of a folder that is written; `default`: what `out_of` makes of a command where none is named, None where then nothing
-    is written."""
-    return typer.Option("--out", "-o", help=about, show_default=default or False)
-
-
-def out_of(named: Path | None, of: Path, command: str = "") -> Path:
-    """The folder `named`, or out/NAME beside the current directory: NAME of the scenario, device or recording `of`, and `_command` where
-    that is not `run`, so that no command replaces what another one left."""
-    return named or Path("out", name_of(of) + (f"_{command}" if command else ""))
-
-
-def name_of(file: Path) -> str:
-    """What a scenario, a device or a recording is called: by its folder where its file has the usual name."""
-    whole = file.resolve()
-    return (whole.parent.name if whole.name in USUAL else whole.stem if whole.suffix else whole.name) or "result"
-
-
 BootstrapCount = Annotated[
     int,
     typer.Option(

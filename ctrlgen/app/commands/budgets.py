@@ -9,7 +9,8 @@ import typer
 from rich.markup import escape
 
 from ctrlgen.app.budget_console import print_budget
-from ctrlgen.app.commands.app import ACCURACY_PANEL, OtherDevice, ScenarioPath, app, out_option
+from ctrlgen.app.commands.app import ACCURACY_PANEL, OtherDevice, ScenarioPath, app
+from ctrlgen.app.commands.result_folder import out_option
 from ctrlgen.app.console import out, progress
 from ctrlgen.core.errors import Fault, InputError
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from ctrlgen.app.commands.app import SCENARIO_PANEL, OtherDevice, ScenarioPath, app, out_of, out_option
+from ctrlgen.app.commands.app import SCENARIO_PANEL, OtherDevice, ScenarioPath, app
+from ctrlgen.app.commands.result_folder import note_source, out_of, out_option
 from ctrlgen.app.console import out, progress
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ def run(
 
     print_solution(outcome)
     print_comparison(outcome)
+    note_source(folder, scenario)
     out.print(f"[bold]report[/bold]  {escape(str(folder / 'report.html'))}", soft_wrap=True)
     _exit(outcome)
 
@@ -61,6 +63,7 @@ def solve(
     from ctrlgen.app.scenario_console import print_solution
 
     print_solution(outcome)
+    note_source(folder, scenario)
     out.print(f"[bold]report[/bold]  {escape(str(folder / 'report.html'))}", soft_wrap=True)
     _exit(outcome)
 
@@ -92,14 +95,14 @@ def generate(
             written = pipeline.player_into(_read(scenario, device), folder, advance)
         for path in written:
             out.print(str(path), soft_wrap=True, markup=False)
-        _tell(folder)
+        _tell(folder, scenario)
         return
     with progress(2) as advance:
         c = pipeline.generate_into(_read(scenario, device), folder, advance)
     for name in [*c.online.values(), *c.player.values()]:
         out.print(f"{folder / name}.c", soft_wrap=True, markup=False)
     out.print(f"online controller: {c.operations} arithmetic operations a call, {c.worst_operations} at most")
-    _tell(folder)
+    _tell(folder, scenario)
 
 
 @app.command(rich_help_panel=SCENARIO_PANEL)
@@ -150,6 +153,7 @@ def verify(
     from ctrlgen.app.scenario_console import print_build
 
     print_build(build)
+    note_source(folder, scenario)
     out.print(f"[bold]page[/bold]  {escape(str(folder / 'build.html'))}", soft_wrap=True)
     if not build.passed:
         raise typer.Exit(1)
@@ -180,10 +184,11 @@ def fmu(
     out.print(f"FMI {fmi}.0, {'binaries for ' + made.binary if made.binary else 'no binaries'}", markup=False)
     if made.remark:
         out.print(made.remark, markup=False, soft_wrap=True)
-    _tell(folder)
+    _tell(folder, scenario)
 
 
-def _tell(folder: Path) -> None:
+def _tell(folder: Path, scenario: Path) -> None:
+    note_source(folder, scenario)
     out.print(f"[bold]folder[/bold]  {escape(str(folder))}", soft_wrap=True)
 
 

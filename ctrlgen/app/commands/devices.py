@@ -9,7 +9,8 @@ from typing import Annotated
 
 import typer
 
-from ctrlgen.app.commands.app import DEVICE_PANEL, DevicePath, app, as_picture, name_of, out_of, out_option
+from ctrlgen.app.commands.app import DEVICE_PANEL, DevicePath, app, as_picture
+from ctrlgen.app.commands.result_folder import name_of, note_source, out_of, out_option
 from ctrlgen.app.console import err, out, progress
 from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError
@@ -125,6 +126,7 @@ def workspace(
 
     folder = out_of(out_folder, device, "workspace")
     print_workspace(map_workspace(load_device(device), at or [], folder))
+    note_source(folder, device)
     out.print(str(folder / "workspace.html"), soft_wrap=True, markup=False)
 
 

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from ctrlgen.app.commands.app import ACCURACY_PANEL, OtherDevice, ScenarioPath, app, out_option
+from ctrlgen.app.commands.app import ACCURACY_PANEL, OtherDevice, ScenarioPath, app
+from ctrlgen.app.commands.result_folder import out_option
 from ctrlgen.app.console import out, progress
 from ctrlgen.app.fastest_console import print_fastest
 

@@ -16,9 +16,8 @@ from ctrlgen.app.commands.app import (
     SchedulerAddress,
     app,
     as_picture,
-    out_of,
-    out_option,
 )
+from ctrlgen.app.commands.result_folder import note_source, out_of, out_option
 from ctrlgen.app.console import complain, counted, err, out, progress
 from ctrlgen.app.diagnosis_console import print_batch, print_bootstrap, print_diagnosis, print_explanation
 from ctrlgen.core.errors import Fault, InputError
@@ -143,7 +142,8 @@ def diagnose(
         raise typer.BadParameter(
             "--scheduler only distributes the replicates of --bootstrap; add --bootstrap 200, or leave it out"
         )
-    folder = out_of(out_folder, recording[0], "diagnose")
+    first = recording[0]
+    folder = out_of(out_folder, first, "diagnose")
     try:
         replicates = Replicates(bootstrap, scheduler, jobs) if bootstrap else None
         chosen = None if laws is None else [name.strip() for name in laws.split(",") if name.strip()]
@@ -167,6 +167,7 @@ def diagnose(
         print_explanation(result, explain)
     if result.bootstrap is not None:
         print_bootstrap(result.bootstrap)
+    note_source(folder, first)
     out.print(f"[bold]report[/bold]  {escape(str(folder / 'report.html'))}", soft_wrap=True)
 
 
@@ -319,6 +320,7 @@ def batch(
         complain(error)
         raise typer.Exit(2) from None
     print_batch(rows)
+    note_source(folder, list_)
     out.print(f"[bold]table[/bold]  {escape(str(folder / 'results.csv'))}", soft_wrap=True)
     out.print(f"[bold]page[/bold]   {escape(str(folder / 'batch.html'))}", soft_wrap=True)
     if any(row.state == "failed" for row in rows):
