@@ -130,5 +130,8 @@ def test_channels_of_mdf_on_different_clocks_are_not_mixed(tmp_path):
         for name, start in (("u", 0.0), ("y", 0.5)):
             file.append([asammdf.Signal(np.arange(9.0), start + np.arange(9.0), name=name)])
         file.save(tmp_path / "a.mf4")
-    with pytest.raises(InputError, match=r"holds 2 tables \(1: u every 1 s, 2: y every 1 s\); write table = 1"):
+    choice = r"holds 3 tables \(1: u every 1 s, 2: y every 1 s, 3: all rasters, each channel on its own clock\); write table = 1"
+    with pytest.raises(InputError, match=choice):
         read_table(tmp_path / "a.mf4")
+    together = read_table(tmp_path / "a.mf4", 3)
+    assert together.numbers("time of y every 1 s")[0] - together.numbers("time of u every 1 s")[0] == 0.5
