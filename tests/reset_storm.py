@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import subprocess
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import casadi as ca
@@ -41,13 +41,15 @@ class Compiled:
         ]
         subprocess.run([*command, str(made.path / f"{name}.c")], check=True)
         c, number = ctypes.CDLL(str(library)), ctypes.c_float if real is Real.FLOAT else ctypes.c_double
-        six = number * N
+        six, varies = number * N, controller.kernels.times is not None
 
         class State(ctypes.Structure):
             _fields_ = [
                 ("x", six),
                 ("z", six),
+                *((("x_begun", six), ("z_begun", six), ("h", number)) if varies else ()),
                 *((word, ctypes.c_uint32) for word in ("ready", "unsure", "ticking", "tick")),
+                *((("stepping", ctypes.c_uint32),) if varies else ()),
             ]
 
         class Output(ctypes.Structure):
@@ -58,6 +60,9 @@ class Compiled:
         self.c_init, call = getattr(c, made.init[real]), lambda what: getattr(c, f"{name}_{what}")
         self.c_step, self.c_settle, self.c_step_at = call("step"), call("settle"), call("step_at")
         self.c_elapsed, self.c_observe, self.c_forget = call("elapsed"), call("observe"), call("forget")
+        if varies:
+            self.c_step_after = call("step_after")
+            self.c_step_after.argtypes = [ctypes.c_void_p, number, number, ctypes.c_void_p, ctypes.c_void_p]
         self.c_observe.argtypes = [ctypes.c_void_p, ctypes.c_void_p, number]
 
     def vector(self, values: np.ndarray) -> ctypes.Array:
@@ -69,6 +74,9 @@ class Compiled:
     def step(self, target: np.ndarray) -> int:
         return int(self.c_step(self.at, self.vector(target), self.output))
 
+    def step_after(self, since: float, ahead: float, target: np.ndarray) -> int:
+        return int(self.c_step_after(self.at, since, ahead, self.vector(target), self.output))
+
     def settle(self, target: np.ndarray) -> int:
         return int(self.c_settle(self.at, self.vector(target), self.output))
 
@@ -79,11 +87,14 @@ class Compiled:
         return int(self.c_observe(self.at, self.vector(measured), error))
 
 
-def compiled(folder: Path) -> dict[Real, Compiled]:
-    """The controller of circle20, generated once, in each arithmetic."""
+def compiled(folder: Path, times: tuple[str, str] | None = None) -> dict[Real, Compiled]:
+    """The controller of circle20, generated once, in each arithmetic; with sample times that vary between `times`."""
     scenario = load_scenario(SCENARIOS / "circle20")
+    if times is not None:
+        file = scenario.file.model_dump() | {"sample_times": times}
+        scenario = replace(scenario, file=type(scenario.file).model_validate(file))
     model = build_model(scenario.device)
-    controller = controller_of(model, scenario.file.follow, scenario.sample_time)
+    controller = controller_of(model, scenario.file.follow, scenario.sample_time, times=scenario.sample_times)
     made = generate(scenario, model, folder)
     return {real: Compiled(real, made, controller) for real in Real}
 

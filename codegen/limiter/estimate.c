@@ -36,6 +36,9 @@ uint32_t limiter_forget(limiter_state *state)
         status = LIMITER_LOST;
     } else {
         int i;
+#if VARIED
+        set_now(state);
+#endif
         copy_states(START, state->x);
         for (i = 0; i < N; i++) {
             state->z[i] = REAL(0.0);
@@ -57,6 +60,9 @@ uint32_t limiter_elapsed(limiter_state *state, uint32_t ticks, const real drive[
     } else if (DRIVE_INSIDE(state, drive) != 0) {
         uint32_t left = ticks;
         int k;
+#if VARIED
+        set_now(state);
+#endif
         for (k = 0; k < EXACT_TICKS; k++) {
             if (left > 0U) {
                 STEP_ADVANCE(state, state->z, drive, state->x);
@@ -164,6 +170,9 @@ uint32_t limiter_observe(limiter_state *state, const real measured[NS], real err
         status = LIMITER_LOST;
     } else if (cannot_be(measured, error) == 0) {
         const uint32_t told = samples_of(error);
+#if VARIED
+        set_now(state);
+#endif
         if (state->unsure > told) {
             believe(state, measured, error);
 #if NX == NS

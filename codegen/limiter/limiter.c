@@ -11,7 +11,8 @@
  * limit), DIRECT (every displacement is a matrix times the target, and a target that leads into the range is a command), BOUND_FIRST (the
  * cheap bound is known of the target), REDUNDANT (more drives than axes, of which GROUPS can be moved without a push), COUPLED (a displacement moves several
  * channels), MOVING (kernels for the next sample), MOTION (targets with derivatives), GIVEN (constants that are given at the
- * start), PIVOTED (targets of a pivot), ESTIMATED (states that are stepped from sample to sample, which can be believed wrongly). SETTLE_DRIVE_LIMITED and STEP_DRIVE_LIMITED: drives beyond their limits can be needed. SETTLE_EXAMINED_FIRST and
+ * start), PIVOTED (targets of a pivot), ESTIMATED (states that are stepped from sample to sample, which can be believed wrongly), VARIED (the
+ * time of a sample, state->h, may vary). SETTLE_DRIVE_LIMITED and STEP_DRIVE_LIMITED: drives beyond their limits can be needed. SETTLE_EXAMINED_FIRST and
  * STEP_EXAMINED_FIRST: whether a state is lost is asked before it is used. STATE_BY_MODE and DRIVE_BY_MODE: the line search calls one
  * kernel to settle and another to step. U_BOUNDS_ONCE: one function alone reads the limits of drives.
  *
@@ -82,11 +83,21 @@ static int drives_admissible(const limiter_state *state, const real drive[NU])
 
 #endif
 #if RATED
+#if VARIED
+#define FALLS(i) (FALL_RATE[i] * state->h)
+#define RISES(i) (RISE_RATE[i] * state->h)
+#else
+#define FALLS(i) FALL[i]
+#define RISES(i) RISE[i]
+#endif
 /* Goes from the last drives toward drive by the largest common share that every rate allows: 0 untouched, 1 changed, 2 by more than the
  * slack. */
 static int limit_rate(const limiter_state *state, real drive[NU], real *share)
 {
-#if !REDUNDANT
+#if VARIED
+    static const real FALL_RATE[NU] = FALL_TABLE; /* SI, in a second */
+    static const real RISE_RATE[NU] = RISE_TABLE;
+#elif !REDUNDANT
     static const real FALL[NU] = FALL_TABLE; /* SI, in one sample */
     static const real RISE[NU] = RISE_TABLE;
 #endif
@@ -97,14 +108,14 @@ static int limit_rate(const limiter_state *state, real drive[NU], real *share)
     for (i = 0; i < NU; i++) {
         const real change = drive[i] - state->u[i];
 #if SETTLE_EXAMINED_FIRST && STEP_EXAMINED_FIRST
-        if ((change > RISE[i]) || (change < FALL[i])) {
+        if ((change > RISES(i)) || (change < FALLS(i))) {
 #else
-        if ((is_nan(&state->u[i]) != 0) || (change > RISE[i]) || (change < FALL[i])) {
+        if ((is_nan(&state->u[i]) != 0) || (change > RISES(i)) || (change < FALLS(i))) {
 #endif
-            const real reached = ((change > REAL(0.0)) ? RISE[i] : FALL[i]) / change;
+            const real reached = ((change > REAL(0.0)) ? RISES(i) : FALLS(i)) / change;
             changed = 1;
             least = (reached < least) ? reached : least;
-            if ((change > (RISE[i] + U_SLACK[i])) || (change < (FALL[i] - U_SLACK[i]))) {
+            if ((change > (RISES(i) + U_SLACK[i])) || (change < (FALLS(i) - U_SLACK[i]))) {
                 beyond = 1;
             }
         }
@@ -435,6 +446,30 @@ static int line_search(const limiter_state *state, int settling, const real orig
 }
 
 #endif
+#if VARIED
+/* A sample of this time begins as the state is. */
+static void set_begin(limiter_state *state, real time)
+{
+    int i;
+    state->h = time;
+#if NX
+    for (i = 0; i < NX; i++) {
+        state->x_begun[i] = state->x[i];
+    }
+#endif
+    for (i = 0; i < N; i++) {
+        state->z_begun[i] = state->z[i];
+    }
+}
+
+/* The state is that of now, whatever was stepped. */
+static void set_now(limiter_state *state)
+{
+    state->h = SAMPLE_TIME;
+    state->stepping = 0U;
+}
+
+#endif
 #if GIVEN
 #include "start_constants.c"
 #else
@@ -462,6 +497,10 @@ void INIT(limiter_state *state)
         state->unsure = 0U;
         state->ticking = 0U;
         state->tick = 0U;
+#endif
+#if VARIED
+        set_begin(state, SAMPLE_TIME);
+        state->stepping = 0U;
 #endif
         state->ready = LIMITER_BUILD;
     }
@@ -517,4 +556,8 @@ static uint32_t set_lost(limiter_state *state, limiter_output *out)
 #if ESTIMATED
 
 #include "estimate.c"
+#endif
+#if VARIED
+
+#include "timed.c"
 #endif

@@ -1,6 +1,10 @@
 /* One sample: an equilibrium where SETTLING, else the next one. limiter.c includes this once for each. */
 #if SETTLING
-#define SAMPLE limiter_settle
+#if VARIED
+#define SAMPLE static uint32_t settle_sample
+#else
+#define SAMPLE uint32_t limiter_settle
+#endif
 #define SAFE settle_safe
 #define LIMIT_DRIVES settle_limit_drives
 #define PROCEED settle_proceed
@@ -15,7 +19,11 @@
 #define DRIVE_LIMITED SETTLE_DRIVE_LIMITED
 #define EXAMINED_FIRST SETTLE_EXAMINED_FIRST
 #else
-#define SAMPLE limiter_step
+#if VARIED
+#define SAMPLE static uint32_t step_sample
+#else
+#define SAMPLE uint32_t limiter_step
+#endif
 #define SAFE step_safe
 #define LIMIT_DRIVES step_limit_drives
 #define PROCEED step_proceed
@@ -331,7 +339,7 @@ static uint32_t UNUSABLE(limiter_state *state, limiter_output *out)
     return status;
 }
 
-uint32_t SAMPLE(limiter_state *state, const real target[M], limiter_output *out)
+SAMPLE(limiter_state *state, const real target[M], limiter_output *out)
 {
     uint32_t status = LIMITER_INPUT;
     if (out == NULL) {

@@ -25,7 +25,7 @@ from ctrlgen.controller.run_time_choices import choices, with_constants
 from ctrlgen.devices import Limit, Signal
 from ctrlgen.model.allocation import inverse_of
 from ctrlgen.model.assembly import build_model
-from ctrlgen.model.inverse import NEWTON_STEPS, Inverse
+from ctrlgen.model.inverse import NEWTON_STEPS, Inverse, invert
 from ctrlgen.model.model import Model
 
 # The memory of an effect does not scale with the displacement, so its share of the excess is removed over several rounds.
@@ -34,11 +34,16 @@ COMPOSITE_ROUNDS = 8
 
 @dataclass(frozen=True)
 class ControllerKernels:
-    """The kernels of one device, one followed signal, one sample time (None: equilibria only), each worked out when first asked for."""
+    """The kernels of one device, one followed signal, one sample time (None: equilibria only), each worked out when first asked for.
+
+    `times`: shortest and longest sample time [s] where it may vary around this one; what is decided before the C runs holds for all
+    between.
+    """
 
     model: Model
     follow: str
     sample_time: float | None
+    times: tuple[float, float] | None = None
 
     @cached_property
     def static(self) -> Inverse:
@@ -53,7 +58,22 @@ class ControllerKernels:
     @cached_property
     def moving(self) -> Inverse | None:
         """Kernels for the next sample; None where there is no sample time."""
-        return None if self._step_time is None else inverse_of(self.nominal, self.follow, self._step_time)
+        if self._step_time is None:
+            return None
+        return (
+            self.varied.at(self._step_time) if self.varied else inverse_of(self.nominal, self.follow, self._step_time)
+        )
+
+    @cached_property
+    def varied(self) -> Inverse | None:
+        """Kernels for the next sample with its time as their last argument; None where it does not vary."""
+        if self.times is None:
+            return None
+        return invert(self.nominal, self.follow, sum(self.times) / 2, longest=self.times[1])
+
+    def over(self, sample_time: float) -> Self:
+        """The kernels over another `sample_time` [s] within `times`."""
+        return replace(self, sample_time=sample_time)
 
     @cached_property
     def quick(self) -> QuickState | None:
@@ -90,7 +110,10 @@ class ControllerKernels:
     @cached_property
     def variants(self) -> tuple[Self, ...]:
         """The kernels of devices with other run-time constants, within their ranges
-        (`ctrlgen.controller.run_time_choices`): decisions that are taken before the C runs hold for all of them."""
+        (`ctrlgen.controller.run_time_choices`), or over the shortest and the longest sample time: decisions that are taken before
+        the C runs hold for all of them."""
+        if self.times is not None:  # not one of its own, which would have variants again
+            return tuple(replace(self, sample_time=h, times=None) for h in self.times)
         return tuple(self.at(values) for values in choices(self.model.device.given_at_start))
 
     @cached_property
@@ -120,20 +143,28 @@ class ControllerKernels:
     @cached_property
     def composite_shares(self) -> ca.Function:
         """(x, z, wanted) -> the square of each guarded limit's value over its bound at displacement `wanted`; above 1 it is broken."""
+        return self._shares(self.moving or self.static)
+
+    @cached_property
+    def varied_shares(self) -> ca.Function:
+        """`composite_shares` with the time of a sample as their last argument, where it varies."""
+        return self._shares(self.varied) if self.varied else self.composite_shares
+
+    def _shares(self, k: Inverse) -> ca.Function:
         m = self.nominal
         wanted = ca.SX.sym("wanted", m.z.numel())
-        x_then = ca.vertcat(m.x[: m.n_states, :], (self.moving or self.static).memory(m.x, m.z, wanted))
+        given = {"x": m.x, "z": m.z, "wanted": wanted} | ({"h": ca.SX.sym("h")} if "h" in k.memory.name_in() else {})
+        x_then = ca.vertcat(m.x[: m.n_states, :], k.memory(*given.values()))
         squares = [
             ca.substitute(limit.expr, ca.vertcat(m.x, m.z), ca.vertcat(x_then, wanted)) ** 2 * (1 / limit.upper**2)
             for limit in self.guarded_limits
             if limit.upper
         ]
-        names = ["x", "z", "wanted"]
         return ca.Function(
             "composite_shares",
-            [m.x, m.z, wanted],
+            list(given.values()),
             [ca.vertcat(ca.SX(0, 1), *squares)],
-            names,
+            list(given),
             ["shares"],
             {"cse": True},
         )
@@ -295,7 +326,7 @@ class ControllerKernels:
         if self.sample_time is None or not self.nominal.x.numel():
             return None
         every = [Stepped(k.nominal, k.static, k.moving) for k in (self, *self.variants) if k.moving is not None]
-        return contraction(every, self.sample_time) if every else None
+        return contraction(every, self.times[0] if self.times else self.sample_time) if every else None
 
     @property
     def rated(self) -> bool:

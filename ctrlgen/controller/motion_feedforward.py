@@ -16,6 +16,7 @@ import numpy as np
 from ctrlgen.controller.controller_step import ControllerStatus, ControllerStep, State
 from ctrlgen.controller.feedforward import Controller, Rounding
 from ctrlgen.controller.kernels import ControllerKernels
+from ctrlgen.controller.sample_times import check_times
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.devices import Signal
 from ctrlgen.model.inverse_dynamics import InverseDynamics, inverse_dynamics
@@ -156,8 +157,17 @@ class MotionController(Controller):
 
 
 @lru_cache(maxsize=4)  # generation and each check of what was generated ask for the same one; its kernels take long
-def controller_of(model: Model, follow: str, sample_time: float | None, leads_modes: bool = False) -> Controller:
-    """The feedforward controller of a device; one with inertia takes derivatives too, two more where it `leads_modes` of bodies."""
+def controller_of(
+    model: Model,
+    follow: str,
+    sample_time: float | None,
+    leads_modes: bool = False,
+    times: tuple[float, float] | None = None,
+) -> Controller:
+    """The feedforward controller of a device; one with inertia takes derivatives too, two more where it `leads_modes` of bodies. With
+    `times` [s], the shortest and the longest, its sample time may vary. Raises InputError where it may not."""
+    if times is not None:
+        check_times(model)
     if model.inertial:
-        return MotionController(MotionKernels(model, follow, sample_time, leads_modes))
-    return Controller(ControllerKernels(model, follow, sample_time))
+        return MotionController(MotionKernels(model, follow, sample_time, leads_modes=leads_modes))
+    return Controller(ControllerKernels(model, follow, sample_time, times))

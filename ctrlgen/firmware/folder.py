@@ -107,7 +107,9 @@ def generate(
     out = Path(out)
     check_tightened(scenario, model)
     check_online(scenario, model)
-    controller = controller_of(model, scenario.file.follow, scenario.sample_time, scenario.file.leads_modes)
+    controller = controller_of(
+        model, scenario.file.follow, scenario.sample_time, scenario.file.leads_modes, scenario.sample_times
+    )
     played = solution if scenario.sample_time else None
     problem = scenario.bind(model)
     command = problem.samples if solution is None else solution.command
@@ -196,7 +198,9 @@ def _write_fixed(context: dict[str, Any], out: Path, name: str) -> list[Path]:
 
 def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Arithmetic, path: Path) -> None:
     """The program that `ctrlgen.verification` builds around one pair of controllers."""
-    controller = controller_of(model, scenario.file.follow, scenario.sample_time, scenario.file.leads_modes)
+    controller = controller_of(
+        model, scenario.file.follow, scenario.sample_time, scenario.file.leads_modes, scenario.sample_times
+    )
     corrections = corrections_of(scenario, controller.kernels)
     context = {
         "real": real,
@@ -214,6 +218,7 @@ def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Arith
         "rated": controller.rate is not None,
         "rate": scenario.sample_time is not None,
         "estimated": controller.kernels.contraction is not None,
+        "times": controller.kernels.times,
         "pivoted": StatedPivot(controller.kernels).acts,
     }
     write("fixed_harness.c" if isinstance(real, Integers) else "harness.c", context, path)

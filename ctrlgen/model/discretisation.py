@@ -19,7 +19,7 @@ from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.model.integrators import NEAR_HOME, integrator_of
 from ctrlgen.model.model import Model
 from ctrlgen.numerics.newton import newton_root
-from ctrlgen.numerics.phi_functions import held_gain, increment, lag_increment
+from ctrlgen.numerics.phi_functions import held_gain, increment, lag_increment, varied_gain
 
 NEWTON_STEPS = 4  # from the displacement one sample before, each step doubles the digits
 SETTLING_SWEEPS = 3  # memories that follow memories that follow heaters whose power depends on their temperature
@@ -92,6 +92,18 @@ def held_step(model: Model, sample_time: float, rates: ca.SX | None = None) -> c
         slope, rate = ca.substitute([A, rates], [model.x], [x])
         x = x + increment(slope, [rate], h / parts, doublings)
     return _with_sampled_states(model, x)
+
+
+def varied_step(model: Model, sample_time: ca.SX, longest: float, rates: ca.SX) -> ca.SX:
+    """`held_step` of states that do not act on one another (`acts_alone`), over a `sample_time` [s] that is a symbol: at most `longest`."""
+    A = ca.jacobian(rates, model.x)
+    gain = ca.vertcat(*(varied_gain(rate, sample_time, longest) for rate in ca.vertsplit(ca.diag(A))))
+    return _with_sampled_states(model, model.x + gain * rates)
+
+
+def acts_alone(model: Model) -> bool:
+    """Whether no state's rate depends on another state, so that each has an exponential of its own."""
+    return _uncoupled(ca.jacobian(model.rates_of_heat, model.x))
 
 
 def _ramp_step(model: Model, sample_time: float, u_next: ca.SX, newton_steps: int) -> ca.SX:

@@ -11,13 +11,13 @@ number of Newton steps. The operation count is therefore fixed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, lru_cache
 
 import casadi as ca
 import numpy as np
 
-from ctrlgen.model.discretisation import held_step
+from ctrlgen.model.discretisation import held_step, varied_step
 from ctrlgen.model.model import Model
 from ctrlgen.numerics.newton import newton_root
 
@@ -46,23 +46,42 @@ class Inverse:
     settle: ca.Function
     newton: ca.Function
 
+    def at(self, sample_time: float) -> Inverse:
+        """Of kernels with a sample time "h" as their last argument: those over this one [s]."""
+        return Inverse(*(_over(getattr(self, kernel.name), sample_time) for kernel in fields(self)))
+
+
+def _over(kernel: ca.Function, sample_time: float) -> ca.Function:
+    names = kernel.name_in()[:-1]
+    given = [ca.SX.sym(name, *kernel.size_in(name)) for name in names]
+    return ca.Function(kernel.name(), given, [kernel(*given, sample_time)], names, ["result"])
+
 
 @lru_cache(maxsize=8)  # a path is solved, and its controller made, of one model
-def invert(model: Model, follow: str, sample_time: float | None, symbolic: bool = False) -> Inverse:
+def invert(
+    model: Model, follow: str, sample_time: float | None, symbolic: bool = False, longest: float | None = None
+) -> Inverse:
     """The inverse of `model` for the signal named `follow`, over one `sample_time` [s]; static where that is None.
 
     Free parameters take their nominal values, and where it is `symbolic` stay a last argument "p" of every kernel: the
     inverse at the nominal values, with its numbers as formulas of the parameters (those of the followed signal excepted).
+    With a `longest` sample time [s] it is a last argument "h" of every kernel, and `sample_time` where they are expanded.
     """
     x, z, u, n, n_s, heat = model.x, model.z, model.u, len(model.axes), model.n_states, model.heat
     end = _SampleEnd.of(model, follow, symbolic)
     x_1, z_1, u_1, target = end.x, end.z, end.u, end.target
-    known = _expansion_point(model, end, symbolic)
+    h = ca.SX.sym("h", 0 if longest is None else 1)
+    known = _expansion_point(model, end, symbolic, (h, sample_time or 0.0))
     followed, balance = (end.of_end(model, e) for e in (model.signals[follow].expr, model.balance))
     if sample_time is None:
         reached, motion, produced = _equilibrium(model, end, known)
     else:
-        reached, motion, produced = _held(model, end, sample_time)
+        stepped = (
+            held_step(model, sample_time, model.rates_of_heat)
+            if longest is None
+            else varied_step(model, h, longest, model.rates_of_heat)
+        )
+        reached, motion, produced = _held(model, end, stepped)
     heating = heat - produced
     followed = ca.substitute(followed, model.p, ca.DM(model.p_nominal))
     wanted_z = solve_by_blocks(
@@ -87,7 +106,7 @@ def invert(model: Model, follow: str, sample_time: float | None, symbolic: bool 
         "settle": ({"x": x, "z": z, "drive": u}, newton_root(settled, z, z, NEWTON_STEPS)),
         "newton": ({"x": x, "z": z, "drive": u}, newton_root(settled, z, z, 1)),
     }
-    more = {"p": model.p} if symbolic else {}
+    more = ({"p": model.p} if symbolic else {}) | ({} if longest is None else {"h": h})
     return Inverse(**{name: _kernel(name, arguments | more, result) for name, (arguments, result) in results.items()})
 
 
@@ -115,8 +134,9 @@ class _SampleEnd:
         return ca.substitute(expression, now, ca.vertcat(self.x, self.z, self.u, self.p))
 
 
-def _expansion_point(model: Model, end: _SampleEnd, symbolic: bool) -> ExpansionPoint:
-    """Rest and typical sizes of a `model`, for its symbols now and at the `end`; rest as formulas where it is `symbolic`."""
+def _expansion_point(model: Model, end: _SampleEnd, symbolic: bool, time: tuple[ca.SX, float]) -> ExpansionPoint:
+    """Rest and typical sizes of a `model`, for its symbols now and at the `end`, and for a sample `time`, with its value; rest as formulas
+    where it is `symbolic`."""
     target, heat = end.target.numel(), model.heat.numel()
     known = ExpansionPoint.of(
         (model.x, model.rest, model.x_scale),
@@ -127,6 +147,7 @@ def _expansion_point(model: Model, end: _SampleEnd, symbolic: bool) -> Expansion
         (end.u, 0 * model.u_scale, model.u_scale),
         (model.heat, np.zeros(heat), np.ones(heat)),
         (model.p, model.p_nominal, np.zeros(model.p.numel())),
+        (time[0], np.full(time[0].numel(), time[1]), np.zeros(time[0].numel())),
     )
     if not symbolic:
         return known
@@ -149,9 +170,9 @@ def _equilibrium(model: Model, end: _SampleEnd, known: ExpansionPoint) -> tuple[
     return reached, motion, produced
 
 
-def _held(model: Model, end: _SampleEnd, sample_time: float) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """The states after one sample under the held drives of its `end`, the residual of the states there, and the heat produced."""
-    reached = ca.substitute(held_step(model, sample_time, model.rates_of_heat), model.p, end.p)
+def _held(model: Model, end: _SampleEnd, stepped: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """The states, as `stepped` over one sample, under the held drives of its `end`, the residual of the states there, the heat produced."""
+    reached = ca.substitute(stepped, model.p, end.p)
     reached = ca.substitute(reached, model.u, end.u)
     produced = ca.substitute(model.heat_of_drive, ca.vertcat(model.u, model.p), ca.vertcat(end.u, end.p))
     return reached, end.x - reached, produced

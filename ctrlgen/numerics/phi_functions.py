@@ -43,10 +43,23 @@ def phi_matrices(M: np.ndarray, count: int) -> list[np.ndarray]:
     return phi
 
 
-def held_gain(rate: ca.SX, h: float) -> ca.SX:
+def held_gain(rate: ca.SX, h: float | ca.SX) -> ca.SX:
     """h phi_1(h rate) of one lag, h where the rate is identically zero: one exponential, since generated C computes it in
     every sample. Its relative error is the rounding divided by |h rate|."""
     return h if rate.is_zero() else (ca.exp(rate * h) - 1) / rate
+
+
+def varied_gain(rate: ca.SX, h: ca.SX, longest: float) -> ca.SX:
+    """`held_gain` of an h that is a symbol, positive and at most `longest`. Of a lag that is slower than that by its series, whose
+    remainder is below rounding: the closed form would lose the digits of short times."""
+    if rate.is_zero() or not rate.is_constant() or abs(float(rate)) * longest > SERIES_BELOW:
+        return held_gain(rate, h)
+    a, largest = rate * h, abs(float(rate)) * longest
+    order = next(k for k in range(1, RAMP_ORDER + 1) if largest**k / factorial(k + 1) < np.finfo(float).eps / 4)
+    total = ca.SX(1 / factorial(order))
+    for j in range(order - 1, 0, -1):
+        total = total * a + 1 / factorial(j)
+    return h * total
 
 
 def increment(A: ca.SX, values: Sequence[ca.SX], h: float, doublings: int) -> ca.SX:

@@ -109,6 +109,12 @@ class Scenario(Shown):
         return None if self.file.sample_rate is None else 1 / self.file.sample_rate.si
 
     @property
+    def sample_times(self) -> tuple[float, float] | None:
+        """Shortest and longest time [s] between calls of the C; None where it is called at its sample rate alone."""
+        times = self.file.sample_times
+        return None if times is None else (times[0].si, times[1].si)
+
+    @property
     def closed(self) -> bool:
         """Whether the path is periodic: its first sample follows the last one."""
         return self.file.closed

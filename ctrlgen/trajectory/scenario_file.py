@@ -87,6 +87,12 @@ class ScenarioFile(Section):
     sample_rate: Annotated[Quantity, In("Hz", positive=True)] | None = None
     """Samples a second of a motion in time. Left out: the scenario is static, and its samples are separate equilibria.
     """
+    sample_times: (
+        tuple[Annotated[Quantity, In("s", positive=True)], Annotated[Quantity, In("s", positive=True)]] | None
+    ) = None
+    """Shortest and longest time between two calls of the C, such as ["0.5 ms", "2 ms"] around a `sample_rate` of 1 kHz: it then has
+    `..._step_after`, which takes how long ago the last call was and when the next one will be. Of devices in balance whose states have a
+    lag each; refused for others, with the reason. Left out: the C is called at its sample rate alone."""
     duration: Annotated[Quantity, In("s", positive=True)] | None = None
     """Length of the motion; with `sample_rate` it gives the number of samples."""
     points: Annotated[int, Field(ge=2, le=MOST_SAMPLES)] | None = None
@@ -138,6 +144,31 @@ class ScenarioFile(Section):
         if self.robust is not None and self.feedforward == "static":
             raise ValueError(
                 'robust solves for drives that keep the path, which feedforward = "static" does not; leave out one of them'
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _varied(self) -> ScenarioFile:
+        if self.sample_times is None:
+            return self
+        low, high = self.sample_times
+        if self.sample_rate is None:
+            raise ValueError(
+                "sample_times are of motions in time: give sample_rate, which lies between them, or leave them out"
+            )
+        if not low.si <= 1 / self.sample_rate.si * (1 + 1e-9) <= high.si * (1 + 2e-9) or low.si == high.si:
+            raise ValueError(
+                f'sample_times = ["{low.text}", "{high.text}"] must be the shortest and the longest, with that of sample_rate '
+                f'between them: "{self.sample_rate.text}" is one sample every {1 / self.sample_rate.si:g} s'
+            )
+        others = {
+            "shaping": self.shaping is not None,
+            "fixed_point": self.fixed_point,
+            'feedforward = "modes"': self.leads_modes,
+        }
+        if other := next((name for name, kept in others.items() if kept), None):
+            raise ValueError(
+                f"sample_times cannot be kept with {other}, whose numbers are those of one sample time; leave one of them out"
             )
         return self
 

@@ -72,7 +72,9 @@ class Interface(Keys):
 def interface(solution: Solution, c: CFolder) -> Interface:
     """The arguments and results of the C, in SI, and the values that its status can have."""
     model, scenario = solution.model, solution.scenario
-    controller = controller_of(model, scenario.file.follow, scenario.sample_time, scenario.file.leads_modes)
+    controller = controller_of(
+        model, scenario.file.follow, scenario.sample_time, scenario.file.leads_modes, scenario.sample_times
+    )
     kernels, m = controller.kernels, controller.kernels.nominal
     state, drive, rated = m.signals.get("state"), _channels(m.signals["drive"]), controller.rate is not None
     can = {
@@ -80,7 +82,7 @@ def interface(solution: Solution, c: CFolder) -> Interface:
         ControllerStatus.STATE: controller.state_can_be_limited,
         ControllerStatus.RATE: rated,
         ControllerStatus.UNSURE: kernels.contraction is not None,
-        ControllerStatus.CLOCK: kernels.contraction is not None,
+        ControllerStatus.CLOCK: kernels.contraction is not None or kernels.times is not None,
     }
     played: Mapping[Any, str] = c.player
     memory = [f"{name} [{unit}]" for name, unit in zip(m.x_names, m.x_units, strict=True)]

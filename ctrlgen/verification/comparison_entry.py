@@ -24,6 +24,7 @@ class ComparisonKind(StrEnum):
     FOLLOWED_INTEGERS = "scenario, C in integers - whole numbers"
     SETTLED_INTEGERS = "random targets, C in integers - whole numbers"
     CHASED_INTEGERS = "hostile sequence, C in integers - whole numbers"
+    TIMED = "calls at times that vary, online C - CasADi"
     EXCESS = "hostile sequence -> model: excess over a limit"
     RATE = "hostile sequence: change of a drive over its rate"
     ABOUT = "poses of pivots, online C - CasADi"
@@ -44,7 +45,7 @@ class ComparisonKind(StrEnum):
 
 
 CONTROLLER = (
-    *(ComparisonKind.FOLLOWED, ComparisonKind.SETTLED, ComparisonKind.CHASED),
+    *(ComparisonKind.FOLLOWED, ComparisonKind.SETTLED, ComparisonKind.CHASED, ComparisonKind.TIMED),
     *(ComparisonKind.FOLLOWED_INTEGERS, ComparisonKind.SETTLED_INTEGERS, ComparisonKind.CHASED_INTEGERS),
 )
 

@@ -84,7 +84,9 @@ def check_hostile(
 
 
 def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> dict[str, Any]:
-    controller = controller_of(model, scenario.file.follow, scenario.sample_time, scenario.file.leads_modes)
+    controller = controller_of(
+        model, scenario.file.follow, scenario.sample_time, scenario.file.leads_modes, scenario.sample_times
+    )
     kernels, nominal = controller.kernels, controller.kernels.nominal
     bits = ControllerStatus.DISPLACEMENT | ControllerStatus.DRIVE | ControllerStatus.INPUT | ControllerStatus.LOST
     bits |= (ControllerStatus.STATE if nominal.n_states else bits) | (
@@ -94,6 +96,7 @@ def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> d
     estimated = kernels.contraction is not None
     bits |= ControllerStatus.UNSURE | ControllerStatus.CLOCK if estimated else bits
     corrections = corrections_of(scenario, kernels)
+    bits |= ControllerStatus.CLOCK if kernels.times else bits
     samples, clock = len(scenario.bind(model).samples), scenario.clock
     return {
         "real": real,
@@ -107,6 +110,7 @@ def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> d
         "rate": isinstance(clock, Sampled),
         "bits": int(bits),
         "estimated": estimated,
+        "times": kernels.times,
         "input_limits": kernels.input_limits,
         "u_low": nominal.u_bounds[0],
         "u_high": nominal.u_bounds[1],
@@ -121,6 +125,8 @@ def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> d
         "farthest": FARTHEST,
         "duration": samples * clock.sample_time if isinstance(clock, Sampled) else None,
         **rates_in_c(controller),
+        # the calls that it is told by are of the sample rate
+        **({} if controller.rate is None else {"fall": controller.rate.fall, "rise": controller.rate.rise}),
         **(_corrected(folder.corrected[real], corrections) if corrections else {"corrected": None}),
     }
 
@@ -141,7 +147,9 @@ def _corrected(name: str, corrections: Corrections) -> dict[str, Any]:
 
 
 def _in_integers(folder: CFolder, scenario: Scenario, model: Model, real: Integers) -> dict[str, Any]:
-    controller = controller_of(model, scenario.file.follow, scenario.sample_time, scenario.file.leads_modes)
+    controller = controller_of(
+        model, scenario.file.follow, scenario.sample_time, scenario.file.leads_modes, scenario.sample_times
+    )
     fixed = fixed_point(controller)
     S = ControllerStatus
     bits = S.DISPLACEMENT | S.DRIVE | S.INPUT | S.LOST | S.UNSURE | (S.COMPOSITE if fixed.bound else S.UNSURE)

@@ -156,6 +156,10 @@ def _hostile_rows(program: ComparedProgram) -> list[ComparisonEntry]:
     drives = chased[:, ref.columns["drive"]]
     if real is Real.DOUBLE:  # in float the line searches accept other trials, and the states drift apart
         rows += _controller_rows(program, ComparisonKind.CHASED, chased, ref.chased, ties=True)
+        if ref.timed is not None:
+            records, expected = ref.timed
+            answer = program.run("timed", records, ref.width)
+            rows += _controller_rows(program, ComparisonKind.TIMED, answer, expected, ties=True)
     if not m.inertial:  # where jumping targets take a mass, no drive can decide any more
         allowed = EXCESS_LIMIT[real] if m.x.numel() == m.n_states else EXCESS_LIMIT_WITH_MEMORY
         over = ref.once("excess", drives, lambda drives: excess(m, drives, ref.sample_time, cold[0])).copy()

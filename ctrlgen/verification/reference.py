@@ -13,6 +13,7 @@ import numpy as np
 from ctrlgen.controller.controller_step import State, answer
 from ctrlgen.controller.feedforward import Controller
 from ctrlgen.controller.motion_feedforward import controller_of
+from ctrlgen.controller.timed import TimedController
 from ctrlgen.firmware.online.limit_tables import FLOAT_SLACK
 from ctrlgen.firmware.online.stated_pivot import FARTHEST, StatedPivot
 from ctrlgen.model.simulation import trace
@@ -33,7 +34,11 @@ class ReferenceAnswers:
         self.solution, self.model, self.scenario = solution, solution.model, solution.scenario
         self._found: dict[tuple[str, bytes], Any] = {}
         self.controller = controller_of(
-            self.model, self.scenario.file.follow, self.scenario.sample_time, self.scenario.file.leads_modes
+            self.model,
+            self.scenario.file.follow,
+            self.scenario.sample_time,
+            self.scenario.file.leads_modes,
+            self.scenario.sample_times,
         )
         self.random, at_limits = self._random_targets(INSIDE), self._random_targets(0.0)
         if self.controller.rate is not None:  # fewer, each until the drives have come there, or nearly
@@ -52,6 +57,27 @@ class ReferenceAnswers:
         self.followed = self._answers(self.command, self.start)
         self.hostile = self._hostile_targets(at_limits)
         self.chased = self._answers(self.hostile, self.controller.rest())
+
+    @cached_property
+    def timed(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Calls at times that vary (n, 2 + channels), since, ahead, target, from a device at rest: the hostile targets and the path between
+        them, some sooner or later than they were said to be, some beyond the bounds; and their answers. None where no time varies."""
+        if self.controller.kernels.times is None:
+            return None
+        rng, mine = np.random.default_rng(23), TimedController(self.controller)
+        low, high = mine.times
+        usual = np.array([low, 0.75 * low + 0.25 * high, self.sample_time, high])  # few: each has kernels of its own
+        targets = np.empty((2 * min(len(self.hostile), len(self.command)), self.command.shape[1]))
+        targets[::2], targets[1::2] = self.hostile[: len(targets) // 2], self.command[: len(targets) // 2]
+        ahead = rng.choice(usual, len(targets))
+        since = np.where(rng.random(len(targets)) < 0.7, np.roll(ahead, 1), rng.choice(usual, len(targets)))
+        since[40::40], ahead[25::40] = 0.5 * low, np.nan
+        belief, held, rows = mine.rest(), np.zeros(self.model.u.numel()), []
+        for at, until, target in zip(since, ahead, targets, strict=True):
+            step, belief = mine.step_after(belief, at, until, target, held)
+            held = step.drive
+            rows.append(np.concatenate([[step.status], step.drive, step.displacement, step.actuator_state]))
+        return np.column_stack([since, ahead, targets]), np.array(rows)
 
     @cached_property
     def turned(self) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:

@@ -41,6 +41,7 @@ typedef float real;
 #define CHANGING 0
 #define DOUBLE 0
 #define ESTIMATED 1
+#define VARIED 0
 #define STATE_BY_MODE 0
 #define DRIVE_BY_MODE 0
 #define SETTLE_DRIVE_LIMITED 0

@@ -38,25 +38,38 @@ def limit_context(controller: Controller, printer: Printer) -> dict[str, Any]:
         "u_safe": kernels.safe_drive,
         "input_limits": kernels.input_limits,
         "unlimited": UNLIMITED,
-        "lost_tests": [magnitude_test(_member(i, m), most, real) for i, most in enumerate(controller.plausible)],
+        "lost_tests": _lost_tests(controller, real),
         "usable_tests": [magnitude_test(f"target[{i}]", most, real) for i, most in enumerate(kernels.input_limits)],
         **rates_in_c(controller),
         **_limits_in_c(controller, printer, real, u_slack),
     }
 
 
+def _lost_tests(controller: Controller, real: Real) -> list[str]:
+    """Tests of each number of a state, which hold where it can be one that the controller left."""
+    kernels, m = controller.kernels, controller.kernels.nominal
+    tests = [magnitude_test(_member(i, m), most, real) for i, most in enumerate(controller.plausible)]
+    if kernels.times is None:
+        return tests
+    began = controller.plausible[: m.x.numel() + len(m.axes)]
+    tests += [magnitude_test(_member(i, m, "_begun"), most, real) for i, most in enumerate(began)]
+    return [*tests, within_test("state->h", *kernels.times, real)]
+
+
 def rates_in_c(controller: Controller) -> dict[str, Any]:
-    """What the C needs to keep limits on the rates of drives."""
+    """What the C needs to keep limits on the rates of drives: changes in a sample, or where its time varies in a second."""
     if (rate := controller.rate) is None:
         return {"rated": False, "passing": False}
-    return {"rated": True, "passing": controller.kernels.limits_can_be_passed, "fall": rate.fall, "rise": rate.rise}
+    over = 1.0 if controller.kernels.times is None else 1 / (controller.kernels.sample_time or 1.0)
+    ends = {"fall": rate.fall * over, "rise": rate.rise * over}
+    return {"rated": True, "passing": controller.kernels.limits_can_be_passed, **ends}
 
 
-def _member(i: int, model: Model) -> str:
-    """Number `i` of x, then z, then the last drive in the C's state."""
+def _member(i: int, model: Model, of: str = "") -> str:
+    """Number `i` of x, then z, then the last drive in the C's state; or `of` another x and z there."""
     for name, count in (("x", model.x.numel()), ("z", len(model.axes))):
         if i < count:
-            return f"state->{name}[{i}]"
+            return f"state->{name}{of}[{i}]"
         i -= count
     return f"state->u[{i}]"
 

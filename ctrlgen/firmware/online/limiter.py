@@ -88,6 +88,7 @@ def _features(context: Mapping[str, Any]) -> dict[str, int]:
         "CHANGING": context["changing"] is not None,
         "DOUBLE": context["real"] is Real.DOUBLE,
         "ESTIMATED": context["estimated"] is not None,
+        "VARIED": context["times"] is not None,
         # Whether the line search calls one kernel to settle and another to step
         "STATE_BY_MODE": len({mode["state"].name for mode in limited if "state" in mode}) > 1,
         "DRIVE_BY_MODE": len({mode["drive"].name for mode in limited}) > 1,
@@ -151,6 +152,10 @@ def _texts(context: Mapping[str, Any]) -> dict[str, str]:
             "GROUP_MEMBERS": _braces(str(i) for those in moves.groups for i in those),
             "GROUP_STARTS": _braces(map(str, starts)),
         }
+    if context["times"] is not None:
+        shortest, longest = context["times"]
+        within = within_test("h", shortest, longest, context["real"])
+        texts |= {"TIME_WITHIN": within, "SAMPLE_TIME": literal(context["sample_time"])}
     if context["nearest_slopes"] is not None:
         rows = ",\n".join(f"    {table(row)}" for row in context["nearest_slopes"].T)
         texts["NEAREST_SLOPES"] = f"{{\n{rows}\n}}"
@@ -238,7 +243,8 @@ def _calls(context: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
         kernels |= {f"{mode['name']}_{part}".upper(): (part, mode[part]) for part in CALLS if part in mode}
     kernels |= {f"MOTION_{part.upper()}": ("motion", kernel) for part, kernel in context["motion"].items()}
     calls = {
-        name: (CALLS[part][0], kernel.call("result", **CALLS[part][1])) for name, (part, kernel) in kernels.items()
+        name: (CALLS[part][0], kernel.call("result", h="&state->h", **CALLS[part][1]))
+        for name, (part, kernel) in kernels.items()
     }
     if context["bound"]:
         calls["COMPOSITE_BOUND"] = "wanted", context["bound"].value(wanted="wanted")

@@ -31,6 +31,8 @@ from ctrlgen.version import __version__, program
 WORDS = ("ready",)  # integers of a controller's state, in the order of its structure
 ESTIMATE_WORDS = ("unsure", "ticking", "tick")  # of one whose state can be wrong (estimate.c)
 
+TIME_WORDS = ("stepping",)  # of one whose sample times vary (timed.c)
+
 
 def online_context(scenario: Scenario, controller: Controller, real: Real, prefix: str) -> dict[str, Any]:
     """The context of online.c.j2 and online.h.j2."""
@@ -68,11 +70,14 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
             "rest": kernels.nominal.rest,
             "far": FAR,
             "estimated": kernels.contraction,
-            "words": WORDS if kernels.contraction is None else WORDS + ESTIMATE_WORDS,
+            "words": WORDS
+            + ESTIMATE_WORDS * (kernels.contraction is not None)
+            + TIME_WORDS * (kernels.times is not None),
             "forever": FOREVER,
             "share_known": KNOWN,
             "exact": EXACT,
             "sample_time": kernels.sample_time,
+            "times": kernels.times,
         }
     )
     called = printed.calls | ({"square_root"} if printed.shares else set()) | set(start_calls(start))
@@ -104,6 +109,7 @@ def build_of(scenario: Scenario, controller: Controller, arithmetic: str) -> dic
         rate,
         [limit.text for limit in kernels.nominal.limits],
         arithmetic,
+        *(() if kernels.times is None else kernels.times),
     )
     ready = int(hashlib.sha256(repr(about).encode()).hexdigest()[:8], 16)
     if len(set(ready.to_bytes(4, "big"))) == 1:  # as memory set to one value is

@@ -67,17 +67,22 @@ def _argument_ranges(kernels: ControllerKernels) -> Ranges:
     )
     n, z = model.n_states, model.z_bounds
     state = np.maximum(x_low[:n], -UNLIMITED), np.minimum(x_high[:n], UNLIMITED)
-    return {"z": z, "wanted": z, "x": (x_low, x_high), "state": state, "drive": (u_low, u_high)}
+    times = {} if kernels.times is None else {"h": tuple(np.array([h]) for h in kernels.times)}
+    return {"z": z, "wanted": z, "x": (x_low, x_high), "state": state, "drive": (u_low, u_high), **times}
 
 
 def printed_kernels(controller: Controller, printer: Printer) -> PrintedKernels:
     """The kernels of a `controller`; where constants are given at the start, in terms of these."""
     kernels, inverses, given = controller.kernels, controller.kernels.named, controller.kernels.given
     static, moving = (given.static or kernels.static, given.moving) if given else (kernels.static, kernels.moving)
+    moving = kernels.varied or moving
     quick = kernels.quick if printer.real is Real.FLOAT else None  # in double their error would be the largest
     printed = _Kernels(printer, kernel_comments(kernels, quick))
     modes: list[dict[str, Any]] = []
-    for name, inverse, formulas in (("settle", static, inverses.static), ("step", moving, inverses.moving)):
+    for name, inverse, formulas in (
+        ("settle", static, inverses.static),
+        ("step", moving, None if kernels.varied else inverses.moving),
+    ):
         if inverse is None:
             continue
         mode: dict[str, Any] = {
@@ -100,7 +105,7 @@ def printed_kernels(controller: Controller, printer: Printer) -> PrintedKernels:
     balance = printed.kernel(static.newton, "balance", ("balance_displacement",), steps=steps, named=named)
     shares = bound = target_bound = None
     if kernels.guarded_limits:
-        shares = printed.kernel(kernels.composite_shares, "shares", ("composite_shares",))
+        shares = printed.kernel(kernels.varied_shares, "shares", ("composite_shares",))
     if kernels.composite_bound:
         bound = printed.kernel(kernels.composite_bound, "bound", ("composite_bound",), returned=True)
     # A state that is limited moves the displacement, and so do targets with derivatives.
@@ -172,7 +177,7 @@ def kernel_comments(kernels: ControllerKernels, quick_state: QuickState | None =
         kernels.model.signals[kernels.follow],
         kernels.nominal.signals["drive"],
     )
-    state, within = m.signals.get("state"), f"one sample of {kernels.sample_time} s"
+    state, within = m.signals.get("state"), f"one sample of {'h' if kernels.times else kernels.sample_time} s"
     holds = f"the {state.label}s `state`" if state and m.n_states else "the displacement `wanted`"
     states = ", ".join(f"{name} [{unit}]" for name, unit in zip(m.x_names, m.x_units, strict=True))
     steps = "the step" if kernels.newton_steps == 1 else f"{kernels.newton_steps} Newton steps"

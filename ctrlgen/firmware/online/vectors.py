@@ -106,10 +106,10 @@ def played_vectors(compression: Compression | None, samples: int, clock: Clock) 
 def self_test_calls(c: dict[str, Any]) -> dict[str, int]:
     """What the self test of a context counts: "online_calls" of the controller, and all "calls", with those of the player, its wrap or
     end and the refused ones among them."""
-    estimate, correction = (
-        _counts(c, name) if c[of] else 0 for name, of in (("estimate", "estimated"), ("correction", "correction"))
-    )
-    online = len(c["rows"]) + 2 * c["unusable"] + 2 + 2 * c["lost"] + estimate + _pivot_calls(c) + correction
+    parts = {"estimate": "estimated", "timed": "times", "correction": "correction"}
+    counted = {name: _counts(c, name) if c[of] else 0 for name, of in parts.items()}
+    correction = counted["correction"]
+    online = len(c["rows"]) + 2 * c["unusable"] + 2 + 2 * c["lost"] + _pivot_calls(c) + sum(counted.values())
     player = 0
     if c["player"]:
         wraps = c["closed"] and c["whole"] < 2**32
