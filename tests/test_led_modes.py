@@ -9,8 +9,9 @@ from conftest import DEVICE
 from mechanism_files import dm, loaded
 from two_masses import K1, K2, M1, M2, MASS, STIFFNESS, damping, two_masses
 
-from ctrlgen import InputError, build_model, load_scenario, solve
+from ctrlgen import InputError, build_model, error_budget, fastest, load_scenario, solve
 from ctrlgen.app.scenario_pipeline import compare_only
+from ctrlgen.budget.budget_section import budget_section
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.devices.mechanism.condensed import nominal
 from ctrlgen.devices.mechanism.modes import as_displacements, body_matrices
@@ -24,9 +25,10 @@ CIRCLE = '[path]\nkind = "circle"\ndiameter = "2 um"\nplane = ["delta_x", "delta
 
 
 def solved(folder, how, seconds, path=LINE, rate="2 kHz"):
-    """The path of the device in `folder` with a feedforward."""
+    """The path of the device in `folder` with a feedforward; listed samples say themselves how many `seconds` they take."""
+    lasts = "" if seconds is None else f'duration = "{seconds} s"\n'
     (folder / "s.toml").write_text(
-        f'title = "t"\ndevice = "device.toml"\nsample_rate = "{rate}"\nduration = "{seconds} s"\nfeedforward = "{how}"\n{path}'
+        f'title = "t"\ndevice = "device.toml"\nsample_rate = "{rate}"\n{lasts}feedforward = "{how}"\n{path}'
     )
     scenario = load_scenario(folder / "s.toml")
     return solve(scenario, build_model(scenario.device))
@@ -113,6 +115,23 @@ def test_modes_cannot_be_led_where_there_are_none(tmp_path):
         solved(tmp_path, "modes", 0.05)
 
 
+def test_what_is_not_computed_with_led_modes_is_refused_with_the_reason(tmp_path):
+    """The fastest law and the error budget have the model condensed to its axes alone: an sd of the spring that is led would do nothing."""
+    loaded(tmp_path, two_masses('modes_below = "200 Hz"\n'))
+    solution = solved(tmp_path, "modes", 0.05)
+    (tmp_path / "uncertainty.toml").write_text(
+        'title = "t"\n[numbers]\n"element[1].delta_x_per_F_x" = { sd = "1 %", source = "s" }\n'
+    )
+    with pytest.raises(InputError, match="is not in an error budget"):
+        error_budget(tmp_path / "s.toml", draws=0)
+    section = budget_section(solution)
+    assert section.budget is None and "is not in an error budget" in section.missing
+    with pytest.raises(InputError, match="the fastest path is not computed: its law has no bodies"):
+        fastest(tmp_path / "s.toml")
+    with pytest.raises(InputError, match="robust judges the model condensed to its axes"):
+        solved(tmp_path, "modes", 0.05, LINE + '[robust]\nprobability = "99 %"\n')
+
+
 def test_all_bodies_of_a_stage_with_levers_follow_a_circle_better(tmp_path):
     """The uncondensed 42 freedoms under the solved drives of a circle of 2 um at 20 Hz, periodic: 0.17 nm instead of 2.1."""
     text = (DEVICE.parent / "xy_lever_stage.toml").read_text()
@@ -143,7 +162,16 @@ def test_all_bodies_of_a_stage_with_levers_follow_a_circle_better(tmp_path):
 
 @pytest.mark.long
 def test_the_c_that_leads_modes_is_the_reference(tmp_path):
-    loaded(tmp_path, two_masses('modes_below = "200 Hz"\n'))
-    solved(tmp_path, "modes", 0.1)
-    compared = compare_only(tmp_path / "s.toml").comparison
-    assert compared.passed, [row for row in compared.rows if not row.passed]
+    """From rest to rest, with a correction in the C, in periodic motion, and with a coil that lags."""
+    device, samples = two_masses('modes_below = "200 Hz"\n'), 5e-6 * (1 - np.cos(2 * np.pi * np.arange(100) / 100))
+    points = ", ".join(f'{{ delta_x = "{x:.12g} m" }}' for x in samples)
+    correction = (
+        '[[correction]]\nof = "delta_x"\nkind = "harmonic"\nperiod = "40 um"\nharmonics = 2\nbound = "0.1 um"\n'
+    )
+    closed = f'[path]\nkind = "poses"\nperiodic = true\npoints = [{points}]\n'
+    lagging = device.replace('gain = "1 N/A"', 'gain = "1 N/A"\ntime_constant = "2 ms"')
+    for text, seconds, path in ((device, 0.1, LINE + correction), (device, None, closed), (lagging, 0.1, LINE)):
+        loaded(tmp_path, text)
+        solved(tmp_path, "modes", seconds, path)
+        compared = compare_only(tmp_path / "s.toml").comparison
+        assert compared.passed, [row for row in compared.rows if not row.passed]

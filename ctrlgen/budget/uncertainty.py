@@ -158,6 +158,12 @@ class Uncertainties:
 def load_uncertainties(scenario: Scenario, model: Model, path: Path | str | None = None) -> Uncertainties:
     """What is uncertain of `scenario` with its `model`: its device's stated sds, and the file at `path`, by default uncertainty.toml
     beside the scenario where there is one. Raises InputError listing every fault."""
+    if scenario.file.leads_modes:
+        what = (
+            'is "modes", and what is uncertain of bodies beside the axes is not in an error budget; draw it up for a copy without '
+            "this line, which has that of the model condensed to its axes"
+        )
+        raise InputError(scenario.path, [Fault("feedforward", what)])
     beside = scenario.path.parent / FILE
     file_path = Path(path) if path is not None else beside if beside.is_file() else None
     file, inputs = UncertaintyFile(title=""), dict[str, Input]()

@@ -145,6 +145,10 @@ class ScenarioFile(Section):
             raise ValueError(
                 'robust solves for drives that keep the path, which feedforward = "static" does not; leave out one of them'
             )
+        if self.robust is not None and self.leads_modes:
+            raise ValueError(
+                'robust judges the model condensed to its axes, whose path feedforward = "modes" does not keep; leave out one of them'
+            )
         return self
 
     @model_validator(mode="after")
