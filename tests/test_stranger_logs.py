@@ -11,6 +11,7 @@ from ctrlgen.core.errors import InputError
 from ctrlgen.devices import load_device
 from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.formats import read_table
+from ctrlgen.recordings.formats.foreign_text import CAN, foreign
 from ctrlgen.recordings.formats.named_lines import are_named
 from ctrlgen.recordings.formats.unit_texts import split_name, unit_of
 from ctrlgen.recordings.look.column_facts import table_facts
@@ -43,6 +44,15 @@ def test_what_holds_no_readings_is_refused_with_the_reason(tmp_path):
         with pytest.raises(InputError) as refused:
             table_of(tmp_path, text)
         assert said in str(refused.value), (program, str(refused.value))
+
+
+def test_words_of_a_bus_in_names_and_comments_make_no_trace_of_it():
+    for head in (
+        "t [s],x extended [um],length [um],data",
+        "# Measurement identifier: 4711, data of stage B\nt [s],u,x",
+    ):
+        assert not foreign([*head.split("\n"), *(f"{t},{u},{x},1" for t, u, x in zip(T, U, X, strict=True))])
+    assert foreign(["time;identifier;flags;data bytes", *(f"{t};291;0;41 0A" for t in T)]) == CAN
 
 
 def test_lines_of_other_texts_are_none_that_name_their_numbers():

@@ -15,6 +15,8 @@ ROS = "is what ROS prints of each message; print a table instead: rostopic echo 
 SHORTENED = "is a print with rows left out (...); save the whole table, as to_csv does"
 WRAPPED = "is a print of MATLAB whose columns are broken into blocks; save it with writematrix"
 BYTE = r"[0-9A-Fa-f]{2}"
+CELL = r"(?:^|[,;\t|])\s*\"?(?:{})\"?\s*(?:[,;\t|]|$)".format
+"""A whole cell: such words occur in comments and in names of readings too."""
 LINES = (
     (re.compile(r"\s*\(\d+\.\d+\)\s+\S+\s+[0-9A-Fa-f]{3,8}##?[0-9A-FR]*"), CAN),  # candump -l
     (re.compile(rf"\s*(?:\([^)]*\)\s+)?\S+\s+[0-9A-Fa-f]{{3,8}}\s+\[\d+\](\s+{BYTE})*\s*"), CAN),  # candump
@@ -30,13 +32,9 @@ LINES = (
 )
 """What most lines of a text are."""
 HEADS = (
-    (
-        re.compile(
-            r"(?=.*\b(arbitration_?id|extended|can.?id|identifier)\b)(?=.*\b(dlc|len|length|data(bytes)?)\b).*", re.I
-        ),
-        CAN,
-    ),
-    (re.compile(r"(?=.*\bid\b)(?=.*\bdlc\b).*", re.I), CAN),
+    (re.compile(r"(?=.*\b(arbitration_?id|can.?id)\b)(?=.*\b(dlc|len|length|data(bytes)?)\b).*", re.I), CAN),
+    (re.compile(r"(?=.*\bid\b)(?=.*\b(dlc|len)\b).*", re.I), CAN),
+    (re.compile(rf"(?=.*{CELL('identifier')})(?=.*{CELL('dlc|len|length|data ?(bytes)?')}).*", re.I), CAN),
     (
         re.compile(r"\s*\$(timescale|enddefinitions|var)\b.*"),
         "is VCD, changes of digital signals; export its signals as CSV",
