@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from conftest import ROOT
 from told_apart import alike_in_chart, alike_in_drawing
 
 from ctrlgen.app.simulated import draw_signals, simulate_device
+from ctrlgen.diagnosis.report.plot_uncertainty import WIDE_LABEL, draw_rivals
 from ctrlgen.reporting.chart import Chart, Curve, Panel
 from ctrlgen.reporting.chart_drawing import chart_svg, draw_chart
 from ctrlgen.reporting.line_patterns import DASHES, MARKS
@@ -56,6 +58,19 @@ def test_legends_of_a_path_and_of_what_was_simulated_stand_above_their_panels(ci
             assert len(legends) > 1 and all(legend.y0 >= panel.y1 for legend, panel in legends)
             assert all(-1 <= legend.x0 < legend.x1 <= figure.bbox.x1 + 1 for legend, _ in legends)
             plt.close(figure)
+
+
+def test_the_axis_of_rival_models_is_named_whole_beside_names_as_wide_as_they_come():
+    none = SimpleNamespace(causes=())
+    rounds = [SimpleNamespace(candidates=[none], criteria=[0.0], criterion_before=1.0, before=none)]
+    chosen = SimpleNamespace(fit=SimpleNamespace(structure=none))
+    with plt.rc_context(STYLE):
+        figure = draw_rivals(SimpleNamespace(search=SimpleNamespace(rounds=rounds, chosen=chosen)))
+        figure.axes[0].set_yticks([0], ["x" * WIDE_LABEL])
+        figure.draw_without_rendering()
+        name = figure.axes[0].xaxis.label.get_window_extent()
+        plt.close(figure)
+    assert figure.bbox.x0 <= name.x0 and name.x1 <= figure.bbox.x1
 
 
 def test_no_legend_of_the_program_is_placed_inside_a_panel():

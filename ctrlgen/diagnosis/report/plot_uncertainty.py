@@ -45,7 +45,7 @@ def draw_rivals(diagnosis: Diagnosis) -> Figure | None:
         _rival_bars(panel, round_, kept)
         gained = round_.criterion_before - round_.criteria[0]
         panel.set_title(f"round {k + 1}: the best candidate lowers T by {number(gained, 3)}", fontsize=9, loc="left")
-    axes[-1, 0].set_xlabel("T above that of the best candidate (left of the dotted line: explains equally well)")
+    axes[-1, 0].set_xlabel("T above that of the best candidate\n(left of the dotted line: explains equally well)")
     return figure
 
 
