@@ -12,15 +12,12 @@ from ctrlgen.model.model import Model
 from ctrlgen.recordings.alike_units import alike
 from ctrlgen.recordings.formats.time_stamps import TIME_NAME
 from ctrlgen.recordings.look.column_facts import TableFacts
+from ctrlgen.recordings.look.signal_words import COMMAND_WORDS
 
 WIDE = 5.0  # times the device's own size: no reading of it is as large
 NARROW = 1e-4  # of it: nothing moved, or the unit is another
 FITTING = (0.02, 2.5)  # of the device's size: a reading of it usually spans so much
 EVEN = 0.01  # of a step: rounding of a time that rises evenly
-COMMANDS = frozenset(
-    ("command", "commanded", "cmd", "ref", "reference", "set", "setpoint", "sp", "target", "demand", "desired", "soll")
-)
-"""Words of columns that nobody measured: they stand at their limits because they are told to."""
 
 
 def table_oddities(facts: TableFacts) -> list[str]:
@@ -38,7 +35,7 @@ def table_oddities(facts: TableFacts) -> list[str]:
     for column in facts.columns:
         if column.values is None:
             continue
-        if set(re.findall(r"[a-z]+", column.bare.lower())) & COMMANDS:
+        if set(re.findall(r"[a-z]+", column.bare.lower())) & COMMAND_WORDS:
             continue
         said += [f"{column.name}: stands at its end {end:g} again and again: clipped?" for end in column.clipped()]
     constant = [c.name for c in facts.columns if c.values is not None and not c.moves]
