@@ -31,6 +31,7 @@ LONG = 100
 REVERSE = {"helper_options": {"ad_weight": 1.0, "ad_weight_sp": 1.0}}
 LARGEST_WRITTEN = 6  # rows of a matrix whose inverse is written out: a few hundred operations
 
+Jacobian = Callable[[ca.SX, ca.SX], ca.SX]
 Step = Callable[[ca.MX, ca.MX, list[ca.MX]], tuple[ca.MX, ca.MX]]
 """(T, seed, [Y, u, u at the end of the step, held values, ambient, c]) -> Y and T one step on. Y = (x, z) as in
 `ctrlgen.model.integrators`; `seed` is the transposed derivative of what is constant within the sample."""
@@ -51,13 +52,16 @@ def forward_sensitivities(
 
     if equations.steps is None:
         values = [equations.following, equations.y]
-        one = ca.Function("one", equations.given, [*values, *_transposed_jacobians(values, symbols)], {"cse": True})
+        transposed = _transposed_jacobians(values, symbols, jacobian_of(equations))
+        one = ca.Function("one", equations.given, [*values, *transposed], {"cse": True})
         following, y, *by = one(*given)
         return following, chain(*by[: len(symbols)]), y, chain(*by[len(symbols) :])
     m = equations.model
     # once a sample, at its beginning
     once = [equations.y, m.held_value, ca.vertcat(ca.SX(0, 1), *m.stepped.values())]
-    first = ca.Function("first", equations.given, [*once, *_transposed_jacobians(once, symbols)], {"cse": True})
+    first = ca.Function(
+        "first", equations.given, [*once, *_transposed_jacobians(once, symbols, shortest_jacobian)], {"cse": True}
+    )
     y, held, stepped, *by = first(*given)
     Y, of_held, of_stepped = (chain(*by[i * len(symbols) : (i + 1) * len(symbols)]) for i in range(3))
     constant = ca.horzcat(of_held, seed) if seed.nnz() else of_held
@@ -90,9 +94,15 @@ def _pattern(sparsity: ca.Sparsity) -> np.ndarray:
     return entries
 
 
-def _transposed_jacobians(values: list[ca.SX], symbols: list[ca.SX]) -> list[ca.SX]:
+def _transposed_jacobians(values: list[ca.SX], symbols: list[ca.SX], jacobian: Jacobian) -> list[ca.SX]:
     """(d value/d symbol)', sparse, of each value by each symbol in turn."""
-    return [ca.sparsify(shortest_jacobian(value, symbol)).T for value in values for symbol in symbols]
+    return [ca.sparsify(jacobian(value, symbol)).T for value in values for symbol in symbols]
+
+
+def jacobian_of(equations: SampleEquations) -> Jacobian:
+    """How a sample is differentiated as a whole. Of settled poses, in which few lags follow one signal, both directions take as many
+    operations, and to write out both takes half as long again."""
+    return ca.jacobian if equations.poses else shortest_jacobian
 
 
 def shortest_jacobian(value: ca.SX, symbol: ca.SX) -> ca.SX:
@@ -210,7 +220,7 @@ def _step_with_jacobians(equations: SampleEquations, c_varies: bool) -> ca.Funct
     value = equations.integrator.nonlinear_rates(equations.model)
     N = ca.Function("N", [Y, u, held, e, c], [value])
     jacobians = ca.Function(
-        "jacobians", [Y, u, held, e, c], _transposed_jacobians([value], [Y, constant]), {"cse": True}
+        "jacobians", [Y, u, held, e, c], _transposed_jacobians([value], [Y, constant], shortest_jacobian), {"cse": True}
     )
     if isinstance(equations.integrator, ExponentialRungeKutta):
         # called at each point, not written out there: a quarter of the code, which takes longer to compile than to run

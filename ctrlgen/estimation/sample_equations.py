@@ -21,7 +21,7 @@ class SampleEquations:
     """S at the next sample, `following`, and the readings `y`, as expressions in `given`: S, u, u+, ambient, c.
 
     `constants` is p -> c, dc/dp. A model with inertia takes the `steps` of its integrator within the sample, under a drive
-    that is `linear` or held; `model` states its rates in terms of c.
+    that is `linear` or held; `model` states its rates in terms of c. A sample is one of settled `poses`, or of a series.
     """
 
     constants: ca.Function
@@ -31,6 +31,7 @@ class SampleEquations:
     following: ca.SX
     y: ca.SX
     given: list[ca.SX]
+    poses: bool
 
     @property
     def integrator(self) -> ExponentialRungeKutta | ImplicitRadau:
@@ -71,7 +72,7 @@ def build_sample_equations(
     following, y = ca.cse([following, y])
     given = [ca.vertcat(model.x, model.z), model.u, sample.u_next, model.ambient_symbol, c]
     steps = integrator_of(model, sample_time, finer) if model.inertial else None
-    return SampleEquations(constants, model, steps, linear, following, y, given)
+    return SampleEquations(constants, model, steps, linear, following, y, given, poses)
 
 
 def _one_step(model: Model, sample_time: float, linear: bool, poses: bool, finer: int) -> Sample:

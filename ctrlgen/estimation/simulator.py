@@ -19,8 +19,8 @@ from ctrlgen.devices import Device
 from ctrlgen.estimation.forward_sensitivities import (
     LONGEST_SAMPLE,
     forward_sensitivities,
+    jacobian_of,
     reached_entries,
-    shortest_jacobian,
     written_out,
 )
 from ctrlgen.estimation.hypothesis import nominal_physics
@@ -147,7 +147,7 @@ class Simulator:
     def _jacobians(self) -> ca.Function:
         """S, u, u+, ambient, c -> F_S, F_c, H_S, H_c, a sample differentiated as a whole."""
         q = self.equations
-        jacobians = [shortest_jacobian(value, by) for value in (q.following, q.y) for by in (q.given[0], q.given[4])]
+        jacobians = [jacobian_of(q)(value, by) for value in (q.following, q.y) for by in (q.given[0], q.given[4])]
         return ca.Function("jacobians", q.given, jacobians)
 
     def _jacobians_by_steps(self, pattern: ca.Sparsity) -> ca.Function:
