@@ -90,6 +90,8 @@ def test_a_number_that_stopped_at_its_bound_is_not_measured_and_a_fit_decides():
     fit = fit_of("asymmetric_displacement_hysteresis", numbers, 0.05)
     assert may_be_plainer(fit, 0) is None
     assert may_be_plainer(fit, 0, bounds_tell=False).effect == "displacement_hysteresis"
+    nearly = fit_of("asymmetric_displacement_hysteresis", numbers | {"lower": -0.5995}, 0.05)
+    assert may_be_plainer(nearly, 0, bounds_tell=False) is not None
     measured = fit_of("asymmetric_displacement_hysteresis", numbers | {"lower": -0.5}, 0.05)
     assert may_be_plainer(measured, 0, bounds_tell=False) is None
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 from axis_records import AXIS, BACKLASH, NOISE, fitter_of, played
 
-from ctrlgen.diagnosis.selection import search
-from ctrlgen.diagnosis.selection.other_laws import stands_for_another
+from ctrlgen.diagnosis.selection import other_laws, search
+from ctrlgen.diagnosis.selection.other_laws import stands_for_another, takes_over
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.estimation.hypothesis import Hypothesis
@@ -39,6 +39,15 @@ def test_a_hysteresis_of_which_all_lags_is_a_play(searched):
     assert BACKLASH in found.causes and LOOP not in found.causes and len(rounds) > 0
     assert searcher.trials is not before and searcher.trials.screen.hypotheses == [LOOP, BACKLASH, GAIN]
     assert len(searcher.trials.log) > len(rounds) and searcher.trials.screen.fitter is searcher.trials.fitter
+
+
+def test_what_stands_for_another_itself_takes_nothing_over(searched, monkeypatch):
+    trials, loop = searched[0].trials, searched[1]
+    both = Structure(AXIS).with_cause(BACKLASH, {"gap": GAP}).with_cause(GAIN, {"gain": 0.3})
+    play = trials.fit(both, BACKLASH, FIT.max_steps)
+    assert takes_over(trials, play, loop, 0) and not takes_over(trials, loop, loop, 0)
+    monkeypatch.setattr(other_laws, "stands_for_another", lambda fit, k: True)
+    assert not takes_over(trials, play, loop, 0)
 
 
 def test_nothing_is_searched_again_where_no_cause_stands_for_another(searched, monkeypatch):

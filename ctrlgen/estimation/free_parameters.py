@@ -13,6 +13,10 @@ from ctrlgen.estimation.hypothesis import DEVICES_KEPT, PARAMETER, Hypothesis, n
 from ctrlgen.estimation.settings import FIT
 from ctrlgen.model.assembly import movable
 
+SHAPE_AT_BOUND = 1e-3
+"""Share of the range of a shape, or of itself where it is positive, within which it is at its bound: a fit stops there, since what
+the shape changes fades toward it."""
+
 
 @dataclass(frozen=True)
 class FreeParameter:
@@ -35,6 +39,11 @@ class FreeParameter:
     def name(self) -> str:
         """The parameter's name in its effect; "value" for a number of the device."""
         return self.path.rpartition(".")[2] if self.path.startswith("effect[") else "value"
+
+    def shape_ends(self, value: float) -> tuple[bool, bool]:
+        """Whether a fit that leaves this number of a law, no amplitude, at `value` has ended at its low bound, at its high one."""
+        span = SHAPE_AT_BOUND * (value if self.low > 0 else self.high - self.low)
+        return value <= self.low + span, value >= self.high - span
 
 
 def free_parameters(

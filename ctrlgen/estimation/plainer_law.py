@@ -7,13 +7,9 @@ from dataclasses import replace
 from scipy import stats
 
 from ctrlgen.estimation.fit import Fit
-from ctrlgen.estimation.free_parameters import FreeParameter
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 from ctrlgen.estimation.robust_covariance import robust_deviations
 from ctrlgen.estimation.settings import STATISTICS
-
-AT_BOUND = 1e-6
-"""Of its range, by which a number may be off its bound and is at it: what a fit that stops there leaves to rounding."""
 
 
 def may_be_plainer(fit: Fit, k: int, bounds_tell: bool = True) -> Hypothesis | None:
@@ -32,12 +28,8 @@ def may_be_plainer(fit: Fit, k: int, bounds_tell: bool = True) -> Hypothesis | N
     z = stats.norm.isf(stats.norm.sf(STATISTICS.z_95) / len(neutral))
     rows = zip(fit.structure.free_parameters, fit.theta, deviations, strict=True)
     there = ((u, v, sd) for u, v, sd in rows if u.cause == k and u.name in neutral)
-    told = ((u, v, sd) for u, v, sd in there if bounds_tell or not _at_bound(u, float(v)))
+    told = ((u, v, sd) for u, v, sd in there if bounds_tell or not any(u.shape_ends(float(v))))
     return None if any(abs(v - neutral[u.name]) > z * sd for u, v, sd in told) else replace(cause, effect=relation.kind)
-
-
-def _at_bound(number: FreeParameter, value: float) -> bool:
-    return min(value - number.low, number.high - value) <= AT_BOUND * (number.high - number.low)
 
 
 def plainer_start(fit: Fit, k: int, plain: Hypothesis) -> dict[str, float]:

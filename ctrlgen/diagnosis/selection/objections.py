@@ -16,6 +16,7 @@ from ctrlgen.diagnosis.selection.way_covered import way_covered
 from ctrlgen.diagnosis.settings import OBJECTIONS
 from ctrlgen.effects import Param
 from ctrlgen.estimation.fit import Fit
+from ctrlgen.estimation.free_parameters import SHAPE_AT_BOUND
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 from ctrlgen.estimation.noise import period_of
 from ctrlgen.estimation.raw_readings import detect_directly
@@ -96,9 +97,8 @@ def _at_a_bound(fit: Fit, k: int) -> str | None:
         stated = cause.prior.at_bounds.get(u.name)
         if u.cause != k or stated is None:
             continue
-        ways = u.low > 0
-        span = OBJECTIONS.shape_at_bound * (value if ways else u.high - u.low)
-        if other := (stated.low if value <= u.low + span else "") or (stated.high if value >= u.high - span else ""):
+        ways, (at_low, at_high) = u.low > 0, u.shape_ends(float(value))
+        if other := (stated.low if at_low else "") or (stated.high if at_high else ""):
             return f"its {u.name} is at a bound of {with_unit(float(from_si(value, u.unit)), u.unit, 3)}, where it is {other}"
         told, beside = (value * size for size in _told(fit, k, i))
         if stated.untold and ways and told < OBJECTIONS.told_shape:
@@ -151,7 +151,7 @@ def _no_pitch(recording: Recording, fit: Fit, k: int) -> str | None:
     if cause.effect == PARAMETER or not any(_is_spatial_period(cause, p) for p in cause.law.params):
         return None
     periods = _line(fit, k) * _covered(recording, cause, fit)
-    if periods > OBJECTIONS.fewest_pitches * (1 + OBJECTIONS.shape_at_bound):  # at its bound it would go on growing
+    if periods > OBJECTIONS.fewest_pitches * (1 + SHAPE_AT_BOUND):  # at its bound it would go on growing
         return None
     return (
         f"the reading covers {periods:.1f} periods of it, and {OBJECTIONS.fewest_pitches:g} are needed to see it repeat"

@@ -11,10 +11,9 @@ from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, l
 from ctrlgen.diagnosis.selection.candidates import significant, trying
 from ctrlgen.diagnosis.selection.confusable import explains_alike, explains_better
 from ctrlgen.diagnosis.selection.model_selection import scored
-from ctrlgen.diagnosis.selection.objections import outside_its_range
+from ctrlgen.diagnosis.selection.other_laws import stands_for_another
 from ctrlgen.diagnosis.selection.precedence import counterparts, explains_alike_but_for_odds
 from ctrlgen.diagnosis.selection.subset_search import Suspect
-from ctrlgen.diagnosis.selection.supported import amplitude_may_be_zero
 from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
 from ctrlgen.estimation.fit import Fit
@@ -153,9 +152,8 @@ def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Rou
     there, plainer = current.causes, _as_plainer(trials, current, k)
     tried = [t for r in rounds for t in r.candidates if not current.errors.is_noise]
     candidates = [*plainer, *replacements(trials, current, k), *_in_place_of(k, there, tried)]
-    # at the end of its range, or of a size that may be zero, the cause stands for something else, which need not do quite as well
-    open_ = outside_its_range(current.fit, k) or amplitude_may_be_zero(current.fit, k)
-    slack = SEARCH.bound_slack if open_ else 0.0
+    # what the cause stands for need not do quite as well
+    slack = SEARCH.bound_slack if stands_for_another(current.fit, k) else 0.0
 
     def is_alike(t: CandidateModel) -> bool:
         return t in plainer or explains_alike(trials.selection, t, current, slack)

@@ -126,8 +126,8 @@ class SearchSettings:
     most_rivals: int = 8
     """Rivals fitted for a cause, beside those in a region: some of them meet an objection."""
     bound_slack: float = 9.0
-    """Difference of the criterion by which a rival may be worse than what explains alike, where the amplitude of the cause is at the
-    end of its range, or may be zero: three standard deviations more. Judgement."""
+    """Difference of the criterion by which a rival may be worse than what explains alike, where the cause has come to stand for
+    something else (`other_laws`): three standard deviations more. Judgement."""
     most_searches_without: int = 2
     """Causes that have come to stand for something else, at most, without which is searched again: each search costs about as much
     as the first. Judgement."""
@@ -244,9 +244,7 @@ class ObjectionsSettings:
     apart: float = 0.5
     """Cycles by which two lines must part within the records to fit: nearer, they beat as one."""
     at_bound: float = 1e-6
-    """Share of a parameter's range within which it is at its bound."""
-    shape_at_bound: float = 1e-3
-    """The same of a shape, of which a fit stops sooner: what it changes fades toward the bound."""
+    """Share of an amplitude's range within which it is at its bound; of a shape see `SHAPE_AT_BOUND`."""
     told_shape: float = 1.0
     """Standard deviations by which all readings together must depend on a shape, per factor of e, to tell it."""
     told_loop: float = 3.0
