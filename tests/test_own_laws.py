@@ -6,19 +6,22 @@ import os
 import subprocess
 import sys
 import tomllib
+from dataclasses import replace
 from importlib.metadata import distributions
 from pathlib import Path
 
 import numpy as np
 import pytest
-from axis_records import AXIS, NOISE, drive, move, record
+from axis_records import AXIS, NOISE, axis_fitter, drive, move, record
 from conftest import AXIS_FILE, ROOT
 from markdown_it import MarkdownIt
 from recovery import N, Planted, fitter_of, recover
 
 from ctrlgen import InputError, build_model, load_device, simulate, version
+from ctrlgen.diagnosis.selection.objections import another_law
 from ctrlgen.effects import Effect, installed, load_laws
-from ctrlgen.estimation.hypothesis import selected_laws
+from ctrlgen.estimation.hypothesis import Hypothesis, selected_laws
+from ctrlgen.estimation.structure import Structure
 
 ON_AXIS = """
 [[effect]]
@@ -102,6 +105,17 @@ def test_a_diagnosis_finds_it_with_its_numbers(page):
     recover(fitter, AXIS, "slack_cable", Planted("stage:axis", {"stiffness": 2e4, "gap": 3e-5}))
 
 
+def test_a_cable_that_is_never_loose_is_another_law_as_its_author_says(page):
+    """Without an entry in a table of ours; where he says nothing it keeps its name."""
+    law = installed().laws["slack_cable"]
+    fitter, _ = axis_fitter(n=100).described(AXIS)
+    begun = Structure(AXIS).with_cause(Hypothesis("slack_cable", "stage:axis", "axis"), {"stiffness": 2e4, "gap": 0.0})
+    fit = fitter.fit(begun, steps=0)
+    assert another_law(fit, 0) == "its gap is at a bound of 0 um, where it is another stiffness to one side"
+    law.prior = replace(law.prior, at_bounds={})
+    assert another_law(fit, 0) is None
+
+
 def stage(folder: Path, package: str = "") -> Path:
     file = folder / "stage.toml"
     file.write_text(AXIS_FILE.read_text() + ON_AXIS.format(package=package))
@@ -147,6 +161,13 @@ WRONG = {
     "vector": ("s.displacement -", "s.displacements -", "must be one number"),
     "bounds": ("(0.0, 20.0)", "(20.0, 0.0)", "bounds 20 ... 0"),
     "reserved": ('"gap"', '"package"', "cannot name a number"),
+    "shape": ('at_bounds={"gap"', 'at_bounds={"gape"', "prior states something of gape"),
+    "ends": (
+        'ShapeBounds(low="another stiffness to one side")',
+        '"a spring"',
+        "gap must be stated as a ShapeBounds",
+    ),
+    "prior": ("    prior = ", '    prior = "rare"\n    other = ', "prior must be a"),
     "needs": ("    place =", "    requires = frozenset({'steam'})\n    place =", "requires steam"),
 }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ctrlgen.effects import Effect, Param
+from ctrlgen.effects import Effect, Param, Side
 from ctrlgen.estimation.law_prior import LawPrior, default_starts
 from ctrlgen.estimation.priors import DEFAULT, PRIORS, prior_of
 
@@ -39,7 +39,24 @@ def test_every_shape_states_what_the_law_is_at_its_bounds(law):
     """A law that is never suspected ends at none; one of another package may state it in its own row."""
     prior = prior_of(law)
     shapes = {p.name for p in law.params if p.off is None}
-    assert set(prior.at_bounds) == (shapes if prior.suspected or prior.refines else set())
+    wanted = shapes if prior.suspected or prior.refines else set()
+    open_, needless = sorted(wanted - set(prior.at_bounds)), sorted(set(prior.at_bounds) - wanted)
+    told = f"state in estimation/shape_bounds.py what {law.kind} is where these end at a bound, ITSELF if still itself"
+    assert not open_, f"{told}: {', '.join(open_)}"
+    assert not needless, (
+        f"shape_bounds.py states of {law.kind} what is no shape of a suspected law: {', '.join(needless)}"
+    )
+
+
+def test_a_law_in_a_region_is_that_of_everywhere_where_its_edge_leaves_all_of_the_motion_inside():
+    """Above an edge that lies lowest, below one that lies highest, beyond one that is narrowest; an event in time is none."""
+    told = set()
+    for kind, law in Effect.library.items():
+        ends = law.acts_in and prior_of(law).at_bounds.get(law.acts_in.at)
+        if ends and (ends.low or ends.high):
+            told.add(kind)
+            assert bool(ends.high) == (law.acts_in.side is Side.BELOW) != bool(ends.low), kind
+    assert {"coulomb_above", "coulomb_below", "stiffness_above", "stiffness_below", "stiffness_beyond"} < told
 
 
 @every_law

@@ -52,8 +52,20 @@ def _declared(law: type[Effect]) -> Iterator[str]:
     names = [number.name for number in law.params]
     if sum(p.off is not None for p in law.params) != 1 or len(set(names)) < len(names):
         yield "exactly one parameter must have an `off` value, and no two the same name"
+    if law.prior is not None:
+        yield from _prior(law.prior, names)
     if law.term is Effect.term:
         yield "term() is missing: what the law adds at its place"
+
+
+def _prior(prior: object, names: list[str]) -> Iterator[str]:
+    """A prior is of `estimation`, which laws do not import: known by what it states."""
+    parameters, at_bounds = (getattr(prior, part, None) for part in ("parameters", "at_bounds"))
+    if parameters is None or at_bounds is None:
+        yield "prior must be a ctrlgen.estimation.law_prior.LawPrior"
+        return
+    for name in sorted({*parameters, *at_bounds} - {*names}):
+        yield f"prior states something of {name}, which is no parameter"
 
 
 def _number(number: Param | State) -> Iterator[str]:

@@ -380,5 +380,8 @@ _ROWS: Mapping[str, LawPrior] = MappingProxyType(
     }
 )
 PRIORS: Mapping[str, LawPrior] = MappingProxyType(
-    {kind: replace(row, at_bounds=AT_BOUNDS.get(kind, {})) for kind, row in _ROWS.items()}
+    {
+        kind: replace(_ROWS.get(kind, DEFAULT), at_bounds=AT_BOUNDS.get(kind, {}))
+        for kind in sorted({*_ROWS, *AT_BOUNDS})
+    }
 )
