@@ -18,6 +18,7 @@ ARGUED = {
     ("devices/run_time.py", "Value error, "): "the same",
     ("firmware/c/expression_graph.py", "1 / "): "C text that this file wrote: the formula of an operation",
     ("firmware/c/expression_graph.py", "(1 / "): "the same",
+    ("effects/_channel_group.py", "all in "): "what `at` of an effect may say in a device file",
     ("recordings/formats/time_stamps.py", "month first"): "what recording.toml may say of dates",
 }
 

@@ -274,7 +274,7 @@ class Simulator:
             others = self._symbols_of(self._with_rates)[1:]
             S, T = state[: self.n_s], ca.MX(reached, ca.vec(state[self.n_s :]))  # of none, a row otherwise
             following, T, y, Y = forward_sensitivities(self._with_rates, T, seed, [S, *others])
-            carried = ca.vec(ca.project(T, reached)).nz[:]  # of a single row, nz alone would be a row
+            carried = ca.vec(ca.project(T, reached).nz[:])  # of a single row or of none, nz alone would be a row
             values = [ca.vertcat(following, carried), ca.vertcat(y, ca.vec(ca.densify(Y)))]
             one = ca.Function("one", [state, *others, c_p], [ca.densify(value) for value in values])
             whole = self._with_rates.steps is None
