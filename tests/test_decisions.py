@@ -11,6 +11,7 @@ from conftest import ROOT
 PACKAGE = ROOT / "ctrlgen"
 SEARCHES = {"startswith", "endswith", "find", "rfind", "index", "count", "partition", "removeprefix", "removesuffix"}
 ARGUED = {
+    ("app/commands/result_folder.py", "# result of "): "a line of `.ctrlgen` that this file wrote",
     (
         "core/files.py",
         "Value error, ",

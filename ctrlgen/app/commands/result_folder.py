@@ -52,15 +52,15 @@ def _source(file: Path) -> Path:
 
 def note_source(folder: Path, of: Path) -> None:
     """Notes in a finished result what it is the result of, for `out_of`; in a folder that may not be written nothing is noted."""
-    from ctrlgen.core.files import MARKER
+    from ctrlgen.core.files import MARKER, write_text
 
     way = os.path.relpath(_source(of), folder.resolve())
     try:
         marker = folder / MARKER
         lines = marker.read_text(encoding="utf-8").splitlines() if marker.exists() else []
         kept = [line for line in lines if not line.startswith(SOURCE)]
-        marker.write_text("\n".join([*kept, SOURCE + way]) + "\n", encoding="utf-8")
-    except OSError:
+        write_text(marker, "\n".join([*kept, SOURCE + way]) + "\n")
+    except (OSError, InputError):
         return
 
 
