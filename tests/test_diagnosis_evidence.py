@@ -21,7 +21,7 @@ from ctrlgen.diagnosis.evidence.excitation_signals import admissible, time_serie
 from ctrlgen.diagnosis.evidence.experiment_design import separate
 from ctrlgen.diagnosis.evidence.experiment_files import files
 from ctrlgen.diagnosis.evidence.ltv_linearisation import linearise_along
-from ctrlgen.diagnosis.evidence.residual_localisation import localise_residual
+from ctrlgen.diagnosis.evidence.residual_localisation import localise_residual, regions_of
 from ctrlgen.diagnosis.evidence.residual_location import LocatedIn
 from ctrlgen.diagnosis.evidence.spectral_lines import spectral_lines
 from ctrlgen.diagnosis.evidence.supporting_analyses import run_supporting_analyses
@@ -387,3 +387,9 @@ def test_noise_of_one_colour_is_taken_at_its_density():
     left = mapped(fitter)[1]
     found = estimate_unknown_input(left[0], noise, np.array([K * NOISE]))
     assert np.mean(np.abs(found.f) < 1.96 * found.sd) > 0.9
+
+
+def test_a_rounding_of_zero_is_no_end_of_a_region():
+    travel = np.linspace(0.0, 6e-6, 101)
+    travel[0] = -3.4e-21
+    assert next(text for text, _ in regions_of(travel, "um")) == "0 ... 1.2 um"

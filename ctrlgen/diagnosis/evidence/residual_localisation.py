@@ -24,6 +24,8 @@ from ctrlgen.diagnosis.evidence.residual_location import (
 from ctrlgen.diagnosis.evidence.spectral_lines import spectral_lines
 from ctrlgen.diagnosis.settings import LOCALISATION
 
+ROUNDING = 1e-12  # of a range: an edge nearer to zero is zero but for rounding
+
 
 def localise_residual(
     models: list[LtvModel], channels: tuple[str, ...], units: tuple[str, ...], seed: int = 0
@@ -43,13 +45,13 @@ def localise_residual(
     for i, axis in enumerate(axes):
         a, sized, unit = maps.actuators[:, i], maps.actuators_white[:, i], models[0].units[i]
         actuators += maps.sizes(sized, maps.complete, [(axis, np.ones(maps.n, bool))], a, unit)
-        regions[axis] = maps.sizes(sized, maps.complete, _quintiles(maps.z[:, i], models[0].travel_unit), a, unit)
+        regions[axis] = maps.sizes(sized, maps.complete, regions_of(maps.z[:, i], models[0].travel_unit), a, unit)
         sides = [("forward", maps.direction[:, i] > 0), ("backward", maps.direction[:, i] < 0)]
         directions[axis] = maps.sizes(
             sized, maps.complete, sides, _without_position(a, maps.z[:, i], maps.complete), unit
         )
     norm, whole = np.sqrt(np.mean(maps.white**2, axis=1)), np.any(maps.usable, axis=1)
-    ambient = _quintiles(maps.ambient, "delta_degC") if maps.ambient is not None else []
+    ambient = regions_of(maps.ambient, "delta_degC") if maps.ambient is not None else []
     located = ResidualLocationEntry(
         excess=maps.excess,
         by_reading=_shared(outputs),
@@ -71,9 +73,11 @@ def localise_residual(
     return located.model_copy(update={"statements": _statements(located)})
 
 
-def _quintiles(values: np.ndarray, unit: str) -> list[tuple[str, np.ndarray]]:
+def regions_of(values: np.ndarray, unit: str) -> list[tuple[str, np.ndarray]]:
+    """The fifths of `values` (n,): their ends as text in `unit`, and which of the values are in each (n,)."""
     edges = np.unique(np.quantile(values, np.linspace(0, 1, LOCALISATION.regions + 1)))
     shown = difference(edges, unit)
+    shown = np.where(np.abs(shown) < ROUNDING * np.ptp(shown), 0.0, shown)
     return [
         (f"{shown[k]:.4g} ... {shown[k + 1]:.4g} {unit}", (values >= edges[k]) & (values <= edges[k + 1]))
         for k in range(len(edges) - 1)
