@@ -137,6 +137,14 @@ def test_what_is_not_computed_with_led_modes_is_refused_with_the_reason(tmp_path
         solved(tmp_path, "modes", 0.05, LINE + '[robust]\nprobability = "99 %"\n')
 
 
+def test_static_drives_have_no_fastest_path(tmp_path):
+    """The law of time is that of the inertia, which static drives leave out: between its set-points they were 81 um off."""
+    loaded(tmp_path, two_masses('modes_below = "200 Hz"\n'))
+    solved(tmp_path, "static", 0.05)
+    with pytest.raises(InputError, match='is "static", whose drives do not follow a path this fast'):
+        fastest(tmp_path / "s.toml")
+
+
 def test_all_bodies_of_a_stage_with_levers_follow_a_circle_better(tmp_path):
     """The uncondensed 42 freedoms under the solved drives of a circle of 2 um at 20 Hz, periodic: 0.17 nm instead of 2.1."""
     text = (DEVICE.parent / "xy_lever_stage.toml").read_text()

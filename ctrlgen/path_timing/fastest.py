@@ -131,6 +131,9 @@ def fastest(
     if scenario.file.leads_modes:
         what = 'is "modes", for which the fastest path is not computed: its law has no bodies beside the axes; leave it out of a copy'
         raise InputError(scenario.path, [Fault("feedforward", what)])
+    if model.inertial and scenario.file.feedforward == "static":
+        what = 'is "static", whose drives do not follow a path this fast; leave it out of a copy'
+        raise InputError(scenario.path, [Fault("feedforward", what)])
     if model.clocks:
         what = "changes with time by itself, so that the fastest path depends on when it begins; leave the effect out"
         raise InputError(model.name, [Fault("effect", what)])
