@@ -358,8 +358,8 @@ def test_a_verdict_says_what_to_do(found):
         (0.041, 0.039, 0.043, "1", "4.1 % (3.9 ... 4.3 %)"),
         (312.0, 300.0, 324.0, "nm", "312 nm (300 ... 324 nm)"),
         (2.5, 2.4, 2.6, "1", "2.5 (2.4 ... 2.6)"),
-        (0.5, 0.3, 0.5, "s", "0.5 s (0.3 ... 0.5 s, at its bound)"),
-        (0.5, -np.inf, np.inf, "s", "0.5 s (this recording does not determine it)"),
+        (0.5, 0.3, 0.5, "s", "500 ms (300 ... 500 ms, at its bound)"),
+        (0.5, -np.inf, np.inf, "s", "500 ms (this recording does not determine it)"),
     ],
 )
 def test_intervals_read_well(value, low, high, unit, says):

@@ -80,9 +80,9 @@ def test_what_a_page_tells_the_reader_to_do_works(name, tmp_path):
 @pytest.mark.long
 def test_the_first_firmware_works(tmp_path):
     assert follow(["tutorial/first_firmware.md"], tmp_path) > 0
-    assert (tmp_path / "out" / "report.html").is_file()
+    assert (tmp_path / "out" / "circle20" / "report.html").is_file()
     shown = [text for language, _, text in blocks("tutorial/first_firmware.md") if language == "c"]
-    headers = "".join(path.read_text(encoding="utf-8") for path in (tmp_path / "out" / "c").glob("*.h"))
+    headers = "".join(path.read_text(encoding="utf-8") for path in (tmp_path / "out" / "circle20" / "c").glob("*.h"))
     names = {name for text in shown for name in re.findall(r"\w+_online_\w+", text)}
     assert names and all(re.search(rf"\b{name}\b", headers) for name in names)
 
