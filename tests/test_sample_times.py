@@ -176,7 +176,7 @@ def test_c_and_python_agree_at_any_times(both):
     c.c_init(c.at)
     believed, times = mine.rest(), [SHORTEST, 0.7e-3, NOMINAL, 1.5e-3, LONGEST]
     for k in range(150):
-        since, ahead = rng.choice(times, 2) if k % 11 else rng.choice([0.4e-3, np.nan, NOMINAL], 2)
+        since, ahead = rng.choice(times, 2) if k % 11 else rng.choice([0.4e-3, 2.5e-3, np.nan, NOMINAL], 2)
         target = T[rng.integers(len(T))] * (1 if k % 13 else np.nan)
         held = np.array(c.out.drive)
         step, believed = mine.step_after(believed, since, ahead, target, held)

@@ -50,9 +50,8 @@ def answer(kernel: ca.Function, *arguments: object) -> np.ndarray:
 
 def clamp(wanted: np.ndarray, low: np.ndarray, high: np.ndarray, slack: np.ndarray) -> tuple[np.ndarray, bool]:
     """`wanted` clipped to low ... high (NaN to low), and whether that changed it by more than `slack`; true for NaN."""
-    if (
-        (wanted > low) & (wanted < high)
-    ).all():  # as most are; at a bound of zero the sign of the answer is the bound's
+    inside = (wanted > low) & (wanted < high)
+    if inside.all():  # as most are; at a bound of zero the sign of the answer is the bound's
         return wanted, False
     raised = np.where(wanted > low, wanted, low)
     limited = np.where(raised < high, raised, high)
