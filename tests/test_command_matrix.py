@@ -14,9 +14,9 @@ import typer
 from conftest import DEVICES, SCENARIOS
 
 from ctrlgen.app.commands.cli import app
-from ctrlgen.app.commands.result_folder import name_of, out_of
+from ctrlgen.app.commands.result_folder import name_of, note_source, out_of
 from ctrlgen.app.shipped_examples import examples
-from ctrlgen.core.errors import CtrlgenError
+from ctrlgen.core.errors import CtrlgenError, InputError
 
 FEW = 24  # samples of a path, so that every scenario can be tried: rates are lowered to it
 TABLES = {path: tomllib.loads(path.read_text()) for path in sorted(SCENARIOS.rglob("*.toml"))}
@@ -128,6 +128,20 @@ def test_the_name_of_a_folder_is_that_of_what_it_is_of(tmp_path, monkeypatch):
     assert name_of(Path("radius_1.5um")) == "radius_1.5um"
     assert name_of(Path()) == name_of(Path("scenario.toml")) == tmp_path.name
     assert out_of(Path("x"), Path("b/stage.toml"), "workspace") == Path("x")
+
+
+def test_another_device_has_a_folder_of_its_own(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    scenario, devices = Path("circle.toml"), [Path("a/stage.next.toml"), Path("b/stage.next.toml")]
+    folders = [out_of(None, scenario, "solve", device) for device in (None, *devices)]
+    assert folders == [Path("out/circle_solve"), *[Path("out/circle_solve_on_stage.next")] * 2]
+    for folder, device in zip(folders, (None, devices[0]), strict=False):
+        folder.mkdir(parents=True)
+        note_source(folder, scenario, device)
+        note_source(folder, scenario, device)  # done again
+        assert out_of(None, scenario, "solve", device) == folder
+    with pytest.raises(InputError, match=r"circle.toml on .*a/stage.next.toml"):
+        out_of(None, scenario, "solve", devices[1])
 
 
 def test_a_folder_that_nobody_named_is_told_and_replaces_nothing_of_somebody_else(tmp_path, monkeypatch, capsys):

@@ -64,6 +64,19 @@ def test_its_folder_holds_a_matrix_device_that_follows_it(every, tmp_path):
     assert "42 numbers fitted to 24 poses" in page and "device.calibrated.toml" in page
 
 
+def test_readings_in_any_order_give_the_same_jacobian(every, tmp_path):
+    lines = (POSES / "recording.toml").read_text().splitlines()
+    readings = [line for line in lines if line.startswith('"reading.')]
+    others = [line for line in lines if line not in readings]
+    (tmp_path / "recording.toml").write_text("\n".join([*others, *readings[::-1]]))
+    for table in POSES.glob("*.csv"):
+        (tmp_path / table.name).write_bytes(table.read_bytes())
+    turned = calibrate_poses(MESO_FILE, [tmp_path])
+    assert turned.recording.channels == every.recording.channels[::-1]
+    for at, expected in ((turned.jacobian, every.jacobian), (turned.sd, every.sd)):
+        assert np.abs(at - expected).max() < 1e-9 * np.abs(expected).max()  # sums in another order
+
+
 def stage_of(J: np.ndarray) -> str:
     """A device file of a stage by its Jacobian in um and urad per volt, of which it follows as many directions as it has drives."""
     k = J.shape[1]

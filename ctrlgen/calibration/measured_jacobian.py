@@ -41,6 +41,8 @@ from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recording import Record, Recording
 from ctrlgen.trajectory.scenario import Input, device_inputs
 
+READINGS = tuple(f"reading.{channel}" for channel in CHANNELS)
+
 
 class JacobianNumbers(Enum):
     """Which numbers are fitted."""
@@ -104,8 +106,7 @@ def calibrate_poses(
         what = f"has {drives} drives, more than a pose has components: a Jacobian is calibrated for {len(CHANNELS)} or fewer"
         raise InputError(device, [Fault("drive", what)])
     recording = with_plausibility(load_recordings(list(recordings), model), model)
-    wanted = tuple(f"reading.{channel}" for channel in CHANNELS)
-    if recording.kind != "poses" or tuple(recording.channels) != wanted:
+    if recording.kind != "poses" or set(recording.channels) != set(READINGS):
         what = f'must be settled poses (kind = "poses") of {", ".join(CHANNELS)}; a Jacobian is calibrated from these'
         raise InputError(recording.title, [Fault("recording", what)])
     taken = _poses_of(described, recording)
@@ -158,13 +159,15 @@ def _poses_of(device: Device, recording: Recording) -> _Poses:
     """Every pose of the records, drift taken out. Raises InputError where a pose lacks a reading."""
     fitter = Fitter(recording, estimate_noise(recording, 0.0))
     nominal, instruments = fitter.fit(Structure(device), steps=0), ReadPoses(device)
+    in_order = [recording.channels.index(reading) for reading in READINGS]
     parts, order = list[tuple[np.ndarray, ...]](), np.zeros(0)
     for record in recording.records:
         read = record.valid.any(axis=1)  # the others belong to another part of a divided record
         at = record.time[read]
         order = np.append(order, at if not np.isin(at, order).any() else at - at.min() + order.max() + 1)
         roles = np.full(read.sum(), record.role)
-        parts.append((record.drive[read], _complete(record)[read], fitter.predict(nominal, record)[read], roles))
+        readings = (_complete(record)[read][:, in_order], fitter.predict(nominal, record)[read][:, in_order])
+        parts.append((record.drive[read], *readings, roles))
     drive, read, expected = (np.vstack(part) for part in list(zip(*parts, strict=True))[:3])
     role = np.concatenate([part[3] for part in parts])
     pose, still = instruments.poses(read), at_home(drive)

@@ -57,7 +57,7 @@ OtherDevice = Annotated[
     Path | None,
     typer.Option(
         "--device",
-        help="Another device file than the scenario names, such as device.next.toml or stage.py.",
+        help="Another device file than the scenario names, such as device.next.toml or stage.py. Adds _on_DEVICE to a default folder.",
         show_default=False,
     ),
 ]

@@ -32,7 +32,7 @@ def run(
     """
     from ctrlgen.app import scenario_pipeline as pipeline
 
-    folder = out_of(out_folder, scenario)
+    folder = out_of(out_folder, scenario, device=device)
     asked = _read(scenario, device)
     with progress(pipeline.steps(asked)) as advance:
         outcome = pipeline.run(asked, folder, advance)
@@ -40,7 +40,7 @@ def run(
 
     print_solution(outcome)
     print_comparison(outcome)
-    note_source(folder, scenario)
+    note_source(folder, scenario, device)
     out.print(f"[bold]report[/bold]  {escape(str(folder / 'report.html'))}", soft_wrap=True)
     _exit(outcome)
 
@@ -57,13 +57,13 @@ def solve(
     """
     from ctrlgen.app import scenario_pipeline as pipeline
 
-    folder = out_of(out_folder, scenario, "solve")
+    folder = out_of(out_folder, scenario, "solve", device)
     with progress(2) as advance:
         outcome = pipeline.solve_into(_read(scenario, device), folder, advance)
     from ctrlgen.app.scenario_console import print_solution
 
     print_solution(outcome)
-    note_source(folder, scenario)
+    note_source(folder, scenario, device)
     out.print(f"[bold]report[/bold]  {escape(str(folder / 'report.html'))}", soft_wrap=True)
     _exit(outcome)
 
@@ -89,20 +89,20 @@ def generate(
     """
     from ctrlgen.app import scenario_pipeline as pipeline
 
-    folder = out_of(out_folder, scenario, "generate")
+    folder = out_of(out_folder, scenario, "generate", device)
     if player:
         with progress(2) as advance:
             written = pipeline.player_into(_read(scenario, device), folder, advance)
         for path in written:
             out.print(str(path), soft_wrap=True, markup=False)
-        _tell(folder, scenario)
+        _tell(folder, scenario, device)
         return
     with progress(2) as advance:
         c = pipeline.generate_into(_read(scenario, device), folder, advance)
     for name in [*c.online.values(), *c.player.values()]:
         out.print(f"{folder / name}.c", soft_wrap=True, markup=False)
     out.print(f"online controller: {c.operations} arithmetic operations a call, {c.worst_operations} at most")
-    _tell(folder, scenario)
+    _tell(folder, scenario, device)
 
 
 @app.command(rich_help_panel=SCENARIO_PANEL)
@@ -146,14 +146,14 @@ def verify(
     """
     from ctrlgen.app import scenario_pipeline as pipeline
 
-    folder = out_of(out_folder, scenario, "verify")
+    folder = out_of(out_folder, scenario, "verify", device)
     asked = _read(scenario, device)
     with progress(pipeline.verify_steps(asked)) as advance:
         build = pipeline.verify(asked, folder, advance, quick)
     from ctrlgen.app.scenario_console import print_build
 
     print_build(build)
-    note_source(folder, scenario)
+    note_source(folder, scenario, device)
     out.print(f"[bold]page[/bold]  {escape(str(folder / 'build.html'))}", soft_wrap=True)
     if not build.passed:
         raise typer.Exit(1)
@@ -177,18 +177,18 @@ def fmu(
     """
     from ctrlgen.app import scenario_pipeline as pipeline
 
-    folder = out_of(out_folder, scenario, "fmu")
+    folder = out_of(out_folder, scenario, "fmu", device)
     made = pipeline.fmus_into(_read(scenario, device), folder, fmi)
     for path in made.paths:
         out.print(str(path), soft_wrap=True, markup=False)
     out.print(f"FMI {fmi}.0, {'binaries for ' + made.binary if made.binary else 'no binaries'}", markup=False)
     if made.remark:
         out.print(made.remark, markup=False, soft_wrap=True)
-    _tell(folder, scenario)
+    _tell(folder, scenario, device)
 
 
-def _tell(folder: Path, scenario: Path) -> None:
-    note_source(folder, scenario)
+def _tell(folder: Path, scenario: Path, device: Path | None) -> None:
+    note_source(folder, scenario, device)
     out.print(f"[bold]folder[/bold]  {escape(str(folder))}", soft_wrap=True)
 
 

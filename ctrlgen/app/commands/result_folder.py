@@ -13,7 +13,8 @@ from ctrlgen.core.errors import Fault, InputError
 USUAL = ("scenario.toml", "recording.toml", "device.toml", "jobs.toml")
 WHOLE = "Result folder; replaced as a whole when the work is done, never half written, and only where it holds a result alone."
 SOURCE = "# result of "
-"""What a line of the marker of a folder begins with that tells its source, by the way from the folder to it."""
+"""What a line of the marker of a folder begins with that tells its source, by the way from the folder to it; one line for the scenario,
+device or recording, and one for another device than the scenario names."""
 
 
 def out_option(default: str | None = None, about: str = WHOLE) -> Any:
@@ -22,17 +23,19 @@ def out_option(default: str | None = None, about: str = WHOLE) -> Any:
     return typer.Option("--out", "-o", help=about, show_default=default or False)
 
 
-def out_of(named: Path | None, of: Path, command: str = "") -> Path:
-    """The folder `named`, or out/NAME beside the current directory: NAME of the scenario, device or recording `of`, and `_command` where
-    that is not `run`, so that no command replaces what another one left.
+def out_of(named: Path | None, of: Path, command: str = "", device: Path | None = None) -> Path:
+    """The folder `named`, or out/NAME beside the current directory: NAME of the scenario, device or recording `of`, `_command` where
+    that is not `run`, and `_on_DEVICE` where `device` is not that of the scenario, so that no result replaces another one.
 
     Raises InputError where nobody named a folder and that one holds the result of another file of the same name.
     """
     if named is not None:
         return named
-    folder = Path("out", name_of(of) + (f"_{command}" if command else ""))
-    if (source := source_of(folder)) not in (None, _source(of)):
-        what = f"holds the result of {source}; name another folder with -o, or that one to replace it"
+    folder = Path(
+        "out", "_".join([name_of(of), *([command] if command else []), *(["on", name_of(device)] if device else [])])
+    )
+    if (sources := sources_of(folder)) not in ([], [_source(file) for file in (of, device) if file]):
+        what = f"holds the result of {' on '.join(map(str, sources))}; name another folder with -o, or that one to replace it"
         raise InputError(folder, [Fault("--out", what)])
     return folder
 
@@ -50,27 +53,26 @@ def _source(file: Path) -> Path:
     return whole.parent if whole.name in USUAL else whole
 
 
-def note_source(folder: Path, of: Path) -> None:
+def note_source(folder: Path, of: Path, device: Path | None = None) -> None:
     """Notes in a finished result what it is the result of, for `out_of`; in a folder that may not be written nothing is noted."""
     from ctrlgen.core.files import MARKER, write_text
 
-    way = os.path.relpath(_source(of), folder.resolve())
+    ways = [SOURCE + os.path.relpath(_source(file), folder.resolve()) for file in (of, device) if file]
     try:
         marker = folder / MARKER
         lines = marker.read_text(encoding="utf-8").splitlines() if marker.exists() else []
         kept = [line for line in lines if not line.startswith(SOURCE)]
-        write_text(marker, "\n".join([*kept, SOURCE + way]) + "\n")
+        write_text(marker, "\n".join([*kept, *ways]) + "\n")
     except (OSError, InputError):
         return
 
 
-def source_of(folder: Path) -> Path | None:
-    """What the result in a folder is the result of; None where none is there, or it was not noted."""
+def sources_of(folder: Path) -> list[Path]:
+    """What the result in a folder is the result of, and of which other device; none where no result is there, or it was not noted."""
     from ctrlgen.core.files import MARKER
 
     try:
         lines = (folder / MARKER).read_text(encoding="utf-8").splitlines()
     except (OSError, ValueError):
-        return None
-    ways = [line.removeprefix(SOURCE) for line in lines if line.startswith(SOURCE)]
-    return (folder / ways[-1]).resolve() if ways else None
+        return []
+    return [(folder / line.removeprefix(SOURCE)).resolve() for line in lines if line.startswith(SOURCE)]
