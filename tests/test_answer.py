@@ -19,7 +19,7 @@ def finding(cause, share: float | None, *alternatives, chance: ChanceEntry | Non
     return Finding(cause.effect, cause.location, {}, alternatives, taken, {}, "", cause, chance=chance)
 
 
-def told(verdict: Verdict, *findings: Finding, passed: bool = False, after: float = 2.0) -> list[str]:
+def told(verdict: Verdict, *findings: Finding, passed=False, after=2.0, untried=()) -> list[str]:
     errors = ChannelErrorEntry(rms_before=50.0, rms_after=after, noise_floor=1.0, unit="um", uncertainty=None)
     noise = SimpleNamespace(known=np.ones(1, bool))
     fitter = SimpleNamespace(recording=SimpleNamespace(tolerance=(None,)), noise=noise)
@@ -32,6 +32,7 @@ def told(verdict: Verdict, *findings: Finding, passed: bool = False, after: floa
             device=SimpleNamespace(title="an axis"),
             search=SimpleNamespace(chosen=chosen, fitter=fitter, unlikely=()),
             residual_tests=SimpleNamespace(passed=passed),
+            untried=SimpleNamespace(sentences=lambda: list(untried)),
             shares=None,
             unconfirmed=(),
         )
@@ -68,3 +69,9 @@ def test_a_doubt_is_told_in_the_same_words_of_every_cause():
     first = told(Verdict.PARTLY, finding(GAIN, 0.6, chance=few), finding(DRIFT, 0.3, chance=few))[0]
     assert "; luck is not excluded, beside drift at sensor:axis (30 %, luck is not excluded)" in first
     assert "(30 %, may be luck)" in told(Verdict.PARTLY, finding(GAIN, 0.6), finding(DRIFT, 0.3, chance=weak))[0]
+
+
+def test_what_could_not_be_tried_is_told_last():
+    without, beside = (told(Verdict.UNEXPLAINED, untried=lost) for lost in ((), ("3 of 4 causes could not be.",)))
+    assert without[0].endswith("and no known effect explains it.") and len(without) == 2
+    assert beside[0].endswith("and no effect that could be tried explains it.") and beside[-1].startswith("3 of 4")

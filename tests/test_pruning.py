@@ -109,7 +109,7 @@ def test_a_trial_that_raises_is_noted_and_the_search_goes_on(monkeypatch):
     monkeypatch.setattr(screen, "run", run)
     found = Searcher(fitter, screen, nothing).run(AXIS)
     assert [c.effect for c in found.chosen.causes] == ["backlash"]
-    assert "log_creep at stage:axis: no balance" in found.rounds[0].failed
+    assert "log_creep at stage:axis: no balance" in map(str, found.rounds[0].failed)
 
 
 def test_what_is_refused_although_it_scores_better_stands_in_its_round(monkeypatch):

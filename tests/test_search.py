@@ -205,7 +205,7 @@ def test_three_at_once_are_sought_only_while_more_than_a_tenth_is_unexplained(mo
     together = ((0.8 * promised, three[:2]), (0.9 * promised, three))
     assert fit_subsets(trials, current, Screened(tuple(three), np.eye(3), 4.0, {}, together), (single,)) == []
     assert tried == sizes
-    assert trials.failed == [
+    assert list(map(str, trials.failed)) == [
         f"{three[n - 1].hypothesis.effect} at {three[n - 1].hypothesis.location}: no such device can be built"
         for n in sizes
     ]

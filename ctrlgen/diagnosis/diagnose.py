@@ -22,7 +22,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from ctrlgen.core.counts import number_of
-from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.errors import CtrlgenError, Fault, InputError, SolverError
 from ctrlgen.core.forks import usable_cores
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.evidence.chance_by_luck import doubted, with_chances
@@ -32,12 +32,13 @@ from ctrlgen.diagnosis.needed_memory import refuse_what_memory_cannot_hold
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.dead_channels import without_dead_channels
 from ctrlgen.diagnosis.selection.direct_detection import directly_detected_findings
+from ctrlgen.diagnosis.selection.failures import FAILURES, reason_of
 from ctrlgen.diagnosis.selection.findings import findings, held_out_errors
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.selection.standing import answer_of, in_standing, possible
-from ctrlgen.diagnosis.selection.trials import FAILURES
+from ctrlgen.diagnosis.selection.untried import refuse_without_trials, untried
 from ctrlgen.diagnosis.selection.verdict import Verdict, in_another_unit, verdict, within_tolerance
 from ctrlgen.diagnosis.selection.way_covered import with_longest_periods
 from ctrlgen.diagnosis.shares.empirical_terms import EmpiricalTerm, empirical_terms
@@ -47,7 +48,7 @@ from ctrlgen.effects import Effect
 from ctrlgen.estimation.checkpoint import Checkpoint
 from ctrlgen.estimation.described_device import described, forget_described
 from ctrlgen.estimation.drive_clock import STAMPS, TOLD, stamp_deviation
-from ctrlgen.estimation.fit import Fitter, forget_predictions
+from ctrlgen.estimation.fit import Fit, Fitter, forget_predictions
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, hypotheses, nominal_physics, selected_laws
 from ctrlgen.estimation.isolated_outliers import mark_outliers
 from ctrlgen.estimation.late_readings import settling_time_of
@@ -89,7 +90,8 @@ def diagnose_recording(
     `progress` is called with a sentence before each step. Fits that the `checkpoint` holds are not repeated. `laws` restricts the
     hypotheses to the effects of these names and the device's own parameters.
     Raises InputError where no record has the role fit or hold_out, where no channel varies, for an unknown effect, or where memory
-    does not hold the recording.
+    does not hold the recording; SolverError where the device as described cannot be simulated, or with no cause that might be its
+    own.
     """
     # Those of an earlier diagnosis only take memory
     compiled_simulator.cache_clear()
@@ -131,6 +133,10 @@ def _diagnose(
     detected = (*live.findings, *directly_detected_findings(search, effects))
     unit_is_wrong = in_another_unit(search)
     answer = verdict(search, tests, attribution, bool(detected), unit_is_wrong)
+    missing = untried(search)
+    named = detected or search.chosen.causes or search.withdrawn
+    if not (named or unit_is_wrong or within_tolerance(search) or (tests.passed and search.fitter.noise.known.all())):
+        refuse_without_trials(search, missing)
     step("supporting analyses")
     likelihoods = profiles(search.fitter, search.chosen.fit)
     analyses = run_supporting_analyses(search, tests.passed, seed)
@@ -176,6 +182,7 @@ def _diagnose(
         unmodelled_force=analyses.unmodelled_force,
         detectability=analyses.detectability,
         next_experiment=analyses.next_experiment,
+        untried=missing,
     )
 
 
@@ -225,8 +232,25 @@ def _with_noise(device: Device, fitter: Fitter) -> Fitter:
 
 def _without_outliers(device: Device, fitter: Fitter) -> Fitter:
     """The fitter without samples that lie off the prediction of the device as described alone."""
-    weighed, fit = described(fitter, device)
+    weighed, fit = _as_described(fitter, device)
     return replace(fitter, recording=mark_outliers(fitter.recording, lambda record: weighed.predict(fit, record)))
+
+
+def _as_described(fitter: Fitter, device: Device) -> tuple[Fitter, Fit]:
+    """The device as described, fitted to the recording. Raises SolverError where it cannot be simulated."""
+    try:
+        weighed, fit = described(fitter, device)
+        if any(np.isfinite(weighed.predict(fit, r)).any() for r in fitter.fit_records):
+            return weighed, fit
+        why = "no reading that it predicts is finite"
+    except CtrlgenError:
+        raise
+    except FAILURES as error:
+        why = reason_of(error)
+    raise SolverError(
+        f"{fitter.recording.title}: no answer, because {device.title} cannot be simulated along it as described: {why}. Check that the "
+        "recorded drives lie in the range of the device and are in their units, and that the device moves with `ctrlgen simulate`"
+    )
 
 
 def _notes(

@@ -38,9 +38,9 @@ import numpy as np
 from ctrlgen.diagnosis.evidence.independent_stretches import Memory, memory_of
 from ctrlgen.diagnosis.evidence.matched_parts import matched_parts
 from ctrlgen.diagnosis.selection.attribution import one_finding
+from ctrlgen.diagnosis.selection.failures import FAILURES
 from ctrlgen.diagnosis.selection.findings import ChanceEntry, Finding, Role
 from ctrlgen.diagnosis.selection.search_result import SearchResult
-from ctrlgen.diagnosis.selection.trials import FAILURES
 from ctrlgen.diagnosis.selection.verdict import Verdict, hides_in_device
 from ctrlgen.diagnosis.settings import LUCK, SEARCH
 from ctrlgen.estimation.fit import Fit

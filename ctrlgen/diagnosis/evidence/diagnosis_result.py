@@ -17,6 +17,7 @@ from ctrlgen.diagnosis.evidence.unmodelled_dynamics import UnmodelledForce
 from ctrlgen.diagnosis.selection.attribution import Attribution
 from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding, Role, estimated_values
 from ctrlgen.diagnosis.selection.search_result import SearchResult
+from ctrlgen.diagnosis.selection.untried import Untried
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.diagnosis.shares.empirical_terms import EmpiricalTerm
 from ctrlgen.diagnosis.shares.gather import ResidualShares
@@ -36,7 +37,7 @@ class Diagnosis(Tabular, Reported):
     attribution: shares of the causes and of the rest. shares: of what the residual is a function, whatever the law, before and
     after; None where the records are too short. empirical_terms: smoothers of what no law reaches. spikes: isolated outliers, of
     the channels that have some. unmodelled_force: None where the findings explain all. next_experiment: None where no drive would
-    decide anything.
+    decide anything. untried: causes that errors kept from being tried.
     """
 
     verdict: Verdict
@@ -56,6 +57,7 @@ class Diagnosis(Tabular, Reported):
     recording: Recording
     search: SearchResult
     fitter: Fitter
+    untried: Untried
     profiles: tuple[Profile, ...] = ()
     bootstrap: Bootstrap | None = None
 

@@ -13,8 +13,8 @@ from ctrlgen.diagnosis.evidence.ltv_linearisation import linearise_along
 from ctrlgen.diagnosis.evidence.residual_localisation import localise_residual
 from ctrlgen.diagnosis.evidence.residual_location import ResidualLocations
 from ctrlgen.diagnosis.evidence.unmodelled_dynamics import UnmodelledForce, describe_unmodelled_force
+from ctrlgen.diagnosis.selection.failures import FAILURES
 from ctrlgen.diagnosis.selection.search_result import SearchResult
-from ctrlgen.diagnosis.selection.trials import FAILURES
 
 # from the folder of the next experiment
 NEXT_DEVICE = "../device.next.toml"

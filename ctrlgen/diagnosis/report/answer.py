@@ -1,4 +1,5 @@
-"""The answer of a diagnosis in three sentences at most: the main cause, the held-out error, what is left and of what kind it is.
+"""The answer of a diagnosis in three sentences at most: the main cause, the held-out error, what is left and of what kind it is. What
+errors kept from being tried follows where that is much of what there was to try.
 
 Every number is one of a table: shares are of the error that the table calls before, in the channel or in all, and the largest
 error that is left stands beside its noise.
@@ -57,9 +58,11 @@ def sentence(diagnosis: Diagnosis) -> str:
 
 
 def answer(diagnosis: Diagnosis) -> list[str]:
-    """The answer sentence by sentence: cause, size, share; held-out error of the channel that was worst; what is left."""
+    """The answer sentence by sentence: cause, size, share; held-out error of the channel that was worst; what is left; what could not be
+    tried."""
     channel = worst_channel(diagnosis)
-    return [_cause(diagnosis), channel_sentence(channel, diagnosis.held_out[channel]), *_left(diagnosis)]
+    errors = channel_sentence(channel, diagnosis.held_out[channel])
+    return [_cause(diagnosis), errors, *_left(diagnosis), *diagnosis.untried.sentences()]
 
 
 def worst_channel(diagnosis: Diagnosis) -> str:
@@ -86,7 +89,8 @@ def _cause(diagnosis: Diagnosis) -> str:
         also = f"; the model also needs {_main(findings)}" if findings else ""
         return f"{head}: {_beyond(diagnosis, far)}{also}."
     if not findings:
-        return f"{head}: the recording differs from {title}, and no known effect explains it."
+        known = "effect that could be tried" if diagnosis.untried.sentences() else "known effect"
+        return f"{head}: the recording differs from {title}, and no {known} explains it."
     best = "no confirmed cause takes away most of the error; the best is " if verdict == Verdict.UNEXPLAINED else ""
     return f"{head}: {best}{_main(findings)}{_rivals(diagnosis)}{unlikely_rival(diagnosis)}."
 

@@ -29,7 +29,7 @@ from pydantic import Field
 
 from ctrlgen.core.forks import in_forks
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
-from ctrlgen.diagnosis.selection.trials import FAILURES
+from ctrlgen.diagnosis.selection.failures import FAILURES
 from ctrlgen.diagnosis.settings import ATTRIBUTION
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.free_parameters import FreeParameter

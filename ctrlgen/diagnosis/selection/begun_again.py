@@ -11,7 +11,8 @@ from collections.abc import Collection
 from math import sqrt
 
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
-from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
+from ctrlgen.diagnosis.selection.failures import FAILURES
+from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ctrlgen.diagnosis.selection.failures import Failure
 from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.estimation.error_model import ErrorModel
 from ctrlgen.estimation.fit import Fit
@@ -78,7 +79,7 @@ class Round:
     before: CandidateModel
     criterion_before: float
     refused: tuple[Refusal, ...] = ()
-    failed: tuple[str, ...] = ()
+    failed: tuple[Failure, ...] = ()
 
 
 def linearised_optimum(fit: Fit) -> float:

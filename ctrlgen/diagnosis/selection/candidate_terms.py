@@ -12,7 +12,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from ctrlgen.core.errors import CtrlgenError
+from ctrlgen.diagnosis.selection.failures import FAILURES, reason_of
 from ctrlgen.diagnosis.selection.law_terms import CompiledTerms, LawTerm, LawTerms, SignalsRead
 from ctrlgen.effects import Effect, Place
 from ctrlgen.estimation.fit import Fit, Fitter
@@ -20,9 +20,6 @@ from ctrlgen.estimation.hypothesis import DataHints, Hypothesis, nominal_physics
 from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.model.effect_terms import channels
-
-UNUSABLE = (CtrlgenError, ValueError, TypeError, AttributeError, LookupError, ArithmeticError, RuntimeError)
-"""What a law that cannot be written down at a place may end with."""
 
 # by unit, SI
 Peaks = dict[tuple[Place, int], dict[str, float]]
@@ -102,8 +99,8 @@ class CandidateTerms:
         for h in hypotheses:
             try:
                 self.columns += list(self._of(h, structure, probes, seen))
-            except UNUSABLE as error:
-                self.unusable[h] = f"{type(error).__name__}: {error}"
+            except FAILURES as error:
+                self.unusable[h] = reason_of(error)
 
     def _of(
         self,

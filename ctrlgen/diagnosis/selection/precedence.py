@@ -12,9 +12,10 @@ import numpy as np
 
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.confusable import explains_alike
+from ctrlgen.diagnosis.selection.failures import FAILURES
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection
 from ctrlgen.diagnosis.selection.screen import Screened
-from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
+from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import CONFUSABLE, PRECEDENCE, REGIONS, SEARCH
 from ctrlgen.diagnosis.shares.families import FAMILY_OF, Family
 from ctrlgen.effects import Place

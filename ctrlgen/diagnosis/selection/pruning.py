@@ -14,8 +14,9 @@ import numpy as np
 
 from ctrlgen.diagnosis.selection.attribution import as_fitted
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal
+from ctrlgen.diagnosis.selection.failures import FAILURES
 from ctrlgen.diagnosis.selection.screen import Screened
-from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
+from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 

@@ -10,11 +10,12 @@ import numpy as np
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, linearised_optimum
 from ctrlgen.diagnosis.selection.candidates import significant, trying
 from ctrlgen.diagnosis.selection.confusable import explains_alike, explains_better
+from ctrlgen.diagnosis.selection.failures import FAILURES
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.other_laws import stands_for_another
 from ctrlgen.diagnosis.selection.precedence import counterparts, explains_alike_but_for_odds
 from ctrlgen.diagnosis.selection.subset_search import Suspect
-from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
+from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
 from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis

@@ -22,6 +22,7 @@ from ctrlgen.diagnosis.selection.begun_again import begun_again
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round
 from ctrlgen.diagnosis.selection.candidates import finer_forms, fit_candidates, restart_elsewhere
 from ctrlgen.diagnosis.selection.confusable import explains_alike
+from ctrlgen.diagnosis.selection.failures import FAILURES
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.not_taken import not_taken
 from ctrlgen.diagnosis.selection.other_laws import stands_for_another, takes_over
@@ -31,7 +32,7 @@ from ctrlgen.diagnosis.selection.rivals import acting_instead, replacements, riv
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
 from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.selection.supported import supported
-from ctrlgen.diagnosis.selection.trials import FAILURES, Trials
+from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import SEARCH
 from ctrlgen.estimation.described_device import described
 from ctrlgen.estimation.drive_clock import with_drive_clock

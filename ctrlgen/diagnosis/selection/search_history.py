@@ -91,7 +91,7 @@ def search_history(search: SearchResult) -> list[RoundEntry]:
                 _tried(search, t, T, round_, then) for t, T in zip(round_.candidates, round_.criteria, strict=True)
             ],
             not_taken=[not_taken_entry(search, r) for r in round_.refused if r.gain > 0],
-            failed=list(round_.failed),
+            failed=list(map(str, round_.failed)),
             causes_after=[(c.effect, c.location) for c in then.causes],
             decision=_decision(round_.before, then, bool(round_.candidates)),
         )

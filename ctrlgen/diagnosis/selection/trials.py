@@ -13,10 +13,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ctrlgen.core.errors import CtrlgenError, InputError
 from ctrlgen.core.forks import in_forks
 from ctrlgen.diagnosis.selection.candidate_model import Attempt, CandidateModel, Refusal
-from ctrlgen.diagnosis.selection.cause_entry import cause_name
+from ctrlgen.diagnosis.selection.failures import FAILURES, Failure, reason_of
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection, scored
 from ctrlgen.diagnosis.selection.motion_regions import no_region
 from ctrlgen.diagnosis.selection.objections import objections
@@ -30,10 +29,8 @@ from ctrlgen.estimation.structure import Structure
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
-FAILURES = (CtrlgenError, ValueError, ArithmeticError, RuntimeError, np.linalg.LinAlgError)
-"""What a trial may end with: a stage that cannot be built, a balance or integrator that does not converge."""
 _Optima = dict[str, list[float]]
-_Learnt = tuple[dict[frozenset[Any], tuple[CandidateModel, int]], list[Refusal], list[str], list[Attempt], _Optima]
+_Learnt = tuple[dict[frozenset[Any], tuple[CandidateModel, int]], list[Refusal], list[Failure], list[Attempt], _Optima]
 
 
 class Trials:
@@ -51,7 +48,7 @@ class Trials:
         self.bare: dict[tuple[int, int], tuple[Fit, Fit, Screened]] = {}
         self.mismatch: np.ndarray | None = None
         self.refused: list[Refusal] = []
-        self.failed: list[str] = []
+        self.failed: list[Failure] = []
         self.log: list[Attempt] = []
         self.round = 1
         self.per_round = SEARCH.candidates_per_round * (SEARCH.cheap_factor if fitter.recording.kind == "poses" else 1)
@@ -159,6 +156,8 @@ class Trials:
         if known is not None and known.fit.objective <= fit.objective:
             self.fitted[key] = (known, steps)
             return replace(known, cause=cause)
+        if not any(np.isfinite(self.fitter.predict(fit, r)).any() for r in self.fitter.fit_records):
+            raise ArithmeticError("no reading that it predicts is finite")
         candidate = self.scored(structure, fit, cause)
         self.fitted[key] = (candidate, steps)
         return candidate
@@ -187,8 +186,7 @@ class Trials:
 
     def note_failure(self, cause: Hypothesis | None, error: Exception) -> None:
         """Keeps why a trial of a cause could not be made."""
-        why = "; ".join(f.what for f in error.faults) if isinstance(error, InputError) else str(error)
-        self.failed.append(f"{cause_name(cause) if cause else 'a trial'}: {why}")
+        self.failed.append(Failure(cause, reason_of(error)))
 
     def converged(self, candidate: CandidateModel) -> CandidateModel:
         """The same candidate fitted until it converges, or as it was where that fails: candidates are first fitted for a few
@@ -217,7 +215,7 @@ class Trials:
             if screened is None:
                 screened = self.screen.run(candidate.fit)
                 self.latest = self.fitter, candidate.fit, screened
-                self.failed += [f"{cause_name(h)}: {why}" for h, why in screened.dropped.items()]
+                self.failed += [Failure(h, why) for h, why in screened.dropped.items()]
             self.screens[key] = candidate.fit, screened
         return screened
 

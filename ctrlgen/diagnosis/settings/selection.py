@@ -334,6 +334,9 @@ class VerdictSettings:
     """p of the device's stated numbers so far off by chance, below which they contradict the data sheet."""
     named_deviation: float = 2.0
     """Stated standard deviations from which on such a number is named."""
+    considerable: float = 0.2
+    """Share of the causes worth a fit, or of the laws offered, from which on it stands in the answer that errors kept them from being
+    tried. Judgement."""
     far: float = 4.0
     """Stated standard deviations from which on a moved number of the device stands in the answer: chance moves one so far once in
     16,000."""
