@@ -6,7 +6,6 @@ import os
 import subprocess
 import sys
 import tomllib
-from dataclasses import replace
 from importlib.metadata import distributions
 from pathlib import Path
 
@@ -112,7 +111,7 @@ def test_a_cable_that_is_never_loose_is_another_law_as_its_author_says(page):
     begun = Structure(AXIS).with_cause(Hypothesis("slack_cable", "stage:axis", "axis"), {"stiffness": 2e4, "gap": 0.0})
     fit = fitter.fit(begun, steps=0)
     assert another_law(fit, 0) == "its gap is at a bound of 0 um, where it is another stiffness to one side"
-    law.prior = replace(law.prior, at_bounds={})
+    law.at_bounds = {}
     assert another_law(fit, 0) is None
 
 
@@ -161,7 +160,9 @@ WRONG = {
     "vector": ("s.displacement -", "s.displacements -", "must be one number"),
     "bounds": ("(0.0, 20.0)", "(20.0, 0.0)", "bounds 20 ... 0"),
     "reserved": ('"gap"', '"package"', "cannot name a number"),
-    "shape": ('at_bounds={"gap"', 'at_bounds={"gape"', "prior states something of gape"),
+    "family": ("Family.ELASTIC", '"elastic"', "family must be a Family"),
+    "shape": ('at_bounds = {"gap"', 'at_bounds = {"gape"', "at_bounds states something of gape"),
+    "start": ('parameters={"gap"', 'parameters={"gape"', "prior states something of gape"),
     "ends": (
         'ShapeBounds(low="another stiffness to one side")',
         '"a spring"',

@@ -36,23 +36,21 @@ def test_a_shape_parameter_has_somewhere_to_start_inside_its_bounds(law):
 
 @every_law
 def test_every_shape_states_what_the_law_is_at_its_bounds(law):
-    """A law that is never suspected ends at none; one of another package may state it in its own row."""
+    """A law that is never suspected ends at none."""
     prior = prior_of(law)
     shapes = {p.name for p in law.params if p.off is None}
     wanted = shapes if prior.suspected or prior.refines else set()
-    open_, needless = sorted(wanted - set(prior.at_bounds)), sorted(set(prior.at_bounds) - wanted)
-    told = f"state in estimation/shape_bounds.py what {law.kind} is where these end at a bound, ITSELF if still itself"
+    open_, needless = sorted(wanted - set(law.at_bounds)), sorted(set(law.at_bounds) - wanted)
+    told = f"state in at_bounds what {law.kind} is where these end at a bound, itself(...) if still itself"
     assert not open_, f"{told}: {', '.join(open_)}"
-    assert not needless, (
-        f"shape_bounds.py states of {law.kind} what is no shape of a suspected law: {', '.join(needless)}"
-    )
+    assert not needless, f"{law.kind} states what is no shape of a suspected law: {', '.join(needless)}"
 
 
 def test_a_law_in_a_region_is_that_of_everywhere_where_its_edge_leaves_all_of_the_motion_inside():
     """Above an edge that lies lowest, below one that lies highest, beyond one that is narrowest; an event in time is none."""
     told = set()
     for kind, law in Effect.library.items():
-        ends = law.acts_in and prior_of(law).at_bounds.get(law.acts_in.at)
+        ends = law.acts_in and law.at_bounds.get(law.acts_in.at)
         if ends and (ends.low or ends.high):
             told.add(kind)
             assert bool(ends.high) == (law.acts_in.side is Side.BELOW) != bool(ends.low), kind

@@ -10,11 +10,12 @@ import pytest
 from scipy.signal import lfilter
 
 from ctrlgen.diagnosis.shares.design import Kind
-from ctrlgen.diagnosis.shares.families import FAMILY_OF, SPEAKS_FOR, Family, ranking
+from ctrlgen.diagnosis.shares.families import SPEAKS_FOR, family_of, ranking
 from ctrlgen.diagnosis.shares.model_free_shares import model_free_shares
 from ctrlgen.diagnosis.shares.shares_record import table_record
 from ctrlgen.diagnosis.shares.signals import Signals
-from ctrlgen.effects import Effect
+from ctrlgen.effects import Effect, Family
+from ctrlgen.estimation.hypothesis import PARAMETER
 from ctrlgen.reporting.result_file import json_text
 
 N, H = 6000, 0.002
@@ -196,8 +197,9 @@ def test_a_drive_that_is_the_position_has_no_row(signals, rng):
 def test_every_kind_speaks_and_every_effect_of_the_library_belongs_to_a_family():
     assert set(SPEAKS_FOR) == set(Kind) and all(reason for _, reason in SPEAKS_FOR.values())
     # These name no cause
-    assert set(FAMILY_OF) == {kind for kind in Effect.library if not kind.startswith("empirical_")}
-    assert set(FAMILY_OF.values()) == set(Family)
+    families = {kind: law.family for kind, law in Effect.library.items() if not kind.startswith("empirical_")}
+    assert set(families.values()) == set(Family)
+    assert family_of("creep") is Family.CREEP and family_of(PARAMETER) is None
     assert {family for families, _ in SPEAKS_FOR.values() for family in families} == set(Family)
 
 

@@ -21,9 +21,9 @@ from ctrlgen.diagnosis.report.shares_sentences import (
 )
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.diagnosis.shares.design import Kind
-from ctrlgen.diagnosis.shares.families import Family
 from ctrlgen.diagnosis.shares.gather import residual_shares
 from ctrlgen.diagnosis.shares.shares_table import ChannelShares, KindShare, Share
+from ctrlgen.effects import Family
 from ctrlgen.recordings.recording import Recording
 
 N, FRICTION = 3000, 0.6  # samples a record; dry friction [N]

@@ -8,7 +8,7 @@ from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.findings import Finding, Role
 from ctrlgen.diagnosis.selection.standing import answer_of, in_standing, possible
 from ctrlgen.diagnosis.selection.verdict import Verdict
-from ctrlgen.diagnosis.shares.families import Family
+from ctrlgen.effects import Family
 from ctrlgen.estimation.hypothesis import Hypothesis
 
 

@@ -24,12 +24,14 @@ from pkgutil import iter_modules
 
 from ctrlgen.effects._channel_group import group, is_group, means
 from ctrlgen.effects._effect import Effect, Place
+from ctrlgen.effects._family import Family
 from ctrlgen.effects._installed import Installed, LeftOut, installed, law_of, laws, load_laws
 from ctrlgen.effects._law_inputs import Expression, LawInputs, LawNumbers
 from ctrlgen.effects._parameter import Channel, Param, State
 from ctrlgen.effects._plainer import Plainer
 from ctrlgen.effects._region import ActsIn, Side
 from ctrlgen.effects._requirements import REQUIREMENTS
+from ctrlgen.effects._shape_bounds import ShapeBounds, either, itself
 from ctrlgen.effects._table import EffectTable, faults_at, read_effect
 
 for _module in iter_modules(__path__):
@@ -42,6 +44,7 @@ __all__ = [
     "Effect",
     "EffectTable",
     "Expression",
+    "Family",
     "Installed",
     "LawInputs",
     "LawNumbers",
@@ -49,12 +52,15 @@ __all__ = [
     "Param",
     "Place",
     "Plainer",
+    "ShapeBounds",
     "Side",
     "State",
+    "either",
     "faults_at",
     "group",
     "installed",
     "is_group",
+    "itself",
     "law_of",
     "laws",
     "load_laws",

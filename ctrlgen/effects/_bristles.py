@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, ShapeBounds, State, itself
 
 STILL = 1e-6  # of v_s: keeps speed/tanh(speed) from being 0/0 at rest
 SHARPEST = 1e-5  # typical travels a second: v_s of a contact that does not creep, as Dahl's
@@ -21,7 +19,13 @@ FALLING = (
     Param("speed", "travel/s", (1e-3, 1e3), "v_s: Stribeck speed, above which the excess has decayed"),
     Param("reach", "travel", (1e-6, 0.03), "displacement over which the contact yields"),
 )
-BRISTLES = (State("z", "1", 1.0),)
+BRISTLES: tuple[State, ...] = (State("z", "1", 1.0),)
+
+# tanh(v/v_s) far below v_s is v/v_s, and the force grows as v_s does; a contact that yields farther, or not at all, is one still
+CREEPS = {"smoothing": ShapeBounds(high="viscous damping", as_size="viscous damping"), **itself("reach")}
+# an excess over sliding that is none, or lasts at every speed
+_STEADY = "dry friction that does not fall with speed"
+FALLS = {"breakaway": ShapeBounds(low=_STEADY), "speed": ShapeBounds(high=_STEADY), **itself("reach")}
 
 
 def bristle_rate(s: LawInputs, p: LawNumbers) -> Expression:
@@ -40,10 +44,11 @@ class FallingFriction(Effect, listed=False):
     """Delta F = -f z in a region, z of `falling_rate`: one law, named once per region."""
 
     place = Place.FORCE
+    family = Family.FRICTION
     set_valued = True
     requires = frozenset({"velocity"})
     source = "C. Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995) 419, eqs. (1)-(4); in a region"
-    states: ClassVar[tuple[State, ...]] = BRISTLES
+    states = BRISTLES
 
     @classmethod
     def from_plainer(cls, numbers: dict[str, float]) -> dict[str, float]:

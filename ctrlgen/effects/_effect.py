@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Mapping
 from enum import Enum
+from types import MappingProxyType
 from typing import ClassVar
 
 from ctrlgen.core.units import Quantity, same_dimension
+from ctrlgen.effects._family import Family
 from ctrlgen.effects._law_inputs import Expression, LawInputs, LawNumbers
 from ctrlgen.effects._parameter import Channel, Param, State
 from ctrlgen.effects._plainer import Plainer
 from ctrlgen.effects._region import ActsIn
+from ctrlgen.effects._shape_bounds import ShapeBounds
 
 
 class Place(Enum):
@@ -41,6 +45,10 @@ class Effect:
     package: ClassVar[str] = ""  # the installed package that brings it; none of ctrlgen's own
     params: ClassVar[tuple[Param, ...]]
     states: ClassVar[tuple[State, ...]] = ()
+    # Of what its residual is like: a diagnosis holds it beside what the model-free shares speak for. None names no cause.
+    family: ClassVar[Family | None] = None
+    # What the law is where a fit of one of its shapes ends at a bound. A shape that is left out is the law itself there.
+    at_bounds: ClassVar[Mapping[str, ShapeBounds]] = MappingProxyType({})
     # What the search believes of a law of another package: an `estimation.law_prior.LawPrior`. Ours have rows in `estimation.priors`.
     prior: ClassVar[object] = None
     # The plainer law that it generalises, if there is one in the library.

@@ -13,8 +13,13 @@ import casadi as ca
 
 from ctrlgen.effects._law_inputs import LawInputs
 from ctrlgen.effects._parameter import State
+from ctrlgen.effects._shape_bounds import ShapeBounds, either
 
 ELEMENTS = 8
+# At the bounds of the reach, of the reversible part and of the taper
+NO_LAG = either("a gain")
+BESIDE_GAIN = ShapeBounds(low="a gain beside a smaller loop", high="a gain beside a smaller loop")
+ONE_PLAY = ShapeBounds(low="a single play, or a gain")
 LEAST_PART = 0.02  # of a play in what is left to it, where a fit begins
 
 

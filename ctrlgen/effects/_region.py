@@ -10,6 +10,7 @@ import casadi as ca
 
 from ctrlgen.effects._law_inputs import Expression, LawInputs, LawNumbers
 from ctrlgen.effects._parameter import Param
+from ctrlgen.effects._shape_bounds import ShapeBounds, itself
 
 EDGE = (
     Param("edge", "travel", (-5.0, 5.0), "displacement at which it sets in"),
@@ -44,6 +45,16 @@ class ActsIn:
     length: str = ""
     over: str = ""
     ramp: float = RAMP
+
+
+def above(everywhere: str) -> dict[str, ShapeBounds]:
+    """Of a law above an `EDGE`: one that lies below all that is recorded has no other side."""
+    return {"edge": ShapeBounds(low=everywhere), **itself("width")}
+
+
+def below(everywhere: str) -> dict[str, ShapeBounds]:
+    """The same of a law below it."""
+    return {"edge": ShapeBounds(high=everywhere), **itself("width")}
 
 
 def beyond_edge(s: LawInputs, p: LawNumbers, side: int) -> Expression:

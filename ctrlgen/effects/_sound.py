@@ -13,9 +13,11 @@ import numpy as np
 from ctrlgen.core.names import is_name
 from ctrlgen.core.units import to_si
 from ctrlgen.effects._effect import Effect, Place
+from ctrlgen.effects._family import Family
 from ctrlgen.effects._law_inputs import LawInputs
 from ctrlgen.effects._parameter import Channel, Param, State
 from ctrlgen.effects._requirements import REQUIREMENTS
+from ctrlgen.effects._shape_bounds import ShapeBounds
 
 RESERVED = frozenset({"kind", "at", "of", "package"})
 """Keys of an [[effect]] table that are no parameter of its law."""
@@ -52,6 +54,13 @@ def _declared(law: type[Effect]) -> Iterator[str]:
     names = [number.name for number in law.params]
     if sum(p.off is not None for p in law.params) != 1 or len(set(names)) < len(names):
         yield "exactly one parameter must have an `off` value, and no two the same name"
+    if not isinstance(law.family, Family | None):
+        yield f"family must be a {Family.__name__}, such as Family.{Family.ELASTIC.name}"
+    for name, ends in law.at_bounds.items():
+        if name not in names:
+            yield f"at_bounds states something of {name}, which is no parameter"
+        elif not isinstance(ends, ShapeBounds):
+            yield f"at_bounds: {name} must be stated as a {ShapeBounds.__name__}"
     if law.prior is not None:
         yield from _prior(law.prior, names)
     if law.term is Effect.term:
@@ -60,11 +69,11 @@ def _declared(law: type[Effect]) -> Iterator[str]:
 
 def _prior(prior: object, names: list[str]) -> Iterator[str]:
     """A prior is of `estimation`, which laws do not import: known by what it states."""
-    parameters, at_bounds = (getattr(prior, part, None) for part in ("parameters", "at_bounds"))
-    if parameters is None or at_bounds is None:
+    parameters = getattr(prior, "parameters", None)
+    if parameters is None:
         yield "prior must be a ctrlgen.estimation.law_prior.LawPrior"
         return
-    for name in sorted({*parameters, *at_bounds} - {*names}):
+    for name in sorted({*parameters} - {*names}):
         yield f"prior states something of {name}, which is no parameter"
 
 

@@ -1,6 +1,6 @@
 """A sensor that does not stand in line with the point it should measure."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class AbbeArm(Effect):
@@ -10,6 +10,7 @@ class AbbeArm(Effect):
     """
 
     place = Place.SENSOR
+    family = Family.GEOMETRY
     pairs = True
     channel_unit = "m"
     partner_unit = "rad"

@@ -2,7 +2,19 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, Plainer, State
+from ctrlgen.effects import (
+    Effect,
+    Expression,
+    Family,
+    LawInputs,
+    LawNumbers,
+    Param,
+    Place,
+    Plainer,
+    State,
+    either,
+    itself,
+)
 
 
 class AsymmetricHysteresis(Effect):
@@ -13,6 +25,7 @@ class AsymmetricHysteresis(Effect):
     """
 
     place = Place.FORCE
+    family = Family.HYSTERESIS
     requires = frozenset({"force"})
     source = "P. R. Dahl, AIAA Journal 14 (1976) 1675; the warped displacement is our extension"
     params = (
@@ -20,6 +33,7 @@ class AsymmetricHysteresis(Effect):
         Param("reach", "travel", (1e-3, 5.0), "travel over which the force settles"),
         Param("skew", "1", (-0.95, 0.95), "a: relative excess of stiffness far on the positive side"),
     )
+    at_bounds = {"reach": either("dry friction, or a spring"), **itself("skew")}
     plainer = Plainer("bouc_wen", {"skew": 0.0}, {"loop": 1.0})
     states = (State("z", "travel", 0.1, stepped=True, free=True), State("w", "travel", 1.0, stepped=True))
 

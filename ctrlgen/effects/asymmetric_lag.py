@@ -2,28 +2,28 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, Plainer
-from ctrlgen.effects._play_operators import kept_between, play_states, radii, weighted_lag
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, Plainer, itself
+from ctrlgen.effects._play_operators import BESIDE_GAIN, NO_LAG, kept_between, play_states, radii, weighted_lag
 
 
 class AsymmetricLag(Effect, listed=False):
     """Delta s = g (sum_j w_j P_j - s + k s), P_j within s - a_j ... s + b_j, r_j = r j/8, w_j ~ j^-q, sum w_j = 1, j = 1..8.
-
     a_j = r_j + (l |s| + t s) r_j/r and b_j = r_j + (u |s| + t s) r_j/r, no less than 0: generalised plays, whose edges widen each in
     its own way. Holds for |u| + |t| and |l| + |t| below 1: the edges then rise with s, and no way between two samples matters.
     """
 
     order = 1
     source = "M. Al Janaideh, S. Rakheja, C.-Y. Su, IEEE/ASME Trans. Mechatron. 16 (2011) 734: generalised plays"
+    at_bounds = {"reach": NO_LAG, "reversible": BESIDE_GAIN, **itself("taper", "upper", "lower", "side")}
+    family = Family.HYSTERESIS
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.share * (weighted_lag(s, s.value, p.reach, p.taper) - p.reversible * s.value)
 
     def update(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         widths = radii(p.reach)
-        shares = (1 + (rise * ca.fabs(s.value) + p.side * s.value) / p.reach for rise in (p.lower, p.upper))
-        low, high = ([ca.fmax(share, 0.0) * r for r in widths] for share in shares)
-        return kept_between(s, [s.value - a for a in low], [s.value + b for b in high], widths)
+        a, b = (ca.fmax(1 + (rise * ca.fabs(s.value) + p.side * s.value) / p.reach, 0.0) for rise in (p.lower, p.upper))
+        return kept_between(s, [s.value - a * r for r in widths], [s.value + b * r for r in widths], widths)
 
 
 def _shape(unit: str) -> tuple[Param, ...]:

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class AsymmetricViscous(Effect):
@@ -12,6 +12,7 @@ class AsymmetricViscous(Effect):
     """
 
     place = Place.FORCE
+    family = Family.DYNAMICS
     requires = frozenset({"velocity"})
     source = "B. Armstrong-Helouvry et al., Automatica 30 (1994) 1083: direction-dependent friction"
     params = (Param("damping", "channel*s/travel", (-10.0, 10.0), "forward minus backward damping", off=0.0),)

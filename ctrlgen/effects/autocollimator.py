@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 from ctrlgen.effects._mirror_normal import turned_normal
 
 
@@ -16,6 +16,7 @@ class Autocollimator(Effect):
     """
 
     place = Place.SENSOR
+    family = Family.GEOMETRY
     requires = frozenset({"spatial"})
     pairs = True
     channel_unit = "rad"

@@ -1,6 +1,6 @@
 """Play in a gear, a nut or a joint."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 from ctrlgen.effects._gap import DRIVEN, behind, carried
 
 
@@ -13,6 +13,7 @@ class Backlash(Effect):
     """
 
     place = Place.DISPLACEMENT
+    family = Family.HYSTERESIS
     order = 1
     source = "M. Nordin, P.-O. Gutman, Automatica 38 (2002) 1633: controlling systems with backlash"
     params = (Param("gap", "travel", (0.0, 10.0), "full width of the gap", off=0.0),)

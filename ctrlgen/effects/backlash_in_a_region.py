@@ -4,15 +4,16 @@ from typing import ClassVar
 
 import casadi as ca
 
-from ctrlgen.effects import ActsIn, Effect, Expression, LawInputs, LawNumbers, Param, Place, Side
+from ctrlgen.effects import ActsIn, Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, Side
 from ctrlgen.effects._gap import DRIVEN, behind, carried
-from ctrlgen.effects._region import EDGE
+from ctrlgen.effects._region import EDGE, above, below
 
 
 class RegionalBacklash(Effect, listed=False):
     """`backlash` whose gap is b in a region and nothing elsewhere: one law, named once per region."""
 
     place = Place.DISPLACEMENT
+    family = Family.HYSTERESIS
     order = 1
     source = "M. Nordin, P.-O. Gutman, Automatica 38 (2002) 1633: controlling systems with backlash; in a region"
     params = (Param("gap", "travel", (0.0, 10.0), "b: full width of the gap beyond the edge", off=0.0), *EDGE)
@@ -37,6 +38,7 @@ class BacklashAbove(RegionalBacklash):
 
     title = "Play in the upper part of the travel"
     acts_in = ActsIn("position", "edge", Side.ABOVE, over="width")
+    at_bounds = above("play everywhere")
     side = 1
 
 
@@ -46,4 +48,5 @@ class BacklashBelow(RegionalBacklash):
 
     title = "Play in the lower part of the travel"
     acts_in = ActsIn("position", "edge", Side.BELOW, over="width")
+    at_bounds = below("play everywhere")
     side = -1

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, State, either, itself
 
 
 class Yielding(Effect, listed=False):
@@ -13,12 +13,12 @@ class Yielding(Effect, listed=False):
     """
 
     source = "Y. K. Wen, J. Eng. Mech. Div. ASCE 102 (1976) 249; R. Bouc (1967)"
+    family = Family.HYSTERESIS
     states = (State("z", "travel", 0.1, stepped=True, free=True), State("d", "travel", 1.0, stepped=True))
 
     def update(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         step = s.displacement - s.states.d
-        way, zeta = ca.fabs(step) / p.reach, ca.sign(step) * s.states.z / p.reach
-        c = 2 * p.loop - 1
+        way, zeta, c = ca.fabs(step) / p.reach, ca.sign(step) * s.states.z / p.reach, 2 * p.loop - 1
         below, above = ca.fmax(-zeta, 0), ca.fmax(zeta, 0)
         to_zero = ca.log(1 + c * below) / c
         back, on = ca.fmin(way, to_zero), ca.fmax(way - to_zero, 0)
@@ -33,14 +33,13 @@ _SHAPE = (
 
 
 class BoucWen(Yielding):
-    """F = -k z, z of `Yielding`: a force. It dissipates for every b within its bounds. Holds for reversals farther apart than a
-    sample.
-    """
+    """F = -k z, z of `Yielding`: a force, which dissipates for every b in its bounds. Holds for reversals farther apart than a sample."""
 
     title = "Hysteresis of a material or joint that yields smoothly"
     place = Place.FORCE
     requires = frozenset({"force"})
     params = (Param("stiffness", "channel/travel", (0.0, 1e2), "stiffness right after a reversal", off=0.0), *_SHAPE)
+    at_bounds = {"reach": either("dry friction, or a spring"), **itself("loop")}
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.stiffness * s.states.z
@@ -54,6 +53,7 @@ class DisplacementBoucWen(Yielding):
     order = 1
     requires = frozenset({"actuator"})
     params = (Param("share", "1", (-0.999, 0.999), "share of the displacement that lags", off=0.0), *_SHAPE)
+    at_bounds = {"reach": either("a gain"), **itself("loop")}
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.share * s.states.z

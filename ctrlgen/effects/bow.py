@@ -1,6 +1,6 @@
 """A sensor with curvature: the first even term of its nonlinearity."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class Bow(Effect):
@@ -9,6 +9,7 @@ class Bow(Effect):
     """
 
     place = Place.SENSOR
+    family = Family.GEOMETRY
     order = -1  # before `cyclic`: the fringes of a bent scale are counted along the bent scale
     source = "A. J. Fleming, Sensors and Actuators A 190 (2013) 106: calibration and nonlinearity"
     params = (Param("curvature", "1/channel", (-0.5, 0.5), "nonlinearity per reading squared", off=0.0),)

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, itself
 from ctrlgen.effects._play_operators import following, play_states, radii, updated_plays, weighted_lag
 
 
@@ -16,6 +16,7 @@ class Butterfly(Effect):
     """
 
     place = Place.DRIVE
+    family = Family.HYSTERESIS
     order = 1
     requires = frozenset({"actuator", "bipolar", "voltage"})
     source = "R. C. Smith, Smart Material Systems: Model Development (2005): electrostriction, strain as the square of polarisation"
@@ -30,6 +31,7 @@ class Butterfly(Effect):
         ),
         Param("taper", "1", (-1.0, 2.0), "q: weight of the domains that switch early over the late ones"),
     )
+    at_bounds = itself("linear", "reach", "taper")
     states = play_states("channel")
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

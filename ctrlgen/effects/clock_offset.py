@@ -1,6 +1,6 @@
 """Two recorders whose clocks do not agree"""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class ClockOffset(Effect):
@@ -13,6 +13,7 @@ class ClockOffset(Effect):
     """
 
     place = Place.SENSOR
+    family = Family.TIMING
     requires = frozenset({"sample_time"})
     source = "definition"
     params = (Param("offset", "ms", (0.0, 50.0), "how far the readings are ahead of the drive", off=0.0),)

@@ -4,7 +4,7 @@ import math
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, itself
 
 
 class Cogging(Effect):
@@ -14,6 +14,7 @@ class Cogging(Effect):
     """
 
     place = Place.FORCE
+    family = Family.PERIODIC
     requires = frozenset({"force", "velocity"})  # what stands in balance has a flexure, and no motor with slots
     source = (
         "T. Sebastian, V. Gangla, IEEE Trans. Ind. Appl. 32 (1996) 730: cogging torque, periodic in the slots and poles"
@@ -23,6 +24,7 @@ class Cogging(Effect):
         Param("period", "travel", (1e-4, 2.0), "Lambda: way of one period"),
         Param("phase", "deg", (-360.0, 360.0), "phi: phase at home"),
     )
+    at_bounds = itself("period", "phase")
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.force * ca.sin(2 * math.pi * s.displacement / p.period + p.phase)

@@ -4,7 +4,7 @@ import math
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, itself
 
 SHARE = "of the second harmonic per largest force of the first"
 
@@ -16,6 +16,7 @@ class CoggingOfSlots(Effect):
     """
 
     place = Place.FORCE
+    family = Family.PERIODIC
     requires = frozenset({"force", "velocity"})
     source = (
         "T. Sebastian, V. Gangla, IEEE Trans. Ind. Appl. 32 (1996) 730: cogging torque, periodic in the slots and poles"
@@ -27,6 +28,7 @@ class CoggingOfSlots(Effect):
         Param("sine", "1", (-1.0, 1.0), f"a: share {SHARE}, in phase with it"),
         Param("cosine", "1", (-1.0, 1.0), f"b: share {SHARE}, a quarter of its own period ahead"),
     )
+    at_bounds = itself("period", "phase", "sine", "cosine")
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         angle = 2 * math.pi * s.displacement / p.period + p.phase

@@ -1,7 +1,7 @@
 """Dry friction."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Place
-from ctrlgen.effects._bristles import BRISTLES, CONTACT, bristle_rate
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Place
+from ctrlgen.effects._bristles import BRISTLES, CONTACT, CREEPS, bristle_rate
 
 
 class Coulomb(Effect):
@@ -12,10 +12,12 @@ class Coulomb(Effect):
     """
 
     place = Place.FORCE
+    family = Family.FRICTION
     set_valued = True
     requires = frozenset({"velocity"})
     source = "P. R. Dahl, AIAA Journal 14 (1976) 1675: solid friction damping; smoothed by the usual tanh"
     params = CONTACT
+    at_bounds = CREEPS
     states = BRISTLES
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

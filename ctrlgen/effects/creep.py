@@ -1,6 +1,6 @@
 """A flexure or its glue keeps moving after the load has settled."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, ShapeBounds, State, itself
 
 RATIO = 4.0  # slow over fast relaxation time: two octaves, which a mixture of the two covers evenly
 
@@ -12,6 +12,7 @@ class Creep(Effect):
     """
 
     place = Place.DISPLACEMENT
+    family = Family.CREEP
     order = 2  # what creeps is carried by the joints: behind their play and hysteresis
     source = (
         "W. N. Findley et al., Creep and Relaxation of Nonlinear Viscoelastic Materials (1976), chain of Kelvin solids"
@@ -21,6 +22,8 @@ class Creep(Effect):
         Param("tau", "s", (1e-3, 1e5), "relaxation time"),
         Param("slow", "1", (0.0, 0.5), "s: share that relaxes four times as slowly"),
     )
+    # what has followed within a millisecond crept nowhere
+    at_bounds = {"tau": ShapeBounds(low="a gain, or a lag"), **itself("slow")}
     states = (State("z", "travel", 1.0), State("w", "travel", 1.0))
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

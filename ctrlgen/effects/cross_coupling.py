@@ -1,6 +1,6 @@
 """Two axes that share a flexure, a damper or a mass: the motion of the one takes force on the other."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class CrossCoupling(Effect, listed=False):
@@ -10,6 +10,7 @@ class CrossCoupling(Effect, listed=False):
     """
 
     place = Place.FORCE
+    family = Family.CROSS_TALK
     pairs = True
     partner_unit = "channel"
     symmetric = True

@@ -4,7 +4,7 @@ import math
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, itself
 
 
 class Cyclic(Effect):
@@ -15,6 +15,7 @@ class Cyclic(Effect):
     """
 
     place = Place.SENSOR
+    family = Family.PERIODIC
     channel_unit = ("m", "rad")
     source = "N. Bobroff, Appl. Opt. 26 (1987) 2676: residual errors in laser interferometry"
     params = (
@@ -27,6 +28,7 @@ class Cyclic(Effect):
         ),
         Param("phase", "deg", (-360.0, 360.0), "phase at home"),
     )
+    at_bounds = itself("period", "phase")
 
     @classmethod
     def contradiction(cls, p: dict[str, float]) -> str:

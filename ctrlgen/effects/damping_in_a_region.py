@@ -2,14 +2,15 @@
 
 import casadi as ca
 
-from ctrlgen.effects import ActsIn, Effect, Expression, LawInputs, LawNumbers, Param, Place, Side
-from ctrlgen.effects._region import EDGE, beyond_edge, ramp
+from ctrlgen.effects import ActsIn, Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, ShapeBounds, Side
+from ctrlgen.effects._region import EDGE, above, below, beyond_edge, ramp
 
 
 class RegionalDamping(Effect, listed=False):
     """Delta F = -c v in a region: one law, named once per region."""
 
     place = Place.FORCE
+    family = Family.DYNAMICS
     requires = frozenset({"velocity"})
     source = "definition: a linear damper, in a region"
 
@@ -20,6 +21,7 @@ class ViscousAbove(RegionalDamping):
 
     title = "Damping in the upper part of the travel"
     params = (Param("damping", "channel*s/travel", (0.0, 10.0), "c: damping beyond the edge", off=0.0), *EDGE)
+    at_bounds = above("damping everywhere")
     acts_in = ActsIn("position", "edge", Side.ABOVE, over="width")
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
@@ -32,6 +34,7 @@ class ViscousBelow(RegionalDamping):
 
     title = "Damping in the lower part of the travel"
     params = ViscousAbove.params
+    at_bounds = below("damping everywhere")
     acts_in = ActsIn("position", "edge", Side.BELOW, over="width")
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
@@ -47,6 +50,7 @@ class ViscousAtSpeed(RegionalDamping):
         Param("damping", "channel*s/travel", (0.0, 10.0), "c: damping above the speed", off=0.0),
         Param("speed", "travel/s", (1e-3, 1e3), "v_0: speed at which it sets in"),
     )
+    at_bounds = {"speed": ShapeBounds(low="damping everywhere")}
     acts_in = ActsIn("speed", "speed", Side.ABOVE)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, itself
 
 
 class DeadZone(Effect):
@@ -12,12 +12,14 @@ class DeadZone(Effect):
     """
 
     place = Place.DRIVE
+    family = Family.DRIVE
     requires = frozenset({"actuator"})
     source = "G. Tao, P. V. Kokotovic, IEEE Trans. Autom. Control 39 (1994) 59: plants with unknown dead-zones"
     params = (
         Param("width", "channel", (0.0, 0.5), "half width", off=0.0),
         Param("rounding", "1", (0.01, 5.0), "r: rounding of the corners, in widths"),
     )
+    at_bounds = itself("rounding")
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         corner = (p.rounding * p.width) ** 2 + (1e-6 * s.scale) ** 2

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, State, itself
 
 
 class Degradation(Effect):
@@ -12,12 +12,14 @@ class Degradation(Effect):
     """
 
     place = Place.DRIVE
+    family = Family.EVENTS
     requires = frozenset({"actuator"})
     source = "R. Isermann, Fault-Diagnosis Systems (2006): incipient faults"
     params = (
         Param("rate", "1/s", (-0.1, 0.1), "relative loss per time, at first", off=0.0),
         Param("levels_off", "s", (0.3, 1e6), "T: time constant with which the loss levels off"),
     )
+    at_bounds = itself("levels_off")
     states = (State("t", "s", 1.0, clock=True),)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

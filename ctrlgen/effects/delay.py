@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, State
 from ctrlgen.effects._kept_samples import samples_in
 
 FREE_SAMPLES = 4  # kept beyond twice the file's delay where the delay is free
@@ -22,6 +22,7 @@ class Delay(Effect):
     """
 
     place = Place.SENSOR
+    family = Family.TIMING
     order = 3
     requires = frozenset({"sample_time"})
     source = "T. I. Laakso et al., IEEE Signal Processing Magazine 13 (1996) 30: splitting the unit delay"

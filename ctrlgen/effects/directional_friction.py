@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, Plainer, State
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, Plainer, State, itself
 from ctrlgen.effects._bristles import SHARPEST
 
 
@@ -14,6 +14,7 @@ class DirectionalFriction(Effect):
     """
 
     place = Place.FORCE
+    family = Family.FRICTION
     set_valued = True
     requires = frozenset({"velocity"})
     source = "B. Armstrong-Helouvry et al., Automatica 30 (1994) 1083: direction-dependent friction; P. R. Dahl (1976)"
@@ -22,6 +23,7 @@ class DirectionalFriction(Effect):
         Param("skew", "1", (-0.95, 0.95), "a: relative excess of the force of sliding forward"),
         Param("reach", "travel", (1e-6, 0.03), "displacement over which the contact yields"),
     )
+    at_bounds = itself("skew", "reach")
     plainer = Plainer("coulomb", {"skew": 0.0}, {"smoothing": SHARPEST})
     states = (State("z", "1", 1.0), State("w", "1", 1.0))
 

@@ -1,7 +1,15 @@
 """Hysteresis of a joint or guide between stage and mechanism: the displacement lags."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
-from ctrlgen.effects._play_operators import play_states, radii, updated_plays, weighted_lag
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects._play_operators import (
+    BESIDE_GAIN,
+    NO_LAG,
+    ONE_PLAY,
+    play_states,
+    radii,
+    updated_plays,
+    weighted_lag,
+)
 
 
 class DisplacementHysteresis(Effect):
@@ -14,6 +22,7 @@ class DisplacementHysteresis(Effect):
     """
 
     place = Place.DISPLACEMENT
+    family = Family.HYSTERESIS
     order = 1
     requires = frozenset({"actuator"})
     source = "K. Kuhnen, Eur. J. Control 9 (2003) 407: modified Prandtl-Ishlinskii operators"
@@ -23,6 +32,7 @@ class DisplacementHysteresis(Effect):
         Param("taper", "1", (-3.0, 3.0), "q: weight of the narrow plays over the wide ones"),
         Param("reversible", "1", (-0.5, 1.5), "k: reversible displacement over the share that lags"),
     )
+    at_bounds = {"reach": NO_LAG, "taper": ONE_PLAY, "reversible": BESIDE_GAIN}
     states = play_states("travel")
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

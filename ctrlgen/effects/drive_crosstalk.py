@@ -1,6 +1,6 @@
 """What is asked of one actuator acts at another one too: by amplifiers, leads, valves of one supply."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class DriveCrosstalk(Effect):
@@ -10,6 +10,7 @@ class DriveCrosstalk(Effect):
     """
 
     place = Place.DRIVE
+    family = Family.CROSS_TALK
     pairs = True
     requires = frozenset({"actuator"})
     source = (

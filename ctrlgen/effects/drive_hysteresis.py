@@ -1,7 +1,7 @@
 """Hysteresis of a piezo stack: the displacement lags behind the voltage."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
-from ctrlgen.effects._play_operators import play_states, radii, updated_plays, weighted_lag
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects._play_operators import NO_LAG, ONE_PLAY, play_states, radii, updated_plays, weighted_lag
 
 
 class DriveHysteresis(Effect):
@@ -12,6 +12,7 @@ class DriveHysteresis(Effect):
     """
 
     place = Place.DRIVE
+    family = Family.HYSTERESIS
     order = 1
     requires = frozenset({"actuator", "force"})
     source = "K. Kuhnen, Eur. J. Control 9 (2003) 407: modified Prandtl-Ishlinskii operators"
@@ -20,6 +21,7 @@ class DriveHysteresis(Effect):
         Param("reach", "channel", (1e-3, 2.0), "r: change of drive after which all plays follow"),
         Param("taper", "1", (-3.0, 3.0), "q: weight of the narrow plays over the wide ones"),
     )
+    at_bounds = {"reach": NO_LAG, "taper": ONE_PLAY}
     states = play_states("channel")
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

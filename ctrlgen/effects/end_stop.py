@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import ActsIn, Effect, Expression, LawInputs, LawNumbers, Param, Place, Side
+from ctrlgen.effects import ActsIn, Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, Side, itself
 
 CORNER = 1e-3  # of e
 
@@ -16,6 +16,7 @@ class EndStop(Effect):
     """
 
     place = Place.FORCE
+    family = Family.ELASTIC
     requires = frozenset({"force"})
     source = "K. L. Johnson, Contact Mechanics (1985), eq. (4.23): Hertz; the corner is rounded"
     params = (
@@ -28,6 +29,7 @@ class EndStop(Effect):
         ),
         Param("power", "1", (1.0, 2.0), "n: how the force grows with the depth"),
     )
+    at_bounds = itself("gap", "power")
     acts_in = ActsIn("position", "gap", Side.OUTWARD)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

@@ -1,6 +1,6 @@
 """Beams whose thermal expansion, or stiffness, depends on temperature differently from the model."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class Expansion(Effect):
@@ -10,6 +10,7 @@ class Expansion(Effect):
     """
 
     place = Place.FORCE
+    family = Family.THERMAL
     requires = frozenset({"state"})
     source = "Y. Okada, Y. Tokumaru, J. Appl. Phys. 56 (1984) 314: expansion of silicon between 300 and 1500 K"
     params = (Param("slope", "1/K", (-1e-2, 1e-2), "relative change of force per kelvin", off=0.0),)

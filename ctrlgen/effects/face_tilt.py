@@ -1,6 +1,6 @@
 """The face that an autocollimator reads does not stand square: the turn about its own axis shows in the reading."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class FaceTilt(Effect):
@@ -11,6 +11,7 @@ class FaceTilt(Effect):
     """
 
     place = Place.SENSOR
+    family = Family.GEOMETRY
     pairs = True
     channel_unit = "rad"
     partner_unit = "channel"

@@ -1,6 +1,6 @@
 """Finite rotations of the links: as the mechanism moves, its Jacobian is no longer the one at home."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class FiniteRotation(Effect):
@@ -11,6 +11,7 @@ class FiniteRotation(Effect):
     """
 
     place = Place.POSE
+    family = Family.GEOMETRY
     requires = frozenset({"second_order_kinematics"})
     source = "J.-P. Merlet, Parallel Robots (2006), chapter 4: loop closure, expanded to second order"
     params = (Param("share", "1", (-2.0, 4.0), "1 for links on ideal pivots", off=0.0),)

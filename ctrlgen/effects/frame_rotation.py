@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class FrameRotation(Effect, listed=False):
@@ -14,6 +14,7 @@ class FrameRotation(Effect, listed=False):
     """
 
     place = Place.POSE
+    family = Family.GEOMETRY
     requires = frozenset({"spatial"})
     source = "definition"
     params = (Param("angle", "mrad", (-100.0, 100.0), "rotation of the platform's frame", off=0.0),)

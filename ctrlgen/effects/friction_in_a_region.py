@@ -1,10 +1,8 @@
 """Dry friction in one part of the travel, or from one moment on: a cable that drags, a seal that touches, dirt on a guide."""
 
-from typing import ClassVar
-
-from ctrlgen.effects import ActsIn, Effect, Expression, LawInputs, LawNumbers, Place, Side, State
-from ctrlgen.effects._bristles import BRISTLES, CONTACT, bristle_rate
-from ctrlgen.effects._region import EDGE, beyond_edge
+from ctrlgen.effects import ActsIn, Effect, Expression, Family, LawInputs, LawNumbers, Place, Side, itself
+from ctrlgen.effects._bristles import BRISTLES, CONTACT, CREEPS, bristle_rate
+from ctrlgen.effects._region import EDGE, above, below, beyond_edge
 from ctrlgen.effects._smooth_step import CLOCK, WHEN, smooth_step
 
 
@@ -12,10 +10,11 @@ class RegionalFriction(Effect, listed=False):
     """Delta F = -f z in a region, z Dahl's bristles of `coulomb`: one law, named once per region."""
 
     place = Place.FORCE
+    family = Family.FRICTION
     set_valued = True
     requires = frozenset({"velocity"})
     source = "P. R. Dahl, AIAA Journal 14 (1976) 1675: solid friction damping; in a region"
-    states: ClassVar[tuple[State, ...]] = BRISTLES
+    states = BRISTLES
 
     def rates(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         return {"z": bristle_rate(s, p)}
@@ -27,6 +26,7 @@ class CoulombAbove(RegionalFriction):
 
     title = "Dry friction in the upper part of the travel"
     params = (*CONTACT, *EDGE)
+    at_bounds = CREEPS | above("dry friction everywhere")
     acts_in = ActsIn("position", "edge", Side.ABOVE, over="width")
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
@@ -39,6 +39,7 @@ class CoulombBelow(RegionalFriction):
 
     title = "Dry friction in the lower part of the travel"
     params = (*CONTACT, *EDGE)
+    at_bounds = CREEPS | below("dry friction everywhere")
     acts_in = ActsIn("position", "edge", Side.BELOW, over="width")
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
@@ -50,6 +51,7 @@ class CoulombAfter(RegionalFriction):
 
     title = "Dry friction that sets in at a moment"
     params = (*CONTACT, *WHEN)
+    at_bounds = CREEPS | itself("moment", "rise")
     states = (*BRISTLES, *CLOCK)
     acts_in = ActsIn("time", "moment", Side.ABOVE, over="rise", ramp=1.0)
 

@@ -1,12 +1,13 @@
 """A wrong gain: of an amplifier, a lever or a sensor."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class Gain(Effect, listed=False):
     """Delta x = g x, x the signal at the place: one law, named once per place."""
 
     source = "definition"
+    family = Family.GAIN
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.gain * s.value

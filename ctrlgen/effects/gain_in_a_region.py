@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import ActsIn, Effect, Expression, LawInputs, LawNumbers, Param, Place, Side
+from ctrlgen.effects import ActsIn, Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, ShapeBounds, Side
 from ctrlgen.effects._region import ramp
 
 
@@ -14,12 +14,14 @@ class DriveGainBeyond(Effect):
 
     title = "A gain that changes above one level of the drive"
     place = Place.DRIVE
+    family = Family.DRIVE
     requires = frozenset({"actuator"})
     source = "definition: a piecewise linear gain"
     params = (
         Param("gain", "1", (-1.0, 1.0), "g: change of the slope beyond the level", off=0.0),
         Param("level", "channel", (1e-3, 1.0), "L: drive beyond which the slope is another"),
     )
+    at_bounds = {"level": ShapeBounds(low="a gain of the drive")}
     acts_in = ActsIn("drive", "level", Side.BOTH)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, itself
 
 
 class Gravity(Effect):
@@ -13,6 +13,7 @@ class Gravity(Effect):
     """
 
     place = Place.FORCE
+    family = Family.ELASTIC
     channel_unit = "N*m"
     requires = frozenset({"force"})
     source = "B. Siciliano et al., Robotics (2009), section 7.2: gravity terms of the joint torques"
@@ -20,6 +21,7 @@ class Gravity(Effect):
         Param("torque", "channel", (0.0, 3.0), "M: largest torque of the weight", off=0.0),
         Param("phase", "deg", (-360.0, 360.0), "q0: of the centre of mass at home, from hanging straight down"),
     )
+    at_bounds = itself("phase")
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.torque * ca.sin(s.displacement + p.phase)

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class HeatCrosstalk(Effect):
@@ -12,6 +12,7 @@ class HeatCrosstalk(Effect):
     """
 
     place = Place.HEAT
+    family = Family.CROSS_TALK
     requires = frozenset({"heat"})
     source = "definition"
     params = (Param("share", "1", (0.0, 0.1), "power arriving per power of another heater", off=0.0),)

@@ -1,6 +1,6 @@
 """A heater whose resistance changes with temperature, driven by an amplifier that was set for the cold heater."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class HeaterResistance(Effect):
@@ -10,6 +10,7 @@ class HeaterResistance(Effect):
     """
 
     place = Place.HEAT
+    family = Family.DRIVE
     requires = frozenset({"heat", "state"})
     source = "definition: linear temperature coefficient of resistance"
     params = (Param("slope", "1/K", (-1e-3, 1e-2), "relative change of resistance per kelvin", off=0.0),)

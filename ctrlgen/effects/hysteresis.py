@@ -1,6 +1,6 @@
 """Hysteresis of many small slipping contacts."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, State, either, itself
 from ctrlgen.effects._play_operators import play_states, radii, updated_plays, weighted_lag
 from ctrlgen.effects._reversal_points import reversal_point
 
@@ -13,6 +13,7 @@ class Hysteresis(Effect):
     """
 
     place = Place.FORCE
+    family = Family.HYSTERESIS
     requires = frozenset({"force"})
     source = "W. D. Iwan, J. Appl. Mech. 33 (1966) 893; K. Kuhnen, Eur. J. Control 9 (2003) 407"
     params = (
@@ -20,6 +21,7 @@ class Hysteresis(Effect):
         Param("reach", "travel", (1e-3, 5.0), "r: travel after which all springs slip"),
         Param("taper", "1", (-3.0, 3.0), "q: weight of the small radii over the large ones"),
     )
+    at_bounds = {"reach": either("dry friction, or a spring"), **itself("taper")}
     states = (
         *play_states("travel"),
         State("d", "travel", 1.0, stepped=True),

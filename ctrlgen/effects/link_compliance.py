@@ -1,12 +1,13 @@
 """A compliant joint or strut: the platform tilts when it moves."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class LinkCompliance(Effect):
     """Delta theta = c delta: the joint's moment, proportional to the motion `of`, over its stiffness. Holds to first order."""
 
     place = Place.POSE
+    family = Family.CROSS_TALK
     pairs = True
     channel_unit = "rad"
     partner_unit = "m"

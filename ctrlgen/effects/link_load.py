@@ -1,6 +1,6 @@
 """Stages that stiffen: they yield less to the load of the links, the further they are driven."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class LinkLoad(Effect):
@@ -10,6 +10,7 @@ class LinkLoad(Effect):
     """
 
     place = Place.DISPLACEMENT
+    family = Family.ELASTIC
     requires = frozenset({"tangent_compliance"})
     source = "S1 eq. (12) and (16): stages in series with struts, at the stage's tangent stiffness"
     params = (Param("share", "1", (-2.0, 4.0), "1 for the stage's own law", off=0.0),)

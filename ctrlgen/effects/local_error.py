@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import ActsIn, Effect, Expression, LawInputs, LawNumbers, Param, Place, Side
+from ctrlgen.effects import ActsIn, Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, Side, itself
 
 
 class LocalError(Effect):
@@ -13,6 +13,7 @@ class LocalError(Effect):
     """
 
     place = Place.SENSOR
+    family = Family.GEOMETRY
     channel_unit = ("m", "rad")
     source = "definition"
     params = (
@@ -21,6 +22,7 @@ class LocalError(Effect):
         Param("length", "channel", (1e-4, 1.0), "w: length of the stretch"),
         Param("rounding", "channel", (1e-4, 0.5), "r: way over which it sets in and ends"),
     )
+    at_bounds = itself("position", "length", "rounding")
     acts_in = ActsIn("position", "position", Side.AROUND, "length", "rounding")
 
     @classmethod

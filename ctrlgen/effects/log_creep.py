@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, State, itself
 
 CHAIN = range(9)
 
@@ -15,6 +15,7 @@ class LogCreep(Effect):
     """
 
     place = Place.DISPLACEMENT
+    family = Family.CREEP
     order = 2  # what creeps is carried by the joints: behind their play and hysteresis
     source = "H. Jung, D.-G. Gweon, Rev. Sci. Instrum. 71 (2000) 1896: creep of piezoelectric actuators"
     params = (
@@ -22,6 +23,7 @@ class LogCreep(Effect):
         Param("tau", "s", (1e-3, 1e2), "shortest relaxation time"),
         Param("decades", "1", (1.0, 7.0), "D: decades after which it ends"),
     )
+    at_bounds = itself("tau", "decades")
     states = tuple(State(f"z{j}", "travel", 1.0) for j in CHAIN)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

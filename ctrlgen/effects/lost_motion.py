@@ -1,6 +1,6 @@
 """A lever that bends under the force it transmits."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class LostMotion(Effect):
@@ -11,6 +11,7 @@ class LostMotion(Effect):
     """
 
     place = Place.DISPLACEMENT
+    family = Family.ELASTIC
     requires = frozenset({"force"})
     source = "S. T. Smith, Flexures: Elements of Elastic Mechanisms (2000): levers"
     params = (Param("compliance", "um/N", (-100.0, 100.0), "lost travel per force", off=0.0),)

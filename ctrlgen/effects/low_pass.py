@@ -1,6 +1,6 @@
 """A sensor, or its filter, of limited bandwidth."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, State, itself
 
 
 class LowPass(Effect):
@@ -11,6 +11,7 @@ class LowPass(Effect):
     """
 
     place = Place.SENSOR
+    family = Family.TIMING
     order = 2
     source = "A. J. Fleming, Sensors and Actuators A 190 (2013) 106: sensor bandwidth"
     params = (
@@ -18,6 +19,7 @@ class LowPass(Effect):
         Param("tau", "s", (1e-4, 1e2), "one over the corner frequency in rad/s"),
         Param("damping", "1", (0.3, 20.0), "D: damping ratio"),
     )
+    at_bounds = itself("tau", "damping")
     states = (State("w", "channel", 1.0), State("v", "channel", 1.0))
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

@@ -1,6 +1,6 @@
 """A mirror that an interferometer reads does not stand square: another direction shows in the reading."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class MirrorTilt(Effect):
@@ -12,6 +12,7 @@ class MirrorTilt(Effect):
     """
 
     place = Place.SENSOR
+    family = Family.GEOMETRY
     pairs = True
     channel_unit = "m"
     partner_unit = "channel"

@@ -1,12 +1,13 @@
 """A constant offset: of an amplifier or a sensor."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class Offset(Effect, listed=False):
     """Delta x = b, x the signal at the place: one law, named once per place."""
 
     source = "definition"
+    family = Family.GAIN
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.offset

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, itself
 
 
 class Payload(Effect):
@@ -12,12 +12,14 @@ class Payload(Effect):
     """
 
     place = Place.POSE
+    family = Family.GAIN
     channel_unit = "rad"
     source = "definition: moment of a weight about a horizontal axis"
     params = (
         Param("share", "1", (-0.5, 0.5), "angle of bending per angle of lean, near upright", off=0.0),
         Param("lean", "deg", (-180.0, 180.0), "how far the centre of mass leans at home"),
     )
+    at_bounds = itself("lean")
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.share * (ca.sin(s.value + p.lean) - ca.sin(p.lean))

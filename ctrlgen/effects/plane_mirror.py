@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 from ctrlgen.effects._mirror_normal import turned_normal
 
 
@@ -15,6 +15,7 @@ class PlaneMirror(Effect):
     """
 
     place = Place.SENSOR
+    family = Family.GEOMETRY
     requires = frozenset({"spatial"})
     channel_unit = "m"
     source = "S0 section 3.1 and Fig. 4: beams along x and y on a cube; the plane n . (X - X_0) = 0 that turns with it"

@@ -2,13 +2,14 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class QuadraticDamping(Effect):
     """Delta F = -c v |v|. Holds for turbulent flow."""
 
     place = Place.FORCE
+    family = Family.DYNAMICS
     requires = frozenset({"velocity"})
     source = "definition: drag at constant drag coefficient"
     params = (Param("damping", "channel*s^2/travel^2", (0.0, 10.0), "force per speed squared", off=0.0),)

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, itself
 
 
 class Quantisation(Effect):
@@ -13,12 +13,14 @@ class Quantisation(Effect):
     """
 
     place = Place.SENSOR
+    family = Family.PERIODIC
     order = 4
     source = "B. Widrow, I. Kollar, Quantization Noise (2008)"
     params = (
         Param("share", "1", (0.0, 1.5), "1: every reading is rounded", off=0.0),
         Param("quantum", "channel", (1e-7, 1.0), "q: step"),
     )
+    at_bounds = itself("quantum")
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.share * (p.quantum * ca.floor(s.value / p.quantum + 0.5) - s.value)

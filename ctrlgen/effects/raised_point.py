@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class RaisedPoint(Effect):
@@ -12,6 +12,7 @@ class RaisedPoint(Effect):
     """
 
     place = Place.POSE
+    family = Family.GEOMETRY
     requires = frozenset({"spatial"})
     channel_unit = "m"
     source = "R. M. Murray, Z. Li, S. S. Sastry, Robotic Manipulation (1994), chapter 2: Rodrigues' formula"

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class Rectified(Effect):
@@ -12,6 +12,7 @@ class Rectified(Effect):
     """
 
     place = Place.SENSOR
+    family = Family.GEOMETRY
     source = "definition"
     params = (Param("share", "1", (0.0, 2.0), "g: half of what a negative reading loses", off=0.0),)
 

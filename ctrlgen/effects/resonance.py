@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, State, itself
 
 
 class Resonance(Effect):
@@ -12,6 +12,7 @@ class Resonance(Effect):
     """
 
     place = Place.FORCE
+    family = Family.DYNAMICS
     requires = frozenset({"velocity"})
     source = "J. P. Den Hartog, Mechanical Vibrations (1956), chapter 3: two degrees of freedom"
     params = (
@@ -19,6 +20,7 @@ class Resonance(Effect):
         Param("frequency", "Hz", (0.5, 2e3), "resonance with the stage held"),
         Param("damping", "1", (1e-3, 1.0), "damping ratio"),
     )
+    at_bounds = itself("frequency", "damping")
     states = (State("q", "travel", 1.0), State("p", "travel", 1.0))
 
     @classmethod

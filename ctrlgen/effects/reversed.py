@@ -1,6 +1,6 @@
 """An actuator connected the wrong way round."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class Reversed(Effect):
@@ -8,6 +8,7 @@ class Reversed(Effect):
     which is `drive_gain`."""
 
     place = Place.DRIVE
+    family = Family.GAIN
     requires = frozenset({"actuator", "bipolar"})
     source = "definition"
     params = (Param("share", "1", (0.0, 1.2), "1: the sign is reversed", off=0.0),)

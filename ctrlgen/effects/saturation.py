@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import ActsIn, Effect, Expression, LawInputs, LawNumbers, Param, Place, Side
+from ctrlgen.effects import ActsIn, Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, Side, itself
 
 
 class Saturation(Effect):
@@ -13,6 +13,7 @@ class Saturation(Effect):
     """
 
     place = Place.DRIVE
+    family = Family.DRIVE
     requires = frozenset({"actuator"})
     source = "R. Isermann, Fault-Diagnosis Systems (2006): actuator faults; smooth form ours"
     params = (
@@ -24,6 +25,7 @@ class Saturation(Effect):
             "L: drive that is not exceeded",
         ),
     )
+    at_bounds = itself("level")
     acts_in = ActsIn("drive", "level", Side.BOTH)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

@@ -1,6 +1,6 @@
 """A second thermal mass between heater and beams: part of the heat comes late."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, State, itself
 
 
 class SecondPole(Effect):
@@ -10,12 +10,14 @@ class SecondPole(Effect):
     """
 
     place = Place.HEAT
+    family = Family.THERMAL
     requires = frozenset({"heat"})
     source = "J. H. Lienhard, A Heat Transfer Textbook (2019), chapter 5: lumped bodies"
     params = (
         Param("share", "1", (0.0, 1.2), "share of the power that comes late", off=0.0),
         Param("tau", "s", (1e-3, 1e4), "time constant"),
     )
+    at_bounds = itself("tau")
     states = (State("w", "channel", 1.0),)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

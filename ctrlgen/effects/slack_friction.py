@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, Plainer, State
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, Plainer, State, itself
 from ctrlgen.effects._play_operators import ELEMENTS, lags, play_states, radii, updated_plays
 from ctrlgen.effects._reversal_points import reversal_point
 
@@ -16,6 +16,7 @@ class SlackFriction(Effect):
     """
 
     place = Place.FORCE
+    family = Family.HYSTERESIS
     requires = frozenset({"force"})
     source = "W. D. Iwan, J. Appl. Mech. 33 (1966) 893, each element behind a gap; M. Nordin, P.-O. Gutman, Automatica 38 (2002) 1633"
     params = (
@@ -23,6 +24,7 @@ class SlackFriction(Effect):
         Param("slack", "travel", (0.0, 10.0), "b: travel without force after a reversal"),
         Param("reach", "travel", (1e-3, 5.0), "r: travel after which all contacts slide, once the slack is crossed"),
     )
+    at_bounds = itself("slack", "reach")
     plainer = Plainer("hysteresis", {"slack": 0.0}, {"taper": 0.0})
     states = (
         *play_states("travel"),

@@ -1,6 +1,6 @@
 """A step at one moment: of a force or of a reading."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, itself
 from ctrlgen.effects._smooth_step import CLOCK, WHEN, smooth_step
 
 
@@ -8,6 +8,8 @@ class Step(Effect, listed=False):
     """Delta x = A e(t), e from 0 to 1 within the time T about the moment t_0: one law, named once per place."""
 
     source = "definition"
+    at_bounds = itself("moment", "rise")
+    family = Family.EVENTS
     states = CLOCK
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

@@ -1,6 +1,6 @@
 """A clamped flexure stretches as it bends."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class Stiffening(Effect):
@@ -10,6 +10,7 @@ class Stiffening(Effect):
     """
 
     place = Place.FORCE
+    family = Family.ELASTIC
     requires = frozenset({"force"})
     source = "S. Timoshenko, Strength of Materials II (1956), large deflection of clamped beams"
     params = (Param("k3", "channel/travel^3", (-10.0, 10.0), "cubic stiffness", off=0.0),)

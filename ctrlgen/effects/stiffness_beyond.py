@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import ActsIn, Effect, Expression, LawInputs, LawNumbers, Param, Place, Side
+from ctrlgen.effects import ActsIn, Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, ShapeBounds, Side
 from ctrlgen.effects._region import CORNER, ramp
 
 
@@ -12,12 +12,14 @@ class StiffnessBeyond(Effect):
 
     title = "A stiffness that changes farther out, on both sides"
     place = Place.FORCE
+    family = Family.ELASTIC
     requires = frozenset({"force", "bipolar"})
     source = "definition: a piecewise linear spring"
     params = (
         Param("stiffness", "channel/travel", (-10.0, 10.0), "k: change of stiffness beyond the edge", off=0.0),
         Param("edge", "travel", (1e-3, 5.0), "d_0: way from home at which it changes"),
     )
+    at_bounds = {"edge": ShapeBounds(low="another stiffness everywhere")}
     acts_in = ActsIn("position", "edge", Side.BOTH)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

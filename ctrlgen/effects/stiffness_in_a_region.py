@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from ctrlgen.effects import ActsIn, Effect, Expression, LawInputs, LawNumbers, Param, Place, Side
+from ctrlgen.effects import ActsIn, Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, ShapeBounds, Side
 from ctrlgen.effects._region import CORNER, ramp
 
 STIFFNESS = Param("stiffness", "channel/travel", (-10.0, 10.0), "k: change of stiffness beyond the edge", off=0.0)
@@ -12,6 +12,7 @@ class RegionalStiffness(Effect, listed=False):
     """Delta F = -k x in a region, x the way beyond its edge: one law, named once per region."""
 
     place = Place.FORCE
+    family = Family.ELASTIC
     requires = frozenset({"force"})
     source = "definition: a piecewise linear spring"
     outward: ClassVar[int]
@@ -34,6 +35,7 @@ class StiffnessAbove(RegionalStiffness):
 
     title = "A stiffness that changes in the upper part of the travel"
     params = (STIFFNESS, Param("edge", "travel", (-5.0, 5.0), "d_0: displacement at which it changes"))
+    at_bounds = {"edge": ShapeBounds(low="another stiffness everywhere")}
     acts_in = ActsIn("position", "edge", Side.ABOVE)
     outward = 1
 
@@ -47,6 +49,7 @@ class StiffnessBelow(RegionalStiffness):
 
     title = "A stiffness that changes in the lower part of the travel"
     params = StiffnessAbove.params
+    at_bounds = {"edge": ShapeBounds(high="another stiffness everywhere")}
     acts_in = ActsIn("position", "edge", Side.BELOW)
     outward = -1
 

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import ActsIn, Effect, Expression, LawInputs, LawNumbers, Param, Place, Side
+from ctrlgen.effects import ActsIn, Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, Side, itself
 
 
 class StitchingError(Effect):
@@ -12,6 +12,7 @@ class StitchingError(Effect):
     """
 
     place = Place.SENSOR
+    family = Family.GEOMETRY
     channel_unit = ("m", "rad")
     source = "definition"
     params = (
@@ -19,6 +20,7 @@ class StitchingError(Effect):
         Param("position", "channel", (-2.0, 2.0), "y_0: position at which it sets in"),
         Param("width", "channel", (1e-4, 0.05), "w: width over which it sets in"),
     )
+    at_bounds = itself("position", "width")
     acts_in = ActsIn("position", "position", Side.ABOVE)
 
     @classmethod

@@ -1,7 +1,7 @@
 """Dry friction that falls as a lubricant film builds up."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Place, Plainer
-from ctrlgen.effects._bristles import BRISTLES, FALLING, SHARPEST, falling_rate
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Place, Plainer
+from ctrlgen.effects._bristles import BRISTLES, FALLING, FALLS, SHARPEST, falling_rate
 
 
 class Stribeck(Effect):
@@ -11,10 +11,12 @@ class Stribeck(Effect):
     """
 
     place = Place.FORCE
+    family = Family.FRICTION
     set_valued = True
     requires = frozenset({"velocity"})
     source = "C. Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995) 419, eqs. (1)-(4)"
     params = FALLING
+    at_bounds = FALLS
     plainer = Plainer("coulomb", {"breakaway": 1.0}, {"smoothing": SHARPEST})
     states = BRISTLES
 

@@ -2,9 +2,9 @@
 
 from typing import ClassVar
 
-from ctrlgen.effects import ActsIn, Expression, LawInputs, LawNumbers, Side
-from ctrlgen.effects._bristles import BRISTLES, FALLING, FallingFriction
-from ctrlgen.effects._region import EDGE, beyond_edge
+from ctrlgen.effects import ActsIn, Expression, LawInputs, LawNumbers, Side, itself
+from ctrlgen.effects._bristles import BRISTLES, FALLING, FALLS, FallingFriction
+from ctrlgen.effects._region import EDGE, above, below, beyond_edge
 from ctrlgen.effects._smooth_step import CLOCK, WHEN, smooth_step
 
 
@@ -23,6 +23,7 @@ class StribeckAbove(OnOneSide):
 
     title = "Dry friction in the upper part of the travel that falls with the speed"
     acts_in = ActsIn("position", "edge", Side.ABOVE, over="width")
+    at_bounds = FALLS | above("dry friction everywhere")
     side = 1
 
 
@@ -31,6 +32,7 @@ class StribeckBelow(OnOneSide):
 
     title = "Dry friction in the lower part of the travel that falls with the speed"
     acts_in = ActsIn("position", "edge", Side.BELOW, over="width")
+    at_bounds = FALLS | below("dry friction everywhere")
     side = -1
 
 
@@ -39,6 +41,7 @@ class StribeckAfter(FallingFriction):
 
     title = "Dry friction that sets in at a moment and falls with the speed"
     params = (*FALLING, *WHEN)
+    at_bounds = FALLS | itself("moment", "rise")
     states = (*BRISTLES, *CLOCK)
     acts_in = ActsIn("time", "moment", Side.ABOVE, over="rise", ramp=1.0)
 

@@ -1,6 +1,6 @@
 """Two actuators whose leads are exchanged."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place
 
 
 class Swapped(Effect):
@@ -8,6 +8,7 @@ class Swapped(Effect):
     crosstalk of the leads."""
 
     place = Place.DRIVE
+    family = Family.CROSS_TALK
     pairs = True
     symmetric = True
     requires = frozenset({"actuator"})

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import ActsIn, Effect, Expression, LawInputs, LawNumbers, Param, Place, Side
+from ctrlgen.effects import ActsIn, Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, ShapeBounds, Side
 
 
 class TemperatureSensitivityAbove(Effect):
@@ -13,6 +13,7 @@ class TemperatureSensitivityAbove(Effect):
 
     title = "A reading that moves with the temperature of the surroundings above one temperature"
     place = Place.SENSOR
+    family = Family.THERMAL
     order = -1  # before `cyclic`: what drifts moves the target along the fringes
     requires = frozenset({"ambient"})
     source = "definition"
@@ -20,6 +21,7 @@ class TemperatureSensitivityAbove(Effect):
         Param("slope", "channel/K", (-10.0, 10.0), "c: change of the reading per kelvin of the surroundings", off=0.0),
         Param("reference", "K", (-30.0, 30.0), "T_0: rise above which the reading moves"),
     )
+    at_bounds = {"reference": ShapeBounds(low="an error of every temperature")}
     acts_in = ActsIn("temperature", "reference", Side.ABOVE)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

@@ -1,6 +1,6 @@
 """A reading that moves with the temperature of the surroundings."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, ShapeBounds
 
 
 class TemperatureSensitivity(Effect):
@@ -10,6 +10,7 @@ class TemperatureSensitivity(Effect):
     """
 
     place = Place.SENSOR
+    family = Family.THERMAL
     order = -1  # before `cyclic`: what drifts moves the target along the fringes
     requires = frozenset({"ambient"})
     source = "definition"
@@ -17,6 +18,8 @@ class TemperatureSensitivity(Effect):
         Param("slope", "channel/K", (-10.0, 10.0), "change of the reading per kelvin of the surroundings", off=0.0),
         Param("reference", "K", (-30.0, 30.0), "rise at which the reading is right, T_0"),
     )
+    # far from where it is right, it is off by nearly the same at every temperature
+    at_bounds = {"reference": ShapeBounds(low="an offset", high="an offset")}
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.slope * (s.ambient - p.reference)

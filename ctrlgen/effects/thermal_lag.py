@@ -1,6 +1,6 @@
 """A share of the actuator's action that builds up slowly, as heat spreads through a body."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, State, itself
 
 THIRD = 9 / 25  # third over second time constant: those of a rod heated at one end are as 1, 1/9, 1/25
 
@@ -13,6 +13,7 @@ class ThermalLag(Effect):
     """
 
     place = Place.DRIVE
+    family = Family.THERMAL
     order = 1
     requires = frozenset({"actuator", "unheated"})
     source = "H. S. Carslaw, J. C. Jaeger, Conduction of Heat in Solids (1959), section 3.4: rod, one end insulated"
@@ -21,6 +22,7 @@ class ThermalLag(Effect):
         Param("tau", "s", (1e-3, 1e4), "time constant"),
         Param("second", "1", (0.01, 1.0), "r: second over first time constant"),
     )
+    at_bounds = itself("tau", "second")
     states = (State("v", "channel", 1.0), State("w", "channel", 1.0), State("x", "channel", 1.0))
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, State, itself
 
 
 class Vibration(Effect):
@@ -12,12 +12,14 @@ class Vibration(Effect):
     """
 
     place = Place.SENSOR
+    family = Family.EVENTS
     source = "definition"
     params = (
         Param("amplitude", "channel", (-1.0, 1.0), "amplitude of the vibration", off=0.0),
         Param("frequency", "Hz", (1e-3, 1e5), "frequency of the vibration"),
         Param("phase", "deg", (-360.0, 360.0), "phase at time zero"),
     )
+    at_bounds = itself("frequency", "phase")
     states = (State("t", "s", 1.0, clock=True),)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

@@ -1,6 +1,6 @@
 """Hysteresis whose narrow and wide plays have weights of their own."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, itself
 from ctrlgen.effects import _play_operators as plays
 
 OF_REST = "f_{j}: part of play {j} in what the narrower plays leave"
@@ -16,6 +16,8 @@ class WeightedLag(Effect, listed=False):
 
     order = 1
     source = "K. Kuhnen, Eur. J. Control 9 (2003) 407: modified Prandtl-Ishlinskii operators"
+    at_bounds = {"reach": plays.NO_LAG, "reversible": plays.BESIDE_GAIN, **itself(*(part.name for part in PARTS))}
+    family = Family.HYSTERESIS
 
     @classmethod
     def from_plainer(cls, numbers: dict[str, float]) -> dict[str, float]:
@@ -26,8 +28,7 @@ class WeightedLag(Effect, listed=False):
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         weights = plays.parted_weights([getattr(p, part.name) for part in PARTS])
         lags = plays.lags(s, s.value, plays.graded_radii(p.reach))
-        behind = sum(w * lag for w, lag in zip(weights, lags, strict=True))
-        return -p.share * (behind - p.reversible * s.value)
+        return -p.share * (sum(w * lag for w, lag in zip(weights, lags, strict=True)) - p.reversible * s.value)
 
     def update(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         return plays.updated_plays(s, [s.value], plays.graded_radii(p.reach))

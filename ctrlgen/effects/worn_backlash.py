@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, itself
 from ctrlgen.effects._gap import DRIVEN, behind, carried
 
 
@@ -13,12 +13,14 @@ class WornBacklash(Effect):
     """
 
     place = Place.DISPLACEMENT
+    family = Family.HYSTERESIS
     order = 1
     source = "M. Nordin, P.-O. Gutman, Automatica 38 (2002) 1633: controlling systems with backlash; wear along the way"
     params = (
         Param("gap", "travel", (0.0, 1.9), "b: full width of the gap at home", off=0.0),
         Param("wear", "1", (-0.95, 0.95), "a: relative excess of the gap far on the positive side"),
     )
+    at_bounds = itself("wear")
     states = DRIVEN
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

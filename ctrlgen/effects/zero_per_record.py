@@ -1,6 +1,6 @@
 """A sensor whose zero is set anew for every record."""
 
-from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, State
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, State
 
 
 class ZeroPerRecord(Effect):
@@ -11,6 +11,7 @@ class ZeroPerRecord(Effect):
     """
 
     place = Place.SENSOR
+    family = Family.GAIN
     source = "definition"
     params = (Param("share", "1", (0.0, 2.0), "1: the zero is free", off=0.0),)
     states = (State("zero", "channel", 1.0, per_record=True),)

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from math import exp, log
 
 from ctrlgen.effects import Param
-from ctrlgen.estimation.shape_bounds import ShapeBounds
 
 ONE_IN_TEN = -2.3  # ln(1/10)
 ONE_IN_A_HUNDRED = -4.6
@@ -81,7 +80,6 @@ class LawPrior:
         the motion comes first where it explains nearly as much.
     domain: where a finding is reported to be; by default what the law's place says.
     parameters: by name; one that is not listed gets `default_starts`.
-    at_bounds: what the law is where a shape ends at a bound, by name (`shape_bounds`); of one that is not listed the law itself.
     """
 
     reason: str = "Default: as common as a wrong gain, its form exact."
@@ -98,13 +96,11 @@ class LawPrior:
     of_time: bool = False
     domain: str | None = None
     parameters: Mapping[str, ParameterPrior] = field(default_factory=dict)
-    at_bounds: Mapping[str, ShapeBounds] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Raises TypeError for what a law of another package states in another form than this."""
-        for stated, kind in ((self.parameters, ParameterPrior), (self.at_bounds, ShapeBounds)):
-            if wrong := [name for name, value in stated.items() if not isinstance(value, kind)]:
-                raise TypeError(f"{wrong[0]} must be stated as a {kind.__name__}")
+        if wrong := [name for name, value in self.parameters.items() if not isinstance(value, ParameterPrior)]:
+            raise TypeError(f"{wrong[0]} must be stated as a {ParameterPrior.__name__}")
 
     @property
     def is_pitch(self) -> bool:

@@ -17,7 +17,6 @@ from ctrlgen.effects import Effect
 from ctrlgen.estimation.law_prior import CREEPING, ONE_IN_A_HUNDRED, ONE_IN_TEN, LawPrior, ParameterPrior, peaks
 from ctrlgen.estimation.priors_in_a_region import IN_A_REGION
 from ctrlgen.estimation.priors_of_a_lag import HYSTERESIS, OF_A_LAG
-from ctrlgen.estimation.shape_bounds import AT_BOUNDS
 
 
 def prior_of(law: type[Effect]) -> LawPrior:
@@ -58,7 +57,7 @@ _PLAY = LawPrior(
     parameters={"gap": peaks(1e-4, 1e-3, 0.01, 0.1, 0.3)},
 )
 
-_ROWS: Mapping[str, LawPrior] = MappingProxyType(
+PRIORS: Mapping[str, LawPrior] = MappingProxyType(
     {
         # Sensor ---------------------------------------------------------------------------------------------------------------
         "bow": LawPrior("No sensor is bent by its first even term alone; 5 %: judgement.", model_form_error=0.05),
@@ -377,11 +376,5 @@ _ROWS: Mapping[str, LawPrior] = MappingProxyType(
             ),
             DEFAULT,
         ),
-    }
-)
-PRIORS: Mapping[str, LawPrior] = MappingProxyType(
-    {
-        kind: replace(_ROWS.get(kind, DEFAULT), at_bounds=AT_BOUNDS.get(kind, {}))
-        for kind in sorted({*_ROWS, *AT_BOUNDS})
     }
 )

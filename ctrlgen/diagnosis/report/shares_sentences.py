@@ -9,8 +9,9 @@ from ctrlgen.diagnosis.report.narrative import empirical_sentences, per_cent, sh
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.diagnosis.settings import SHARES
 from ctrlgen.diagnosis.shares.design import Kind
-from ctrlgen.diagnosis.shares.families import SPEAKS_FOR, Family, ranking
+from ctrlgen.diagnosis.shares.families import SPEAKS_FOR, ranking
 from ctrlgen.diagnosis.shares.shares_table import ChannelShares, Share, SharesTable
+from ctrlgen.effects import Family
 from ctrlgen.reporting.numbers import number
 
 # kinds that a sentence names

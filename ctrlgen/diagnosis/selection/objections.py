@@ -94,7 +94,7 @@ def _at_a_bound(fit: Fit, k: int) -> str | None:
     if cause.effect == PARAMETER:
         return None
     for i, (u, value) in enumerate(zip(structure.free_parameters, fit.theta, strict=True)):
-        stated = cause.prior.at_bounds.get(u.name)
+        stated = cause.law.at_bounds.get(u.name)
         if u.cause != k or stated is None:
             continue
         ways, (at_low, at_high) = u.low > 0, u.shape_ends(float(value))

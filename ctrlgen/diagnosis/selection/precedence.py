@@ -17,8 +17,8 @@ from ctrlgen.diagnosis.selection.model_selection import ModelSelection
 from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import CONFUSABLE, PRECEDENCE, REGIONS, SEARCH
-from ctrlgen.diagnosis.shares.families import FAMILY_OF, Family
-from ctrlgen.effects import Place
+from ctrlgen.diagnosis.shares.families import family_of
+from ctrlgen.effects import Family, Place
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis
 from ctrlgen.estimation.size_odds import prior_odds
 from ctrlgen.recordings.recording import Recording
@@ -83,7 +83,7 @@ def one_loop_first(
 
 
 def _is_loop(cause: Hypothesis) -> bool:
-    return FAMILY_OF.get(cause.effect) is Family.HYSTERESIS
+    return family_of(cause.effect) is Family.HYSTERESIS
 
 
 def _of_time(candidate: CandidateModel, current: CandidateModel) -> bool:

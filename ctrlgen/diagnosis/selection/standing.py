@@ -13,7 +13,8 @@ from dataclasses import replace
 from ctrlgen.diagnosis.selection.findings import Finding, Role, SupportEntry
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.diagnosis.settings import STANDING
-from ctrlgen.diagnosis.shares.families import FAMILY_OF, Family
+from ctrlgen.diagnosis.shares.families import family_of
+from ctrlgen.effects import Family
 from ctrlgen.estimation.hypothesis import Hypothesis
 
 
@@ -25,7 +26,7 @@ def in_standing(findings: Sequence[Finding], shares: Sequence[tuple[Family, floa
 
 def possible(shares: Sequence[tuple[Family, float]], offered: Sequence[Hypothesis]) -> list[tuple[Family, float]]:
     """The `shares` without families of which such a device has no law, as an axis without a spring has no nonlinear one."""
-    families = {FAMILY_OF.get(h.effect) for h in offered}
+    families = {family_of(h.effect) for h in offered}
     return [(family, share) for family, share in shares if family in families]
 
 
@@ -36,7 +37,7 @@ def answer_of(verdict: Verdict, findings: Sequence[Finding], exact: bool) -> Ver
 
 
 def _support(finding: Finding, shares: Sequence[tuple[Family, float]]) -> SupportEntry | None:
-    family = FAMILY_OF.get(finding.effect)
+    family = family_of(finding.effect)
     if family is None or not shares or finding.role is not Role.CAUSE:
         return None
     leading, most = shares[0]

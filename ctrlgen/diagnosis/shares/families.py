@@ -1,4 +1,4 @@
-"""Families of laws: which of them a share speaks for, and to which of them each effect of the library belongs.
+"""Families of laws: which of them a share speaks for. To which of them a law belongs stands in its own file.
 
 A recording often tells the family and not the member: what is a function of the direction of motion is dry friction, whichever
 of its laws. A kind speaks for the first family of its row; the others can look the same.
@@ -6,29 +6,9 @@ of its laws. A kind speaks for the first family of its row; the others can look 
 
 from __future__ import annotations
 
-from enum import Enum
-
 from ctrlgen.diagnosis.shares.design import Kind
 from ctrlgen.diagnosis.shares.shares_table import SharesTable
-
-
-class Family(Enum):
-    """Families of laws, as the report names them."""
-
-    FRICTION = "dry friction"
-    HYSTERESIS = "hysteresis"
-    ELASTIC = "elastic nonlinearity"
-    DRIVE = "drive nonlinearity"
-    GAIN = "gain and offset"
-    CROSS_TALK = "cross-talk"
-    DYNAMICS = "dynamics"
-    CREEP = "creep"
-    TIMING = "timing"
-    GEOMETRY = "sensor geometry"
-    PERIODIC = "periodic sensor error"
-    THERMAL = "thermal"
-    EVENTS = "events and disturbances"
-
+from ctrlgen.effects import Family, law_of
 
 SPEAKS_FOR: dict[Kind, tuple[tuple[Family, ...], str]] = {
     Kind.DIRECTION: (
@@ -84,58 +64,11 @@ SPEAKS_FOR: dict[Kind, tuple[tuple[Family, ...], str]] = {
     Kind.PAST: ((), "says that something is left that lasts longer than a sample, not what"),
 }
 
-FAMILY_OF = {
-    **dict.fromkeys(("coulomb", "directional_friction", "stribeck"), Family.FRICTION),
-    **dict.fromkeys(("coulomb_above", "coulomb_after", "coulomb_below"), Family.FRICTION),
-    **dict.fromkeys(("stribeck_above", "stribeck_after", "stribeck_below"), Family.FRICTION),
-    **dict.fromkeys(("viscous_above", "viscous_at_speed", "viscous_below"), Family.DYNAMICS),
-    **dict.fromkeys(
-        (
-            "hysteresis",
-            "asymmetric_displacement_hysteresis",
-            "asymmetric_drive_hysteresis",
-            "asymmetric_hysteresis",
-            "bouc_wen",
-            "butterfly",
-            "displacement_bouc_wen",
-            "displacement_hysteresis",
-            "drive_hysteresis",
-            "slack_friction",
-            "weighted_displacement_hysteresis",
-            "weighted_drive_hysteresis",
-            "backlash",
-            "backlash_above",
-            "backlash_below",
-            "worn_backlash",
-        ),
-        Family.HYSTERESIS,
-    ),
-    **dict.fromkeys(("stiffening", "one_sided_stiffening", "end_stop", "link_load", "lost_motion"), Family.ELASTIC),
-    "gravity": Family.ELASTIC,
-    **dict.fromkeys(("stiffness_above", "stiffness_below", "stiffness_beyond"), Family.ELASTIC),
-    **dict.fromkeys(
-        ("asymmetric_gain", "dead_zone", "drive_gain_beyond", "saturation", "heater_resistance"), Family.DRIVE
-    ),
-    **dict.fromkeys(
-        ("drive_gain", "lever_ratio", "sensor_gain", "stiffness", "drive_offset", "home_offset", "zero_per_record"),
-        Family.GAIN,
-    ),
-    **dict.fromkeys(("reversed", "stuck", "payload"), Family.GAIN),
-    **dict.fromkeys(("coupling", "drive_crosstalk", "heat_crosstalk", "link_compliance", "swapped"), Family.CROSS_TALK),
-    **dict.fromkeys(("damping_coupling", "inertia_coupling", "stiffness_coupling"), Family.CROSS_TALK),
-    **dict.fromkeys(("asymmetric_viscous", "quadratic_damping", "resonance"), Family.DYNAMICS),
-    **dict.fromkeys(("creep", "log_creep"), Family.CREEP),
-    **dict.fromkeys(("clock_offset", "delay", "low_pass"), Family.TIMING),
-    **dict.fromkeys(("abbe_arm", "bow", "cubic_sensor", "finite_rotation", "frame_rotation_x"), Family.GEOMETRY),
-    **dict.fromkeys(("frame_rotation_y", "frame_rotation_z", "raised_point", "screw_motion"), Family.GEOMETRY),
-    **dict.fromkeys(("local_error", "rectified", "stitching_error"), Family.GEOMETRY),
-    **dict.fromkeys(("autocollimator", "face_tilt", "mirror_tilt", "plane_mirror"), Family.GEOMETRY),
-    **dict.fromkeys(("cogging", "cogging_of_slots", "cyclic", "quantisation"), Family.PERIODIC),
-    **dict.fromkeys(("expansion", "second_pole", "temperature_sensitivity", "thermal_lag"), Family.THERMAL),
-    "temperature_sensitivity_above": Family.THERMAL,
-    **dict.fromkeys(("degradation", "drift", "force_step", "lost_beams", "sensor_step", "vibration"), Family.EVENTS),
-}
-"""By effect of the library its family: the place where its name says what it is, not every kind in which it can show."""
+
+def family_of(kind: str) -> Family | None:
+    """The family that a law states of itself; None without one, as for a number of the device."""
+    law = law_of(kind)
+    return law.family if law else None
 
 
 def ranking(table: SharesTable, noise: dict[str, float] | None = None) -> list[tuple[Family, float]]:
