@@ -21,6 +21,12 @@ NOISE = 1.5  # times the noise: more is not explained
 HELD_OUT = re.compile(r"Held-out error of (\S+): (\S+) (\S+?)(?: -> (\S+) \S+?)?, noise (?:not known|(\S+) \S+?)[.;]")
 TAKES = re.compile(r"it takes away ((?:[<>] )?[\d.]+ %)")
 LEFT = re.compile(r"Left: (\S+) (\S+) in (\S+), (\S+) times the noise")
+ALIKE = (
+    {"pm", "nm", "um", "mm", "m"},
+    {"nrad", "urad", "mrad", "rad", "deg"},
+    {"uN", "mN", "N", "kN"},
+    {"mN*m", "N*m"},
+)
 HEADS = {
     "explained": "Explained",
     "partly": "Partly explained",
@@ -189,6 +195,10 @@ def _numbers(d: dict[str, Any]) -> Iterator[str]:
                     yield f"{_name(f)}: {name} = {e['value']} {e['unit']} ({low} ... {high})"
                 elif high is not None and e["value"] > high:
                     yield f"{_name(f)}: {name} = {e['value']} {e['unit']} is above {high}"
+                read = d["held_out"].get(f"reading.{f['location'].removeprefix('sensor:')}")
+                both = {e["unit"], read["unit"]} if read and name != "phase" else set()
+                if len(both) > 1 and any(both <= alike for alike in ALIKE):
+                    yield f"{_name(f)}: {name} in {e['unit']}, which is read in {read['unit']}"
     for channel, s in d["spikes"].items():
         if not 0 < s["count"] <= s["samples"] or not _same(s["per_thousand"], 1000 * s["count"] / s["samples"]):
             yield f"{channel}: {s['count']} spikes of {s['samples']} samples, {s['per_thousand']} in a thousand"

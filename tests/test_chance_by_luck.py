@@ -273,7 +273,9 @@ def test_of_two_causes_each_of_which_could_be_all_neither_is_certain(monkeypatch
 def test_of_many_causes_no_sets_are_fitted(monkeypatch):
     causes = tuple(Hypothesis("coulomb", f"stage:{k}") for k in range(LUCK.most_causes + 1))
     first = chances(monkeypatch, lambda S, k: 20 if len(S) == LUCK.most_causes else 0, causes)[0]
-    assert first.reason == chance_by_luck.FEW.format(20, ceil(log2(2 * looks(61, 3, 5) / LUCK.certain)))
+    assert first.reason == chance_by_luck.FEW.format(
+        "20 independent stretches", ceil(log2(2 * looks(61, 3, 5) / LUCK.certain))
+    )
 
 
 def test_what_too_few_stretches_cannot_show_is_said_with_how_many_could(monkeypatch):

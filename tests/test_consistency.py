@@ -1,4 +1,4 @@
-"""The checker of diagnosis.json finds each contradiction that is put into a file that has none."""
+"""The checkers of diagnosis.json and of the first screen find each contradiction that is put into one that has none."""
 
 from __future__ import annotations
 
@@ -11,14 +11,22 @@ from creeping_axis import LAWS, creeping_recording
 
 import ctrlgen
 from battery.consistency import contradictions
+from battery.first_screen_check import BETTER, WORSE, screen_contradictions
+from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
+from ctrlgen.diagnosis.report.diagnosis_first_screen import diagnosis_first_screen
 from ctrlgen.diagnosis.report.diagnosis_record import Provenance, diagnosis_record
 from ctrlgen.reporting.result_file import json_text
 
 
 @pytest.fixture(scope="module")
-def sound(tmp_path_factory) -> dict:
+def found(tmp_path_factory) -> Diagnosis:
     """The answer for an axis that creeps."""
-    found = ctrlgen.diagnose(AXIS_FILE, creeping_recording(tmp_path_factory.mktemp("creeping")), laws=LAWS)
+    return ctrlgen.diagnose(AXIS_FILE, creeping_recording(tmp_path_factory.mktemp("creeping")), laws=LAWS)
+
+
+@pytest.fixture(scope="module")
+def sound(found) -> dict:
+    """Its diagnosis.json."""
     return json.loads(json_text(diagnosis_record(found, Provenance({}, 0))))
 
 
@@ -64,6 +72,13 @@ def test_a_contradiction_is_found(sound, wrong):
     assert contradictions(changed)
 
 
+def test_a_number_of_a_sensor_is_told_in_the_unit_of_its_reading(sound):
+    changed = copy.deepcopy(sound)
+    first = changed["findings"][0]
+    first["location"], first["parameters"]["gain"]["unit"] = "sensor:axis", "um"
+    assert [text for text in contradictions(changed) if "which is read in nm" in text]
+
+
 @pytest.mark.parametrize(
     ("said", "instead"),
     [
@@ -78,3 +93,75 @@ def test_a_contradiction_is_found(sound, wrong):
 def test_words_that_are_not_those_of_the_tables_are_found(sound, said, instead):
     assert said in sound["sentence"]
     assert contradictions(sound | {"sentence": sound["sentence"].replace(said, instead)})
+
+
+@pytest.fixture(scope="module")
+def screen(found) -> dict[str, list]:
+    first = diagnosis_first_screen(found, {})
+    return {"answer": list(first.answer), "numbers": [list(n) for n in first.numbers], "steps": list(first.steps)}
+
+
+def test_a_sound_first_screen_has_no_contradiction(sound, screen):
+    assert screen_contradictions(sound, **screen) == []
+
+
+WRONG_SCREEN = {
+    "another answer than in diagnosis.json": ("answer", "Explained", "Certain"),
+    "another error beside the figure": ("numbers", " nm", " um"),
+    "a number of the other sign": ("numbers", "3.", "-3."),
+    "a number outside of its interval": ("numbers", " (2", " (9"),
+    "nothing to correct": ("steps", "Use device.next.toml", "Nothing to correct"),
+    "numbers too uncertain that predict better": ("steps", "Use device.next.toml", f"{WORSE} device.next.toml"),
+    "no number": ("numbers", " nm", " nan"),
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG_SCREEN)
+def test_a_contradiction_of_the_first_screen_is_found(sound, screen, wrong):
+    where, said, instead = WRONG_SCREEN[wrong]
+    text = json.dumps(screen[where]).replace("\\u00a0", " ")
+    assert said in text
+    changed = screen | {where: json.loads(text.replace(said, instead))}
+    assert screen_contradictions(sound, **changed)
+
+
+@pytest.mark.parametrize(
+    "step",
+    [
+        "Not taken: bow at sensor:axis, although the held-out error of axis would be 9.1 nm instead of {}: few.",
+        "Not taken: bow at sensor:axis, although the held-out error of axis would be 1 nm instead of 1.2 nm: few.",
+        "Not taken: creep at stage:axis, although it scored better than what its round took: few.",
+        "creep at stage:axis cannot be judged by luck: 1 independent stretches of the held-out records.",
+    ],
+)
+def test_a_next_step_that_contradicts_the_answer_is_found(sound, screen, step):
+    left = f"{sound['held_out']['reading.axis']['rms_after']:.4g} nm"
+    assert screen_contradictions(sound, **screen | {"steps": [*screen["steps"], step.format(left)]})
+
+
+@pytest.mark.parametrize(
+    ("findings", "after"), [("none", 1.4), ("all", 1.4)], ids=["of no finding", "every channel worse"]
+)
+def test_errors_that_no_step_may_follow_from_are_found(sound, screen, findings, after):
+    """Of a device that is said to predict better, or of which nothing was found."""
+    changed = copy.deepcopy(sound)
+    e = changed["held_out"]["reading.axis"]
+    e["rms_after"] = after * e["rms_before"]
+    numbers = screen["numbers"]
+    if findings == "none":
+        changed["findings"], numbers = [], [n for n in numbers if n[0].startswith("held-out") or n[0] == "noise"]
+    told = screen | {"numbers": numbers, "steps": [BETTER]}
+    assert [w for w in screen_contradictions(changed, **told) if "by no finding" in w or "every channel worse" in w]
+
+
+@pytest.mark.parametrize(
+    ("said", "sound_one"),
+    [
+        ("A constant explains 0 % (0 ... 61 %) of what the device leaves in axis.", False),
+        ("Position (70 %) and a constant (60 %) explain 80 % (70 ... 90 %) of what the device leaves in axis.", False),
+        ("Position (70 %) and a constant (8 %) explain 80 % (70 ... 90 %) of what the device leaves in axis.", True),
+    ],
+)
+def test_parts_that_are_no_part_of_the_whole_are_found(sound, screen, said, sound_one):
+    shares = (sound["shares"] or {}) | {"statements": [said]}
+    assert (screen_contradictions(sound | {"shares": shares}, **screen) == []) == sound_one

@@ -17,9 +17,9 @@ from ctrlgen.core.errors import InputError
 from ctrlgen.diagnosis.diagnose import diagnose_recording
 from ctrlgen.diagnosis.report.diagnosis_record import Provenance, diagnosis_record
 from ctrlgen.diagnosis.report.explain import explain
-from ctrlgen.diagnosis.report.history_table import history_rows, not_taken_rows
+from ctrlgen.diagnosis.report.history_table import history_rows, most_gained, not_taken_rows
 from ctrlgen.diagnosis.report.html_report import page
-from ctrlgen.diagnosis.report.narrative import refusals
+from ctrlgen.diagnosis.report.narrative import EMPIRICAL_ALONE, NOTHING_FOUND, next_steps, refusals
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection, Shortfall
 from ctrlgen.diagnosis.selection.not_taken import not_taken, that_matter
@@ -164,3 +164,24 @@ def test_a_refusal_that_the_answer_has_does_not_matter_any_more(turned):
     (row, *_) = that_matter(turned.search)
     with_it = replace(turned.search, chosen=row[1].candidate)
     assert not [r for r in that_matter(with_it) if r[1].causes == row[1].causes]
+
+
+def test_a_refusal_is_told_in_a_channel_in_which_it_would_be_better_or_in_none(turned):
+    """What scores better by the records to fit may predict the held-out ones no better."""
+    ((gain, refusal), *_) = that_matter(turned.search)
+    channel, would, now = most_gained(turned.search, refusal.candidate)
+    assert channel == "reading.axis" and would.value < now.value and gain > 0
+    answer = turned.search.chosen
+    no_better = replace(refusal.candidate, held_out=answer.held_out)
+    assert most_gained(turned.search, no_better) is None
+    rounds = [replace(r, refused=(replace(refusal, candidate=no_better),)) for r in turned.search.rounds[:1]]
+    told = replace(turned, search=replace(turned.search, rounds=tuple(rounds)))
+    assert not any("would be" in said for said in refusals(told))
+
+
+def test_where_nothing_is_found_no_number_of_it_is_uncertain_and_no_error_changes(turned):
+    first, *_ = next_steps(turned)
+    assert first == (EMPIRICAL_ALONE if turned.empirical_terms else NOTHING_FOUND)
+    assert next_steps(replace(turned, empirical_terms=()))[0] == NOTHING_FOUND
+    assert turned.search.chosen is turned.search.nominal
+    assert all(e.rms_before == e.rms_after for e in turned.held_out.values())

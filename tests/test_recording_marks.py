@@ -57,6 +57,9 @@ def test_spikes_are_marked(tmp_path, model):
     assert np.array_equal(np.flatnonzero(~recording.records[0].valid[:, 0]), [100, 200, 201, 202])
     assert np.isnan(recording.records[0].observed[[100, 200, 201, 202], 0]).all()
     assert "4 of 400 samples are outliers" in recording.notes[0]
+    one = samples()
+    one["x"][100] += 0.3
+    assert "1 of 400 samples is an outlier" in load_recordings([two(tmp_path, one)], model).notes[0]
 
 
 def test_frozen_stretches_are_marked(tmp_path, model):

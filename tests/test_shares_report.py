@@ -161,6 +161,8 @@ def channel(
         ),
         (channel({Kind.LINE: 0.7}, 0.7), "A line of 50 Hz explains 70 % (65 ... 73 %) of what"),
         (channel({Kind.TIME: 0.03}, 0.04), "No signal explains more than 5 % of what"),
+        # a part of nothing: together they predict no more than chance
+        (channel({}, 0.0, constant=0.3), "No signal explains more than 5 %"),
     ],
 )
 def test_the_ceiling_names_what_has_most_first(shares, said):

@@ -67,9 +67,12 @@ def marking_notes(before: Recording, after: Recording) -> tuple[str, ...]:
         for i, channel in enumerate(after.channels):
             back = int((new.valid & ~old.valid)[:, i].sum())
             if back:
-                notes.append(
-                    f"{new.name}, {channel}: {back} of what was marked as outliers is used again; the accepted model explains it."
+                again = number_of(
+                    back,
+                    "sample that was marked as an outlier is used again; the accepted model explains it",
+                    "samples that were marked as outliers are used again; the accepted model explains them",
                 )
+                notes.append(f"{new.name}, {channel}: {again}.")
             held = [(a, b) for a, b, k in new.held if k == i]
             if held:
                 at = ", ".join(f"{new.time[a]:.6g} s" for a, _ in held)

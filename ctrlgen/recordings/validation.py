@@ -229,7 +229,9 @@ def mark(record: Record, kind: str, names: ChannelNames, recorded: np.ndarray) -
         for what, chosen in marks.items():
             if chosen.any():
                 first = f"{record.time[chosen.argmax()]:.6g} s" if kind == "series" else f"row {chosen.argmax()}"
-                seen = f"{chosen.sum()} of {len(y)} samples {'is' if chosen.sum() == 1 else 'are'}"
+                one = chosen.sum() == 1
+                seen = f"{chosen.sum()} of {len(y)} samples {'is' if one else 'are'}"
+                what = "an outlier" if one and what == "outliers" else what
                 note = f"{title}: {seen} {what} (first at {first}); not used."
                 notes.append(MissingSamples(note) if chosen is missing else note)
                 valid[chosen, i] = False

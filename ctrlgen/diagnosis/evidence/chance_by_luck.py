@@ -35,6 +35,7 @@ from math import ceil, comb, log2
 
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.diagnosis.evidence.independent_stretches import Memory, memory_of
 from ctrlgen.diagnosis.evidence.matched_parts import matched_parts
 from ctrlgen.diagnosis.selection.attribution import one_finding
@@ -51,7 +52,7 @@ Causes = frozenset[int]
 NO_MODEL = "without it no such device can be simulated"
 UNSEEN = "the held-out records do not show it"
 IN_THE_FILE = "the readings alone hardly show it: without it numbers of the device would contradict its file"
-FEW = "{} independent stretches of the held-out records, and no chance below 5 % with fewer than {}"
+FEW = "{} of the held-out records, and no chance below 5 % with fewer than {}"
 NOISE = "noise"
 REST = "what no law reaches"
 
@@ -160,7 +161,8 @@ def _entry(search: SearchResult, finding: Finding, members: Causes, look: Look, 
         elif any(hides_in_device(search, k) for k in members):
             reason = IN_THE_FILE
         elif look.looks * 0.5**look.parts > LUCK.certain:
-            reason = FEW.format(look.parts, ceil(log2(look.looks / LUCK.certain)))
+            parts = number_of(look.parts, "independent stretch", "independent stretches")
+            reason = FEW.format(parts, ceil(log2(look.looks / LUCK.certain)))
     if reason is not None:
         return ChanceEntry(by_luck=None, p=None, looks=None, stretches=look.parts, against=against, reason=reason)
     return ChanceEntry(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.not_taken import that_matter
@@ -90,7 +92,11 @@ def quantity(e: NumberEntry) -> str:
     return f"- {e.unit}".removesuffix(" 1") if e.value is None else with_unit(e.value, e.unit)
 
 
-def worst_error(search: SearchResult, candidate: CandidateModel) -> tuple[str, NumberEntry]:
-    """The channel in which a model leaves most on the held-out records beside the noise, and that error."""
-    channel = search.fitter.recording.channels[int(candidate.held_out.plain_mean.argmax())]
-    return channel, held_out_error(search, candidate)[channel]
+def most_gained(search: SearchResult, candidate: CandidateModel) -> tuple[str, NumberEntry, NumberEntry] | None:
+    """The channel in which a model leaves less of the held-out records than the answer does, most so beside the noise, with its error
+    there and that of the answer; None where it leaves less of none, as it may where its numbers alone are likelier."""
+    less = search.chosen.held_out.plain_mean - candidate.held_out.plain_mean
+    channel = search.fitter.recording.channels[int(np.nan_to_num(less, nan=-np.inf).argmax())]
+    would, now = (held_out_error(search, model)[channel] for model in (candidate, search.chosen))
+    known = would.value is not None and now.value is not None
+    return (channel, would, now) if known and would.value < now.value and quantity(would) != quantity(now) else None

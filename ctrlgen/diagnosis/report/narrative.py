@@ -7,13 +7,12 @@ import re
 
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.experiment_sentences import experiment_sentence
-from ctrlgen.diagnosis.report.history_table import quantity, worst_error
+from ctrlgen.diagnosis.report.history_table import most_gained, quantity
 from ctrlgen.diagnosis.report.luck_sentences import luck_steps
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding, Role
 from ctrlgen.diagnosis.selection.not_taken import that_matter
-from ctrlgen.diagnosis.selection.search_history import held_out_error
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.hypothesis import PARAMETER
@@ -160,7 +159,7 @@ def _steps(diagnosis: Diagnosis) -> list[str]:
             "device.next.toml holds the best of them, which predicts recordings of this kind as well as the others do."
             + rest,
         ]
-    steps = [BETTER if predicts_better(diagnosis) else WORSE]
+    steps = [_use(diagnosis)]
     if not known:
         steps.append(f"Whether a mismatch remains cannot be said, because the noise is not known.{rest}")
     elif not diagnosis.residual_tests.passed:
@@ -186,6 +185,20 @@ WORSE = (
 )
 
 
+NOTHING_FOUND = "Do not use device.next.toml yet: it holds no cause, only numbers of the device refitted within what its file states."
+EMPIRICAL_ALONE = (
+    "device.next.toml holds no cause, only an empirical term of what is left: with it the held-out recordings are predicted better, inside "
+    "the recorded range alone."
+)
+
+
+def _use(diagnosis: Diagnosis) -> str:
+    """What device.next.toml may be used for where the answer is not certain."""
+    if not diagnosis.findings:
+        return EMPIRICAL_ALONE if diagnosis.empirical_terms else NOTHING_FOUND
+    return BETTER if predicts_better(diagnosis) else WORSE
+
+
 def predicts_better(diagnosis: Diagnosis) -> bool:
     """Whether the corrected device predicts the held-out records better than the device as described, in noise units."""
     search = diagnosis.search
@@ -197,10 +210,10 @@ def refusals(diagnosis: Diagnosis) -> list[str]:
     most."""
     search, said = diagnosis.search, []
     for gain, refusal in that_matter(search)[:NAMED]:
-        channel, error = worst_error(search, refusal.candidate)
-        now = held_out_error(search, search.chosen)[channel]
-        would = f"the held-out error of {short(channel)} would be {quantity(error)} instead of {quantity(now)}"
-        better = would if gain > 0 else "it scored better than what its round took"
+        better = "it scored better than what its round took"
+        if gain > 0 and (gained := most_gained(search, refusal.candidate)):
+            channel, error, now = gained
+            better = f"the held-out error of {short(channel)} would be {quantity(error)} instead of {quantity(now)}"
         names = " and ".join(map(cause_name, refusal.causes))
         said.append(f"{names}, although {better}: {'; '.join(dict.fromkeys(refusal.reasons))}")
     return said

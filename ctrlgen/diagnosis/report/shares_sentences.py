@@ -130,7 +130,10 @@ def rest_kind(diagnosis: Diagnosis, channel: str) -> str:
 
 
 def named_parts(c: ChannelShares) -> list[tuple[Kind | Beside, float]]:
-    """What a residual is a function of with the share that each adds, the largest first; those below `SHARES.told` left out."""
+    """What a residual is a function of with the share that each adds, the largest first; those below `SHARES.told` left out, and all
+    where together they predict no more."""
+    if c.total.share < SHARES.told:
+        return []
     parts: list[tuple[Kind | Beside, float]] = [(Beside.CONSTANT, c.constant), (Beside.NUMBERS, c.numbers)]
     parts += [(row.kind, row.additional) for row in c.selected]
     return sorted((part for part in parts if part[1] >= SHARES.told), key=lambda part: -part[1])

@@ -77,7 +77,7 @@ class Searcher:
         nominal = scored(trials.fitter, trials.fitter.described(device)[1])
         current, account = supported(trials, nominal, current, trials.screen.seed)
         found = current
-        current = no_worse(trials, nominal, current)
+        current = no_worse(trials, nominal, current) if current.causes else nominal
         if current is not found:
             account = attribute(trials.fitter, nominal, current, trials.screen.seed, trials.jobs)
         each = range(len(current.causes))
