@@ -9,9 +9,14 @@ import ctrlgen
 from ctrlgen.core.errors import InputError
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
-from ctrlgen.estimation.hypothesis import hypotheses
+from ctrlgen.diagnosis.selection.screen import Screen
+from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.hypothesis import Hypothesis, hypotheses
+from ctrlgen.estimation.noise import estimate_noise
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.simulation import trace
+from ctrlgen.recordings.recording import Record, Recording
 
 SECOND = {
     "mass": "2 kg*m^2",
@@ -146,3 +151,19 @@ def test_linear_and_rotary_axes_are_not_mixed():
     }
     with pytest.raises(InputError, match="'a' and 'b' are not both linear or both rotary"):
         device_of(axis=[{"name": "a", **FIRST}, {"name": "b", **linear}])
+
+
+def test_laws_can_be_screened_where_no_number_is_free_and_the_axis_has_no_stiffness():
+    """What acts on the displacement then reaches nothing, as where the stiffness itself is barred as a cause; friction does."""
+    device = device_of(axis=[{"name": "a", **FIRST}, {"name": "b", **SECOND, "stiffness": "0 N*m/rad"}])
+    rng, parts = np.random.default_rng(3), []
+    for role in ("fit", "hold_out"):
+        y = torque(device) + [0.0, 0.5] * np.sign(SPEED) + 1e-3 * rng.standard_normal((N, 2))
+        parts.append(Record(role, role, T, H, MOTION, y, False, None, np.ones((N, 2), bool)))
+    names = ("reading.a", "reading.b")
+    recording = Recording("t", device.name, "series", names, ("N*m", "N*m"), (1e-3, 1e-3), tuple(parts), ())
+    fitter = Fitter(recording, estimate_noise(recording, 0.1))
+    friction, play = Hypothesis("coulomb", "stage:b", "b"), Hypothesis("backlash", "stage:b", "b")
+    screened = Screen(fitter, [friction, play]).run(fitter.fit(Structure(device), steps=0))
+    assert [s.hypothesis for s in screened.suspects] == [friction] and abs(screened.suspects[0].z) > 1e2
+    assert screened.undetectable == {play: -1} and not screened.dropped

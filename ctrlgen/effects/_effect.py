@@ -74,6 +74,8 @@ class Effect:
     active: ClassVar[bool] = False
     # Shifts the recorded drive by its amplitude [s] in simulations of recordings; adds nothing to the model.
     shifts_drive: ClassVar[bool] = False
+    # Asks what reaches the readings from its place, and may find that nothing does: its amplitude may be free all the same.
+    asks: ClassVar[bool] = False
     # Its amplitude [s] moves a signal in time, so far that no slope at zero tells what it would explain.
     moves_in_time: ClassVar[bool] = False
     # The force at standstill takes any value that holds the stage there (dry friction). The integrator must then be

@@ -14,6 +14,7 @@ class _DisturbanceInput(Effect, listed=False):
     """Delta = delta, constant within a sample."""
 
     source = "definition"
+    asks = True  # behind a spring of no stiffness nothing reads the displacement
     params = (Param("delta", "channel", (-1.0, 1.0), "the disturbance", off=0.0),)
 
     def __init__(self, place: Place, at: str, unit: str) -> None:

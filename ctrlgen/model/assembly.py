@@ -46,7 +46,8 @@ def build_model(
     """
     _check_free(device, free)
     model = _assemble(device, free, NO_RISE if ambient is None else ambient, sample_time, per_record, apart)
-    outside = {f"effect[{k}].{e.amplitude().name}" for k, e in enumerate(device.effect) if e.shifts_drive or k in apart}
+    told_apart = (k for k, e in enumerate(device.effect) if e.shifts_drive or e.asks or k in apart)
+    outside = {f"effect[{k}].{device.effect[k].amplitude().name}" for k in told_apart}
     idle = [path for path in free if path not in model.moved_by and path not in outside]
     if idle:
         what = "appears in no equation of motion (a limit, a material of the wires' stress): it cannot be free"

@@ -75,12 +75,10 @@ class Screen:
         return part
 
     def in_regions(self, fit: Fit, locations: Collection[str]) -> Screened:
-        """The laws in a region at `locations`, their edges at quantiles of the motion, whether or not a region stands out there; and
-        the device's numbers, without which a place may act on nothing."""
+        """The laws in a region at `locations`, their edges at quantiles of the motion, whether or not a region stands out there."""
         self._follow(fit)
         regional = [h for h in self.hypotheses if h.prior.in_a_region and h.location in locations]
-        numbers = [h for h in self.hypotheses if h.effect == PARAMETER]
-        part = Screen(self.fitter, [*regional, *numbers], self.seed)
+        part = Screen(self.fitter, regional, self.seed)
         part.peaks, part.motion = self.peaks, self.motion
         return part.run(fit, regions=on_either_side(self.motion))
 
