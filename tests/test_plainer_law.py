@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from axis_records import AXIS, NOISE, fitter_of
 from effect_cases import Law, rich, shapes
 
-from ctrlgen.diagnosis.selection.rivals import rivals, simplified
+from ctrlgen.diagnosis.selection.rivals import _as_plainer, rivals, simplified
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.hypothesis import Hypothesis
-from ctrlgen.estimation.plainer_law import may_be_plainer, plainer_start
+from ctrlgen.estimation.plainer_law import left_beside, may_be_plainer, plainer_start
 from ctrlgen.estimation.priors import prior_of
 from ctrlgen.estimation.structure import Structure
 
@@ -104,6 +105,53 @@ def test_all_numbers_by_which_two_laws_differ_must_be_neutral():
     assert may_be_plainer(fit_of("asymmetric_displacement_hysteresis", leaning, 0.05), 0).effect == (
         "displacement_hysteresis"
     )
+
+
+@pytest.mark.parametrize("part, told", [(0.6, True), (-0.4, True), (0.1, False)])
+def test_a_part_in_proportion_excludes_no_plain_law_and_is_a_gain_beside_it(part, told):
+    """Of g k where the interval of k excludes that there is none."""
+    lagging = {"share": 0.2, "reach": 0.5, "taper": 0.5, **dict.fromkeys(("upper", "lower", "side"), 0.0)}
+    fit = fit_of("asymmetric_drive_hysteresis", lagging | {"reversible": part}, 0.1, "actuator:axis")
+    plain, gain = (Hypothesis(kind, "actuator:axis", "axis") for kind in ("drive_hysteresis", "drive_gain"))
+    assert may_be_plainer(fit, 0) == plain
+    assert left_beside(fit, 0, plain) == ({gain: {"gain": pytest.approx(0.2 * part)}} if told else {})
+
+
+@pytest.mark.parametrize(
+    "alike, offered, there, found",
+    [
+        (True, True, False, [["drive_hysteresis"]]),
+        (False, True, False, [["drive_hysteresis", "drive_gain"]]),
+        (False, False, False, []),
+        (False, False, True, [["drive_gain", "drive_hysteresis"]]),
+    ],
+)
+def test_a_gain_stands_beside_the_plain_law_where_nothing_else_takes_the_part_over(
+    monkeypatch, alike, offered, there, found
+):
+    """The device's numbers may, a gain that is there does, and without any the plain law is none."""
+    cause, plain, gain = (
+        Hypothesis(kind, "actuator:axis", "axis")
+        for kind in ("asymmetric_drive_hysteresis", "drive_hysteresis", "drive_gain")
+    )
+    numbers = {"share": 0.2, "reach": 0.5, "taper": 0.5, "reversible": 0.6, "upper": 0.0, "lower": 0.0, "side": 0.0}
+    structure = Structure(AXIS).with_cause(cause, numbers)
+    if there:
+        structure = Structure(AXIS).with_cause(gain, {"gain": 0.0}).with_cause(cause, numbers)
+    J = np.eye(len(structure.start)) / 0.1
+    current = SimpleNamespace(
+        fit=Fit(structure, structure.start, (), 0.0, 1500, np.zeros(0), J, 0.0), causes=structure.causes
+    )
+    trials = SimpleNamespace(
+        screen=SimpleNamespace(hypotheses=[cause, plain, *[gain] * offered]),
+        selection=None,
+        tried=lambda begun, cause: [SimpleNamespace(causes=begun.causes, starts=begun.starts)],
+        converged=lambda t: t,
+    )
+    monkeypatch.setattr("ctrlgen.diagnosis.selection.rivals.explains_alike", lambda *_: alike)
+    tried = _as_plainer(trials, current, len(structure.causes) - 1)
+    assert [[c.effect for c in t.causes] for t in tried] == found
+    assert not offered or alike or tried[0].starts[1] == {"gain": pytest.approx(0.12)}
 
 
 def test_what_generalises_nothing_is_what_it_is():

@@ -11,9 +11,11 @@ class Plainer:
     """The law `kind`, which a law is where its numbers `where` have these values; what `kind` alone has is then as in `beside`.
 
     Both count in the units of the laws' bounds. Numbers of one name mean the same in both laws; where they do not,
-    `Effect.as_plainer` translates them.
+    `Effect.as_plainer` translates them. `left`: parts in proportion to the signal, over the amplitude, which the law `kind` has not; of
+    each the law that says it beside `kind` at the same place.
     """
 
     kind: str
     where: Mapping[str, float]
     beside: Mapping[str, float] = field(default_factory=dict)
+    left: Mapping[str, str] = field(default_factory=dict)

@@ -44,7 +44,7 @@ class AsymmetricDisplacementHysteresis(AsymmetricLag):
     place = Place.DISPLACEMENT
     requires = frozenset({"actuator"})
     params = (Param("share", "1", (-0.999, 0.999), "share of the displacement that lags", off=0.0), *_shape("travel"))
-    plainer = Plainer("displacement_hysteresis", dict.fromkeys(("upper", "lower", "side"), 0.0))
+    plainer = Plainer("displacement_hysteresis", {"upper": 0.0, "lower": 0.0, "side": 0.0})
     states = play_states("travel")
 
 
@@ -55,5 +55,5 @@ class AsymmetricDriveHysteresis(AsymmetricLag):
     place = Place.DRIVE
     requires = frozenset({"actuator", "force"})
     params = (Param("share", "1", (-0.999, 0.999), "share of the drive that lags", off=0.0), *_shape("channel"))
-    plainer = Plainer("drive_hysteresis", dict.fromkeys(("upper", "lower", "side", "reversible"), 0.0))
+    plainer = Plainer("drive_hysteresis", {"upper": 0.0, "lower": 0.0, "side": 0.0}, left={"reversible": "drive_gain"})
     states = play_states("channel")

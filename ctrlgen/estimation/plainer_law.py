@@ -32,6 +32,19 @@ def may_be_plainer(fit: Fit, k: int, bounds_tell: bool = True) -> Hypothesis | N
     return None if any(abs(v - neutral[u.name]) > z * sd for u, v, sd in told) else replace(cause, effect=relation.kind)
 
 
+def left_beside(fit: Fit, k: int, plain: Hypothesis) -> dict[Hypothesis, dict[str, float]]:
+    """The causes, with their numbers [SI], that say beside the `plain` law of cause k what that adds in proportion to the signal, where
+    its 95 % interval excludes that it is none."""
+    law, values, left = fit.structure.causes[k].law, fit.values(k), {}
+    rows = zip(fit.structure.free_parameters, robust_deviations(fit), strict=True)
+    deviations = {u.name: sd for u, sd in rows if u.cause == k}
+    for name, kind in law.plainer.left.items() if law.plainer else ():
+        if abs(values[name]) > STATISTICS.z_95 * deviations.get(name, 0.0):
+            gain = replace(plain, effect=kind)
+            left[gain] = {gain.law.amplitude().name: values[law.amplitude().name] * values[name]}
+    return left
+
+
 def plainer_start(fit: Fit, k: int, plain: Hypothesis) -> dict[str, float]:
     """The numbers [SI] with which the `plain` law of cause k does what cause k does, but for what they differ by."""
     law, channel = fit.structure.causes[k].law, plain.channel_on(fit.structure.device)

@@ -19,7 +19,7 @@ from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
 from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis
-from ctrlgen.estimation.plainer_law import may_be_plainer, plainer_start
+from ctrlgen.estimation.plainer_law import left_beside, may_be_plainer, plainer_start
 from ctrlgen.estimation.settings import FIT
 from ctrlgen.estimation.size_odds import size_odds
 from ctrlgen.estimation.structure import Structure
@@ -53,11 +53,21 @@ def simplified(trials: Trials, current: CandidateModel) -> CandidateModel:
 
 def _as_plainer(trials: Trials, current: CandidateModel, k: int, bounds_tell: bool = True) -> list[CandidateModel]:
     """The model with the plainer law that cause k may be in its place, begun where both are one; none where there is no such law, or
-    this machine cannot have it."""
+    this machine cannot have it. A part in proportion to the signal, which the plainer law has not, is taken over by the device's numbers
+    or by a gain that is there; else a gain stands beside it."""
     plain = may_be_plainer(current.fit, k, bounds_tell)
     if plain not in trials.screen.hypotheses:
         return []
     begun = current.fit.restarted.without(k).with_cause(plain, plainer_start(current.fit, k, plain))
+    alone = [trials.converged(t) for t in trials.tried(begun, plain)]
+    left = left_beside(current.fit, k, plain)
+    gains = {gain: start for gain, start in left.items() if gain not in current.causes}
+    if not gains or any(explains_alike(trials.selection, t, current) for t in alone):
+        return alone
+    if not gains.keys() <= set(trials.screen.hypotheses):
+        return []
+    for gain, start in gains.items():
+        begun = begun.with_cause(gain, start)
     return [trials.converged(t) for t in trials.tried(begun, plain)]
 
 
