@@ -141,6 +141,46 @@ def test_a_number_that_is_set_is_wrong_by_a_slip_of_the_pen_alone():
     assert told.endswith("which is set and not measured, the one named by 1")
 
 
+@pytest.mark.parametrize(
+    "stated, cause, known",
+    [
+        ("delta_z", "delta_z", True),
+        ("all in m", "delta_z", True),
+        ("all in m", "theta_x", False),
+        ("all in m", "all in m", True),
+        ("delta_x", "delta_z", False),
+    ],
+)
+def test_what_the_file_states_of_a_gain_is_known_of_the_channels_that_it_means(stated, cause, known):
+    gain = SensorGain(stated, {"gain": Quantity(0.0, "0", sd=1e-3)})
+    device = DEVICE.model_copy(update={"effect": (gain,)})
+    found = known_deviation(Hypothesis("sensor_gain", f"sensor:{cause}", cause), device)
+    assert (found.stated, found.sd == 1e-3) == (known, known)
+
+
+@pytest.mark.parametrize("other, told", [(False, 0), (True, 1)])
+def test_what_has_come_to_stand_for_something_else_has_a_rival_that_does_not_do_quite_as_well(monkeypatch, other, told):
+    """Worse by 10, where up to 9 is alike, and up to 9 more for such a cause."""
+    fit = SimpleNamespace()
+    of_z, of_height = (
+        SimpleNamespace(fit=fit, causes=(c,), cause=c, errors=SimpleNamespace(is_noise=True)) for c in (OF_Z, HEIGHT)
+    )
+    selection = SimpleNamespace(ranked=list, advantage=lambda model, rival: 10.0)
+    trials = SimpleNamespace(selection=selection, objections=lambda *_: {}, screen=None)
+    answers = {
+        "counterparts": [],
+        "_as_plainer": [],
+        "replacements": [of_height],
+        "size_odds": 0.0,
+        "_contains": False,
+        "explains_alike_but_for_odds": False,
+        "stands_for_another": other,
+    }
+    for name, found in answers.items():
+        monkeypatch.setattr(f"ctrlgen.diagnosis.selection.rivals.{name}", lambda *_, found=found: found)
+    assert [len(found) for found in rivals(trials, of_z, 0)] == [told, 0]
+
+
 def test_a_scale_of_all_channels_that_are_read_is_one_cause_more():
     for read in (COMPONENTS[3:], COMPONENTS[5:]):
         observed = tuple(f"reading.{c}" for c in read)
