@@ -191,24 +191,3 @@ uint32_t limiter_observe(limiter_state *state, const real measured[NS], real err
     return status;
 }
 #endif
-
-uint32_t limiter_step_at(limiter_state *state, uint32_t tick, const real target[M], limiter_output *out)
-{
-    uint32_t status = 0U;
-    uint32_t since = 1U;
-    if ((state != NULL) && (out != NULL) && (state->ready == LIMITER_BUILD)) {
-        since = (state->ticking != 0U) ? (tick - state->tick) : 1U;
-        state->ticking = 1U;
-        state->tick = tick;
-        if (since != 1U) {
-            status = LIMITER_CLOCK;
-        }
-        if ((since > 1U) && ((since >= BACKWARD) || (limiter_elapsed(state, since - 1U, out->drive) == LIMITER_INPUT))) {
-            (void)limiter_forget(state);
-        }
-    }
-    if (since != 0U) {
-        status |= limiter_step(state, target, out);
-    }
-    return status;
-}

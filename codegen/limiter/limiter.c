@@ -11,7 +11,8 @@
  * limit), DIRECT (every displacement is a matrix times the target, and a target that leads into the range is a command), BOUND_FIRST (the
  * cheap bound is known of the target), REDUNDANT (more drives than axes, of which GROUPS can be moved without a push), COUPLED (a displacement moves several
  * channels), MOVING (kernels for the next sample), MOTION (targets with derivatives), GIVEN (constants that are given at the
- * start), PIVOTED (targets of a pivot), ESTIMATED (states that are stepped from sample to sample, which can be believed wrongly), VARIED (the
+ * start), PIVOTED (targets of a pivot), ESTIMATED (states that are stepped from sample to sample, which can be believed wrongly), RINGING (a
+ * stage with inertia, which may be off its motion; NY numbers tell of that), OBSERVED (these can be measured), VARIED (the
  * time of a sample, state->h, may vary). SETTLE_DRIVE_LIMITED and STEP_DRIVE_LIMITED: drives beyond their limits can be needed. SETTLE_EXAMINED_FIRST and
  * STEP_EXAMINED_FIRST: whether a state is lost is asked before it is used. STATE_BY_MODE and DRIVE_BY_MODE: the line search calls one
  * kernel to settle and another to step. U_BOUNDS_ONCE: one function alone reads the limits of drives.
@@ -470,6 +471,10 @@ static void set_now(limiter_state *state)
 }
 
 #endif
+#if RINGING
+#include "ringing_count.c"
+
+#endif
 #if GIVEN
 #include "start_constants.c"
 #else
@@ -501,6 +506,12 @@ void INIT(limiter_state *state)
 #if VARIED
         set_begin(state, SAMPLE_TIME);
         state->stepping = 0U;
+#endif
+#if RINGING
+        set_still(state, state->ahead);
+        state->ringing = REAL(0.0);
+        state->ticking = 0U;
+        state->tick = 0U;
 #endif
         state->ready = LIMITER_BUILD;
     }
@@ -556,6 +567,14 @@ static uint32_t set_lost(limiter_state *state, limiter_output *out)
 #if ESTIMATED
 
 #include "estimate.c"
+#endif
+#if RINGING
+
+#include "ringing.c"
+#endif
+#if ESTIMATED || RINGING
+
+#include "step_at.c"
 #endif
 #if VARIED
 

@@ -51,15 +51,29 @@ static uint32_t motion_broken(const limiter_state *at)
 /* The drives of the motion whose state is at, within their limits. */
 static uint32_t motion_drives(limiter_state *at, const limiter_state *state, const real target[M], limiter_output *out)
 {
+#if RINGING
+    static const real U_WEIGHT[NU] = U_WEIGHT_TABLE;
+    real left = REAL(0.0);
+    real wanted[NU];
+    real join[2 * NY];
+#endif
     uint32_t status = 0U;
     int i;
 #if RATED
     real share = REAL(1.0);
 #endif
     (void)state;
+#if RINGING
+    MOTION_JOINS(target, join); /* before out, which may be the target */
+#endif
     MOTION_DRIVE(target, out->drive);
 #if REDUNDANT
     choose_drives(state, out->drive);
+#endif
+#if RINGING
+    for (i = 0; i < NU; i++) {
+        wanted[i] = out->drive[i];
+    }
 #endif
     if (limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, NU) != 0) {
         status = LIMITER_DRIVE;
@@ -80,6 +94,13 @@ static uint32_t motion_drives(limiter_state *at, const limiter_state *state, con
         out->state[i] = at->x[i];
     }
 #endif
+#if RINGING
+    for (i = 0; i < NU; i++) {
+        const real by = out->drive[i] - wanted[i];
+        left += U_WEIGHT[i] * ((by < REAL(0.0)) ? -by : by);
+    }
+    status |= follow_on(at, join, &join[NY], left);
+#endif
     at->ready = LIMITER_BUILD;
     return status;
 }
@@ -95,8 +116,15 @@ uint32_t limiter_step(limiter_state *state, const real target[M], limiter_output
         status = set_lost(state, out);
     } else if ((target == NULL) || (is_usable(target) == 0)) {
         settle_safe(state, out);
+#if RINGING
+        status |= stay(state);
+#endif
     } else {
+#if RINGING
+        limiter_state at = *state;
+#else
         limiter_state at;
+#endif
         uint32_t broken;
         MOTION_DISPLACEMENT(target, at.z);
         MOTION_STATE(target, at.x);

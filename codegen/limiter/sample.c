@@ -258,6 +258,9 @@ static uint32_t WITHIN(limiter_state *state, limiter_output *out)
 #if ESTIMATED
     status |= count_down(state);
 #endif
+#if RINGING
+    status |= stay(state);
+#endif
 #else
     if (lost == 0) {
         GO_ON
@@ -266,6 +269,9 @@ static uint32_t WITHIN(limiter_state *state, limiter_output *out)
 #endif
 #if ESTIMATED
         status |= count_down(state);
+#endif
+#if RINGING
+        status |= stay(state);
 #endif
     }
 #endif
@@ -326,6 +332,9 @@ static uint32_t UNUSABLE(limiter_state *state, limiter_output *out)
 #if ESTIMATED
     status |= count_down(state);
 #endif
+#if RINGING
+    status |= stay(state);
+#endif
 #else
     if (is_lost(state) != 0) {
         status = set_lost(state, out);
@@ -333,6 +342,9 @@ static uint32_t UNUSABLE(limiter_state *state, limiter_output *out)
         SAFE(state, out);
 #if ESTIMATED
         status |= count_down(state);
+#endif
+#if RINGING
+        status |= stay(state);
 #endif
     }
 #endif

@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ctrlgen.controller.clocked import Clocked
 from ctrlgen.controller.contraction import FOREVER, Contraction
 from ctrlgen.controller.controller_step import ControllerStatus, ControllerStep, State, answer
 from ctrlgen.controller.feedforward import Controller
@@ -19,7 +20,6 @@ from ctrlgen.model.discretisation import SETTLING_SWEEPS
 
 EXACT = 64  # samples of a late call that are followed one by one; later the device is taken for settled, and counted
 DOUBLED = 32  # times that a measurement's error is halved at most: what is left then is below any float
-BACKWARD = 2**31  # ticks: a clock that went on by more went back
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Belief:
 
 
 @dataclass(frozen=True)
-class Estimator:
+class Estimator(Clocked[Belief]):
     """The `controller` of a device whose kernels have a `contraction`."""
 
     controller: Controller
@@ -128,28 +128,6 @@ class Estimator:
             if left > 1 and samples < b.unknown:
                 left, samples = left / 2, samples + b.halving
         return min(samples, b.unknown)
-
-    def step_at(
-        self, estimate: Belief, tick: int, target: np.ndarray, held: np.ndarray
-    ) -> tuple[ControllerStep | None, Belief]:
-        """A step at `tick` of a clock that counts samples, 32 bits wide; `held` (n_u,) is the drive of the last call.
-
-        Calls that were missed are made up for (`elapsed`), with the bit CLOCK. None where no sample has passed: drives and state stay. A
-        clock that went back, and a held drive out of range, leave the state unknown."""
-        status = ControllerStatus(0)
-        if estimate.tick is not None:
-            since = (tick - estimate.tick) % 2**32
-            if since == 0:
-                return None, estimate
-            if since > 1:
-                status, caught_up = ControllerStatus.CLOCK, estimate
-                if since < BACKWARD:
-                    refused, caught_up = self.elapsed(estimate, since - 1, held)
-                if since >= BACKWARD or refused & ControllerStatus.INPUT:
-                    caught_up = self.forget(estimate)
-                estimate = caught_up
-        step, estimate = self.step(replace(estimate, tick=tick), target)
-        return replace(step, status=step.status | status), estimate
 
 
 def _later(unsure: int, ticks: int) -> int:

@@ -21,6 +21,7 @@ from ctrlgen.controller.named_inverse import NamedInverses, given_inverses, name
 from ctrlgen.controller.nearest_displacement import coupling, nearest_displacement
 from ctrlgen.controller.null_motion import NullMotion, null_motion
 from ctrlgen.controller.quick_state import QuickState, quick_state
+from ctrlgen.controller.ringing import Ringing
 from ctrlgen.controller.run_time_choices import choices, with_constants
 from ctrlgen.devices import Limit, Signal
 from ctrlgen.model.allocation import inverse_of
@@ -327,6 +328,21 @@ class ControllerKernels:
             return None
         every = [Stepped(k.nominal, k.static, k.moving) for k in (self, *self.variants) if k.moving is not None]
         return contraction(every, self.times[0] if self.times else self.sample_time) if every else None
+
+    @property
+    def ringing(self) -> Ringing | None:
+        """How fast the device stops ringing (`ctrlgen.controller.ringing`); None without inertia."""
+        return None
+
+    @property
+    def can_be_observed(self) -> bool:
+        """Whether a measured state tells how far the device is off its motion: not of modes that are led."""
+        return self.ringing is not None and len(self.ringing.weights) == len(self.nominal.axes) + self.nominal.x.numel()
+
+    @property
+    def tells_of_itself(self) -> bool:
+        """Whether its status says that what is believed of the device may be wrong."""
+        return self.contraction is not None or self.ringing is not None
 
     @property
     def rated(self) -> bool:

@@ -16,11 +16,12 @@ import numpy as np
 from ctrlgen.controller.controller_step import ControllerStatus, ControllerStep, State
 from ctrlgen.controller.feedforward import Controller, Rounding
 from ctrlgen.controller.kernels import ControllerKernels
+from ctrlgen.controller.ringing import Ringing, followed, ringing
 from ctrlgen.controller.sample_times import check_times
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.devices import Signal
 from ctrlgen.model.inverse_dynamics import InverseDynamics, inverse_dynamics
-from ctrlgen.model.led_modes import led
+from ctrlgen.model.led_modes import amplitudes, led, structure_to_lead
 from ctrlgen.model.model import Model
 from ctrlgen.model.state_vector import TYPICAL_RATE
 
@@ -71,6 +72,27 @@ class MotionKernels(ControllerKernels):
             name: ca.Function(name, [target], [value], ["target"], ["result"], {"cse": True})
             for name, value in parts.items()
         }
+
+    @cached_property
+    def ringing(self) -> Ringing | None:
+        """How fast what sets the device ringing dies out; None where no time passes between targets."""
+        if self.sample_time is None:
+            return None
+        structure = structure_to_lead(self.nominal, self.follow) if self.leads_modes else None
+        return ringing(self.nominal, self.sample_time, structure)
+
+    @cached_property
+    def joins(self) -> ca.Function:
+        """target -> (2 n_y,) where the motion comes from, half a sample before, then where it leads, half a sample after, both weighted:
+        of a motion that does not break, the last target leads to where this one comes from."""
+        bounds, motion = self.ringing, self.motion
+        assert bounds is not None and self.sample_time is not None
+        eta = amplitudes(structure_to_lead(self.nominal, self.follow)) if self.leads_modes else []
+        along = followed(self.nominal, motion, len(self.model.signals[self.follow].channels), eta)
+        target = ca.SX.sym("target", len(self.target.channels))
+        y, rate = along(target)
+        at, by = bounds.weights * y, self.sample_time / 2 * bounds.weights * rate
+        return ca.Function("joins", [target], [ca.vertcat(at - by, at + by)], ["target"], ["result"], {"cse": True})
 
     def state_can_be_limited(self, share: float) -> bool:
         """Whether actuator states have limits: a motion can need any state."""
@@ -131,6 +153,13 @@ class MotionController(Controller):
             status |= ControllerStatus.RATE if too_fast else status
         last = () if self.rate is None else (u,)
         return ControllerStep(status, z, x[: m.n_states], u, (x, z, *last))
+
+    def wanted(self, state: State, target: np.ndarray) -> np.ndarray | None:
+        """(n_u,) the drives of the motion, whatever their limits; None where a step from `state` does not follow it."""
+        if self.is_lost(*state) or not np.all(np.abs(target) <= self.kernels.input_limits):
+            return None
+        z, x, u = (self.kernels.motion[name](target).full().ravel() for name in ("displacement", "state", "drive"))
+        return None if self._broken(x, z) else self.chosen(u, state)
 
     def _broken(self, x: np.ndarray, z: np.ndarray) -> ControllerStatus:
         """Which limits beside those of the drives a motion breaks."""

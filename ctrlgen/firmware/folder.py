@@ -218,6 +218,7 @@ def write_harness(folder: CFolder, scenario: Scenario, model: Model, real: Arith
         "rated": controller.rate is not None,
         "rate": scenario.sample_time is not None,
         "estimated": controller.kernels.contraction is not None,
+        "ringing": controller.kernels.ringing is not None,
         "times": controller.kernels.times,
         "pivoted": StatedPivot(controller.kernels).acts,
     }

@@ -148,7 +148,8 @@ def _context(
         "elements": lambda signal: [
             f"{a} [{base_unit(u)}]" for a, u in zip(signal.channels, signal.units, strict=True)
         ],
-        "target": c["rows"][0]["target"],
+        # of a motion the derivatives are left at zero: it stays there
+        "target": [v if k < c["positions"] else 0.0 for k, v in enumerate(c["rows"][0]["target"])],
         "period": f"{scenario.sample_time:.6g}" if scenario.sample_time else "",
         "memory": _memory(c, contexts),
         "checksum_cost": checksum_instructions(_memory(c, contexts)[0]["float"]),
@@ -164,14 +165,15 @@ def _memory(c: dict[str, Any], contexts: Mapping[Real, dict[str, Any]]) -> list[
     x, n, nu, n_s = len(c["x_names"]), c["n"], c["nu"], c["n_s"]
     chosen: list[PlayerCandidate | None] = [contexts[real].get("chosen") for real in Real]
     rated = nu if c["rated"] else 0
-    given = (f" + {rated}" if rated else "") + (f" + {c['given_numbers']}" if c["given_numbers"] else "")
+    more = [rated, c["given_numbers"], len(c["ringing"].weights) + 1 if c["ringing"] else 0]
+    given = "".join(f" + {count}" for count in more if count)
     words = len(c["words"])
     told = "a word" if words == 1 else f"{words} words of 4 B"
     state = f"`sizeof({c['online']}_state)` = ({x} + {n}{given}) numbers and {told}, RAM, one a device"
     output = f"`sizeof({c['online']}_output)` = ({nu} + {n} + {n_s}) numbers, RAM or stack"
     rows = [
         # an odd word is aligned as a number
-        _counted("state", x + n + rated + c["given_numbers"] + words % 2, 4 * (words - words % 2), state),
+        _counted("state", x + n + sum(more) + words % 2, 4 * (words - words % 2), state),
         _counted("output", nu + n + n_s, 0, output),
         _vectors(contexts),
     ]

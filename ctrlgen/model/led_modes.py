@@ -58,16 +58,27 @@ def inverse_series(structure: StructuralModel) -> tuple[list[np.ndarray], list[n
     """d_j [m s^j] and f_j [N s^j], j = 0 ... 4, each (axes, channels), per channel of the target [SI]. K has no terms between d and eta,
     the modes with the axes held."""
     n = structure.axes
+    q, forces = _series(structure)
+    return [each[:n] for each in q], forces
+
+
+def amplitudes(structure: StructuralModel) -> list[np.ndarray]:
+    """eta_j [m s^j], j = 0 ... 4, each (modes, channels), of the modes beside the axes, as `inverse_series`."""
+    return [each[structure.axes :] for each in _series(structure)[0]]
+
+
+def _series(structure: StructuralModel) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """q_j and f_j."""
+    n = structure.axes
     M, D, K, C = structure.mass, structure.damping, structure.stiffness, structure.output
-    q, displacements, forces = [np.zeros((len(K), n)), np.zeros((len(K), n))], [], []
+    q, forces = [np.zeros((len(K), n)), np.zeros((len(K), n))], []
     for j in range(TERMS + 1):
         rates = D @ q[-1] + M @ q[-2]
         eta = -np.linalg.solve(K[n:, n:], rates[n:])
         d = np.linalg.solve(C[:, :n], (np.eye(n) if j == 0 else np.zeros((n, n))) - C[:, n:] @ eta)
         q.append(np.vstack([d, eta]))
-        displacements.append(d)
         forces.append(K[:n, :n] @ d + rates[:n])
-    return displacements, forces
+    return q[2:], forces
 
 
 def lowest_zero(structure: StructuralModel) -> float | None:

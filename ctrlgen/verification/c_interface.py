@@ -25,7 +25,7 @@ STATUS_WORDS = {
     ControllerStatus.INPUT: "target is no number, or absurd: safe drives",
     ControllerStatus.LOST: "state is no number, absurd, or was not initialised: safe drives until it is",
     ControllerStatus.RATE: "drives change as fast as they may: the target is reached later",
-    ControllerStatus.UNSURE: "the state that is believed may be wrong: it settles, was called late, or was not known at the start",
+    ControllerStatus.UNSURE: "what is believed of it may be wrong: it settles or rings, was called late, or was not known at the start",
     ControllerStatus.CLOCK: "not one sample has passed since the last call, of step_at",
 }
 
@@ -81,8 +81,8 @@ def interface(solution: Solution, c: CFolder) -> Interface:
         ControllerStatus.COMPOSITE: bool(kernels.guarded_limits),
         ControllerStatus.STATE: controller.state_can_be_limited,
         ControllerStatus.RATE: rated,
-        ControllerStatus.UNSURE: kernels.contraction is not None,
-        ControllerStatus.CLOCK: kernels.contraction is not None or kernels.times is not None,
+        ControllerStatus.UNSURE: kernels.tells_of_itself,
+        ControllerStatus.CLOCK: kernels.tells_of_itself or kernels.times is not None,
     }
     played: Mapping[Any, str] = c.player
     memory = [f"{name} [{unit}]" for name, unit in zip(m.x_names, m.x_units, strict=True)]

@@ -93,8 +93,7 @@ def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> d
         ControllerStatus.COMPOSITE if kernels.guarded_limits else bits
     )
     bits |= ControllerStatus.RATE if controller.rate else bits
-    estimated = kernels.contraction is not None
-    bits |= ControllerStatus.UNSURE | ControllerStatus.CLOCK if estimated else bits
+    bits |= ControllerStatus.UNSURE | ControllerStatus.CLOCK if kernels.tells_of_itself else bits
     corrections = corrections_of(scenario, kernels)
     bits |= ControllerStatus.CLOCK if kernels.times else bits
     samples, clock = len(scenario.bind(model).samples), scenario.clock
@@ -109,7 +108,9 @@ def _context(folder: CFolder, scenario: Scenario, model: Model, real: Real) -> d
         "m": len(kernels.input_limits),
         "rate": isinstance(clock, Sampled),
         "bits": int(bits),
-        "estimated": estimated,
+        "estimated": kernels.contraction is not None,
+        "ringing": kernels.ringing is not None,
+        "observed": kernels.can_be_observed,
         "times": kernels.times,
         "input_limits": kernels.input_limits,
         "u_low": nominal.u_bounds[0],

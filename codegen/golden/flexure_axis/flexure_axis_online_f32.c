@@ -72,6 +72,27 @@ static void flexure_axis_online_f32_motion_drive(const float target[3], float re
     result[0] = (20000.0f * target_0) + (3.0f * target_1) + (0.05f * target_2);
 }
 
+/* Where the motion that `target` says comes from, half a sample before, then where it leads, half a sample after:
+ * states and displacements, weighted by what is told of a ringing. */
+static void flexure_axis_online_f32_motion_joins(const float target[3], float result[4])
+{
+    static const float TABLE_1[2] = { 8743.522f, 0.21858805f };
+    static const float TABLE_2[2] = { 5.0110615e+06f, 125.27654f };
+    float shared1[2];
+    float shared2[2];
+    int i;
+    for (i = 0; i < 2; i++) {
+        shared1[i] = TABLE_1[i] * target[i + 1];
+    }
+    for (i = 0; i < 2; i++) {
+        shared2[i] = TABLE_2[i] * target[i];
+    }
+    result[0] = shared1[0] - shared1[1];
+    result[1] = shared2[0] - shared2[1];
+    result[2] = shared1[0] + shared1[1];
+    result[3] = shared2[0] + shared2[1];
+}
+
 /* Displacement at which the forces balance, g(x, z, drive) = 0: the step z - g/(dg/dz) from z. */
 static void flexure_axis_online_f32_balance_displacement(const float x[1], const float z[1], const float drive[1], float result[1])
 {
@@ -136,7 +157,58 @@ static int flexure_axis_online_f32_limit_displacement(float value[1])
     return flexure_axis_online_f32_limit_all(value, LOW, HIGH, SLACK, 1);
 }
 
-void flexure_axis_online_f32_init_20000hz_6af76ef7(flexure_axis_online_f32_state *state)
+/* Where a device that stays in its state is led, weighted. */
+static void flexure_axis_online_f32_set_still(const flexure_axis_online_f32_state *state, float still[2])
+{
+    static const float X_WEIGHT[1] = { 8743.522f }; /* in units of what is told, per SI */
+    static const float Z_WEIGHT[1] = { 5.0110615e+06f };
+    int i;
+    for (i = 0; i < 1; i++) {
+        still[i] = X_WEIGHT[i] * state->x[i];
+    }
+    for (i = 0; i < 1; i++) {
+        still[1 + i] = Z_WEIGHT[i] * state->z[i];
+    }
+}
+
+/* UNSURE while the device may ring by more than is told. */
+static uint32_t flexure_axis_online_f32_is_ringing(const flexure_axis_online_f32_state *state)
+{
+    return ((flexure_axis_online_f32_is_nan(&state->ringing) != 0) || (state->ringing > 0.5f)) ? FLEXURE_AXIS_ONLINE_F32_UNSURE : 0U;
+}
+
+/* What a break of the motion, and what is left of drives, adds to a ringing. */
+static float flexure_axis_online_f32_added(const flexure_axis_online_f32_state *state, const float from[2], float left)
+{
+    float size = left;
+    int i;
+    for (i = 0; i < 2; i++) {
+        const float by = from[i] - state->ahead[i];
+        size += (by < 0.0f) ? -by : by;
+    }
+    return ((flexure_axis_online_f32_is_nan(&size) == 0) && (size <= 0.002f)) ? 0.0f : size;
+}
+
+/* A sample of a motion that comes from here and leads ahead. */
+static uint32_t flexure_axis_online_f32_follow_on(flexure_axis_online_f32_state *state, const float from[2], const float ahead[2], float left)
+{
+    int i;
+    state->ringing = (state->ringing * 0.99918395f) + flexure_axis_online_f32_added(state, from, left);
+    for (i = 0; i < 2; i++) {
+        state->ahead[i] = ahead[i];
+    }
+    return flexure_axis_online_f32_is_ringing(state);
+}
+
+/* A sample of a motion that ends where the state is. */
+static uint32_t flexure_axis_online_f32_stay(flexure_axis_online_f32_state *state)
+{
+    float still[2];
+    flexure_axis_online_f32_set_still(state, still);
+    return flexure_axis_online_f32_follow_on(state, still, still, 0.0f);
+}
+
+void flexure_axis_online_f32_init_20000hz_11318565(flexure_axis_online_f32_state *state)
 {
     static const float X_REST[1] = { 0.0f }; /* SI */
     if (state != NULL) {
@@ -147,6 +219,10 @@ void flexure_axis_online_f32_init_20000hz_6af76ef7(flexure_axis_online_f32_state
         for (i = 0; i < 1; i++) {
             state->z[i] = 0.0f;
         }
+        flexure_axis_online_f32_set_still(state, state->ahead);
+        state->ringing = 0.0f;
+        state->ticking = 0U;
+        state->tick = 0U;
         state->ready = FLEXURE_AXIS_ONLINE_F32_BUILD;
     }
 }
@@ -201,6 +277,7 @@ static uint32_t flexure_axis_online_f32_settle_within(flexure_axis_online_f32_st
         (void)flexure_axis_online_f32_limit_all(out->drive, FLEXURE_AXIS_ONLINE_F32_U_LOW, FLEXURE_AXIS_ONLINE_F32_U_HIGH, FLEXURE_AXIS_ONLINE_F32_U_SLACK, 1);
     }
     flexure_axis_online_f32_settle_proceed(state, out);
+    status |= flexure_axis_online_f32_stay(state);
     return status;
 }
 
@@ -222,6 +299,7 @@ static uint32_t flexure_axis_online_f32_settle_unusable(flexure_axis_online_f32_
 {
     uint32_t status = FLEXURE_AXIS_ONLINE_F32_INPUT;
     flexure_axis_online_f32_settle_safe(state, out);
+    status |= flexure_axis_online_f32_stay(state);
     return status;
 }
 
@@ -276,16 +354,29 @@ static uint32_t flexure_axis_online_f32_motion_broken(const flexure_axis_online_
 /* The drives of the motion whose state is at, within their limits. */
 static uint32_t flexure_axis_online_f32_motion_drives(flexure_axis_online_f32_state *at, const flexure_axis_online_f32_state *state, const float target[3], flexure_axis_online_f32_output *out)
 {
+    static const float U_WEIGHT[1] = { 8.743523f };
+    float left = 0.0f;
+    float wanted[1];
+    float join[2 * 2];
     uint32_t status = 0U;
     int i;
     (void)state;
+    flexure_axis_online_f32_motion_joins(target, join); /* before out, which may be the target */
     flexure_axis_online_f32_motion_drive(target, out->drive);
+    for (i = 0; i < 1; i++) {
+        wanted[i] = out->drive[i];
+    }
     if (flexure_axis_online_f32_limit_all(out->drive, FLEXURE_AXIS_ONLINE_F32_U_LOW, FLEXURE_AXIS_ONLINE_F32_U_HIGH, FLEXURE_AXIS_ONLINE_F32_U_SLACK, 1) != 0) {
         status = FLEXURE_AXIS_ONLINE_F32_DRIVE;
     }
     for (i = 0; i < 1; i++) {
         out->displacement[i] = at->z[i];
     }
+    for (i = 0; i < 1; i++) {
+        const float by = out->drive[i] - wanted[i];
+        left += U_WEIGHT[i] * ((by < 0.0f) ? -by : by);
+    }
+    status |= flexure_axis_online_f32_follow_on(at, join, &join[2], left);
     at->ready = FLEXURE_AXIS_ONLINE_F32_BUILD;
     return status;
 }
@@ -301,8 +392,9 @@ uint32_t flexure_axis_online_f32_step(flexure_axis_online_f32_state *state, cons
         status = flexure_axis_online_f32_set_lost(state, out);
     } else if ((target == NULL) || (flexure_axis_online_f32_is_usable(target) == 0)) {
         flexure_axis_online_f32_settle_safe(state, out);
+        status |= flexure_axis_online_f32_stay(state);
     } else {
-        flexure_axis_online_f32_state at;
+        flexure_axis_online_f32_state at = *state;
         uint32_t broken;
         flexure_axis_online_f32_motion_displacement(target, at.z);
         flexure_axis_online_f32_motion_state(target, at.x);
@@ -313,6 +405,171 @@ uint32_t flexure_axis_online_f32_step(flexure_axis_online_f32_state *state, cons
         } else {
             status = broken | flexure_axis_online_f32_settle(state, target, out);
         }
+    }
+    return status;
+}
+
+/* Nothing is known of the device but that its drives were within their limits. */
+static void flexure_axis_online_f32_set_unknown(flexure_axis_online_f32_state *state)
+{
+    static const float HOME[1] = { 0.0f }; /* SI */
+    int i;
+    for (i = 0; i < 1; i++) {
+        state->x[i] = HOME[i];
+    }
+    for (i = 0; i < 1; i++) {
+        state->z[i] = 0.0f;
+    }
+    flexure_axis_online_f32_set_still(state, state->ahead);
+    state->ringing = 42835.184f;
+}
+
+uint32_t flexure_axis_online_f32_forget(flexure_axis_online_f32_state *state)
+{
+    uint32_t status = FLEXURE_AXIS_ONLINE_F32_INPUT;
+    if (state == NULL) {
+        /* nothing is written */
+    } else if (state->ready != FLEXURE_AXIS_ONLINE_F32_BUILD) {
+        status = FLEXURE_AXIS_ONLINE_F32_LOST;
+    } else {
+        flexure_axis_online_f32_set_unknown(state);
+        status = FLEXURE_AXIS_ONLINE_F32_UNSURE;
+    }
+    return status;
+}
+
+/* 1 if the state can be corrected; one that is lost stays so. */
+static int flexure_axis_online_f32_can_be_corrected(flexure_axis_online_f32_state *state)
+{
+    if ((state->ready != FLEXURE_AXIS_ONLINE_F32_BUILD) || (flexure_axis_online_f32_is_lost(state) != 0)) {
+        state->ready = 0U;
+    }
+    return (state->ready != 0U) ? 1 : 0;
+}
+
+/* What is left of a ringing after so many samples: DECAY to their power, by squares. */
+static float flexure_axis_online_f32_left_after(float ringing, uint32_t ticks)
+{
+    float left = ringing;
+    float power = 0.99918395f;
+    uint32_t rest = ticks;
+    int k;
+    for (k = 0; k < 32; k++) {
+        if ((rest & 1U) != 0U) {
+            left = left * power;
+        }
+        power = power * power;
+        rest >>= 1U;
+    }
+    return left;
+}
+
+uint32_t flexure_axis_online_f32_elapsed(flexure_axis_online_f32_state *state, uint32_t ticks, const float drive[1])
+{
+    uint32_t status = FLEXURE_AXIS_ONLINE_F32_INPUT;
+    if ((state == NULL) || (drive == NULL)) {
+        /* nothing is written */
+    } else if (flexure_axis_online_f32_can_be_corrected(state) == 0) {
+        status = FLEXURE_AXIS_ONLINE_F32_LOST;
+    } else if (flexure_axis_online_f32_drive_inside(drive) != 0) {
+        int k;
+        if (ticks > 0U) { /* it rings about the equilibrium under this drive */
+            for (k = 0; k < 3; k++) {
+                flexure_axis_online_f32_wanted_advance(state->x);
+                flexure_axis_online_f32_balance_displacement(state->x, state->z, drive, state->z);
+            }
+            if (flexure_axis_online_f32_is_lost(state) != 0) { /* far beyond its range */
+                flexure_axis_online_f32_set_unknown(state);
+            } else {
+                float still[2];
+                flexure_axis_online_f32_set_still(state, still);
+                state->ringing = flexure_axis_online_f32_left_after(state->ringing + flexure_axis_online_f32_added(state, still, 0.0f), ticks);
+                for (k = 0; k < 2; k++) {
+                    state->ahead[k] = still[k];
+                }
+            }
+        }
+        status = flexure_axis_online_f32_is_ringing(state);
+    } else {
+        status = FLEXURE_AXIS_ONLINE_F32_INPUT; /* no drive that was held */
+    }
+    return status;
+}
+
+/* 1 if an error is one: a number of zero or more that is not absurd. */
+static int flexure_axis_online_f32_is_error(const float error[], int count)
+{
+    int is = 1;
+    int i;
+    for (i = 0; i < count; i++) {
+        if ((flexure_axis_online_f32_is_nan(&error[i]) != 0) || (error[i] < 0.0f) || (error[i] > 1e+18f)) {
+            is = 0;
+        }
+    }
+    return is;
+}
+
+uint32_t flexure_axis_online_f32_observe(flexure_axis_online_f32_state *state, const float x[1], const float z[1], const float x_error[1], const float z_error[1])
+{
+    static const float REACH[2] = { 1.1658612f, 1.0022123f }; /* of what is told */
+    uint32_t status = FLEXURE_AXIS_ONLINE_F32_INPUT;
+    if ((state == NULL) || (x == NULL) || (z == NULL) || (x_error == NULL) || (z_error == NULL)) {
+        /* nothing is written */
+    } else if (flexure_axis_online_f32_can_be_corrected(state) == 0) {
+        status = FLEXURE_AXIS_ONLINE_F32_LOST;
+    } else {
+        flexure_axis_online_f32_state seen = *state;
+        flexure_axis_online_f32_state off = *state;
+        int i;
+        for (i = 0; i < 1; i++) {
+            seen.x[i] = x[i];
+            off.x[i] = x_error[i];
+        }
+        for (i = 0; i < 1; i++) {
+            seen.z[i] = z[i];
+            off.z[i] = z_error[i];
+        }
+        if ((flexure_axis_online_f32_is_lost(&seen) == 0) && (flexure_axis_online_f32_is_error(x_error, 1) != 0) && (flexure_axis_online_f32_is_error(z_error, 1) != 0)) {
+            float measured[2];
+            float error[2];
+            float size = 0.0f;
+            int apart = 0;
+            flexure_axis_online_f32_set_still(&seen, measured);
+            flexure_axis_online_f32_set_still(&off, error);
+            for (i = 0; i < 2; i++) {
+                const float by = measured[i] - state->ahead[i];
+                const float away = (by < 0.0f) ? -by : by;
+                size += away + error[i];
+                if (away > (error[i] + (REACH[i] * (state->ringing + 1.0f)))) {
+                    apart = 1;
+                }
+            }
+            if ((apart != 0) || (size < state->ringing)) {
+                state->ringing = size;
+            }
+            status = flexure_axis_online_f32_is_ringing(state);
+        }
+    }
+    return status;
+}
+
+uint32_t flexure_axis_online_f32_step_at(flexure_axis_online_f32_state *state, uint32_t tick, const float target[3], flexure_axis_online_f32_output *out)
+{
+    uint32_t status = 0U;
+    uint32_t since = 1U;
+    if ((state != NULL) && (out != NULL) && (state->ready == FLEXURE_AXIS_ONLINE_F32_BUILD)) {
+        since = (state->ticking != 0U) ? (tick - state->tick) : 1U;
+        state->ticking = 1U;
+        state->tick = tick;
+        if (since != 1U) {
+            status = FLEXURE_AXIS_ONLINE_F32_CLOCK;
+        }
+        if ((since > 1U) && ((since >= 2147483648U) || (flexure_axis_online_f32_elapsed(state, since - 1U, out->drive) == FLEXURE_AXIS_ONLINE_F32_INPUT))) {
+            (void)flexure_axis_online_f32_forget(state);
+        }
+    }
+    if (since != 0U) {
+        status |= flexure_axis_online_f32_step(state, target, out);
     }
     return status;
 }

@@ -35,12 +35,15 @@ typedef float real;
 #define COUPLED 1
 #define MOVING 1
 #define MOTION 0
+#define NY 0
 #define PIVOTED 1
 #define U_BOUNDS_ONCE 0
 #define REST_GIVEN 0
 #define CHANGING 0
 #define DOUBLE 0
 #define ESTIMATED 1
+#define RINGING 0
+#define OBSERVED 0
 #define VARIED 0
 #define STATE_BY_MODE 0
 #define DRIVE_BY_MODE 0
@@ -59,8 +62,8 @@ typedef float real;
 #define SECANT_STEPS 3
 #define GROUPS 0
 #define GIVEN 0
-#define INIT limiter_init_1000hz_6a8340fe
-#define INIT_WITH limiter_init_with_1000hz_6a8340fe
+#define INIT limiter_init_1000hz_5f705b14
+#define INIT_WITH limiter_init_with_1000hz_5f705b14
 #define Z_LOW_TABLE { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }
 #define Z_HIGH_TABLE { 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f }
 #define Z_SLACK_TABLE { 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f }

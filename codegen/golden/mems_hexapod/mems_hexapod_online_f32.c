@@ -663,7 +663,7 @@ static int mems_hexapod_online_f32_line_search(const mems_hexapod_online_f32_sta
     return mems_hexapod_online_f32_limit_all(out->drive, MEMS_HEXAPOD_ONLINE_F32_U_LOW, MEMS_HEXAPOD_ONLINE_F32_U_HIGH, MEMS_HEXAPOD_ONLINE_F32_U_SLACK, 6);
 }
 
-void mems_hexapod_online_f32_init_1000hz_6a8340fe(mems_hexapod_online_f32_state *state)
+void mems_hexapod_online_f32_init_1000hz_5f705b14(mems_hexapod_online_f32_state *state)
 {
     if (state != NULL) {
         int i;

@@ -30,12 +30,12 @@
 extern "C" {
 #endif
 
-/* For _Static_assert(MEMS_HEXAPOD_ONLINE_F32_ABI == 3U, "..."): raised when code written for an older header must be changed. */
-#define MEMS_HEXAPOD_ONLINE_F32_ABI (3U)
+/* For _Static_assert(MEMS_HEXAPOD_ONLINE_F32_ABI == 4U, "..."): raised when code written for an older header must be changed. */
+#define MEMS_HEXAPOD_ONLINE_F32_ABI (4U)
 #define MEMS_HEXAPOD_ONLINE_F32_VERSION "0.1.0" /* of ctrlgen */
 #define MEMS_HEXAPOD_ONLINE_F32_DEVICE_HASH (0x39f6d797U) /* the first 32 bits of the SHA-256 of the device's description */
 #define MEMS_HEXAPOD_ONLINE_F32_RATE_HZ (1000U) /* samples a second */
-#define MEMS_HEXAPOD_ONLINE_F32_BUILD (0x6A8340FEU) /* of device, followed signal, rate, limits and arithmetic; the mark of an initialised state */
+#define MEMS_HEXAPOD_ONLINE_F32_BUILD (0x5F705B14U) /* of device, followed signal, rate, limits and arithmetic; the mark of an initialised state */
 #define MEMS_HEXAPOD_ONLINE_F32_TARGET_SIZE (6U)
 #define MEMS_HEXAPOD_ONLINE_F32_DRIVE_SIZE (6U)
 #define MEMS_HEXAPOD_ONLINE_F32_DISPLACEMENT_SIZE (6U)
@@ -70,13 +70,13 @@ typedef struct {
 
 /* What mems_hexapod_online_f32_init calls. It is linked by a name of this build, rate and hash of device, signal and limits: a program that was
  * compiled with this header and is linked with another build of the same prefix is told so by the linker. */
-void mems_hexapod_online_f32_init_1000hz_6a8340fe(mems_hexapod_online_f32_state *state);
+void mems_hexapod_online_f32_init_1000hz_5f705b14(mems_hexapod_online_f32_state *state);
 
 /* A cold device at rest. Also the way out of status LOST: hold the safe drive until the device has settled, then call it.
  * Behind a reset, a brown-out or a watchdog nobody knows whether it is: call mems_hexapod_online_f32_forget then. */
 static inline void mems_hexapod_online_f32_init(mems_hexapod_online_f32_state *state)
 {
-    mems_hexapod_online_f32_init_1000hz_6a8340fe(state);
+    mems_hexapod_online_f32_init_1000hz_5f705b14(state);
 }
 
 /* Drive of the equilibrium at target; the state becomes that equilibrium. Hold the drive until the device has settled: MEMS_HEXAPOD_ONLINE_F32_SETTLING samples,

@@ -172,6 +172,7 @@ def _controller_unit(scenario: Scenario, model: Model, sample_time: float, folde
             "drive_start": [Real.DOUBLE.literal(v) for v in controller.kernels.safe_drive],
             "rated": controller.rate is not None,
             "estimated": controller.kernels.contraction is not None,
+            "ringing": controller.kernels.ringing is not None,
             "most_settling": controller.rate.samples(*m.u_bounds) if controller.rate else 0,
         },
     )

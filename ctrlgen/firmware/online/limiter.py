@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ctrlgen.controller.estimate import BACKWARD, DOUBLED, EXACT
+from ctrlgen.controller.clocked import BACKWARD
+from ctrlgen.controller.estimate import DOUBLED, EXACT
 from ctrlgen.controller.feedforward import SECANT_FRACTION, SECANT_STEPS
 from ctrlgen.controller.nearest_displacement import SWEEPS
+from ctrlgen.controller.ringing import TOLD
 from ctrlgen.firmware.c.preprocessor import Macro, resolved
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.templates import codegen_folder
@@ -59,7 +61,10 @@ def limiter_macros(context: Mapping[str, Any]) -> dict[str, Macro]:
     macros |= {"REAL": Macro("x ## f" if real is Real.FLOAT else "x", ("x",))}
     macros |= {name: Macro(str(int(value))) for name, value in _features(context).items()}
     macros |= {
-        name: Macro(text) for name, text in (_texts(context) | _start_texts(context) | _estimate_texts(context)).items()
+        name: Macro(text)
+        for name, text in (
+            _texts(context) | _start_texts(context) | _estimate_texts(context) | _ringing_texts(context)
+        ).items()
     }
     return macros | {name: Macro(body, tuple(given.split())) for name, (given, body) in _calls(context).items()}
 
@@ -82,12 +87,15 @@ def _features(context: Mapping[str, Any]) -> dict[str, int]:
         "COUPLED": context["nearest_slopes"] is not None,
         "MOVING": "step" in modes,
         "MOTION": bool(context["motion"]),
+        "NY": 0 if context["ringing"] is None else len(context["ringing"].weights),
         "PIVOTED": context["pivot"] is not None,
         "U_BOUNDS_ONCE": bounds_once(context),
         "REST_GIVEN": bool(context["rest_given"]),
         "CHANGING": context["changing"] is not None,
         "DOUBLE": context["real"] is Real.DOUBLE,
         "ESTIMATED": context["estimated"] is not None,
+        "RINGING": context["ringing"] is not None,
+        "OBSERVED": context["observed"],
         "VARIED": context["times"] is not None,
         # Whether the line search calls one kernel to settle and another to step
         "STATE_BY_MODE": len({mode["state"].name for mode in limited if "state" in mode}) > 1,
@@ -190,6 +198,27 @@ def _estimate_texts(context: Mapping[str, Any]) -> dict[str, str]:
     texts = {f"{name}_TABLE": _braces(literal(v) for v in values) for name, values in tables.items()}
     texts |= {name: str(count) if name in loops else f"{count}U" for name, count in counts.items()}
     return texts | ({"GROWTH": literal(bounds.in_known(n_s))} if n_s else {})
+
+
+def _ringing_texts(context: Mapping[str, Any]) -> dict[str, str]:
+    """What the macros of ringing.c and ringing_count.c stand for."""
+    bounds, real = context["ringing"], context["real"]
+    if bounds is None:
+        return {}
+    nx, n = len(context["x_names"]), context["n"]
+    reach = np.minimum(bounds.reach[: nx + n], context["unlimited"])
+    tables = {
+        "X_WEIGHT": bounds.weights[:nx],
+        "Z_WEIGHT": bounds.weights[nx : nx + n],
+        "U_WEIGHT": bounds.drive,
+        "REACH": reach,
+    }
+    # powers of it are taken: rounded up, so that what is left is not taken for less
+    decay = 1.0 if bounds.decay == 1.0 else bounds.decay * (1 + real.epsilon)
+    numbers = {"DECAY": decay, "LEAST_BREAK": bounds.least, "UNKNOWN_RINGING": bounds.unknown, "TOLD": TOLD}
+    texts = {f"{name}_TABLE": _braces(real.literal(v) for v in values) for name, values in tables.items()}
+    texts |= {name: real.literal(value) for name, value in numbers.items()}
+    return texts | {"BACKWARD": f"{BACKWARD}U", "SETTLING_SWEEPS": str(SETTLING_SWEEPS)}
 
 
 def _start_texts(context: Mapping[str, Any]) -> dict[str, str]:

@@ -14,6 +14,7 @@ from ctrlgen.controller.estimate import EXACT
 from ctrlgen.controller.feedforward import SECANT_STEPS, Controller
 from ctrlgen.controller.lost_state import FAR
 from ctrlgen.controller.nearest_displacement import SWEEPS
+from ctrlgen.controller.ringing import STILL, TOLD
 from ctrlgen.controller.run_time_check import check_run_time
 from ctrlgen.core.units import show, show_difference
 from ctrlgen.devices import Limit
@@ -29,7 +30,8 @@ from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.version import __version__, program
 
 WORDS = ("ready",)  # integers of a controller's state, in the order of its structure
-ESTIMATE_WORDS = ("unsure", "ticking", "tick")  # of one whose state can be wrong (estimate.c)
+CLOCK_WORDS = ("ticking", "tick")  # of one that is told what time it is (step_at.c)
+ESTIMATE_WORDS = ("unsure", *CLOCK_WORDS)  # of one whose state can be wrong (estimate.c)
 
 TIME_WORDS = ("stepping",)  # of one whose sample times vary (timed.c)
 
@@ -70,11 +72,17 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
             "rest": kernels.nominal.rest,
             "far": FAR,
             "estimated": kernels.contraction,
+            "ringing": kernels.ringing,
+            # of modes that are led nobody measures the amplitudes
+            "observed": kernels.can_be_observed,
             "words": WORDS
             + ESTIMATE_WORDS * (kernels.contraction is not None)
+            + CLOCK_WORDS * (kernels.ringing is not None)
             + TIME_WORDS * (kernels.times is not None),
             "forever": FOREVER,
             "share_known": KNOWN,
+            "share_still": STILL,
+            "told": TOLD,
             "exact": EXACT,
             "sample_time": kernels.sample_time,
             "times": kernels.times,
@@ -140,6 +148,7 @@ def header_context(scenario: Scenario, controller: Controller) -> dict[str, Any]
         "n": len(model.axes),
         "nu": len(drive.channels),
         "m": len(follow.channels),
+        "positions": len(model.signals[kernels.follow].channels),  # of a motion's target the rest are derivatives
         "n_s": model.n_states,
         "axes": model.axes,
         "follow": follow,

@@ -100,6 +100,8 @@ def printed_kernels(controller: Controller, printer: Printer) -> PrintedKernels:
     motion = {}
     if isinstance(kernels, MotionKernels):
         motion = {part: printed.kernel(k, ("motion", part), (f"motion_{part}",)) for part, k in kernels.motion.items()}
+        if kernels.ringing is not None:
+            motion["joins"] = printed.kernel(kernels.joins, ("motion", "joins"), ("motion_joins",))
     steps = ("z", kernels.newton_steps) if kernels.newton_steps > 1 else None
     named = None if inverses.static is None else inverses.static.newton
     balance = printed.kernel(static.newton, "balance", ("balance_displacement",), steps=steps, named=named)
@@ -204,6 +206,11 @@ def kernel_comments(kernels: ControllerKernels, quick_state: QuickState | None =
                 "step": f"{drive.label.capitalize()} that leads from x to {holds} within {within}.",
                 "motion": f"{drive.label.capitalize()} of the motion that `target` says.",
             }[mode],
+            (
+                mode,
+                "joins",
+            ): "Where the motion that `target` says comes from, half a sample before, then where it leads, half a sample after: "
+            "states and displacements, weighted by what is told of a ringing.",
             (mode, "advance"): f"States under `drive`, {after}: {states}.",
         }
     return comments

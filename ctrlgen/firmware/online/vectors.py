@@ -106,7 +106,7 @@ def played_vectors(compression: Compression | None, samples: int, clock: Clock) 
 def self_test_calls(c: dict[str, Any]) -> dict[str, int]:
     """What the self test of a context counts: "online_calls" of the controller, and all "calls", with those of the player, its wrap or
     end and the refused ones among them."""
-    parts = {"estimate": "estimated", "timed": "times", "correction": "correction"}
+    parts = {"estimate": "estimated", "ringing": "ringing", "timed": "times", "correction": "correction"}
     counted = {name: _counts(c, name) if c[of] else 0 for name, of in parts.items()}
     correction = counted["correction"]
     online = len(c["rows"]) + 2 * c["unusable"] + 2 + 2 * c["lost"] + _pivot_calls(c) + sum(counted.values())

@@ -1,0 +1,57 @@
+/* How far the device may be off the motion that it is to follow. limiter.c includes this for a device with inertia. */
+
+/* Where a device that stays in its state is led, weighted. */
+static void set_still(const limiter_state *state, real still[NY])
+{
+    static const real X_WEIGHT[NX] = X_WEIGHT_TABLE; /* in units of what is told, per SI */
+    static const real Z_WEIGHT[N] = Z_WEIGHT_TABLE;
+    int i;
+    for (i = 0; i < NX; i++) {
+        still[i] = X_WEIGHT[i] * state->x[i];
+    }
+    for (i = 0; i < N; i++) {
+        still[NX + i] = Z_WEIGHT[i] * state->z[i];
+    }
+#if NY > (NX + N)
+    for (i = NX + N; i < NY; i++) {
+        still[i] = REAL(0.0);
+    }
+#endif
+}
+
+/* UNSURE while the device may ring by more than is told. */
+static uint32_t is_ringing(const limiter_state *state)
+{
+    return ((is_nan(&state->ringing) != 0) || (state->ringing > TOLD)) ? LIMITER_UNSURE : 0U;
+}
+
+/* What a break of the motion, and what is left of drives, adds to a ringing. */
+static real added(const limiter_state *state, const real from[NY], real left)
+{
+    real size = left;
+    int i;
+    for (i = 0; i < NY; i++) {
+        const real by = from[i] - state->ahead[i];
+        size += (by < REAL(0.0)) ? -by : by;
+    }
+    return ((is_nan(&size) == 0) && (size <= LEAST_BREAK)) ? REAL(0.0) : size;
+}
+
+/* A sample of a motion that comes from here and leads ahead. */
+static uint32_t follow_on(limiter_state *state, const real from[NY], const real ahead[NY], real left)
+{
+    int i;
+    state->ringing = (state->ringing * DECAY) + added(state, from, left);
+    for (i = 0; i < NY; i++) {
+        state->ahead[i] = ahead[i];
+    }
+    return is_ringing(state);
+}
+
+/* A sample of a motion that ends where the state is. */
+static uint32_t stay(limiter_state *state)
+{
+    real still[NY];
+    set_still(state, still);
+    return follow_on(state, still, still, REAL(0.0));
+}
