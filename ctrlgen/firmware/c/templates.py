@@ -36,6 +36,10 @@ SOURCES = {
 }
 
 
+# A double of less than double precision; a tool that does not know <float.h> reads the source
+NARROW = "#include <float.h>\n#if defined(DBL_MANT_DIG) && (DBL_MANT_DIG < 53)\n"
+
+
 def codegen_folder() -> Path:
     """The folder of the C templates and of the test harness."""
     return shipped("codegen")
@@ -54,10 +58,27 @@ def render(template: str, context: dict[str, Any]) -> str:
     """`template` of `codegen/templates/` with `context`. A name that the template asks for and does not get is an error. In a source of
     a firmware every name of file scope begins with that of the source."""
     text = _environment().get_template(f"{template}.j2").render(context)
+    doubles, source = context.get("real") is Real.DOUBLE, f"{template.removesuffix('.h')}.c"
     if template not in SOURCES:
-        return text
+        return _refused(text) if doubles and source in SOURCES and template != source else text
     header = _environment().get_template(f"{template.removesuffix('.c')}.h.j2").render(context)
-    return prefixed(text, context[SOURCES[template]], header)
+    text = prefixed(text, context[SOURCES[template]], header)
+    return _left_out(text, context[SOURCES[template]]) if doubles else text
+
+
+def _refused(header: str) -> str:
+    """A header of the arithmetic in double, which a program refuses whose double is no double."""
+    guard, _, rest = header.partition("_H\n#define ")
+    name, _, rest = rest.partition("\n")
+    check = f'{NARROW}#error "double has fewer than 53 bits here, as on AVR: take the controller of the suffix _f32"\n#endif\n'
+    return f"{guard}_H\n#define {name}\n\n{check}{rest}"
+
+
+def _left_out(source: str, name: str) -> str:
+    """A source of the arithmetic in double, which is empty where a double is no double: Arduino builds every source of a library."""
+    about, _, rest = source.partition("*/\n")
+    empty = f"typedef int {name}_left_out; /* double has fewer than 53 bits here, as on AVR: take the suffix _f32 */\n"
+    return f"{about}*/\n{NARROW}{empty}#else\n{rest}#endif\n"
 
 
 @cache
