@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from turntable import RIPPLE, RUNOUT_TABLE, made, stated
 
-from ctrlgen import InputError, build_model
+from ctrlgen import InputError, build_model, load_scenario
 from ctrlgen.controller.correction import EARLY, Basis, Correction, CorrectionLearning, Corrections, CorrectionStatus
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.firmware.c.real import Real
@@ -333,3 +333,11 @@ def test_one_channel_has_one_correction(tmp_path):
     scenario = stated(tmp_path, RUNOUT_TABLE, RUNOUT_TABLE)
     with pytest.raises(InputError, match="corrected twice"):
         corrections_of(scenario, controller_of(build_model(scenario.device), "pose", scenario.sample_time).kernels)
+
+
+def test_integers_have_no_correction_and_say_so(tmp_path):
+    stated(tmp_path, RUNOUT_TABLE)
+    text = (tmp_path / "scenario.toml").read_text()
+    (tmp_path / "scenario.toml").write_text("fixed_point = true\n" + text)
+    with pytest.raises(InputError, match=r"fixed_point has no \[\[correction\]\]"):
+        load_scenario(tmp_path / "scenario.toml")

@@ -152,6 +152,15 @@ class ScenarioFile(Section):
         return self
 
     @model_validator(mode="after")
+    def _integers(self) -> ScenarioFile:
+        if self.fixed_point and self.correction:
+            raise ValueError(
+                "fixed_point has no [[correction]]: the controller in integers would follow targets that nothing is added to; leave out "
+                "one of them"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _varied(self) -> ScenarioFile:
         if self.sample_times is None:
             return self
