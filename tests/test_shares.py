@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 from ctrlgen.diagnosis.shares.design import Kind
-from ctrlgen.diagnosis.shares.families import SPEAKS_FOR, family_of, ranking
+from ctrlgen.diagnosis.shares.families import SPEAKS_FOR, alone, family_of, ranking
 from ctrlgen.diagnosis.shares.model_free_shares import model_free_shares
 from ctrlgen.diagnosis.shares.shares_record import table_record
 from ctrlgen.diagnosis.shares.signals import Signals
@@ -229,3 +230,18 @@ def test_the_record_is_plain_and_says_what_was_selected(signals, rng):
     first = record["channels"]["x"]["kinds"][0]
     assert first["kind"] == "position" and first["share"] == table.channels[0].kinds[0].alone.share
     assert first["selected"] == 1 and record["channels"]["x"]["rms"] == pytest.approx(1e6 * table.channels[0].rms)
+
+
+def test_a_kind_that_another_one_took_the_place_of_still_speaks_alone():
+    """In a sine the speed and the history of travel are nearly one signal."""
+    rows = [
+        SimpleNamespace(kind=Kind.SPEED, alone=SimpleNamespace(share=0.96), additional=0.96, selected=1),
+        SimpleNamespace(kind=Kind.TRAVEL_HISTORY, alone=SimpleNamespace(share=0.97), additional=0.02, selected=2),
+    ]
+    channel = SimpleNamespace(channel="x", rms=1.0, kinds=rows, constant=0.0, numbers=0.0, axes=frozenset())
+    other = SimpleNamespace(channel="y", rms=0.0, kinds=[], constant=0.0, numbers=0.0, axes=frozenset())
+    table = SimpleNamespace(channels=[channel, other], design=SimpleNamespace(one_way=lambda axes: False))
+    assert dict(ranking(table))[Family.HYSTERESIS] == pytest.approx(0.01)
+    by_itself = alone(table, {"x": 1.0, "y": 1.0})
+    assert by_itself[Family.HYSTERESIS] == pytest.approx(0.97) and by_itself[Family.DYNAMICS] == pytest.approx(0.96)
+    assert by_itself[Family.CREEP] == 0.0

@@ -41,6 +41,14 @@ def test_a_cause_whose_family_is_far_behind_a_clear_one_does_not_stand_first(fri
     assert {f.effect: f.contradicted for f in (first, second)}["creep"] == (not stands)
 
 
+@pytest.mark.parametrize(("by_itself", "stands"), [(0.95, True), (0.86, True), (0.8, False)])
+def test_a_family_that_predicts_as_much_alone_is_not_contradicted(by_itself, stands):
+    """As the history of travel and the speed in a sine, of which only the first one selected adds anything."""
+    (first, *_) = in_standing([finding("creep")], shares(0.95, 0.02), {Family.CREEP: by_itself})
+    assert first.contradicted == (not stands)
+    assert first.support.share == (min(by_itself, 0.95) if stands else 0.02)
+
+
 def test_what_is_no_cause_stays_behind_the_causes_and_is_not_judged():
     found = in_standing([finding("creep"), finding("drift", role=Role.MINOR)], shares(0.9, 0.0))
     assert [f.effect for f in found] == ["creep", "drift"] and found[1].support is None

@@ -42,7 +42,7 @@ from ctrlgen.diagnosis.selection.untried import refuse_without_trials, untried
 from ctrlgen.diagnosis.selection.verdict import Verdict, in_another_unit, verdict, within_tolerance
 from ctrlgen.diagnosis.selection.way_covered import with_longest_periods
 from ctrlgen.diagnosis.shares.empirical_terms import EmpiricalTerm, empirical_terms
-from ctrlgen.diagnosis.shares.families import ranking
+from ctrlgen.diagnosis.shares.families import alone, ranking
 from ctrlgen.diagnosis.shares.gather import ResidualShares, residual_shares
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.checkpoint import Checkpoint
@@ -145,7 +145,8 @@ def _diagnose(
     if shares is not None:
         noise = dict(zip(search.fitter.recording.channels, search.fitter.noise.floor.tolist(), strict=True))
         spoken_for = ranking(shares.before, noise)
-        found = in_standing(found, spoken_for if laws is not None else possible(spoken_for, suspected))
+        spoken_for = spoken_for if laws is not None else possible(spoken_for, suspected)
+        found = in_standing(found, spoken_for, alone(shares.before, noise))
         answer = answer_of(answer, found, search.chosen.errors.is_noise)
     found = with_chances(found, search)
     answer = doubted(answer, found)

@@ -2,13 +2,16 @@
 
 A share says of what the residual of the device as described is a function, whatever the law. Where more than noise is left, a law
 whose family the shares put near zero, or far below another family, may be what fits best and still not be what acts: it does not
-stand first, and alone it makes the answer ambiguous. Where a model leaves noise alone, it has the better evidence.
+stand first, and alone it makes the answer ambiguous. Not where a signal that speaks for its family predicts nearly as much alone: then
+the shares do not tell the two apart, and which was selected first is but an order. Where a model leaves noise alone, it has the better
+evidence.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 from ctrlgen.diagnosis.selection.findings import Finding, Role, SupportEntry
 from ctrlgen.diagnosis.selection.verdict import Verdict
@@ -17,10 +20,15 @@ from ctrlgen.diagnosis.shares.families import family_of
 from ctrlgen.effects import Family
 from ctrlgen.estimation.hypothesis import Hypothesis
 
+NOTHING: Mapping[Family, float] = MappingProxyType({})
 
-def in_standing(findings: Sequence[Finding], shares: Sequence[tuple[Family, float]]) -> tuple[Finding, ...]:
-    """The findings with what the `shares` by family (the largest first) say of each; those that they contradict after the others."""
-    told = [replace(f, support=_support(f, shares)) for f in findings]
+
+def in_standing(
+    findings: Sequence[Finding], shares: Sequence[tuple[Family, float]], alone: Mapping[Family, float] = NOTHING
+) -> tuple[Finding, ...]:
+    """The findings with what the `shares` by family (the largest first), and those of its own kind `alone`, say of each; those that they
+    contradict after the others."""
+    told = [replace(f, support=_support(f, shares, alone)) for f in findings]
     return tuple(sorted(told, key=lambda f: (f.role is not Role.CAUSE, f.contradicted)))
 
 
@@ -36,12 +44,16 @@ def answer_of(verdict: Verdict, findings: Sequence[Finding], exact: bool) -> Ver
     return Verdict.AMBIGUOUS if doubted and verdict in (Verdict.PARTLY, Verdict.EXPLAINED) else verdict
 
 
-def _support(finding: Finding, shares: Sequence[tuple[Family, float]]) -> SupportEntry | None:
+def _support(
+    finding: Finding, shares: Sequence[tuple[Family, float]], alone: Mapping[Family, float]
+) -> SupportEntry | None:
     family = family_of(finding.effect)
     if family is None or not shares or finding.role is not Role.CAUSE:
         return None
     leading, most = shares[0]
     own = dict(shares).get(family, 0.0)
+    if (by_itself := alone.get(family, 0.0)) >= STANDING.as_much * most:
+        own = max(own, min(by_itself, most))
     weak = own < STANDING.near_zero or own < STANDING.far_below * most
     return SupportEntry(
         family=family.value,

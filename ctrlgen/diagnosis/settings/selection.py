@@ -352,6 +352,9 @@ class StandingSettings:
     """Share of a family over the largest one, below which it is far behind. Judgement."""
     clear: float = 0.5
     """Share of the largest family, below which the shares tell no family: the larger half."""
+    as_much: float = 0.9
+    """Share that a kind of a family predicts alone over that of the largest family, from which on the two are one signal to the shares.
+    Judgement; of a piezo stack under a sine the history of travel predicts 97 % and the speed 97 %, selected first."""
 
 
 SCREEN = ScreenSettings()

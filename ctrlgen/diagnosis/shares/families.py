@@ -79,8 +79,7 @@ def ranking(table: SharesTable, noise: dict[str, float] | None = None) -> list[t
     offset. Of two with the same share the one that stands earlier in the rows goes first. Channels count by their energy over
     the variance of their `noise` [SI]; alike without it.
     """
-    weights = {c.channel: (c.rms / noise[c.channel]) ** 2 if noise else 1.0 for c in table.channels}
-    whole = sum(weights.values()) or 1.0
+    weights = _weights(table, noise)
     share = dict.fromkeys(Family, 0.0)
     place = dict.fromkeys(Family, len(Family))
     for channel in table.channels:
@@ -97,6 +96,29 @@ def ranking(table: SharesTable, noise: dict[str, float] | None = None) -> list[t
         if table.design.one_way(channel.axes):
             selected[Family.FRICTION] += channel.constant
         for family in Family:
-            share[family] += weights[channel.channel] / whole * (selected[family] or beside[family])
+            share[family] += weights[channel.channel] * (selected[family] or beside[family])
     shares = [(family, value) for family, value in share.items() if value > 0]
     return sorted(shares, key=lambda pair: (-round(pair[1], 3), place[pair[0]], list(Family).index(pair[0])))
+
+
+def alone(table: SharesTable, noise: dict[str, float] | None = None) -> dict[Family, float]:
+    """By family the share that a kind which speaks for it first predicts alone, channels weighed as in `ranking`.
+
+    Two kinds may be nearly one signal, as the speed and the history of travel are in a sine: the one that is selected first then leaves
+    nothing to the other, which says nothing against its family.
+    """
+    weights, share = _weights(table, noise), dict.fromkeys(Family, 0.0)
+    for channel in table.channels:
+        most = dict.fromkeys(Family, 0.0)
+        for row in channel.kinds:
+            for family in SPEAKS_FOR[row.kind][0][:1]:
+                most[family] = max(most[family], row.alone.share)
+        for family in Family:
+            share[family] += weights[channel.channel] * most[family]
+    return share
+
+
+def _weights(table: SharesTable, noise: dict[str, float] | None) -> dict[str, float]:
+    weights = {c.channel: (c.rms / noise[c.channel]) ** 2 if noise else 1.0 for c in table.channels}
+    whole = sum(weights.values()) or 1.0
+    return {channel: weight / whole for channel, weight in weights.items()}
