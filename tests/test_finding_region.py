@@ -14,7 +14,8 @@ from ctrlgen.diagnosis.report.answer import where
 from ctrlgen.diagnosis.selection.edge_intervals import edge_intervals, moved_by_form, out_to_visited
 from ctrlgen.diagnosis.selection.finding_region import region_of
 from ctrlgen.diagnosis.selection.findings import Estimate, estimated_values, finding_estimates
-from ctrlgen.effects import Effect
+from ctrlgen.diagnosis.selection.motion_regions import along_region
+from ctrlgen.effects import Effect, Place
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.structure import Structure
 
@@ -121,3 +122,33 @@ def test_intervals_of_ends_hold_those_of_the_independent_plant():
     """One case of each law that is not of its own form there; docs/evidence.md counts more of them."""
     for name in ("friction_there", "friction_from", "damping_fast", "knee"):
         assert found(name, 1).covered == (True,), name
+
+
+@pytest.mark.parametrize(
+    "kind, key",
+    [
+        ("coulomb_after", ("time", None, 0)),
+        ("temperature_sensitivity_above", ("temperature", None, 0)),
+        ("coulomb_above", ("position", Place.FORCE, 1)),
+        ("backlash_above", ("position", Place.FORCE, 1)),
+        ("viscous_at_speed", ("speed", Place.FORCE, 1)),
+        ("coulomb", None),
+        ("parameter", None),
+    ],
+)
+def test_a_region_lies_along_what_its_own_axis_does_or_along_what_all_share(kind, key):
+    """Time and temperature are of no axis; what acts on a displacement lies along the way of the axis that a force acts on."""
+    motion = {
+        (quantity, place, i): np.array([i])
+        for quantity, place in (
+            ("time", None),
+            ("temperature", None),
+            ("position", Place.FORCE),
+            ("position", Place.SENSOR),
+            ("speed", Place.FORCE),
+        )
+        for i in range(2)
+    }
+    cause = SimpleNamespace(effect=kind, law=Effect.library.get(kind), acts_on=lambda device: [1])
+    fit = SimpleNamespace(structure=SimpleNamespace(causes=(cause,), device=None))
+    assert along_region(motion, fit, 0) is (motion[key] if key else None)

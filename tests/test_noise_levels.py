@@ -8,7 +8,9 @@ from scipy import stats
 from scipy.signal import lfilter
 
 from ctrlgen.estimation.noise import estimate_noise, ljung_box, stationary_deviation, without_lines
+from ctrlgen.estimation.noise_update import _longest_stretch
 from ctrlgen.estimation.residual_noise import noise_from_residual
+from ctrlgen.estimation.settings import NOISE_UPDATE
 from ctrlgen.recordings.recording import Record, Recording
 
 SIGMAS = 4.0  # once in 16 000
@@ -217,3 +219,11 @@ def test_a_residual_tells_the_noise_beside_a_line_and_white_noise_has_no_pole(po
     sd, ar, worth = noise_from_residual(left, motion)
     assert sd == pytest.approx(1.0, abs=SIGMAS / np.sqrt(2 * worth))
     assert ar.size == 0 if pole == 0 else ar == pytest.approx([pole], abs=SIGMAS / np.sqrt(worth))
+
+
+def test_the_longest_stretch_of_good_samples_bridges_a_few_others():
+    """Half open, from its first good sample to behind its last."""
+    assert _longest_stretch(np.zeros(9, bool)) is None
+    for others, stretch in ((NOISE_UPDATE.bridged, (2, 11 + NOISE_UPDATE.bridged)), (NOISE_UPDATE.bridged + 1, (2, 8))):
+        good = np.r_[np.zeros(2), np.ones(6), np.zeros(others), np.ones(3), np.zeros(2)].astype(bool)
+        assert _longest_stretch(good) == stretch

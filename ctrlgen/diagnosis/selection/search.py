@@ -142,7 +142,8 @@ class Searcher:
         return self.trials.tried(current.fit.restarted.without(k), None, steps=FIT.max_steps)
 
     def searched_on(self, begun: CandidateModel, current: CandidateModel, rounds: list[Round]) -> CandidateModel:
-        """What a search finds that begins with a model, where that one is worse than `current`, with one cause more than this at most."""
+        """What a search finds that begins with a model, where that one is worse than `current`, with one cause more than this at most: what
+        a law stands for is two others, beside what the device's numbers take over, as they do a gain."""
         found = self._settled(begun)
         if self.trials.selection.advantage(current, found) <= 0:
             return found
