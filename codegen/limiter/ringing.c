@@ -64,8 +64,11 @@ uint32_t limiter_elapsed(limiter_state *state, uint32_t ticks, const real drive[
     } else if (can_be_corrected(state) == 0) {
         status = LIMITER_LOST;
     } else if (DRIVE_INSIDE(state, drive) != 0) {
-        int k;
+#if RATED
+        int i;
+#endif
         if (ticks > 0U) { /* it rings about the equilibrium under this drive */
+            int k;
             for (k = 0; k < SETTLING_SWEEPS; k++) {
                 SETTLE_ADVANCE(state, state->z, drive, state->x);
                 BALANCE(state, state->x, state->z, drive, state->z);
@@ -82,8 +85,8 @@ uint32_t limiter_elapsed(limiter_state *state, uint32_t ticks, const real drive[
             }
         }
 #if RATED
-        for (k = 0; k < NU; k++) {
-            state->u[k] = drive[k];
+        for (i = 0; i < NU; i++) {
+            state->u[i] = drive[i];
         }
 #endif
         status = is_ringing(state);

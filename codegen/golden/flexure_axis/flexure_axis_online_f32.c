@@ -472,8 +472,8 @@ uint32_t flexure_axis_online_f32_elapsed(flexure_axis_online_f32_state *state, u
     } else if (flexure_axis_online_f32_can_be_corrected(state) == 0) {
         status = FLEXURE_AXIS_ONLINE_F32_LOST;
     } else if (flexure_axis_online_f32_drive_inside(drive) != 0) {
-        int k;
         if (ticks > 0U) { /* it rings about the equilibrium under this drive */
+            int k;
             for (k = 0; k < 3; k++) {
                 flexure_axis_online_f32_wanted_advance(state->x);
                 flexure_axis_online_f32_balance_displacement(state->x, state->z, drive, state->z);

@@ -78,7 +78,8 @@ def _left_out(source: str, name: str) -> str:
     """A source of the arithmetic in double, which is empty where a double is no double: Arduino builds every source of a library."""
     about, _, rest = source.partition("*/\n")
     empty = f"typedef int {name}_left_out; /* double has fewer than 53 bits here, as on AVR: take the suffix _f32 */\n"
-    return f"{about}*/\n{NARROW}{empty}#else\n{rest}#endif\n"
+    wide = "#include <float.h>\n#if !defined(DBL_MANT_DIG) || (DBL_MANT_DIG >= 53)\n"
+    return f"{about}*/\n{wide}{rest}#else\n{empty}#endif\n"  # behind all that is included
 
 
 @cache
