@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from axis_records import H, record
@@ -10,8 +12,11 @@ from recovery import fitter_of
 
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
+from ctrlgen.estimation import initial_memory
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.initial_memory import turning_point_before
+from ctrlgen.estimation.settings import INITIAL_MEMORY
 from ctrlgen.estimation.structure import Structure
 
 LAW = Hypothesis("displacement_hysteresis", "stage:axis", "axis")
@@ -45,3 +50,21 @@ def test_a_record_to_fit_begins_with_the_memory_of_what_was_before():
     fit = fitter.fit(structure)
     assert np.sqrt(fit.chi2 / fit.n) < 1.1  # 15 from the middle of all plays
     assert fit.values(0)["share"] == pytest.approx(SHARE, rel=0.01)
+
+
+@pytest.mark.parametrize("way", (0.0, *INITIAL_MEMORY.ways_back))
+@pytest.mark.parametrize("side, back", [(-1.0, 1), (1.0, -1), (0.0, 1), (0.0, -1)])
+def test_a_turning_point_is_sought_where_the_record_begins_and_every_way_back(monkeypatch, way, side, back):
+    """From either side, or from rest. A record that begins at `here` has these readings from that turning point alone."""
+    here, at_rest = 0.3, np.zeros(2)
+    turned = np.array([here + back * way, side])
+    simulator = SimpleNamespace(
+        plays=((0, 0, 1),),
+        simulate=lambda record, theta, states: states,
+        simulate_states=lambda record, theta, states: (np.array([[here - states[0]]]),),
+    )
+    monkeypatch.setattr(initial_memory, "initial_state_sd", lambda _: np.ones(2))
+    found = turning_point_before(
+        simulator, at_rest, record(at_rest, at_rest, "fit"), at_rest, lambda _, y: 1e3 * (y - turned)
+    )
+    assert found == pytest.approx(turned, abs=1e-12)
