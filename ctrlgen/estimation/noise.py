@@ -189,13 +189,20 @@ def _of_series(recording: Recording, i: int, settling: float) -> _ChannelNoise:
     if stated := recording.noise[i]:
         sd, _ = _with_rounding(stated, np.zeros(0), rounding)
         return _ChannelNoise(sd, NoiseSource.STATED_WHITE, NOISE.stated_samples)
-    thirds = [d for r in recording.records for d in _third_differences(r, i)]
-    banded = any(r.band for r in recording.records)
+    deviation, n = fastest_part(recording, i)
     # third differences of white noise have 1 + 9 + 9 + 1 = 20 times its variance
-    deviation = _quiet_deviation if banded else _robust_deviation
-    sd = max(deviation(np.concatenate(thirds)) / np.sqrt(20.0), rounding, 1e-300)
-    count = sum(map(len, thirds)) / NOISE.robust_cost
+    sd, count = deviation / np.sqrt(20.0), n / NOISE.robust_cost
     return _ChannelNoise(sd, NoiseSource.FASTEST_PART, count, "; a record at rest would tell it better")
+
+
+def fastest_part(recording: Recording, i: int) -> tuple[float, int]:
+    """Standard deviation of most third differences of channel i, no less than that of its rounding, and their number."""
+    thirds = [d for r in recording.records for d in _third_differences(r, i)]
+    values = np.concatenate([r.observed[r.valid[:, i], i] for r in recording.records])
+    deviation = _quiet_deviation if any(r.band for r in recording.records) else _robust_deviation
+    # a uniform rounding error, taken as white
+    least = quantisation_step(values) * np.sqrt(20.0 / 12.0)
+    return max(deviation(np.concatenate(thirds)), least, 1e-300), sum(map(len, thirds))
 
 
 def _from_stretches(stretches: list[np.ndarray], source: NoiseSource, rounding: float, removed: int) -> _ChannelNoise:

@@ -17,7 +17,7 @@ from ctrlgen.estimation.noise import (
     without_lines,
 )
 from ctrlgen.estimation.pose_noise import stated_pose_noise
-from ctrlgen.estimation.residual_noise import noise_from_residual
+from ctrlgen.estimation.residual_noise import louder_than_readings, noise_from_residual
 from ctrlgen.estimation.settings import DISCREPANCY, NOISE, NOISE_UPDATE, STATISTICS
 from ctrlgen.recordings.recording import Record
 
@@ -50,7 +50,9 @@ def update_noise(fitter: Fitter, fit: Fit) -> Noise:
 def update_guessed_noise(fitter: Fitter, fit: Fit) -> Noise:
     """Guessed noise estimated from the residual of `fit` at the frequencies at which the readings move least.
 
-    Variances and coefficients of the records to fit are averaged by their numbers of independent samples.
+    Variances and coefficients of the records to fit are averaged by their numbers of independent samples. Where the readings would have
+    to be louder than most of them are, the residual is physics that was left out and acts at all frequencies, as a lag after steps of
+    the drive does, and the guess stays.
     """
     noise, channels = fitter.noise, fitter.recording.channels
     sd, ar, count, notes = noise.sd.copy(), list(noise.ar), noise.count.copy(), list(noise.notes)
@@ -60,8 +62,11 @@ def update_guessed_noise(fitter: Fitter, fit: Fit) -> Noise:
             continue
         weights = [n for *_, n in estimates]
         order = max(len(a) for _, a, _ in estimates)
-        sd[i] = np.sqrt(np.average([s**2 for s, *_ in estimates], weights=weights))
-        ar[i] = np.average([np.pad(a, (0, order - len(a))) for _, a, _ in estimates], axis=0, weights=weights)
+        size = float(np.sqrt(np.average([s**2 for s, *_ in estimates], weights=weights)))
+        colour = np.average([np.pad(a, (0, order - len(a))) for _, a, _ in estimates], axis=0, weights=weights)
+        if louder_than_readings(fitter.recording, i, size, colour):
+            continue
+        sd[i], ar[i] = size, colour
         count[i] = sum(weights)
         notes[i] = (
             f"{channels[i]}: from the residual of the fit at the frequencies at which the readings move least, "

@@ -9,13 +9,31 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.optimize import minimize_scalar
+from scipy.signal import lfilter
 from scipy.signal.windows import blackmanharris
 
+from ctrlgen.estimation.noise import fastest_part
 from ctrlgen.estimation.settings import RESIDUAL_NOISE
 from ctrlgen.numerics.spectral_peaks import local_floor, periodogram
+from ctrlgen.recordings.recording import Recording
 
 # of an exponential variable, as the bins of a noise spectrum are
 MEAN_OVER_MEDIAN = 1 / np.log(2)
+LOUDER = 3.0
+"""Times by which noise may have larger third differences than most readings have, noise and motion together: a noise that is louder on
+the move than in the quieter half of the samples is so by a factor. Judgement."""
+
+
+def louder_than_readings(recording: Recording, i: int, sd: float, a: np.ndarray) -> bool:
+    """Whether autoregressive noise with innovations `sd` and coefficients `a` (p,) is louder than channel i: its third differences are
+    beyond those of most readings. Not of readings that passed a low-pass, whose noise has hardly any.
+    """
+    if any(r.band for r in recording.records):
+        return False
+    impulse = np.zeros(4096)
+    impulse[:4] = 1.0, -3.0, 3.0, -1.0
+    alone = sd * np.linalg.norm(lfilter([1.0], np.concatenate([[1.0], -a]), impulse))
+    return bool(alone > LOUDER * fastest_part(recording, i)[0])
 
 
 def noise_from_residual(
