@@ -22,7 +22,7 @@ HUM = Hypothesis("vibration", "disturbance:axis", "axis")
 
 
 def shared(
-    monkeypatch, energy, causes: int, held: float = 1.0, blocks=None, described=None, known=True, names=()
+    monkeypatch, energy, causes: int, held: float = 1.0, blocks=None, described=None, known=True, names=(), laws=()
 ) -> Attribution:
     """Shares of `causes` causes where those of a set S leave energy(S) on the records to fit; held out `held` times as much."""
 
@@ -44,7 +44,8 @@ def shared(
         recording=SimpleNamespace(channels=("reading.axis",)),
     )
     places = names or tuple(f"stage:{k}" for k in range(causes))
-    structure = SimpleNamespace(causes=tuple(Hypothesis("coulomb", place) for place in places))
+    kinds = laws or ("coulomb",) * causes
+    structure = SimpleNamespace(causes=tuple(Hypothesis(k, place) for k, place in zip(kinds, places, strict=True)))
 
     def trial(leaves):
         fit = SimpleNamespace(structure=structure, leaves=leaves)
@@ -128,6 +129,17 @@ def test_of_two_causes_that_make_up_for_one_another_one_has_what_both_take(monke
     told = [s for s in found.shares[:2] if s is not None]
     assert [s.value for s in (*told, found.shares[2], found.rest)] == pytest.approx([0.4, 0.5, 0.1])
     assert found.serves[:2] == (1, 0)
+
+
+@pytest.mark.parametrize(("without_weight", "first"), [(1.1e5, "gravity"), (3e4, "drive_offset")])
+def test_a_constant_is_part_of_the_law_that_needs_it(monkeypatch, without_weight, first):
+    """A weight and the constant that balances it at home, each alone worse than neither; and a constant that leaves little without
+    a weight, which is what is wrong then."""
+    table = {(): 1e5, (0,): without_weight, (1,): 2.5e5, (0, 1): 1e3}
+    found = shared(monkeypatch, lambda S: table[tuple(sorted(S))], 2, laws=("drive_offset", "gravity"))
+    k = ("drive_offset", "gravity").index(first)
+    assert found.shares[k].value == pytest.approx(0.99) and found.shares[1 - k] is None
+    assert found.serves[1 - k] == k
 
 
 def test_sets_of_causes_begin_and_end_where_the_tables_do():

@@ -78,6 +78,9 @@ class LawPrior:
     of_one_reference: the law of a sensor is suspected at all channels at once too, read or not: one thing they share may be wrong.
     of_time: what it does is a function of time alone (an event, a drift, a line), whatever the machine does. A law that acts with
         the motion comes first where it explains nearly as much.
+    constant: what it does is the same whatever the machine does: where it is needed beside a law that acts with the motion, it is part
+        of that one.
+    once_a_turn: the law repeats with the turn of an axis: it is suspected where a good part of a turn is read.
     domain: where a finding is reported to be; by default what the law's place says.
     parameters: by name; one that is not listed gets `default_starts`.
     """
@@ -94,6 +97,8 @@ class LawPrior:
     acts_on_all: bool = False
     of_one_reference: bool = False
     of_time: bool = False
+    constant: bool = False
+    once_a_turn: bool = False
     domain: str | None = None
     parameters: Mapping[str, ParameterPrior] = field(default_factory=dict)
 

@@ -14,8 +14,8 @@ instead, a set would be told by an error that nobody sees: that of a device whos
     share_k = phi_k/E(none),   left = E(all)/E(none),
 
 which are one, in every channel and in all. A cause that takes nothing away itself is counted with the one that it serves, so that no
-share is negative. Intervals are those of a bootstrap over blocks of the records. Where the noise of a channel is not known, its whole
-error counts.
+share is negative; a constant, if alone it takes nothing away, with the law that needs it. Intervals are those of a bootstrap over
+blocks of the records. Where the noise of a channel is not known, its whole error counts.
 """
 
 from __future__ import annotations
@@ -91,6 +91,8 @@ def attribute(
     left = {frozenset(): before, frozenset(range(n)): after} | dict(zip(subsets, energies, strict=True))
     serves = [_needed_by(left, g, n) for g in range(n)]
     parts, told = _counted(np.array([_shapley(left, g, n) for g in range(n)]), before, after, serves, seed)
+    back = [float(np.sum(left[frozenset(range(n)) - {g}] - after) / np.sum(before - after)) for g in range(n)]
+    _lead_constants(parts, told, serves, back, [causes[of.index(g)].prior.constant for g in range(n)])
     shares = [ShareEntry(value=v, ci95=(a, b)) for v, a, b in _with_intervals(parts, before, after, seed)]
     by_channel = _shares(*(v.sum(axis=-2) for v in (parts, before, after)))
     shown = before.sum(axis=0) > ATTRIBUTION.least_excess * described.held_out.n_plain.sum(axis=0)
@@ -131,6 +133,23 @@ def _counted(
         if served is not None and told[served]:
             parts[served] += parts[least]
         parts[least] = 0.0
+
+
+def _lead_constants(
+    parts: np.ndarray, told: np.ndarray, serves: list[int | None], back: list[float], constant: list[bool]
+) -> None:
+    """Gives what a constant takes away together with a law that has no share of its own to that law, in `parts`, `told` and `serves`: a
+    weight that is balanced at home is a weight, and what balances it is part of that. `back` is the share of the error that comes back
+    without each: a law without which the constant takes away most of it all the same is a part of the constant."""
+    for c in (g for g in range(len(parts)) if constant[g] and told[g]):
+        laws = [g for g in range(len(parts)) if serves[g] == c and not told[g] and not constant[g]]
+        law = max(laws, key=lambda g: back[g], default=None)
+        if law is None or back[law] < ATTRIBUTION.comes_back:
+            continue
+        parts[law], parts[c] = parts[c].copy(), 0.0
+        told[law], told[c] = True, False
+        for g in (c, *laws):
+            serves[g] = law if g != law else serves[g]
 
 
 def _with_intervals(parts: np.ndarray, before: np.ndarray, after: np.ndarray, seed: int) -> np.ndarray:

@@ -255,6 +255,8 @@ class ObjectionsSettings:
     Judgement."""
     fewest_pitches: float = 1.5
     """Periods along a reading that it must cover: with less, nothing repeats and any curve looks like a part of one."""
+    least_turn: float = 0.25
+    """Turns that a reading must cover to show what repeats once a turn: in less than a quarter that is a gain and a bow. Judgement."""
     harmonic: float = 0.25
     """Cycles within the records to fit between a line and a harmonic of a periodic drive, below which they are one."""
     repeats: float = 0.9
@@ -299,6 +301,8 @@ class AttributionSettings:
     diverged: float = 4.0
     """Energy of a subset, over that of the device without any, that stands for a larger one: a cause without its partner may
     diverge."""
+    comes_back: float = 0.5
+    """Share of the error that comes back without a law, from which on a constant beside it is part of the law. Judgement."""
     updates: int = 2
     """Estimates of the discrepancy of a set of causes, after each of which the device's own numbers are fitted: those of the accepted
     model leave several times what they leave once they are fitted, and the second ends where the tables do to a per cent or two."""
