@@ -250,6 +250,7 @@ def test_no_law_is_left_out():
         *SHARED,
         *IN_ORDER,
         "clock_offset",
+        "eccentricity",  # tests/test_rotary_servo.py
         "payload",
         "second_pole",
         "temperature_sensitivity_above",

@@ -118,7 +118,12 @@ def test_what_fits_alike_and_is_unlikelier_of_its_size_is_told_and_nothing_likel
     trials = SimpleNamespace(
         selection=SimpleNamespace(ranked=list, advantage=lambda *_: np.inf), objections=lambda *_: {}, screen=None
     )
-    for name, found in (("counterparts", []), ("_as_plainer", []), ("explains_alike_but_for_odds", True)):
+    for name, found in (
+        ("counterparts", []),
+        ("twins", []),
+        ("_as_plainer", []),
+        ("explains_alike_but_for_odds", True),
+    ):
         monkeypatch.setattr(f"{module}.{name}", lambda *_, found=found: found)
     for named, other, told in ((of_sensor_, of_height, (of_height,)), (of_height, of_sensor_, ())):
         monkeypatch.setattr(f"{module}.replacements", lambda *_, other=other: [other])

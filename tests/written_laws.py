@@ -200,6 +200,7 @@ LAWS = {
             -p.force * (sin(s_ := TWO_PI * s.displacement / 0.4 + 0.9) + 0.2 * sin(2 * s_) - 0.1 * cos(2 * s_))
         ),
     ),
+    "eccentricity": ({"phase": 0.9}, lambda s, p: p.amplitude * (sin(s.value + 0.9) - sin(0.9))),
     "drive_crosstalk": ({}, lambda s, p: p.share * s.all[s.partner]),
     "gravity": ({"phase": 0.9}, lambda s, p: -p.torque * sin(s.displacement + 0.9)),
     "coulomb": ({"reach": 0.02, "smoothing": 0.3}, lambda s, p: -p.force * s.z, lambda s, p: {"z": dahl_rate(s, p)}),

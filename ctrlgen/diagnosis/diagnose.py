@@ -40,7 +40,7 @@ from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.selection.standing import answer_of, in_standing, possible
 from ctrlgen.diagnosis.selection.untried import refuse_without_trials, untried
 from ctrlgen.diagnosis.selection.verdict import Verdict, in_another_unit, verdict, within_tolerance
-from ctrlgen.diagnosis.selection.way_covered import with_longest_periods
+from ctrlgen.diagnosis.selection.way_covered import where_it_turns, with_longest_periods
 from ctrlgen.diagnosis.shares.empirical_terms import EmpiricalTerm, empirical_terms
 from ctrlgen.diagnosis.shares.families import alone, ranking
 from ctrlgen.diagnosis.shares.gather import ResidualShares, residual_shares
@@ -296,7 +296,7 @@ def _hypotheses(device: Device, recording: Recording, effects: Sequence[type[Eff
     ambient = any(r.ambient is not None for r in recording.records)
     offered = hypotheses(device, nominal_physics(device), recording.channels, sample_time, ambient, effects)
     offered = [h for h in offered if h.effect != PARAMETER or h.path in acting]
-    return with_longest_periods(offered, recording, device)
+    return with_longest_periods(where_it_turns(offered, recording, device), recording, device)
 
 
 def _relative_ambient(recording: Recording) -> Recording:

@@ -89,10 +89,16 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             model_form_error=0.1,
             of_time=True,
         ),
+        "eccentricity": LawPrior(
+            "Within a part of a turn it is a gain and a bow. With a wrong phase it explains little of a turn or two: every 30 deg.",
+            once_a_turn=True,
+            parameters={"phase": _starts((0.0, 30.0, 60.0, 90.0, 120.0, 150.0))},
+        ),
         "home_offset": LawPrior(
             "Readings are zeroed before a run, and an offset fits the mean of any residual of one sign, as of friction in one "
             "direction: judgement.",
             log_prior_odds=ONE_IN_TEN,
+            constant=True,
         ),
         "low_pass": LawPrior(
             "No filter has exactly two poles; 0.5 %: judgement. A real filter acts on the whole reading: one that is fitted to a part "
@@ -154,6 +160,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
         "zero_per_record": LawPrior(
             "Within one record it is a home offset, and over several it fits the mean of whatever is missing: it is stated.",
             suspected=False,
+            constant=True,
             parameters={"share": ParameterPrior(fixed_range=(0.8, 1.2))},
         ),
         # Drive and heat -------------------------------------------------------------------------------------------------------
@@ -181,6 +188,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             log_prior_odds=ONE_IN_TEN,
             unless=frozenset({"displacement_command"}),
         ),
+        "drive_offset": LawPrior("As common as a wrong gain.", constant=True),
         "degradation": LawPrior(
             "From a loss that ends within the recording to a steady one.",
             parameters={"levels_off": _starts((3.0, 30.0, 1e4))},
@@ -358,7 +366,6 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
                 "cubic_sensor",
                 "damping_coupling",
                 "drive_gain",
-                "drive_offset",
                 "expansion",
                 "frame_rotation_x",
                 "frame_rotation_y",

@@ -76,6 +76,10 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
             ),
             ("", "A drive that is off by a constant, or a constant force such as a weight"),
         ),
+        "eccentricity": (
+            ("gear", "An error once a turn: a gear, or the sensor's graduation, whose centre is beside the axis"),
+            ("", "An error once a turn: the sensor's graduation is centred beside the axis"),
+        ),
         "lever_ratio": (
             ("lever", "A lever whose arms are not as drawn"),
             ("flexible", "A lever whose arms are not as drawn"),

@@ -16,7 +16,7 @@ from ctrlgen.diagnosis.selection.other_laws import stands_for_another
 from ctrlgen.diagnosis.selection.precedence import counterparts, explains_alike_but_for_odds
 from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.selection.trials import Trials
-from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
+from ctrlgen.diagnosis.settings import CONFUSABLE, MODEL_SELECTION, SEARCH
 from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis
 from ctrlgen.estimation.plainer_law import left_beside, may_be_plainer, plainer_start
@@ -162,7 +162,12 @@ def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Rou
     place. And what fits alike, and is unlikely of the size that it takes."""
     there, plainer = current.causes, _as_plainer(trials, current, k)
     tried = [t for r in rounds for t in r.candidates if not current.errors.is_noise]
-    candidates = [*plainer, *replacements(trials, current, k), *_in_place_of(k, there, tried)]
+    candidates = [
+        *plainer,
+        *replacements(trials, current, k),
+        *twins(trials, current, k),
+        *_in_place_of(k, there, tried),
+    ]
     # what the cause stands for need not do quite as well
     slack = SEARCH.bound_slack if stands_for_another(current.fit, k) else 0.0
 
@@ -233,6 +238,23 @@ def replacements(trials: Trials, current: CandidateModel, k: int) -> list[Candid
     near = trials.close_contenders(without, current, trials.selection.ranked(fits))
     ends = trials.each(lambda branch, t: branch.converged(t), near)
     return trials.selection.ranked([*ends, *(t for t in fits if t not in near)])
+
+
+def twins(trials: Trials, current: CandidateModel, k: int) -> list[CandidateModel]:
+    """The model with what does the same as cause k in its place, such as the gain of the drive for that of the sensor, begun where it does
+    what that one does now. Without cause k the others may bend to do its part, and then no screen suspects it."""
+    fit = current.fit
+    sizes = {i for i, u in enumerate(fit.structure.free_parameters) if u.cause == k and u.amplitude}
+    others, found = fit.restarted.without(k), trials.screened(current).twins
+    same = [(h, start) for h, (i, start) in found.items() if i in sizes and h not in current.causes]
+    same = same[: CONFUSABLE.most_listed]
+
+    def one(branch: Trials, twin: tuple[Hypothesis, dict[str, float]]) -> list[CandidateModel]:
+        return branch.tried(others.with_cause(*twin), twin[0])
+
+    tried = trials.each(one, same, lambda twin: f"{trying(twin[0])} instead")
+    fits = trials.selection.ranked([t for fitted in tried for t in fitted])
+    return [trials.converged(t) if t is fits[0] else t for t in fits]
 
 
 def replace_cause(trials: Trials, fit: Fit, k: int, others: Structure, suspect: Suspect) -> Structure:

@@ -30,7 +30,7 @@ from ctrlgen.diagnosis.selection.spatial_periods import (
     spatial_periods,
 )
 from ctrlgen.diagnosis.selection.subset_search import SubsetSearch, Suspect
-from ctrlgen.diagnosis.settings import SCREEN
+from ctrlgen.diagnosis.settings import CONFUSABLE, SCREEN
 from ctrlgen.effects import Place
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis, nominal_physics
@@ -45,7 +45,8 @@ class Screened:
     without mismatch exceeds with one percent chance, anywhere among all hypotheses; `amplitude_sd` [SI] of each;
     `together` sets of two to four suspects that would jointly explain most, with the chi^2 they would: causes can hide
     each other; `undetectable` the hypotheses that this record cannot see, with the free number (its place in the fit's slopes)
-    whose own effect looks most like theirs, -1 where they do not reach the readings at all; `dropped` the hypotheses whose law
+    whose own effect looks most like theirs, -1 where they do not reach the readings at all; `twins` the hypotheses whose effect is
+    that of a free number but for a factor, with the number and where they do what it does now; `dropped` the hypotheses whose law
     could not be evaluated, with the reason; `regions` where most of what is left is."""
 
     suspects: tuple[Suspect, ...]
@@ -54,6 +55,7 @@ class Screened:
     amplitude_sd: dict[tuple[str, str], float]
     subsets: tuple[tuple[float, tuple[Suspect, ...]], ...] = ()
     undetectable: dict[Hypothesis, int] = field(default_factory=dict)
+    twins: dict[Hypothesis, tuple[int, dict[str, float]]] = field(default_factory=dict)
     dropped: dict[Hypothesis, str] = field(default_factory=dict)
     regions: dict[Along, tuple[Region, ...]] = field(default_factory=dict)
 
@@ -116,9 +118,39 @@ class Screen:
         if not columns or sums is None:
             return Screened((), np.zeros((0, 0)), np.inf, {}, dropped=dropped)
         size = np.linalg.norm(fit.J[:first], axis=0)
-        likeness = np.abs(back @ sums.US) / np.maximum(size, 1e-150)[:, None]
-        screened = self._screened(columns, sums, U.T @ fit.residual, likeness)
-        return replace(screened, dropped=dropped, regions=regions)
+        along = (back @ sums.US) / np.maximum(size, 1e-150)[:, None]
+        screened = self._screened(columns, sums, U.T @ fit.residual, np.abs(along))
+        free_numbers = fit.structure.free_parameters
+        sizes = {k: v - u.nominal for k, (u, v) in enumerate(zip(free_numbers, fit.theta, strict=True)) if u.amplitude}
+        twins = self._twins(columns, {k: size[k] * change for k, change in sizes.items()}, along, sums.SS)
+        return replace(screened, twins=twins, dropped=dropped, regions=regions)
+
+    def _twins(
+        self, columns: list[CandidateTerm], does: dict[int, float], along: np.ndarray, SS: np.ndarray
+    ) -> dict[Hypothesis, tuple[int, dict[str, float]]]:
+        """The hypotheses whose slopes, of the products `SS` (columns, columns), are that of the size of one cause but for a factor, or make
+        it up where there are no more of them than the law has numbers, the likest first: the place of the size among the free numbers,
+        and a start at which they do what it does now. `does` is the length of that by place, `along` J's/|J| (free numbers, columns)."""
+        by_hypothesis: dict[Hypothesis, list[int]] = {}
+        for j in np.flatnonzero(np.diag(SS) > 0).tolist():
+            if not columns[j].hypothesis.prior.in_a_region:
+                by_hypothesis.setdefault(columns[j].hypothesis, []).append(j)
+        found: dict[Hypothesis, tuple[float, int, dict[str, float]]] = {}
+        for h, js in by_hypothesis.items():
+            together = h.effect != PARAMETER and 1 < len(js) <= len(h.law.params)
+            for k, length in does.items():
+                cosine = np.abs(along[k, js]) / np.sqrt(np.diag(SS)[js])
+                best, likeness = js[int(np.argmax(cosine))], float(cosine.max())
+                if together:
+                    part = np.linalg.lstsq(SS[np.ix_(js, js)], along[k, js], rcond=SCREEN.free_direction)[0]
+                    likeness = float(np.sqrt(max(part @ along[k, js], 0.0)))
+                if likeness < CONFUSABLE.cosine or (h in found and likeness <= found[h][0]):
+                    continue
+                # a residual falls with what the model adds
+                column, amplitude = columns[best], -float(length / along[k, best])
+                if column.range[0] <= amplitude <= column.range[1]:
+                    found[h] = likeness, k, self._suspect(column, 0.0, amplitude, 0.0, best).start
+        return {h: (k, start) for h, (_, k, start) in sorted(found.items(), key=lambda f: -f[1][0])}
 
     def _laws(self, fit: Fit, timing: Timing) -> LawTerms:
         """The terms of the hypotheses' laws for records of one timing."""

@@ -82,9 +82,9 @@ class Searcher:
             account = attribute(trials.fitter, nominal, current, trials.screen.seed, trials.jobs)
         each = range(len(current.causes))
         bare = tuple(trials.each(lambda branch, k: _without(branch, current, k, nominal), each))
+        screened = trials.screened(current)
         found_alike = trials.each(lambda branch, k: rivals(branch, current, k, rounds), each)
         alike, unlikely = (tuple(rows[i] for rows in found_alike) for i in (0, 1))
-        screened = trials.screened(current)
         log = (tuple(trials.log), tuple(trials.screen.hypotheses))
         withdrawn = tuple(c for c in found.causes if c not in current.causes)
         return SearchResult(

@@ -28,6 +28,16 @@ def way_covered(recording: Recording, cause: Hypothesis, device: Device) -> floa
     return float(np.ptp(read)) if len(read) else np.inf
 
 
+def where_it_turns(suspected: Sequence[Hypothesis], recording: Recording, device: Device) -> list[Hypothesis]:
+    """The hypotheses without laws that repeat once a turn of readings that go through too little of one."""
+    least = 2 * np.pi * OBJECTIONS.least_turn
+
+    def may_turn(h: Hypothesis) -> bool:
+        return not h.prior.once_a_turn or (recording.kind == "series" and way_covered(recording, h, device) >= least)
+
+    return [h for h in suspected if may_turn(h)]
+
+
 def with_longest_periods(suspected: Sequence[Hypothesis], recording: Recording, device: Device) -> list[Hypothesis]:
     """The hypotheses, those of laws that repeat along a way with the longest period that is seen to repeat: one that is shorter grows into
     no longer one while other causes come and go, as it would where two causes nearly make up for one another."""
