@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from axis_records import SETTLING, record
@@ -9,6 +12,8 @@ from recovery import Planted, fitter_of, recover
 
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
+from ctrlgen.diagnosis.report.half_a_sample import half_a_sample
+from ctrlgen.diagnosis.selection.findings import Estimate
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.rivals import rivals
 from ctrlgen.diagnosis.selection.screen import Screen
@@ -121,3 +126,15 @@ def test_a_lag_after_steps_is_not_taken_for_noise():
     assert fitter.noise.guessed.all()
     noise = update_guessed_noise(*fitter.described(WRIST))
     assert 1e-4 < noise.floor[0] < 2e-4  # 0.04 rad where the residual is taken
+
+
+@pytest.mark.parametrize(
+    ("linear", "late", "told"), [(True, 10.0, True), (True, 9.7, True), (True, 12.0, False), (False, 10.0, False)]
+)
+def test_a_delay_of_half_a_sample_may_be_a_held_drive_that_was_read_as_linear(linear, late, told):
+    recording = fitter_on(lambda q: q, 0.5).recording
+    recording = replace(recording, records=tuple(replace(r, linear=linear) for r in recording.records))
+    numbers = {"delay": Estimate(late, (late - 0.01, late + 0.01), "ms")}
+    found = SimpleNamespace(effect="delay", cause=Hypothesis("delay", "sensor:axis", "axis"), parameters=numbers)
+    notes = half_a_sample(recording, [found, SimpleNamespace(effect="parameter")])
+    assert len(notes) == told and all("half a sample" in note and "held" in note for note in notes)
