@@ -176,6 +176,7 @@ def test_what_has_come_to_stand_for_something_else_has_a_rival_that_does_not_do_
         "counterparts": [],
         "_as_plainer": [],
         "replacements": [of_height],
+        "twins": [],
         "size_odds": 0.0,
         "_contains": False,
         "explains_alike_but_for_odds": False,
