@@ -136,13 +136,13 @@ def widened(u, radius=2e-5):
     return np.array(out)
 
 
-def yielding(u):
-    """d - z/5, dz = dd (1 - (4e4 sgn(dd z) + 1e4)|z|/m), in two hundred steps from pose to pose."""
+def yielding(u, n=1):
+    """d - z/5, dz = dd (1 - (0.8 sgn(dd z) + 0.2)|z/20 um|^n), in two hundred steps from pose to pose."""
     z, before, out = 0.0, 0.0, []
     for d in u:
         step = (d - before) / 200
         for _ in range(200):
-            z += step * (1 - (4e4 * np.sign(step * z) + 1e4) * abs(z))
+            z += step * (1 - (0.8 * np.sign(step * z) + 0.2) * abs(z / 2e-5) ** n)
         before = d
         out.append(d - 0.2 * z)
     return np.array(out)
@@ -165,5 +165,13 @@ IN_ORDER = {
     "displacement_bouc_wen": (
         yielding,
         Planted("stage:axis", {"share": 0.2, "reach": 2e-5, "loop": 0.8}, within={"loop": 0.05}),
+    ),
+    "displacement_bouc_wen_of_power": (
+        lambda u: yielding(u, 2),
+        Planted(
+            "stage:axis",
+            {"share": 0.2, "reach": 2e-5, "loop": 0.8, "power": 2.0},
+            within={"loop": 0.05, "power": 0.03},
+        ),
     ),
 }

@@ -1,9 +1,10 @@
 """A law that is found is tried in a finer form, with more numbers, where it leaves more than noise: hysteresis with free weights,
-friction in a region that falls with the speed, slots with a second harmonic, play that is worn."""
+friction in a region that falls with the speed, slots with a second harmonic, play that is worn, a sharper knee."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -145,16 +146,65 @@ def test_slots_that_are_no_sine_and_play_that_is_worn_have_a_form_of_their_own()
     assert simplified(trials, finer).causes == finer.causes
     trials, plain, (finer,) = reached("backlash", {"gap": 4e-7}, worn(0.4))
     assert [c.effect for c in finer.causes] == ["worn_backlash"] and trials.selection.improves_enough(plain, finer)
-    values, L = finer.fit.values(0), AXIS.mechanics.stroke.si
+    values = finer.fit.values(0)
     assert values["gap"] == pytest.approx(4e-7, rel=0.02)
-    assert values["wear"] / L == pytest.approx(0.4 / 5e-5, rel=0.3)  # the slope at home of a form that levels off
+    # the slope at home of a form that levels off
+    assert values["wear"] / values["spread"] == pytest.approx(0.4 / 5e-5, rel=0.3)
     assert simplified(trials, finer).causes == finer.causes
 
 
+def kneed(n: float) -> Callable[[np.ndarray], np.ndarray]:
+    """F = -k z, dz = dd (1 - (0.8 sgn(dd z) + 0.2)|z/10 um|^n), k = 2e4 N/m, in forty steps a sample."""
+
+    def force(time, q, v, memory):
+        z, before = memory or (0.0, 0.0)
+        step = q - before
+        z += step * (1 - (0.8 * np.sign(step * z) + 0.2) * abs(z / 1e-5) ** n)
+        return -2e4 * z, (z, q)
+
+    return lambda u: move(u, force, fine=40)
+
+
 @pytest.mark.long
-def test_a_sine_and_an_even_play_keep_the_plain_law():
+def test_a_knee_that_is_no_exponential_has_a_form_of_its_own():
+    loop = {"stiffness": 2e4, "reach": 1e-5, "loop": 0.8}
+    trials, plain, (finer,) = reached("bouc_wen", loop, kneed(2.0))
+    assert [c.effect for c in finer.causes] == ["bouc_wen_of_power"] and trials.selection.improves_enough(plain, finer)
+    assert finer.fit.values(0) == pytest.approx(loop | {"power": 2.0}, rel=0.05)
+    assert simplified(trials, finer).causes == finer.causes
+
+
+def test_what_lags_has_its_finer_forms_whichever_of_its_names_it_was_found_under():
+    for plain in ("displacement_hysteresis", "asymmetric_displacement_hysteresis"):
+        finer = Hypothesis(plain, "stage:axis", "axis").finer
+        assert finer == (Hypothesis("weighted_displacement_hysteresis", "stage:axis", "axis"),)
+
+
+def test_a_finer_form_need_not_be_worth_a_name_which_a_further_cause_must():
+    plain, finer, other = (
+        Hypothesis(kind, "stage:axis", "axis") for kind in ("bouc_wen", "bouc_wen_of_power", "creep")
+    )
+
+    def candidate(*causes: Hypothesis, left: float) -> SimpleNamespace:
+        return SimpleNamespace(causes=causes, held_out=SimpleNamespace(plain_mean=np.array([left])))
+
+    noise = SimpleNamespace(noise=SimpleNamespace(floor=np.array([1e-9])))
+    compare = ModelSelection(noise, lambda *_: [], np.array([1e-14]))
+    compare.takes_much = lambda before, after: False
+    before = candidate(plain, left=16.0)  # of the noise's squares, where the device as described leaves 1e4
+    assert compare.matters(before, candidate(finer, left=9.0))
+    for causes in ((other,), (plain, other), (finer, other), ()):
+        assert not compare.matters(before, candidate(*causes, left=9.0))
+
+
+@pytest.mark.long
+def test_a_sine_an_even_play_and_an_exponential_knee_keep_the_plain_law():
     slots = {"force": 0.1, "period": 2.5e-5, "phase": 0.7}
-    for kind, shape, reading in (("cogging", slots, slotted(0.0)), ("backlash", {"gap": 4e-7}, worn(0.0))):
+    for kind, shape, reading in (
+        ("cogging", slots, slotted(0.0)),
+        ("backlash", {"gap": 4e-7}, worn(0.0)),
+        ("bouc_wen", {"stiffness": 2e4, "reach": 1e-5, "loop": 0.8}, kneed(1.0)),
+    ):
         trials, plain, finer = reached(kind, shape, reading)
         assert not any(trials.selection.improves_enough(plain, t) for t in finer)
         for t in finer:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from axis_records import H, record
+from axis_records import AXIS, BACKLASH, FINE, H, fine, record
 from play_records import NOISE, SERVO, lagging, moved
 from recovery import fitter_of
 
@@ -15,7 +16,8 @@ from ctrlgen.devices import Device
 from ctrlgen.estimation import initial_memory
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
-from ctrlgen.estimation.initial_memory import turning_point_before
+from ctrlgen.estimation.initial_memory import begins_worse, memory_before
+from ctrlgen.estimation.least_squares import initial_state_sd
 from ctrlgen.estimation.settings import INITIAL_MEMORY
 from ctrlgen.estimation.structure import Structure
 
@@ -45,6 +47,31 @@ def test_a_held_out_record_begins_with_the_memory_of_what_was_before(begin):
     )  # 6 of it from the middle of all plays
 
 
+def test_the_driven_side_of_a_gap_is_looked_for_where_one_step_led_astray():
+    """A step bent the speed and the place with which a record begins, and was shortened to a quarter of the way to the driven side."""
+    gap, rng, t = 4e-6, np.random.default_rng(1), H * np.arange(400)
+    u = np.where(t < 0.1, 0.0, 0.8 * np.sin(2 * np.pi * 11 * t))
+    w, y = -0.7 * gap / 2, []
+    for place in fine(u).tolist():
+        w = min(max(w, place - gap / 2), place + gap / 2)
+        y.append(w)
+    part = record(u, np.array(y[::FINE]) + NOISE * rng.standard_normal(len(u)), "hold_out")
+    fitter = fitter_of(AXIS, ("reading.axis",), ("um",), (NOISE,), "series", [replace(part, role="fit"), part])
+    structure = Structure(AXIS).with_cause(BACKLASH, {"gap": gap})
+    simulator = fitter.simulator(structure, part)
+    sd = initial_state_sd(simulator)
+    (start,) = simulator.gaps
+    astray = np.zeros(len(sd))
+    astray[start] = -0.17 / sd[start]
+
+    def white(record, readings):
+        return ((record.observed - readings) / NOISE).ravel()
+
+    assert begins_worse(part, white(part, simulator.simulate(part, structure.start, sd * astray)))
+    found = memory_before(simulator, structure.start, part, astray, white)
+    assert sd[start] * found[start] == pytest.approx(-0.7, abs=0.125)
+
+
 def test_a_record_to_fit_begins_with_the_memory_of_what_was_before():
     fitter, structure = cut(280, 0)
     fit = fitter.fit(structure)
@@ -60,11 +87,10 @@ def test_a_turning_point_is_sought_where_the_record_begins_and_every_way_back(mo
     turned = np.array([here + back * way, side])
     simulator = SimpleNamespace(
         plays=((0, 0, 1),),
+        gaps=(),
         simulate=lambda record, theta, states: states,
         simulate_states=lambda record, theta, states: (np.array([[here - states[0]]]),),
     )
     monkeypatch.setattr(initial_memory, "initial_state_sd", lambda _: np.ones(2))
-    found = turning_point_before(
-        simulator, at_rest, record(at_rest, at_rest, "fit"), at_rest, lambda _, y: 1e3 * (y - turned)
-    )
+    found = memory_before(simulator, at_rest, record(at_rest, at_rest, "fit"), at_rest, lambda _, y: 1e3 * (y - turned))
     assert found == pytest.approx(turned, abs=1e-12)

@@ -86,14 +86,14 @@ def test_friction_behind_a_slack_slides_lets_go_and_grips_again():
     assert -0.01 < found[2] < 0 < found[6] < 0.01 and 0.39 < found[7] < 0.4
 
 
-def bent(z: float, step: float, b: float, r: float) -> float:
-    """z after the way `step` by dz = dd (1 - (b sgn(dd z) + 1 - b) |z|/r), integrated."""
+def bent(z: float, step: float, b: float, r: float, n: float = 1.0) -> float:
+    """z after the way `step` by dz = dd (1 - (b sgn(dd z) + 1 - b) |z/r|^n), integrated."""
     way = sign(step)
 
     def slope(_, y):
-        return way * (1 - (b * sign(way * y) + 1 - b) * abs(y) / r)
+        return way * (1 - (b * sign(way * y) + 1 - b) * abs(y / r) ** n)
 
-    return float(solve_ivp(slope, (0, abs(step)), [z], rtol=1e-10, atol=1e-13, max_step=1e-3).y[0, -1])
+    return float(solve_ivp(slope, (0, abs(step)), [z], rtol=1e-10, atol=1e-13, max_step=5e-3).y[0, -1])
 
 
 @pytest.mark.parametrize("b", [0.55, 0.8, 1.0])
@@ -103,6 +103,16 @@ def test_bouc_and_wens_law_is_solved_exactly_over_a_sample_of_any_length(b):
     for d, force in zip(path, along("bouc_wen", path, p), strict=True):
         z, before = bent(z, d - before, b, p.reach), d
         assert force == pytest.approx(-2 * z, abs=1e-6)  # the switch at z = 0 within a step of the integration
+
+
+@pytest.mark.parametrize(("b", "n"), [(0.55, 1.0), (0.8, 1.5), (1.0, 2.0), (0.7, 5.0)])
+def test_bouc_and_wens_law_of_any_power_is_solved_to_a_thousandth_over_a_sample_of_any_length(b, n):
+    p = SimpleNamespace(stiffness=2.0, reach=0.3, loop=b, power=n)
+    z, before, path = 0.0, 0.0, np.array([0.2, 0.9, 0.8, 0.5, -0.6, -0.5, 0.05, 0.1, 0.13, 2.0, 1.7])
+    for d, force in zip(path, along("bouc_wen_of_power", path, p), strict=True):
+        z, before = bent(z, d - before, b, p.reach, n), d
+        assert force == pytest.approx(-2 * z, abs=2 * 1.5e-3 * p.reach)
+        assert abs(force) <= 2 * p.reach
 
 
 def test_skewed_hysteresis_is_dahls_law_in_the_warped_displacement():

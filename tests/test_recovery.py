@@ -202,6 +202,7 @@ STATED = {
 }  # the mirrors: tests/test_mirrors.py
 # found in tests/test_finer_forms.py
 FINER = {
+    "bouc_wen_of_power",
     "cogging_of_slots",
     "worn_backlash",
     "weighted_displacement_hysteresis",

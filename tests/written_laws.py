@@ -188,6 +188,7 @@ LAWS = {
     "asymmetric_viscous": ({}, lambda s, p: -abs(p.damping) * max(s.velocity * sign(p.damping), 0) * sign(p.damping)),
     "backlash": ({}, lambda s, p: 0.999 * (s.w + s.start * p.gap / 2 - s.displacement)),
     "bouc_wen": ({"reach": 0.3, "loop": 0.8}, lambda s, p: -p.stiffness * s.z),
+    "bouc_wen_of_power": ({"reach": 0.3, "loop": 0.8, "power": 1.5}, lambda s, p: -p.stiffness * s.z),
     "bow": ({}, lambda s, p: p.curvature * s.value**2),
     "clock_offset": None,  # below: it shifts the recorded drive
     "cogging": (
@@ -284,6 +285,7 @@ LAWS = {
         lambda s, p: {"z": (s.velocity - abs(s.velocity) * s.z) / 0.02, "w": abs(s.velocity) * (1 - s.w) / 0.02},
     ),
     "displacement_bouc_wen": ({"reach": 0.3, "loop": 0.8}, lambda s, p: -p.share * s.z),
+    "displacement_bouc_wen_of_power": ({"reach": 0.3, "loop": 0.8, "power": 1.5}, lambda s, p: -p.share * s.z),
     "displacement_hysteresis": (
         {"reach": 0.3, "taper": 0.5, "reversible": 0.7},
         lambda s, p: -p.share * (weighted(s, p, s.value) - 0.7 * s.value),
@@ -382,7 +384,7 @@ LAWS = {
             lambda s, p: -p.share * (heavy_narrow(s, p) - 0.7 * s.value),
         ),
     ),
-    "worn_backlash": ({"wear": 0.4}, lambda s, p: 0.999 * (s.w + s.start * p.gap / 2 - s.displacement)),
+    "worn_backlash": ({"wear": 0.4, "spread": 0.5}, lambda s, p: 0.999 * (s.w + s.start * p.gap / 2 - s.displacement)),
     "zero_per_record": ({}, lambda s, p: p.share * s.zero),
     "vibration": ({"frequency": 3.0, "phase": 0.9}, lambda s, p: p.amplitude * sin(TWO_PI * 3 * s.t + 0.9)),
 }

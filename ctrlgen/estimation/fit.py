@@ -15,7 +15,7 @@ import numpy as np
 from ctrlgen.devices import Device
 from ctrlgen.estimation.checkpoint import Checkpoint, key_of
 from ctrlgen.estimation.error_model import ErrorModel, error_model
-from ctrlgen.estimation.initial_memory import begins_worse, turning_point_before
+from ctrlgen.estimation.initial_memory import begins_worse, memory_before
 from ctrlgen.estimation.leading_part import leading_part
 from ctrlgen.estimation.least_squares import LeastSquaresProblem, initial_state_sd, limited, whiten_residual
 from ctrlgen.estimation.moved_drive import with_drive_at
@@ -211,7 +211,7 @@ class Fitter:
             if simulator.plays and begins_worse(record, white):
                 sd = initial_state_sd(simulator)
                 begun = states[i] / sd
-                turned = turning_point_before(simulator, fit.theta, record, begun, self._white)
+                turned = memory_before(simulator, fit.theta, record, begun, self._white)
                 states[i] = states[i] if turned is begun else sd * turned
         if all(a is b for a, b in zip(states, fit.initial_states, strict=True)):
             return fit
@@ -283,7 +283,7 @@ class Fitter:
         """What is added to the free initial states [SI] so that they suit a record best, and the readings (n, n_y) [SI] from there.
 
         One Gauss-Newton step from rest, shortened until it lowers the objective; from rest where no step does. Where the record then
-        begins worse than it goes on and a law has plays, another from the turning point before it.
+        begins worse than it goes on and a law has plays, another from the turning point before it, or from a place in its gap.
         """
         simulator, error = self.simulator(fit.structure, record), self.error.weighted
         key = (id(simulator), id(record), fit.theta.tobytes(), error.sd.tobytes(), *(a.tobytes() for a in error.ar))
@@ -300,10 +300,10 @@ class Fitter:
         if len(sd) == 0:
             return sd, simulator.simulate(record, fit.theta)
         objective, begun, y = self._begun_near(simulator, fit.theta, record, np.zeros(len(sd)))
-        if simulator.plays and begins_worse(record, self._white(record, y)):
-            turned = turning_point_before(simulator, fit.theta, record, begun, self._white)
-            if turned is not begun:
-                again = self._begun_near(simulator, fit.theta, record, turned)
+        if (simulator.plays or simulator.gaps) and begins_worse(record, self._white(record, y)):
+            other = memory_before(simulator, fit.theta, record, begun, self._white)
+            if other is not begun:
+                again = self._begun_near(simulator, fit.theta, record, other)
                 objective, begun, y = min((objective, begun, y), again, key=lambda found: found[0])
         return sd * begun, y
 

@@ -26,11 +26,12 @@ def begins_worse(record: Record, white: np.ndarray) -> bool:
     return bool(squares[:rows].mean() > INITIAL_MEMORY.worse * max(squares[rows:].mean(), 1.0))
 
 
-def turning_point_before(
+def memory_before(
     simulator: Simulator, theta: np.ndarray, record: Record, begun: np.ndarray, white: White
 ) -> np.ndarray:
     """The free initial states in their prior deviations with which the first part of a record is foretold best: as `begun`, or with a
-    turning point before the record at one of several ways back from where it begins."""
+    turning point before the record at one of several ways back from where it begins, or the driven side of a gap at one of several
+    places in it: what is crossed soon leaves one step of its slope no guide, which then bends the speed instead."""
     sd = initial_state_sd(simulator)
     first = rows_of(record, np.arange(len(record.time)) < _first_rows(record))
 
@@ -54,6 +55,12 @@ def turning_point_before(
                 states = moved(turn, start, place, side)
                 if (value := squares(states)) < least:
                     best, least = states, value
+    for start in simulator.gaps:
+        for side in INITIAL_MEMORY.sides:
+            states = np.zeros_like(begun)
+            states[start] = side / sd[start]
+            if (value := squares(states)) < least:
+                best, least = states, value
     return best
 
 

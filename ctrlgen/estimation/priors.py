@@ -239,6 +239,14 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             family="hysteresis",
             parameters={"reach": _LOOP, "loop": _starts((0.55, 0.9))},
         ),
+        "bouc_wen_of_power": LawPrior(
+            "A finer form of a smooth loop that is found, for a knee that is no exponential; 2 %: as of any loop.",
+            suspected=False,
+            refines=frozenset({"bouc_wen", "hysteresis"}),
+            model_form_error=0.02,
+            family="hysteresis",
+            parameters={"reach": _LOOP, "loop": _starts((0.55, 0.9)), "power": _starts((1.5,))},
+        ),
         "cogging": _COGGING,
         "cogging_of_slots": replace(
             _COGGING,
@@ -314,7 +322,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             _PLAY,
             suspected=False,
             refines=frozenset({"backlash", "backlash_above", "backlash_below"}),
-            parameters={**_PLAY.parameters, "wear": _starts((-0.3, 0.3))},
+            parameters={**_PLAY.parameters, "wear": _starts((-0.3, 0.3)), "spread": peaks(0.3, 1.0)},
         ),
         "creep": LawPrior(
             _CREEP,

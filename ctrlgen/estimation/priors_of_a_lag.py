@@ -59,6 +59,18 @@ OF_A_LAG: Mapping[str, LawPrior] = {
         family="hysteresis",
         parameters={"reach": _reach(0.01, 0.03, 0.1, 0.3, 1.0, peaks=True), "loop": ParameterPrior((0.55, 0.9))},
     ),
+    "displacement_bouc_wen_of_power": LawPrior(
+        "A finer form of a smooth loop that is found, for a knee that is no exponential. " + HYSTERESIS,
+        suspected=False,
+        refines=frozenset({"displacement_bouc_wen"}),
+        model_form_error=0.02,
+        family="hysteresis",
+        parameters={
+            "reach": _reach(0.1, 0.3, peaks=True),
+            "loop": ParameterPrior((0.55, 0.9)),
+            "power": ParameterPrior((1.5,)),
+        },
+    ),
     "displacement_hysteresis": LawPrior(
         HYSTERESIS,
         model_form_error=0.02,
@@ -79,11 +91,12 @@ OF_A_LAG: Mapping[str, LawPrior] = {
         parameters={"reach": _reach(0.03, 0.1, 0.3, 1.0), "taper": replace(_TAPER, start_values=(0.0,))},
     ),
     "weighted_displacement_hysteresis": replace(
-        _WEIGHTED_LAG, refines=frozenset({"displacement_hysteresis", "displacement_bouc_wen"})
+        _WEIGHTED_LAG,
+        refines=frozenset({"displacement_hysteresis", "displacement_bouc_wen", "asymmetric_displacement_hysteresis"}),
     ),
     "weighted_drive_hysteresis": replace(
         _WEIGHTED_LAG,
-        refines=frozenset({"drive_hysteresis"}),
+        refines=frozenset({"drive_hysteresis", "asymmetric_drive_hysteresis"}),
         log_prior_odds=ONE_IN_TEN,
         unless=frozenset({"heat"}),
     ),

@@ -280,6 +280,9 @@ class InitialMemorySettings:
     the turning point begins. Judgement."""
     far: float = 30.0
     """From where every play is dragged along, in the same."""
+    sides: tuple[float, ...] = (-0.875, -0.625, -0.375, -0.125, 0.125, 0.375, 0.625, 0.875)
+    """Places of a driven side in its gap, in halves of it, from which a search begins: no two are farther apart than one step reaches.
+    Judgement."""
 
 
 @dataclass(frozen=True)

@@ -110,6 +110,13 @@ class Simulator:
         return tuple(found)
 
     @cached_property
+    def gaps(self) -> tuple[int, ...]:
+        """Of each law with one gap: the place among the free initial states of that of its driven side."""
+        names = self.model.x_names
+        free = ((i, names[k]) for i, k in enumerate(self.free_initial_states) if k < len(names))
+        return tuple(i for i, name in free if "_start_" in name and name.replace("_start_", "_turn_") not in names)
+
+    @cached_property
     def _observed(self) -> ca.SX:
         signals = self.model.signals
         rows = []

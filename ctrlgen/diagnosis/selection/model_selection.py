@@ -24,7 +24,7 @@ from ctrlgen.diagnosis.settings import MODEL_SELECTION
 from ctrlgen.estimation.error_model import ErrorModel, error_model
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.held_out import refit_to_held_out
-from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 from ctrlgen.estimation.misfit import Misfit, misfit
 from ctrlgen.estimation.settings import FIT, HELD_OUT_REFIT, RESIDUAL_TESTS, STATISTICS
 from ctrlgen.estimation.size_odds import prior_odds
@@ -193,8 +193,8 @@ class ModelSelection:
 
     def matters(self, before: CandidateModel, after: CandidateModel) -> bool:
         """Whether `after` takes away a share of the whole mismatch of any channel on the held-out records that is worth a name, or
-        much of what `before` leaves there."""
-        if self.mismatch is None:
+        much of what `before` leaves there. A law in a finer form is no further name, and any of it counts that is no chance."""
+        if self.mismatch is None or in_finer_form(before.causes, after.causes):
             return True
         gain = (before.held_out.plain_mean - after.held_out.plain_mean) * self.fitter.noise.floor**2
         return bool(np.any(gain > MODEL_SELECTION.least_share * self.mismatch)) or self.takes_much(before, after)
@@ -257,6 +257,13 @@ class ModelSelection:
                 if squares < (form_error * times) ** 4 * lost:
                     return True
         return False
+
+
+def in_finer_form(before: Sequence[Hypothesis], after: Sequence[Hypothesis]) -> bool:
+    """Whether what is new in `after` are finer forms of the laws of `before` that are gone, and there is something new."""
+    new = {c for c in after if c not in before}
+    forms = [f for c in before if c not in after and c.effect != PARAMETER for f in c.finer]
+    return bool(new) and len(after) == len(before) and new <= set(forms)
 
 
 def _lost(bare: CandidateModel, full: CandidateModel) -> float:
