@@ -88,12 +88,10 @@ def test_what_is_left_to_the_sensor_never_lets_the_stage_be_worse(rng):
     n, scale = 40, np.ones(2)
     lines = tuple(Feigned("a", "", "", rng.standard_normal((n, 2))) for _ in range(3))
     budget = SensorBudget(lines, 2.0, scale)
-    G = np.stack([line.deviation.ravel() for line in lines], axis=1) * 2.0
-    U, w, _ = np.linalg.svd(G, full_matrices=False)
     for size in (0.1, 1.0, 3.0, 30.0):
         for _ in range(100):
             true = size * rng.standard_normal((n, 2))
-            feigned = (U @ (w * rng.uniform(-1, 1, 3))).reshape(n, 2)
+            feigned = sum(2 * rng.choice([-1, rng.uniform(-1, 1), 1]) * line.deviation for line in lines)
             seen = true + feigned
             after = true - (seen - budget.of_sensor(seen))
             assert np.linalg.norm(after) <= np.linalg.norm(true) * (1 + 1e-12)
@@ -104,6 +102,19 @@ def test_what_is_left_to_the_sensor_never_lets_the_stage_be_worse(rng):
         lines[:1], 2.0, scale
     )  # half as much again as it may feign: at the worst the third of it is true, and may be turned about
     assert one.of_sensor(3 * lines[0].deviation) == pytest.approx(lines[0].deviation)
+
+
+def test_scales_of_one_size_are_told_apart_by_no_basis():
+    """Two scales within their budgets: what an SVD of lines so nearly of one size takes for coordinates is turned by 45 degrees."""
+    x, y = np.zeros((2, 100, 2))
+    angle = np.linspace(0, 2 * np.pi, 100, endpoint=False)
+    x[:, 0], y[:, 1] = np.cos(angle), np.sin(angle)
+    for mixed in (0.0, 1e-9, -1e-9):
+        lines = (Feigned("x", "", "", x + mixed * y), Feigned("y", "", "", y + mixed * x))
+        budget = SensorBudget(lines, 2.0, np.ones(2))
+        seen = 1.6 * (x + y)
+        assert budget.of_sensor(seen) == pytest.approx(seen, rel=1e-7)
+        assert budget.of_sensor(3 * x) == pytest.approx(x, abs=1e-7)  # y takes no part
 
 
 def test_the_budget_is_what_a_wrong_scale_zero_and_clock_make_of_the_readings(circle):

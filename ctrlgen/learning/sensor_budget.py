@@ -1,13 +1,15 @@
 """What a sensor may feign of a motion, and how far an error that it read is believed to be the stage's.
 
 A reading that is wrong by its scale, its zero or its clock shows an error that the stage does not have, and drives that take it away
-spoil the true motion. In the span of what the sensor may feign, G with columns of so many standard deviations each, G = U w V', a
-deviation that was read has the coordinates c = U'd; the true one lies within w of it. Of each coordinate
+spoil the true motion. With g_i what line i makes of the reading at its largest, the sensor's part of a deviation d is sum b_i g_i with
+|b_i| <= 1, and what is taken for the stage's is the a nearest to d of those that leave the stage no worse than it was, |t - a| <= |t| for
+every t = d - sum b_i g_i that may be true:
 
-    a = sign(c) min(|c|, 2 max(|c| - w, 0))
+    min |d - a|  subject to  1/2 |a|^2 + sum_i |g_i . a| <= a . d
 
-is taken for the stage's: the most that leaves the stage no worse than it was, |d - a| <= |d|, whatever the sensor is within its budget. The
-rest is left to the sensor. Outside the span the reading is believed.
+Its solution is d less the nearest sum of lines within nu, a = d - sum b_i g_i with |b_i| <= nu and the least nu in 0..1 that keeps the
+condition. Of one line w = |g| that is a = min(|d|, 2 max(|d| - w, 0)). The rest is left to the sensor. Outside the span of the g_i the
+reading is believed. No basis of that span enters: where lines are of one size, as the scales of a circle are, no basis is marked out.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import brentq, lsq_linear
 
 from ctrlgen.budget.sensor_statement import SensorStatement
 from ctrlgen.core.units import show_difference
@@ -23,6 +26,8 @@ from ctrlgen.learning.learning_options import LearningOptions
 from ctrlgen.learning.lifted import Lifted
 
 ASSUMED = "assumed: nothing is stated"
+ROUNDING = 1e-12
+"""Of a deviation, above what sums of some hundred samples round to."""
 
 
 @dataclass(frozen=True)
@@ -53,11 +58,27 @@ class SensorBudget:
         columns = [line.deviation / self.scale for line in self.lines if line.deviation.any()]
         if not columns:
             return np.zeros(deviation.shape)
-        G = self.coverage * np.stack([column.ravel() for column in columns], axis=1)
-        U, w, _ = np.linalg.svd(G, full_matrices=False)
-        c = U.T @ (deviation / self.scale).ravel()
-        believed = np.sign(c) * np.minimum(np.abs(c), 2 * np.maximum(np.abs(c) - w, 0.0))
-        return (U @ (c - believed)).reshape(deviation.shape) * self.scale
+        Q, R = np.linalg.qr(self.coverage * np.stack([column.ravel() for column in columns], axis=1))
+        d = Q.T @ (deviation / self.scale).ravel()
+        return (Q @ (d - believed(d, R))).reshape(deviation.shape) * self.scale
+
+
+def believed(d: np.ndarray, G: np.ndarray) -> np.ndarray:
+    """(m,) what of a deviation `d` (m,) is the stage's for sure where columns of G (m, k), each times -1 to 1, may be the sensor's."""
+
+    def beyond(nu: float) -> np.ndarray:
+        return d - nu * (G @ lsq_linear(nu * G, d, (-1, 1), method="bvls", max_iter=1000).x) if nu else d
+
+    def worse(nu: float) -> float:
+        """By how much the stage may be worse, times |a|; none where not above zero."""
+        a = beyond(nu)
+        return float(a @ a / 2 + np.abs(G.T @ a).sum() - a @ d)
+
+    if worse(0.0) <= 0:
+        return d
+    if np.linalg.norm(beyond(1.0)) <= ROUNDING * np.linalg.norm(d):  # all of it may be the sensor's
+        return np.zeros(d.shape)
+    return beyond(brentq(worse, 0.0, 1.0, xtol=ROUNDING))
 
 
 def sensor_budget(
