@@ -26,6 +26,7 @@ TARGET_LIMIT = np.full(N, 64.0)
 NO_DRIVE = 2.0  # of the first displacement: within what a state may be, beyond what a sample leads to
 OUTCOMES = ("inside", "edge", "beyond")
 TRIALS = tuple("".join(outcome) for outcome in product("+-", repeat=3))  # "+": the drives of a trial are admissible
+REACHED = ("into inside", "into edge", "into beyond")  # the drives of what is reached in closed form
 PLAIN = ("inside", "inside", "kept", "inside")
 # instead of a scenario: of it the controller's C says the device
 NOWHERE = SimpleNamespace(device_sha256="0" * 64, device=SimpleNamespace(load_texts=()))
@@ -44,6 +45,7 @@ class Device:
     moving: bool = True  # a sample time: step beside settle
     coupled: bool = True  # one displacement moves several channels
     rated: bool = False  # drives change no faster than they may
+    own: bool = False  # each drive leads one displacement: what is reached is known in closed form
 
     def __str__(self) -> str:
         return (
@@ -67,7 +69,7 @@ class Device:
         """Every combination of decisions that this device can be brought to."""
         state = OUTCOMES if self.states and self.limited else ("inside",)
         shares = {"none": ("none",), "plain": ("kept", "edge", "over"), "bounded": ("bound", "kept", "edge", "over")}
-        drive = ("inside", "edge", "origin", *TRIALS)
+        drive = ("inside", "edge", *(REACHED if self.own else ("origin", *TRIALS)))
         modes = ("settle", "step") if self.moving else ("settle",)
         return set(product(modes, OUTCOMES, state, shares[self.composite], drive))
 
@@ -81,6 +83,7 @@ DEVICES = (
     Device(states=False, moving=False, composite="plain"),
     Device(moving=False, composite="none", coupled=False),
     Device(composite="none", rated=True),
+    Device(composite="none", own=True),
     Device(states=False, memory=True, composite="plain", rounds=3, rated=True),
 )
 
@@ -102,6 +105,8 @@ class Scripted(ControllerKernels):
     target_bound: Any = None
     target_directions: Any = None
     quick: Any = None
+    few_shares: Any = None
+    own_drives: Any = False
     composite_rounds: Any = None
     nearest_slopes: Any = None
     contraction: Any = None
@@ -193,6 +198,7 @@ def scripted(device: Device) -> Controller:
         if device.composite == "bounded"
         else None,
         composite_rounds=device.rounds,
+        own_drives=device.own,
         nearest_slopes=np.array([[1, 0.25, 0.0625], [0.25, 1, -0.125], [0.0625, -0.125, 1]])
         if device.coupled
         else None,
@@ -235,6 +241,8 @@ def combination(device: Device, mode: str, calls: list) -> tuple[str, ...]:
             share = "kept" if ratio <= 1 else "edge" if ratio <= 1 + SLACK else "over"
     drive = outcomes[0]
     if drive == "beyond":
+        if device.own:
+            return mode, outcome(first["displacement"], Z_LOW, Z_HIGH), state, share, f"into {outcomes[1]}"
         drive = "origin" if outcomes[1] == "beyond" else "".join("-" if o == "beyond" else "+" for o in outcomes[2:])
     return mode, outcome(first["displacement"], Z_LOW, Z_HIGH), state, share, drive
 

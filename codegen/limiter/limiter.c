@@ -7,7 +7,7 @@
  *
  * Sizes: N displacements, NU drives, NX states that the model remembers, of them NS of actuators, M numbers of a target.
  * What a device has is 1, else 0: STATE_LIMITED (limits on states of actuators can be met), BOUNDED (a cheap bound of the shares of
- * composite limits, of which there are SHARES), RATED (drives change only so fast), PASSING (they can lead the device beyond a
+ * composite limits, of which there are SHARES, of FEW coordinates where these are fewer), RATED (drives change only so fast), PASSING (they can lead the device beyond a
  * limit), DIRECT (every displacement is a matrix times the target, and a target that leads into the range is a command), BOUND_FIRST (the
  * cheap bound is known of the target), REDUNDANT (more drives than axes, of which GROUPS can be moved without a push), COUPLED (a displacement moves several
  * channels), MOVING (kernels for the next sample), MOTION (targets with derivatives), GIVEN (constants that are given at the
@@ -15,7 +15,8 @@
  * stage with inertia, which may be off its motion; NY numbers tell of that), OBSERVED (these can be measured), VARIED (the
  * time of a sample, state->h, may vary). SETTLE_DRIVE_LIMITED and STEP_DRIVE_LIMITED: drives beyond their limits can be needed. SETTLE_EXAMINED_FIRST and
  * STEP_EXAMINED_FIRST: whether a state is lost is asked before it is used. STATE_BY_MODE and DRIVE_BY_MODE: the line search calls one
- * kernel to settle and another to step. U_BOUNDS_ONCE: one function alone reads the limits of drives.
+ * kernel to settle and another to step, as ADVANCE_BY_MODE says of drives within reach. OWN_DRIVES: each drive leads one displacement of its
+ * own. U_BOUNDS_ONCE: one function alone reads the limits of drives.
  *
  * BALANCE, COMPOSITE_SHARES, SETTLE_STATE and other macros with arguments call a kernel, which may read fewer of them. Names that end
  * in _TABLE are numbers in braces. EACH_AXIS(F), EACH_STATE(F) and EACH_DRIVE(F) are F(0) F(1) ..., one by one, because a loop costs a
@@ -29,19 +30,27 @@ static int limit_all(real value[], const real low[], const real high[], const re
     int hit = 0;
     int i;
     for (i = 0; i < count; i++) {
-        const int unknown = is_nan(&value[i]);
-        const real wanted = (unknown != 0) ? low[i] : value[i];
-        const real raised = (wanted > low[i]) ? wanted : low[i];
-        const real limited = (raised < high[i]) ? raised : high[i];
-        const real moved = limited - wanted;
-        if ((unknown != 0) || (moved > slack[i]) || (moved < -slack[i])) {
+        if (is_nan(&value[i]) != 0) {
+            value[i] = low[i];
             hit = 1;
+        } else if (value[i] > high[i]) {
+            if ((value[i] - high[i]) > slack[i]) {
+                hit = 1;
+            }
+            value[i] = high[i];
+        } else if (value[i] <= low[i]) { /* a negative zero too */
+            if ((low[i] - value[i]) > slack[i]) {
+                hit = 1;
+            }
+            value[i] = low[i];
+        } else {
+            /* within its limits */
         }
-        value[i] = limited;
     }
     return hit;
 }
 
+#if !COUPLED || !DIRECT || PASSING
 /* Clips a displacement to its range; 1 if it was beyond by more than the slack. */
 static int limit_displacement(real value[N])
 {
@@ -51,6 +60,7 @@ static int limit_displacement(real value[N])
     return limit_all(value, LOW, HIGH, SLACK, N);
 }
 
+#endif
 #if STATE_LIMITED
 /* Clips the states of actuators to their range; 1 if one was beyond by more than the slack. */
 static int limit_state(const limiter_state *state, real value[NS])
@@ -67,7 +77,7 @@ static int limit_state(const limiter_state *state, real value[NS])
 }
 
 #endif
-#if SETTLE_DRIVE_LIMITED || STEP_DRIVE_LIMITED
+#if (SETTLE_DRIVE_LIMITED || STEP_DRIVE_LIMITED) && !OWN_DRIVES
 /* 1 if every drive is within its limits or beyond by no more than the slack. */
 static int drives_admissible(const limiter_state *state, const real drive[NU])
 {
@@ -198,6 +208,16 @@ static void choose_drives(const limiter_state *state, real drive[NU])
 }
 
 #endif
+#if FEW
+/* The squares of how far a displacement uses composite limits. */
+static void used_shares(const real wanted[N], real share[SHARES])
+{
+    real few[FEW];
+    FEW_COORDINATES(wanted, few);
+    SHARES_OF_FEW(few, share);
+}
+
+#endif
 #if SHARES
 /* Scales a displacement that breaks a composite limit toward home, several times where the limited quantity is not proportional to it: 0
  * untouched, 1 scaled, 2 scaled by more than the slack. */
@@ -308,34 +328,48 @@ static uint32_t passed(const limiter_state *state)
 
 #endif
 #if COUPLED
-#define ADD_COLUMN(j) slope[j] = slope[j] + (P[i][j] * change);
+/* Clips a number to low ... high. */
+static real clipped(real number, real low, real high)
+{
+    const real raised = (number > low) ? number : low;
+    return (raised < high) ? raised : high;
+}
+
+#define CLIP_AXIS(k) value[k] = clipped(beyond[k], LOW[k], HIGH[k]);
+#define MEASURE_AXIS(k) off[k] = value[k] - beyond[k];
 /* The displacement in range whose followed signal is nearest to that of the displacement beyond, to first order, from beyond clipped to
  * the range: sweeps of projected coordinate descent (C. Hildreth, Naval Res. Logist. Quart. 4 (1957) 79) on |W (value - beyond)|^2,
- * W the slope of the followed signal at home. */
-static void nearest_displacement(const real beyond[N], real value[N])
+ * W the slope of the followed signal at home, by H_ij/H_ii of H = W^T W. Axis by axis, because a loop costs a small core twice as much.
+ * 1 if beyond was out of range by more than the slack, else value is clipped alone. */
+static int nearest_displacement(const real beyond[N], real value[N])
 {
-    static const real P[N][N] = NEAREST_SLOPES; /* H_ij/H_jj of H = W^T W */
+#if DIRECT /* then beyond is a number */
     static const real LOW[N] = Z_LOW_TABLE; /* m */
     static const real HIGH[N] = Z_HIGH_TABLE; /* m */
-    real slope[N] = HOME_TABLE;
+    static const real SLACK[N] = Z_SLACK_TABLE; /* m */
+#endif
+    real off[N];
+    int hit = 0;
     int sweep;
+#if DIRECT
     int i;
+    EACH_AXIS(CLIP_AXIS)
+    EACH_AXIS(MEASURE_AXIS)
     for (i = 0; i < N; i++) {
-        const real change = value[i] - beyond[i];
-        EACH_AXIS(ADD_COLUMN)
-    }
-    for (sweep = 0; sweep < SWEEPS; sweep++) {
-        for (i = 0; i < N; i++) {
-            const real wanted = value[i] - slope[i];
-            const real raised = (wanted > LOW[i]) ? wanted : LOW[i];
-            const real moved = (raised < HIGH[i]) ? raised : HIGH[i];
-            const real change = moved - value[i];
-            if ((change < REAL(0.0)) || (change > REAL(0.0))) {
-                EACH_AXIS(ADD_COLUMN)
-                value[i] = moved;
-            }
+        if ((off[i] > SLACK[i]) || (off[i] < -SLACK[i])) {
+            hit = 1;
         }
     }
+#else
+    hit = limit_displacement(value);
+    EACH_AXIS(MEASURE_AXIS)
+#endif
+    if (hit != 0) {
+        for (sweep = 0; sweep < SWEEPS; sweep++) {
+            NEAREST_SWEEP
+        }
+    }
+    return hit;
 }
 
 #endif
@@ -373,6 +407,60 @@ static void wanted_drives(const limiter_state *state, int settling, limiter_outp
 #endif
 }
 
+#if OWN_DRIVES
+#define HOLD_DRIVE(k) held[k] = out->drive[k];
+#define TAKE_HELD(k) out->drive[k] = held[k];
+/* Keeps the limits of drives that out->drive does not keep: as far from origin toward out->displacement as every drive can lead the
+ * displacement of its own. The drives held within their limits lead to reached, and the slowest of those that were beyond says how much of the
+ * line is gone. As drives rise with their displacements, or fall, all lie between those of origin and held; limited is 1 if one does not,
+ * because those of origin are inadmissible. */
+static uint32_t into_reach(const limiter_state *state, int settling, const real origin[N], limiter_output *out, int *limited)
+{
+    real held[NU];
+    uint32_t status = 0U;
+    EACH_DRIVE(HOLD_DRIVE)
+    if (limit_all(held, U_LOW, U_HIGH, U_SLACK, NU) == 0) {
+        EACH_DRIVE(TAKE_HELD)
+    } else {
+        real reached[N];
+        real x[NX];
+        real share = REAL(1.0);
+        int i;
+#if ADVANCE_BY_MODE
+        if (settling != 0) {
+            SETTLE_ADVANCE(state, out->displacement, held, x);
+        } else {
+            STEP_ADVANCE(state, state->z, held, x);
+        }
+#else
+        LIMITED_ADVANCE(state, LIMITED_FROM, held, x);
+#endif
+        REACHED(state, x, out->displacement, held, reached);
+        for (i = 0; i < N; i++) {
+            const real whole = out->displacement[i] - origin[i];
+            if ((out->drive[i] > held[i]) || (out->drive[i] < held[i])) {
+                const real gone = reached[i] - origin[i];
+                const real most = share * whole;
+                if (((whole > REAL(0.0)) && (gone < most)) || ((whole < REAL(0.0)) && (gone > most))) {
+                    share = gone / whole;
+                }
+            }
+            reached[i] = whole;
+        }
+        share = (share > REAL(0.0)) ? (REACH_FRACTION * share) : REAL(0.0);
+        for (i = 0; i < N; i++) {
+            out->displacement[i] = origin[i] + (share * reached[i]);
+        }
+        wanted_drives(state, settling, out);
+        if (DRIVE_INSIDE(state, out->drive) == 0) {
+            *limited = limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, NU);
+        }
+        status = LIMITER_DRIVE;
+    }
+    return status;
+}
+
+#else
 #define START_DRIVE(k) at_start[k] = out->drive[k];
 #define START_STATE(k) state_at_start[k] = out->state[k];
 /* Line search from origin toward out->displacement, whose drives are inadmissible: secants of the drive that is first
@@ -446,6 +534,7 @@ static int line_search(const limiter_state *state, int settling, const real orig
     return limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, NU);
 }
 
+#endif
 #endif
 #if VARIED
 /* A sample of this time begins as the state is. */

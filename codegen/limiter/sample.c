@@ -104,6 +104,11 @@ static uint32_t LIMIT_DRIVES(const limiter_state *state, limiter_output *out, in
     static const real HOME[N] = HOME_TABLE;
 #endif
     uint32_t status = 0U;
+#if OWN_DRIVES && SETTLING
+    status = into_reach(state, 1, HOME, out, limited);
+#elif OWN_DRIVES
+    status = into_reach(state, 0, state->z, out, limited);
+#else
     if (drives_admissible(state, out->drive) != 0) {
         (void)limit_all(out->drive, U_LOW, U_HIGH, U_SLACK, NU);
     } else {
@@ -114,6 +119,7 @@ static uint32_t LIMIT_DRIVES(const limiter_state *state, limiter_output *out, in
 #endif
         status = LIMITER_DRIVE;
     }
+#endif
     return status;
 }
 
@@ -181,10 +187,8 @@ static uint32_t WITHIN(limiter_state *state, limiter_output *out)
     real before[NX];
     copy_states(state->x, before);
 #endif
-#if NS
-    STATE(state, out->displacement, out->state);
-#endif
 #if STATE_LIMITED
+    STATE(state, out->displacement, out->state);
     if (STATE_INSIDE(state, out->state) == 0) {
         status |= keep_state(state, out);
     }
@@ -201,14 +205,15 @@ static uint32_t WITHIN(limiter_state *state, limiter_output *out)
             if (scaled > 1) {
                 status |= LIMITER_COMPOSITE;
             }
-#if NS
-            STATE(state, out->displacement, out->state);
-#endif
 #if STATE_LIMITED
+            STATE(state, out->displacement, out->state);
             (void)limit_state(state, out->state);
 #endif
         }
     }
+#endif
+#if NS && !STATE_LIMITED
+    STATE(state, out->displacement, out->state);
 #endif
     DRIVE(state, out->displacement, out->state, out->drive);
 #if REDUNDANT
@@ -293,9 +298,6 @@ static uint32_t BEYOND(limiter_state *state, limiter_output *out)
 {
     uint32_t status;
     int hit;
-#if BOUND_FIRST
-    int kept = 0;
-#endif
 #if COUPLED
     real beyond[N];
     int i;
@@ -303,17 +305,13 @@ static uint32_t BEYOND(limiter_state *state, limiter_output *out)
         beyond[i] = out->displacement[i];
     }
 #endif
-    hit = limit_displacement(out->displacement);
 #if COUPLED
-    if (hit != 0) {
-        nearest_displacement(beyond, out->displacement);
-    }
+    hit = nearest_displacement(beyond, out->displacement);
+#else
+    hit = limit_displacement(out->displacement);
 #endif
-#if BOUND_FIRST
-    if (COMPOSITE_BOUND(out->displacement) <= REAL(1.0)) {
-        kept = 1;
-    }
-    status = WITHIN(state, out, kept);
+#if BOUND_FIRST /* at the end of the range the cheap bound seldom tells, and with it the longest call would be longer */
+    status = WITHIN(state, out, 0);
 #else
     status = WITHIN(state, out);
 #endif

@@ -24,6 +24,7 @@ from ctrlgen.model.inverse import Inverse
 SLACK = 1e-9  # of a signal's typical size: an excess below this is clipped without being reported
 SECANT_STEPS = 3  # of the line search toward a target that the drives cannot reach in one sample
 SECANT_FRACTION = 1 - 2**-8  # of the secant estimate is taken, because the drive is not linear along the line
+REACH_FRACTION = 1 - 2**-14  # of what is reached in closed form is taken, because numbers are rounded
 
 
 @dataclass(frozen=True)
@@ -186,7 +187,8 @@ class Controller:
             return self._without_state()
         u, limited = clamp(drive, *m.u_bounds, u_slack)
         if limited:
-            wanted, state_wanted, drive = self._line_search(k, state, np.zeros_like(z) if static else z, wanted, drive)
+            toward = self._into_reach if kernels.own_drives else self._line_search
+            wanted, state_wanted, drive = toward(k, state, np.zeros_like(z) if static else z, wanted, drive)
             u, limited = clamp(drive, *m.u_bounds, u_slack)
             status |= ControllerStatus.DRIVE
         held = False
@@ -250,6 +252,26 @@ class Controller:
                 if ratio > 1:  # not for NaN
                     worst, wanted = max(worst, ratio), wanted / ratio
         return wanted, worst
+
+    def _into_reach(
+        self, k: Inverse, now: State, origin: np.ndarray, target: np.ndarray, at_target: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """As `_line_search` where each drive leads a displacement of its own: as far as every one can, in closed form.
+
+        Drives held within their limits lead to displacements r. Of the line as much is gone, max(0, min_i (r_i - o_i) / (t_i - o_i)),
+        as the slowest of those that are beyond allows. As drives rise with their displacements, or fall, all lie between those of
+        origin o and r.
+        """
+        (low, high), slack, (x, z) = self.kernels.nominal.u_bounds, self.slacks[2], now[:2]
+        held, _ = clamp(at_target, low, high, slack)
+        x_then = answer(k.advance, x, target if k is self.kernels.static else z, held)
+        gone, whole, share = answer(k.settle, x_then, target, held) - origin, target - origin, 1.0
+        for i in np.flatnonzero((at_target > held) | (at_target < held)):
+            if (whole[i] > 0 and gone[i] < share * whole[i]) or (whole[i] < 0 and gone[i] > share * whole[i]):
+                share = gone[i] / whole[i]
+        reached = origin + (REACH_FRACTION * share if share > 0 else 0.0) * whole
+        state, _ = self._limited_state(k, x, z, reached)
+        return reached, state, self.drive(k, now, reached, state)
 
     def _line_search(
         self, k: Inverse, now: State, origin: np.ndarray, target: np.ndarray, at_target: np.ndarray

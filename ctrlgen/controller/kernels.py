@@ -15,12 +15,14 @@ import numpy as np
 from ctrlgen.controller.composite_bound import CompositeBound, composite_bound, worst_in_range
 from ctrlgen.controller.contraction import Contraction, Stepped, contraction
 from ctrlgen.controller.controller_step import answer
+from ctrlgen.controller.few_coordinates import FewCoordinates, few_coordinates
 from ctrlgen.controller.limit_reach import Slacks, drive_beyond, state_beyond
 from ctrlgen.controller.lost_state import plausible_magnitudes
 from ctrlgen.controller.named_inverse import NamedInverses, given_inverses, named_inverses
 from ctrlgen.controller.nearest_displacement import coupling, nearest_displacement
 from ctrlgen.controller.null_motion import NullMotion, null_motion
-from ctrlgen.controller.quick_state import QuickState, quick_state
+from ctrlgen.controller.own_drives import has_own_drives
+from ctrlgen.controller.quick_state import QuickReach, QuickState, quick_reach, quick_state
 from ctrlgen.controller.ringing import Ringing
 from ctrlgen.controller.run_time_choices import choices, with_constants
 from ctrlgen.devices import Limit, Signal
@@ -88,6 +90,29 @@ class ControllerKernels:
         texts = {str(k.state(*(ca.SX.sym(name, *k.state.size_in(name)) for name in k.state.name_in()))) for k in every}
         return found[0] if len(texts) == 1 else None
 
+    def quick_reach(self, room: np.ndarray) -> QuickReach | None:
+        """The polynomials that stand for the displacement which balances states, in single precision, where one sample can lead less far
+        than to the target; None where there are none, or drives (n_u,) would be off by more than `room`."""
+        if self.quick is None or not self.own_drives:
+            return None
+        found = quick_reach(self.static.state, *self.nominal.z_bounds)
+        return None if found is None or np.any(self._drive_off(found.state_off) > room) else found
+
+    def _drive_off(self, state_off: np.ndarray) -> np.ndarray:
+        """(n_u,) by how much drives that are linear in the actuator states change where these do by `state_off`, at most."""
+        changes = []
+        for k in self.modes:
+            x, z, wanted, state = (ca.SX.sym(name, *k.drive.size_in(name)) for name in k.drive.name_in()[:4])
+            slope = ca.evalf(ca.densify(ca.jacobian(k.drive(x, z, wanted, state), state))).full()
+            changes.append(np.abs(slope) @ state_off)
+        return np.asarray(np.max(changes, axis=0))
+
+    @cached_property
+    def own_drives(self) -> bool:
+        """Whether each drive leads one displacement of its own (`ctrlgen.controller.own_drives`), to settle and to step."""
+        every = (self, *self.variants)
+        return self.times is None and all(has_own_drives(k.nominal, mode) for k in every for mode in k.modes)
+
     @cached_property
     def named(self) -> NamedInverses:
         """The same kernels with their numbers as formulas of the device's parameters."""
@@ -144,12 +169,24 @@ class ControllerKernels:
     @cached_property
     def composite_shares(self) -> ca.Function:
         """(x, z, wanted) -> the square of each guarded limit's value over its bound at displacement `wanted`; above 1 it is broken."""
-        return self._shares(self.moving or self.static)
+        shares = self._shares(self.moving or self.static)
+        if (few := self.few_shares) is None:
+            return shares
+        arguments = [ca.SX.sym(name, *shares.size_in(name)) for name in shares.name_in()]
+        found = few.function(few.coordinates(arguments[-1]))
+        return ca.Function("composite_shares", arguments, [found], shares.name_in(), ["shares"], {"cse": True})
 
     @cached_property
     def varied_shares(self) -> ca.Function:
         """`composite_shares` with the time of a sample as their last argument, where it varies."""
         return self._shares(self.varied) if self.varied else self.composite_shares
+
+    @cached_property
+    def few_shares(self) -> FewCoordinates | None:
+        """`composite_shares` in fewer coordinates than there are displacements; None where there are none."""
+        if not self.guarded_limits or self.times is not None:
+            return None
+        return few_coordinates(self._shares(self.moving or self.static), *self.nominal.z_bounds)
 
     def _shares(self, k: Inverse) -> ca.Function:
         m = self.nominal

@@ -1,8 +1,12 @@
 """The displacement in range whose followed signal is nearest to that of one beyond it, in a fixed number of operations.
 
 Minimises |W (z - beyond)|^2 over the box of displacements, W the slope of the followed signal at home in its typical sizes, by `SWEEPS`
-of projected coordinate descent from the clipped displacement; to first order in the displacement, and exact where one displacement
-moves one channel. Source: C. Hildreth, Naval Res. Logist. Quart. 4 (1957) 79.
+of projected coordinate descent from the clipped displacement, each axis in turn at its optimum clipped to its range,
+
+    z_i = beyond_i - sum_{j != i} H_ij / H_ii (z_j - beyond_j),   H = W^T W;
+
+to first order in the displacement, and exact where one displacement moves one channel. Source: C. Hildreth, Naval Res. Logist. Quart. 4
+(1957) 79.
 """
 
 from __future__ import annotations
@@ -33,10 +37,10 @@ def nearest_displacement(bounds: tuple[np.ndarray, np.ndarray], P: np.ndarray | 
     beyond = ca.SX.sym("beyond", n)
     z = ca.fmin(ca.fmax(beyond, low), high)
     if P is not None:
-        slopes = ca.mtimes(ca.DM(P), z - beyond)
+        off = z - beyond
         for _ in range(SWEEPS):
             for i in range(n):
-                moved = ca.fmin(ca.fmax(z[i] - slopes[i], low[i]), high[i])
-                slopes += ca.DM(P[:, i]) * (moved - z[i])
-                z[i] = moved
+                others = sum(P[i, j] * off[j] for j in range(n) if j != i)
+                z[i] = ca.fmin(ca.fmax(beyond[i] - others, low[i]), high[i])
+                off[i] = z[i] - beyond[i]
     return ca.Function("nearest", [beyond], [z], ["beyond"], ["z"], {"cse": True})

@@ -16,12 +16,14 @@ from math import comb
 
 import casadi as ca
 import numpy as np
+import scipy
 from numpy.polynomial import chebyshev
 
 from ctrlgen.numerics.taylor_intervals import taylor_intervals
 
 CELLS = 64  # of the range: the error of degree 12 turns 13 times, five cells a turn
 HIGHEST = 12  # degree: beyond it a root and a quotient cost no more
+HIGHEST_INVERSE = 16  # degree of an inverse, in place of Newton steps with a root and quotients each
 LARGEST = 1e37  # coefficient that is a number in single precision
 # Of the range of values: terms of powers about zero may add up to this much, or three binary digits are lost
 CANCELLED = 8.0
@@ -43,7 +45,8 @@ class ProvenPolynomial:
         """The polynomial as an expression of v, by Horner's rule."""
         s = v - self.centre if self.centre else v
         coefficients = self.coefficients / self.half ** np.arange(len(self.coefficients))
-        if np.abs(coefficients).max() > LARGEST:
+        sizes = np.abs(coefficients[coefficients != 0.0])
+        if sizes.max(initial=0.0) > LARGEST or sizes.min(initial=1.0) < 1 / LARGEST:
             s, coefficients = s * (1 / self.half), self.coefficients
         value = ca.SX(float(coefficients[-1]))
         for c in coefficients[-2::-1]:
@@ -75,6 +78,47 @@ def proven_polynomial(f: ca.Function, low: float, high: float, share: float) -> 
             found = ProvenPolynomial(series, middle, half, error / steepness, steepness, steepest)
             return _conditioned(found, low, high, abs(values[-1] - values[0]))
     return None
+
+
+def is_monotonic(f: ca.Function, low: float, high: float) -> bool:
+    """Whether f rises on all of low ... high, or falls, with a slope that is not zero, by interval arithmetic on each of the cells."""
+    radius = (high - low) / 2 / CELLS
+    centres = low + radius * (2 * np.arange(CELLS) + 1)
+    over = taylor_intervals(f, centres - radius, centres + radius, radius, 1)
+    return bool(np.all(np.isfinite(over.low)) and (np.all(over.low[1] > 0) or np.all(over.high[1] < 0)))
+
+
+def proven_inverse(f: ca.Function, low: float, high: float, share: float) -> ProvenPolynomial | None:
+    """The polynomial q of lowest degree for which |q(f(v)) - v| <= `share` (high - low) on low ... high, enclosed as above; its `flattest`
+    and `steepest` are those of the inverse. None where f is not smooth, not monotonic, or q needs more than degree `HIGHEST_INVERSE`."""
+    forward = proven_polynomial(f, low, high, share)
+    if forward is None:
+        return None
+    radius = (high - low) / 2 / CELLS
+    centres = low + radius * (2 * np.arange(CELLS) + 1)
+    ends = float(f(low)), float(f(high))
+    half, middle, v = abs(ends[1] - ends[0]) / 2, sum(ends) / 2, ca.SX.sym("v")
+    for degree in range(1, HIGHEST_INVERSE + 1):
+        nodes = -np.cos(np.pi * np.arange(degree + 1) / degree)
+        values = [_root(f, middle + half * s, low, high) for s in nodes]
+        series = chebyshev.cheb2poly(chebyshev.chebfit(nodes, values, degree))
+        found = ProvenPolynomial(series, middle, half, 0.0, 1 / forward.steepest, 1 / forward.flattest)
+        error = ca.Function("e", [v], [found.of(f(v)) - v], {"cse": True})
+        over = taylor_intervals(error, centres - radius, centres + radius, radius, degree + 1)
+        at = taylor_intervals(error, centres, centres, radius, degree)
+        terms = np.maximum(np.abs(at.low), np.abs(at.high)).sum(axis=0)
+        off = float(np.max(terms + np.maximum(np.abs(over.low[-1]), np.abs(over.high[-1]))))
+        if off <= share * (high - low):  # not where it is no number
+            return replace(found, off=off)
+    return None
+
+
+def _root(f: ca.Function, value: float, low: float, high: float) -> float:
+    """v in low ... high with f(v) = `value`; an end where rounding leaves none."""
+    sides = [float(f(v)) - value for v in (low, high)]
+    if sides[0] * sides[1] >= 0:
+        return (low, high)[int(abs(sides[1]) < abs(sides[0]))]
+    return float(scipy.optimize.brentq(lambda v: float(f(v)) - value, low, high, xtol=1e-16 * (high - low)))
 
 
 def _about(series: np.ndarray, centres: np.ndarray, radius: float) -> np.ndarray:

@@ -135,15 +135,22 @@ static int flexure_axis_online_f32_limit_all(float value[], const float low[], c
     int hit = 0;
     int i;
     for (i = 0; i < count; i++) {
-        const int unknown = flexure_axis_online_f32_is_nan(&value[i]);
-        const float wanted = (unknown != 0) ? low[i] : value[i];
-        const float raised = (wanted > low[i]) ? wanted : low[i];
-        const float limited = (raised < high[i]) ? raised : high[i];
-        const float moved = limited - wanted;
-        if ((unknown != 0) || (moved > slack[i]) || (moved < -slack[i])) {
+        if (flexure_axis_online_f32_is_nan(&value[i]) != 0) {
+            value[i] = low[i];
             hit = 1;
+        } else if (value[i] > high[i]) {
+            if ((value[i] - high[i]) > slack[i]) {
+                hit = 1;
+            }
+            value[i] = high[i];
+        } else if (value[i] <= low[i]) { /* a negative zero too */
+            if ((low[i] - value[i]) > slack[i]) {
+                hit = 1;
+            }
+            value[i] = low[i];
+        } else {
+            /* within its limits */
         }
-        value[i] = limited;
     }
     return hit;
 }

@@ -26,7 +26,7 @@ typedef float real;
     F(5)
 #define REAL(x) x ## f
 #define STATE_LIMITED 0
-#define BOUNDED 1
+#define BOUNDED 0
 #define DIRECT 1
 #define BOUND_FIRST 1
 #define RATED 0
@@ -47,6 +47,8 @@ typedef float real;
 #define VARIED 0
 #define STATE_BY_MODE 0
 #define DRIVE_BY_MODE 0
+#define OWN_DRIVES 1
+#define ADVANCE_BY_MODE 0
 #define SETTLE_DRIVE_LIMITED 0
 #define SETTLE_EXAMINED_FIRST 0
 #define STEP_DRIVE_LIMITED 1
@@ -57,6 +59,7 @@ typedef float real;
 #define NX 6
 #define M 6
 #define SHARES 12
+#define FEW 4
 #define COMPOSITE_ROUNDS 1
 #define SWEEPS 3
 #define SECANT_STEPS 3
@@ -78,19 +81,32 @@ typedef float real;
 #define COMPOSITE_SLACK 1.000004f
 #define COMPOSITE_SLACK_SQUARED 1.000008f
 #define SECANT_FRACTION 0.99609375f
+#define REACH_FRACTION 0.99993896f
 #define UNLIMITED 1e+18f
 #define STATE_LOW LOW
 #define STATE_HIGH HIGH
-#define NEAREST_SLOPES { \
-        { 1.0f, 0.49971864f, -0.2363756f, -0.07558483f, -0.2363756f, -0.20494296f }, \
-        { 1.1193434f, 1.0f, -0.45906138f, -0.25956145f, -0.16930602f, -0.25956145f }, \
-        { -0.2363756f, -0.20494296f, 1.0f, 0.49971864f, -0.2363756f, -0.07558483f }, \
-        { -0.16930602f, -0.25956145f, 1.1193434f, 1.0f, -0.45906138f, -0.25956145f }, \
-        { -0.2363756f, -0.07558483f, -0.2363756f, -0.20494296f, 1.0f, 0.49971864f }, \
-        { -0.45906138f, -0.25956145f, -0.16930602f, -0.25956145f, 1.1193434f, 1.0f } \
-    }
+#define NEAREST_SWEEP value[0] = clipped(beyond[0] - ((1.1193434f * off[1]) - (0.2363756f * off[2]) - (0.16930602f * off[3]) - \
+        (0.2363756f * off[4]) - (0.45906138f * off[5])), 0.0f, 5.5e-05f); \
+    off[0] = value[0] - beyond[0]; \
+    value[1] = clipped(beyond[1] - ((0.49971864f * off[0]) - (0.20494296f * off[2]) - (0.25956145f * off[3]) - \
+        (0.07558483f * off[4]) - (0.25956145f * off[5])), 0.0f, 5.5e-05f); \
+    off[1] = value[1] - beyond[1]; \
+    value[2] = clipped(beyond[2] - (-(0.2363756f * off[0]) - (0.45906138f * off[1]) + (1.1193434f * off[3]) - \
+        (0.2363756f * off[4]) - (0.16930602f * off[5])), 0.0f, 5.5e-05f); \
+    off[2] = value[2] - beyond[2]; \
+    value[3] = clipped(beyond[3] - (-(0.07558483f * off[0]) - (0.25956145f * off[1]) + (0.49971864f * off[2]) - \
+        (0.20494296f * off[4]) - (0.25956145f * off[5])), 0.0f, 5.5e-05f); \
+    off[3] = value[3] - beyond[3]; \
+    value[4] = clipped(beyond[4] - (-(0.2363756f * off[0]) - (0.16930602f * off[1]) - (0.2363756f * off[2]) - \
+        (0.45906138f * off[3]) + (1.1193434f * off[5])), 0.0f, 5.5e-05f); \
+    off[4] = value[4] - beyond[4]; \
+    value[5] = clipped(beyond[5] - (-(0.20494296f * off[0]) - (0.25956145f * off[1]) - (0.07558483f * off[2]) - \
+        (0.25956145f * off[3]) + (0.49971864f * off[4])), 0.0f, 5.5e-05f); \
+    off[5] = value[5] - beyond[5];
 #define LIMITED_STATE STEP_STATE
 #define LIMITED_DRIVE STEP_DRIVE
+#define LIMITED_ADVANCE STEP_ADVANCE
+#define LIMITED_FROM state->z
 #define KNOWN_TABLE { 0.00055f, 0.00055f, 0.00055f, 0.00055f, 0.00055f, 0.00055f }
 #define START_TABLE { 845.15f, 845.15f, 845.15f, 845.15f, 845.15f, 845.15f }
 #define REACH_LOW_TABLE { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }
@@ -105,8 +121,10 @@ typedef float real;
 #define DOUBLED 32
 #define GROWTH 3636.3635f
 #define BALANCE(state, x, z, drive, result) balance_displacement(x, z, result)
+#define REACHED(state, x, z, drive, result) reached_displacement(x, result)
 #define OF_PIVOT(pose, pivot, result) of_pivot(pose, pivot, result)
-#define COMPOSITE_SHARES(state, wanted, result) composite_shares(wanted, result)
+#define FEW_COORDINATES(wanted, result) few_coordinates(wanted, result)
+#define SHARES_OF_FEW(few, result) few_shares(few, result)
 #define SETTLE_DISPLACEMENT(state, target, result) wanted_displacement(target, result)
 #define SETTLE_STATE(state, wanted, result) wanted_state(wanted, result)
 #define SETTLE_DRIVE(state, wanted, limited, result) wanted_drive(limited, result)
@@ -115,7 +133,7 @@ typedef float real;
 #define STEP_STATE(state, wanted, result) wanted_state(wanted, result)
 #define STEP_DRIVE(state, wanted, limited, result) step_drive(state->x, limited, result)
 #define STEP_ADVANCE(state, z, drive, result) step_advance(state->x, drive, result)
-#define COMPOSITE_BOUND(wanted) composite_bound(wanted)
+#define COMPOSITE_SHARES(state, wanted, result) used_shares(wanted, result)
 #define TARGET_BOUND(target) target_bound(target)
 #define STATE_INSIDE(state, value) state_inside(value)
 #define DRIVE_INSIDE(state, value) drive_inside(value)
@@ -123,8 +141,6 @@ typedef float real;
 static const float U_LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
 static const float U_HIGH[6] = { 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f }; /* W */
 static const float U_SLACK[6] = { 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f }; /* W */
-static const float U_LEAST[6] = { -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f }; /* admissible, W */
-static const float U_MOST[6] = { 1.000004f, 1.000004f, 1.000004f, 1.000004f, 1.000004f, 1.000004f }; /* admissible, W */
 static const float U_SAFE[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
 static const float X_REST[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
 
@@ -348,102 +364,116 @@ static void balance_displacement(const float x[6], const float z[6], float resul
     }
 }
 
-/* The square of each wire flexure stress over its limit at displacement `wanted`. */
-static void composite_shares(const float wanted[6], float result[12])
+/* Displacement at which the forces balance the states x, in its range. By polynomials of degree 14, proved to be off by
+ * less than 1.4e-11 m. */
+static void reached_displacement(const float x[6], float result[6])
 {
-    static const float TABLE_1[6][6] = {
-        { 7.163396e+09f, -8.725365e+09f, -1.0396979e+10f, -4.441134e+09f, 2.0934612e+09f, 8.624482e+09f },
-        { 1.3912608e+09f, -1.1251239e+10f, -1.1180811e+10f, 1.8204311e+09f, 6.4256225e+09f, 6.1723305e+09f },
-        { 2.0934612e+09f, 8.624482e+09f, 7.163396e+09f, -8.725365e+09f, -1.0396979e+10f, -4.441134e+09f },
-        { 6.4256225e+09f, 6.1723305e+09f, 1.3912608e+09f, -1.1251239e+10f, -1.1180811e+10f, 1.8204311e+09f },
-        { -1.0396979e+10f, -4.441134e+09f, 2.0934612e+09f, 8.624482e+09f, 7.163396e+09f, -8.725365e+09f },
-        { -1.1180811e+10f, 1.8204311e+09f, 6.4256225e+09f, 6.1723305e+09f, 1.3912608e+09f, -1.1251239e+10f }
-    };
-    static const float TABLE_2[6][6] = {
-        { 1.1599883e+11f, 1.5950956e+11f, 7.835179e+11f, -1.2846023e+11f, 2.0036921e+11f, -5.625638e+11f },
-        { 5.0045413e+11f, -6.161432e+11f, -8.0449085e+10f, -1.7690893e+11f, 5.9039056e+11f, 1.0655088e+11f },
-        { 2.0036921e+11f, -5.625638e+11f, 1.1599883e+11f, 1.5950956e+11f, 7.835179e+11f, -1.2846023e+11f },
-        { 5.9039056e+11f, 1.0655088e+11f, 5.0045413e+11f, -6.161432e+11f, -8.0449085e+10f, -1.7690893e+11f },
-        { 7.835179e+11f, -1.2846023e+11f, 2.0036921e+11f, -5.625638e+11f, 1.1599883e+11f, 1.5950956e+11f },
-        { -8.0449085e+10f, -1.7690893e+11f, 5.9039056e+11f, 1.0655088e+11f, 5.0045413e+11f, -6.161432e+11f }
-    };
-    static const float TABLE_3[12][6] = {
-        { -4.4585724e+12f, 1.102723e+12f, 1.3200545e+11f, 1.7759255e+12f, -1.5802731e+12f, -2.536233e+12f },
-        { 2.3661778e+12f, 2.4000602e+12f, 1.4819732e+12f, -1.1901199e+12f, -1.1851115e+12f, 1.3707138e+12f },
-        { 1.4880515e+12f, 1.02434066e+12f, 3.1952187e+12f, -3.3340386e+12f, -1.4328322e+12f, -2.6332991e+12f },
-        { -1.7746715e+12f, 6.861064e+11f, 8.951435e+11f, 3.2527894e+12f, 1.7830487e+12f, -3.4267975e+11f },
-        { 1.0806304e+12f, 1.4966203e+12f, 3.0024456e+12f, -3.4103414e+12f, -2.2080156e+12f, -2.6212012e+12f },
-        { -1.883654e+12f, 7.064584e+11f, 1.1220354e+12f, 3.5960072e+12f, 2.1216132e+12f, -4.5177068e+11f },
-        { 9.697803e+11f, 1.4594866e+12f, -5.4737345e+11f, 2.2814135e+12f, 9.2301296e+11f, 3.1843436e+12f },
-        { -3.9721988e+12f, 1.851032e+12f, 3.843818e+12f, -2.6561623e+12f, -3.967535e+12f, -7.1714346e+12f },
-        { 2.2969296e+12f, 6.93611e+11f, 7.789762e+11f, 1.5153417e+12f, 2.2495927e+12f, 2.4190625e+12f },
-        { -4.2271263e+12f, 1.9982296e+12f, 3.5889726e+12f, -2.5090518e+12f, -4.222497e+12f, -7.0243514e+12f },
-        { -4.4247045e+12f, 8.9836945e+11f, 7.435699e+11f, 1.6559757e+12f, -1.1844611e+12f, -3.1986845e+12f },
-        { 2.5495121e+12f, 2.7678878e+12f, 1.5541005e+12f, -1.2738329e+12f, -1.4484263e+12f, 1.6090792e+12f }
-    };
-    static const float TABLE_4[12][6] = {
-        { 1.3734536e+11f, -3.5444797e+12f, -2.7926258e+12f, -1.9302325e+12f, 7.0338765e+10f, -1.9992656e+11f },
-        { 3.50037e+12f, 6.7848587e+12f, 4.059425e+12f, -1.6124403e+12f, -3.4923767e+12f, 2.1020536e+12f },
-        { 2.8585063e+11f, 3.333003e+12f, 3.0894944e+12f, 1.6695599e+12f, 2.4708851e+11f, 7.325468e+10f },
-        { 3.4239317e+12f, -2.704245e+12f, -4.1205613e+12f, -6.4245046e+12f, -3.5701538e+12f, 1.9693478e+12f },
-        { 1.1551834e+12f, 2.0573224e+12f, 3.2989472e+12f, 1.4659148e+12f, 1.7148913e+12f, -9.493543e+10f },
-        { 3.1706516e+12f, -2.4079872e+12f, -4.07338e+12f, -6.234046e+12f, -3.7648282e+12f, 1.952499e+12f },
-        { 1.0833221e+12f, 2.1930641e+12f, -1.4129366e+12f, -2.6369178e+12f, -4.3476942e+12f, 1.9398967e+12f },
-        { 3.8327186e+11f, -7.5461276e+11f, -3.1277734e+11f, 8.53514e+11f, 1.4279259e+12f, 6.522469e+11f },
-        { 1.5938316e+12f, 2.529548e+12f, -1.3767377e+12f, -2.0435721e+12f, -3.8518912e+12f, 2.8155762e+12f },
-        { -8.9809656e+11f, -1.5306036e+11f, 8.487993e+11f, 4.6308487e+10f, 1.4800983e+11f, -1.5662322e+12f },
-        { 4.1998467e+11f, -3.6188638e+12f, -1.2494657e+12f, -2.0487497e+12f, 9.450183e+11f, -1.3880204e+12f },
-        { 3.358615e+12f, 6.647834e+12f, 3.6755997e+12f, -1.5404901e+12f, -3.5741893e+12f, 2.279155e+12f }
-    };
-    float shared1[6];
-    float shared2[6];
     int i;
+    for (i = 0; i < 6; i++) {
+        const float t1 = (x[i] < 570.51404f) ? x[i] : 570.51404f;
+        const float t2 = t1 - 432.83203f;
+        const float t3 = (((1.633017e-37f * t2) - 2.3013922e-35f) * t2) - 1.0610405e-32f;
+        const float t4 = (((t3 * t2) + 1.92615e-30f) * t2) + 1.3653258e-28f;
+        const float t5 = (((t4 * t2) - 4.145125e-26f) * t2) + 2.2336474e-24f;
+        const float t6 = (((t5 * t2) - 3.3138825e-22f) * t2) + 8.2948205e-20f;
+        const float t7 = (((t6 * t2) - 5.5785325e-18f) * t2) - 1.8503594e-15f;
+        const float t8 = (((t7 * t2) + 9.850066e-13f) * t2) - 3.5499853e-10f;
+        result[i] = (((t8 * t2) + 1.8703099e-07f) * t2) + 3.4055425e-05f;
+    }
+}
+
+/* As many coordinates of the displacement as these limits depend on. */
+static void few_coordinates(const float wanted[6], float result[4])
+{
     const float wanted_0 = wanted[0];
     const float wanted_1 = wanted[1];
     const float wanted_2 = wanted[2];
     const float wanted_3 = wanted[3];
     const float wanted_4 = wanted[4];
     const float wanted_5 = wanted[5];
+    result[0] = wanted_0 + (0.5f * wanted_4) + (0.8660254f * wanted_5);
+    result[1] = wanted_1 - (0.8660254f * wanted_4) + (0.5f * wanted_5);
+    result[2] = wanted_2 + (0.5f * wanted_4) - (0.8660254f * wanted_5);
+    result[3] = wanted_3 + (0.8660254f * wanted_4) + (0.5f * wanted_5);
+}
+
+/* The square of each wire flexure stress over its limit at displacement with these coordinates `few`. */
+static void few_shares(const float few[4], float result[12])
+{
+    static const float TABLE_1[6][4] = {
+        { 7.163396e+09f, -8.725365e+09f, -1.0396979e+10f, -4.441134e+09f },
+        { 1.3912608e+09f, -1.1251239e+10f, -1.1180811e+10f, 1.8204311e+09f },
+        { 2.0934612e+09f, 8.624482e+09f, 7.163396e+09f, -8.725365e+09f },
+        { 6.4256225e+09f, 6.1723305e+09f, 1.3912608e+09f, -1.1251239e+10f },
+        { -1.0396979e+10f, -4.441134e+09f, 2.0934612e+09f, 8.624482e+09f },
+        { -1.1180811e+10f, 1.8204311e+09f, 6.4256225e+09f, 6.1723305e+09f }
+    };
+    static const float TABLE_2[6][4] = {
+        { 1.1599883e+11f, 1.5950956e+11f, 7.835179e+11f, -1.2846023e+11f },
+        { 5.0045413e+11f, -6.161432e+11f, -8.0449085e+10f, -1.7690893e+11f },
+        { 2.0036921e+11f, -5.625638e+11f, 1.1599883e+11f, 1.5950956e+11f },
+        { 5.9039056e+11f, 1.0655088e+11f, 5.0045413e+11f, -6.161432e+11f },
+        { 7.835179e+11f, -1.2846023e+11f, 2.0036921e+11f, -5.625638e+11f },
+        { -8.0449085e+10f, -1.7690893e+11f, 5.9039056e+11f, 1.0655088e+11f }
+    };
+    static const float TABLE_3[12][4] = {
+        { -4.4585724e+12f, 1.102723e+12f, 1.3200545e+11f, 1.7759255e+12f },
+        { 2.3661778e+12f, 2.4000602e+12f, 1.4819732e+12f, -1.1901199e+12f },
+        { 1.4880515e+12f, 1.02434066e+12f, 3.1952187e+12f, -3.3340386e+12f },
+        { -1.7746715e+12f, 6.861064e+11f, 8.951435e+11f, 3.2527894e+12f },
+        { 1.0806304e+12f, 1.4966203e+12f, 3.0024456e+12f, -3.4103414e+12f },
+        { -1.883654e+12f, 7.064584e+11f, 1.1220354e+12f, 3.5960072e+12f },
+        { 9.697803e+11f, 1.4594866e+12f, -5.4737345e+11f, 2.2814135e+12f },
+        { -3.9721988e+12f, 1.851032e+12f, 3.843818e+12f, -2.6561623e+12f },
+        { 2.2969296e+12f, 6.93611e+11f, 7.789762e+11f, 1.5153417e+12f },
+        { -4.2271263e+12f, 1.9982296e+12f, 3.5889726e+12f, -2.5090518e+12f },
+        { -4.4247045e+12f, 8.9836945e+11f, 7.435699e+11f, 1.6559757e+12f },
+        { 2.5495121e+12f, 2.7678878e+12f, 1.5541005e+12f, -1.2738329e+12f }
+    };
+    static const float TABLE_4[12][4] = {
+        { 1.3734536e+11f, -3.5444797e+12f, -2.7926258e+12f, -1.9302325e+12f },
+        { 3.50037e+12f, 6.7848587e+12f, 4.059425e+12f, -1.6124403e+12f },
+        { 2.8585063e+11f, 3.333003e+12f, 3.0894944e+12f, 1.6695599e+12f },
+        { 3.4239317e+12f, -2.704245e+12f, -4.1205613e+12f, -6.4245046e+12f },
+        { 1.1551834e+12f, 2.0573224e+12f, 3.2989472e+12f, 1.4659148e+12f },
+        { 3.1706516e+12f, -2.4079872e+12f, -4.07338e+12f, -6.234046e+12f },
+        { 1.0833221e+12f, 2.1930641e+12f, -1.4129366e+12f, -2.6369178e+12f },
+        { 3.8327186e+11f, -7.5461276e+11f, -3.1277734e+11f, 8.53514e+11f },
+        { 1.5938316e+12f, 2.529548e+12f, -1.3767377e+12f, -2.0435721e+12f },
+        { -8.9809656e+11f, -1.5306036e+11f, 8.487993e+11f, 4.6308487e+10f },
+        { 4.1998467e+11f, -3.6188638e+12f, -1.2494657e+12f, -2.0487497e+12f },
+        { 3.358615e+12f, 6.647834e+12f, 3.6755997e+12f, -1.5404901e+12f }
+    };
+    float shared1[6];
+    float shared2[6];
+    int i;
+    const float few_0 = few[0];
+    const float few_1 = few[1];
+    const float few_2 = few[2];
+    const float few_3 = few[3];
     for (i = 0; i < 6; i++) {
-        const float t1 = (TABLE_1[i][0] * wanted_0) + (TABLE_1[i][1] * wanted_1) + (TABLE_1[i][2] * wanted_2) +
-            (TABLE_1[i][3] * wanted_3) + (TABLE_1[i][4] * wanted_4) + (TABLE_1[i][5] * wanted_5);
+        const float t1 = (TABLE_1[i][0] * few_0) + (TABLE_1[i][1] * few_1) + (TABLE_1[i][2] * few_2) + (TABLE_1[i][3] *
+            few_3);
         shared1[i] = (t1 < 0.0f) ? -t1 : t1;
     }
     for (i = 0; i < 6; i++) {
-        const float t2 = (TABLE_2[i][0] * wanted_0) + (TABLE_2[i][1] * wanted_1) + (TABLE_2[i][2] * wanted_2) +
-            (TABLE_2[i][3] * wanted_3) + (TABLE_2[i][4] * wanted_4) + (TABLE_2[i][5] * wanted_5);
+        const float t2 = (TABLE_2[i][0] * few_0) + (TABLE_2[i][1] * few_1) + (TABLE_2[i][2] * few_2) + (TABLE_2[i][3] *
+            few_3);
         shared2[i] = 3.0f * (t2 * t2);
     }
     for (i = 0; i < 12; i++) {
-        const float t3 = (TABLE_3[i][0] * wanted_0) + (TABLE_3[i][1] * wanted_1) + (TABLE_3[i][2] * wanted_2) +
-            (TABLE_3[i][3] * wanted_3) + (TABLE_3[i][4] * wanted_4) + (TABLE_3[i][5] * wanted_5);
-        const float t4 = (TABLE_4[i][0] * wanted_0) + (TABLE_4[i][1] * wanted_1) + (TABLE_4[i][2] * wanted_2) +
-            (TABLE_4[i][3] * wanted_3) + (TABLE_4[i][4] * wanted_4) + (TABLE_4[i][5] * wanted_5);
+        const float t3 = (TABLE_3[i][0] * few_0) + (TABLE_3[i][1] * few_1) + (TABLE_3[i][2] * few_2) + (TABLE_3[i][3] *
+            few_3);
+        const float t4 = (TABLE_4[i][0] * few_0) + (TABLE_4[i][1] * few_1) + (TABLE_4[i][2] * few_2) + (TABLE_4[i][3] *
+            few_3);
         const float t5 = ((t3 * t3) + (t4 * t4)) + 0.3025f;
         const float t6 = square_root(t5) + shared1[i / 2];
         result[i] = 3.3057851e-18f * ((t6 * t6) + shared2[i / 2]);
     }
 }
 
-/* A cheap upper bound of the root of the largest of these shares: no more than 1 means that every limit is kept. */
-static float composite_bound(const float wanted[6])
-{
-    const float t1 = ((-7418.532f) * wanted[0]) - (4198.844f * wanted[1]) + (72.96058f * wanted[2]) + (8524.06f *
-        wanted[3]) + (7345.572f * wanted[4]) - (4325.2153f * wanted[5]);
-    const float t2 = (t1 < 0.0f) ? -t1 : t1;
-    const float t3 = ((-4731.5063f) * wanted[0]) + (8359.642f * wanted[1]) + (9605.415f * wanted[2]) - (82.2163f *
-        wanted[3]) - (4873.909f * wanted[4]) - (8277.426f * wanted[5]);
-    const float t4 = (t3 < 0.0f) ? -t3 : t3;
-    const float t5 = (3009.9507f * wanted[0]) - (1737.9247f * wanted[1]) + (3009.9507f * wanted[2]) - (1737.9247f *
-        wanted[3]) + (3009.9507f * wanted[4]) - (1737.9247f * wanted[5]);
-    const float t6 = (t5 < 0.0f) ? -t5 : t5;
-    const float t7 = (2774.401f * wanted[0]) + (4745.9053f * wanted[1]) + (2774.401f * wanted[2]) + (4745.9053f *
-        wanted[3]) + (2774.401f * wanted[4]) + (4745.9053f * wanted[5]);
-    const float t8 = (t7 < 0.0f) ? -t7 : t7;
-    return (((t2 + t4) + t6) + t8) + 1.0020007e-06f;
-}
-
-/* The same bound at the displacement of a `target` that leads into the range. */
+/* A cheap upper bound of the root of the largest of these shares at the displacement of a `target` that leads into the
+ * range: no more than 1 means that every limit is kept. */
 static float target_bound(const float target[6])
 {
     const float t1 = 78.29389f * target[0];
@@ -454,7 +484,7 @@ static float target_bound(const float target[6])
     const float t6 = (t5 < 0.0f) ? -t5 : t5;
     const float t7 = 21314.357f * target[5];
     const float t8 = (t7 < 0.0f) ? -t7 : t7;
-    return (((t2 + t4) + t6) + t8) + 1.0020009e-06f;
+    return (((t2 + t4) + t6) + t8) + 1.0020003e-06f;
 }
 
 /* Pose of the stated point where `pose` is that of the `pivot`: delta = delta_p - (R - I) pivot, R the rotation by

@@ -10,8 +10,6 @@
 static const float MEMS_HEXAPOD_ONLINE_F32_U_LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
 static const float MEMS_HEXAPOD_ONLINE_F32_U_HIGH[6] = { 1.0f, 1.0f, 1.0f, 1.0f, 1.0f, 1.0f }; /* W */
 static const float MEMS_HEXAPOD_ONLINE_F32_U_SLACK[6] = { 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f, 4.012113e-06f }; /* W */
-static const float MEMS_HEXAPOD_ONLINE_F32_U_LEAST[6] = { -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f, -4.012113e-06f }; /* admissible, W */
-static const float MEMS_HEXAPOD_ONLINE_F32_U_MOST[6] = { 1.000004f, 1.000004f, 1.000004f, 1.000004f, 1.000004f, 1.000004f }; /* admissible, W */
 static const float MEMS_HEXAPOD_ONLINE_F32_U_SAFE[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* W */
 static const float MEMS_HEXAPOD_ONLINE_F32_X_REST[6] = { 295.15f, 295.15f, 295.15f, 295.15f, 295.15f, 295.15f }; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
 
@@ -235,102 +233,116 @@ static void mems_hexapod_online_f32_balance_displacement(const float x[6], const
     }
 }
 
-/* The square of each wire flexure stress over its limit at displacement `wanted`. */
-static void mems_hexapod_online_f32_composite_shares(const float wanted[6], float result[12])
+/* Displacement at which the forces balance the states x, in its range. By polynomials of degree 14, proved to be off by
+ * less than 1.4e-11 m. */
+static void mems_hexapod_online_f32_reached_displacement(const float x[6], float result[6])
 {
-    static const float TABLE_1[6][6] = {
-        { 7.163396e+09f, -8.725365e+09f, -1.0396979e+10f, -4.441134e+09f, 2.0934612e+09f, 8.624482e+09f },
-        { 1.3912608e+09f, -1.1251239e+10f, -1.1180811e+10f, 1.8204311e+09f, 6.4256225e+09f, 6.1723305e+09f },
-        { 2.0934612e+09f, 8.624482e+09f, 7.163396e+09f, -8.725365e+09f, -1.0396979e+10f, -4.441134e+09f },
-        { 6.4256225e+09f, 6.1723305e+09f, 1.3912608e+09f, -1.1251239e+10f, -1.1180811e+10f, 1.8204311e+09f },
-        { -1.0396979e+10f, -4.441134e+09f, 2.0934612e+09f, 8.624482e+09f, 7.163396e+09f, -8.725365e+09f },
-        { -1.1180811e+10f, 1.8204311e+09f, 6.4256225e+09f, 6.1723305e+09f, 1.3912608e+09f, -1.1251239e+10f }
-    };
-    static const float TABLE_2[6][6] = {
-        { 1.1599883e+11f, 1.5950956e+11f, 7.835179e+11f, -1.2846023e+11f, 2.0036921e+11f, -5.625638e+11f },
-        { 5.0045413e+11f, -6.161432e+11f, -8.0449085e+10f, -1.7690893e+11f, 5.9039056e+11f, 1.0655088e+11f },
-        { 2.0036921e+11f, -5.625638e+11f, 1.1599883e+11f, 1.5950956e+11f, 7.835179e+11f, -1.2846023e+11f },
-        { 5.9039056e+11f, 1.0655088e+11f, 5.0045413e+11f, -6.161432e+11f, -8.0449085e+10f, -1.7690893e+11f },
-        { 7.835179e+11f, -1.2846023e+11f, 2.0036921e+11f, -5.625638e+11f, 1.1599883e+11f, 1.5950956e+11f },
-        { -8.0449085e+10f, -1.7690893e+11f, 5.9039056e+11f, 1.0655088e+11f, 5.0045413e+11f, -6.161432e+11f }
-    };
-    static const float TABLE_3[12][6] = {
-        { -4.4585724e+12f, 1.102723e+12f, 1.3200545e+11f, 1.7759255e+12f, -1.5802731e+12f, -2.536233e+12f },
-        { 2.3661778e+12f, 2.4000602e+12f, 1.4819732e+12f, -1.1901199e+12f, -1.1851115e+12f, 1.3707138e+12f },
-        { 1.4880515e+12f, 1.02434066e+12f, 3.1952187e+12f, -3.3340386e+12f, -1.4328322e+12f, -2.6332991e+12f },
-        { -1.7746715e+12f, 6.861064e+11f, 8.951435e+11f, 3.2527894e+12f, 1.7830487e+12f, -3.4267975e+11f },
-        { 1.0806304e+12f, 1.4966203e+12f, 3.0024456e+12f, -3.4103414e+12f, -2.2080156e+12f, -2.6212012e+12f },
-        { -1.883654e+12f, 7.064584e+11f, 1.1220354e+12f, 3.5960072e+12f, 2.1216132e+12f, -4.5177068e+11f },
-        { 9.697803e+11f, 1.4594866e+12f, -5.4737345e+11f, 2.2814135e+12f, 9.2301296e+11f, 3.1843436e+12f },
-        { -3.9721988e+12f, 1.851032e+12f, 3.843818e+12f, -2.6561623e+12f, -3.967535e+12f, -7.1714346e+12f },
-        { 2.2969296e+12f, 6.93611e+11f, 7.789762e+11f, 1.5153417e+12f, 2.2495927e+12f, 2.4190625e+12f },
-        { -4.2271263e+12f, 1.9982296e+12f, 3.5889726e+12f, -2.5090518e+12f, -4.222497e+12f, -7.0243514e+12f },
-        { -4.4247045e+12f, 8.9836945e+11f, 7.435699e+11f, 1.6559757e+12f, -1.1844611e+12f, -3.1986845e+12f },
-        { 2.5495121e+12f, 2.7678878e+12f, 1.5541005e+12f, -1.2738329e+12f, -1.4484263e+12f, 1.6090792e+12f }
-    };
-    static const float TABLE_4[12][6] = {
-        { 1.3734536e+11f, -3.5444797e+12f, -2.7926258e+12f, -1.9302325e+12f, 7.0338765e+10f, -1.9992656e+11f },
-        { 3.50037e+12f, 6.7848587e+12f, 4.059425e+12f, -1.6124403e+12f, -3.4923767e+12f, 2.1020536e+12f },
-        { 2.8585063e+11f, 3.333003e+12f, 3.0894944e+12f, 1.6695599e+12f, 2.4708851e+11f, 7.325468e+10f },
-        { 3.4239317e+12f, -2.704245e+12f, -4.1205613e+12f, -6.4245046e+12f, -3.5701538e+12f, 1.9693478e+12f },
-        { 1.1551834e+12f, 2.0573224e+12f, 3.2989472e+12f, 1.4659148e+12f, 1.7148913e+12f, -9.493543e+10f },
-        { 3.1706516e+12f, -2.4079872e+12f, -4.07338e+12f, -6.234046e+12f, -3.7648282e+12f, 1.952499e+12f },
-        { 1.0833221e+12f, 2.1930641e+12f, -1.4129366e+12f, -2.6369178e+12f, -4.3476942e+12f, 1.9398967e+12f },
-        { 3.8327186e+11f, -7.5461276e+11f, -3.1277734e+11f, 8.53514e+11f, 1.4279259e+12f, 6.522469e+11f },
-        { 1.5938316e+12f, 2.529548e+12f, -1.3767377e+12f, -2.0435721e+12f, -3.8518912e+12f, 2.8155762e+12f },
-        { -8.9809656e+11f, -1.5306036e+11f, 8.487993e+11f, 4.6308487e+10f, 1.4800983e+11f, -1.5662322e+12f },
-        { 4.1998467e+11f, -3.6188638e+12f, -1.2494657e+12f, -2.0487497e+12f, 9.450183e+11f, -1.3880204e+12f },
-        { 3.358615e+12f, 6.647834e+12f, 3.6755997e+12f, -1.5404901e+12f, -3.5741893e+12f, 2.279155e+12f }
-    };
-    float shared1[6];
-    float shared2[6];
     int i;
+    for (i = 0; i < 6; i++) {
+        const float t1 = (x[i] < 570.51404f) ? x[i] : 570.51404f;
+        const float t2 = t1 - 432.83203f;
+        const float t3 = (((1.633017e-37f * t2) - 2.3013922e-35f) * t2) - 1.0610405e-32f;
+        const float t4 = (((t3 * t2) + 1.92615e-30f) * t2) + 1.3653258e-28f;
+        const float t5 = (((t4 * t2) - 4.145125e-26f) * t2) + 2.2336474e-24f;
+        const float t6 = (((t5 * t2) - 3.3138825e-22f) * t2) + 8.2948205e-20f;
+        const float t7 = (((t6 * t2) - 5.5785325e-18f) * t2) - 1.8503594e-15f;
+        const float t8 = (((t7 * t2) + 9.850066e-13f) * t2) - 3.5499853e-10f;
+        result[i] = (((t8 * t2) + 1.8703099e-07f) * t2) + 3.4055425e-05f;
+    }
+}
+
+/* As many coordinates of the displacement as these limits depend on. */
+static void mems_hexapod_online_f32_few_coordinates(const float wanted[6], float result[4])
+{
     const float wanted_0 = wanted[0];
     const float wanted_1 = wanted[1];
     const float wanted_2 = wanted[2];
     const float wanted_3 = wanted[3];
     const float wanted_4 = wanted[4];
     const float wanted_5 = wanted[5];
+    result[0] = wanted_0 + (0.5f * wanted_4) + (0.8660254f * wanted_5);
+    result[1] = wanted_1 - (0.8660254f * wanted_4) + (0.5f * wanted_5);
+    result[2] = wanted_2 + (0.5f * wanted_4) - (0.8660254f * wanted_5);
+    result[3] = wanted_3 + (0.8660254f * wanted_4) + (0.5f * wanted_5);
+}
+
+/* The square of each wire flexure stress over its limit at displacement with these coordinates `few`. */
+static void mems_hexapod_online_f32_few_shares(const float few[4], float result[12])
+{
+    static const float TABLE_1[6][4] = {
+        { 7.163396e+09f, -8.725365e+09f, -1.0396979e+10f, -4.441134e+09f },
+        { 1.3912608e+09f, -1.1251239e+10f, -1.1180811e+10f, 1.8204311e+09f },
+        { 2.0934612e+09f, 8.624482e+09f, 7.163396e+09f, -8.725365e+09f },
+        { 6.4256225e+09f, 6.1723305e+09f, 1.3912608e+09f, -1.1251239e+10f },
+        { -1.0396979e+10f, -4.441134e+09f, 2.0934612e+09f, 8.624482e+09f },
+        { -1.1180811e+10f, 1.8204311e+09f, 6.4256225e+09f, 6.1723305e+09f }
+    };
+    static const float TABLE_2[6][4] = {
+        { 1.1599883e+11f, 1.5950956e+11f, 7.835179e+11f, -1.2846023e+11f },
+        { 5.0045413e+11f, -6.161432e+11f, -8.0449085e+10f, -1.7690893e+11f },
+        { 2.0036921e+11f, -5.625638e+11f, 1.1599883e+11f, 1.5950956e+11f },
+        { 5.9039056e+11f, 1.0655088e+11f, 5.0045413e+11f, -6.161432e+11f },
+        { 7.835179e+11f, -1.2846023e+11f, 2.0036921e+11f, -5.625638e+11f },
+        { -8.0449085e+10f, -1.7690893e+11f, 5.9039056e+11f, 1.0655088e+11f }
+    };
+    static const float TABLE_3[12][4] = {
+        { -4.4585724e+12f, 1.102723e+12f, 1.3200545e+11f, 1.7759255e+12f },
+        { 2.3661778e+12f, 2.4000602e+12f, 1.4819732e+12f, -1.1901199e+12f },
+        { 1.4880515e+12f, 1.02434066e+12f, 3.1952187e+12f, -3.3340386e+12f },
+        { -1.7746715e+12f, 6.861064e+11f, 8.951435e+11f, 3.2527894e+12f },
+        { 1.0806304e+12f, 1.4966203e+12f, 3.0024456e+12f, -3.4103414e+12f },
+        { -1.883654e+12f, 7.064584e+11f, 1.1220354e+12f, 3.5960072e+12f },
+        { 9.697803e+11f, 1.4594866e+12f, -5.4737345e+11f, 2.2814135e+12f },
+        { -3.9721988e+12f, 1.851032e+12f, 3.843818e+12f, -2.6561623e+12f },
+        { 2.2969296e+12f, 6.93611e+11f, 7.789762e+11f, 1.5153417e+12f },
+        { -4.2271263e+12f, 1.9982296e+12f, 3.5889726e+12f, -2.5090518e+12f },
+        { -4.4247045e+12f, 8.9836945e+11f, 7.435699e+11f, 1.6559757e+12f },
+        { 2.5495121e+12f, 2.7678878e+12f, 1.5541005e+12f, -1.2738329e+12f }
+    };
+    static const float TABLE_4[12][4] = {
+        { 1.3734536e+11f, -3.5444797e+12f, -2.7926258e+12f, -1.9302325e+12f },
+        { 3.50037e+12f, 6.7848587e+12f, 4.059425e+12f, -1.6124403e+12f },
+        { 2.8585063e+11f, 3.333003e+12f, 3.0894944e+12f, 1.6695599e+12f },
+        { 3.4239317e+12f, -2.704245e+12f, -4.1205613e+12f, -6.4245046e+12f },
+        { 1.1551834e+12f, 2.0573224e+12f, 3.2989472e+12f, 1.4659148e+12f },
+        { 3.1706516e+12f, -2.4079872e+12f, -4.07338e+12f, -6.234046e+12f },
+        { 1.0833221e+12f, 2.1930641e+12f, -1.4129366e+12f, -2.6369178e+12f },
+        { 3.8327186e+11f, -7.5461276e+11f, -3.1277734e+11f, 8.53514e+11f },
+        { 1.5938316e+12f, 2.529548e+12f, -1.3767377e+12f, -2.0435721e+12f },
+        { -8.9809656e+11f, -1.5306036e+11f, 8.487993e+11f, 4.6308487e+10f },
+        { 4.1998467e+11f, -3.6188638e+12f, -1.2494657e+12f, -2.0487497e+12f },
+        { 3.358615e+12f, 6.647834e+12f, 3.6755997e+12f, -1.5404901e+12f }
+    };
+    float shared1[6];
+    float shared2[6];
+    int i;
+    const float few_0 = few[0];
+    const float few_1 = few[1];
+    const float few_2 = few[2];
+    const float few_3 = few[3];
     for (i = 0; i < 6; i++) {
-        const float t1 = (TABLE_1[i][0] * wanted_0) + (TABLE_1[i][1] * wanted_1) + (TABLE_1[i][2] * wanted_2) +
-            (TABLE_1[i][3] * wanted_3) + (TABLE_1[i][4] * wanted_4) + (TABLE_1[i][5] * wanted_5);
+        const float t1 = (TABLE_1[i][0] * few_0) + (TABLE_1[i][1] * few_1) + (TABLE_1[i][2] * few_2) + (TABLE_1[i][3] *
+            few_3);
         shared1[i] = (t1 < 0.0f) ? -t1 : t1;
     }
     for (i = 0; i < 6; i++) {
-        const float t2 = (TABLE_2[i][0] * wanted_0) + (TABLE_2[i][1] * wanted_1) + (TABLE_2[i][2] * wanted_2) +
-            (TABLE_2[i][3] * wanted_3) + (TABLE_2[i][4] * wanted_4) + (TABLE_2[i][5] * wanted_5);
+        const float t2 = (TABLE_2[i][0] * few_0) + (TABLE_2[i][1] * few_1) + (TABLE_2[i][2] * few_2) + (TABLE_2[i][3] *
+            few_3);
         shared2[i] = 3.0f * (t2 * t2);
     }
     for (i = 0; i < 12; i++) {
-        const float t3 = (TABLE_3[i][0] * wanted_0) + (TABLE_3[i][1] * wanted_1) + (TABLE_3[i][2] * wanted_2) +
-            (TABLE_3[i][3] * wanted_3) + (TABLE_3[i][4] * wanted_4) + (TABLE_3[i][5] * wanted_5);
-        const float t4 = (TABLE_4[i][0] * wanted_0) + (TABLE_4[i][1] * wanted_1) + (TABLE_4[i][2] * wanted_2) +
-            (TABLE_4[i][3] * wanted_3) + (TABLE_4[i][4] * wanted_4) + (TABLE_4[i][5] * wanted_5);
+        const float t3 = (TABLE_3[i][0] * few_0) + (TABLE_3[i][1] * few_1) + (TABLE_3[i][2] * few_2) + (TABLE_3[i][3] *
+            few_3);
+        const float t4 = (TABLE_4[i][0] * few_0) + (TABLE_4[i][1] * few_1) + (TABLE_4[i][2] * few_2) + (TABLE_4[i][3] *
+            few_3);
         const float t5 = ((t3 * t3) + (t4 * t4)) + 0.3025f;
         const float t6 = mems_hexapod_online_f32_square_root(t5) + shared1[i / 2];
         result[i] = 3.3057851e-18f * ((t6 * t6) + shared2[i / 2]);
     }
 }
 
-/* A cheap upper bound of the root of the largest of these shares: no more than 1 means that every limit is kept. */
-static float mems_hexapod_online_f32_composite_bound(const float wanted[6])
-{
-    const float t1 = ((-7418.532f) * wanted[0]) - (4198.844f * wanted[1]) + (72.96058f * wanted[2]) + (8524.06f *
-        wanted[3]) + (7345.572f * wanted[4]) - (4325.2153f * wanted[5]);
-    const float t2 = (t1 < 0.0f) ? -t1 : t1;
-    const float t3 = ((-4731.5063f) * wanted[0]) + (8359.642f * wanted[1]) + (9605.415f * wanted[2]) - (82.2163f *
-        wanted[3]) - (4873.909f * wanted[4]) - (8277.426f * wanted[5]);
-    const float t4 = (t3 < 0.0f) ? -t3 : t3;
-    const float t5 = (3009.9507f * wanted[0]) - (1737.9247f * wanted[1]) + (3009.9507f * wanted[2]) - (1737.9247f *
-        wanted[3]) + (3009.9507f * wanted[4]) - (1737.9247f * wanted[5]);
-    const float t6 = (t5 < 0.0f) ? -t5 : t5;
-    const float t7 = (2774.401f * wanted[0]) + (4745.9053f * wanted[1]) + (2774.401f * wanted[2]) + (4745.9053f *
-        wanted[3]) + (2774.401f * wanted[4]) + (4745.9053f * wanted[5]);
-    const float t8 = (t7 < 0.0f) ? -t7 : t7;
-    return (((t2 + t4) + t6) + t8) + 1.0020007e-06f;
-}
-
-/* The same bound at the displacement of a `target` that leads into the range. */
+/* A cheap upper bound of the root of the largest of these shares at the displacement of a `target` that leads into the
+ * range: no more than 1 means that every limit is kept. */
 static float mems_hexapod_online_f32_target_bound(const float target[6])
 {
     const float t1 = 78.29389f * target[0];
@@ -341,7 +353,7 @@ static float mems_hexapod_online_f32_target_bound(const float target[6])
     const float t6 = (t5 < 0.0f) ? -t5 : t5;
     const float t7 = 21314.357f * target[5];
     const float t8 = (t7 < 0.0f) ? -t7 : t7;
-    return (((t2 + t4) + t6) + t8) + 1.0020009e-06f;
+    return (((t2 + t4) + t6) + t8) + 1.0020003e-06f;
 }
 
 /* Pose of the stated point where `pose` is that of the `pivot`: delta = delta_p - (R - I) pivot, R the rotation by
@@ -458,40 +470,32 @@ static int mems_hexapod_online_f32_limit_all(float value[], const float low[], c
     int hit = 0;
     int i;
     for (i = 0; i < count; i++) {
-        const int unknown = mems_hexapod_online_f32_is_nan(&value[i]);
-        const float wanted = (unknown != 0) ? low[i] : value[i];
-        const float raised = (wanted > low[i]) ? wanted : low[i];
-        const float limited = (raised < high[i]) ? raised : high[i];
-        const float moved = limited - wanted;
-        if ((unknown != 0) || (moved > slack[i]) || (moved < -slack[i])) {
+        if (mems_hexapod_online_f32_is_nan(&value[i]) != 0) {
+            value[i] = low[i];
             hit = 1;
+        } else if (value[i] > high[i]) {
+            if ((value[i] - high[i]) > slack[i]) {
+                hit = 1;
+            }
+            value[i] = high[i];
+        } else if (value[i] <= low[i]) { /* a negative zero too */
+            if ((low[i] - value[i]) > slack[i]) {
+                hit = 1;
+            }
+            value[i] = low[i];
+        } else {
+            /* within its limits */
         }
-        value[i] = limited;
     }
     return hit;
 }
 
-/* Clips a displacement to its range; 1 if it was beyond by more than the slack. */
-static int mems_hexapod_online_f32_limit_displacement(float value[6])
+/* The squares of how far a displacement uses composite limits. */
+static void mems_hexapod_online_f32_used_shares(const float wanted[6], float share[12])
 {
-    static const float LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* m */
-    static const float HIGH[6] = { 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f }; /* m */
-    static const float SLACK[6] = { 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f }; /* m */
-    return mems_hexapod_online_f32_limit_all(value, LOW, HIGH, SLACK, 6);
-}
-
-/* 1 if every drive is within its limits or beyond by no more than the slack. */
-static int mems_hexapod_online_f32_drives_admissible(const mems_hexapod_online_f32_state *state, const float drive[6])
-{
-    int admissible = 1;
-    int i;
-    (void)state;
-    for (i = 0; i < 6; i++) {
-        if ((mems_hexapod_online_f32_is_nan(&drive[i]) != 0) || (drive[i] > MEMS_HEXAPOD_ONLINE_F32_U_MOST[i]) || (drive[i] < MEMS_HEXAPOD_ONLINE_F32_U_LEAST[i])) {
-            admissible = 0;
-        }
-    }
-    return admissible;
+    float few[4];
+    mems_hexapod_online_f32_few_coordinates(wanted, few);
+    mems_hexapod_online_f32_few_shares(few, share);
 }
 
 /* Scales a displacement that breaks a composite limit toward home, several times where the limited quantity is not proportional to it: 0
@@ -505,7 +509,7 @@ static int mems_hexapod_online_f32_scale_home(const mems_hexapod_online_f32_stat
         float share[12];
         float worst;
         int i;
-        mems_hexapod_online_f32_composite_shares(wanted, share);
+        mems_hexapod_online_f32_used_shares(wanted, share);
         worst = share[0];
         for (i = 0; i < 12; i++) {
             worst = (share[i] > worst) ? share[i] : worst;
@@ -525,50 +529,66 @@ static int mems_hexapod_online_f32_scale_home(const mems_hexapod_online_f32_stat
     return hit;
 }
 
+/* Clips a number to low ... high. */
+static float mems_hexapod_online_f32_clipped(float number, float low, float high)
+{
+    const float raised = (number > low) ? number : low;
+    return (raised < high) ? raised : high;
+}
+
 /* The displacement in range whose followed signal is nearest to that of the displacement beyond, to first order, from beyond clipped to
  * the range: sweeps of projected coordinate descent (C. Hildreth, Naval Res. Logist. Quart. 4 (1957) 79) on |W (value - beyond)|^2,
- * W the slope of the followed signal at home. */
-static void mems_hexapod_online_f32_nearest_displacement(const float beyond[6], float value[6])
+ * W the slope of the followed signal at home, by H_ij/H_ii of H = W^T W. Axis by axis, because a loop costs a small core twice as much.
+ * 1 if beyond was out of range by more than the slack, else value is clipped alone. */
+static int mems_hexapod_online_f32_nearest_displacement(const float beyond[6], float value[6])
 {
-    static const float P[6][6] = {
-        { 1.0f, 0.49971864f, -0.2363756f, -0.07558483f, -0.2363756f, -0.20494296f },
-        { 1.1193434f, 1.0f, -0.45906138f, -0.25956145f, -0.16930602f, -0.25956145f },
-        { -0.2363756f, -0.20494296f, 1.0f, 0.49971864f, -0.2363756f, -0.07558483f },
-        { -0.16930602f, -0.25956145f, 1.1193434f, 1.0f, -0.45906138f, -0.25956145f },
-        { -0.2363756f, -0.07558483f, -0.2363756f, -0.20494296f, 1.0f, 0.49971864f },
-        { -0.45906138f, -0.25956145f, -0.16930602f, -0.25956145f, 1.1193434f, 1.0f }
-    }; /* H_ij/H_jj of H = W^T W */
     static const float LOW[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }; /* m */
     static const float HIGH[6] = { 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f }; /* m */
-    float slope[6] = { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f };
+    static const float SLACK[6] = { 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f }; /* m */
+    float off[6];
+    int hit = 0;
     int sweep;
     int i;
+    value[0] = mems_hexapod_online_f32_clipped(beyond[0], LOW[0], HIGH[0]);
+    value[1] = mems_hexapod_online_f32_clipped(beyond[1], LOW[1], HIGH[1]);
+    value[2] = mems_hexapod_online_f32_clipped(beyond[2], LOW[2], HIGH[2]);
+    value[3] = mems_hexapod_online_f32_clipped(beyond[3], LOW[3], HIGH[3]);
+    value[4] = mems_hexapod_online_f32_clipped(beyond[4], LOW[4], HIGH[4]);
+    value[5] = mems_hexapod_online_f32_clipped(beyond[5], LOW[5], HIGH[5]);
+    off[0] = value[0] - beyond[0];
+    off[1] = value[1] - beyond[1];
+    off[2] = value[2] - beyond[2];
+    off[3] = value[3] - beyond[3];
+    off[4] = value[4] - beyond[4];
+    off[5] = value[5] - beyond[5];
     for (i = 0; i < 6; i++) {
-        const float change = value[i] - beyond[i];
-        slope[0] = slope[0] + (P[i][0] * change);
-        slope[1] = slope[1] + (P[i][1] * change);
-        slope[2] = slope[2] + (P[i][2] * change);
-        slope[3] = slope[3] + (P[i][3] * change);
-        slope[4] = slope[4] + (P[i][4] * change);
-        slope[5] = slope[5] + (P[i][5] * change);
-    }
-    for (sweep = 0; sweep < 3; sweep++) {
-        for (i = 0; i < 6; i++) {
-            const float wanted = value[i] - slope[i];
-            const float raised = (wanted > LOW[i]) ? wanted : LOW[i];
-            const float moved = (raised < HIGH[i]) ? raised : HIGH[i];
-            const float change = moved - value[i];
-            if ((change < 0.0f) || (change > 0.0f)) {
-                slope[0] = slope[0] + (P[i][0] * change);
-                slope[1] = slope[1] + (P[i][1] * change);
-                slope[2] = slope[2] + (P[i][2] * change);
-                slope[3] = slope[3] + (P[i][3] * change);
-                slope[4] = slope[4] + (P[i][4] * change);
-                slope[5] = slope[5] + (P[i][5] * change);
-                value[i] = moved;
-            }
+        if ((off[i] > SLACK[i]) || (off[i] < -SLACK[i])) {
+            hit = 1;
         }
     }
+    if (hit != 0) {
+        for (sweep = 0; sweep < 3; sweep++) {
+            value[0] = mems_hexapod_online_f32_clipped(beyond[0] - ((1.1193434f * off[1]) - (0.2363756f * off[2]) - (0.16930602f * off[3]) -
+                (0.2363756f * off[4]) - (0.45906138f * off[5])), 0.0f, 5.5e-05f);
+            off[0] = value[0] - beyond[0];
+            value[1] = mems_hexapod_online_f32_clipped(beyond[1] - ((0.49971864f * off[0]) - (0.20494296f * off[2]) - (0.25956145f * off[3]) -
+                (0.07558483f * off[4]) - (0.25956145f * off[5])), 0.0f, 5.5e-05f);
+            off[1] = value[1] - beyond[1];
+            value[2] = mems_hexapod_online_f32_clipped(beyond[2] - (-(0.2363756f * off[0]) - (0.45906138f * off[1]) + (1.1193434f * off[3]) -
+                (0.2363756f * off[4]) - (0.16930602f * off[5])), 0.0f, 5.5e-05f);
+            off[2] = value[2] - beyond[2];
+            value[3] = mems_hexapod_online_f32_clipped(beyond[3] - (-(0.07558483f * off[0]) - (0.25956145f * off[1]) + (0.49971864f * off[2]) -
+                (0.20494296f * off[4]) - (0.25956145f * off[5])), 0.0f, 5.5e-05f);
+            off[3] = value[3] - beyond[3];
+            value[4] = mems_hexapod_online_f32_clipped(beyond[4] - (-(0.2363756f * off[0]) - (0.16930602f * off[1]) - (0.2363756f * off[2]) -
+                (0.45906138f * off[3]) + (1.1193434f * off[5])), 0.0f, 5.5e-05f);
+            off[4] = value[4] - beyond[4];
+            value[5] = mems_hexapod_online_f32_clipped(beyond[5] - (-(0.20494296f * off[0]) - (0.25956145f * off[1]) - (0.07558483f * off[2]) -
+                (0.25956145f * off[3]) + (0.49971864f * off[4])), 0.0f, 5.5e-05f);
+            off[5] = value[5] - beyond[5];
+        }
+    }
+    return hit;
 }
 
 /* Actuator state (limited) and drives (not limited) that out->displacement needs: with settling at rest, else at the next sample. */
@@ -580,87 +600,56 @@ static void mems_hexapod_online_f32_wanted_drives(const mems_hexapod_online_f32_
     mems_hexapod_online_f32_step_drive(state->x, out->state, out->drive);
 }
 
-/* Line search from origin toward out->displacement, whose drives are inadmissible: secants of the drive that is first
- * at its limit. Leaves the farthest admissible displacement found and its drives; 1 if even those of origin are inadmissible. */
-static int mems_hexapod_online_f32_line_search(const mems_hexapod_online_f32_state *state, int settling, const float origin[6], mems_hexapod_online_f32_output *out)
+/* Keeps the limits of drives that out->drive does not keep: as far from origin toward out->displacement as every drive can lead the
+ * displacement of its own. The drives held within their limits lead to reached, and the slowest of those that were beyond says how much of the
+ * line is gone. As drives rise with their displacements, or fall, all lie between those of origin and held; limited is 1 if one does not,
+ * because those of origin are inadmissible. */
+static uint32_t mems_hexapod_online_f32_into_reach(const mems_hexapod_online_f32_state *state, int settling, const float origin[6], mems_hexapod_online_f32_output *out, int *limited)
 {
-    float direction[6];
-    float at_target[6];
-    int i;
-    for (i = 0; i < 6; i++) {
-        direction[i] = out->displacement[i] - origin[i];
-        out->displacement[i] = origin[i];
-    }
-    for (i = 0; i < 6; i++) {
-        at_target[i] = out->drive[i];
-    }
-    mems_hexapod_online_f32_wanted_drives(state, settling, out);
-    if (mems_hexapod_online_f32_drives_admissible(state, out->drive) != 0) {
-        float at_start[6];
-        float state_at_start[6];
-        float accepted = 0.0f;
-        float rejected = 1.0f;
-        int trial;
-        at_start[0] = out->drive[0];
-        at_start[1] = out->drive[1];
-        at_start[2] = out->drive[2];
-        at_start[3] = out->drive[3];
-        at_start[4] = out->drive[4];
-        at_start[5] = out->drive[5];
-        state_at_start[0] = out->state[0];
-        state_at_start[1] = out->state[1];
-        state_at_start[2] = out->state[2];
-        state_at_start[3] = out->state[3];
-        state_at_start[4] = out->state[4];
-        state_at_start[5] = out->state[5];
-        for (trial = 0; trial < 3; trial++) {
-            float share = 1.0f;
-            float fraction;
-            for (i = 0; i < 6; i++) {
-                if ((at_target[i] > MEMS_HEXAPOD_ONLINE_F32_U_MOST[i]) || (at_target[i] < MEMS_HEXAPOD_ONLINE_F32_U_LEAST[i])) {
-                    const float limit = (at_target[i] > MEMS_HEXAPOD_ONLINE_F32_U_HIGH[i]) ? MEMS_HEXAPOD_ONLINE_F32_U_HIGH[i] : MEMS_HEXAPOD_ONLINE_F32_U_LOW[i];
-                    const float reached = (limit - at_start[i]) / (at_target[i] - at_start[i]);
-                    share = (reached < share) ? reached : share;
+    float held[6];
+    uint32_t status = 0U;
+    held[0] = out->drive[0];
+    held[1] = out->drive[1];
+    held[2] = out->drive[2];
+    held[3] = out->drive[3];
+    held[4] = out->drive[4];
+    held[5] = out->drive[5];
+    if (mems_hexapod_online_f32_limit_all(held, MEMS_HEXAPOD_ONLINE_F32_U_LOW, MEMS_HEXAPOD_ONLINE_F32_U_HIGH, MEMS_HEXAPOD_ONLINE_F32_U_SLACK, 6) == 0) {
+        out->drive[0] = held[0];
+        out->drive[1] = held[1];
+        out->drive[2] = held[2];
+        out->drive[3] = held[3];
+        out->drive[4] = held[4];
+        out->drive[5] = held[5];
+    } else {
+        float reached[6];
+        float x[6];
+        float share = 1.0f;
+        int i;
+        mems_hexapod_online_f32_step_advance(state->x, held, x);
+        mems_hexapod_online_f32_reached_displacement(x, reached);
+        for (i = 0; i < 6; i++) {
+            const float whole = out->displacement[i] - origin[i];
+            if ((out->drive[i] > held[i]) || (out->drive[i] < held[i])) {
+                const float gone = reached[i] - origin[i];
+                const float most = share * whole;
+                if (((whole > 0.0f) && (gone < most)) || ((whole < 0.0f) && (gone > most))) {
+                    share = gone / whole;
                 }
             }
-            share = (share > 0.0f) ? share : 0.0f;
-            fraction = accepted + ((0.99609375f * share) * (rejected - accepted));
-            for (i = 0; i < 6; i++) {
-                out->displacement[i] = origin[i] + (fraction * direction[i]);
-            }
-            mems_hexapod_online_f32_wanted_drives(state, settling, out);
-            if (mems_hexapod_online_f32_drives_admissible(state, out->drive) != 0) {
-                accepted = fraction;
-                at_start[0] = out->drive[0];
-                at_start[1] = out->drive[1];
-                at_start[2] = out->drive[2];
-                at_start[3] = out->drive[3];
-                at_start[4] = out->drive[4];
-                at_start[5] = out->drive[5];
-                state_at_start[0] = out->state[0];
-                state_at_start[1] = out->state[1];
-                state_at_start[2] = out->state[2];
-                state_at_start[3] = out->state[3];
-                state_at_start[4] = out->state[4];
-                state_at_start[5] = out->state[5];
-            } else {
-                rejected = fraction;
-                for (i = 0; i < 6; i++) {
-                    at_target[i] = out->drive[i];
-                }
-            }
+            reached[i] = whole;
         }
+        share = (share > 0.0f) ? (0.99993896f * share) : 0.0f;
         for (i = 0; i < 6; i++) {
-            out->displacement[i] = origin[i] + (accepted * direction[i]);
+            out->displacement[i] = origin[i] + (share * reached[i]);
         }
-        for (i = 0; i < 6; i++) {
-            out->drive[i] = at_start[i];
+        mems_hexapod_online_f32_wanted_drives(state, settling, out);
+        if (mems_hexapod_online_f32_drive_inside(out->drive) == 0) {
+            *limited = mems_hexapod_online_f32_limit_all(out->drive, MEMS_HEXAPOD_ONLINE_F32_U_LOW, MEMS_HEXAPOD_ONLINE_F32_U_HIGH, MEMS_HEXAPOD_ONLINE_F32_U_SLACK, 6);
         }
-        for (i = 0; i < 6; i++) {
-            out->state[i] = state_at_start[i];
-        }
+        status = MEMS_HEXAPOD_ONLINE_F32_DRIVE;
     }
-    return mems_hexapod_online_f32_limit_all(out->drive, MEMS_HEXAPOD_ONLINE_F32_U_LOW, MEMS_HEXAPOD_ONLINE_F32_U_HIGH, MEMS_HEXAPOD_ONLINE_F32_U_SLACK, 6);
+    return status;
 }
 
 void mems_hexapod_online_f32_init_1000hz_5f705b14(mems_hexapod_online_f32_state *state)
@@ -786,16 +775,15 @@ static uint32_t mems_hexapod_online_f32_settle_within(mems_hexapod_online_f32_st
     int lost = 0;
     float before[6];
     mems_hexapod_online_f32_copy_states(state->x, before);
-    mems_hexapod_online_f32_wanted_state(out->displacement, out->state);
     if (kept == 0) {
         const int scaled = mems_hexapod_online_f32_scale_home(state, out->displacement);
         if (scaled > 0) {
             if (scaled > 1) {
                 status |= MEMS_HEXAPOD_ONLINE_F32_COMPOSITE;
             }
-            mems_hexapod_online_f32_wanted_state(out->displacement, out->state);
         }
     }
+    mems_hexapod_online_f32_wanted_state(out->displacement, out->state);
     mems_hexapod_online_f32_wanted_drive(out->state, out->drive);
     if (mems_hexapod_online_f32_drive_inside(out->drive) == 0) {
         if (mems_hexapod_online_f32_is_lost(state) != 0) {
@@ -818,20 +806,13 @@ static uint32_t mems_hexapod_online_f32_settle_beyond(mems_hexapod_online_f32_st
 {
     uint32_t status;
     int hit;
-    int kept = 0;
     float beyond[6];
     int i;
     for (i = 0; i < 6; i++) {
         beyond[i] = out->displacement[i];
     }
-    hit = mems_hexapod_online_f32_limit_displacement(out->displacement);
-    if (hit != 0) {
-        mems_hexapod_online_f32_nearest_displacement(beyond, out->displacement);
-    }
-    if (mems_hexapod_online_f32_composite_bound(out->displacement) <= 1.0f) {
-        kept = 1;
-    }
-    status = mems_hexapod_online_f32_settle_within(state, out, kept);
+    hit = mems_hexapod_online_f32_nearest_displacement(beyond, out->displacement);
+    status = mems_hexapod_online_f32_settle_within(state, out, 0);
     if ((hit != 0) && (status != MEMS_HEXAPOD_ONLINE_F32_LOST)) {
         status |= MEMS_HEXAPOD_ONLINE_F32_DISPLACEMENT;
     }
@@ -900,12 +881,7 @@ static void mems_hexapod_online_f32_step_safe(mems_hexapod_online_f32_state *sta
 static uint32_t mems_hexapod_online_f32_step_limit_drives(const mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out, int *limited)
 {
     uint32_t status = 0U;
-    if (mems_hexapod_online_f32_drives_admissible(state, out->drive) != 0) {
-        (void)mems_hexapod_online_f32_limit_all(out->drive, MEMS_HEXAPOD_ONLINE_F32_U_LOW, MEMS_HEXAPOD_ONLINE_F32_U_HIGH, MEMS_HEXAPOD_ONLINE_F32_U_SLACK, 6);
-    } else {
-        *limited = mems_hexapod_online_f32_line_search(state, 0, state->z, out);
-        status = MEMS_HEXAPOD_ONLINE_F32_DRIVE;
-    }
+    status = mems_hexapod_online_f32_into_reach(state, 0, state->z, out, limited);
     return status;
 }
 
@@ -940,16 +916,15 @@ static uint32_t mems_hexapod_online_f32_step_within(mems_hexapod_online_f32_stat
     uint32_t status = 0U;
     int limited = 0;
     int lost = 0;
-    mems_hexapod_online_f32_wanted_state(out->displacement, out->state);
     if (kept == 0) {
         const int scaled = mems_hexapod_online_f32_scale_home(state, out->displacement);
         if (scaled > 0) {
             if (scaled > 1) {
                 status |= MEMS_HEXAPOD_ONLINE_F32_COMPOSITE;
             }
-            mems_hexapod_online_f32_wanted_state(out->displacement, out->state);
         }
     }
+    mems_hexapod_online_f32_wanted_state(out->displacement, out->state);
     mems_hexapod_online_f32_step_drive(state->x, out->state, out->drive);
     if (mems_hexapod_online_f32_drive_inside(out->drive) == 0) {
         if (mems_hexapod_online_f32_is_lost(state) != 0) {
@@ -971,20 +946,13 @@ static uint32_t mems_hexapod_online_f32_step_beyond(mems_hexapod_online_f32_stat
 {
     uint32_t status;
     int hit;
-    int kept = 0;
     float beyond[6];
     int i;
     for (i = 0; i < 6; i++) {
         beyond[i] = out->displacement[i];
     }
-    hit = mems_hexapod_online_f32_limit_displacement(out->displacement);
-    if (hit != 0) {
-        mems_hexapod_online_f32_nearest_displacement(beyond, out->displacement);
-    }
-    if (mems_hexapod_online_f32_composite_bound(out->displacement) <= 1.0f) {
-        kept = 1;
-    }
-    status = mems_hexapod_online_f32_step_within(state, out, kept);
+    hit = mems_hexapod_online_f32_nearest_displacement(beyond, out->displacement);
+    status = mems_hexapod_online_f32_step_within(state, out, 0);
     if ((hit != 0) && (status != MEMS_HEXAPOD_ONLINE_F32_LOST)) {
         status |= MEMS_HEXAPOD_ONLINE_F32_DISPLACEMENT;
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from ctrlgen.controller.clocked import BACKWARD
 from ctrlgen.controller.estimate import DOUBLED, EXACT
-from ctrlgen.controller.feedforward import SECANT_FRACTION, SECANT_STEPS
+from ctrlgen.controller.feedforward import REACH_FRACTION, SECANT_FRACTION, SECANT_STEPS
 from ctrlgen.controller.nearest_displacement import SWEEPS
 from ctrlgen.controller.ringing import TOLD
 from ctrlgen.firmware.c.preprocessor import Macro, resolved
@@ -20,12 +21,15 @@ from ctrlgen.firmware.online.limit_tables import within_test
 from ctrlgen.model.discretisation import SETTLING_SWEEPS
 
 CONFIGURATION = "limiter_config.h"  # what the macros are defined in, where the files are compiled as they are
+WIDE = 110  # characters of a statement that a macro stands for
 # Arrays of numbers of the context of online.c.j2: Z_LOW_TABLE is what stands in braces for "z_low".
 TABLES = "z_low z_high z_slack s_low s_high s_slack u_low u_high u_slack fall rise rest"
 # Parameters of the macros that call kernels, and what the kernels take for their arguments.
 CALLS = {
     "balance": ("state x z drive result", {"x": "x", "z": "z", "drive": "drive"}),
     "shares": ("state wanted result", {"x": "state->x", "z": "state->z", "wanted": "wanted"}),
+    "few": ("wanted result", {"wanted": "wanted"}),
+    "of_few": ("few result", {"few": "few"}),
     "displacement": ("state target result", {"x": "state->x", "z": "state->z", "target": "target"}),
     "state": ("state wanted result", {"x": "state->x", "z": "state->z", "wanted": "wanted"}),
     "drive": (
@@ -100,6 +104,8 @@ def _features(context: Mapping[str, Any]) -> dict[str, int]:
         # Whether the line search calls one kernel to settle and another to step
         "STATE_BY_MODE": len({mode["state"].name for mode in limited if "state" in mode}) > 1,
         "DRIVE_BY_MODE": len({mode["drive"].name for mode in limited}) > 1,
+        "OWN_DRIVES": bool(limited) and context["own_drives"],
+        "ADVANCE_BY_MODE": len({mode["advance"].name for mode in limited if "advance" in mode}) > 1,
     }
     for name in ("settle", "step"):
         for flag, key in (("DRIVE_LIMITED", "drive_can_be_limited"), ("EXAMINED_FIRST", "examined_first")):
@@ -111,6 +117,7 @@ def _features(context: Mapping[str, Any]) -> dict[str, int]:
         "NX": len(context["x_names"]),
         "M": context["m"],
         "SHARES": context["shares_count"],
+        "FEW": context["few_count"],
         "COMPOSITE_ROUNDS": context["composite_rounds"],
         "SWEEPS": SWEEPS,
         "SECANT_STEPS": SECANT_STEPS,
@@ -144,6 +151,7 @@ def _texts(context: Mapping[str, Any]) -> dict[str, str]:
         "COMPOSITE_SLACK": literal(1.0 + context["relative_slack"]),
         "COMPOSITE_SLACK_SQUARED": literal((1.0 + context["relative_slack"]) ** 2),
         "SECANT_FRACTION": literal(SECANT_FRACTION),
+        "REACH_FRACTION": literal(REACH_FRACTION),
         "UNLIMITED": literal(context["unlimited"]),
     }
     # Of limits that follow from the constants of the start there is no table: they are members of the state.
@@ -165,10 +173,10 @@ def _texts(context: Mapping[str, Any]) -> dict[str, str]:
         within = within_test("h", shortest, longest, context["real"])
         texts |= {"TIME_WITHIN": within, "SAMPLE_TIME": literal(context["sample_time"])}
     if context["nearest_slopes"] is not None:
-        rows = ",\n".join(f"    {table(row)}" for row in context["nearest_slopes"].T)
-        texts["NEAREST_SLOPES"] = f"{{\n{rows}\n}}"
+        texts["NEAREST_SWEEP"] = _nearest_sweep(context)
     for mode in limited_modes(context)[:1]:
-        texts |= {f"LIMITED_{part}": f"{mode['name']}_{part}".upper() for part in ("STATE", "DRIVE")}
+        texts |= {f"LIMITED_{part}": f"{mode['name']}_{part}".upper() for part in ("STATE", "DRIVE", "ADVANCE")}
+        texts["LIMITED_FROM"] = "out->displacement" if mode["name"] == "settle" else "state->z"
     return texts
 
 
@@ -253,6 +261,24 @@ def _start_texts(context: Mapping[str, Any]) -> dict[str, str]:
     return texts
 
 
+def _nearest_sweep(context: Mapping[str, Any]) -> str:
+    """A sweep of `ctrlgen.controller.nearest_displacement` as statements, axis by axis."""
+    literal, lines = context["real"].literal, list[str]()
+    ranges = zip(context["nearest_slopes"], context["z_low"], context["z_high"], strict=True)
+    for i, (row, low, high) in enumerate(ranges):
+        others = "".join(
+            f" {'-' if p < 0 else '+'} ({literal(abs(p))} * off[{j}])" for j, p in enumerate(row) if j != i and p
+        )
+        others = others.removeprefix(" + ") if others.startswith(" +") else others.replace(" - ", "-", 1)
+        wanted = f"beyond[{i}] - ({others})" if others else f"beyond[{i}]"
+        statement = f"value[{i}] = clipped({wanted}, {literal(low)}, {literal(high)});"
+        lines += textwrap.wrap(
+            statement, WIDE, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
+        )
+        lines += [f"off[{i}] = value[{i}] - beyond[{i}];"]
+    return "\n".join(lines)
+
+
 def _braces(texts: Iterable[str]) -> str:
     return f"{{ {', '.join(texts)} }}"
 
@@ -263,10 +289,12 @@ def _assignments(assigned: Sequence[tuple[str, int]]) -> str:
 
 def _calls(context: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
     """Parameters and body of the macros that call kernels, each with the arguments that the kernel reads."""
-    kernels = {"BALANCE": ("balance", context["balance"])}
+    kernels = {"BALANCE": ("balance", context["balance"]), "REACHED": ("balance", context["reached"])}
     if context["pivot"]:
         kernels["OF_PIVOT"] = "about", context["pivot"]["kernel"]
-    if context["shares"]:
+    if context["few"]:
+        kernels |= {"FEW_COORDINATES": ("few", context["few"]), "SHARES_OF_FEW": ("of_few", context["shares"])}
+    elif context["shares"]:
         kernels["COMPOSITE_SHARES"] = "shares", context["shares"]
     for mode in context["modes"]:
         kernels |= {f"{mode['name']}_{part}".upper(): (part, mode[part]) for part in CALLS if part in mode}
@@ -275,6 +303,8 @@ def _calls(context: Mapping[str, Any]) -> dict[str, tuple[str, str]]:
         name: (CALLS[part][0], kernel.call("result", h="&state->h", **CALLS[part][1]))
         for name, (part, kernel) in kernels.items()
     }
+    if context["few"]:
+        calls["COMPOSITE_SHARES"] = "state wanted result", "used_shares(wanted, result)"
     if context["bound"]:
         calls["COMPOSITE_BOUND"] = "wanted", context["bound"].value(wanted="wanted")
     if context["target_bound"]:

@@ -59,12 +59,16 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
             "motion": printed.motion,
             "pivot": pivot,
             "balance": printed.balance,
+            "reached": printed.reached,
+            "own_drives": kernels.own_drives,
             "shares": printed.shares,
+            "few": printed.few,
             "bound": printed.bound,
             "target_bound": printed.target_bound,
             # derivatives of a motion's target tell nothing of the displacement: they are examined first
             "direct": kernels.target_directions is not None and not printed.motion,
             "shares_count": kernels.composite_shares.size1_out(0) if printed.shares else 0,
+            "few_count": kernels.few_shares.function.size1_in(0) if kernels.few_shares else 0,
             "composite_rounds": kernels.composite_rounds,
             "nearest_slopes": kernels.nearest_slopes,
             "redundancy": kernels.redundancy,
@@ -166,7 +170,8 @@ def header_context(scenario: Scenario, controller: Controller) -> dict[str, Any]
 
 def _tables(context: Mapping[str, Any]) -> list[tuple[str, np.ndarray, str]]:
     """Name, numbers and unit of the tables that several functions of the limiter read."""
-    arrays, unit, limited = context["arrays"], context["drive_unit"], bool(limited_modes(context))
+    arrays, unit = context["arrays"], context["drive_unit"]
+    limited = bool(limited_modes(context)) and not context["own_drives"]
     candidates = [
         ("U_LOW", context["u_low"], unit, not bounds_once(context) and arrays["U_LOW"] == "U_LOW"),
         ("U_HIGH", context["u_high"], unit, not bounds_once(context) and arrays["U_HIGH"] == "U_HIGH"),
@@ -193,7 +198,8 @@ def _tables(context: Mapping[str, Any]) -> list[tuple[str, np.ndarray, str]]:
 
 def _cost(controller: Controller, printed: PrintedKernels) -> dict[str, int]:
     """Operations of the physics: of a "step" that no limit touches, and of the "worst"."""
-    mode, shares, bound, balance = printed.modes[-1], printed.shares, printed.bound, printed.balance
+    mode, bound, balance = printed.modes[-1], printed.bound, printed.balance
+    shares = sum(kernel.operations for kernel in (printed.shares, printed.few) if kernel)
     kernels = controller.kernels
     n = len(kernels.nominal.axes)
     advance = [] if kernels.nominal.x.numel() == kernels.nominal.n_states else ["advance"]
@@ -205,12 +211,14 @@ def _cost(controller: Controller, printed: PrintedKernels) -> dict[str, int]:
         step = sum(kernel.operations for kernel in printed.motion.values())
     again = sum(mode[part].operations for part in ("state", "drive") if part in mode)
     worst = step + (2 if controller.state_can_be_limited else 1) * balance.operations
-    worst += again * (SECANT_STEPS + 3 if mode["drive_can_be_limited"] else 1)
-    worst += kernels.composite_rounds * (shares.operations + 1) if shares else 0
+    worst += again * ((2 if kernels.own_drives else SECANT_STEPS + 3) if mode["drive_can_be_limited"] else 1)
+    if mode["drive_can_be_limited"] and kernels.own_drives:
+        worst += printed.reached.operations + (mode["advance"].operations if "advance" in mode else 0)
+    worst += kernels.composite_rounds * (shares + 1) if shares else 0
     worst += mode["advance"].operations if "advance" in mode and not advance else 0
     worst += 2 * n * n * (1 + SWEEPS) if kernels.nearest_slopes is not None else 0
     if kernels.limits_can_be_passed:
-        worst += kernels.composite_rounds * (shares.operations + 1) if shares else 0
+        worst += kernels.composite_rounds * (shares + 1) if shares else 0
         worst += bound.operations if bound else 0
     return {"step": step, "worst": worst}
 

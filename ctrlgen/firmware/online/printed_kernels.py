@@ -13,28 +13,32 @@ from ctrlgen.controller.feedforward import Controller
 from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.controller.lost_state import UNLIMITED
 from ctrlgen.controller.motion_feedforward import MotionKernels
-from ctrlgen.controller.quick_state import QuickState
+from ctrlgen.controller.quick_state import QuickReach, QuickState
 from ctrlgen.core.units import base_unit
 from ctrlgen.devices import Signal
 from ctrlgen.firmware.c.cprint import Kernel, Law, Printer, Ranges
 from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.online.limit_tables import FLOAT_SLACK
 from ctrlgen.firmware.online.start_constants import given_ranges
 from ctrlgen.model.model import Model
 
-IN_EVERY_SAMPLE = ("displacement", "drive")  # short kernels of every sample
+IN_EVERY_SAMPLE = ("displacement", "drive", "few")  # short kernels of every sample
 UNROLLED = 8  # rows of a matrix that are written without a loop: 64 products are half a kilobyte
 
 
 @dataclass(frozen=True)
 class PrintedKernels:
     """`modes`: for "settle" and "step" the kernels by part beside "name", "examined_first" and "drive_can_be_limited"; `motion`: those of
-    a target with derivatives, by part; `shares` and `bound` of composite limits, `target_bound` where a target
-    tells it; `every` kernel in the order of the file."""
+    a target with derivatives, by part; `reached` is `balance`, or what stands for it in the range
+    of displacements; `shares` and `bound` of composite limits, those of `few` coordinates where they
+    need no more, `target_bound` where a target tells it; `every` kernel in the order of the file."""
 
     modes: list[dict[str, Any]]
     motion: dict[str, Kernel]
     balance: Kernel
+    reached: Kernel
     shares: Kernel | None
+    few: Kernel | None
     bound: Kernel | None
     target_bound: Kernel | None
     every: list[Kernel]
@@ -77,7 +81,12 @@ def printed_kernels(controller: Controller, printer: Printer) -> PrintedKernels:
     static, moving = (given.static or kernels.static, given.moving) if given else (kernels.static, kernels.moving)
     moving = kernels.varied or moving
     quick = kernels.quick if printer.real is Real.FLOAT else None  # in double their error would be the largest
-    printed = _Kernels(printer, kernel_comments(kernels, quick))
+    reach = (
+        kernels.quick_reach(kernels.slacks(FLOAT_SLACK)[2] / 2)
+        if quick and any(controller.drive_can_be_limited)
+        else None
+    )
+    printed = _Kernels(printer, kernel_comments(kernels, quick, reach))
     modes: list[dict[str, Any]] = []
     for name, inverse, formulas in (
         ("settle", static, inverses.static),
@@ -105,15 +114,23 @@ def printed_kernels(controller: Controller, printer: Printer) -> PrintedKernels:
     steps = ("z", kernels.newton_steps) if kernels.newton_steps > 1 else None
     named = None if inverses.static is None else inverses.static.newton
     balance = printed.kernel(static.newton, "balance", ("balance_displacement",), steps=steps, named=named)
-    shares = bound = target_bound = None
+    reached = balance
+    if reach is not None:
+        reached = printed.kernel(reach.displacement, "reached", ("reached_displacement",))
+    shares = few = bound = target_bound = None
     if kernels.guarded_limits:
-        shares = printed.kernel(kernels.varied_shares, "shares", ("composite_shares",))
-    if kernels.composite_bound:
-        bound = printed.kernel(kernels.composite_bound, "bound", ("composite_bound",), returned=True)
+        fewer = kernels.few_shares
+        if fewer is not None:
+            few = printed.kernel(fewer.coordinates, ("shares", "few"), ("few_coordinates",))
+        function, name = (kernels.varied_shares, "composite") if fewer is None else (fewer.function, "few")
+        shares = printed.kernel(function, "shares", (f"{name}_shares",))
     # A state that is limited moves the displacement, and so do targets with derivatives.
-    if kernels.target_bound and not controller.state_can_be_limited and not motion:
+    of_target = kernels.target_bound and not controller.state_can_be_limited and not motion
+    if kernels.composite_bound and (not of_target or kernels.limits_can_be_passed):
+        bound = printed.kernel(kernels.composite_bound, "bound", ("composite_bound",), returned=True)
+    if of_target:
         target_bound = printed.kernel(kernels.target_bound, "target_bound", ("target_bound",), returned=True)
-    return PrintedKernels(modes, motion, balance, shares, bound, target_bound, printed.kernels)
+    return PrintedKernels(modes, motion, balance, reached, shares, few, bound, target_bound, printed.kernels)
 
 
 @dataclass
@@ -172,8 +189,11 @@ def printed_laws(model: Model, symbolic: Model) -> list[Law]:
     return laws
 
 
-def kernel_comments(kernels: ControllerKernels, quick_state: QuickState | None = None) -> dict[Any, str]:
-    """What each kernel computes, in words, by mode and part or by name; the state by `quick_state` where there is one."""
+def kernel_comments(
+    kernels: ControllerKernels, quick_state: QuickState | None = None, reach: QuickReach | None = None
+) -> dict[Any, str]:
+    """What each kernel computes, in words, by mode and part or by name; the state by `quick_state` and what it leads to by `reach` where
+    there are any."""
     m, follow, drive = (
         kernels.nominal,
         kernels.model.signals[kernels.follow],
@@ -186,10 +206,17 @@ def kernel_comments(kernels: ControllerKernels, quick_state: QuickState | None =
     comments: dict[Any, str] = {
         "balance": f"Displacement at which the forces balance, g(x, z, drive) = 0: {steps} z - g/(dg/dz) from z.",
         "shares": f"The square of each {', '.join(limit.label for limit in kernels.guarded_limits)} over its limit at displacement "
-        "`wanted`.",
+        + ("`wanted`." if kernels.few_shares is None else "with these coordinates `few`."),
+        ("shares", "few"): "As many coordinates of the displacement as these limits depend on.",
         "bound": "A cheap upper bound of the root of the largest of these shares: no more than 1 means that every limit is kept.",
-        "target_bound": "The same bound at the displacement of a `target` that leads into the range.",
+        "target_bound": "A cheap upper bound of the root of the largest of these shares at the displacement of a `target` that leads into "
+        "the range: no more than 1 means that every limit is kept.",
     }
+    if reach is not None:
+        comments["reached"] = (
+            f"Displacement at which the forces balance the states x, in its range. By polynomials of degree {reach.degree}, proved to be "
+            f"off by less than {1.05 * reach.off:.2g} m."
+        )
     quick = ""
     if quick_state is not None:
         quick = (
