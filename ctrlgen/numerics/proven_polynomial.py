@@ -24,7 +24,9 @@ from ctrlgen.numerics.taylor_intervals import taylor_intervals
 CELLS = 64  # of the range: the error of degree 12 turns 13 times, five cells a turn
 HIGHEST = 12  # degree: beyond it a root and a quotient cost no more
 HIGHEST_INVERSE = 16  # degree of an inverse, in place of Newton steps with a root and quotients each
-LARGEST = 1e37  # coefficient that is a number in single precision
+# Between which magnitudes the numbers of Horner's rule are: in single precision (1.2e-38 to 3.4e38) none overflows, and a product with a
+# difference that is but a rounding is a normal number
+SMALLEST, LARGEST = 1e-30, 1e37
 # Of the range of values: terms of powers about zero may add up to this much, or three binary digits are lost
 CANCELLED = 8.0
 
@@ -42,12 +44,15 @@ class ProvenPolynomial:
     steepest: float
 
     def of(self, v: ca.SX) -> ca.SX:
-        """The polynomial as an expression of v, by Horner's rule."""
+        """The polynomial as an expression of v, by Horner's rule: of v - centre, or where its numbers would be too small or too large for
+        single precision, of that in units of half the range, for one more product."""
         s = v - self.centre if self.centre else v
-        coefficients = self.coefficients / self.half ** np.arange(len(self.coefficients))
-        sizes = np.abs(coefficients[coefficients != 0.0])
-        if sizes.max(initial=0.0) > LARGEST or sizes.min(initial=1.0) < 1 / LARGEST:
-            s, coefficients = s * (1 / self.half), self.coefficients
+        powers = self.half ** np.arange(len(self.coefficients))
+        coefficients, sizes = self.coefficients / powers, np.abs(self.coefficients)
+        sums = np.cumsum(sizes[::-1])[::-1] / powers  # no sum of Horner's rule is larger
+        if sums.max() > LARGEST or np.any((sizes > 0) & (sizes / powers < SMALLEST)):
+            # so and not (v - centre) / half, from whose products with it CasADi would take the factor out, each time anew
+            s, coefficients = v * (1 / self.half) - self.centre / self.half, self.coefficients
         value = ca.SX(float(coefficients[-1]))
         for c in coefficients[-2::-1]:
             value = value * s + float(c)

@@ -240,14 +240,14 @@ static void mems_hexapod_online_f32_reached_displacement(const float x[6], float
     int i;
     for (i = 0; i < 6; i++) {
         const float t1 = (x[i] < 570.51404f) ? x[i] : 570.51404f;
-        const float t2 = t1 - 432.83203f;
-        const float t3 = (((1.633017e-37f * t2) - 2.3013922e-35f) * t2) - 1.0610405e-32f;
-        const float t4 = (((t3 * t2) + 1.92615e-30f) * t2) + 1.3653258e-28f;
-        const float t5 = (((t4 * t2) - 4.145125e-26f) * t2) + 2.2336474e-24f;
-        const float t6 = (((t5 * t2) - 3.3138825e-22f) * t2) + 8.2948205e-20f;
-        const float t7 = (((t6 * t2) - 5.5785325e-18f) * t2) - 1.8503594e-15f;
-        const float t8 = (((t7 * t2) + 9.850066e-13f) * t2) - 3.5499853e-10f;
-        result[i] = (((t8 * t2) + 1.8703099e-07f) * t2) + 3.4055425e-05f;
+        const float t2 = (0.007263112f * t1) - 3.1437075f;
+        const float t3 = (((1.4363897e-07f * t2) - 1.470263e-07f) * t2) - 4.9233313e-07f;
+        const float t4 = (((t3 * t2) + 6.4914235e-07f) * t2) + 3.3420187e-07f;
+        const float t5 = (((t4 * t2) - 7.3694144e-07f) * t2) + 2.8842484e-07f;
+        const float t6 = (((t5 * t2) - 3.107978e-07f) * t2) + 5.6502876e-07f;
+        const float t7 = (((t6 * t2) - 2.7599822e-07f) * t2) - 6.6491344e-07f;
+        const float t8 = (((t7 * t2) + 2.5708155e-06f) * t2) - 6.729473e-06f;
+        result[i] = (((t8 * t2) + 2.5750805e-05f) * t2) + 3.4055425e-05f;
     }
 }
 

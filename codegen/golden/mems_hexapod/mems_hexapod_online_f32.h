@@ -16,7 +16,7 @@
  *   notch rotation <= 5 deg
  *   wire flexure stress <= 550 MPa
  *
- * Arithmetic operations of the physics per call: 198 while all limits hold, 2813 at most
+ * Arithmetic operations of the physics per call: 198 while all limits hold, 2819 at most
  * (comparisons and the limiter's own arithmetic not counted). Arithmetic: float.
  * Physics: S1: Mech. Mach. Theory 80 (2014) 246-264, doi 10.1016/j.mechmachtheory.2014.05.004
  * Made by ctrlgen 0.1.0 from device 39f6d7972ef7d6f4 (sha256), whatever the trajectory. Do not edit.
