@@ -117,7 +117,7 @@ def test_marks_that_the_accepted_model_explains_are_taken_back_and_told():
     again = mark_again(first, of(recording, [clean[0] + peaks, clean[1]]), noise)
     assert not marks(again)[0].size and again.records[0].spikes == ()
     (note,) = marking_notes(first, again)
-    assert "fit, reading.axis: 3 of what was marked" in note
+    assert "fit, reading.axis: 3 samples that were marked as outliers are used again" in note
 
 
 def test_a_reading_that_validation_marked_comes_back_as_it_was():

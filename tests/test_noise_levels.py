@@ -8,7 +8,7 @@ from scipy import stats
 from scipy.signal import lfilter
 
 from ctrlgen.estimation.noise import estimate_noise, ljung_box, stationary_deviation, without_lines
-from ctrlgen.estimation.noise_update import _longest_stretch
+from ctrlgen.estimation.noise_update import longest_stretch
 from ctrlgen.estimation.residual_noise import noise_from_residual
 from ctrlgen.estimation.settings import NOISE_UPDATE
 from ctrlgen.recordings.recording import Record, Recording
@@ -223,7 +223,7 @@ def test_a_residual_tells_the_noise_beside_a_line_and_white_noise_has_no_pole(po
 
 def test_the_longest_stretch_of_good_samples_bridges_a_few_others():
     """Half open, from its first good sample to behind its last."""
-    assert _longest_stretch(np.zeros(9, bool)) is None
+    assert longest_stretch(np.zeros(9, bool)) is None
     for others, stretch in ((NOISE_UPDATE.bridged, (2, 11 + NOISE_UPDATE.bridged)), (NOISE_UPDATE.bridged + 1, (2, 8))):
         good = np.r_[np.zeros(2), np.ones(6), np.zeros(others), np.ones(3), np.zeros(2)].astype(bool)
-        assert _longest_stretch(good) == stretch
+        assert longest_stretch(good) == stretch

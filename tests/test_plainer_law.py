@@ -10,7 +10,7 @@ import pytest
 from axis_records import AXIS, NOISE, fitter_of
 from effect_cases import Law, rich, shapes
 
-from ctrlgen.diagnosis.selection.rivals import _as_plainer, rivals, simplified
+from ctrlgen.diagnosis.selection.rivals import as_plainer, rivals, simplified
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.effects import Effect
@@ -149,7 +149,7 @@ def test_a_gain_stands_beside_the_plain_law_where_nothing_else_takes_the_part_ov
         converged=lambda t: t,
     )
     monkeypatch.setattr("ctrlgen.diagnosis.selection.rivals.explains_alike", lambda *_: alike)
-    tried = _as_plainer(trials, current, len(structure.causes) - 1)
+    tried = as_plainer(trials, current, len(structure.causes) - 1)
     assert [[c.effect for c in t.causes] for t in tried] == found
     assert not offered or alike or tried[0].starts[1] == {"gain": pytest.approx(0.12)}
 

@@ -121,7 +121,7 @@ def test_what_fits_alike_and_is_unlikelier_of_its_size_is_told_and_nothing_likel
     for name, found in (
         ("counterparts", []),
         ("twins", []),
-        ("_as_plainer", []),
+        ("as_plainer", []),
         ("explains_alike_but_for_odds", True),
     ):
         monkeypatch.setattr(f"{module}.{name}", lambda *_, found=found: found)
@@ -174,7 +174,7 @@ def test_what_has_come_to_stand_for_something_else_has_a_rival_that_does_not_do_
     trials = SimpleNamespace(selection=selection, objections=lambda *_: {}, screen=None)
     answers = {
         "counterparts": [],
-        "_as_plainer": [],
+        "as_plainer": [],
         "replacements": [of_height],
         "twins": [],
         "size_odds": 0.0,

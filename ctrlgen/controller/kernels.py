@@ -1,7 +1,5 @@
 """What a feedforward controller computes with: its kernels, what of its limits can be met, and what a state is judged by.
-
-`ctrlgen.controller.feedforward` decides with them, `ctrlgen.firmware.online.online` prints them.
-"""
+`ctrlgen.controller.feedforward` decides with them, `ctrlgen.firmware.online.online` prints them."""
 
 from __future__ import annotations
 
@@ -39,8 +37,7 @@ COMPOSITE_ROUNDS = 8
 class ControllerKernels:
     """The kernels of one device, one followed signal, one sample time (None: equilibria only), each worked out when first asked for.
 
-    `times`: shortest and longest sample time [s] where it may vary around this one; what is decided before the C runs holds for all
-    between.
+    `times`: shortest and longest sample time [s] where it may vary; what is decided before the C runs holds for all between.
     """
 
     model: Model

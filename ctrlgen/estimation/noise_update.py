@@ -79,7 +79,7 @@ def _of_longest_stretch(fitter: Fitter, fit: Fit, record: Record, i: int) -> tup
     """`noise_from_residual` on the longest stretch of channel i whose gaps are short, with straight lines across them."""
     y = fitter.predict(fit, record)[:, i]
     good = record.valid[:, i] & np.isfinite(y)
-    stretch = _longest_stretch(good)
+    stretch = longest_stretch(good)
     if stretch is None:
         return None
     a, b = stretch
@@ -89,7 +89,7 @@ def _of_longest_stretch(fitter: Fitter, fit: Fit, record: Record, i: int) -> tup
     return noise_from_residual(residual, np.interp(rows, at, y[at]), highest)
 
 
-def _longest_stretch(good: np.ndarray) -> tuple[int, int] | None:
+def longest_stretch(good: np.ndarray) -> tuple[int, int] | None:
     """The longest half-open range of `good` samples (n,) with no more than `NOISE_UPDATE.bridged` others in a row between; None where
     none is good."""
     at = np.flatnonzero(good)

@@ -271,18 +271,15 @@ class InitialMemorySettings:
     """Where the plays of a hysteresis stood when a record began."""
 
     rows: int = 300
-    """Samples at the beginning of a record, a quarter of it at most, that tell where plays stood before it: each is dragged along as
-    soon as the motion has gone its width. Judgement."""
+    """Samples at the beginning of a record, a quarter of it at most, that tell where plays stood before. Judgement."""
     worse: float = 1.5
     """Mean square there over that of the rest, from which on the beginning is wrong. Judgement."""
     ways_back: tuple[float, ...] = (0.05, 0.15, 0.4, 1.0, 2.0)
-    """How far the motion has come back since it turned last before a record, in prior deviations of a place, from which a search for
-    the turning point begins. Judgement."""
+    """How far the motion came back since it last turned, in prior deviations of a place, where the search for that begins. Judgement."""
     far: float = 30.0
     """From where every play is dragged along, in the same."""
     sides: tuple[float, ...] = (-0.875, -0.625, -0.375, -0.125, 0.125, 0.375, 0.625, 0.875)
-    """Places of a driven side in its gap, in halves of it, from which a search begins: no two are farther apart than one step reaches.
-    Judgement."""
+    """Places of a driven side in its gap, in halves of it, from which a search begins, so near that a step reaches the next. Judgement."""
 
 
 @dataclass(frozen=True)

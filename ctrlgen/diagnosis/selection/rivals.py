@@ -46,13 +46,13 @@ def simplified(trials: Trials, current: CandidateModel) -> CandidateModel:
         if coarser is not current:
             return simplified(trials, coarser)
         current = _in_usual_shape(trials, current, k)
-        for t in _as_plainer(trials, current, k, bounds_tell=False):
+        for t in as_plainer(trials, current, k, bounds_tell=False):
             if explains_alike(trials.selection, t, current) and not trials.objections(t, current.causes):
                 return simplified(trials, t)
     return current
 
 
-def _as_plainer(trials: Trials, current: CandidateModel, k: int, bounds_tell: bool = True) -> list[CandidateModel]:
+def as_plainer(trials: Trials, current: CandidateModel, k: int, bounds_tell: bool = True) -> list[CandidateModel]:
     """The model with the plainer law that cause k may be in its place, begun where both are one; none where there is no such law, or
     this machine cannot have it. A part in proportion to the signal, which the plainer law has not, is taken over by the device's numbers
     or by a gain that is there; else a gain stands beside it."""
@@ -163,7 +163,7 @@ Alike = tuple[CandidateModel, ...]
 def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Round] = ()) -> tuple[Alike, Alike]:
     """What explains alike in place of cause k, or is the plainer law that the fit does not exclude; with what the `rounds` tried in its
     place. And what fits alike, and is unlikely of the size that it takes."""
-    there, plainer = current.causes, _as_plainer(trials, current, k)
+    there, plainer = current.causes, as_plainer(trials, current, k)
     tried = [t for r in rounds for t in r.candidates if not current.errors.is_noise]
     candidates = [
         *plainer,
