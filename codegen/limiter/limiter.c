@@ -350,7 +350,6 @@ static int nearest_displacement(const real beyond[N], real value[N])
 #endif
     real off[N];
     int hit = 0;
-    int sweep;
 #if DIRECT
     int i;
     EACH_AXIS(CLIP_AXIS)
@@ -365,6 +364,7 @@ static int nearest_displacement(const real beyond[N], real value[N])
     EACH_AXIS(MEASURE_AXIS)
 #endif
     if (hit != 0) {
+        int sweep;
         for (sweep = 0; sweep < SWEEPS; sweep++) {
             NEAREST_SWEEP
         }

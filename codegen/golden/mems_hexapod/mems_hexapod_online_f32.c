@@ -547,7 +547,6 @@ static int mems_hexapod_online_f32_nearest_displacement(const float beyond[6], f
     static const float SLACK[6] = { 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f }; /* m */
     float off[6];
     int hit = 0;
-    int sweep;
     int i;
     value[0] = mems_hexapod_online_f32_clipped(beyond[0], LOW[0], HIGH[0]);
     value[1] = mems_hexapod_online_f32_clipped(beyond[1], LOW[1], HIGH[1]);
@@ -567,6 +566,7 @@ static int mems_hexapod_online_f32_nearest_displacement(const float beyond[6], f
         }
     }
     if (hit != 0) {
+        int sweep;
         for (sweep = 0; sweep < 3; sweep++) {
             value[0] = mems_hexapod_online_f32_clipped(beyond[0] - ((1.1193434f * off[1]) - (0.2363756f * off[2]) - (0.16930602f * off[3]) -
                 (0.2363756f * off[4]) - (0.45906138f * off[5])), 0.0f, 5.5e-05f);
