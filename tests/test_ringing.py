@@ -168,6 +168,24 @@ def test_a_header_says_when_a_ringing_is_told_as_over(tmp_path, floats):
         assert "_SETTLING (0xFFFFFFFFU)" in never.header and "Clears itself by no waiting" in never.header
 
 
+@pytest.mark.long
+def test_a_float_tells_a_ringing_as_over_when_the_header_says(tmp_path):
+    """Of a stage that rings for long the decay of a sample is near one, and what a float rounds of it adds up."""
+    if not shutil.which("gcc"):
+        pytest.skip("gcc is missing: no float rounded")
+    c = Compiled(tmp_path, Real.FLOAT, DAMPED.replace(f'"{DAMPING:g} N*s/m", sd = "20 N*s/m"', '"0.5 N*s/m"'))
+    settling = c.twin.bounds.settling
+    assert 1e5 < settling < FOREVER
+    c.c_init(c.at)
+    for ticks, told in ((settling, 0), (int(0.99 * settling), UNSURE)):
+        c.c_forget(c.at)
+        assert c.elapsed(ticks, 0.0) == told
+    c.c_forget(c.at)
+    still = np.zeros(3)
+    told = [c.settle(still) for _ in range(settling)]
+    assert told[-1] == 0 and told[int(0.99 * settling)] == UNSURE
+
+
 def test_modes_that_are_led_ring_too(tmp_path):
     """Two masses with 1 % of damping, after a jump: the second one is told as still when it is, and nobody can measure the first."""
     (tmp_path / "device.toml").write_text(two_masses('modes_below = "200 Hz"\n'))

@@ -39,6 +39,8 @@ SURE = 2.0  # standard deviations, by which a number is off at most
 LEFT = (0.02, 0.1, 0.3)  # shares of s that are given up for a smaller P
 WEIGHTS = (0.0, 1.0, 1e2, 1e4)  # of the actuators' states beside the rest of P, of which the soonest is taken
 ROUNDED = 1e-9  # of P: what rounding may leave of an inequality
+# Of a bound: what a float may leave of it more in a sample, as its decay is rounded up (2^-23), written (2^-25) and multiplied (2^-24)
+SLOWER = 2.0**-22
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,8 @@ class Ringing:
 
     `weights` (n_y,) p of y = (x, z) and of the modes that are led beside them, per SI; `drive` (n_u,) what a sample adds per SI of a
     drive that was left; `decay` in a sample; `least` break that counts; `unknown` size of a motion of which nothing is known; `settling`
-    samples until that is told no more, or FOREVER; `reach` (n_y,) what a difference of one can make of each number that is weighted.
+    samples until that is told no more, in a float too, or FOREVER; `reach` (n_y,) what a difference of one can make of
+    each number that is weighted.
     """
 
     weights: np.ndarray
@@ -97,8 +100,11 @@ def ringing(model: Model, sample_time: float, structure: StructuralModel | None)
     rate = min(p.rate for p in proofs)
     unknown = max(float(p.weights @ (forced / size)) / p.rate for p in proofs)
     decay = float(np.exp(-rate * sample_time))
-    settling = ceil(np.log(max(unknown / TOLD, 1.0)) / (rate * sample_time)) + 1
-    if settling >= MOST or unknown > UNLIMITED or decay >= 1 - 2.0**-22:  # a float would not see it decay
+    seen = rate * sample_time - SLOWER
+    if seen <= SLOWER or unknown > UNLIMITED:  # a float might see it decay half as fast, or not at all
+        return _unproven(size, driven, sample_time)
+    settling = ceil(np.log(max(unknown / TOLD, 1.0)) / seen) + 1
+    if settling >= MOST:
         return _unproven(size, driven, sample_time)
     reach = np.max([np.sqrt(np.diag(np.linalg.inv(p.P))) for p in proofs], axis=0) * weights
     least = max(LEAST, TOLD * (1 - decay))
