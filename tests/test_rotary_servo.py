@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from axis_records import SETTLING, record
 from recovery import Planted, fitter_of, recover
+from scipy.signal import lfilter
 
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
@@ -23,6 +24,7 @@ from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.noise import estimate_noise
 from ctrlgen.estimation.noise_update import update_guessed_noise
+from ctrlgen.estimation.residual_noise import louder_than_readings
 from ctrlgen.estimation.settings import FIT
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Recording
@@ -74,6 +76,9 @@ def test_what_errs_once_a_turn_is_suspected_where_a_quarter_of_one_is_read(large
     fitter = fitter_on(lambda q: q, largest)
     offered = where_it_turns([ECCENTRIC, GAIN], fitter.recording, WRIST)
     assert (ECCENTRIC in offered) == there and GAIN in offered
+    # an indexing table is calibrated pose by pose
+    poses = replace(fitter.recording, kind="poses")
+    assert where_it_turns([ECCENTRIC, GAIN], poses, WRIST) == offered
 
 
 def chosen(change, largest: float, suspected: list[Hypothesis], *causes: tuple[Hypothesis, dict[str, float]]):
@@ -112,6 +117,31 @@ def test_a_weight_is_not_told_from_a_disc_beside_its_axis(named, other):
     assert [t.cause for t in alike] == [other]
 
 
+def reads(noise: np.ndarray) -> Recording:
+    """A recording of a slow motion with this noise, and nothing that tells it."""
+    slow = 0.3 * np.sin(0.7 * H * np.arange(len(noise)))
+    parts = tuple(record(slow, slow + noise, role, h=H) for role in ("fit", "hold_out"))
+    return Recording("t", WRIST.name, "series", ("reading.axis",), ("deg",), (None,), parts, ())
+
+
+def test_noise_of_any_colour_is_no_louder_than_the_readings_that_hold_it():
+    """Coloured, coarsely read, heavy in its tails, and such as is louder where the device moves; not what is five times as loud."""
+    white = np.random.default_rng(4).standard_normal(3000)
+    tailed = np.random.default_rng(5).standard_t(3, 3000) / np.sqrt(3)
+    for a in (-0.8, 0.0, 0.6, 0.99):
+        coloured = reads(NOISE * lfilter([1.0], [1.0, -a], white))
+        assert not louder_than_readings(coloured, 0, NOISE, np.array([a]))
+        assert louder_than_readings(coloured, 0, 5 * NOISE, np.array([a]))
+    assert not louder_than_readings(reads(NOISE * tailed), 0, NOISE, np.zeros(0))
+    on_the_move = np.where(np.arange(3000) % 100 < 60, 0.5, 1.5)
+    assert not louder_than_readings(reads(NOISE * white * on_the_move), 0, NOISE, np.zeros(0))
+    coarse, step = reads(NOISE * white), 0.1  # which most samples do not leave
+    rounded = replace(
+        coarse, records=tuple(replace(r, observed=step * np.round(r.observed / step)) for r in coarse.records)
+    )
+    assert not louder_than_readings(rounded, 0, step / np.sqrt(12.0), np.zeros(0))
+
+
 def test_a_lag_after_steps_is_not_taken_for_noise():
     """It acts at all frequencies, as noise does; most readings show that they are not so loud."""
     rng, parts = np.random.default_rng(3), []
@@ -129,12 +159,21 @@ def test_a_lag_after_steps_is_not_taken_for_noise():
 
 
 @pytest.mark.parametrize(
-    ("linear", "late", "told"), [(True, 10.0, True), (True, 9.7, True), (True, 12.0, False), (False, 10.0, False)]
+    ("linear", "late", "sd", "told"),
+    [
+        (True, 10.0, 0.01, True),
+        (True, 9.7, 0.01, True),
+        (True, 12.0, 0.01, False),
+        (False, 10.0, 0.01, False),
+        (True, 9.0, 3.0, True),
+        (True, 9.0, 10.0, False),  # it may be none at all
+        (True, 14.0, 6.0, False),  # or a whole sample
+    ],
 )
-def test_a_delay_of_half_a_sample_may_be_a_held_drive_that_was_read_as_linear(linear, late, told):
+def test_a_delay_of_half_a_sample_may_be_a_held_drive_that_was_read_as_linear(linear, late, sd, told):
     recording = fitter_on(lambda q: q, 0.5).recording
     recording = replace(recording, records=tuple(replace(r, linear=linear) for r in recording.records))
-    numbers = {"delay": Estimate(late, (late - 0.01, late + 0.01), "ms")}
+    numbers = {"delay": Estimate(late, (late - sd, late + sd), "ms")}
     found = SimpleNamespace(effect="delay", cause=Hypothesis("delay", "sensor:axis", "axis"), parameters=numbers)
     notes = half_a_sample(recording, [found, SimpleNamespace(effect="parameter")])
     assert len(notes) == told and all("half a sample" in note and "held" in note for note in notes)

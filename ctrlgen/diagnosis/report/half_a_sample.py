@@ -19,7 +19,7 @@ HALF = (
 
 
 def half_a_sample(recording: Recording, findings: Sequence[Finding]) -> list[str]:
-    """What is told of delays that may be how the drive goes on between its samples."""
+    """What is told of delays that may be how the drive goes on between its samples: that are told from none and from a whole sample."""
     rates = {r.sample_time for r in recording.records if r.linear and r.role != "rest"}
     told = []
     for finding in findings:
@@ -27,6 +27,6 @@ def half_a_sample(recording: Recording, findings: Sequence[Finding]) -> list[str
             continue
         late = finding.parameters[finding.cause.law.amplitude().name]
         low, high = (to_si(end, late.unit) for end in late.ci95)
-        if any(low - NEAR * h <= h / 2 <= high + NEAR * h for h in rates):
+        if any(0 < low - NEAR * h <= h / 2 <= high + NEAR * h < h for h in rates):
             told.append(HALF.format(interval(late)))
     return told

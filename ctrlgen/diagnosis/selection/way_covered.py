@@ -32,10 +32,7 @@ def where_it_turns(suspected: Sequence[Hypothesis], recording: Recording, device
     """The hypotheses without laws that repeat once a turn of readings that go through too little of one."""
     least = 2 * np.pi * OBJECTIONS.least_turn
 
-    def may_turn(h: Hypothesis) -> bool:
-        return not h.prior.once_a_turn or (recording.kind == "series" and way_covered(recording, h, device) >= least)
-
-    return [h for h in suspected if may_turn(h)]
+    return [h for h in suspected if not h.prior.once_a_turn or way_covered(recording, h, device) >= least]
 
 
 def with_longest_periods(suspected: Sequence[Hypothesis], recording: Recording, device: Device) -> list[Hypothesis]:
