@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import sys
 from functools import wraps
@@ -14,8 +15,10 @@ from package_programs import STRICT, run
 from told_apart import alike_in_drawing
 
 from battery.consistency import contradictions
+from battery.first_screen_check import screen_contradictions
 from ctrlgen import build_model, generate, load_device, load_scenario, solve
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
+from ctrlgen.diagnosis.report.diagnosis_first_screen import diagnosis_first_screen
 from ctrlgen.diagnosis.report.diagnosis_record import Provenance, diagnosis_record
 from ctrlgen.firmware.folder import CFolder
 from ctrlgen.trajectory.solution_plots import draw_solution
@@ -25,6 +28,8 @@ SCENARIOS = ROOT / "scenarios"
 DEVICES = SCENARIOS / "devices"
 # Measurements that may not be copied stand beside the repository, or nowhere: their tests are then skipped
 RECORDINGS = ROOT.parent / "shared" / "recordings"
+# A trial ends with any error, and so would every trial of a law that is wrongly written
+ERROR_OF_CODE = re.compile(r"\b(?:TypeError|AttributeError|LookupError|KeyError|IndexError): ")
 DEVICE, AXIS_FILE, MESO_FILE = (DEVICES / f"{name}.toml" for name in ("mems_hexapod", "flexure_axis", "meso_hexapod"))
 
 
@@ -46,8 +51,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """Every diagnosis that a test makes in this process is held to the checker of contradictions, wherever it is called from, and every
-    drawing to series that are told apart without their colour."""
+    """Every diagnosis that a test makes in this process is held to the checkers of contradictions, wherever it is called from, and to no
+    trial that ended in an error of code; every drawing to series that are told apart without their colour."""
     _holds_drawings()
     called = sys.modules.get("ctrlgen.diagnosis.diagnose")
     if called is None:
@@ -57,7 +62,9 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     @wraps(diagnose_recording)
     def checked(*args: Any, **options: Any) -> Diagnosis:
         found = diagnose_recording(*args, **options)
-        wrong = contradictions(diagnosis_record(found, Provenance({}, 0)).as_json())
+        record, screen = diagnosis_record(found, Provenance({}, 0)).as_json(), diagnosis_first_screen(found, {})
+        wrong = [*contradictions(record), *screen_contradictions(record, screen.answer, screen.numbers, screen.steps)]
+        wrong += [note for note in found.notes if ERROR_OF_CODE.search(note)]
         assert not wrong, "\n".join(wrong)
         return found
 

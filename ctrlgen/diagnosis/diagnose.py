@@ -196,7 +196,7 @@ def _empirical_terms(
     try:
         return empirical_terms(search.fitter, search.chosen.fit, shares), ()
     except FAILURES as error:
-        return (), (f"empirical terms are left out: {error}",)
+        return (), (f"empirical terms are left out: {reason_of(error)}",)
 
 
 def _in_units_of_the_reader(device: Device, recording: Recording) -> Device:
@@ -241,6 +241,7 @@ def _without_outliers(device: Device, fitter: Fitter) -> Fitter:
 
 def _as_described(fitter: Fitter, device: Device) -> tuple[Fitter, Fit]:
     """The device as described, fitted to the recording. Raises SolverError where it cannot be simulated."""
+    cause: Exception | None = None
     try:
         weighed, fit = described(fitter, device)
         if any(np.isfinite(weighed.predict(fit, r)).any() for r in fitter.fit_records):
@@ -249,11 +250,11 @@ def _as_described(fitter: Fitter, device: Device) -> tuple[Fitter, Fit]:
     except CtrlgenError:
         raise
     except FAILURES as error:
-        why = reason_of(error)
+        why, cause = reason_of(error), error
     raise SolverError(
         f"{fitter.recording.title}: no answer, because {device.title} cannot be simulated along it as described: {why}. Check that the "
         "recorded drives lie in the range of the device and are in their units, and that the device moves with `ctrlgen simulate`"
-    )
+    ) from cause
 
 
 def _notes(

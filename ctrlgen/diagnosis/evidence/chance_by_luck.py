@@ -39,7 +39,7 @@ from ctrlgen.core.counts import number_of
 from ctrlgen.diagnosis.evidence.independent_stretches import Memory, memory_of
 from ctrlgen.diagnosis.evidence.matched_parts import matched_parts
 from ctrlgen.diagnosis.selection.attribution import one_finding
-from ctrlgen.diagnosis.selection.failures import FAILURES
+from ctrlgen.diagnosis.selection.failures import UNSOLVED
 from ctrlgen.diagnosis.selection.findings import ChanceEntry, Finding, Role
 from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.selection.verdict import Verdict, hides_in_device
@@ -121,7 +121,7 @@ class Looks:
                 count = ways * looks(len(self.search.offered), self._starts(S | unit), false)
                 tried.append(Look(sign_flip_p(parts), count, int(np.count_nonzero(parts))))
             return min(tried, key=lambda t: t.p * t.looks)
-        except FAILURES:
+        except UNSOLVED:
             return Look(known=False)
 
     def fit(self, S: Causes) -> Fit:

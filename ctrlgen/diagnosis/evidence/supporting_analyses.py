@@ -13,7 +13,7 @@ from ctrlgen.diagnosis.evidence.ltv_linearisation import linearise_along
 from ctrlgen.diagnosis.evidence.residual_localisation import localise_residual
 from ctrlgen.diagnosis.evidence.residual_location import ResidualLocations
 from ctrlgen.diagnosis.evidence.unmodelled_dynamics import UnmodelledForce, describe_unmodelled_force
-from ctrlgen.diagnosis.selection.failures import FAILURES
+from ctrlgen.diagnosis.selection.failures import FAILURES, reason_of
 from ctrlgen.diagnosis.selection.search_result import SearchResult
 
 # from the folder of the next experiment
@@ -48,7 +48,7 @@ def run_supporting_analyses(search: SearchResult, explained: bool, seed: int = 0
         try:
             return analysis()
         except FAILURES as error:
-            failed.append(f"{name} is left out: {error}")
+            failed.append(f"{name} is left out: {reason_of(error)}")
             return None
 
     force = None if explained else tried("the unknown input", lambda: describe_unmodelled_force(fitter, after))

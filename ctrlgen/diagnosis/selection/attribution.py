@@ -29,7 +29,7 @@ from pydantic import Field
 
 from ctrlgen.core.forks import in_forks
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
-from ctrlgen.diagnosis.selection.failures import FAILURES
+from ctrlgen.diagnosis.selection.failures import UNSOLVED
 from ctrlgen.diagnosis.settings import ATTRIBUTION
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.free_parameters import FreeParameter
@@ -214,7 +214,7 @@ def _left_or_all(
     can stand or be simulated."""
     try:
         left = _by_block(known, left_by(fitter, fit, present, records))
-    except FAILURES:
+    except UNSOLVED:
         return everything
     most = ATTRIBUTION.diverged * everything.sum()
     return left * (most / left.sum() if left.sum() > most else 1.0)

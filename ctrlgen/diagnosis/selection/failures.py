@@ -9,9 +9,11 @@ from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.estimation.hypothesis import Hypothesis
 
 _OF_CODE = (TypeError, AttributeError, LookupError)  # their messages alone do not say what is wrong
-FAILURES = (CtrlgenError, ValueError, ArithmeticError, RuntimeError, *_OF_CODE)
-"""What a trial may end with: a stage that cannot be built, a balance or integrator that does not converge, a law that cannot be written
-down at its place."""
+UNSOLVED = (CtrlgenError, ValueError, ArithmeticError, RuntimeError)
+"""What a simulation of laws that have been fitted may end with: a stage that cannot be built, a balance or integrator that does not
+converge. For where nobody is told of it: other errors are this program's own, and end the diagnosis."""
+FAILURES = (*UNSOLVED, *_OF_CODE)
+"""What a trial may end with, and then says so: also a law that cannot be written down at its place."""
 
 
 @dataclass(frozen=True)

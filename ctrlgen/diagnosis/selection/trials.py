@@ -15,7 +15,7 @@ import numpy as np
 
 from ctrlgen.core.forks import in_forks
 from ctrlgen.diagnosis.selection.candidate_model import Attempt, CandidateModel, Refusal
-from ctrlgen.diagnosis.selection.failures import FAILURES, Failure, reason_of
+from ctrlgen.diagnosis.selection.failures import FAILURES, UNSOLVED, Failure, reason_of
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection, scored
 from ctrlgen.diagnosis.selection.motion_regions import no_region
 from ctrlgen.diagnosis.selection.objections import objections
@@ -283,7 +283,7 @@ class Trials:
                 before, errors, structure = errors, fitter.with_errors_of(fit).error, fit.restarted
                 if np.allclose(errors.weighted.sd, before.weighted.sd, rtol=DISCREPANCY.same, atol=0):
                     break
-        except FAILURES:
+        except UNSOLVED:
             return False
         return errors.is_noise
 
