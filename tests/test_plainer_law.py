@@ -40,7 +40,7 @@ def test_laws_say_what_they_generalise():
 @every_general_law
 def test_a_plainer_law_is_of_the_same_family_and_place_and_both_name_their_numbers(law):
     plain = Effect.library[law.plainer.kind]
-    assert prior_of(plain).family == prior_of(law).family and plain.place is law.place
+    assert prior_of(plain).form_of == prior_of(law).form_of and plain.place is law.place
     for given, of in ((law.plainer.where, law), (law.plainer.beside, plain)):
         bounds = {p.name: p.bounds for p in of.params if p is not of.amplitude()}
         assert all(bounds[name][0] <= value <= bounds[name][1] for name, value in given.items())

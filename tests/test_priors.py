@@ -79,4 +79,4 @@ def test_a_law_without_a_row_has_even_odds_and_an_exact_form():
         params = (Param("gain", "1", (-1.0, 1.0), "amplitude", off=0.0),)
 
     assert prior_of(Unlisted) == LawPrior()
-    assert (DEFAULT.log_prior_odds, DEFAULT.model_form_error, DEFAULT.family) == (0.0, 0.0, None)
+    assert (DEFAULT.log_prior_odds, DEFAULT.model_form_error, DEFAULT.form_of) == (0.0, 0.0, None)

@@ -79,12 +79,12 @@ class Hypothesis:
     def beside(self, causes: Sequence[Hypothesis]) -> Hypothesis | None:
         """The hypothesis to add to `causes`: itself, one more where it is there and repeatable, None where it cannot be added.
 
-        A place has at most one law of a family, and one cause of a law that is not repeatable.
+        A place has at most one form of one physics, and one cause of a law that is not repeatable.
         """
         if any(
-            (c.family, c.location) == (self.family, self.location) and c.effect != self.effect
+            (c.form_of, c.location) == (self.form_of, self.location) and c.effect != self.effect
             for c in causes
-            if c.family
+            if c.form_of
         ):
             return None
         same = [c for c in causes if (c.effect, c.location, c.of) == (self.effect, self.location, self.of)]
@@ -93,9 +93,9 @@ class Hypothesis:
         return replace(self, count=1 + max(c.count for c in same)) if self.prior.repeatable else None
 
     @property
-    def family(self) -> str | None:
-        """The family of laws of which a place has at most one; None where the law belongs to none."""
-        return self.prior.family
+    def form_of(self) -> str | None:
+        """The physics of which a place has at most one form; None where the law shares its own with no other."""
+        return self.prior.form_of
 
     @property
     def finer(self) -> tuple[Hypothesis, ...]:

@@ -67,7 +67,7 @@ class LawPrior:
 
     log_prior_odds: ln of how many times commoner the law is than a wrong gain; decides among causes that explain alike.
     model_form_error: error of the law's form after its parameters are fitted, as a share of what the law explains.
-    family: name shared by laws that are forms of one physics; a place has at most one of a family.
+    form_of: name of the physics of which laws are forms, finer than their `Effect.family`; a place has at most one form of it.
     refines: the plainer laws of which this is a finer form, with more numbers. It is never suspected itself, but tried in the place of
         one of them that is among the causes, where that leaves more than noise.
     unless: what a device must not have (words of `Effect.requires`) for the law to be suspected there: another law says the same.
@@ -88,7 +88,7 @@ class LawPrior:
     reason: str = "Default: as common as a wrong gain, its form exact."
     log_prior_odds: float = 0.0
     model_form_error: float = 0.0
-    family: str | None = None
+    form_of: str | None = None
     refines: frozenset[str] = frozenset()
     unless: frozenset[str] = frozenset()
     suspected: bool = True

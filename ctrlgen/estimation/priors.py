@@ -172,7 +172,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             log_prior_odds=ONE_IN_TEN,
             unless=frozenset({"heat"}),
             model_form_error=0.02,
-            family="hysteresis",
+            form_of="hysteresis",
             parameters={
                 "linear": _starts((0.0, 1.0)),
                 "reach": _starts((0.03, 0.1, 0.3, 1.0)),
@@ -229,14 +229,14 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             log_prior_odds=ONE_IN_TEN,
             unless=frozenset({"balanced"}),
             model_form_error=0.02,
-            family="hysteresis",
+            form_of="hysteresis",
             parameters={"reach": _LOOP, "skew": _starts((-0.6, 0.6))},
         ),
         "bouc_wen": LawPrior(
             HYSTERESIS + _IN_BALANCE,
             unless=frozenset({"balanced"}),
             model_form_error=0.02,
-            family="hysteresis",
+            form_of="hysteresis",
             parameters={"reach": _LOOP, "loop": _starts((0.55, 0.9))},
         ),
         "bouc_wen_of_power": LawPrior(
@@ -244,7 +244,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             suspected=False,
             refines=frozenset({"bouc_wen", "hysteresis"}),
             model_form_error=0.02,
-            family="hysteresis",
+            form_of="hysteresis",
             parameters={"reach": _LOOP, "loop": _starts((0.55, 0.9)), "power": _starts((1.5,))},
         ),
         "cogging": _COGGING,
@@ -257,7 +257,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
         "coulomb": LawPrior(
             _DRY_FRICTION,
             model_form_error=0.02,
-            family="dry friction",
+            form_of="dry friction",
             parameters={"reach": peaks(3e-4, 3e-3, 0.03), "smoothing": CREEPING},
         ),
         **IN_A_REGION,
@@ -266,7 +266,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             "Dry friction alike in both directions is commoner: judgement. " + _DRY_FRICTION,
             log_prior_odds=-1.0,
             model_form_error=0.02,
-            family="dry friction",
+            form_of="dry friction",
             parameters={"skew": _starts((-0.3, 0.3)), "reach": peaks(3e-4, 3e-3, 0.03)},
         ),
         "end_stop": LawPrior(
@@ -288,7 +288,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             HYSTERESIS + _IN_BALANCE,
             unless=frozenset({"balanced"}),
             model_form_error=0.02,
-            family="hysteresis",
+            form_of="hysteresis",
             parameters={"reach": replace(_LOOP, start_values=(0.03, 0.1, 0.3, 1.0, 2.0)), "taper": _starts((0.5,))},
         ),
         "lost_beams": LawPrior(_EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, of_time=True, parameters=_EVENT),
@@ -306,14 +306,14 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             log_prior_odds=-1.0,
             unless=frozenset({"balanced"}),
             model_form_error=0.02,
-            family="hysteresis",
+            form_of="hysteresis",
             parameters={"slack": peaks(0.1, 0.3, 0.6), "reach": peaks(0.03, 0.1, 0.3)},
         ),
         "stribeck": LawPrior(
             "Dry friction that does not fall with speed is commoner: judgement. " + _DRY_FRICTION,
             log_prior_odds=-1.0,
             model_form_error=0.02,
-            family="dry friction",
+            form_of="dry friction",
             parameters={"breakaway": _starts((1.8,)), "speed": peaks(0.01, 0.05, 0.2), "reach": peaks(1e-3, 0.01)},
         ),
         # Displacement and pose ------------------------------------------------------------------------------------------------
@@ -327,7 +327,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
         "creep": LawPrior(
             _CREEP,
             model_form_error=0.01,
-            family="creep",
+            form_of="creep",
             parameters={"tau": _starts((0.03, 0.3, 3.0, 30.0, 300.0)), "slow": _starts((0.0, 0.25))},
         ),
         "finite_rotation": LawPrior("One geometry for all components.", acts_on_all=True),
@@ -341,7 +341,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
         "log_creep": LawPrior(
             _CREEP,
             model_form_error=0.01,
-            family="creep",
+            form_of="creep",
             parameters={"tau": _starts((0.01, 0.1, 1.0)), "decades": _starts((3.25, 6.0))},
         ),
         "lost_motion": LawPrior(

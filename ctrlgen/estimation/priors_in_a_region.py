@@ -30,7 +30,7 @@ def _friction(where: dict[str, ParameterPrior], log_prior_odds: float) -> LawPri
         _REASON,
         log_prior_odds=log_prior_odds,
         model_form_error=_FORM,
-        family="dry friction",
+        form_of="dry friction",
         in_a_region=True,
         parameters=contact | where,
     )

@@ -28,7 +28,7 @@ _ASYMMETRIC_LAG = LawPrior(
     + HYSTERESIS,
     log_prior_odds=ONE_IN_TEN,
     model_form_error=0.02,
-    family="hysteresis",
+    form_of="hysteresis",
     parameters={
         "reach": _reach(0.1, 0.4, peaks=True),
         "taper": ParameterPrior((0.5,)),
@@ -42,7 +42,7 @@ _WEIGHTED_LAG = LawPrior(
     "A finer form of a hysteresis that is found, for weights of its plays that follow no power. " + HYSTERESIS,
     suspected=False,
     model_form_error=0.02,
-    family="hysteresis",
+    form_of="hysteresis",
     parameters={
         "reach": _reach(0.3, peaks=True),
         "reversible": _reversible(0.0),
@@ -56,7 +56,7 @@ OF_A_LAG: Mapping[str, LawPrior] = {
     "displacement_bouc_wen": LawPrior(
         HYSTERESIS,
         model_form_error=0.02,
-        family="hysteresis",
+        form_of="hysteresis",
         parameters={"reach": _reach(0.01, 0.03, 0.1, 0.3, 1.0, peaks=True), "loop": ParameterPrior((0.55, 0.9))},
     ),
     "displacement_bouc_wen_of_power": LawPrior(
@@ -64,7 +64,7 @@ OF_A_LAG: Mapping[str, LawPrior] = {
         suspected=False,
         refines=frozenset({"displacement_bouc_wen"}),
         model_form_error=0.02,
-        family="hysteresis",
+        form_of="hysteresis",
         parameters={
             "reach": _reach(0.1, 0.3, peaks=True),
             "loop": ParameterPrior((0.55, 0.9)),
@@ -74,7 +74,7 @@ OF_A_LAG: Mapping[str, LawPrior] = {
     "displacement_hysteresis": LawPrior(
         HYSTERESIS,
         model_form_error=0.02,
-        family="hysteresis",
+        form_of="hysteresis",
         parameters={
             "reach": _reach(0.03, 0.1, 0.3, 1.0, peaks=True),
             "taper": _TAPER,
@@ -87,7 +87,7 @@ OF_A_LAG: Mapping[str, LawPrior] = {
         log_prior_odds=ONE_IN_TEN,
         unless=frozenset({"heat"}),
         model_form_error=0.02,
-        family="hysteresis",
+        form_of="hysteresis",
         parameters={"reach": _reach(0.03, 0.1, 0.3, 1.0), "taper": replace(_TAPER, start_values=(0.0,))},
     ),
     "weighted_displacement_hysteresis": replace(

@@ -177,18 +177,18 @@ def priors_page() -> str:
         "",
         "- *Odds*: how many times commoner the law is than a wrong gain; it decides among causes that explain alike.",
         "- *Form error*: what the law's form leaves after its parameters are fitted, as a share of what the law explains.",
-        "- *Family*: laws that are forms of one physics. A place has at most one of a family.",
+        "- *Form of*: the physics of which several laws are forms. A place has at most one form of it.",
         "- *Plainer law*: what this law is where the numbers by which both differ are neutral; it is named instead where their "
         "intervals do not exclude that.",
         "",
-        "| law | odds | form error | family | plainer law | reason |",
+        "| law | odds | form error | form of | plainer law | reason |",
         "|---|---|---|---|---|---|",
     ]
     for kind, law in sorted(Effect.library.items()):
         prior = priors.prior_of(law)
         plainer = f"`{law.plainer.kind}`" if law.plainer else ""
         odds, error = f"{math.exp(prior.log_prior_odds):.2g}", f"{100 * prior.model_form_error:g} %"
-        lines.append(f"| `{kind}` | {odds} | {error} | {prior.family or ''} | {plainer} | {cell(prior.reason)} |")
+        lines.append(f"| `{kind}` | {odds} | {error} | {prior.form_of or ''} | {plainer} | {cell(prior.reason)} |")
     return "\n".join([*lines, ""])
 
 

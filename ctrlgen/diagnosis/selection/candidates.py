@@ -283,8 +283,8 @@ def fit_subsets(
 
 
 def _promising_sets(screened: Screened, size: int, enough: float, most: int) -> list[tuple[Suspect, ...]]:
-    """The first `most` sets of one size that promise `enough`, no suspect in more than half of them, no two of one family at one
-    place."""
+    """The first `most` sets of one size that promise `enough`, no suspect in more than half of them, no two forms of one physics at
+    one place."""
     chosen: list[tuple[Suspect, ...]] = []
     used: dict[Hypothesis, int] = {}
     for promised, suspects in screened.subsets:
@@ -292,7 +292,7 @@ def _promising_sets(screened: Screened, size: int, enough: float, most: int) -> 
         if len(suspects) != size or promised < enough or len(chosen) >= most:
             continue
         often = max(used.get(h, 0) for h in causes) >= max(2, most // 2)
-        if often or len({(h.family, h.location) if h.family else h for h in causes}) < size:
+        if often or len({(h.form_of, h.location) if h.form_of else h for h in causes}) < size:
             continue
         used.update({h: used.get(h, 0) + 1 for h in causes})
         chosen.append(suspects)

@@ -191,6 +191,6 @@ def why_alike(cause: Hypothesis, rival: Hypothesis) -> str:
         )
     if cause.prior.of_time != rival.prior.of_time:
         return "a function of time alone; a record of another course of the motion tells them apart"
-    if cause.family is not None and (cause.family, cause.location) == (rival.family, rival.location):
-        return f"another form of {cause.family}"
+    if cause.form_of is not None and (cause.form_of, cause.location) == (rival.form_of, rival.location):
+        return f"another form of {cause.form_of}"
     return "their effects on these readings are alike"

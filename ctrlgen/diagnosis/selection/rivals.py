@@ -261,11 +261,11 @@ def twins(trials: Trials, current: CandidateModel, k: int) -> list[CandidateMode
 
 
 def replace_cause(trials: Trials, fit: Fit, k: int, others: Structure, suspect: Suspect) -> Structure:
-    """The suspect beside the `others` in place of cause k of a fit; of its family, begun with that one's numbers where that is
+    """The suspect beside the `others` in place of cause k of a fit; another form of its physics begun with that one's numbers where that is
     better: what they have in common means the same."""
     structure = others.with_cause(suspect.hypothesis, suspect.start)
     cause = fit.structure.causes[k]
-    if cause.family is None or (cause.family, cause.at) != (suspect.hypothesis.family, suspect.hypothesis.at):
+    if cause.form_of is None or (cause.form_of, cause.at) != (suspect.hypothesis.form_of, suspect.hypothesis.at):
         return structure
     common = {name: value for name, value in fit.values(k).items() if name in suspect.start}
     kin = (structure.restarted(len(others.causes), s | common) for s in (suspect.start, *suspect.other_starts))

@@ -67,11 +67,11 @@ class Trials:
         self.bare.clear()
 
     def without_kin(self, cause: Hypothesis) -> Trials:
-        """A copy of these trials, which learns for itself, that suspects neither `cause` nor a law of its family at its place."""
+        """A copy of these trials, which learns for itself, that suspects neither `cause` nor another form of its physics at its place."""
 
         def is_kin(h: Hypothesis) -> bool:
-            family = h.family is not None and (h.family, h.at) == (cause.family, cause.at)
-            return family or (h.effect, h.location, h.path) == (cause.effect, cause.location, cause.path)
+            form = h.form_of is not None and (h.form_of, h.at) == (cause.form_of, cause.at)
+            return form or (h.effect, h.location, h.path) == (cause.effect, cause.location, cause.path)
 
         branch = copy.copy(self)
         branch.screen = self.screen.without(is_kin)

@@ -122,14 +122,14 @@ def _is_little(before: np.ndarray, after: np.ndarray) -> np.ndarray:
 def main_rivals(search: SearchResult, shares: Attribution) -> bool:
     """Whether a cause with a share near the largest has a rival of other physics.
 
-    Where more than noise is left, laws of one family at one place are one answer: a discrepancy of any model hides which of them
+    Where more than noise is left, forms of one physics at one place are one answer: a discrepancy of any model hides which of them
     it is. Of several terms of one law, as harmonics are, the largest counts: what else a small one may be does not change the law.
     """
     first = {terms[0] for terms in terms_of_findings(search)}
     largest = max((s.value for s in shares.shares if s), default=0.0)
     exact = search.chosen.errors.is_noise
     return any(
-        any(exact or not _one_family(cause, r.cause) for r in rivals)
+        any(exact or not _one_physics(cause, r.cause) for r in rivals)
         and (shares.rest is None or (share is not None and share.value >= VERDICT.main_share * largest))
         for k, (cause, rivals, share) in enumerate(zip(search.chosen.causes, search.rivals, shares.shares, strict=True))
         if k in first
@@ -149,11 +149,11 @@ def terms_of_findings(search: SearchResult) -> list[list[int]]:
     return [sorted(terms, key=left_without, reverse=True) if len(terms) > 1 else terms for terms in groups.values()]
 
 
-def _one_family(cause: Hypothesis, rival: Hypothesis | None) -> bool:
+def _one_physics(cause: Hypothesis, rival: Hypothesis | None) -> bool:
     return (
         rival is not None
-        and cause.family is not None
-        and (rival.family, rival.location) == (cause.family, cause.location)
+        and cause.form_of is not None
+        and (rival.form_of, rival.location) == (cause.form_of, cause.location)
     )
 
 
