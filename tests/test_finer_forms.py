@@ -22,7 +22,9 @@ from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import SEARCH
+from ctrlgen.effects import Effect
 from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.priors import prior_of
 from ctrlgen.estimation.structure import Structure
 
 OFFERED = [Hypothesis(kind, "stage:axis", "axis") for kind in ("displacement_hysteresis", "backlash", "creep")]
@@ -174,7 +176,11 @@ def test_a_knee_that_is_no_exponential_has_a_form_of_its_own():
     assert simplified(trials, finer).causes == finer.causes
 
 
-def test_what_lags_has_its_finer_forms_whichever_of_its_names_it_was_found_under():
+def test_a_finer_form_acts_where_the_plain_law_does():
+    refined = [(law, Effect.library[plain]) for law in Effect.library.values() for plain in prior_of(law).refines]
+    assert len(refined) > 10
+    for law, plain in refined:
+        assert (law.place, prior_of(law).domain) == (plain.place, prior_of(plain).domain)
     for plain in ("displacement_hysteresis", "asymmetric_displacement_hysteresis"):
         finer = Hypothesis(plain, "stage:axis", "axis").finer
         assert finer == (Hypothesis("weighted_displacement_hysteresis", "stage:axis", "axis"),)

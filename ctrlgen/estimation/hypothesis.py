@@ -99,12 +99,9 @@ class Hypothesis:
 
     @property
     def finer(self) -> tuple[Hypothesis, ...]:
-        """The finer forms of its law at the same channel: of an action that is late, also where it is the displacement that is."""
-        return tuple(self.of_law(law) for _, law in sorted(laws().items()) if self.effect in prior_of(law).refines)
-
-    def of_law(self, law: type[Effect]) -> Hypothesis:
-        """Another law at the same channel, wherever between drive and reading that one acts."""
-        return replace(self, effect=law.kind, location=f"{_domain(law)}:{self.at}")
+        """The finer forms of its law, at the same place."""
+        kinds = (kind for kind, law in sorted(laws().items()) if self.effect in prior_of(law).refines)
+        return tuple(replace(self, effect=kind) for kind in kinds)
 
     @property
     def prior(self) -> LawPrior:
@@ -204,11 +201,6 @@ def hypotheses(
     return effects + [Hypothesis(PARAMETER, location, path=path) for path, location in _numbers(device)]
 
 
-def _domain(law: type[Effect]) -> str:
-    """Where a finding of a law is reported to be."""
-    return prior_of(law).domain or DOMAIN[law.place]
-
-
 def _of_law(
     law: type[Effect],
     physics: DevicePhysics,
@@ -224,7 +216,7 @@ def _of_law(
         return
     if not law.requires <= there or (law.place is Place.HEAT and "heat" not in there):
         return
-    domain = _domain(law)
+    domain = prior.domain or DOMAIN[law.place]
     highest = CANDIDATE_TERMS.highest_frequency / sample_time if sample_time else float("inf")
     longest = float("inf")
     if law.apart and sample_time:

@@ -17,7 +17,6 @@ from ctrlgen.diagnosis.selection.precedence import counterparts, explains_alike_
 from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import CONFUSABLE, MODEL_SELECTION, SEARCH
-from ctrlgen.effects import Effect
 from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis
 from ctrlgen.estimation.plainer_law import left_beside, may_be_plainer, plainer_start
@@ -78,7 +77,7 @@ def _coarser(trials: Trials, current: CandidateModel, k: int) -> CandidateModel:
     if not cause.prior.refines:
         return current
     others, fits = current.fit.restarted.without(k), []
-    for plain in (cause.of_law(Effect.library[effect]) for effect in sorted(cause.prior.refines)):
+    for plain in (replace(cause, effect=effect) for effect in sorted(cause.prior.refines)):
         if plain.law.amplitude().name not in current.fit.values(k):  # a size of another kind
             continue
         channel = plain.channel_on(current.fit.structure.device)
