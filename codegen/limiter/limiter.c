@@ -410,6 +410,7 @@ static void wanted_drives(const limiter_state *state, int settling, limiter_outp
 #if OWN_DRIVES
 #define HOLD_DRIVE(k) held[k] = out->drive[k];
 #define TAKE_HELD(k) out->drive[k] = held[k];
+#define BEGIN_AT(k) reached[k] = out->displacement[k];
 /* Keeps the limits of drives that out->drive does not keep: as far from origin toward out->displacement as every drive can lead the
  * displacement of its own. The drives held within their limits lead to reached, and the slowest of those that were beyond says how much of the
  * line is gone. As drives rise with their displacements, or fall, all lie between those of origin and held; limited is 1 if one does not,
@@ -435,6 +436,7 @@ static uint32_t into_reach(const limiter_state *state, int settling, const real 
 #else
         LIMITED_ADVANCE(state, LIMITED_FROM, held, x);
 #endif
+        EACH_AXIS(BEGIN_AT) /* analysers that do not follow all of Newton's loop see them set */
         REACHED(state, x, out->displacement, held, reached);
         for (i = 0; i < N; i++) {
             const real whole = out->displacement[i] - origin[i];
@@ -447,7 +449,11 @@ static uint32_t into_reach(const limiter_state *state, int settling, const real 
             }
             reached[i] = whole;
         }
-        share = (share > REAL(0.0)) ? (REACH_FRACTION * share) : REAL(0.0);
+        if (share > REAL(0.0)) {
+            share *= REACH_FRACTION;
+        } else {
+            share = REAL(0.0);
+        }
         for (i = 0; i < N; i++) {
             out->displacement[i] = origin[i] + (share * reached[i]);
         }

@@ -627,6 +627,12 @@ static uint32_t mems_hexapod_online_f32_into_reach(const mems_hexapod_online_f32
         float share = 1.0f;
         int i;
         mems_hexapod_online_f32_step_advance(state->x, held, x);
+        reached[0] = out->displacement[0];
+        reached[1] = out->displacement[1];
+        reached[2] = out->displacement[2];
+        reached[3] = out->displacement[3];
+        reached[4] = out->displacement[4];
+        reached[5] = out->displacement[5]; /* analysers that do not follow all of Newton's loop see them set */
         mems_hexapod_online_f32_reached_displacement(x, reached);
         for (i = 0; i < 6; i++) {
             const float whole = out->displacement[i] - origin[i];
@@ -639,7 +645,11 @@ static uint32_t mems_hexapod_online_f32_into_reach(const mems_hexapod_online_f32
             }
             reached[i] = whole;
         }
-        share = (share > 0.0f) ? (0.99993896f * share) : 0.0f;
+        if (share > 0.0f) {
+            share *= 0.99993896f;
+        } else {
+            share = 0.0f;
+        }
         for (i = 0; i < 6; i++) {
             out->displacement[i] = origin[i] + (share * reached[i]);
         }
