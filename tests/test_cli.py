@@ -227,6 +227,8 @@ def test_an_interruption_at_any_moment_leaves_nothing_behind(tmp_path, stop, aft
     if process.returncode == 0:  # too late: it had finished, and the result is whole
         assert {p.name for p in out.iterdir()} >= {"c", "figures", "summary.json", "trajectory.csv", "report.html"}
         assert list(tmp_path.iterdir()) == [out]
+    elif process.returncode == -stop and after < 0.1:  # too early: on a busy machine nothing of ctrlgen had run
+        assert not message and list(tmp_path.iterdir()) == []
     else:
         assert process.returncode == 130 and "nothing was written" in message
         assert list(tmp_path.iterdir()) == []

@@ -19,7 +19,7 @@ from ctrlgen import build_model
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
 from ctrlgen.effects import Effect
-from ctrlgen.effects._yielding_steps import taken_up
+from ctrlgen.effects.bouc_wen_of_power import taken_up
 
 EVENT = '\n[[effect]]\nkind = "coulomb_after"\nat = "axis"\n{}\n'
 
