@@ -32,6 +32,9 @@ LEAST = {
     "meso_circle": 0.7,
     "tilt_platform": 0.9,
 }
+NEVER = {
+    "meso_circle": {"limit_all", "is_nan"}
+}  # its drives are its displacements, which are in range before: rounding alone can need them
 QUICK = ("circle20", "flexure_axis_line", "tilt_platform")  # heaters, inertia, and more drives than axes
 NOT_ENTERED = (
     r"^const (float|double) t\d+ = ",  # which of two numbers is the larger, in a kernel of the physics
@@ -89,10 +92,10 @@ def test_the_shipped_test_enters_every_function_and_the_branches_that_can_be(nam
             pytest.skip(f"{program} is missing: what the shipped test enters was not counted")
     folder, _ = solved(name, tmp_path)
     never, found = branches(folder, Real.FLOAT)
-    assert never == []
+    assert {function.split("_f32_")[-1] for function in never} == NEVER.get(name, set())
     every = [taken for those in found.values() for _, taken in those]
     assert sum(every) >= LEAST[name] * len(every), (sum(every), len(every))
-    missed = {text for those in found.values() for text, taken in those if not taken}
+    missed = {text for name, those in found.items() if name not in never for text, taken in those if not taken}
     assert [text for text in sorted(missed) if not any(re.search(known, text) for known in NOT_ENTERED)] == []
 
 
