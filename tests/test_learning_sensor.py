@@ -19,7 +19,7 @@ from ctrlgen.learning.lifted import Lifted
 from ctrlgen.learning.run_errors import RunErrors
 from ctrlgen.learning.run_gate import belonging
 from ctrlgen.learning.runs import Run, Runs, in_time
-from ctrlgen.learning.sensor_budget import Feigned, SensorBudget, sensor_budget
+from ctrlgen.learning.sensor_budget import Feigned, SensorBudget, believed, sensor_budget
 from ctrlgen.learning.sensor_words import sensor_words
 from ctrlgen.learning.steady_drift import drift_of, without_drift
 from ctrlgen.trajectory.scenario import model_of
@@ -89,7 +89,7 @@ def test_what_is_left_to_the_sensor_never_lets_the_stage_be_worse(rng):
     lines = tuple(Feigned("a", "", "", rng.standard_normal((n, 2))) for _ in range(3))
     budget = SensorBudget(lines, 2.0, scale)
     for size in (0.1, 1.0, 3.0, 30.0):
-        for _ in range(100):
+        for _ in range(300):
             true = size * rng.standard_normal((n, 2))
             feigned = sum(2 * rng.choice([-1, rng.uniform(-1, 1), 1]) * line.deviation for line in lines)
             seen = true + feigned
@@ -115,6 +115,17 @@ def test_scales_of_one_size_are_told_apart_by_no_basis():
         seen = 1.6 * (x + y)
         assert budget.of_sensor(seen) == pytest.approx(seen, rel=1e-7)
         assert budget.of_sensor(3 * x) == pytest.approx(x, abs=1e-7)  # y takes no part
+
+
+def test_the_condition_holds_for_lines_of_any_size_that_may_say_the_same(rng):
+    """1/2 |a|^2 + sum |g_i . a| <= a . d to rounding, for lines from 1e-2 to 1e2 of the deviation, two of which are one line."""
+    for _ in range(300):
+        m, n = rng.integers(1, 8), rng.integers(3, 9)
+        G = rng.standard_normal((m, n)) * 10 ** rng.uniform(-2, 2, n)
+        G[:, 1] = (1 + 1e-13) * G[:, 0]
+        d = G @ rng.uniform(-3, 3, n)
+        a = believed(d, G)
+        assert a @ a / 2 + np.abs(G.T @ a).sum() - a @ d < 1e-8 * (d @ d)
 
 
 def test_the_budget_is_what_a_wrong_scale_zero_and_clock_make_of_the_readings(circle):
