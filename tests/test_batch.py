@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -145,6 +146,28 @@ def test_a_batch_that_is_stopped_goes_on_where_it_was(jobs, tmp_path, by):
         assert not list(out.glob(".*"))
     rows = {row.name: row.state for row in run_batch(load_batch(jobs), out, jobs=0)}
     assert rows == {"table--run0": "done before", "table--run1": "done", "table--wrong": "failed"}
+
+
+def test_a_result_counts_that_was_there_when_the_batch_was_stopped_before_its_row(jobs, tmp_path, monkeypatch):
+    out, task = tmp_path / "out", load_batch(jobs)[1]
+    record = {"findings": [], "verdict": "consistent", "implausible": []}
+    error = {"rms_before": 1.0, "rms_after": 1.0, "noise_floor": 1.0, "unit": "um"}
+    content = json.dumps({**record, "held_out": {"y": error}}).encode()
+    monkeypatch.setattr("ctrlgen.app.batch._work", lambda task: {"diagnosis.json": content})
+    whole = ctrlgen.app.batch.whole_folder
+
+    @contextmanager
+    def stopped(folder):
+        with whole(folder) as draft:
+            yield draft
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("ctrlgen.app.batch.whole_folder", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        run_batch([task], out, jobs=0)
+    told = json.loads((out / "batch.json").read_text())
+    assert (told["total"], told["done"], told["failed"], told["verdicts"]) == (1, 1, 0, {"consistent": 1})
+    assert list(table_of(out)) == [task.name]
 
 
 def kill_a_worker_at_work(cluster, killed: list) -> None:

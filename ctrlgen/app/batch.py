@@ -206,6 +206,9 @@ def run_batch(
             rows[task.name] = _kept(task, made_from, result, out)
             tables.told(rows)
     finally:
+        for task, made_from in to_do:  # stopped between a result and its row: what is there counts
+            if task.name not in rows and (row := earlier(task.name, out / task.name, made_from)) is not None:
+                rows[task.name] = replace(row, state="done")
         tables.write(rows)
     in_order = tuple(rows[task.name] for task in tasks)
     write_parquet(in_order, out)
