@@ -10,7 +10,8 @@ from conftest import SCENARIOS
 from ctrlgen import build_model, load_scenario
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.controller.quick_state import SHARE
-from ctrlgen.numerics.proven_polynomial import proven_polynomial
+from ctrlgen.numerics import proven_polynomial as module
+from ctrlgen.numerics.proven_polynomial import proven_inverse, proven_polynomial
 from ctrlgen.numerics.taylor_intervals import taylor_intervals
 
 V = ca.SX.sym("v")
@@ -48,6 +49,22 @@ def test_a_polynomial_is_off_by_less_than_is_proved_and_exact_at_the_ends(name, 
     assert np.abs(error).max() <= polynomial.off * steepness * (1 + 1e-6) + 1e-14  # roundings of numbers of about ten
     assert max(abs(error[0]), abs(error[-1])) < 1e-13
     assert np.abs(error).max() > 0.2 * polynomial.off * steepness or name == "square"  # the bound is no idle one
+
+
+def test_an_inverse_is_enclosed_only_at_degrees_that_no_point_refutes_and_is_the_same(monkeypatch):
+    f, enclosed = ca.Function("f", [V], [ca.exp(V / 2)]), []
+    monkeypatch.setattr(
+        module, "taylor_intervals", lambda *given: enclosed.append(given[-1]) or taylor_intervals(*given)
+    )
+    inverse = proven_inverse(f, 0.0, 1.0, 1e-7)
+    few = len(enclosed)
+    monkeypatch.setattr(module, "REFUTED", np.inf)
+    every = proven_inverse(f, 0.0, 1.0, 1e-7)
+    assert inverse is not None and every is not None and inverse.off == every.off <= 1e-7
+    assert np.array_equal(inverse.coefficients, every.coefficients)
+    assert few <= 6 < len(enclosed) - few  # two for f, two a degree
+    points, q = np.linspace(0, 1, 501), ca.Function("q", [V], [inverse.of(V)])
+    assert max(abs(float(q(f(v)) - v)) for v in points) <= inverse.off
 
 
 def test_what_turns_or_has_a_corner_has_no_polynomial():

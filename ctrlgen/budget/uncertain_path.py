@@ -22,7 +22,7 @@ from ctrlgen.devices import Limit
 from ctrlgen.model.assembly import model_of_numbers
 from ctrlgen.model.discretisation import NEWTON_STEPS, balanced, one_step_map, settling_time
 from ctrlgen.model.model import Model
-from ctrlgen.numerics.batched_evaluation import Recursion
+from ctrlgen.numerics.batched_evaluation import Recursion, evaluate
 from ctrlgen.trajectory.inverse.clock import Settled
 from ctrlgen.trajectory.solution import Solution
 
@@ -188,10 +188,10 @@ class UncertainPath:
 
     def evaluate(self, name: str, S: np.ndarray, drive: np.ndarray) -> np.ndarray:
         """The `pose` or the `limits` (n, n_y) of the described device, at states S (n, n_s) and drives (n, n_u)."""
-        one, c = self.of_sample[name], self.constants[name](self.q_nominal).full()
+        one, c = self.of_sample[name], self.constants[name](self.q_nominal).full().ravel()
         if not one.numel_out(0):
             return np.zeros((len(S), 0))
-        return one.map(len(S))(S.T, drive.T, np.tile(c, (1, len(S)))).full().T
+        return np.asfortranarray(evaluate(one.map(len(S)), S, drive, np.tile(c, (len(S), 1)))[0])
 
     def lsb(self) -> np.ndarray:
         """(n_u,) one step of the converter [SI]."""

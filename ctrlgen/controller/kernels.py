@@ -214,7 +214,7 @@ class ControllerKernels:
             "composite_ratio", arguments, [worst], self.composite_shares.name_in(), ["ratio"], {"cse": True}
         )
 
-    @property
+    @cached_property
     def composite_rounds(self) -> int:
         """How often a displacement is scaled toward home: once where the limited quantities are proportional to it."""
         m = self.nominal

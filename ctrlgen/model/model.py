@@ -18,6 +18,7 @@ import numpy as np
 from ctrlgen.core.shown import Shown
 from ctrlgen.devices import Device, Limit, Signal
 from ctrlgen.effects import LawInputs
+from ctrlgen.numerics.batched_evaluation import evaluate
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +159,7 @@ class Model(Shown):
         return ca.Function(
             f"{self.name}_signals",
             [self.x, self.z, self.u, self.p],
-            [signal.expr for signal in self.signals.values()],
+            [ca.densify(signal.expr) for signal in self.signals.values()],
             ["x", "z", "u", "p"],
             list(self.signals),
         )
@@ -169,7 +170,7 @@ class Model(Shown):
         return ca.Function(
             f"{self.name}_limits",
             [self.x, self.z, self.u, self.p],
-            [limit.expr for limit in self.limits],
+            [ca.densify(limit.expr) for limit in self.limits],
             ["x", "z", "u", "p"],
             [limit.name for limit in self.limits],
         )
@@ -228,8 +229,8 @@ class Model(Shown):
 
     def limited_values(self, x: np.ndarray, z: np.ndarray, u: np.ndarray) -> list[np.ndarray]:
         """(n, channels) [SI] of each of the `limits` under the states x (n, n_x), displacements z (n, n_axes) and drives u (n, n_u)."""
-        p = np.tile(self.p_nominal[:, None], (1, len(x)))
-        return [values.full().T for values in self.evaluate_limits.map(len(x)).call([x.T, z.T, u.T, p])]
+        p = np.tile(self.p_nominal, (len(x), 1))
+        return [np.asfortranarray(v) for v in evaluate(self.evaluate_limits.map(len(x)), x, z, u, p)]
 
     def limited_rates(self, u: np.ndarray, before: np.ndarray, sample_time: float) -> list[np.ndarray]:
         """(n,) [SI] of each of the `rate_limits`: the change by time of its drive to `u` (n, n_u) from the one `before` (n, n_u)."""

@@ -16,7 +16,7 @@ from ctrlgen.core.units import from_si
 from ctrlgen.devices import Signal
 from ctrlgen.model.discretisation import held_step, one_step_map
 from ctrlgen.model.model import Model
-from ctrlgen.numerics.batched_evaluation import in_blocks
+from ctrlgen.numerics.batched_evaluation import evaluate, in_blocks
 from ctrlgen.numerics.newton import newton_solver
 
 PERIODIC = 1e-9  # typical sizes by which a period may end elsewhere than it began
@@ -61,8 +61,9 @@ def first_samples(of: Trace, n: int) -> Trace:
 
 def trace(model: Model, time: np.ndarray, x: np.ndarray, z: np.ndarray, u: np.ndarray) -> Trace:
     """Every signal at given states x (n, n_x), displacements z (n, n_axes) and drives u (n, n_u), SI."""
-    values = model.evaluate.map(len(time))(x.T, z.T, u.T, np.tile(model.p_nominal[:, None], (1, len(time))))
-    return Trace(time, {role: v.full().T for role, v in zip(model.signals, values, strict=True)}, x, z, model.signals)
+    n = len(time)
+    values = evaluate(model.evaluate.map(n), x, z, u, np.tile(model.p_nominal, (n, 1)))
+    return Trace(time, dict(zip(model.signals, map(np.asfortranarray, values), strict=True)), x, z, model.signals)
 
 
 def balance_solver(model: Model) -> ca.Function:

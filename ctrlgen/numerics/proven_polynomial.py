@@ -16,14 +16,16 @@ from math import comb
 
 import casadi as ca
 import numpy as np
-import scipy
-from numpy.polynomial import chebyshev
+from numpy.polynomial import chebyshev, polynomial
 
+from ctrlgen.numerics.batched_evaluation import QuickCall, evaluate
 from ctrlgen.numerics.taylor_intervals import taylor_intervals
 
 CELLS = 64  # of the range: the error of degree 12 turns 13 times, five cells a turn
 HIGHEST = 12  # degree: beyond it a root and a quotient cost no more
 HIGHEST_INVERSE = 16  # degree of an inverse, in place of Newton steps with a root and quotients each
+HALVINGS = 54  # of the range, to a root: less than a rounding of its ends is left
+REFUTED = 1.01  # of the error asked for: one seen that is larger than so, and than roundings, needs no enclosure
 # Between which magnitudes the numbers of Horner's rule are: in single precision (1.2e-38 to 3.4e38) none overflows, and a product with a
 # difference that is but a rounding is a normal number
 SMALLEST, LARGEST = 1e-30, 1e37
@@ -103,10 +105,14 @@ def proven_inverse(f: ca.Function, low: float, high: float, share: float) -> Pro
     centres = low + radius * (2 * np.arange(CELLS) + 1)
     ends = float(f(low)), float(f(high))
     half, middle, v = abs(ends[1] - ends[0]) / 2, sum(ends) / 2, ca.SX.sym("v")
+    called, at_centres = QuickCall(f), evaluate(f.map(CELLS), centres)[0].ravel()
     for degree in range(1, HIGHEST_INVERSE + 1):
         nodes = -np.cos(np.pi * np.arange(degree + 1) / degree)
-        values = [_root(f, middle + half * s, low, high) for s in nodes]
+        values = [_root(called, middle + half * s, low, high) for s in nodes]
         series = chebyshev.cheb2poly(chebyshev.chebfit(nodes, values, degree))
+        seen = np.abs(polynomial.polyval((at_centres - middle) / half, series) - centres).max()
+        if not seen <= REFUTED * share * (high - low):
+            continue
         found = ProvenPolynomial(series, middle, half, 0.0, 1 / forward.steepest, 1 / forward.flattest)
         error = ca.Function("e", [v], [found.of(f(v)) - v], {"cse": True})
         over = taylor_intervals(error, centres - radius, centres + radius, radius, degree + 1)
@@ -118,12 +124,15 @@ def proven_inverse(f: ca.Function, low: float, high: float, share: float) -> Pro
     return None
 
 
-def _root(f: ca.Function, value: float, low: float, high: float) -> float:
+def _root(f: QuickCall, value: float, low: float, high: float) -> float:
     """v in low ... high with f(v) = `value`; an end where rounding leaves none."""
-    sides = [float(f(v)) - value for v in (low, high)]
+    sides = [f(v)[0] - value for v in (low, high)]
     if sides[0] * sides[1] >= 0:
         return (low, high)[int(abs(sides[1]) < abs(sides[0]))]
-    return float(scipy.optimize.brentq(lambda v: float(f(v)) - value, low, high, xtol=1e-16 * (high - low)))
+    for _ in range(HALVINGS):  # scipy.optimize takes half a second to import
+        middle = (low + high) / 2
+        low, high = (low, middle) if (f(middle)[0] > value) == (sides[1] > 0) else (middle, high)
+    return (low + high) / 2
 
 
 def _about(series: np.ndarray, centres: np.ndarray, radius: float) -> np.ndarray:

@@ -48,10 +48,10 @@ def _times(a: Jet, b: Jet) -> Jet:
 
 def _convolved(a: Jet, b: Jet, k: int, first: int, last: int) -> Jet:
     """sum_j a_j b_{k-j}, j = first ... last."""
-    total = Jet(np.zeros_like(a.low[0]), np.zeros_like(a.low[0]))
-    for j in range(first, last + 1):
-        total = total + a[j] * b[k - j]
-    return total
+    products = Jet(a.low[first : last + 1], a.high[first : last + 1]) * Jet(
+        b.low[k - last : k - first + 1][::-1], b.high[k - last : k - first + 1][::-1]
+    )
+    return Jet(products.low.sum(axis=0), products.high.sum(axis=0))
 
 
 def _divided(a: Jet, b: Jet) -> Jet:
