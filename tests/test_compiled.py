@@ -105,15 +105,90 @@ def test_a_long_function_is_compiled_in_parts_and_gives_the_same_bits(cache, mon
     y = first = ca.exp(-x * x)
     for k in range(200):
         y = ca.vertcat(ca.sin(y[1]) + y[2] / (k + 1), y[0] * y[1] - 0.5 * y[2], ca.cos(y[0] * y[0]))
-    step, at = ca.Function("step", [x], [y + first]), ca.MX.sym("at", 3)
-    whole = ca.Function("whole", [at], [step(step(at)) + step(2 * at)])
+    step, at, by = ca.Function("step", [x], [y + first]), ca.MX.sym("at", 3), ca.MX.sym("by")
+    after = step(step(at)) + by * step(2 * at)
+    whole = ca.Function("whole", [at, by], [after, ca.sum1(after)])
     monkeypatch.setattr(compiled, "LARGE", 1000)
     code = compiled.c_code(whole)
     assert 2 <= code.count("__attribute__((noinline)) static void casadi_f") <= 10
-    long = Compilable(whole)
-    assert long.spent(LONG)
-    for point in np.random.default_rng(2).standard_normal((20, 3)):
-        assert np.array_equal(long.function(point).full(), whole(point).full())
+    assert_same_bits(whole, np.array([0.1, -0.2, 0.3]), np.random.default_rng(2).standard_normal((20, 1)))
+
+
+OF_ONE = (
+    *(
+        "sqrt",
+        "exp",
+        "log",
+        "log1p",
+        "expm1",
+        "sin",
+        "cos",
+        "tan",
+        "asin",
+        "acos",
+        "atan",
+        "sinh",
+        "cosh",
+        "tanh",
+        "asinh",
+        "acosh",
+    ),
+    *("atanh", "erf", "floor", "ceil", "fabs", "sign"),
+)
+OF_TWO = (
+    *(
+        "fmin",
+        "fmax",
+        "atan2",
+        "hypot",
+        "copysign",
+        "fmod",
+        "remainder",
+        "power",
+        "lt",
+        "le",
+        "eq",
+        "ne",
+        "logic_and",
+        "logic_or",
+    ),
+    "if_else",
+)
+
+
+def test_every_operation_has_the_bits_of_the_virtual_machine_and_is_declared(cache, monkeypatch):
+    """At numbers that no operation can be evaluated at too: what a header declares in front of CasADi's code, the code declares itself."""
+    if compiled.compiler() is None:
+        pytest.skip("no C compiler here")
+    flags = ["-Werror=implicit-function-declaration" if flag == "-w" else flag for flag in compiled.FLAGS]
+    monkeypatch.setattr(compiled, "FLAGS", (*flags, "-Wno-unused"))
+    for symbol in (ca.SX, ca.MX):
+        s, a, b = (symbol.sym(name) for name in "sab")
+        two = [getattr(ca, name)(a, b, *([0] if name == "if_else" else [])) for name in OF_TWO]
+        others = [1 / a, a * a, 2 * a, -a, ca.logic_not(a), symbol(np.inf) * a, symbol(np.nan) + a]
+        values = ca.vertcat(*(getattr(ca, name)(a) for name in OF_ONE), *two, *others)
+        one = ca.Function("one", [s, a, b], [s + b, values])
+        rows = np.array([-np.inf, -1.5, -1.0, -0.3, -0.0, 0.0, 0.4, 1.0, 2.5, np.inf, np.nan])
+        assert_same_bits(one, np.zeros(1), np.repeat(rows, len(rows))[:, None], np.tile(rows, len(rows))[:, None])
+
+
+def assert_same_bits(one, state, *inputs):
+    """States and results of the library are those of the virtual machine, whatever the sign of a zero; any two NaN are the same."""
+    slow, library = Recursion(one), Compilable(one)
+    slow.one._settled = True
+    assert library.spent(LONG)
+    for a, b in zip(slow.run(state, *inputs), library.run(state, inputs, len(inputs[0])), strict=True):
+        assert np.array_equal(a, b, equal_nan=True) and np.array_equal(np.signbit(a[a == 0]), np.signbit(b[b == 0]))
+
+
+def test_a_damaged_library_leaves_the_virtual_machine(cache):
+    if compiled.compiler() is None:
+        pytest.skip("no C compiler here")
+    cache.mkdir()
+    (cache / compiled._library(compiled.c_code(friction()))).write_bytes(b"no library")
+    broken = Recursion(friction())
+    assert not broken.one.spent(LONG)
+    assert broken.run(np.zeros(1), np.ones((3, 1)), np.array([[0.3, 0.7]]))[0].shape == (3, 1)
 
 
 def test_a_constant_input_is_given_once_and_one_of_another_length_is_refused(cache):

@@ -1,8 +1,9 @@
-"""CasADi functions compiled to machine code where a C compiler is there, and left to CasADi's virtual machine elsewhere.
+"""Recursions compiled to machine code where a C compiler is there, and left to CasADi's virtual machine elsewhere.
 
 Compiled libraries are kept in the user's cache folder under the SHA-256 of their code, so that another diagnosis of the same
 device need not compile them again. The code is compiled without contraction of products and sums: its results are those of the
-virtual machine to the last bit.
+virtual machine to the last bit. A diagnosis compiles some hundred of them, most of them short: headers, CasADi's interface and the
+C library's start-up files, which nothing here needs, would take two thirds of the time of a short one.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -24,9 +26,9 @@ import numpy as np
 from ctrlgen.core.compiled_templates import cache_folder
 from ctrlgen.core.counts import number_of
 
-FLAGS = ("-Og", "-fPIC", "-shared", "-ffp-contract=off", "-w")
-# Of generated C, for the compiler: measured with gcc 12 to 14 on steps of an axis and a hexapod.
-SECONDS_PER_CHARACTER = 4e-6
+FLAGS = ("-Og", "-fPIC", "-shared", "-ffp-contract=off", "-w", *(("-nostdlib",) if sys.platform == "linux" else ()))
+# Of generated C, for the compiler: measured with gcc 12 on steps of an axis and a hexapod.
+SECONDS, SECONDS_PER_CHARACTER = 0.02, 4e-6
 # Characters of generated C above which it is compiled in parts: four seconds and not fifteen for a million.
 LARGE = 400_000
 PART = 250  # statements of a part
@@ -37,36 +39,45 @@ IN_WORK_VECTOR = re.compile(r"  (w\[\d+\]=|if \(res\[\d+\]!=0\) )")
 PLACE = re.compile(r"w\[(\d+)\]")
 LONGEST = 6_000_000  # characters of generated C: beyond, the compiler takes longer than the diagnosis
 
+INTERFACE = re.compile(r"^CASADI_SYMBOL_EXPORT int \w+\(.*\{\n  return (?P<main>casadi_f\d+)\(", re.M)
+KEEPS_NO_MEMORY = re.compile(r"_checkout\(void\) \{\n  return 0;\n\}")
+CONFIGURATION = re.compile(
+    r"^CASADI_SYMBOL_EXPORT \w+ \w*casadi_(version|int_size|real_size)\(.*\{(.*\}|[^}]*\n\})\n", re.M
+)
+# what CasADi calls for one or two numbers
+HELPER = re.compile(r"^(?=casadi_real casadi_\w+\(casadi_real \w+(, casadi_real \w+)?\) ?\{)", re.M)
+# <math.h> without what a header takes: what CasADi calls, and the two numbers
+UNARY = "acos acosh asin asinh atan atanh cbrt ceil cos cosh erf exp expm1 fabs floor log log10 log1p sin sinh sqrt tan tanh"
+BINARY = "atan2 copysign fmax fmin fmod hypot pow remainder"
+DECLARED = (
+    "".join(f"double {name}(double);\n" for name in UNARY.split())
+    + "".join(f"double {name}(double, double);\n" for name in BINARY.split())
+    + '#define INFINITY __builtin_inf()\n#define NAN __builtin_nan("")\n'
+)
+
 # A recursion as one call, sample after sample on the caller's memory: CasADi copies what goes in and out of every sample, which takes
 # as long as the equations of an axis. `by`: numbers from one sample of an argument to the next, 0 for one that is constant.
 LOOP = """
-#include <stdlib.h>
-CASADI_SYMBOL_EXPORT int {name}_run(casadi_int n, const casadi_real** given, const casadi_int* by, const casadi_real* state,
-                                    casadi_real* states, casadi_int n_s, casadi_real* results, casadi_int n_r) {{
-  casadi_int sz_arg, sz_res, sz_iw, sz_w, k, i;
-  if ({name}_work(&sz_arg, &sz_res, &sz_iw, &sz_w)) return 1;
-  const casadi_real** arg = malloc((sz_arg + 1)*sizeof(casadi_real*));
-  casadi_real** res = malloc((sz_res + 1)*sizeof(casadi_real*));
-  casadi_int* iw = malloc((sz_iw + 1)*sizeof(casadi_int));
-  casadi_real* w = malloc((sz_w + 1)*sizeof(casadi_real));
-  int mem = {name}_checkout(), failed = !arg || !res || !iw || !w;
-  for (k = 0; k < n && !failed; ++k) {{
+CASADI_SYMBOL_EXPORT int run(casadi_int n, const casadi_real** given, const casadi_int* by, casadi_int n_given,
+                             const casadi_real* state, casadi_real* states, casadi_int n_s, casadi_real* results, casadi_int n_r,
+                             const casadi_real** arg, casadi_real** res, casadi_int* iw, casadi_real* w) {{
+  casadi_int k, i;
+  for (k = 0; k < n; ++k) {{
     arg[0] = state;
-    for (i = 1; i < {name}_n_in(); ++i) arg[i] = given[i - 1] + k*by[i - 1];
+    for (i = 0; i < n_given; ++i) arg[i + 1] = given[i] + k*by[i];
     res[0] = states + k*n_s;
     res[1] = results + k*n_r;
-    failed = {name}(arg, res, iw, w, mem);
+    if ({main}(arg, res, iw, w, 0)) return 1;
     state = states + k*n_s;
   }}
-  {name}_release(mem);
-  free(arg), free(res), free(iw), free(w);
-  return failed;
+  return 0;
 }}
 """
 
 
 class Compilable:
-    """`function`, and the library that takes its place once it has run so long that compiling pays."""
+    """The recursion `function`, (state, input ...) -> (next state, result), and the library that takes its place once it has run so long
+    that compiling pays."""
 
     def __init__(self, function: ca.Function) -> None:
         self.function = function
@@ -77,16 +88,20 @@ class Compilable:
         self._loop: Callable[..., int] | None = None
 
     def spent(self, seconds: float, expected: float = 0.0) -> bool:
-        """Counts `seconds` of the virtual machine, where it would take the `expected` ones beside; whether `function` has been replaced
-        by its library."""
+        """Counts `seconds` of the virtual machine, where it would take the `expected` ones beside; whether the library is there from
+        now on."""
         if self._settled or self._folder is None:
             return False
         self.seconds += seconds
         if self._code is None:
-            if self.seconds + expected < 0.2:  # what hardly runs need not be written as C
+            if self.seconds + expected < 0.1:  # what hardly runs need not be written as C
                 return False
-            self._code = c_code(self.function)
-        price = len(self._code) * SECONDS_PER_CHARACTER
+            try:
+                self._code = c_code(self.function)
+            except ValueError:  # it stays with the virtual machine
+                self._settled = True
+                return False
+        price = SECONDS + len(self._code) * SECONDS_PER_CHARACTER
         path = self._folder / _library(self._code)
         kept = os.access(path, os.R_OK)  # where a folder above is another user's, `exists` is an error
         if not kept and (self.seconds + expected < price or len(self._code) > LONGEST):
@@ -94,14 +109,16 @@ class Compilable:
         self._settled = True
         if not kept and not _compile(self._code, path):
             return False
-        name, self._code = self.function.name(), ""
-        self.function = ca.external(name, str(path))
-        self._loop = getattr(ctypes.CDLL(str(path)), f"{name}_run", None)
+        self._code = ""
+        try:
+            self._loop = ctypes.CDLL(str(path)).run
+        except OSError:  # a folder from which nothing may be run, a damaged file
+            return False
         return True
 
     @property
     def is_compiled(self) -> bool:
-        """Whether a library with a loop over samples is there."""
+        """Whether the library is there."""
         return self._loop is not None
 
     def run(self, state: np.ndarray, inputs: Sequence[np.ndarray], n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -116,8 +133,11 @@ class Compilable:
         given = (ctypes.c_void_p * len(inputs))(*(x.ctypes.data for x in rows[1:]))
         by = (ctypes.c_longlong * len(inputs))(*(x.shape[1] if len(x) == n else 0 for x in rows[1:]))
         at = [ctypes.c_void_p(x.ctypes.data) for x in (rows[0], states, results)]
-        sizes = [ctypes.c_longlong(x.shape[1]) for x in (states, results)]
-        if self._loop is None or self._loop(ctypes.c_longlong(n), given, by, at[0], at[1], sizes[0], at[2], sizes[1]):
+        n_s, n_r, count, samples = (ctypes.c_longlong(k) for k in (states.shape[1], results.shape[1], len(inputs), n))
+        # pointers, integers and numbers, all of eight bytes
+        work = [np.empty(size + 1) for size in (one.sz_arg(), one.sz_res(), one.sz_iw(), one.sz_w())]
+        memory = (ctypes.c_void_p(x.ctypes.data) for x in work)
+        if self._loop is None or self._loop(samples, given, by, count, at[0], at[1], n_s, at[2], n_r, *memory):
             raise RuntimeError(f"{one.name()} could not be evaluated")
         return states, results
 
@@ -131,25 +151,21 @@ def compiler() -> str | None:
 
 
 def c_code(function: ca.Function) -> str:
-    """C of `function` with CasADi's interface, in parts where it is long."""
+    """C of the recursion `function` in a loop over samples, in parts where it is long. Raises ValueError for a function that keeps memory
+    from one call to the next."""
     code = _generated(function, avoid_stack=False)
     code = code if len(code) < LARGE else _in_parts(_generated(function, avoid_stack=True))
-    # a state and a result: a recursion
-    return _with_loop(code, function.name()) if function.n_out() == 2 and function.n_in() > 1 else code
-
-
-def _with_loop(code: str, name: str) -> str:
-    """The code with the loop over samples, in front of what closes the C linkage."""
-    head, end, tail = code.rpartition("#ifdef __cplusplus\n} /* extern")
-    return head + LOOP.format(name=name) + end + tail
+    interface = INTERFACE.search(code)
+    if interface is None or not KEEPS_NO_MEMORY.search(code):
+        raise ValueError(f"{function.name()} keeps memory from one call to the next")
+    code = CONFIGURATION.sub("", code[: interface.start()]).replace("#include <math.h>\n", DECLARED)
+    return HELPER.sub("static inline __attribute__((always_inline)) ", code) + LOOP.format(main=interface["main"])
 
 
 def _generated(function: ca.Function, avoid_stack: bool) -> str:
-    with tempfile.TemporaryDirectory() as folder:
-        generator = ca.CodeGenerator("step.c", {"avoid_stack": avoid_stack})
-        generator.add(function)
-        generator.generate(f"{folder}/")
-        return Path(folder, "step.c").read_text()
+    generator = ca.CodeGenerator("step.c", {"avoid_stack": avoid_stack})
+    generator.add(function)
+    return generator.dump()
 
 
 def _in_parts(code: str) -> str:
