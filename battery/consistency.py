@@ -117,6 +117,10 @@ def _verdict(d: dict[str, Any]) -> Iterator[str]:
     known = all(e["noise_floor"] for e in errors)
     quiet = known and all(e["rms_after"] is not None and e["rms_after"] <= NOISE * e["noise_floor"] for e in errors)
     chance = "which chance allows so few samples" in d["sentence"]
+    # of the worst channel; chi-square of the numbers' move is part of it
+    moved = "with them moved within it" in d["sentence"] and all(
+        e["rms_refitted"] is not None and e["rms_refitted"] <= NOISE * e["noise_floor"] for e in errors
+    )
     little = "too little to name" in d["sentence"] and known and all(map(_little, errors))
     if verdict == "explained" and not (quiet or tolerated or chance or little):
         yield "explained, and more than noise is left"
@@ -126,7 +130,7 @@ def _verdict(d: dict[str, Any]) -> Iterator[str]:
         yield f"{verdict} by nothing"
     if verdict == "consistent" and d["findings"]:
         yield "consistent, with findings"
-    if verdict == "consistent" and known and not (quiet or tolerated):
+    if verdict == "consistent" and known and not (quiet or tolerated or moved):
         yield "consistent, and more than noise is left"
     if verdict == "partly" and not quiet and known and d["attribution"]["explained"] < MOST and not tolerated:
         yield f"partly explained, and {d['attribution']['explained']} of the mismatch is taken away"

@@ -15,6 +15,8 @@ from battery.first_screen_check import BETTER, WORSE, screen_contradictions
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.diagnosis_first_screen import diagnosis_first_screen
 from ctrlgen.diagnosis.report.diagnosis_record import Provenance, diagnosis_record
+from ctrlgen.diagnosis.report.narrative import channel_sentence
+from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry
 from ctrlgen.reporting.result_file import json_text
 
 
@@ -70,6 +72,33 @@ def test_a_contradiction_is_found(sound, wrong):
     assert at[last] != value
     at[last] = value
     assert contradictions(changed)
+
+
+def test_consistent_beyond_the_noise_needs_numbers_that_may_move_so_far_and_says_so(sound):
+    error = {
+        "rms_before": 3.0,
+        "rms_after": 3.0,
+        "noise_floor": 1.0,
+        "unit": "nm",
+        "uncertainty": 2.0,
+        "rms_refitted": 1.1,
+    }
+    said, moved = (
+        channel_sentence("reading.axis", ChannelErrorEntry(**error)),
+        ", and with them moved within it 1.1 nm are left",
+    )
+    assert moved in said
+    record = sound | {
+        "verdict": "consistent",
+        "findings": [],
+        "held_out": {"reading.axis": error},
+        "sentence": f"Consistent: it lacks nothing. {said}",
+    }
+    told = "consistent, and more than noise is left"
+    assert told not in contradictions(record)
+    assert told in contradictions(record | {"sentence": record["sentence"].replace(moved, "")})
+    error["rms_refitted"] = 1.6
+    assert told in contradictions(record)
 
 
 def test_a_number_of_a_sensor_is_told_in_the_unit_of_its_reading(sound):

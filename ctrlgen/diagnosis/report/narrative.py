@@ -74,12 +74,15 @@ def _to_width(value: float, width: float) -> str:
 
 
 def channel_sentence(channel: str, error: ChannelErrorEntry) -> str:
-    """'Held-out error of delta_x: 312 nm -> 5.2 nm, noise 5 nm.'"""
+    """'Held-out error of delta_x: 312 nm -> 5.2 nm, noise 5 nm.' Where the numbers are so uncertain that they may cause most of it, what is
+    left when they move within their uncertainty is told too."""
     noise = "not known" if error.noise_floor is None else f"{number(error.noise_floor, 3)} {error.unit}"
     shown = [f"{number(v, 3)} {error.unit}" for v in (error.rms_before, error.rms_after)]
     unsure = ""
     if error.uncertainty is not None and error.uncertainty > (error.noise_floor or 0.0):
         unsure = f"; the uncertainty of the parameters alone is {number(error.uncertainty, 3)} {error.unit}"
+        if error.rms_refitted is not None and error.rms_refitted < error.rms_after:
+            unsure += f", and with them moved within it {number(error.rms_refitted, 3)} {error.unit} are left"
     return f"Held-out error of {short(channel)}: {' -> '.join(dict.fromkeys(shown))}, noise {noise}{unsure}."
 
 

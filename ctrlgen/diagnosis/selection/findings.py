@@ -20,6 +20,7 @@ from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, nominal_physics
 from ctrlgen.estimation.prediction_uncertainty import prediction_uncertainty
 from ctrlgen.estimation.profile_likelihood import Profile
+from ctrlgen.estimation.residual_tests import ResidualTests
 from ctrlgen.estimation.robust_covariance import robust_deviations
 from ctrlgen.estimation.settings import STATISTICS
 from ctrlgen.reporting.result_file import FiniteOrNull, Keys, Number
@@ -148,14 +149,19 @@ class ChannelErrorEntry(Keys):
     rms_before: FiniteOrNull = Field(description="Of the device as described, refitted within its stated uncertainty.")
     rms_after: FiniteOrNull = Field(description="With the findings.")
     noise_floor: Number = Field(description="Standard deviation of the noise; null where it is not known.")
-    unit: str = Field(description="Unit of all four numbers.")
+    unit: str = Field(description="Unit of all numbers here.")
     uncertainty: Number = Field(
         description="Prediction uncertainty that the fitted parameters alone cause; null where it is not known."
     )
+    rms_refitted: Number = Field(
+        description="With the findings, all numbers moved to these records within their uncertainty, the cost of that (chi-square) "
+        "included; null where the noise is not known."
+    )
 
 
-def held_out_errors(search: SearchResult, known: np.ndarray) -> dict[str, ChannelErrorEntry]:
-    """Held-out errors of the nominal and of the chosen model by channel; `known` (n_y,) says whose noise is known."""
+def held_out_errors(search: SearchResult, known: np.ndarray, tests: ResidualTests) -> dict[str, ChannelErrorEntry]:
+    """Held-out errors of the nominal and of the chosen model by channel; `known` (n_y,) says whose noise is known. `tests` are those of
+    the chosen model."""
     errors, fitter = {}, search.fitter
     floor, unsure = fitter.noise.floor, prediction_uncertainty(fitter, search.chosen.fit)
     for i, (channel, unit) in enumerate(zip(fitter.recording.channels, fitter.recording.units, strict=True)):
@@ -169,7 +175,12 @@ def held_out_errors(search: SearchResult, known: np.ndarray) -> dict[str, Channe
         noise = float(floor[i] * scale) if known[i] else None
         beside = float(unsure[i] * scale) if np.isfinite(unsure[i]) else None
         errors[channel] = ChannelErrorEntry(
-            rms_before=rms[0], rms_after=rms[1], noise_floor=noise, unit=unit, uncertainty=beside
+            rms_before=rms[0],
+            rms_after=rms[1],
+            noise_floor=noise,
+            unit=unit,
+            uncertainty=beside,
+            rms_refitted=tests.ratio[i] * noise if noise is not None and np.isfinite(tests.ratio[i]) else None,
         )
     return errors
 
