@@ -277,7 +277,7 @@ def test_planted_faults_are_found_by_hostile_calls(folder, stage, tmp_path):
             f"    for (i = 0; i < {n}; i++) {{\n        out->drive[i] = {safe}[i];",
             f"    for (i = 0; i < {9 * n}; i++) {{\n        out->drive[i] = {safe}[i % {n}];",
         ),
-        Real.DOUBLE: ("        value[i] = limited;", "        value[i] = (limited > 0.0) ? wanted : limited;"),
+        Real.DOUBLE: ("            value[i] = high[i];", "            hit = 1;"),
     }
     bad = planted(folder, tmp_path / "c", faults)
     for check in check_hostile(bad, *stage, runs=20_000):

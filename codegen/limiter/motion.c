@@ -120,12 +120,11 @@ uint32_t limiter_step(limiter_state *state, const real target[M], limiter_output
         status |= stay(state);
 #endif
     } else {
-#if RINGING
-        limiter_state at = *state;
-#else
         limiter_state at;
-#endif
         uint32_t broken;
+#if RINGING
+        at = *state;
+#endif
         MOTION_DISPLACEMENT(target, at.z);
         MOTION_STATE(target, at.x);
         broken = motion_broken(&at);

@@ -119,9 +119,11 @@ uint32_t limiter_observe(limiter_state *state, const real x[NX], const real z[N]
     } else if (can_be_corrected(state) == 0) {
         status = LIMITER_LOST;
     } else {
-        limiter_state seen = *state;
-        limiter_state off = *state;
+        limiter_state seen;
+        limiter_state off;
         int i;
+        seen = *state;
+        off = *state;
         for (i = 0; i < NX; i++) {
             seen.x[i] = x[i];
             off.x[i] = x_error[i];

@@ -401,8 +401,9 @@ uint32_t flexure_axis_online_f32_step(flexure_axis_online_f32_state *state, cons
         flexure_axis_online_f32_settle_safe(state, out);
         status |= flexure_axis_online_f32_stay(state);
     } else {
-        flexure_axis_online_f32_state at = *state;
+        flexure_axis_online_f32_state at;
         uint32_t broken;
+        at = *state;
         flexure_axis_online_f32_motion_displacement(target, at.z);
         flexure_axis_online_f32_motion_state(target, at.x);
         broken = flexure_axis_online_f32_motion_broken(&at);
@@ -525,9 +526,11 @@ uint32_t flexure_axis_online_f32_observe(flexure_axis_online_f32_state *state, c
     } else if (flexure_axis_online_f32_can_be_corrected(state) == 0) {
         status = FLEXURE_AXIS_ONLINE_F32_LOST;
     } else {
-        flexure_axis_online_f32_state seen = *state;
-        flexure_axis_online_f32_state off = *state;
+        flexure_axis_online_f32_state seen;
+        flexure_axis_online_f32_state off;
         int i;
+        seen = *state;
+        off = *state;
         for (i = 0; i < 1; i++) {
             seen.x[i] = x[i];
             off.x[i] = x_error[i];
