@@ -6,6 +6,7 @@ its second run, which is of another path, or another run's readings, and must be
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -120,6 +121,6 @@ class Specimen:
         return out
 
 
-def battery(seeds: range, lifted: Lifted, other: np.ndarray, folder: Path) -> list[Outcome]:
+def battery(seeds: Sequence[int], lifted: Lifted, other: np.ndarray, folder: Path) -> list[Outcome]:
     """The outcomes of all specimens."""
     return [Specimen(seed).learnt(lifted, other, folder / f"{seed}") for seed in seeds]

@@ -144,6 +144,7 @@ def test_the_hexapod_meets_the_printed_force_and_faults_change_it():
     assert np.abs(small - plant.pose(np.full((1, 6), 1e-3))).max() < 1e-8  # second order in 1 nm
 
 
+@pytest.mark.long
 def test_seeds_reproduce_and_answers_have_a_lid(tmp_path):
     orders = [o for o in cases.plan(5, "ci") if o.kind in {"clean", "weak", "hexapod_single"}][:3]
     for folder in ("a", "b"):
@@ -349,6 +350,7 @@ def test_a_slow_command_is_stopped_and_a_run_is_resumed(tmp_path):
     assert json.loads((tmp_path / "table.json").read_text())["cases"][0]["verdict"] == "failed"
 
 
+@pytest.mark.long
 def test_the_refitted_nominal_reaches_the_noise_on_a_clean_case(tmp_path):
     order = next(o for o in cases.plan(0, "ci") if o.kind == "clean")
     name = cases.make_case(replace(order, seed=(3, 1)), tmp_path)

@@ -159,7 +159,9 @@ def test_a_share_is_the_mean_over_orders():
     assert truth.shapley(energy, 0, 2) + truth.shapley(energy, 1, 2) == pytest.approx(8.0)
 
 
-@pytest.mark.parametrize("wanted", [("mems", "drive_gain", "coupling"), ("servo", "messy", "preisach")])
+@pytest.mark.parametrize(
+    "wanted", [pytest.param(("mems", "drive_gain", "coupling"), marks=pytest.mark.long), ("servo", "messy", "preisach")]
+)
 def test_a_messy_case_has_the_sizes_it_promises(wanted):
     kind = "memory" if wanted[0] == "servo" else "messy"
     _, answer = rough_cases.make(kind, wanted, 4.0, np.random.default_rng(2))

@@ -82,6 +82,7 @@ def test_a_number_that_acts_on_a_limit_alone_makes_it_uncertain(tmp_path):
     assert stress.drawn == pytest.approx(stress.kept, abs=0.15e6)  # forty draws lie beyond the quantile
 
 
+@pytest.mark.long
 def test_a_limit_that_is_not_kept_says_by_how_much(circle, tmp_path):
     tight = changed(circle.model.device, {"actuator.temperature_limit": 273.15 + 160.0})
     scenario = load_scenario(SCENARIOS / "circle20")

@@ -94,6 +94,7 @@ def test_a_key_tells_values_and_order():
     assert len({key_of(a, b), key_of(b, a), key_of(a), key_of(a, 1), key_of(a + 1e-16 * a, b + 1e-15)}) == 5
 
 
+@pytest.mark.long
 def test_what_is_stopped_among_its_replicates_keeps_its_fits(asked, tmp_path):
     out = tmp_path / "out"
 

@@ -156,6 +156,7 @@ def test_a_folder_with_other_peoples_files_is_not_replaced(scenario, tmp_path):
     assert (out / "chapter1.tex").read_text() == "precious"
 
 
+@pytest.mark.long
 def test_an_earlier_result_is_replaced_whole_and_kept_when_the_next_run_fails(scenario, tmp_path):
     out = tmp_path / "out"
     assert ctrlgen("solve", scenario, "--out", out).returncode == 0
@@ -268,6 +269,7 @@ def test_a_compiler_that_says_nothing_is_reported_with_its_command(scenario, tmp
     refused(ctrlgen("run", scenario, "--out", tmp_path / "out", PATH=f"{tools}:/bin/nowhere"), "gcc", "status 1")
 
 
+@pytest.mark.long
 def test_a_device_without_dynamics_has_no_frequency_response(tmp_path):
     devices = DEVICES
     refused(
@@ -338,6 +340,7 @@ def test_reproduce_prints_rows_as_a_table_and_as_json(tmp_path):
     refused(ctrlgen("reproduce", "S9"), "S9", "S0, S1, S2, S3")
 
 
+@pytest.mark.long
 def test_check_tells_what_a_file_describes():
     assert "6 actuators" in ctrlgen("check", DEVICE).stdout
     assert "1000 samples" in ctrlgen("check", SCENARIOS / "circle20").stdout

@@ -239,14 +239,17 @@ def small(tmp_path):
     return copied
 
 
-@pytest.mark.parametrize("path", PATHS, ids=named)
-@pytest.mark.parametrize(
-    "command",
-    [
-        *(pytest.param(name, marks=pytest.mark.long) for name in ("solve", "generate", "budget", "fastest")),
-        *(pytest.param(name, marks=pytest.mark.exhaustive) for name in ("player", "fmu", "compare", "run", "verify")),
-    ],
-)
+def tried_by(command: str, path: Path) -> Any:
+    """A command on a scenario as parameters of a test."""
+    long = command in ("solve", "generate", "budget") or (command == "fastest" and path.parent.name != "dynamic_circle")
+    mark = pytest.mark.long if long else pytest.mark.exhaustive
+    return pytest.param(command, path, marks=mark, id=f"{command}-{named(path)}")
+
+
+ON_SCENARIOS = ("solve", "generate", "budget", "fastest", "player", "fmu", "compare", "run", "verify")
+
+
+@pytest.mark.parametrize(("command", "path"), [tried_by(command, path) for command in ON_SCENARIOS for path in PATHS])
 def test_every_command_on_every_scenario(command, path, small, tmp_path):
     folder, out = small(path, rated=command == "fastest"), tmp_path / "out"
     words = {

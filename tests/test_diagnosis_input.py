@@ -151,6 +151,7 @@ def test_agreement_without_a_known_noise_says_how_far_it_goes(tmp_path):
     assert found.verdict == Verdict.CONSISTENT and "errors below 0.000918 deg" in sentence(found)
 
 
+@pytest.mark.long
 def test_only_the_effects_asked_for_are_considered_and_the_answer_says_so(tmp_path):
     """A creeping axis, diagnosed without creep among the hypotheses."""
     creep = '[[effect]]\nkind = "creep"\nat = "axis"\ngain = "0.03"\ntau = "0.2 s"\nslow = "0.1"\n'

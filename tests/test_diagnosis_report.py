@@ -245,6 +245,7 @@ def test_the_page_needs_nothing_from_elsewhere_and_says_it_at_the_top(found):
     assert text.index("device.next.toml") < text.index("<nav")
 
 
+@pytest.mark.long
 def test_a_diagnosis_draws_and_pages_itself(found, tmp_path):
     """What a notebook asks of it: one figure, all of them, the page."""
     assert found.plot("residuals").figures["residuals"].startswith("<svg") and len(found.plot().figures) > 5

@@ -121,6 +121,7 @@ def test_a_function_that_the_held_out_record_does_not_show_is_not_written():
     assert diagnosed(bumps, also_held_out=False).empirical_terms == ()
 
 
+@pytest.mark.long
 def test_where_what_is_left_is_within_the_tolerance_nothing_is_written():
     device = servo()
     given = replace(

@@ -43,6 +43,7 @@ def unity(compiler: str, folders: list[Path], scratch: Path) -> None:
     run(compiler, "-std=c99", *STRICT, *include, "-c", scratch / "all.c", "-o", scratch / "all.o")
 
 
+@pytest.mark.long
 def test_two_packages_are_one_translation_unit(packages, compiler, tmp_path):
     unity(compiler, [c.path for c in packages.values()], tmp_path)
 

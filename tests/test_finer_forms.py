@@ -73,6 +73,7 @@ def friction_found(breakaway: float, plain_kind: str = "coulomb_after"):
     return trials, found, finer_forms(trials, found)
 
 
+@pytest.mark.long
 def test_friction_that_sticks_from_a_moment_on_falls_with_the_speed(monkeypatch):
     trials, plain, (finer,) = friction_found(2.0)
     assert [c.effect for c in finer.causes] == ["stribeck_after"] and trials.selection.improves_enough(plain, finer)

@@ -48,6 +48,7 @@ def test_what_a_fit_predicts_is_simulated_once_under_the_same_errors(counted):
     assert counted["sensitivities"] == 1
 
 
+@pytest.mark.long
 def test_a_diagnosis_simulates_no_more_than_it_did(counted):
     """A spring that stiffens and three laws that might be it; a tenth more for the rounding of other machines."""
     fitter = axis_fitter(lambda t, q, v, memory: (-1.8e12 * q**3, memory), n=600)

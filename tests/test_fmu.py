@@ -92,6 +92,7 @@ def test_coupled_they_trace_the_circle(units, circle, tmp_path):
     assert np.all(off[:3] < 1e-12) and np.all(off[3:] < 1e-11), off
 
 
+@pytest.mark.long
 def test_a_controller_whose_drives_have_rates_starts_settled_however_many_samples_that_takes(tmp_path, compiler):
     """100 V at 10 V a sample, then four drives that trace a circle of three axes."""
     scenario = load_scenario(SCENARIOS / "tilt_platform")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
@@ -20,8 +21,8 @@ PATH = {"sample_rate": "200 Hz", "duration": "1 s"}
 
 @pytest.mark.long
 def test_the_true_error_falls_and_runs_of_another_path_are_refused(tmp_path):
-    """Sixteen specimens: each fault twice, with a sensor of which nothing is stated and with a calibrated one."""
-    check(outcomes_of(range(16), tmp_path))
+    """Eight specimens: each fault once, by turns with a sensor of which nothing is stated and with a calibrated one."""
+    check(outcomes_of((0, 9, 2, 11, 4, 13, 6, 15), tmp_path))
 
 
 # The same as above on more specimens; half an hour
@@ -30,7 +31,7 @@ def test_the_same_on_two_hundred_specimens(tmp_path):
     check(outcomes_of(range(200), tmp_path))
 
 
-def outcomes_of(seeds: range, folder: Path) -> list[Outcome]:
+def outcomes_of(seeds: Sequence[int], folder: Path) -> list[Outcome]:
     circle = Lifted(solved(shortened("circle20", folder / "circle20", **PATH)))
     smaller = solved(shortened("circle20", folder / "smaller", diameter="14 um", **PATH))
     return battery(seeds, circle, smaller.drive, folder)

@@ -228,6 +228,7 @@ def test_limiter_in_c_and_in_python_agree_on_every_combination_of_branches(devic
     assert not unvisited(tmp_path, {f"limiter_{name}" for name in physics})
 
 
+@pytest.mark.long
 def test_samples_of_these_devices_take_every_branch_of_the_limiter_in_python(tmp_path):
     measured = coverage.Coverage(branch=True, include=[feedforward.__file__], data_file=None)
     rng = np.random.default_rng(15)

@@ -73,6 +73,7 @@ def test_the_axis_of_rival_models_is_named_whole_beside_names_as_wide_as_they_co
     assert figure.bbox.x0 <= name.x0 and name.x1 <= figure.bbox.x1
 
 
+@pytest.mark.long
 def test_no_legend_of_the_program_is_placed_inside_a_panel():
     """Outside the figure's panels, or anchored at an edge of its own: what is placed `best` covers a curve where none is free."""
     placed = []

@@ -71,6 +71,7 @@ def long_ones_are_short(monkeypatch):
     monkeypatch.setattr(long_text_file, "PIECE", 60_000)
 
 
+@pytest.mark.long
 def test_a_long_file_is_read_as_a_short_one(tmp_path, monkeypatch):
     taken = []
     kept = long_text_file.whole_table

@@ -138,6 +138,7 @@ def test_files_of_one_bench_are_alike_between_samples(axis, tmp_path):
     assert 'between_samples = "linear" # assumed: every drive is a smooth curve' in alone
 
 
+@pytest.mark.long
 def test_new_recording_writes_what_look_proposes(tmp_path):
     t = 1e-3 * np.arange(1000)
     rows = "".join(f"{a:.3f},{np.sin(6 * a):.6f},{40 * np.sin(6 * a):.6f}\n" for a in t)
@@ -243,6 +244,7 @@ def test_six_drives_are_told_apart_by_their_names(tmp_path):
     }
 
 
+@pytest.mark.long
 def test_the_command_draws_prints_and_writes(tmp_path):
     log, to, figure = tmp_path / "log.csv", tmp_path / "recording.toml", tmp_path / "log.png"
     log.write_text(LOGS["spreadsheet"])

@@ -23,6 +23,7 @@ def stress_of(loads) -> float:
     return max(abs(N) / (T * W) + abs(M) / (W * T**2 / 6) for N, M in ends)
 
 
+@pytest.mark.long
 def test_force_and_stress_of_held_blades_are_those_of_corotational_beams(tmp_path):
     """Up to two thicknesses, where most of both is stretching: in line, and where the stage turns beside it."""
     for beside, most in ((0.5, 0.01), (5.0, 0.03)):

@@ -168,6 +168,7 @@ def test_the_most_specific_and_fastest_tests_come_first_and_as_many_as_fit():
     assert fitting(["slow", "quick"], known.seconds, 1.0) == ["slow"]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(
     "text, operator, what",
     [

@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 
+import pytest
 from conftest import ROOT
 
 import ctrlgen
@@ -24,6 +25,7 @@ def same(text: str) -> list[str]:
     return [re.sub(r"\s+", " ", ROUNDING.sub("~", line)).strip() for line in text.strip().splitlines()]
 
 
+@pytest.mark.long
 def test_the_printed_output_is_the_programs(tmp_path, compiler):
     out = tmp_path / "circle20"
     done = subprocess.run(

@@ -103,6 +103,7 @@ def test_a_refusal_that_mattered_is_told_with_what_it_would_leave(turned):
     )
 
 
+@pytest.mark.long
 def test_the_history_is_a_table_with_one_outcome_a_model(creeping):
     rows = history_rows(creeping.search)
     assert rows[0]["model"] == "the device as described" and rows[0]["held_out"].endswith(" nm")

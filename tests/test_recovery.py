@@ -99,6 +99,7 @@ def settle(effect: str, plant, planted: Planted) -> None:
     recover(poses_of(parts, "poses"), hexapod(), effect, planted)
 
 
+@pytest.mark.long
 def test_of_heaters_with_a_second_lag():
     rng, parts = np.random.default_rng(7), []
     for n, role in ((400, "fit"), (300, "hold_out")):

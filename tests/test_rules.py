@@ -100,7 +100,13 @@ def test_the_list_of_deviations_is_what_is_reported_no_more_no_less(folder, chec
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["circle20", "meso_circle", "xy_stage_force", "tilt_platform"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "xy_stage_force",
+        *(pytest.param(name, marks=pytest.mark.exhaustive) for name in ("circle20", "meso_circle", "tilt_platform")),
+    ],
+)
 def test_other_devices_break_no_rule_either(name, tmp_path):
     scenario = load_scenario(SCENARIOS / name)
     folder = generate(scenario, build_model(scenario.device), tmp_path)

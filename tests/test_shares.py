@@ -99,6 +99,7 @@ def test_two_causes_add_up_to_the_ceiling(signals, rng):
     assert found.rest_own_past < 0.02  # what is left is white
 
 
+@pytest.mark.long
 def test_what_no_kind_explains_is_left_and_has_memory(signals, rng):
     y = planted(lfilter([1.0], [1, -0.95], rng.standard_normal(N)), rng)
     (found,) = model_free_shares([y[:, None]], [signals], ["x"]).channels
@@ -179,6 +180,7 @@ def test_spikes_change_nothing(signals, rng):
     assert found.selected[0].kind is Kind.POSITION
 
 
+@pytest.mark.long
 def test_samples_that_are_not_valid_and_a_second_record_are_taken_as_they_are(signals, rng):
     y = planted(FUNCTIONS[Kind.DIRECTION](signals), rng)
     second = y + 2.0  # another zero point

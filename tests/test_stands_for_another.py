@@ -30,6 +30,7 @@ def searched():
     return searcher, loop
 
 
+@pytest.mark.long
 def test_a_hysteresis_of_which_all_lags_is_a_play(searched):
     """No rival alone explains alike; the search without it suspects no law of its family, and the next one all of them again."""
     searcher, loop = searched

@@ -35,7 +35,7 @@ LEAST = {
 NEVER = {
     "meso_circle": {"limit_all", "is_nan"}
 }  # its drives are its displacements, which are in range before: rounding alone can need them
-QUICK = ("circle20", "flexure_axis_line", "tilt_platform")  # heaters, inertia, and more drives than axes
+QUICK = ("flexure_axis_line",)
 NOT_ENTERED = (
     r"^const (float|double) t\d+ = ",  # which of two numbers is the larger, in a kernel of the physics
     r"^if \(worst > 1\.0\d+f?\)|^if \(scaled > 1\)",  # a stress within the slack of its limit
@@ -113,6 +113,7 @@ def test_the_vectors_have_every_status_that_a_target_can_bring_about(real):
         assert stepped & (bits & ~ControllerStatus.STATE) == bits & ~ControllerStatus.STATE
 
 
+@pytest.mark.long
 def test_a_device_whose_limits_have_no_cheap_bound_has_vectors_too():
     """With stages that yield less to the struts as they stiffen the wire stress is not of the first degree in the displacement."""
     model = build_model(effect_device({"kind": "link_load", "at": "all", "share": "1.15"}))

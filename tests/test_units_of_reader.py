@@ -49,6 +49,7 @@ def both():
     return told("um", "V"), told("mm", "mV")
 
 
+@pytest.mark.long
 def test_only_the_units_differ(both):
     """Every number is the same in SI: no threshold, start or bound of the search is in the reader's units."""
     fine, coarse = both
@@ -61,6 +62,7 @@ def test_only_the_units_differ(both):
         assert coarse.held_out[channel].rms_after == pytest.approx(1e-3 * error.rms_after, rel=1e-6)
 
 
+@pytest.mark.long
 def test_nothing_is_told_in_a_unit_that_no_column_has(both):
     found, origin = both[1], Provenance({}, 0)
     report = page(found, origin)  # with its figures, whose texts stand in the SVG
@@ -69,6 +71,7 @@ def test_nothing_is_told_in_a_unit_that_no_column_has(both):
     assert " mm" in sentence(found) and "axis [mm]<" in report
 
 
+@pytest.mark.long
 def test_the_corrected_device_can_be_read_and_is_the_same(both, tmp_path):
     original = (SCENARIOS / "devices" / "flexure_axis.toml").read_text()
     k3 = []

@@ -38,6 +38,7 @@ def tried():
     return trials, current, screened, everywhere, fit_in_regions(trials, current, screened, everywhere)
 
 
+@pytest.mark.long
 def test_friction_in_half_of_the_travel_is_tried_there(tried):
     trials, _, _, everywhere, regional = tried
     best = trials.selection.ranked([*everywhere, *regional])[0]
@@ -48,11 +49,13 @@ def test_friction_in_half_of_the_travel_is_tried_there(tried):
     assert np.all(best.held_out.plain_mean < 0.1 * plain.held_out.plain_mean)
 
 
+@pytest.mark.long
 def test_beside_a_cause_a_region_must_show_itself(tried):
     trials, _, screened, everywhere, _ = tried
     assert fit_in_regions(trials, everywhere[0], screened, everywhere) == ()
 
 
+@pytest.mark.long
 def test_it_comes_before_a_law_everywhere_where_it_leaves_a_quarter(tried):
     trials, current, screened, everywhere, regional = tried
     best = trials.converged(trials.selection.ranked(regional)[0])

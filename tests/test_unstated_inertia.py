@@ -47,6 +47,7 @@ def test_slow_paths_leave_less_and_a_stated_inertia_nothing(tmp_path):
     assert solved(line(tmp_path, 0.1, '[dynamics]\ndamping_ratio = "1 %"\n')).unstated_inertia is None
 
 
+@pytest.mark.long
 def test_console_page_and_readme_tell_it(tmp_path):
     line(tmp_path, 0.1)
     ran = run_command("run", tmp_path, "--out", tmp_path / "out")

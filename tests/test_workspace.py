@@ -148,6 +148,7 @@ def test_without_a_third_translation_slices_are_at_the_middle_of_the_drives_and_
     assert above - middle == pytest.approx(0.5 * up * way, abs=1e-15)
 
 
+@pytest.mark.long
 def test_a_ball_is_drawn_where_a_view_has_two_of_its_channels():
     """The ball of a platform that tips, tilts and lifts is an interval of its one translation: an ellipse would leave the slices."""
     for name, views in (("tip_tilt_mirror", [0, 0]), ("mems_hexapod", [0, 1])):
