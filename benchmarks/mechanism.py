@@ -115,7 +115,7 @@ def _made(folder: Path, compile_it: Callable[[ca.Function, Path], None]) -> Call
 
 
 def _in_parts(function: ca.Function, folder: Path) -> None:
-    _compile(compiled.c_code(function), folder / f"{_in_parts.__name__}.so")
+    _compile(compiled.casadi_c(function), folder / f"{_in_parts.__name__}.so")
 
 
 def _as_casadi_writes_it(function: ca.Function, folder: Path) -> None:

@@ -154,13 +154,18 @@ def compiler() -> str | None:
 def c_code(function: ca.Function) -> str:
     """C of the recursion `function` in a loop over samples, in parts where it is long. Raises ValueError for a function that keeps memory
     from one call to the next."""
-    code = _generated(function, avoid_stack=False)
-    code = code if len(code) < LARGE else _in_parts(_generated(function, avoid_stack=True))
+    code = casadi_c(function)
     interface = INTERFACE.search(code)
     if interface is None or not KEEPS_NO_MEMORY.search(code):
         raise ValueError(f"{function.name()} keeps memory from one call to the next")
     code = CONFIGURATION.sub("", code[: interface.start()]).replace("#include <math.h>\n", DECLARED)
     return HELPER.sub("static inline __attribute__((always_inline)) ", code) + LOOP.format(main=interface["main"])
+
+
+def casadi_c(function: ca.Function) -> str:
+    """C of any `function` with CasADi's interface, in parts where it is long."""
+    code = _generated(function, avoid_stack=False)
+    return code if len(code) < LARGE else _in_parts(_generated(function, avoid_stack=True))
 
 
 def _generated(function: ca.Function, avoid_stack: bool) -> str:
