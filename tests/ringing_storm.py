@@ -29,9 +29,9 @@ DAMPED = AXIS_FILE.read_text().replace('"30 N*s/m", sd = "6 N*s/m"', f'"{DAMPING
 class Compiled:
     """The C of that axis in one arithmetic, and its twin in Python; its structures are C's own."""
 
-    def __init__(self, folder: Path, real: Real, device: str = DAMPED):
+    def __init__(self, folder: Path, real: Real, device: str = DAMPED, h: float = H):
         (folder / "device.toml").write_text(device)
-        it = scenario(folder, "device.toml", LINE, rate=f"{1 / H:g} Hz")
+        it = scenario(folder, "device.toml", LINE, rate=f"{1 / h!r} Hz")
         controller = controller_of(build_model(it.device), "pose", it.sample_time)
         self.twin, name = MotionEstimator(controller), f"axis{real.suffix}"
         context = online_context(it, controller, real, name)

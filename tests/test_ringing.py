@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from inertial_stages import coil
 from ringing_storm import DAMPED, DAMPING, MASS, UNSURE, Compiled, H, Mass, storm
+from ringing_storm import STIFFNESS as STIFFNESS_OF_AXIS
 from scipy.linalg import expm
 from two_masses import MASS as MASSES
 from two_masses import STIFFNESS, damping, two_masses
@@ -96,6 +97,60 @@ def test_c_and_python_tell_the_same_of_a_mass(tmp_path):
         assert c.state.z == pytest.approx(mine.state[1][0], abs=1e-18)
 
 
+@pytest.mark.parametrize("damping", [0.1, 0.8])
+def test_what_a_held_drive_leaves_of_a_fast_path_is_told(tmp_path, damping):
+    """A sample of half the mass's own period, in which it answers to every step of the drive."""
+    if not shutil.which("gcc"):
+        pytest.skip("gcc is missing: the C was not tried")
+    own = float(np.sqrt(STIFFNESS_OF_AXIS / MASS))
+    h, c = 3 / own, 2 * damping * own * MASS
+    tool = Compiled(tmp_path, Real.DOUBLE, DAMPED.replace(f'"{DAMPING:g} N*s/m", sd = "20 N*s/m"', f'"{c!r} N*s/m"'), h)
+    for turn in (0.01, 0.08):
+        size, w, device = 9e-5, turn / h, Mass(c)
+        tool.c_init(tool.at)
+        belief, told, far = tool.twin.rest(), [], []
+        for k in range(240):
+            angle = (k + 0.5) * turn
+            target = size * np.array([np.sin(angle), w * np.cos(angle), -w * w * np.sin(angle)])
+            told.append(tool.step_at(k, target))
+            if k < 40:
+                step, belief = tool.twin.step(belief, target)
+                assert told[-1] == step.status
+            apart = []
+            for part in range(8):
+                device.hold(float(tool.out.drive), h / 8)
+                apart.append(abs(device.y[0] - size * np.sin((k + (part + 1) / 8) * turn)))
+            far.append(max(apart))
+        sure = np.array(told) == 0
+        assert np.max(np.array(far)[sure]) <= TOLERANCE
+        assert sure.mean() > 0.9 if turn == 0.01 else sure.mean() < 0.2 and max(far) > 3 * TOLERANCE
+
+
+def test_no_command_rings_for_longer_than_the_header_says(floats):
+    """An acceleration that nothing can follow, for one sample: the device itself has moved no more than its drives made it."""
+    settling, still = floats.twin.bounds.settling, (0.0, 0.0, 0.0)
+    absurd = 0.99 * float(floats.twin.controller.kernels.input_limits[2])
+    assert absurd > 1e3
+    for wait in (lambda: [floats.settle(still) for _ in range(settling)][-1], lambda: floats.elapsed(settling, 0.0)):
+        floats.c_init(floats.at)
+        for _ in range(3):
+            assert floats.c_step(floats.at, (floats.number * 3)(0.0, 0.0, absurd), floats.output) & UNSURE
+        assert wait() == 0
+
+
+def test_a_ringing_that_is_over_is_zero_and_no_denormal_number(floats):
+    floats.c_init(floats.at)
+    floats.c_forget(floats.at)
+    left = []
+    for _ in range(3 * floats.twin.bounds.settling):
+        floats.settle((0.0, 0.0, 0.0))
+        left.append(float(floats.state.ringing))
+    assert left[-1] == 0 and min(size for size in left if size) >= 1.9e-6
+    floats.c_forget(floats.at)
+    floats.elapsed(5 * floats.twin.bounds.settling, 0.0)
+    assert floats.state.ringing == 0
+
+
 def bounds_of(folder, device: str):
     (folder / "device.toml").write_text(device)
     return ringing(build_model(load_device(folder / "device.toml")), H, None)
@@ -162,7 +217,7 @@ def test_a_device_without_damping_is_unsure_until_it_is_told(tmp_path):
 
 
 def test_a_header_says_when_a_ringing_is_told_as_over(tmp_path, floats):
-    assert "_SETTLING (316U)" in floats.header and "Clears itself */" in floats.header
+    assert "_SETTLING (323U)" in floats.header and "Clears itself */" in floats.header
     if shutil.which("gcc"):
         never = Compiled(tmp_path, Real.FLOAT, DAMPED.replace(f'"{DAMPING:g} N*s/m", sd = "20 N*s/m"', '"0 N*s/m"'))
         assert "_SETTLING (0xFFFFFFFFU)" in never.header and "Clears itself by no waiting" in never.header

@@ -78,7 +78,8 @@ uint32_t limiter_elapsed(limiter_state *state, uint32_t ticks, const real drive[
             } else {
                 real still[NY];
                 set_still(state, still);
-                state->ringing = left_after(state->ringing + added(state, still, REAL(0.0)), ticks);
+                state->ringing = bounded(state->ringing + added(state, still, REAL(0.0)), still);
+                state->ringing = bounded(left_after(state->ringing, ticks), still);
                 for (k = 0; k < NY; k++) {
                     state->ahead[k] = still[k];
                 }
@@ -89,7 +90,7 @@ uint32_t limiter_elapsed(limiter_state *state, uint32_t ticks, const real drive[
             state->u[i] = drive[i];
         }
 #endif
-        status = is_ringing(state);
+        status = is_ringing(state, REAL(0.0));
     } else {
         status = LIMITER_INPUT; /* no drive that was held */
     }
@@ -150,7 +151,7 @@ uint32_t limiter_observe(limiter_state *state, const real x[NX], const real z[N]
             if ((apart != 0) || (size < state->ringing)) {
                 state->ringing = size;
             }
-            status = is_ringing(state);
+            status = is_ringing(state, REAL(0.0));
         }
     }
     return status;

@@ -19,10 +19,11 @@ static void set_still(const limiter_state *state, real still[NY])
 #endif
 }
 
-/* UNSURE while the device may ring by more than is told. */
-static uint32_t is_ringing(const limiter_state *state)
+/* UNSURE while the device may ring by more than is told, beside what held drives leave. */
+static uint32_t is_ringing(const limiter_state *state, real held)
 {
-    return ((is_nan(&state->ringing) != 0) || (state->ringing > TOLD)) ? LIMITER_UNSURE : 0U;
+    const real size = state->ringing + held;
+    return ((is_nan(&size) != 0) || (size > TOLD)) ? LIMITER_UNSURE : 0U;
 }
 
 /* What a break of the motion, and what is left of drives, adds to a ringing. */
@@ -37,15 +38,40 @@ static real added(const limiter_state *state, const real from[NY], real left)
     return ((is_nan(&size) == 0) && (size <= LEAST_BREAK)) ? REAL(0.0) : size;
 }
 
+/* A ringing of this size about a motion that leads ahead: the device itself is never farther from rest than unknown. */
+static real bounded(real size, const real ahead[NY])
+{
+    static const real HOME_AHEAD[NY] = HOME_AHEAD_TABLE; /* of rest */
+    real most = UNKNOWN_RINGING;
+    real left = size;
+    int i;
+    for (i = 0; i < NY; i++) {
+        const real by = ahead[i] - HOME_AHEAD[i];
+        most += (by < REAL(0.0)) ? -by : by;
+    }
+    if ((is_nan(&left) == 0) && (left > most)) {
+        left = most;
+    }
+    if ((is_nan(&left) == 0) && (left < GONE)) { /* denormal numbers are slow */
+        left = REAL(0.0);
+    }
+    return left;
+}
+
 /* A sample of a motion that comes from here and leads ahead. */
 static uint32_t follow_on(limiter_state *state, const real from[NY], const real ahead[NY], real left)
 {
+    static const real HELD[NY] = HELD_TABLE; /* what a held drive leaves, per change in a sample */
+    const real size = (state->ringing * DECAY) + added(state, from, left);
+    real held = REAL(0.0);
     int i;
-    state->ringing = (state->ringing * DECAY) + added(state, from, left);
+    state->ringing = bounded(size, ahead);
     for (i = 0; i < NY; i++) {
+        const real by = ahead[i] - from[i];
+        held += HELD[i] * ((by < REAL(0.0)) ? -by : by);
         state->ahead[i] = ahead[i];
     }
-    return is_ringing(state);
+    return is_ringing(state, held);
 }
 
 /* A sample of a motion that ends where the state is. */

@@ -59,6 +59,13 @@ class MotionEstimator(Clocked[MotionBelief]):
         weights, own = self.bounds.weights, np.concatenate(state[:2])
         return np.concatenate([weights[: len(own)] * own, np.zeros(len(weights) - len(own))])
 
+    @cached_property
+    def _home(self) -> np.ndarray:
+        return self._still(self.controller.rest())
+
+    def _bounded(self, size: float, ahead: np.ndarray) -> float:
+        return self.bounds.bounded(size, ahead - self._home)
+
     def _counted(self, size: float) -> float:
         return 0.0 if size <= self.bounds.least else size
 
@@ -76,9 +83,9 @@ class MotionEstimator(Clocked[MotionBelief]):
             behind, ahead = np.split(answer(self.controller.kernels.joins, target), 2)
             size = float(self.bounds.drive @ np.abs(step.drive - wanted))
         size += float(np.sum(np.abs(behind - estimate.ahead)))
-        left = self.bounds.decay * estimate.ringing + self._counted(size)
-        told = ControllerStatus(0) if left <= TOLD else ControllerStatus.UNSURE
+        left = self._bounded(self.bounds.decay * estimate.ringing + self._counted(size), ahead)
         after = replace(estimate, state=step.state, ahead=ahead, ringing=left)
+        told = self._told(after, float(self.bounds.held @ np.abs(ahead - behind)))
         return replace(step, status=step.status | told), after
 
     def elapsed(self, estimate: MotionBelief, ticks: int, drive: np.ndarray) -> tuple[ControllerStatus, MotionBelief]:
@@ -101,7 +108,8 @@ class MotionEstimator(Clocked[MotionBelief]):
             else:
                 ahead = self._still(state)
                 off = estimate.ringing + self._counted(float(np.sum(np.abs(ahead - estimate.ahead))))
-                after = replace(after, state=state, ahead=ahead, ringing=off * self.bounds.decay**ticks)
+                left = self._bounded(self._bounded(off, ahead) * self.bounds.decay**ticks, ahead)
+                after = replace(after, state=state, ahead=ahead, ringing=left)
         return self._told(after), after
 
     def observe(
@@ -122,5 +130,5 @@ class MotionEstimator(Clocked[MotionBelief]):
         after = replace(estimate, ringing=seen) if apart or seen < estimate.ringing else estimate
         return self._told(after), after
 
-    def _told(self, estimate: MotionBelief) -> ControllerStatus:
-        return ControllerStatus(0) if estimate.ringing <= TOLD else ControllerStatus.UNSURE
+    def _told(self, estimate: MotionBelief, held: float = 0.0) -> ControllerStatus:
+        return ControllerStatus(0) if estimate.ringing + held <= TOLD else ControllerStatus.UNSURE

@@ -12,6 +12,10 @@ jump of the target or a drive that was limited, adds at most sum p_i |d_i|, p_i^
 A is that of rest; where it varies over the ranges, |R dA R^-1| (P = R^T R, dA by interval arithmetic) is taken from s. Numbers of the
 device that have a standard deviation are taken `SURE` of them off, all to the sides on which it rings longer. Without damping, or where
 what is left of s is not positive, it is not shown that a ringing ever ends.
+
+Apart from all ringing a drive that is held over a sample T leaves a smooth path z by T^2/24 z'' (its mean over a sample is that of the path,
+sinc(w T/2) = 1 - (w T)^2/24 + ...), and by what the device answers to the saw-tooth between the held drive and the one that fits,
+e' = A e + (t - T/2) B du/dt, of one sample and the next alike. With B du/dt = y'' - A y', of which y'' is left out, both are linear in y'.
 """
 
 from __future__ import annotations
@@ -22,7 +26,7 @@ from math import ceil
 
 import casadi as ca
 import numpy as np
-from scipy.linalg import LinAlgError, cholesky, solve_continuous_lyapunov
+from scipy.linalg import LinAlgError, cholesky, expm, solve_continuous_lyapunov
 
 from ctrlgen.controller.contraction import FOREVER, MOST, ROOM
 from ctrlgen.controller.lost_state import UNLIMITED
@@ -35,6 +39,8 @@ from ctrlgen.numerics.interval_arithmetic import bounds
 STILL = 1e-3  # of its range, by which a stage may ring and is told as still
 TOLD = 0.5  # of that, above which it is told: breaks too small to be counted may make as much
 LEAST = 2e-3  # of that: a break that is none. 16 roundings of a float at the end of the range
+GONE = 1e-3 * LEAST  # of that: less is set to zero, before it becomes a denormal number, on which some cores are slow
+PARTS = 32  # of a sample, at whose ends it is looked where a held drive leaves the device
 SURE = 2.0  # standard deviations, by which a number is off at most
 LEFT = (0.02, 0.1, 0.3)  # shares of s that are given up for a smaller P
 WEIGHTS = (0.0, 1.0, 1e2, 1e4)  # of the actuators' states beside the rest of P, of which the soonest is taken
@@ -49,8 +55,8 @@ class Ringing:
 
     `weights` (n_y,) p of y = (x, z) and of the modes that are led beside them, per SI; `drive` (n_u,) what a sample adds per SI of a
     drive that was left; `decay` in a sample; `least` break that counts; `unknown` size of a motion of which nothing is known; `settling`
-    samples until that is told no more, in a float too, or FOREVER; `reach` (n_y,) what a difference of one can make of
-    each number that is weighted.
+    samples until that is told no more about any equilibrium, in a float too, or FOREVER; `reach` (n_y,) what a difference of one can make of
+    each number that is weighted; `held` (n_y,) what a held drive leaves, per change of such a number in a sample.
     """
 
     weights: np.ndarray
@@ -60,6 +66,12 @@ class Ringing:
     unknown: float
     settling: int
     reach: np.ndarray
+    held: np.ndarray
+
+    def bounded(self, size: float, away: np.ndarray) -> float:
+        """A ringing of this `size` about a motion that is `away` (n_y,) from rest, weighted: the device itself is never farther from rest
+        than `unknown`."""
+        return 0.0 if size < GONE else min(size, self.unknown + float(np.sum(np.abs(away))))
 
 
 @dataclass(frozen=True)
@@ -78,7 +90,8 @@ def ringing(model: Model, sample_time: float, structure: StructuralModel | None)
     """Of a `model` with inertia whose numbers are free of parameters; with the modes of a `structure` that is led."""
     A, varies, forced, driven = _linear(model)
     size, told = _sizes(model, A)
-    every = [A, *_uncertain(model)]
+    far, positions = _equilibria(model, A, forced), np.arange(model.x.numel(), len(A))
+    whole, every = A, [A, *_uncertain(model)]
     if structure is not None:
         n, more = structure.axes, 2 * (len(structure.mass) - structure.axes)
         forced, driven = (_on_structure(structure, f) for f in (forced, driven))
@@ -89,12 +102,15 @@ def ringing(model: Model, sample_time: float, structure: StructuralModel | None)
         led = replace(structure, damping_ratio=max(slower, 0.0) * structure.damping_ratio)
         every = [_of_structure(led) if shown else np.zeros((len(size), len(size)))]
         varies = np.zeros_like(every[0])
+        far = np.concatenate([far, np.zeros(more)])  # amplitudes are left out of where a motion stays
+        whole, positions = _of_structure(structure), np.arange(n, n + len(structure.mass))
+    held = _held(whole, positions, told, size, sample_time)
     proofs = []
     for one in every:
         scaled, loose = (matrix / size[:, None] * size for matrix in (one, varies))
         found = [proof for proof in _proofs(scaled, loose, told, model.n_states) if proof.rate > 0]
         if not found:
-            return _unproven(size, driven, sample_time)
+            return _unproven(size, driven, held, sample_time)
         proofs.append(min(found, key=lambda p: _samples(p, forced / size, sample_time)))
     weights = np.max([p.weights for p in proofs], axis=0)
     rate = min(p.rate for p in proofs)
@@ -102,21 +118,52 @@ def ringing(model: Model, sample_time: float, structure: StructuralModel | None)
     decay = float(np.exp(-rate * sample_time))
     seen = rate * sample_time - SLOWER
     if seen <= SLOWER or unknown > UNLIMITED:  # a float might see it decay half as fast, or not at all
-        return _unproven(size, driven, sample_time)
-    settling = ceil(np.log(max(unknown / TOLD, 1.0)) / seen) + 1
+        return _unproven(size, driven, held, sample_time)
+    settling = ceil(np.log(max((unknown + float(weights @ (far / size))) / TOLD, 1.0)) / seen) + 1
     if settling >= MOST:
-        return _unproven(size, driven, sample_time)
+        return _unproven(size, driven, held, sample_time)
     reach = np.max([np.sqrt(np.diag(np.linalg.inv(p.P))) for p in proofs], axis=0) * weights
     least = max(LEAST, TOLD * (1 - decay))
     drive = sample_time * (weights / size) @ driven
-    return Ringing(weights / size, drive, decay, least, unknown, settling, reach)
+    return Ringing(weights / size, drive, decay, least, unknown, settling, reach, held / weights)
 
 
-def _unproven(size: np.ndarray, driven: np.ndarray, sample_time: float) -> Ringing:
+def _unproven(size: np.ndarray, driven: np.ndarray, held: np.ndarray, sample_time: float) -> Ringing:
     """Of a device of which it was not shown that a ringing ends."""
-    return Ringing(
-        1 / size, sample_time * (1 / size) @ driven, 1.0, LEAST, UNLIMITED, FOREVER, np.full(len(size), np.inf)
-    )
+    drive, never = sample_time * (1 / size) @ driven, np.full(len(size), np.inf)
+    return Ringing(1 / size, drive, 1.0, LEAST, UNLIMITED, FOREVER, never, held)
+
+
+def _equilibria(m: Model, A: np.ndarray, forced: np.ndarray) -> np.ndarray:
+    """(n_y,) how far from rest a device is held at most by its drives, or a controller may believe it to be held."""
+    far = np.abs(np.linalg.pinv(A)) @ forced
+    nx = m.x.numel()
+    far[nx:] = np.maximum(far[nx:], np.max(np.abs(m.z_bounds), axis=0))
+    far[nx - len(m.axes) : nx] = 0.0  # of which none moves
+    return far
+
+
+def _held(
+    A: np.ndarray, positions: np.ndarray, told: np.ndarray, size: np.ndarray, sample_time: float
+) -> np.ndarray:
+    """(n_y,) how far a held drive leaves any number that is `told` at most, in its `size`, per change of each number in a sample."""
+    n, h = len(A), sample_time
+    pushed = A.copy()
+    pushed[positions] = 0.0  # a drive changes no speed at once
+    scaled = A / size[:, None] * size
+    ramp = np.zeros((3 * n, 3 * n))  # e' = A e + s, s' = c
+    ramp[:n, :n], ramp[:n, n : 2 * n], ramp[n : 2 * n, 2 * n :] = scaled, np.eye(n), np.eye(n)
+
+    def after(t: float) -> tuple[np.ndarray, np.ndarray]:
+        of_start, of_s, of_c = np.hsplit(expm(t * ramp)[:n], 3)
+        return of_start, of_c - h / 2 * of_s
+
+    whole, own = after(h)
+    start = np.linalg.lstsq(np.eye(n) - whole, own, rcond=None)[0]  # of one sample and the next alike
+    parts = (after(t) for t in np.linspace(0.0, h, PARTS + 1))
+    left = np.max([np.abs((free @ start + own) @ (pushed / size[:, None] * size)) for free, own in parts], axis=0) / h
+    left[positions] += h / 24 * np.abs(scaled[positions])  # T^2/24 z'', z' = v
+    return np.max(left[told], axis=0)
 
 
 def _samples(proof: _Proof, forced: np.ndarray, sample_time: float) -> float:

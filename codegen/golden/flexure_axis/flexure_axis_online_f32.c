@@ -178,10 +178,11 @@ static void flexure_axis_online_f32_set_still(const flexure_axis_online_f32_stat
     }
 }
 
-/* UNSURE while the device may ring by more than is told. */
-static uint32_t flexure_axis_online_f32_is_ringing(const flexure_axis_online_f32_state *state)
+/* UNSURE while the device may ring by more than is told, beside what held drives leave. */
+static uint32_t flexure_axis_online_f32_is_ringing(const flexure_axis_online_f32_state *state, float held)
 {
-    return ((flexure_axis_online_f32_is_nan(&state->ringing) != 0) || (state->ringing > 0.5f)) ? FLEXURE_AXIS_ONLINE_F32_UNSURE : 0U;
+    const float size = state->ringing + held;
+    return ((flexure_axis_online_f32_is_nan(&size) != 0) || (size > 0.5f)) ? FLEXURE_AXIS_ONLINE_F32_UNSURE : 0U;
 }
 
 /* What a break of the motion, and what is left of drives, adds to a ringing. */
@@ -196,15 +197,40 @@ static float flexure_axis_online_f32_added(const flexure_axis_online_f32_state *
     return ((flexure_axis_online_f32_is_nan(&size) == 0) && (size <= 0.002f)) ? 0.0f : size;
 }
 
+/* A ringing of this size about a motion that leads ahead: the device itself is never farther from rest than unknown. */
+static float flexure_axis_online_f32_bounded(float size, const float ahead[2])
+{
+    static const float HOME_AHEAD[2] = { 0.0f, 0.0f }; /* of rest */
+    float most = 42835.184f;
+    float left = size;
+    int i;
+    for (i = 0; i < 2; i++) {
+        const float by = ahead[i] - HOME_AHEAD[i];
+        most += (by < 0.0f) ? -by : by;
+    }
+    if ((flexure_axis_online_f32_is_nan(&left) == 0) && (left > most)) {
+        left = most;
+    }
+    if ((flexure_axis_online_f32_is_nan(&left) == 0) && (left < 2e-06f)) { /* denormal numbers are slow */
+        left = 0.0f;
+    }
+    return left;
+}
+
 /* A sample of a motion that comes from here and leads ahead. */
 static uint32_t flexure_axis_online_f32_follow_on(flexure_axis_online_f32_state *state, const float from[2], const float ahead[2], float left)
 {
+    static const float HELD[2] = { 0.0011920454f, 7.993895e-06f }; /* what a held drive leaves, per change in a sample */
+    const float size = (state->ringing * 0.99918395f) + flexure_axis_online_f32_added(state, from, left);
+    float held = 0.0f;
     int i;
-    state->ringing = (state->ringing * 0.99918395f) + flexure_axis_online_f32_added(state, from, left);
+    state->ringing = flexure_axis_online_f32_bounded(size, ahead);
     for (i = 0; i < 2; i++) {
+        const float by = ahead[i] - from[i];
+        held += HELD[i] * ((by < 0.0f) ? -by : by);
         state->ahead[i] = ahead[i];
     }
-    return flexure_axis_online_f32_is_ringing(state);
+    return flexure_axis_online_f32_is_ringing(state, held);
 }
 
 /* A sample of a motion that ends where the state is. */
@@ -491,13 +517,14 @@ uint32_t flexure_axis_online_f32_elapsed(flexure_axis_online_f32_state *state, u
             } else {
                 float still[2];
                 flexure_axis_online_f32_set_still(state, still);
-                state->ringing = flexure_axis_online_f32_left_after(state->ringing + flexure_axis_online_f32_added(state, still, 0.0f), ticks);
+                state->ringing = flexure_axis_online_f32_bounded(state->ringing + flexure_axis_online_f32_added(state, still, 0.0f), still);
+                state->ringing = flexure_axis_online_f32_bounded(flexure_axis_online_f32_left_after(state->ringing, ticks), still);
                 for (k = 0; k < 2; k++) {
                     state->ahead[k] = still[k];
                 }
             }
         }
-        status = flexure_axis_online_f32_is_ringing(state);
+        status = flexure_axis_online_f32_is_ringing(state, 0.0f);
     } else {
         status = FLEXURE_AXIS_ONLINE_F32_INPUT; /* no drive that was held */
     }
@@ -557,7 +584,7 @@ uint32_t flexure_axis_online_f32_observe(flexure_axis_online_f32_state *state, c
             if ((apart != 0) || (size < state->ringing)) {
                 state->ringing = size;
             }
-            status = flexure_axis_online_f32_is_ringing(state);
+            status = flexure_axis_online_f32_is_ringing(state, 0.0f);
         }
     }
     return status;

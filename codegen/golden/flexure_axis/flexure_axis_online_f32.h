@@ -45,7 +45,7 @@ extern "C" {
 #define FLEXURE_AXIS_ONLINE_F32_UNSURE (256U)     /* the device may be off the motion by more than 1 thousandth of its range, and pass limits by as much and more: it rings after a jump of the target, a drive that was limited, a late call, settling, or was not known at the start. Clears itself */
 #define FLEXURE_AXIS_ONLINE_F32_CLOCK (512U)      /* of flexure_axis_online_f32_step_at: not one sample has passed since the last call */
 
-#define FLEXURE_AXIS_ONLINE_F32_SETTLING (13917U) /* samples under a held drive, after which whatever drives within their limits made the device ring is told no more, with the damping that it has at least: 0.696 s */
+#define FLEXURE_AXIS_ONLINE_F32_SETTLING (13945U) /* samples under a held drive, after which whatever drives within their limits made the device ring is told no more, with the damping that it has at least: 0.697 s */
 
 typedef struct {
     float x[1]; /* velocity_axis [m / s] */

@@ -13,7 +13,7 @@ from ctrlgen.controller.clocked import BACKWARD
 from ctrlgen.controller.estimate import DOUBLED, EXACT
 from ctrlgen.controller.feedforward import REACH_FRACTION, SECANT_FRACTION, SECANT_STEPS
 from ctrlgen.controller.nearest_displacement import SWEEPS
-from ctrlgen.controller.ringing import TOLD
+from ctrlgen.controller.ringing import GONE, TOLD
 from ctrlgen.firmware.c.preprocessor import Macro, resolved
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.templates import codegen_folder
@@ -220,10 +220,13 @@ def _ringing_texts(context: Mapping[str, Any]) -> dict[str, str]:
         "Z_WEIGHT": bounds.weights[nx : nx + n],
         "U_WEIGHT": bounds.drive,
         "REACH": reach,
+        "HELD": bounds.held,
+        "HOME_AHEAD": np.append(bounds.weights[:nx] * context["rest"], np.zeros(len(bounds.weights) - nx)),
     }
     # powers of it are taken: rounded up, so that what is left is not taken for less
     decay = 1.0 if bounds.decay == 1.0 else bounds.decay * (1 + real.epsilon)
     numbers = {"DECAY": decay, "LEAST_BREAK": bounds.least, "UNKNOWN_RINGING": bounds.unknown, "TOLD": TOLD}
+    numbers["GONE"] = GONE
     texts = {f"{name}_TABLE": _braces(real.literal(v) for v in values) for name, values in tables.items()}
     texts |= {name: real.literal(value) for name, value in numbers.items()}
     return texts | {"BACKWARD": f"{BACKWARD}U", "SETTLING_SWEEPS": str(SETTLING_SWEEPS)}
