@@ -126,6 +126,9 @@ def test_the_condition_holds_for_lines_of_any_size_that_may_say_the_same(rng):
         d = G @ rng.uniform(-3, 3, n)
         a = believed(d, G)
         assert a @ a / 2 + np.abs(G.T @ a).sum() - a @ d < 1e-8 * (d @ d)
+        for unit in (1e-9, 1e9):  # whatever they are told in
+            assert believed(unit * d, unit * G) == pytest.approx(unit * a, abs=1e-8 * unit * np.linalg.norm(d))
+    assert not believed(np.zeros(3), np.ones((3, 2))).any()
 
 
 def test_the_budget_is_what_a_wrong_scale_zero_and_clock_make_of_the_readings(circle):

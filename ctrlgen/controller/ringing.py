@@ -12,10 +12,6 @@ jump of the target or a drive that was limited, adds at most sum p_i |d_i|, p_i^
 A is that of rest; where it varies over the ranges, |R dA R^-1| (P = R^T R, dA by interval arithmetic) is taken from s. Numbers of the
 device that have a standard deviation are taken `SURE` of them off, all to the sides on which it rings longer. Without damping, or where
 what is left of s is not positive, it is not shown that a ringing ever ends.
-
-Apart from all ringing a drive that is held over a sample T leaves a smooth path z by T^2/24 z'' (its mean over a sample is that of the path,
-sinc(w T/2) = 1 - (w T)^2/24 + ...), and by what the device answers to the saw-tooth between the held drive and the one that fits,
-e' = A e + (t - T/2) B du/dt, of one sample and the next alike. With B du/dt = y'' - A y', of which y'' is left out, both are linear in y'.
 """
 
 from __future__ import annotations
@@ -26,9 +22,10 @@ from math import ceil
 
 import casadi as ca
 import numpy as np
-from scipy.linalg import LinAlgError, cholesky, expm, solve_continuous_lyapunov
+from scipy.linalg import LinAlgError, cholesky, solve_continuous_lyapunov
 
 from ctrlgen.controller.contraction import FOREVER, MOST, ROOM
+from ctrlgen.controller.held_drives import left_by_held_drives
 from ctrlgen.controller.lost_state import UNLIMITED
 from ctrlgen.devices import Device
 from ctrlgen.devices.structural_model import StructuralModel
@@ -40,7 +37,6 @@ STILL = 1e-3  # of its range, by which a stage may ring and is told as still
 TOLD = 0.5  # of that, above which it is told: breaks too small to be counted may make as much
 LEAST = 2e-3  # of that: a break that is none. 16 roundings of a float at the end of the range
 GONE = 1e-3 * LEAST  # of that: less is set to zero, before it becomes a denormal number, on which some cores are slow
-PARTS = 32  # of a sample, at whose ends it is looked where a held drive leaves the device
 SURE = 2.0  # standard deviations, by which a number is off at most
 LEFT = (0.02, 0.1, 0.3)  # shares of s that are given up for a smaller P
 WEIGHTS = (0.0, 1.0, 1e2, 1e4)  # of the actuators' states beside the rest of P, of which the soonest is taken
@@ -55,8 +51,8 @@ class Ringing:
 
     `weights` (n_y,) p of y = (x, z) and of the modes that are led beside them, per SI; `drive` (n_u,) what a sample adds per SI of a
     drive that was left; `decay` in a sample; `least` break that counts; `unknown` size of a motion of which nothing is known; `settling`
-    samples until that is told no more about any equilibrium, in a float too, or FOREVER; `reach` (n_y,) what a difference of one can make of
-    each number that is weighted; `held` (n_y,) what a held drive leaves, per change of such a number in a sample.
+    samples until that is told no more about any equilibrium, in a float too, or FOREVER; `reach` (n_y,) what a difference of
+    one can make of each number that is weighted; `held` (n_y,) what a held drive leaves, per change of such a number in a sample.
     """
 
     weights: np.ndarray
@@ -103,8 +99,8 @@ def ringing(model: Model, sample_time: float, structure: StructuralModel | None)
         every = [_of_structure(led) if shown else np.zeros((len(size), len(size)))]
         varies = np.zeros_like(every[0])
         far = np.concatenate([far, np.zeros(more)])  # amplitudes are left out of where a motion stays
-        whole, positions = _of_structure(structure), np.arange(n, n + len(structure.mass))
-    held = _held(whole, positions, told, size, sample_time)
+        whole, positions = _through_lags(structure, A), model.x.numel() + np.arange(len(structure.mass))
+    held = left_by_held_drives(whole, positions, told, size, sample_time)
     proofs = []
     for one in every:
         scaled, loose = (matrix / size[:, None] * size for matrix in (one, varies))
@@ -141,29 +137,6 @@ def _equilibria(m: Model, A: np.ndarray, forced: np.ndarray) -> np.ndarray:
     far[nx:] = np.maximum(far[nx:], np.max(np.abs(m.z_bounds), axis=0))
     far[nx - len(m.axes) : nx] = 0.0  # of which none moves
     return far
-
-
-def _held(
-    A: np.ndarray, positions: np.ndarray, told: np.ndarray, size: np.ndarray, sample_time: float
-) -> np.ndarray:
-    """(n_y,) how far a held drive leaves any number that is `told` at most, in its `size`, per change of each number in a sample."""
-    n, h = len(A), sample_time
-    pushed = A.copy()
-    pushed[positions] = 0.0  # a drive changes no speed at once
-    scaled = A / size[:, None] * size
-    ramp = np.zeros((3 * n, 3 * n))  # e' = A e + s, s' = c
-    ramp[:n, :n], ramp[:n, n : 2 * n], ramp[n : 2 * n, 2 * n :] = scaled, np.eye(n), np.eye(n)
-
-    def after(t: float) -> tuple[np.ndarray, np.ndarray]:
-        of_start, of_s, of_c = np.hsplit(expm(t * ramp)[:n], 3)
-        return of_start, of_c - h / 2 * of_s
-
-    whole, own = after(h)
-    start = np.linalg.lstsq(np.eye(n) - whole, own, rcond=None)[0]  # of one sample and the next alike
-    parts = (after(t) for t in np.linspace(0.0, h, PARTS + 1))
-    left = np.max([np.abs((free @ start + own) @ (pushed / size[:, None] * size)) for free, own in parts], axis=0) / h
-    left[positions] += h / 24 * np.abs(scaled[positions])  # T^2/24 z'', z' = v
-    return np.max(left[told], axis=0)
 
 
 def _samples(proof: _Proof, forced: np.ndarray, sample_time: float) -> float:
@@ -269,6 +242,17 @@ def _of_structure(structure: StructuralModel) -> np.ndarray:
     A[positions, speeds] = 1.0
     A[np.ix_(speeds, positions)] = -inverse @ structure.stiffness
     A[np.ix_(speeds, speeds)] = -inverse @ structure.damping
+    return A
+
+
+def _through_lags(structure: StructuralModel, own: np.ndarray) -> np.ndarray:
+    """A of y = (states of the actuators, v, z, eta, eta'), of which `own` is that of the axes alone, without eta."""
+    n, k, lags = structure.axes, len(structure.mass), len(own) - 2 * structure.axes
+    A = np.zeros((lags + 2 * k, lags + 2 * k))
+    A[:lags, : len(own)] = own[:lags]
+    A[lags:, lags:] = _of_structure(structure)
+    speeds = lags + np.concatenate([np.arange(n), np.arange(n + k, 2 * k)])
+    A[speeds, :lags] = np.linalg.inv(structure.mass)[:, :n] @ structure.mass[:n, :n] @ own[lags : lags + n, :lags]
     return A
 
 

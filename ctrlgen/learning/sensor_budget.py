@@ -15,6 +15,7 @@ reading is believed. No basis of that span enters: where lines are of one size, 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from sys import maxsize
 
 import numpy as np
 from scipy.optimize import brentq, lsq_linear
@@ -65,9 +66,15 @@ class SensorBudget:
 
 def believed(d: np.ndarray, G: np.ndarray) -> np.ndarray:
     """(m,) what of a deviation `d` (m,) is the stage's for sure where columns of G (m, k), each times -1 to 1, may be the sensor's."""
+    size = float(np.linalg.norm(d))
+    return size * _of_one(d / size, G / size) if size else d
+
+
+def _of_one(d: np.ndarray, G: np.ndarray) -> np.ndarray:
+    """The same of a d of length one, by which the least squares stop."""
 
     def beyond(nu: float) -> np.ndarray:
-        return d - nu * (G @ lsq_linear(nu * G, d, (-1, 1), method="bvls", max_iter=1000).x) if nu else d
+        return d - nu * (G @ lsq_linear(nu * G, d, (-1, 1), method="bvls", max_iter=maxsize).x) if nu else d
 
     def worse(nu: float) -> float:
         """By how much the stage may be worse, times |a|; none where not above zero."""
@@ -76,7 +83,7 @@ def believed(d: np.ndarray, G: np.ndarray) -> np.ndarray:
 
     if worse(0.0) <= 0:
         return d
-    if np.linalg.norm(beyond(1.0)) <= ROUNDING * np.linalg.norm(d):  # all of it may be the sensor's
+    if np.linalg.norm(beyond(1.0)) <= ROUNDING:  # all of it may be the sensor's
         return np.zeros(d.shape)
     return beyond(brentq(worse, 0.0, 1.0, xtol=ROUNDING))
 
