@@ -33,4 +33,4 @@ def left_by_held_drives(
     parts = (after(t) for t in np.linspace(0.0, h, PARTS + 1))
     left = np.max([np.abs((free @ start + own) @ (pushed / size[:, None] * size)) for free, own in parts], axis=0) / h
     left[positions] += h / 24 * np.abs(scaled[positions])  # T^2/24 z'', z' = v
-    return np.max(left[told], axis=0)
+    return np.asarray(np.max(left[told], axis=0))
