@@ -159,14 +159,14 @@ class Controller:
         k = self._inverse(settle)
         n, static = m.n_states, k is kernels.static
         first = kernels.examined_first[not static]
-        if np.all(np.isnan(np.concatenate(state))) or (first and self.is_lost(*state)):
+        if np.isnan(np.concatenate(state)).all() or (first and self.is_lost(*state)):
             return self._without_state()
         z_slack, _, u_slack = self.slacks
-        if not np.all(np.abs(target) <= kernels.input_limits[: len(target)]):  # nor is a NaN
+        if not (np.abs(target) <= kernels.input_limits[: len(target)]).all():  # nor is a NaN
             lost = not first and self.is_lost(*state)
             return self._without_state() if lost else self._without_target(k, state)
         wanted, status = self._answer("displacement", k.displacement, x, z, target), ControllerStatus(0)
-        if not np.all((wanted >= m.z_bounds[0]) & (wanted <= m.z_bounds[1])):  # a NaN is not inside either
+        if not ((wanted >= m.z_bounds[0]) & (wanted <= m.z_bounds[1])).all():  # a NaN is not inside either
             beyond = wanted
             wanted, hit = clamp(beyond, *m.z_bounds, z_slack)
             if hit:
@@ -182,7 +182,7 @@ class Controller:
         if worst > 1 + self.slack:
             status |= ControllerStatus.COMPOSITE
         drive = self.drive(k, state, wanted, state_wanted)
-        outside = not np.all((drive >= m.u_bounds[0]) & (drive <= m.u_bounds[1]))
+        outside = not ((drive >= m.u_bounds[0]) & (drive <= m.u_bounds[1])).all()
         if outside and not first and self.is_lost(*state):
             return self._without_state()
         u, limited = clamp(drive, *m.u_bounds, u_slack)

@@ -13,7 +13,7 @@ from functools import cached_property, lru_cache
 import casadi as ca
 import numpy as np
 
-from ctrlgen.controller.controller_step import ControllerStatus, ControllerStep, State
+from ctrlgen.controller.controller_step import ControllerStatus, ControllerStep, State, answer
 from ctrlgen.controller.feedforward import Controller, Rounding
 from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.controller.ringing import Ringing, followed, ringing
@@ -139,7 +139,7 @@ class MotionController(Controller):
         position = target[: len(kernels.model.signals[kernels.follow].channels)]
         if settle:
             return super().step(state, position, settle=True)
-        z, x, u = (kernels.motion[name](target).full().ravel() for name in ("displacement", "state", "drive"))
+        z, x, u = (answer(kernels.motion[name], target) for name in ("displacement", "state", "drive"))
         if broken := self._broken(x, z):
             held = super().step(state, position, settle=True)
             return ControllerStep(held.status | broken, held.displacement, held.actuator_state, held.drive, held.state)
