@@ -43,7 +43,7 @@ WRONG = {
 }
 
 
-@pytest.mark.long
+@pytest.mark.exhaustive
 def test_hostile_calls_of_corrections_break_no_promise_and_find_wrong_lines(tmp_path):
     """Sanitizers and a fuzzer over tables, runs and stored bytes, sound and damaged."""
     for name, sections in (("open", (OPEN_TABLE,)), ("closed", (RUNOUT_TABLE, RIPPLE))):

@@ -117,7 +117,7 @@ def test_a_finding_tells_its_edge_no_more_narrowly_than_that():
         assert not unsure or by_form[1] > out_to_visited((0.0, 5.0 + unsure / 2), visited)[1]
 
 
-@pytest.mark.long
+@pytest.mark.exhaustive
 def test_intervals_of_ends_hold_those_of_the_independent_plant():
     """One case of each law that is not of its own form there; docs/evidence.md counts more of them."""
     for name in ("friction_there", "friction_from", "damping_fast", "knee"):

@@ -125,7 +125,7 @@ def test_more_drives_than_axes_with_inertia_and_rates_break_no_rule_either(tmp_p
         assert check.state != "failed", [str(f) for f in check.findings if not f.permitted]
 
 
-@pytest.mark.long
+@pytest.mark.exhaustive
 def test_the_list_of_deviations_is_exact_with_a_player(circle, tmp_path):
     folder = generate(circle.scenario, circle.model, tmp_path, circle)
     check = ran(by_tool(check_rules(folder))[STATIC[0]])
@@ -133,7 +133,7 @@ def test_the_list_of_deviations_is_exact_with_a_player(circle, tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("kind", ["creep", pytest.param("hysteresis", marks=pytest.mark.exhaustive)])
+@pytest.mark.parametrize("kind", [pytest.param(kind, marks=pytest.mark.exhaustive) for kind in ("creep", "hysteresis")])
 def test_controllers_of_devices_with_effects_break_no_rule_and_survive_hostile_calls(kind, tmp_path):
     effects = {
         "creep": {"kind": "creep", "at": "1X", "tau": "0.03 s", "gain": 0.02, "slow": 0.3},
@@ -267,7 +267,7 @@ def test_hostile_calls_find_nothing(folder, stage):
         assert check.note.count("calls") + check.note.count("edges of the generated C") == 2  # both arithmetics ran
 
 
-@pytest.mark.long
+@pytest.mark.exhaustive
 def test_many_hostile_calls_of_controller_and_player_find_nothing(circle, tmp_path):
     folder = generate(circle.scenario, circle.model, tmp_path, circle)
     for check in check_hostile(folder, circle.scenario, circle.model):

@@ -52,7 +52,9 @@ def scenario_of(name: str, folder):
     return load_scenario(folder)
 
 
-@pytest.mark.parametrize("name", ["heated", "creeping", "rated", "lagging"])
+@pytest.mark.parametrize(
+    "name", ["heated", "rated", *(pytest.param(name, marks=pytest.mark.exhaustive) for name in ("creeping", "lagging"))]
+)
 def test_the_c_answers_at_any_times_as_the_controller_does(name, tmp_path):
     """Status, drives and states; its own test passes, and no hostile call breaks a promise."""
     if not shutil.which("gcc"):

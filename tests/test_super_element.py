@@ -346,7 +346,7 @@ def test_paths_and_c_of_a_part_by_its_matrices_are_those_of_the_part(tmp_path):
     assert all(p.read_bytes() == (tmp_path / "by_matrices" / "K.npy").read_bytes() for p in copied)
 
 
-@pytest.mark.long
+@pytest.mark.exhaustive
 @pytest.mark.filterwarnings(
     "ignore"
 )  # of masses that a drawing without [dynamics] leaves out, of notches between two equations
