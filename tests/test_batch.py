@@ -153,7 +153,7 @@ def test_a_result_counts_that_was_there_when_the_batch_was_stopped_before_its_ro
     record = {"findings": [], "verdict": "consistent", "implausible": []}
     error = {"rms_before": 1.0, "rms_after": 1.0, "noise_floor": 1.0, "unit": "um"}
     content = json.dumps({**record, "held_out": {"y": error}}).encode()
-    monkeypatch.setattr("ctrlgen.app.batch._work", lambda task: {"diagnosis.json": content})
+    monkeypatch.setattr("ctrlgen.app.batch.work_on", lambda task: {"diagnosis.json": content})
     whole = ctrlgen.app.batch.whole_folder
 
     @contextmanager

@@ -175,7 +175,7 @@ def test_every_operation_has_the_bits_of_the_virtual_machine_and_is_declared(cac
 def assert_same_bits(one, state, *inputs):
     """States and results of the library are those of the virtual machine, whatever the sign of a zero; any two NaN are the same."""
     slow, library = Recursion(one), Compilable(one)
-    slow.one._settled = True
+    slow.one.settled = True
     assert library.spent(LONG)
     for a, b in zip(slow.run(state, *inputs), library.run(state, inputs, len(inputs[0])), strict=True):
         assert np.array_equal(a, b, equal_nan=True) and np.array_equal(np.signbit(a[a == 0]), np.signbit(b[b == 0]))
@@ -185,7 +185,7 @@ def test_a_damaged_library_leaves_the_virtual_machine(cache):
     if compiled.compiler() is None:
         pytest.skip("no C compiler here")
     cache.mkdir()
-    (cache / compiled._library(compiled.c_code(friction()))).write_bytes(b"no library")
+    (cache / compiled.library_name(compiled.c_code(friction()))).write_bytes(b"no library")
     broken = Recursion(friction())
     assert not broken.one.spent(LONG)
     assert broken.run(np.zeros(1), np.ones((3, 1)), np.array([[0.3, 0.7]]))[0].shape == (3, 1)

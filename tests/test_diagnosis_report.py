@@ -313,9 +313,8 @@ def test_the_page_shows_whatever_evidence_there_is(found):
 
 
 def errors(before: float, after: float, noise: float | None) -> ChannelErrorEntry:
-    return ChannelErrorEntry(
-        rms_before=before, rms_after=after, noise_floor=noise, unit="um", uncertainty=None, rms_refitted=None
-    )
+    none = dict.fromkeys(("uncertainty", "rms_refitted"))
+    return ChannelErrorEntry(rms_before=before, rms_after=after, noise_floor=noise, unit="um", **none)
 
 
 def test_the_answer_tells_what_is_left_where_most_is_left(found):
@@ -355,7 +354,6 @@ def test_a_verdict_says_what_to_do(found):
     assert "no known effect" in sentence(replace(found, verdict=Verdict.UNEXPLAINED, findings=()))
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("value", "low", "high", "unit", "says"),
     [

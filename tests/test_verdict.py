@@ -282,9 +282,15 @@ def test_errors_are_root_mean_squares_of_valid_readings_in_the_readers_unit(monk
     f = fitter(predict=lambda fit, r: np.full((4, 1), 1e-6 if fit is nominal.fit else 3e-6))
     f.held_out_records = [SimpleNamespace(valid=valid, observed=np.array([[4e-6], [5e-6], [6e-6], [9.0]]))]
     f.recording = SimpleNamespace(channels=("reading.axis",), units=("um",))
-    found = held_out_errors(search(nominal, chosen, of=f), np.array([True]))["reading.axis"]
+    found, unknown = (
+        held_out_errors(search(nominal, chosen, of=f), np.array([known]), SimpleNamespace(ratio=(1.5,)))["reading.axis"]
+        for known in (True, False)
+    )
     wanted = (np.sqrt((9 + 16 + 25) / 3), np.sqrt((1 + 4 + 9) / 3), 2e-3, 5e-3)
     assert (found.rms_before, found.rms_after, found.noise_floor, found.uncertainty) == pytest.approx(wanted)
-    assert held_out_errors(search(nominal, chosen, of=f), np.array([False]))["reading.axis"].noise_floor is None
+    assert found.rms_refitted == pytest.approx(3e-3) and (unknown.noise_floor, unknown.rms_refitted) == (None, None)
     f.held_out_records = []
-    assert np.isnan(held_out_errors(search(nominal, chosen, of=f), np.array([True]))["reading.axis"].rms_after)
+    (none,) = held_out_errors(
+        search(nominal, chosen, of=f), np.array([True]), SimpleNamespace(ratio=(np.nan,))
+    ).values()
+    assert np.isnan(none.rms_after) and none.rms_refitted is None

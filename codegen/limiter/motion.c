@@ -96,8 +96,7 @@ static uint32_t motion_drives(limiter_state *at, const limiter_state *state, con
 #endif
 #if RINGING
     for (i = 0; i < NU; i++) {
-        const real by = out->drive[i] - wanted[i];
-        left += U_WEIGHT[i] * ((by < REAL(0.0)) ? -by : by);
+        left += U_WEIGHT[i] * magnitude(out->drive[i] - wanted[i]);
     }
     status |= follow_on(at, join, &join[NY], left);
 #endif

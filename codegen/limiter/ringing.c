@@ -141,8 +141,7 @@ uint32_t limiter_observe(limiter_state *state, const real x[NX], const real z[N]
             set_still(&seen, measured);
             set_still(&off, error);
             for (i = 0; i < NY; i++) {
-                const real by = measured[i] - state->ahead[i];
-                const real away = (by < REAL(0.0)) ? -by : by;
+                const real away = magnitude(measured[i] - state->ahead[i]);
                 size += away + error[i];
                 if (away > (error[i] + (REACH[i] * (state->ringing + REAL(1.0))))) {
                     apart = 1;

@@ -1,5 +1,10 @@
 /* How far the device may be off the motion that it is to follow. limiter.c includes this for a device with inertia. */
 
+static real magnitude(real of)
+{
+    return (of < REAL(0.0)) ? -of : of;
+}
+
 /* Where a device that stays in its state is led, weighted. */
 static void set_still(const limiter_state *state, real still[NY])
 {
@@ -32,8 +37,7 @@ static real added(const limiter_state *state, const real from[NY], real left)
     real size = left;
     int i;
     for (i = 0; i < NY; i++) {
-        const real by = from[i] - state->ahead[i];
-        size += (by < REAL(0.0)) ? -by : by;
+        size += magnitude(from[i] - state->ahead[i]);
     }
     return ((is_nan(&size) == 0) && (size <= LEAST_BREAK)) ? REAL(0.0) : size;
 }
@@ -46,8 +50,7 @@ static real bounded(real size, const real ahead[NY])
     real left = size;
     int i;
     for (i = 0; i < NY; i++) {
-        const real by = ahead[i] - HOME_AHEAD[i];
-        most += (by < REAL(0.0)) ? -by : by;
+        most += magnitude(ahead[i] - HOME_AHEAD[i]);
     }
     if ((is_nan(&left) == 0) && (left > most)) {
         left = most;
@@ -67,8 +70,7 @@ static uint32_t follow_on(limiter_state *state, const real from[NY], const real 
     int i;
     state->ringing = bounded(size, ahead);
     for (i = 0; i < NY; i++) {
-        const real by = ahead[i] - from[i];
-        held += HELD[i] * ((by < REAL(0.0)) ? -by : by);
+        held += HELD[i] * magnitude(ahead[i] - from[i]);
         state->ahead[i] = ahead[i];
     }
     return is_ringing(state, held);

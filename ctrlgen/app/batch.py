@@ -201,7 +201,7 @@ def run_batch(
     if progress is not None:
         progress(before, len(tasks))
     try:
-        for k, result in run_all(_work, [task for task, _ in to_do], scheduler, jobs, told):
+        for k, result in run_all(work_on, [task for task, _ in to_do], scheduler, jobs, told):
             task, made_from = to_do[k]
             rows[task.name] = _kept(task, made_from, result, out)
             tables.told(rows)
@@ -216,7 +216,8 @@ def run_batch(
     return in_order
 
 
-def _work(task: Task) -> dict[str, bytes]:
+def work_on(task: Task) -> dict[str, bytes]:
+    """What a worker does: the files of the result, by name."""
     return task()
 
 

@@ -85,13 +85,13 @@ class Compilable:
         self.seconds = 0.0  # spent in the virtual machine so far
         self._code: str | None = None
         self._folder = cache_folder()
-        self._settled = compiler() is None
+        self.settled = compiler() is None  # whether it is known already if the library takes the place
         self._loop: Callable[..., int] | None = None
 
     def spent(self, seconds: float, expected: float = 0.0) -> bool:
         """Counts `seconds` of the virtual machine, where it would take the `expected` ones beside; whether the library is there from
         now on."""
-        if self._settled or self._folder is None:
+        if self.settled or self._folder is None:
             return False
         self.seconds += seconds
         if self._code is None:
@@ -100,14 +100,14 @@ class Compilable:
             try:
                 self._code = c_code(self.function)
             except ValueError:  # it stays with the virtual machine
-                self._settled = True
+                self.settled = True
                 return False
         price = SECONDS + len(self._code) * SECONDS_PER_CHARACTER
-        path = self._folder / _library(self._code)
+        path = self._folder / library_name(self._code)
         kept = os.access(path, os.R_OK)  # where a folder above is another user's, `exists` is an error
         if not kept and (self.seconds + expected < price or len(self._code) > LONGEST):
             return False
-        self._settled = True
+        self.settled = True
         if not kept and not _compile(self._code, path):
             return False
         self._code = ""
@@ -223,7 +223,8 @@ def _with_locals(parts: list[list[str]]) -> list[str]:
     return pieces[::-1]
 
 
-def _library(code: str) -> str:
+def library_name(code: str) -> str:
+    """The file of the library in the cache folder: other code, another compiler or other options have another one."""
     digest = hashlib.sha256("\0".join((code, str(compiler()), *FLAGS)).encode()).hexdigest()[:32]
     return f"{digest}.so"
 

@@ -164,6 +164,11 @@ static int flexure_axis_online_f32_limit_displacement(float value[1])
     return flexure_axis_online_f32_limit_all(value, LOW, HIGH, SLACK, 1);
 }
 
+static float flexure_axis_online_f32_magnitude(float of)
+{
+    return (of < 0.0f) ? -of : of;
+}
+
 /* Where a device that stays in its state is led, weighted. */
 static void flexure_axis_online_f32_set_still(const flexure_axis_online_f32_state *state, float still[2])
 {
@@ -191,8 +196,7 @@ static float flexure_axis_online_f32_added(const flexure_axis_online_f32_state *
     float size = left;
     int i;
     for (i = 0; i < 2; i++) {
-        const float by = from[i] - state->ahead[i];
-        size += (by < 0.0f) ? -by : by;
+        size += flexure_axis_online_f32_magnitude(from[i] - state->ahead[i]);
     }
     return ((flexure_axis_online_f32_is_nan(&size) == 0) && (size <= 0.002f)) ? 0.0f : size;
 }
@@ -205,8 +209,7 @@ static float flexure_axis_online_f32_bounded(float size, const float ahead[2])
     float left = size;
     int i;
     for (i = 0; i < 2; i++) {
-        const float by = ahead[i] - HOME_AHEAD[i];
-        most += (by < 0.0f) ? -by : by;
+        most += flexure_axis_online_f32_magnitude(ahead[i] - HOME_AHEAD[i]);
     }
     if ((flexure_axis_online_f32_is_nan(&left) == 0) && (left > most)) {
         left = most;
@@ -226,8 +229,7 @@ static uint32_t flexure_axis_online_f32_follow_on(flexure_axis_online_f32_state 
     int i;
     state->ringing = flexure_axis_online_f32_bounded(size, ahead);
     for (i = 0; i < 2; i++) {
-        const float by = ahead[i] - from[i];
-        held += HELD[i] * ((by < 0.0f) ? -by : by);
+        held += HELD[i] * flexure_axis_online_f32_magnitude(ahead[i] - from[i]);
         state->ahead[i] = ahead[i];
     }
     return flexure_axis_online_f32_is_ringing(state, held);
@@ -406,8 +408,7 @@ static uint32_t flexure_axis_online_f32_motion_drives(flexure_axis_online_f32_st
         out->displacement[i] = at->z[i];
     }
     for (i = 0; i < 1; i++) {
-        const float by = out->drive[i] - wanted[i];
-        left += U_WEIGHT[i] * ((by < 0.0f) ? -by : by);
+        left += U_WEIGHT[i] * flexure_axis_online_f32_magnitude(out->drive[i] - wanted[i]);
     }
     status |= flexure_axis_online_f32_follow_on(at, join, &join[2], left);
     at->ready = FLEXURE_AXIS_ONLINE_F32_BUILD;
@@ -574,8 +575,7 @@ uint32_t flexure_axis_online_f32_observe(flexure_axis_online_f32_state *state, c
             flexure_axis_online_f32_set_still(&seen, measured);
             flexure_axis_online_f32_set_still(&off, error);
             for (i = 0; i < 2; i++) {
-                const float by = measured[i] - state->ahead[i];
-                const float away = (by < 0.0f) ? -by : by;
+                const float away = flexure_axis_online_f32_magnitude(measured[i] - state->ahead[i]);
                 size += away + error[i];
                 if (away > (error[i] + (REACH[i] * (state->ringing + 1.0f)))) {
                     apart = 1;
