@@ -70,6 +70,8 @@ def test_c_and_python_tell_the_same_of_a_mass(tmp_path):
     for k in range(400):
         what, held = int(rng.integers(9)), np.array([c.out.drive])
         target = rng.normal(size=3) * [4e-5, 1e-2, 20] * rng.choice([0, 1e-4, 1, 3]) if k % 3 == 0 else np.zeros(3)
+        if k % 11 == 5:  # nothing can follow that
+            target = np.array([0.0, 0.0, 0.9 * float(twin.controller.kernels.input_limits[2])])
         if what == 0:
             assert c.c_forget(c.at) == UNSURE
             mine = twin.forget(mine)
@@ -126,15 +128,18 @@ def test_what_a_held_drive_leaves_of_a_fast_path_is_told(tmp_path, damping):
         assert sure.mean() > 0.9 if turn == 0.01 else sure.mean() < 0.2 and max(far) > 3 * TOLERANCE
 
 
-def test_no_command_rings_for_longer_than_the_header_says(floats):
-    """An acceleration that nothing can follow, for one sample: the device itself has moved no more than its drives made it."""
-    settling, still = floats.twin.bounds.settling, (0.0, 0.0, 0.0)
+@pytest.mark.parametrize("place", [0.0, 99e-6])
+def test_no_command_rings_for_longer_than_the_header_says(floats, place):
+    """An acceleration that nothing can follow, for one sample: the device itself has moved no more than its drives made it; about
+    home, and about the end of its range."""
+    settling, still = floats.twin.bounds.settling, (place, 0.0, 0.0)
+    held = float(floats.twin.controller.step(floats.twin.rest().state, np.array(still), settle=True).drive[0])
     absurd = 0.99 * float(floats.twin.controller.kernels.input_limits[2])
     assert absurd > 1e3
-    for wait in (lambda: [floats.settle(still) for _ in range(settling)][-1], lambda: floats.elapsed(settling, 0.0)):
+    for wait in (lambda: [floats.settle(still) for _ in range(settling)][-1], lambda: floats.elapsed(settling, held)):
         floats.c_init(floats.at)
         for _ in range(3):
-            assert floats.c_step(floats.at, (floats.number * 3)(0.0, 0.0, absurd), floats.output) & UNSURE
+            assert floats.c_step(floats.at, (floats.number * 3)(-place, 0.0, absurd), floats.output) & UNSURE
         assert wait() == 0
 
 

@@ -19,7 +19,7 @@ def left_by_held_drives(
     """(n_y,) how far a held drive leaves any number that is `told` at most, in its `size`, per change of each number in a sample."""
     n, h = len(A), sample_time
     pushed = A.copy()
-    pushed[positions] = 0.0  # a drive changes no speed at once
+    pushed[positions] = 0.0  # z' = v has no drive in it
     scaled = A / size[:, None] * size
     ramp = np.zeros((3 * n, 3 * n))  # e' = A e + s, s' = c
     ramp[:n, :n], ramp[:n, n : 2 * n], ramp[n : 2 * n, 2 * n :] = scaled, np.eye(n), np.eye(n)

@@ -154,8 +154,9 @@ class ChannelErrorEntry(Keys):
         description="Prediction uncertainty that the fitted parameters alone cause; null where it is not known."
     )
     rms_refitted: Number = Field(
-        description="With the findings, all numbers moved to these records within their uncertainty, the cost of that (chi-square) "
-        "included; null where the noise is not known."
+        description="With the findings, all numbers moved to these records within their uncertainty: the noise times the root mean "
+        "square of the whitened residual (rare spikes by Huber's loss), the chi-square of that move included; null "
+        "where the noise is not known."
     )
 
 
