@@ -117,7 +117,7 @@ def _verdict(d: dict[str, Any]) -> Iterator[str]:
     known = all(e["noise_floor"] for e in errors)
     quiet = known and all(e["rms_after"] is not None and e["rms_after"] <= NOISE * e["noise_floor"] for e in errors)
     chance = "which chance allows so few samples" in d["sentence"]
-    # of the worst channel; chi-square of the numbers' move is part of it
+    # told of the worst channel
     moved = "with them moved within it" in d["sentence"] and all(
         e["rms_refitted"] is not None and e["rms_refitted"] <= NOISE * e["noise_floor"] for e in errors
     )

@@ -21,7 +21,7 @@ def finding(cause, share: float | None, *alternatives, chance: ChanceEntry | Non
 
 def told(verdict: Verdict, *findings: Finding, passed=False, after=2.0, untried=()) -> list[str]:
     errors = ChannelErrorEntry(
-        rms_before=50.0, rms_after=after, noise_floor=1.0, unit="um", uncertainty=None, rms_refitted=None
+        rms_before=50.0, rms_after=after, noise_floor=1.0, unit="um", uncertainty=None, rms_refitted=after
     )
     noise = SimpleNamespace(known=np.ones(1, bool))
     fitter = SimpleNamespace(recording=SimpleNamespace(tolerance=(None,)), noise=noise)

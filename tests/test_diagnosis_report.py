@@ -313,8 +313,8 @@ def test_the_page_shows_whatever_evidence_there_is(found):
 
 
 def errors(before: float, after: float, noise: float | None) -> ChannelErrorEntry:
-    none = dict.fromkeys(("uncertainty", "rms_refitted"))
-    return ChannelErrorEntry(rms_before=before, rms_after=after, noise_floor=noise, unit="um", **none)
+    rms = {"rms_before": before, "rms_after": after, "rms_refitted": after}
+    return ChannelErrorEntry(**rms, noise_floor=noise, unit="um", uncertainty=None)
 
 
 def test_the_answer_tells_what_is_left_where_most_is_left(found):

@@ -130,7 +130,7 @@ def judged(
     bare = (trial(0.0, left_over - 100.0 + confirmed),) * len(causes)
     found = search(nominal, chosen, bare, rivals[: len(causes)], of=f)
     shares = shares_of(*[share] * len(causes), rest=(1 - share) if rest is None else rest)
-    return verdict(found, ResidualTests((1.0,), {}, passed), shares, seen)
+    return verdict(found, ResidualTests((1.0,), {}, passed, fitted()), shares, seen)
 
 
 def test_a_verdict_says_what_is_known():
@@ -172,7 +172,7 @@ def test_what_takes_away_three_quarters_of_the_mismatch_is_part_of_the_answer(sh
 )
 def test_what_is_left_is_little_beside_the_mismatch_or_the_noise(before, after, little):
     """Squares beyond the noise, over those of the noise; of the records to fit and of those held out."""
-    quiet, passed = 0.0, ResidualTests((1.0,), {}, False)
+    quiet, passed = 0.0, ResidualTests((1.0,), {}, False, fitted())
     for fit, held in ((after, quiet), (quiet, after)):
         found = search(trial(before * N, before * N), trial(fit * N, held * N, causes=(GAIN,)), of=fitter())
         assert too_little_to_name(found, passed) == little
@@ -278,19 +278,24 @@ def test_errors_are_root_mean_squares_of_valid_readings_in_the_readers_unit(monk
     monkeypatch.setattr("ctrlgen.diagnosis.selection.findings.prediction_uncertainty", lambda *_: np.array([5e-9]))
     valid = np.ones((4, 1), bool)
     valid[3] = False
-    nominal, chosen = trial(), trial()
-    f = fitter(predict=lambda fit, r: np.full((4, 1), 1e-6 if fit is nominal.fit else 3e-6))
+    nominal, chosen, moved = trial(), trial(), fitted()
+    read = {id(nominal.fit): 1e-6, id(chosen.fit): 3e-6, id(moved): 4e-6}
+    f = fitter(predict=lambda fit, r: np.full((4, 1), read[id(fit)]))
     f.held_out_records = [SimpleNamespace(valid=valid, observed=np.array([[4e-6], [5e-6], [6e-6], [9.0]]))]
     f.recording = SimpleNamespace(channels=("reading.axis",), units=("um",))
     found, unknown = (
-        held_out_errors(search(nominal, chosen, of=f), np.array([known]), SimpleNamespace(ratio=(1.5,)))["reading.axis"]
+        held_out_errors(search(nominal, chosen, of=f), np.array([known]), moved)["reading.axis"]
         for known in (True, False)
     )
-    wanted = (np.sqrt((9 + 16 + 25) / 3), np.sqrt((1 + 4 + 9) / 3), 2e-3, 5e-3)
-    assert (found.rms_before, found.rms_after, found.noise_floor, found.uncertainty) == pytest.approx(wanted)
-    assert found.rms_refitted == pytest.approx(3e-3) and (unknown.noise_floor, unknown.rms_refitted) == (None, None)
+    wanted = (np.sqrt((9 + 16 + 25) / 3), np.sqrt((1 + 4 + 9) / 3), np.sqrt((0 + 1 + 4) / 3), 2e-3, 5e-3)
+    assert (
+        found.rms_before,
+        found.rms_after,
+        found.rms_refitted,
+        found.noise_floor,
+        found.uncertainty,
+    ) == pytest.approx(wanted)
+    assert unknown.noise_floor is None
     f.held_out_records = []
-    (none,) = held_out_errors(
-        search(nominal, chosen, of=f), np.array([True]), SimpleNamespace(ratio=(np.nan,))
-    ).values()
-    assert np.isnan(none.rms_after) and none.rms_refitted is None
+    (none,) = held_out_errors(search(nominal, chosen, of=f), np.array([True]), moved).values()
+    assert np.isnan(none.rms_after)

@@ -172,7 +172,7 @@ def _diagnose(
         attribution=attribution,
         shares=shares,
         empirical_terms=left,
-        held_out=held_out_errors(search, known, tests),
+        held_out=held_out_errors(search, known, tests.refitted),
         residual_tests=tests,
         spikes=spikes,
         notes=notes,

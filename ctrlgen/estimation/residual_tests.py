@@ -32,12 +32,13 @@ class ResidualTests:
 
     `p_values`: "memory" (Ljung-Box), "variance" (McLeod-Li), "drive" (cross-correlation), "size" of the held-out residual,
     "fitted" size of that of the records to fit. `restless`: channels that do at rest what no stationary noise does. `passed`:
-    whether the structure is valid by all of them.
+    whether the structure is valid by all of them. `refitted`: the fit with its numbers moved to the held-out records under their posterior.
     """
 
     ratio: tuple[float, ...]
     p_values: dict[str, float]
     passed: bool
+    refitted: Fit
     restless: tuple[str, ...] = ()
 
     @property
@@ -73,7 +74,7 @@ def run_residual_tests(fitter: Fitter, fit: Fit) -> ResidualTests:
     too_large |= large and smallest["fitted"] < RESIDUAL_TESTS.size_p
     restless = _restless(fitter, fit)
     passed = bool(np.isfinite(ratio).all()) and not (too_large or rejected or restless)
-    return ResidualTests(ratio, smallest, passed, restless)
+    return ResidualTests(ratio, smallest, passed, refit.fit, restless)
 
 
 def _held_out_residual(fitter: Fitter, refit: HeldOutRefit) -> tuple[np.ndarray, np.ndarray, dict[str, list[float]]]:

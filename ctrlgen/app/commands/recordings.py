@@ -132,7 +132,7 @@ def diagnose(
     --explain backlash answers for one effect: where it was tried, from what
     starts, what it reached and why it was not taken.
 
-    Example:  ctrlgen diagnose scenarios/devices/xy_lever_stage.toml scenarios/lever_runs/run_a.toml
+    Example:  ctrlgen diagnose scenarios/rrr_matrices/device.toml scenarios/rrr_matrices
     """
     from ctrlgen.app.look_console import described
     from ctrlgen.diagnosis.diagnosis_folder import Replicates, diagnose_into, unfinished

@@ -81,7 +81,7 @@ def channel_sentence(channel: str, error: ChannelErrorEntry) -> str:
     unsure = ""
     if error.uncertainty is not None and error.uncertainty > (error.noise_floor or 0.0):
         unsure = f"; the uncertainty of the parameters alone is {number(error.uncertainty, 3)} {error.unit}"
-        if error.rms_refitted is not None and error.rms_refitted < error.rms_after:
+        if error.rms_refitted < error.rms_after:
             unsure += f", and with them moved within it {number(error.rms_refitted, 3)} {error.unit} are left"
     return f"Held-out error of {short(channel)}: {' -> '.join(dict.fromkeys(shown))}, noise {noise}{unsure}."
 

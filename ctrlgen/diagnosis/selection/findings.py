@@ -20,7 +20,6 @@ from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, nominal_physics
 from ctrlgen.estimation.prediction_uncertainty import prediction_uncertainty
 from ctrlgen.estimation.profile_likelihood import Profile
-from ctrlgen.estimation.residual_tests import ResidualTests
 from ctrlgen.estimation.robust_covariance import robust_deviations
 from ctrlgen.estimation.settings import STATISTICS
 from ctrlgen.reporting.result_file import FiniteOrNull, Keys, Number
@@ -153,24 +152,22 @@ class ChannelErrorEntry(Keys):
     uncertainty: Number = Field(
         description="Prediction uncertainty that the fitted parameters alone cause; null where it is not known."
     )
-    rms_refitted: Number = Field(
-        description="With the findings, all numbers moved to these records within their uncertainty: the noise times the root mean "
-        "square of the whitened residual (rare spikes by Huber's loss), the chi-square of that move included; null "
-        "where the noise is not known."
+    rms_refitted: FiniteOrNull = Field(
+        description="With the findings, all numbers moved to these records within their uncertainty (under their posterior)."
     )
 
 
-def held_out_errors(search: SearchResult, known: np.ndarray, tests: ResidualTests) -> dict[str, ChannelErrorEntry]:
-    """Held-out errors of the nominal and of the chosen model by channel; `known` (n_y,) says whose noise is known. `tests` are those of
-    the chosen model."""
+def held_out_errors(search: SearchResult, known: np.ndarray, refitted: Fit) -> dict[str, ChannelErrorEntry]:
+    """Held-out errors of the nominal and of the chosen model by channel; `known` (n_y,) says whose noise is known. `refitted` is
+    the chosen model with its numbers moved to the held-out records within their uncertainty."""
     errors, fitter = {}, search.fitter
     floor, unsure = fitter.noise.floor, prediction_uncertainty(fitter, search.chosen.fit)
     for i, (channel, unit) in enumerate(zip(fitter.recording.channels, fitter.recording.units, strict=True)):
         scale = difference(1.0, unit)
         rms = []
-        for model in (search.nominal, search.chosen):
+        for fit in (search.nominal.fit, search.chosen.fit, refitted):
             squares = [
-                ((r.observed - fitter.predict(model.fit, r))[:, i])[r.valid[:, i]] ** 2 for r in fitter.held_out_records
+                ((r.observed - fitter.predict(fit, r))[:, i])[r.valid[:, i]] ** 2 for r in fitter.held_out_records
             ]
             rms.append(float(np.sqrt(np.mean(np.concatenate(squares)))) * scale if squares else float("nan"))
         noise = float(floor[i] * scale) if known[i] else None
@@ -181,7 +178,7 @@ def held_out_errors(search: SearchResult, known: np.ndarray, tests: ResidualTest
             noise_floor=noise,
             unit=unit,
             uncertainty=beside,
-            rms_refitted=tests.ratio[i] * noise if noise is not None and np.isfinite(tests.ratio[i]) else None,
+            rms_refitted=rms[2],
         )
     return errors
 
