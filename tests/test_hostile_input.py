@@ -6,8 +6,10 @@ import errno
 import json
 import os
 import resource
+import shutil
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -232,6 +234,68 @@ def test_a_full_disk_at_a_single_file(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="No space left on device; free space on that disk"):
         write_bytes(tmp_path / "page.html", b"text")
     assert not list(tmp_path.iterdir())
+
+
+@contextmanager
+def interrupted_at(step: int):
+    """Ctrl-C at instruction number `step` of ctrlgen/core/files.py, or of a function that it calls returning to it."""
+    left = step
+
+    def trace(frame, event, _argument):
+        nonlocal left
+        frame.f_trace_opcodes = True
+        if not frame.f_code.co_filename.endswith("core/files.py"):
+            return None
+        left -= event == "opcode"
+        if left == 0:
+            raise KeyboardInterrupt
+        return trace
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        yield
+    finally:
+        sys.settrace(before)
+
+
+@pytest.mark.filterwarnings("ignore:Exception ignored")  # a file that was open is closed by Python, which warns
+def test_ctrl_c_at_any_instruction_leaves_a_whole_file_and_no_other(tmp_path):
+    path, contents, step = tmp_path / "out.csv", set(), 0
+    path.write_bytes(b"old")
+    while True:
+        step += 1
+        try:
+            with interrupted_at(step):
+                write_bytes(path, b"new")
+            break
+        except KeyboardInterrupt:
+            assert [p.name for p in tmp_path.iterdir()] == ["out.csv"]
+            contents.add(path.read_bytes())
+            path.write_bytes(b"old")
+    assert contents == {b"old", b"new"} and path.read_bytes() == b"new"
+
+
+@pytest.mark.filterwarnings("ignore:Exception ignored")  # a file that was open is closed by Python, which warns
+def test_ctrl_c_at_any_instruction_leaves_a_whole_folder(tmp_path):
+    out, step = tmp_path / "out", 0
+    with whole_folder(out) as draft:
+        (draft / "a.csv").write_text("old")
+    while True:
+        step += 1
+        try:
+            with interrupted_at(step), whole_folder(out) as draft:
+                (draft / "a.csv").write_text("new")
+            break
+        except KeyboardInterrupt:
+            assert {p.name for p in out.iterdir()} == {".ctrlgen", "a.csv"}
+            assert (out / "a.csv").read_text() in {"old", "new"}
+            left = {p.name for p in tmp_path.iterdir()} - {"out"}
+            for name in left:  # only what was replaced, and only while it is removed
+                assert name.endswith(".old")
+                assert (out / "a.csv").read_text() == "new"
+                shutil.rmtree(tmp_path / name)
+    assert (out / "a.csv").read_text() == "new"
 
 
 @pytest.mark.long

@@ -10,19 +10,16 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
-import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
 from ctrlgen.app.batch_row import BatchRow
 from ctrlgen.core.escaping import csv_cell
-from ctrlgen.core.files import unwritable, write_text
+from ctrlgen.core.files import whole_file, write_text
 
 TABLE = "results.csv"
 PROGRESS = "batch.json"
@@ -92,19 +89,9 @@ def _write(path: Path, schema: Any, entries: Iterator[dict[str, Any]]) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    os.close(handle)
-    try:
-        with pq.ParquetWriter(temporary, schema, compression="zstd") as file:
-            for part in _parts(entries):
-                file.write_table(pa.Table.from_pylist(part, schema))
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except OSError as error:
-        raise unwritable(path, error) from None
-    finally:
-        with suppress(OSError):
-            os.unlink(temporary)
+    with whole_file(path) as draft, pq.ParquetWriter(draft, schema, compression="zstd") as file:
+        for part in _parts(entries):
+            file.write_table(pa.Table.from_pylist(part, schema))
 
 
 def _parts(entries: Iterator[dict[str, Any]]) -> Iterator[list[dict[str, Any]]]:

@@ -6,12 +6,12 @@ import difflib
 import errno
 import os
 import reprlib
+import secrets
 import shutil
 import stat
-import tempfile
 import tomllib
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -246,24 +246,34 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write `content` whole or not at all: a temporary file beside `path`, then a rename. Raises InputError."""
+    """Write `content` whole or not at all (`whole_file`). Raises InputError."""
+    with whole_file(path) as draft, draft.open("xb") as file:
+        file.write(content)
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """A file that appears at `path` only when the block ends without an error.
+
+    Yields the name of a temporary file beside `path` that the block is to write; on success it takes the place of `path`,
+    on an error or Ctrl-C it is removed and `path` is left as it was. Raises InputError when `path` cannot be written.
+    """
+    draft = _draft(path)  # named before it is made: whatever stops the block, its name is known to what removes it
     try:
-        _write_whole(path, content)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield draft
+        os.chmod(draft, 0o644)
+        os.replace(draft, path)
     except OSError as error:
         raise unwritable(path, error) from None
+    finally:
+        with suppress(OSError):
+            draft.unlink(missing_ok=True)
 
 
-def _write_whole(path: Path, content: bytes) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+def _draft(path: Path) -> Path:
+    """A name beside `path` that no other process takes."""
+    return path.with_name(f".{path.name}.{secrets.token_hex(4)}")
 
 
 @contextmanager
@@ -274,14 +284,11 @@ def whole_folder(out: Path) -> Iterator[Path]:
     earlier result and nothing else (`.ctrlgen` lists what was made). On an error or Ctrl-C `out` is left as it was.
     Raises InputError when `out` cannot be written or holds somebody else's files.
     """
-    try:
-        out = check_folder(out)
-        out.parent.mkdir(parents=True, exist_ok=True)
-        draft = Path(tempfile.mkdtemp(dir=out.parent, prefix=f".{out.name}."))
-    except OSError as error:
-        raise unwritable(out, error, "--out") from None
+    out = check_folder(out)
+    draft = _draft(out)
     retired = draft.with_name(draft.name + ".old")
     try:
+        _make_draft(draft, out)
         yield draft
         (draft / STEPS).unlink(missing_ok=True)
         made = sorted(str(path.relative_to(draft)) for path in draft.rglob("*") if path.is_file())
@@ -299,6 +306,13 @@ def whole_folder(out: Path) -> Iterator[Path]:
         raise
     finally:
         shutil.rmtree(retired, ignore_errors=True)
+
+
+def _make_draft(draft: Path, out: Path) -> None:
+    try:
+        draft.mkdir(mode=0o700, parents=True)
+    except OSError as error:
+        raise unwritable(out, error, "--out") from None
 
 
 def check_folder(out: Path) -> Path:
