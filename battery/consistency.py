@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from typing import Any
 
 SUM = 1e-6  # by which shares that make up one may differ from it
+NEARLY = 0.1  # difference of shares that do not say which cause is the main one
 SQUARES = 0.02  # by which a share may differ from that of the squares, which leave out what the tables round
 LEAST = 0.01  # of the mismatch: below, nothing is a cause
 MOST = 0.75  # of the mismatch, which a partial answer takes away
@@ -67,9 +68,15 @@ def _shares(d: dict[str, Any]) -> Iterator[str]:
     if shares and abs(whole - explained) > SUM:
         yield f"the shares make up {whole}, not {explained}"
     standing = [f for f in d["findings"] if f["role"] == "cause" and f["share"] is not None]
-    causes = [f["share"]["value"] for f in standing if not (f["support"] and f["support"]["contradicted"])]
-    if causes != sorted(causes, reverse=True):
-        yield f"the largest share is not first: {causes}"
+    standing = [f for f in standing if not (f["support"] and f["support"]["contradicted"])]
+    causes = [f["share"]["value"] for f in standing]
+    if causes[1:] != sorted(causes[1:], reverse=True):
+        yield f"shares are not in their order: {causes}"
+    if causes and causes[0] < max(causes):
+        first, largest = standing[0], standing[causes.index(max(causes))]
+        needed = any(w["without"] > largest["worth"][channel]["without"] for channel, w in first["worth"].items())
+        if causes[0] <= max(causes) - NEARLY or not needed:
+            yield f"the largest share is not first: {causes}"
 
 
 def _channels(d: dict[str, Any]) -> Iterator[str]:

@@ -36,6 +36,22 @@ def test_a_sound_answer_has_no_contradiction(sound):
     assert contradictions(sound) == []
 
 
+@pytest.mark.parametrize(("share", "without", "wrong"), [(0.48, 2.0, 0), (0.48, 0.5, 1), (0.4, 2.0, 1)])
+def test_a_cause_with_less_than_the_largest_share_is_first_where_it_is_as_large_and_needed_more(
+    sound, share, without, wrong
+):
+    """Two causes in place of one: the first with this share, and with what is left without it over what is left without the other."""
+    changed = copy.deepcopy(sound)
+    first = changed["findings"][0]
+    whole, own = first["share"]["value"], first["worth"]["reading.axis"]
+    other = copy.deepcopy(first) | {"effect": "drift"}
+    for finding, part, left in ((first, share, without), (other, 1 - share, 1.0)):
+        finding["share"] = {"value": part * whole, "ci95": [part * whole, part * whole]}
+        finding["worth"] = {"reading.axis": own | {"without": left * own["without"], "share": part * own["share"]}}
+    changed["findings"] = [first, other]
+    assert sum("largest share is not first" in told for told in contradictions(changed)) == wrong
+
+
 WRONG = {
     "a share above one": ("findings.0.share.value", 1.4),
     "a negative share": ("findings.0.share.value", -0.2),

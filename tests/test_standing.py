@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
+from ctrlgen.diagnosis.report.nearly_as_large import nearly_as_large
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
-from ctrlgen.diagnosis.selection.findings import Finding, Role
+from ctrlgen.diagnosis.selection.findings import Finding, Role, WorthEntry, leading
 from ctrlgen.diagnosis.selection.standing import answer_of, in_standing, possible
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.effects import Family
@@ -66,3 +69,32 @@ def test_alone_it_makes_the_answer_ambiguous_unless_noise_alone_is_left(verdict)
 def test_a_family_of_which_the_device_can_have_no_law_is_not_spoken_for():
     offered = [Hypothesis(effect, "sensor:axis", "axis") for effect in ("creep", "bow", "parameter")]
     assert possible(shares(0.9, 0.5), offered) == [(Family.CREEP, 0.5)]
+
+
+@pytest.mark.parametrize(
+    ("of", "left", "first"),
+    [
+        ([0.52, 0.48], [0.5, 0.9], 1),
+        ([0.52, 0.48], [0.9, 0.5], 0),
+        ([0.56, 0.44], [0.5, 0.9], 0),
+        ([0.3, 0.34, 0.33], [1.0, 2.0, 3.0], 2),
+        ([0.1, 0.5, 0.35], [9.0, 1.0, 5.0], 1),
+        ([], [], None),
+    ],
+)
+def test_of_causes_with_nearly_the_same_share_the_one_that_is_needed_most_is_the_main_one(of, left, first):
+    assert leading(of, left) == first
+
+
+def test_why_the_largest_share_does_not_stand_first_is_told():
+    def worth(without: float) -> dict[str, WorthEntry]:
+        return {"reading.axis": WorthEntry(without=without, with_it=0.19, unit="um", share=0.5)}
+
+    lag, loop = (
+        replace(finding("delay", 0.52), worth=worth(0.589)),
+        replace(finding("hysteresis", 0.48), worth=worth(0.705)),
+    )
+    assert nearly_as_large([lag, loop]) == []
+    (told,) = nearly_as_large([loop, lag])
+    assert "0.705 um is left without it, 0.589 um without the other" in told and "(48 % and 52 %)" in told
+    assert nearly_as_large([]) == []

@@ -30,6 +30,7 @@ from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.evidence.supporting_analyses import run_supporting_analyses
 from ctrlgen.diagnosis.needed_memory import refuse_what_memory_cannot_hold
 from ctrlgen.diagnosis.report.half_a_sample import half_a_sample
+from ctrlgen.diagnosis.report.nearly_as_large import nearly_as_large
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.dead_channels import without_dead_channels
 from ctrlgen.diagnosis.selection.direct_detection import directly_detected_findings
@@ -156,7 +157,7 @@ def _diagnose(
     left, failed = ((), ()) if enough else _empirical_terms(search, shares)
     spikes = find_spikes(search.fitter, search.chosen.fit, known)
     told = (*marking_notes(live.recording, search.fitter.recording), *(s.sentence for s in spikes))
-    told = (*told, *half_a_sample(search.fitter.recording, found))
+    told = (*told, *half_a_sample(search.fitter.recording, found), *nearly_as_large(found))
     told_of_machine = [NOT_OFFERED.format("; ".join(refusals(refused)))] if refused else []
     if brought := [f"{law.kind} ({law.package})" for law in effects if law.package]:
         told_of_machine.append(f"laws of other packages were considered too: {', '.join(brought)}")

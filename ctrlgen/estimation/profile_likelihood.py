@@ -11,12 +11,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import brentq
 
 from ctrlgen.core.units import from_si
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER
+from ctrlgen.estimation.least_squares import LeastSquaresProblem
 from ctrlgen.estimation.robust_covariance import sandwich_over_model, widening
 from ctrlgen.estimation.settings import PROFILE, STATISTICS
+from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 
 BOUNDED, ABOVE, BELOW, FLAT = (
     "bounded",
@@ -126,19 +129,22 @@ class _Side:
         return rise
 
     def _crossing(self, near: tuple[float, float], far: tuple[float, float]) -> float:
-        """The distance at which the root of the rise is 1.96, by secants between `near` and `far` (distance, root), as long
-        as `far` lies well above."""
-        z = STATISTICS.z_95
-        for _ in range(PROFILE.most_secants):
-            distance = float(near[0] + (z - near[1]) / (far[1] - near[1]) * (far[0] - near[0]))
-            if far[1] < PROFILE.overshoot * z or not self.objective.affordable:
-                return distance
-            rise = self._rise(distance, z**2)
-            if rise < z**2:
-                near = distance, np.sqrt(max(rise, 0.0))
-            else:
-                far = distance, np.sqrt(rise)
-        return far[0]
+        """The distance at which the root of the rise is 1.96, between `near` and `far` (distance, root): by the secant of both, or
+        looked for where `far` lies well above."""
+        z, known = STATISTICS.z_95, dict([near, far])
+        if far[1] < PROFILE.overshoot * z or not self.objective.affordable:
+            return float(near[0] + (z - near[1]) / (far[1] - near[1]) * (far[0] - near[0]))
+
+        def above(distance: float) -> float:
+            if distance not in known and self.objective.affordable:
+                known[distance] = np.sqrt(max(self._rise(distance, z**2), 0.0))
+            # what may no longer be evaluated counts as below: an end is not found too near
+            return float(known.get(distance, near[1])) - z
+
+        looked = brentq(
+            above, near[0], far[0], xtol=1e-300, rtol=PROFILE.same_end, maxiter=PROFILE.most_steps, disp=False
+        )
+        return float(looked)
 
 
 class _Objective:
@@ -149,6 +155,8 @@ class _Objective:
         self.values = np.concatenate([fit.theta, *fit.initial_states])
         self.optimum = self.problem.to_scaled(self.values)
         self.low, self.high = self.problem.bounds
+        # by parameter all variables, the others fitted at a value of it
+        self.refitted: dict[int, list[np.ndarray]] = {}
         J = fit.J * self.problem.si_by_scaled(self.values)
         self.H, self.least = J.T @ J, fit.objective
         states = max(len(sd) for sd in self.problem.initial_sd) + fit.J.shape[1]
@@ -163,8 +171,8 @@ class _Objective:
     def rise(self, i: int, value: float, expected: float) -> float:
         """The objective above its optimum with parameter `i` at `value` [SI] and the others fitted again.
 
-        The others follow the quadratic approximation; where the rise exceeds the one `expected`, one Gauss-Newton step is
-        added.
+        The others follow the quadratic approximation; where the rise exceeds the one `expected`, they are fitted, from there or from
+        the nearest value at which they were.
         """
         others = np.arange(len(self.optimum)) != i
         x = self.optimum.copy()
@@ -175,14 +183,39 @@ class _Objective:
         x[others] -= np.linalg.lstsq(self.H[np.ix_(others, others)], shift, rcond=1e-12)[0]
         x[others] = np.clip(x, self.low, self.high)[others]
         rise = self._at(x) - self.least
-        if rise > PROFILE.refit_ratio * expected and self.affordable:
-            r, J = self.problem.evaluate(x)
-            step = np.linalg.lstsq(J[:, others], r, rcond=1e-10)[0]
-            x[others] = np.clip(x[others] - step, self.low[others], self.high[others])
-            rise = min(rise, self._at(x) - self.least)
-        return float(rise)
+        if rise <= PROFILE.refit_ratio * expected or not self.affordable:
+            return float(rise)
+        known = self.refitted.setdefault(i, [self.optimum])
+        beside = np.where(others, min(known, key=lambda near: abs(near[i] - x[i])), x)
+        start = beside if self._at(beside) - self.least < rise else x
+        held = _Held(self.problem, i, x[i])
+        fitted = levenberg_marquardt(held, start, PROFILE.most_refits)
+        known.append(fitted)
+        self.evaluations_left -= held.evaluations
+        return float(min(rise, self._at(fitted) - self.least))
 
     def _at(self, x: np.ndarray) -> float:
         self.evaluations_left -= 1
         r, _ = self.problem.evaluate(x)
         return float(r @ r)
+
+
+class _Held:
+    """A problem with variable `i` held at a value; counts its `evaluations`."""
+
+    def __init__(self, problem: LeastSquaresProblem, i: int, value: float) -> None:
+        self.problem, self.evaluations = problem, 0
+        self.k, self.step_limit, self.normal_matrix = problem.k, problem.step_limit, problem.normal_matrix
+        low, high = (end.copy() for end in problem.bounds)
+        low[i] = high[i] = value
+        self.bounds = low, high
+
+    def residual(self, x: np.ndarray) -> np.ndarray:
+        """That of the problem."""
+        self.evaluations += 1
+        return self.problem.residual(x)
+
+    def evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """That of the problem with its Jacobian."""
+        self.evaluations += 1
+        return self.problem.evaluate(x)

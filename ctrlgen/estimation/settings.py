@@ -319,9 +319,13 @@ class ProfileSettings:
     the interval's end by less than 1 - 1/sqrt(1.4) = 15 %."""
     overshoot: float = 1.5
     """Root of the rise over the 95 % level above which the end of the interval is looked for again."""
-    most_secants: int = 4
+    most_steps: int = 8
     """Times it is looked for again."""
-    cost: float = 2e7
+    same_end: float = 0.05
+    """Relative distance from the optimum by which two ends are the same."""
+    most_refits: int = 6
+    """Steps of the fit of the others at one value."""
+    cost: float = 5e7
     """Samples times states times sensitivities that all profiles of a diagnosis may take. Bounds the time;
     what remains has its interval by curvature."""
     fewest_points: int = 4

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 from pydantic import Field
 
-from ctrlgen.core.units import difference, from_si
+from ctrlgen.core.units import difference, from_si, to_si
 from ctrlgen.diagnosis.selection.attribution import Attribution, ShareEntry
 from ctrlgen.diagnosis.selection.edge_intervals import edge_intervals
 from ctrlgen.diagnosis.selection.finding_region import RegionEntry, region_of
@@ -186,22 +187,22 @@ def held_out_errors(search: SearchResult, known: np.ndarray, refitted: Fit) -> d
 def estimated_values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, Estimate]:
     """Every free parameter of a fit with its 95 % interval, by path, in the unit of its file.
 
-    An interval includes the model-form error of an amplitude's law, and is at least as wide as the parameter's profile
-    likelihood gives.
+    The interval is that of the parameter's profile likelihood where one was evaluated, else that of the curvature. It includes the
+    model-form error of an amplitude's law.
     """
-    estimates, profiled = {}, {p.path: p for p in profiles}
+    estimates, profiled = {}, {p.path: p for p in profiles if p.verified}
     for unknown, value, s in zip(fit.structure.free_parameters, fit.theta, robust_deviations(fit), strict=True):
+        way, form = np.full(2, STATISTICS.z_95 * s), 0.0
+        if unknown.path in profiled:
+            way = np.abs([to_si(end, unknown.unit) - value for end in profiled[unknown.path].ci95])
         cause = fit.structure.cause_of(unknown) if unknown.amplitude else None
         if cause is not None and cause.effect != PARAMETER:
-            s = np.hypot(s, cause.prior.model_form_error * (value - unknown.nominal))
-        ends = (value, max(value - STATISTICS.z_95 * s, unknown.low), min(value + STATISTICS.z_95 * s, unknown.high))
+            form = STATISTICS.z_95 * cause.prior.model_form_error * (value - unknown.nominal)
+        below, above = np.hypot(way, form)
+        ends = (value, max(value - below, unknown.low), min(value + above, unknown.high))
         value, low, high = (float(from_si(v, unknown.unit)) for v in ends)
-        if unknown.path in profiled:
-            below, above = profiled[unknown.path].ci95
-            low, high = min(low, below), max(high, above)
         # units round: a number at its bound is within its interval
-        low, high = min(low, value), max(high, value)
-        estimates[unknown.path] = Estimate(value, (low, high), unknown.unit)
+        estimates[unknown.path] = Estimate(value, (min(low, value), max(high, value)), unknown.unit)
     return estimates
 
 
@@ -213,7 +214,8 @@ def finding_estimates(fitter: Fitter, fit: Fit, profiles: tuple[Profile, ...] = 
 
 
 def findings(search: SearchResult, shares: Attribution, profiles: tuple[Profile, ...] = ()) -> tuple[Finding, ...]:
-    """The causes of the chosen model with intervals, shares and alternatives, that with the largest share first.
+    """The causes of the chosen model with intervals, shares and alternatives, that with the largest share first; of shares that are
+    nearly the same, that without which most is left, the others fitted again.
 
     Causes of one law at one place, such as harmonics, are one finding, with the numbers of the largest first, and its alternatives.
     """
@@ -241,7 +243,27 @@ def findings(search: SearchResult, shares: Attribution, profiles: tuple[Profile,
                 _title(search, cause),
             )
         )
-    return tuple(sorted(rows, key=lambda f: (f.role is not Role.CAUSE, -(f.share.value if f.share else 0.0))))
+    main = _leading(search, rows)
+    return tuple(
+        sorted(rows, key=lambda f: (f.role is not Role.CAUSE, f is not main, -(f.share.value if f.share else 0.0)))
+    )
+
+
+def _leading(search: SearchResult, rows: list[Finding]) -> Finding | None:
+    causes = [(f, f.share.value) for f in rows if f.role is Role.CAUSE and f.share is not None]
+    left = {
+        c: float(np.sum(t.held_out.plain_mean)) for c, t in zip(search.chosen.causes, search.without_cause, strict=True)
+    }
+    first = leading([share for _, share in causes], [left[f.cause] for f, _ in causes])
+    return None if first is None else causes[first][0]
+
+
+def leading(shares: Sequence[float], left: Sequence[float]) -> int | None:
+    """Which of the causes with these `shares` is the main one: of those with nearly the largest that without which most is `left`, the
+    others fitted again. Of two laws that take the same away, such as a loop and a lateness along a sine, the order of the shares is that
+    of the numbers that happened to be fitted, and not of which law is needed. None of no causes."""
+    near = [k for k, share in enumerate(shares) if share > max(shares) - ATTRIBUTION.as_large]
+    return max(near, key=lambda k: left[k], default=None)
 
 
 def _alternatives(search: SearchResult, k: int) -> tuple[Hypothesis, ...]:

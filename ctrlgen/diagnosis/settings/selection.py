@@ -314,6 +314,8 @@ class AttributionSettings:
     """Share of the mismatch below which nothing is called a cause: a tenth of the error. Judgement."""
     vague_share: float = 0.1
     """The same of a cause whose amplitude may be zero. Judgement."""
+    as_large: float = 0.1
+    """Difference of two shares below which they do not say which cause is the main one. Judgement."""
 
 
 @dataclass(frozen=True)
