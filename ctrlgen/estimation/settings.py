@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ctrlgen.estimation.settings_of_parts import LeadingPartSettings
+from ctrlgen.estimation.settings_of_parts import LeadingPartSettings, ProfileSettings
 
 
 @dataclass(frozen=True)
@@ -304,34 +304,6 @@ class ResidualTestsSettings:
     size_p: float = 1e-3
     """p of so large a residual by chance, below which an error ratio above the limit counts: a short record exceeds the
     ratio by chance."""
-
-
-@dataclass(frozen=True)
-class ProfileSettings:
-    """Settings of the profile likelihood."""
-
-    first_distance: float = 2.0
-    """Distance from the optimum of the first point [standard deviations by curvature]: just outside of 95 %."""
-    doublings: int = 3
-    """Times the distance is doubled while the profile stays below the 95 % level: up to 16 standard deviations."""
-    refit_ratio: float = 1.4
-    """Rise over the quadratic one above which the other parameters are refitted. Below, their linear prediction shifts
-    the interval's end by less than 1 - 1/sqrt(1.4) = 15 %."""
-    overshoot: float = 1.5
-    """Root of the rise over the 95 % level above which the end of the interval is looked for again."""
-    most_steps: int = 8
-    """Times it is looked for again."""
-    same_end: float = 0.05
-    """Relative distance from the optimum by which two ends are the same."""
-    most_refits: int = 6
-    """Steps of the fit of the others at one value."""
-    cost: float = 5e7
-    """Samples times states times sensitivities that all profiles of a diagnosis may take. Bounds the time;
-    what remains has its interval by curvature."""
-    fewest_points: int = 4
-    """Points that are evaluated whatever they cost."""
-    largest_ratio: float = 2.0
-    """Squared residual over the noise's above which the objective is no likelihood, and no profile is evaluated."""
 
 
 @dataclass(frozen=True)
