@@ -310,7 +310,8 @@ def whole_folder(out: Path) -> Iterator[Path]:
 
 def _make_draft(draft: Path, out: Path) -> None:
     try:
-        draft.mkdir(mode=0o700, parents=True)
+        out.parent.mkdir(parents=True, exist_ok=True)
+        draft.mkdir(mode=0o700)
     except OSError as error:
         raise unwritable(out, error, "--out") from None
 
