@@ -128,8 +128,13 @@ def _verdict(d: dict[str, Any]) -> Iterator[str]:
     moved = "with them moved within it" in d["sentence"] and all(
         e["rms_refitted"] is not None and e["rms_refitted"] <= NOISE * e["noise_floor"] for e in errors
     )
+    # size and memory do not tell there
+    untold = (
+        "nothing of which is seen to go with the drive" in d["sentence"]
+        or "cannot tell whether it goes" in d["sentence"]
+    )
     little = "too little to name" in d["sentence"] and known and all(map(_little, errors))
-    if verdict == "explained" and not (quiet or tolerated or chance or little):
+    if verdict == "explained" and not (quiet or tolerated or chance or little or untold):
         yield "explained, and more than noise is left"
     if verdict == "explained" and any(f["role"] == "unseen" for f in d["findings"]):
         yield "explained by what no held-out record shows"
@@ -137,7 +142,7 @@ def _verdict(d: dict[str, Any]) -> Iterator[str]:
         yield f"{verdict} by nothing"
     if verdict == "consistent" and d["findings"]:
         yield "consistent, with findings"
-    if verdict == "consistent" and known and not (quiet or tolerated or moved):
+    if verdict == "consistent" and known and not (quiet or tolerated or moved or untold):
         yield "consistent, and more than noise is left"
     if verdict == "partly" and not quiet and known and d["attribution"]["explained"] < MOST and not tolerated:
         yield f"partly explained, and {d['attribution']['explained']} of the mismatch is taken away"

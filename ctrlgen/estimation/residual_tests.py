@@ -4,21 +4,25 @@ Three residuals are tested. That of the held-out records, with the parameters re
 that it holds noise alone, also where the device drifts or saturates and a small parameter error grows. That of the records
 to fit, by its size. That at rest, where the noise was estimated: its size tells nothing, but stationary noise has neither
 memory nor heavy tails after whitening, and a stage that moves by itself has, whatever its parameters within their posterior.
+
+Where nothing but the readings tells the noise of a channel, neither its size nor its memory speaks against a structure: both are those of
+the noise as well. There only what goes with the motion is no noise (`goes_with_motion`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import stats
 from scipy.ndimage import median_filter
 
 from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.goes_with_motion import goes_with_motion
 from ctrlgen.estimation.held_out import HeldOutRefit, refit_to_held_out
-from ctrlgen.estimation.misfit import misfit
+from ctrlgen.estimation.misfit import Misfit, misfit
 from ctrlgen.estimation.noise import cross_correlation, ljung_box, without_lines
-from ctrlgen.estimation.settings import DISCREPANCY, HELD_OUT_REFIT, OUTLIERS, RESIDUAL_TESTS, STATISTICS
+from ctrlgen.estimation.settings import DISCREPANCY, HELD_OUT_REFIT, MOTION, OUTLIERS, RESIDUAL_TESTS, STATISTICS
 from ctrlgen.numerics.quantisation_step import quantisation_step
 from ctrlgen.recordings.recording import Record
 
@@ -31,8 +35,10 @@ class ResidualTests:
     """`ratio` of the held-out residual to the noise, root mean square, by channel; the smallest p of each test.
 
     `p_values`: "memory" (Ljung-Box), "variance" (McLeod-Li), "drive" (cross-correlation), "size" of the held-out residual,
-    "fitted" size of that of the records to fit. `restless`: channels that do at rest what no stationary noise does. `passed`:
-    whether the structure is valid by all of them. `refitted`: the fit with its numbers moved to the held-out records under their posterior.
+    "fitted" size of that of the records to fit, of the channels whose noise is told; "motion": that what is left goes with the motion,
+    of the others. `restless`: channels that do at rest what no
+    stationary noise does. `passed`: whether the structure is valid by all of them. `refitted`: the fit with its numbers moved to the
+    held-out records under their posterior. `by_motion`: p of "motion" of each channel whose noise is not told.
     """
 
     ratio: tuple[float, ...]
@@ -40,6 +46,7 @@ class ResidualTests:
     passed: bool
     refitted: Fit
     restless: tuple[str, ...] = ()
+    by_motion: dict[str, float] = field(default_factory=dict)
 
     @property
     def worst(self) -> float:
@@ -54,32 +61,60 @@ def run_residual_tests(fitter: Fitter, fit: Fit) -> ResidualTests:
     of the noise itself. A test of whiteness counts where its p, after Bonferroni's correction, is below `whiteness_p` and the
     ratio is noticed at all.
     """
-    n_y = len(fitter.recording.channels)
+    told = ~fitter.noise.guessed
     refit = refit_to_held_out(fitter, fit, HELD_OUT_REFIT.max_steps_tests)
-    squares, count, p = _held_out_residual(fitter, refit)
+    squares, count, p = _held_out_residual(fitter, refit, told)
     fitted = misfit(fitter.noise, fitter.fit_records, [r.observed - fitter.predict(fit, r) for r in fitter.fit_records])
     ratio = tuple(np.sqrt(squares / np.maximum(count, 1.0)))
     smallest = {name: min(1.0, min(values) * len(values)) for name, values in p.items() if values}
-    noticed = max(ratio, default=0.0) > RESIDUAL_TESTS.noticed_ratio
+    noticed = max(np.array(ratio)[told], default=0.0) > RESIDUAL_TESTS.noticed_ratio
     rejected = noticed and any(value < RESIDUAL_TESTS.whiteness_p for value in smallest.values())
-    # the noise itself is known no better
-    margin = 1 + STATISTICS.noise_size_margin / np.sqrt(2 * np.maximum(fitter.noise.count, 1.0))
-    by_channel = stats.chi2.sf(squares / margin**2, np.maximum(count, 1.0))
-    smallest["size"] = min(1.0, n_y * min(map(float, by_channel)))
-    large = any(r > RESIDUAL_TESTS.error_ratio * m for r, m in zip(ratio, margin, strict=True))
-    too_large = large and smallest["size"] < RESIDUAL_TESTS.size_p
-    free, left = max(float(fitted.n_white.sum()) - len(fit.theta), 1.0), float(fitted.white.sum())
-    smallest["fitted"] = float(stats.chi2.sf(left / max(margin) ** 2, free))
-    large = np.sqrt(left / free) > RESIDUAL_TESTS.error_ratio * max(margin)
-    too_large |= large and smallest["fitted"] < RESIDUAL_TESTS.size_p
+    by_motion = _by_motion(fitter, fit, refit.fit, np.flatnonzero(~told).tolist())
+    if by_motion:
+        smallest["motion"] = min(1.0, min(by_motion.values()) * len(by_motion))
+        rejected |= smallest["motion"] < MOTION.p
+    too_large = bool(told.any()) and _too_large(fitter, fit, told, (squares, count), fitted, smallest)
     restless = _restless(fitter, fit)
     passed = bool(np.isfinite(ratio).all()) and not (too_large or rejected or restless)
-    return ResidualTests(ratio, smallest, passed, refit.fit, restless)
+    return ResidualTests(ratio, smallest, passed, refit.fit, restless, by_motion)
 
 
-def _held_out_residual(fitter: Fitter, refit: HeldOutRefit) -> tuple[np.ndarray, np.ndarray, dict[str, list[float]]]:
+def _too_large(
+    fitter: Fitter,
+    fit: Fit,
+    told: np.ndarray,
+    held_out: tuple[np.ndarray, np.ndarray],
+    fitted: Misfit,
+    p_values: dict[str, float],
+) -> bool:
+    """Whether the residual of the channels whose noise is `told` (n_y,) is larger than their noise: that of the `held_out` records by
+    squares and counts, or that of those `fitted`. Writes both p into the `p_values`."""
+    squares, count = (values[told] for values in held_out)
+    # the noise itself is known no better
+    margin = 1 + STATISTICS.noise_size_margin / np.sqrt(2 * np.maximum(fitter.noise.count[told], 1.0))
+    by_channel = stats.chi2.sf(squares / margin**2, np.maximum(count, 1.0))
+    p_values["size"] = min(1.0, len(margin) * min(map(float, by_channel)))
+    ratio = np.sqrt(squares / np.maximum(count, 1.0))
+    large = bool(np.any(ratio > RESIDUAL_TESTS.error_ratio * margin))
+    too_large = large and p_values["size"] < RESIDUAL_TESTS.size_p
+    free = max(float(fitted.n_white[:, told].sum()) - len(fit.theta), 1.0)
+    left = float(fitted.white[:, told].sum())
+    p_values["fitted"] = float(stats.chi2.sf(left / max(margin) ** 2, free))
+    large = np.sqrt(left / free) > RESIDUAL_TESTS.error_ratio * max(margin)
+    return too_large or bool(large and p_values["fitted"] < RESIDUAL_TESTS.size_p)
+
+
+def _by_motion(fitter: Fitter, fit: Fit, refitted: Fit, channels: list[int]) -> dict[str, float]:
+    """p of what is left of some `channels` to go with the motion by chance, over all records that move."""
+    left = [*((fit, r) for r in fitter.fit_records), *((refitted, r) for r in fitter.held_out_records)]
+    return {fitter.recording.channels[i]: goes_with_motion(fitter, left, i) for i in channels}
+
+
+def _held_out_residual(
+    fitter: Fitter, refit: HeldOutRefit, told: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, dict[str, list[float]]]:
     """Huber's loss of the whitened residual (n_y,) with the refit's penalty, usable samples (n_y,), and the p of each test of
-    whiteness, for which rare spikes are cut."""
+    whiteness of the channels whose noise is `told` (n_y,), for which rare spikes are cut."""
     n_y, corner = len(fitter.recording.channels), DISCREPANCY.huber_corner
     unseen = fitter.held_out_records
     left = misfit(fitter.noise, unseen, [r.observed - fitter.predict(refit.fit, r) for r in unseen])
@@ -89,7 +124,7 @@ def _held_out_residual(fitter: Fitter, refit: HeldOutRefit) -> tuple[np.ndarray,
         white = np.clip(fitter.whitened_residual(refit.fit, record), -corner, corner)
         usable = fitter.noise.usable(record.valid)
         if fitter.recording.kind == "series":
-            for i in range(n_y):
+            for i in np.flatnonzero(told).tolist():
                 e = white[usable[:, i], i]
                 if len(e) > SHORTEST:
                     p["memory"].append(ljung_box(e))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ctrlgen.estimation.settings_of_parts import LeadingPartSettings, ProfileSettings
+from ctrlgen.estimation.settings_of_parts import LeadingPartSettings, MotionSettings, ProfileSettings
 
 
 @dataclass(frozen=True)
@@ -368,6 +368,7 @@ INITIAL_MEMORY = InitialMemorySettings()
 SIMULATION = SimulationSettings()
 FIT = FitSettings()
 LEADING_PART = LeadingPartSettings()
+MOTION = MotionSettings()
 HELD_OUT_REFIT = HeldOutRefitSettings()
 RESIDUAL_TESTS = ResidualTestsSettings()
 PROFILE = ProfileSettings()

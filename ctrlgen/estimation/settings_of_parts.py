@@ -1,4 +1,4 @@
-"""Settings of where fits begin and of profiles, for `ctrlgen.estimation.settings`."""
+"""Settings of where fits begin, of profiles, and of what goes with the motion, for `ctrlgen.estimation.settings`."""
 
 from __future__ import annotations
 
@@ -25,6 +25,27 @@ class LeadingPartSettings:
     by that much in its own objective."""
     kept: int = 4
     """Recordings whose part is kept at a time: a search marks its samples again a few times."""
+
+
+@dataclass(frozen=True)
+class MotionSettings:
+    """Whether a residual goes with the motion."""
+
+    degree: int = 5
+    """Degree of the polynomials of place and drive: bends as short as a fifth of the range are followed. Judgement."""
+    standing: float = 0.02
+    """Rate over the largest one at which the sign of the rate is half there: below, noise of a differentiated drive turns it. Judgement."""
+    plays: tuple[float, ...] = (0.02, 0.1, 0.3)
+    """Half widths of plays over half the range: what a hysteresis near and far from its reversals remembers."""
+    lags: tuple[float, ...] = (4.0, 16.0, 64.0)
+    """Time constants [samples] of the low-passes: creep and lags. Judgement."""
+    samples_per_function: int = 5
+    """Samples for each function that a test needs, as of a test of whiteness."""
+    alike: float = 1e-3
+    """Singular value over the largest one below which a direction of the functions is one of the others."""
+    p: float = 1e-4
+    """p of going so well with the motion by chance, below which a residual does: the chance of a false alarm for each diagnosis of noise
+    that nothing else tells."""
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,7 @@ from ctrlgen.diagnosis.selection.verdict import (
 )
 from ctrlgen.diagnosis.settings import VERDICT
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.estimation.settings import RESIDUAL_TESTS
 from ctrlgen.estimation.size_odds import size_of
 from ctrlgen.reporting.numbers import number
 
@@ -84,7 +85,7 @@ def _cause(diagnosis: Diagnosis) -> str:
     far = contradicts_datasheet(diagnosis.search.chosen.fit)
     if verdict == Verdict.CONSISTENT:
         lacks = f"{head}: the device file ({title}) lacks nothing that this recording can show"
-        return f"{lacks}{_blind(diagnosis) or _within(diagnosis)}."
+        return f"{lacks}{_blind(diagnosis) or _within(diagnosis) or untold(diagnosis)}."
     if far and (diagnosis.residual_tests.passed or not findings):
         also = f"; the model also needs {_main(findings)}" if findings else ""
         return f"{head}: {_beyond(diagnosis, far)}{also}."
@@ -223,6 +224,8 @@ def _rest(diagnosis: Diagnosis) -> str:
         return f"No held-out record shows {' or '.join(map(cause_name, diagnosis.unconfirmed))}."
     if diagnosis.verdict == Verdict.PARTLY and poorly_determined(diagnosis.search):
         return "The numbers are too uncertain to predict the held-out records better."
+    if channel in untold_noise(diagnosis):
+        return f"Left: {number(e.rms_after, 3)} {e.unit} in {short(channel)}{untold(diagnosis)}."
     return f"Left: {size}, which chance allows so few samples." if ratio > CHANCE else ""
 
 
@@ -261,6 +264,30 @@ def _blind(diagnosis: Diagnosis) -> str:
     """'; errors below 3.6 um cannot be judged', for the channels whose noise is not known."""
     sizes = [f"{number(e.rms_after, 3)} {e.unit}" for e in diagnosis.held_out.values() if e.noise_floor is None]
     return f"; the noise is not known, so errors below {', '.join(sizes)} cannot be judged" if sizes else ""
+
+
+def untold_noise(diagnosis: Diagnosis) -> dict[str, float]:
+    """Of channels that leave more than the guess of their noise: p that it goes so well with the motion by chance."""
+    left = diagnosis.held_out
+    return {
+        channel: p
+        for channel, p in diagnosis.residual_tests.by_motion.items()
+        if left[channel].rms_after > RESIDUAL_TESTS.error_ratio * (left[channel].noise_floor or math.inf)
+    }
+
+
+def untold(diagnosis: Diagnosis) -> str:
+    """'; the noise was neither stated nor recorded at rest and would be 0.0652 um in axis, nothing of which is seen to go with the drive or
+    the motion (p = 0.35)', where size and memory of what is left could not decide. Nothing where something of it does."""
+    unsure = untold_noise(diagnosis)
+    if not unsure or not diagnosis.residual_tests.passed:
+        return ""
+    of = {c: diagnosis.held_out[c] for c in unsure}
+    sizes = ", ".join(f"{number(e.rms_after, 3)} {e.unit} in {short(c)}" for c, e in of.items())
+    p, seen = min(unsure.values()), "so few samples cannot tell whether it goes with the drive or the motion"
+    if p < 1:
+        seen = f"nothing of which is seen to go with the drive or the motion (p = {number(p, 2)})"
+    return f"; the noise was neither stated nor recorded at rest and would be {sizes}, {seen}"
 
 
 def _beyond(diagnosis: Diagnosis, far: dict[str, float]) -> str:

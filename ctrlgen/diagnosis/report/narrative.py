@@ -149,7 +149,8 @@ def _steps(diagnosis: Diagnosis) -> list[str]:
     verdict = diagnosis.verdict
     use = "Use device.next.toml in place of the device file: solve and generate the C with it, then record again to confirm."
     known = all(e.noise_floor is not None for e in diagnosis.held_out.values())
-    rest = "" if known else " Record a period at rest (drive off), or repeat poses, so that the noise can be estimated."
+    told = known and not diagnosis.residual_tests.by_motion
+    rest = "" if told else " Record a period at rest (drive off), or repeat poses, so that the noise can be estimated."
     if verdict == Verdict.CONSISTENT:
         return [
             f"Nothing to correct. Effects smaller than those listed in the report would not have been detected.{rest}"
