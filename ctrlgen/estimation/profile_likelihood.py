@@ -95,7 +95,8 @@ class _Side:
     """One side of a profile, towards a bound of the parameter.
 
     `points`: (value [SI], rise); `end` [SI] of the 95 % interval; `bounded`: whether the objective rises enough before the
-    parameter's bound; `verified`: whether it was evaluated. Points are taken at doubling distances until the rise is enough.
+    parameter's bound; `verified`: whether it was evaluated as far as its end. Points are taken at doubling distances until the
+    rise is enough.
     """
 
     def __init__(self, objective: _Objective, i: int, value: float, sd: float, bound: float) -> None:
@@ -114,7 +115,10 @@ class _Side:
             self.verified, root = True, np.sqrt(max(rise, 0.0))
             self.bounded = root >= STATISTICS.z_95
             if self.bounded:
-                self.end = value + self.sign * self._crossing(before, (distance, root))
+                # with nothing left to fit the others the rise may be far too large, and the secant far too near
+                self.verified = objective.affordable
+                if self.verified:
+                    self.end = value + self.sign * self._crossing(before, (distance, root))
                 return
             self.end, before = float(value + self.sign * distance), (distance, root)
             if distance == room:
@@ -132,7 +136,7 @@ class _Side:
         """The distance at which the root of the rise is 1.96, between `near` and `far` (distance, root): by the secant of both, or
         looked for where `far` lies well above."""
         z, known = STATISTICS.z_95, dict([near, far])
-        if far[1] < PROFILE.overshoot * z or not self.objective.affordable:
+        if far[1] < PROFILE.overshoot * z:
             return float(near[0] + (z - near[1]) / (far[1] - near[1]) * (far[0] - near[0]))
 
         def above(distance: float) -> float:

@@ -35,10 +35,10 @@ class ResidualTests:
     """`ratio` of the held-out residual to the noise, root mean square, by channel; the smallest p of each test.
 
     `p_values`: "memory" (Ljung-Box), "variance" (McLeod-Li), "drive" (cross-correlation), "size" of the held-out residual,
-    "fitted" size of that of the records to fit, of the channels whose noise is told; "motion": that what is left goes with the motion,
-    of the others. `restless`: channels that do at rest what no
-    stationary noise does. `passed`: whether the structure is valid by all of them. `refitted`: the fit with its numbers moved to the
-    held-out records under their posterior. `by_motion`: p of "motion" of each channel whose noise is not told.
+    "fitted" size of that of the records to fit, of the channels whose noise is told; "motion": that what is left goes with the
+    motion, of the others. `restless`: channels that do at rest what no stationary noise does. `passed`: whether the structure is
+    valid by all of them. `refitted`: the fit with its numbers moved to the held-out records under their posterior. `by_motion`: p
+    of "motion" of each channel whose noise is not told.
     """
 
     ratio: tuple[float, ...]

@@ -187,14 +187,15 @@ def held_out_errors(search: SearchResult, known: np.ndarray, refitted: Fit) -> d
 def estimated_values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, Estimate]:
     """Every free parameter of a fit with its 95 % interval, by path, in the unit of its file.
 
-    The interval is that of the parameter's profile likelihood where one was evaluated, else that of the curvature. It includes the
-    model-form error of an amplitude's law.
+    The interval is that of the parameter's profile likelihood where one was evaluated to its ends, else the wider of that and the
+    curvature's. It includes the model-form error of an amplitude's law.
     """
-    estimates, profiled = {}, {p.path: p for p in profiles if p.verified}
+    estimates, profiled = {}, {p.path: p for p in profiles}
     for unknown, value, s in zip(fit.structure.free_parameters, fit.theta, robust_deviations(fit), strict=True):
         way, form = np.full(2, STATISTICS.z_95 * s), 0.0
-        if unknown.path in profiled:
-            way = np.abs([to_si(end, unknown.unit) - value for end in profiled[unknown.path].ci95])
+        if profile := profiled.get(unknown.path):
+            seen = np.abs([to_si(end, unknown.unit) - value for end in profile.ci95])
+            way = seen if profile.verified else np.maximum(way, seen)
         cause = fit.structure.cause_of(unknown) if unknown.amplitude else None
         if cause is not None and cause.effect != PARAMETER:
             form = STATISTICS.z_95 * cause.prior.model_form_error * (value - unknown.nominal)
