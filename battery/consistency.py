@@ -19,6 +19,7 @@ LEAST = 0.01  # of the mismatch: below, nothing is a cause
 MOST = 0.75  # of the mismatch, which a partial answer takes away
 LUCK = 0.05  # chance up to which a cause is told without a word of doubt
 NOISE = 1.5  # times the noise: more is not explained
+BY_MOTION = 1e-4  # chance of going so well with the motion: less is no noise
 HELD_OUT = re.compile(r"Held-out error of (\S+): (\S+) (\S+?)(?: -> (\S+) \S+?)?, noise (?:not known|(\S+) \S+?)[.;]")
 TAKES = re.compile(r"it takes away ((?:[<>] )?[\d.]+ %)")
 LEFT = re.compile(r"Left: (\S+) (\S+) in (\S+), (\S+) times the noise")
@@ -99,6 +100,8 @@ def _channels(d: dict[str, Any]) -> Iterator[str]:
         for channel, worth in f["worth"].items():
             if worth["unit"] != d["held_out"][channel]["unit"]:
                 yield f"{_name(f)}: {channel} in {worth['unit']} here and {d['held_out'][channel]['unit']} there"
+            elif not _same(worth["with_it"], d["held_out"][channel]["rms_after"]):
+                yield f"{_name(f)}: with it {worth['with_it']} are left in {channel}, not {d['held_out'][channel]['rms_after']}"
 
 
 def _causes(d: dict[str, Any]) -> Iterator[str]:
@@ -122,17 +125,17 @@ def _verdict(d: dict[str, Any]) -> Iterator[str]:
     verdict, errors = d["verdict"], d["held_out"].values()
     tolerated = "within the stated tolerance" in d["sentence"]
     known = all(e["noise_floor"] for e in errors)
-    quiet = known and all(e["rms_after"] is not None and e["rms_after"] <= NOISE * e["noise_floor"] for e in errors)
+    quiet = known and not any(map(_loud, errors))
     chance = "which chance allows so few samples" in d["sentence"]
     # told of the worst channel
     moved = "with them moved within it" in d["sentence"] and all(
         e["rms_refitted"] is not None and e["rms_refitted"] <= NOISE * e["noise_floor"] for e in errors
     )
-    # size and memory do not tell there
-    untold = (
-        "nothing of which is seen to go with the drive" in d["sentence"]
-        or "cannot tell whether it goes" in d["sentence"]
-    )
+    # size does not tell there, and the sentence says so
+    judged = [e["goes_with_motion"] for e in errors if e["goes_with_motion"] is not None]
+    untold = all(e["goes_with_motion"] is not None for e in errors if _loud(e))
+    untold &= not judged or min(judged) * len(judged) >= BY_MOTION
+    untold &= "the noise was neither stated nor recorded at rest" in d["sentence"]
     little = "too little to name" in d["sentence"] and known and all(map(_little, errors))
     if verdict == "explained" and not (quiet or tolerated or chance or little or untold):
         yield "explained, and more than noise is left"
@@ -254,6 +257,11 @@ def _luck(d: dict[str, Any]) -> Iterator[str]:
 def _doubted(finding: dict[str, Any]) -> bool:
     c = finding["chance"]
     return c is not None and (c["by_luck"] is None or c["by_luck"] > LUCK)
+
+
+def _loud(e: dict[str, Any]) -> bool:
+    """Whether an error is more than its noise."""
+    return e["rms_after"] is None or not e["noise_floor"] or e["rms_after"] > NOISE * e["noise_floor"]
 
 
 def _little(e: dict[str, Any]) -> bool:

@@ -21,7 +21,13 @@ def finding(cause, share: float | None, *alternatives, chance: ChanceEntry | Non
 
 def told(verdict: Verdict, *findings: Finding, passed=False, after=2.0, untried=()) -> list[str]:
     errors = ChannelErrorEntry(
-        rms_before=50.0, rms_after=after, noise_floor=1.0, unit="um", uncertainty=None, rms_refitted=after
+        rms_before=50.0,
+        rms_after=after,
+        noise_floor=1.0,
+        unit="um",
+        uncertainty=None,
+        rms_refitted=after,
+        goes_with_motion=None,
     )
     noise = SimpleNamespace(known=np.ones(1, bool))
     fitter = SimpleNamespace(recording=SimpleNamespace(tolerance=(None,)), noise=noise)

@@ -49,7 +49,7 @@ def shared(
 
     def trial(leaves):
         fit = SimpleNamespace(structure=structure, leaves=leaves)
-        return SimpleNamespace(fit=fit, fitted=leaves(1.0), held_out=leaves(held))
+        return SimpleNamespace(fit=fit, fitted=leaves(1.0), predicted=leaves(held))
 
     nominal = trial(lambda times: misfit_of((), times) if described is None else left(described))
     return attribute(fitter, nominal, trial(lambda times: misfit_of(range(causes), times)))

@@ -59,6 +59,7 @@ WRONG = {
     "shares that are not one": ("attribution.explained", 0.5),
     "a rest that is not that of the squares": ("held_out.reading.axis.rms_after", 60.0),
     "a channel's share that is not one with its rest": ("findings.0.worth.reading.axis.share", 0.5),
+    "an error with a cause that is not that after": ("findings.0.worth.reading.axis.with_it", 60.0),
     "another unit": ("findings.0.worth.reading.axis.unit", "um"),
     "an alternative that is the cause itself": (
         "findings.0.alternatives",
@@ -98,6 +99,7 @@ def test_consistent_beyond_the_noise_needs_numbers_that_may_move_so_far_and_says
         "unit": "nm",
         "uncertainty": 2.0,
         "rms_refitted": 1.1,
+        "goes_with_motion": None,
     }
     said, moved = (
         channel_sentence("reading.axis", ChannelErrorEntry(**error)),
@@ -115,6 +117,16 @@ def test_consistent_beyond_the_noise_needs_numbers_that_may_move_so_far_and_says
     assert told in contradictions(record | {"sentence": record["sentence"].replace(moved, "")})
     error["rms_refitted"] = 1.6
     assert told in contradictions(record)
+
+
+@pytest.mark.parametrize("p, excused", [(0.2, True), (2e-5, False), (None, False)])
+def test_more_than_the_guess_of_the_noise_may_be_left_where_nothing_of_it_goes_with_the_motion(sound, p, excused):
+    error = sound["held_out"]["reading.axis"] | {"rms_before": 50.0, "rms_after": 50.0, "goes_with_motion": p}
+    said = "Held-out error of axis: 50 nm, noise 1 nm; the noise was neither stated nor recorded at rest and would be 50 nm in axis."
+    record = sound | {"verdict": "consistent", "findings": [], "held_out": {"reading.axis": error}, "sentence": said}
+    told = "consistent, and more than noise is left"
+    assert (told in contradictions(record)) != excused
+    assert told in contradictions(record | {"sentence": said.partition(";")[0]})
 
 
 def test_a_number_of_a_sensor_is_told_in_the_unit_of_its_reading(sound):

@@ -108,8 +108,12 @@ def test_the_json_is_the_contract(found):
     low, high = finding["parameters"]["gain"]["ci95"]
     assert low < finding["parameters"]["gain"]["value"] < high and low < 0.03 < high
     error = result["held_out"]["reading.axis"]
-    assert error["unit"] == "nm" and error["rms_refitted"] == pytest.approx(error["noise_floor"], rel=0.1)
-    assert len(error) == 6
+    assert (
+        error["unit"] == "nm"
+        and error["goes_with_motion"] is None
+        and error["rms_refitted"] == pytest.approx(error["noise_floor"], rel=0.1)
+    )
+    assert len(error) == 7
     assert error["rms_before"] > 10 * error["rms_after"] and error["noise_floor"] == pytest.approx(5, rel=0.05)
     assert 0 < error["uncertainty"] < error["noise_floor"]
 
@@ -314,7 +318,7 @@ def test_the_page_shows_whatever_evidence_there_is(found):
 
 def errors(before: float, after: float, noise: float | None) -> ChannelErrorEntry:
     rms = {"rms_before": before, "rms_after": after, "rms_refitted": after}
-    return ChannelErrorEntry(**rms, noise_floor=noise, unit="um", uncertainty=None)
+    return ChannelErrorEntry(**rms, noise_floor=noise, unit="um", uncertainty=None, goes_with_motion=None)
 
 
 def test_the_answer_tells_what_is_left_where_most_is_left(found):

@@ -22,8 +22,9 @@ from ctrlgen.diagnosis.report.html_report import page
 from ctrlgen.diagnosis.report.narrative import EMPIRICAL_ALONE, NOTHING_FOUND, next_steps, refusals
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection, Shortfall
-from ctrlgen.diagnosis.selection.not_taken import not_taken, that_matter
+from ctrlgen.diagnosis.selection.not_taken import held_out_rms, not_taken, that_matter
 from ctrlgen.diagnosis.selection.screen import Screen
+from ctrlgen.diagnosis.selection.search_history import held_out_error
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.structure import Structure
@@ -167,13 +168,23 @@ def test_a_refusal_that_the_answer_has_does_not_matter_any_more(turned):
     assert not [r for r in that_matter(with_it) if r[1].causes == row[1].causes]
 
 
+def test_an_error_that_is_told_is_that_of_the_numbers_as_fitted(creeping):
+    """Where a model leaves the noise, models are compared with their numbers moved to the held-out records: that is no prediction."""
+    fitter, chosen = creeping.search.fitter, creeping.search.chosen
+    left = np.concatenate([(r.observed - fitter.predict(chosen.fit, r))[r.valid] for r in fitter.held_out_records])
+    assert held_out_rms(chosen) == pytest.approx(np.sqrt(np.mean(left**2)), rel=1e-9)
+    told = creeping.held_out["reading.axis"]
+    assert held_out_error(creeping.search, chosen)["reading.axis"].value == pytest.approx(told.rms_after, rel=1e-9)
+    assert told.rms_refitted < 0.999 * told.rms_after
+
+
 def test_a_refusal_is_told_in_a_channel_in_which_it_would_be_better_or_in_none(turned):
     """What scores better by the records to fit may predict the held-out ones no better."""
     ((gain, refusal), *_) = that_matter(turned.search)
     channel, would, now = most_gained(turned.search, refusal.candidate)
     assert channel == "reading.axis" and would.value < now.value and gain > 0
     answer = turned.search.chosen
-    no_better = replace(refusal.candidate, held_out=answer.held_out)
+    no_better = replace(refusal.candidate, held_out=answer.held_out, unmoved=answer.unmoved)
     assert most_gained(turned.search, no_better) is None
     rounds = [replace(r, refused=(replace(refusal, candidate=no_better),)) for r in turned.search.rounds[:1]]
     told = replace(turned, search=replace(turned.search, rounds=tuple(rounds)))

@@ -61,6 +61,10 @@ def shares_of(*values: float | None, rest: float | None = 0.0) -> Attribution:
     return Attribution(said, None if rest is None else ShareEntry(value=rest, ci95=(rest, rest)), True)
 
 
+def outcome(refitted, **by_motion: float) -> ResidualTests:
+    return ResidualTests((1.0,), {}, True, refitted, by_motion={f"reading.{c}": p for c, p in by_motion.items()})
+
+
 CHANCE = 4 * np.sqrt(2 * N)  # squares by which N of them differ by chance
 
 
@@ -284,7 +288,7 @@ def test_errors_are_root_mean_squares_of_valid_readings_in_the_readers_unit(monk
     f.held_out_records = [SimpleNamespace(valid=valid, observed=np.array([[4e-6], [5e-6], [6e-6], [9.0]]))]
     f.recording = SimpleNamespace(channels=("reading.axis",), units=("um",))
     found, unknown = (
-        held_out_errors(search(nominal, chosen, of=f), np.array([known]), moved)["reading.axis"]
+        held_out_errors(search(nominal, chosen, of=f), np.array([known]), outcome(moved, axis=0.2))["reading.axis"]
         for known in (True, False)
     )
     wanted = (np.sqrt((9 + 16 + 25) / 3), np.sqrt((1 + 4 + 9) / 3), np.sqrt((0 + 1 + 4) / 3), 2e-3, 5e-3)
@@ -295,7 +299,7 @@ def test_errors_are_root_mean_squares_of_valid_readings_in_the_readers_unit(monk
         found.noise_floor,
         found.uncertainty,
     ) == pytest.approx(wanted)
-    assert unknown.noise_floor is None
+    assert unknown.noise_floor is None and found.goes_with_motion == 0.2
     f.held_out_records = []
-    (none,) = held_out_errors(search(nominal, chosen, of=f), np.array([True]), moved).values()
-    assert np.isnan(none.rms_after)
+    (none,) = held_out_errors(search(nominal, chosen, of=f), np.array([True]), outcome(moved)).values()
+    assert np.isnan(none.rms_after) and none.goes_with_motion is None

@@ -173,7 +173,7 @@ def _diagnose(
         attribution=attribution,
         shares=shares,
         empirical_terms=left,
-        held_out=held_out_errors(search, known, tests.refitted),
+        held_out=held_out_errors(search, known, tests),
         residual_tests=tests,
         spikes=spikes,
         notes=notes,

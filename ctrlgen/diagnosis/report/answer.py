@@ -268,11 +268,10 @@ def _blind(diagnosis: Diagnosis) -> str:
 
 def untold_noise(diagnosis: Diagnosis) -> dict[str, float]:
     """Of channels that leave more than the guess of their noise: p that it goes so well with the motion by chance."""
-    left = diagnosis.held_out
     return {
-        channel: p
-        for channel, p in diagnosis.residual_tests.by_motion.items()
-        if left[channel].rms_after > RESIDUAL_TESTS.error_ratio * (left[channel].noise_floor or math.inf)
+        channel: e.goes_with_motion
+        for channel, e in diagnosis.held_out.items()
+        if e.goes_with_motion is not None and e.rms_after > RESIDUAL_TESTS.error_ratio * (e.noise_floor or math.inf)
     }
 
 

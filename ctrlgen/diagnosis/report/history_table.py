@@ -95,7 +95,7 @@ def quantity(e: NumberEntry) -> str:
 def most_gained(search: SearchResult, candidate: CandidateModel) -> tuple[str, NumberEntry, NumberEntry] | None:
     """The channel in which a model leaves less of the held-out records than the answer does, most so beside the noise, with its error
     there and that of the answer; None where it leaves less of none, as it may where its numbers alone are likelier."""
-    less = search.chosen.held_out.plain_mean - candidate.held_out.plain_mean
+    less = search.chosen.predicted.plain_mean - candidate.predicted.plain_mean
     channel = search.fitter.recording.channels[int(np.nan_to_num(less, nan=-np.inf).argmax())]
     would, now = (held_out_error(search, model)[channel] for model in (candidate, search.chosen))
     known = would.value is not None and now.value is not None

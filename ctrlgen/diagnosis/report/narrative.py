@@ -148,8 +148,9 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
 def _steps(diagnosis: Diagnosis) -> list[str]:
     verdict = diagnosis.verdict
     use = "Use device.next.toml in place of the device file: solve and generate the C with it, then record again to confirm."
-    known = all(e.noise_floor is not None for e in diagnosis.held_out.values())
-    told = known and not diagnosis.residual_tests.by_motion
+    errors = diagnosis.held_out.values()
+    known = all(e.noise_floor is not None for e in errors)
+    told = known and all(e.goes_with_motion is None for e in errors)
     rest = "" if told else " Record a period at rest (drive off), or repeat poses, so that the noise can be estimated."
     if verdict == Verdict.CONSISTENT:
         return [
@@ -206,7 +207,7 @@ def _use(diagnosis: Diagnosis) -> str:
 def predicts_better(diagnosis: Diagnosis) -> bool:
     """Whether the corrected device predicts the held-out records better than the device as described, in noise units."""
     search = diagnosis.search
-    return bool(search.chosen.causes) and search.chosen.held_out.excess < search.nominal.held_out.excess
+    return bool(search.chosen.causes) and search.chosen.predicted.excess < search.nominal.predicted.excess
 
 
 def refusals(diagnosis: Diagnosis) -> list[str]:

@@ -78,7 +78,7 @@ def attribute(
     fit = model.fit
     causes, of = fit.structure.causes, _groups(fit.structure.causes)
     n = max(of, default=-1) + 1
-    held = described.held_out.excess > ATTRIBUTION.least_excess * np.sum(described.held_out.n_plain)
+    held = described.predicted.excess > ATTRIBUTION.least_excess * np.sum(described.predicted.n_plain)
     records = fitter.held_out_records if held else fitter.fit_records
     known = fitter.noise.known
     before = _by_block(known, as_fitted(fitter, described.fit, records))
@@ -95,7 +95,7 @@ def attribute(
     _lead_constants(parts, told, serves, back, [causes[of.index(g)].prior.constant for g in range(n)])
     shares = [ShareEntry(value=v, ci95=(a, b)) for v, a, b in _with_intervals(parts, before, after, seed)]
     by_channel = _shares(*(v.sum(axis=-2) for v in (parts, before, after)))
-    shown = before.sum(axis=0) > ATTRIBUTION.least_excess * described.held_out.n_plain.sum(axis=0)
+    shown = before.sum(axis=0) > ATTRIBUTION.least_excess * described.predicted.n_plain.sum(axis=0)
     channels = {
         name: tuple(float(by_channel[g, i]) for g in (*of, -1))
         for i, name in enumerate(fitter.recording.channels)

@@ -19,8 +19,9 @@ class CandidateModel:
     """A fitted structure and what it leaves.
 
     errors: noise and the discrepancy that the candidate itself leaves. fitted, held_out: its misfit on the records to fit and
-    on the held-out records. refit_penalty: -2 ln likelihood of the refit to the held-out records, 0 where the parameters are
-    as fitted. cause: the hypothesis that the candidate was fitted for.
+    on the held-out records, by which models are compared. refit_penalty: -2 ln likelihood of the refit to the held-out records, 0
+    where the parameters are as fitted. cause: the hypothesis that the candidate was fitted for. unmoved: its misfit on the held-out
+    records with the parameters as fitted, where `held_out` is of such a refit.
     """
 
     fit: Fit
@@ -29,6 +30,12 @@ class CandidateModel:
     held_out: Misfit
     refit_penalty: float = 0.0
     cause: Hypothesis | None = None
+    unmoved: Misfit | None = None
+
+    @property
+    def predicted(self) -> Misfit:
+        """Its misfit on the held-out records with the parameters as fitted: what a reader is told."""
+        return self.held_out if self.unmoved is None else self.unmoved
 
     @property
     def causes(self) -> tuple[Hypothesis, ...]:

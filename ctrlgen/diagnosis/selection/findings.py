@@ -21,6 +21,7 @@ from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, nominal_physics
 from ctrlgen.estimation.prediction_uncertainty import prediction_uncertainty
 from ctrlgen.estimation.profile_likelihood import Profile
+from ctrlgen.estimation.residual_tests import ResidualTests
 from ctrlgen.estimation.robust_covariance import robust_deviations
 from ctrlgen.estimation.settings import STATISTICS
 from ctrlgen.reporting.result_file import FiniteOrNull, Keys, Number
@@ -156,17 +157,21 @@ class ChannelErrorEntry(Keys):
     rms_refitted: FiniteOrNull = Field(
         description="With the findings, all numbers moved to these records within their uncertainty (under their posterior)."
     )
+    goes_with_motion: Number = Field(
+        description="Probability that noise goes so well with the drive and the motion by chance as what is left does, by which what is "
+        "left is judged where neither a statement nor a rest tells the noise; null where one does."
+    )
 
 
-def held_out_errors(search: SearchResult, known: np.ndarray, refitted: Fit) -> dict[str, ChannelErrorEntry]:
-    """Held-out errors of the nominal and of the chosen model by channel; `known` (n_y,) says whose noise is known. `refitted` is
-    the chosen model with its numbers moved to the held-out records within their uncertainty."""
+def held_out_errors(search: SearchResult, known: np.ndarray, tests: ResidualTests) -> dict[str, ChannelErrorEntry]:
+    """Held-out errors of the nominal and of the chosen model by channel, with what the `tests` of the chosen one say; `known` (n_y,) says
+    whose noise is known."""
     errors, fitter = {}, search.fitter
     floor, unsure = fitter.noise.floor, prediction_uncertainty(fitter, search.chosen.fit)
     for i, (channel, unit) in enumerate(zip(fitter.recording.channels, fitter.recording.units, strict=True)):
         scale = difference(1.0, unit)
         rms = []
-        for fit in (search.nominal.fit, search.chosen.fit, refitted):
+        for fit in (search.nominal.fit, search.chosen.fit, tests.refitted):
             squares = [
                 ((r.observed - fitter.predict(fit, r))[:, i])[r.valid[:, i]] ** 2 for r in fitter.held_out_records
             ]
@@ -180,6 +185,7 @@ def held_out_errors(search: SearchResult, known: np.ndarray, refitted: Fit) -> d
             unit=unit,
             uncertainty=beside,
             rms_refitted=rms[2],
+            goes_with_motion=tests.by_motion.get(channel),
         )
     return errors
 
@@ -253,7 +259,8 @@ def findings(search: SearchResult, shares: Attribution, profiles: tuple[Profile,
 def _leading(search: SearchResult, rows: list[Finding]) -> Finding | None:
     causes = [(f, f.share.value) for f in rows if f.role is Role.CAUSE and f.share is not None]
     left = {
-        c: float(np.sum(t.held_out.plain_mean)) for c, t in zip(search.chosen.causes, search.without_cause, strict=True)
+        c: float(np.sum(t.predicted.plain_mean))
+        for c, t in zip(search.chosen.causes, search.without_cause, strict=True)
     }
     first = leading([share for _, share in causes], [left[f.cause] for f, _ in causes])
     return None if first is None else causes[first][0]
@@ -314,7 +321,7 @@ def _numbers_of(search: SearchResult, k: int, estimates: dict[str, Estimate]) ->
 def _worth(search: SearchResult, k: int, shares: Attribution) -> dict[str, WorthEntry]:
     """The held-out error without cause k, the others refitted, and with it, of each channel, and its share there."""
     recording, floor = search.fitter.recording, search.fitter.noise.floor
-    without, with_it = (np.sqrt(t.held_out.plain_mean) * floor for t in (search.without_cause[k], search.chosen))
+    without, with_it = (np.sqrt(t.predicted.plain_mean) * floor for t in (search.without_cause[k], search.chosen))
     return {
         channel: WorthEntry(
             without=float(a) * difference(1.0, unit),

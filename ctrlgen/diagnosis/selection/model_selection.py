@@ -46,15 +46,14 @@ def scored(fitter: Fitter, fit: Fit, cause: Hypothesis | None = None) -> Candida
     records = fitter.fit_records
     left = [np.nan_to_num(r.observed - fitter.predict(fit, r), nan=1e150) for r in records]
     errors = error_model(fitter.noise, records, left)
-    held, penalty = fit, 0.0
+    unseen = fitter.held_out_records
+    unmoved = misfit(fitter.noise, unseen, [r.observed - fitter.predict(fit, r) for r in unseen])
+    held_out, penalty = unmoved, 0.0
     if errors.is_noise and fitter.noise.known.all():
         refit = refit_to_held_out(fitter, fit, HELD_OUT_REFIT.max_steps)
-        held, penalty = refit.fit, refit.penalty + refit.log_det
-    unseen = fitter.held_out_records
-    apart = [r.observed - fitter.predict(held, r) for r in unseen]
-    return CandidateModel(
-        fit, errors, misfit(fitter.noise, records, left), misfit(fitter.noise, unseen, apart), penalty, cause
-    )
+        held_out = misfit(fitter.noise, unseen, [r.observed - fitter.predict(refit.fit, r) for r in unseen])
+        penalty = refit.penalty + refit.log_det
+    return CandidateModel(fit, errors, misfit(fitter.noise, records, left), held_out, penalty, cause, unmoved)
 
 
 class ModelSelection:

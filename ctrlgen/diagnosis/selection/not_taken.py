@@ -72,5 +72,5 @@ def compared(search: SearchResult) -> ModelSelection:
 
 
 def held_out_rms(candidate: CandidateModel) -> np.ndarray:
-    """Root mean square (n_y,) [SI] of what a candidate leaves on the held-out records."""
-    return np.sqrt(candidate.held_out.plain_mean) * candidate.errors.noise.floor
+    """Root mean square (n_y,) [SI] of what a candidate leaves on the held-out records, its numbers as fitted."""
+    return np.sqrt(candidate.predicted.plain_mean) * candidate.errors.noise.floor

@@ -144,7 +144,7 @@ def _left(search: SearchResult, candidate: CandidateModel, criterion: float) -> 
     return {
         "criterion": criterion,
         "fitted": float(np.mean(candidate.fitted.plain_mean)),
-        "held_out": float(np.mean(candidate.held_out.plain_mean)),
+        "held_out": float(np.mean(candidate.predicted.plain_mean)),
         "held_out_error": held_out_error(search, candidate),
     }
 

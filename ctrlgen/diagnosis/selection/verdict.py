@@ -88,7 +88,7 @@ def within_tolerance(search: SearchResult) -> bool:
     wanted = [t or 0.0 for t in fitter.recording.tolerance]
     if not any(wanted):
         return False
-    left = search.chosen.held_out
+    left = search.chosen.predicted
     rms = np.sqrt(left.plain_mean) * fitter.noise.floor
     noisy = fitter.noise.known & (
         left.white_mean <= 1 + STATISTICS.chance_excess * np.sqrt(2 / left.n_white.sum(axis=0))
@@ -144,7 +144,7 @@ def terms_of_findings(search: SearchResult) -> list[list[int]]:
         groups.setdefault(one_finding(cause), []).append(k)
 
     def left_without(k: int) -> float:
-        return float(search.without_cause[k].held_out.plain.sum())
+        return float(search.without_cause[k].predicted.plain.sum())
 
     return [sorted(terms, key=left_without, reverse=True) if len(terms) > 1 else terms for terms in groups.values()]
 
