@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,6 +25,7 @@ from ctrlgen.diagnosis.shares.design import Kind
 from ctrlgen.diagnosis.shares.gather import residual_shares
 from ctrlgen.diagnosis.shares.shares_table import ChannelShares, KindShare, Share
 from ctrlgen.effects import Family
+from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.recordings.recording import Recording
 
 N, FRICTION = 3000, 0.6  # samples a record; dry friction [N]
@@ -149,6 +151,22 @@ def channel(
         nothing,
         {},
     )
+
+
+def test_a_law_that_the_readings_show_directly_is_not_told_to_be_unconfirmed():
+    lattice = Hypothesis("quantisation", "sensor:axis", "axis")
+    table = SimpleNamespace(channels=(channel({}, 0.0),))
+    told = SimpleNamespace(
+        shares=SimpleNamespace(before=table),
+        verdict=Verdict.EXPLAINED,
+        findings=(SimpleNamespace(cause=lattice),),
+        search=SimpleNamespace(chosen=SimpleNamespace(causes=())),
+        recording=SimpleNamespace(channels=("reading.axis",)),
+        fitter=SimpleNamespace(noise=SimpleNamespace(floor=np.ones(1))),
+        empirical_terms=(),
+    )
+    (said,) = shares_sentences(told)
+    assert said.endswith("; quantisation at sensor:axis is seen in the readings themselves and takes no share.")
 
 
 @pytest.mark.parametrize(

@@ -90,6 +90,11 @@ def test_ranges_that_change_from_row_to_row_are_told(tmp_path):
     assert "gain: goes from 1 to 2 and is not applied, should numbers beside it lack it" in notes
 
 
+def test_what_a_glass_scale_reads_is_no_factor_of_another_column(tmp_path):
+    text = lines("t,command,scale\n", lambda k: f"{T[k]},{X[k]},{X[k] + 0.25}")
+    assert not table_of(tmp_path, text).notes
+
+
 def test_the_unit_after_a_word():
     assert split_name("C1 in V") == ("C1", "V") and split_name("in s") == ("in s", "s")
     assert split_name("built in x") == ("built in x", None) and split_name("Weg in") == ("Weg in", None)

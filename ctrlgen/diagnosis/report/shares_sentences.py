@@ -6,6 +6,7 @@ from enum import Enum
 
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.narrative import empirical_sentences, per_cent, short
+from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.diagnosis.settings import SHARES
 from ctrlgen.diagnosis.shares.design import Kind
@@ -52,7 +53,7 @@ def shares_sentences(diagnosis: Diagnosis) -> list[str]:
     worst = worst_of(diagnosis, shares.before)
     said = ceiling_sentence(worst)
     if not diagnosis.search.chosen.causes:
-        return [f"{said}; no law of the library is confirmed for it.", *empirical_sentences(diagnosis)]
+        return [f"{said}; {_without_fit(diagnosis)}.", *empirical_sentences(diagnosis)]
     reached = shares.reached(worst.channel)
     # a delay, say, is a function of no signal at its own moment
     laws = (
@@ -62,6 +63,14 @@ def shares_sentences(diagnosis: Diagnosis) -> list[str]:
     if not diagnosis.residual_tests.passed:
         sentences.append(rest_sentence(worst_of(diagnosis, shares.after)))
     return [*sentences, *empirical_sentences(diagnosis)]
+
+
+def _without_fit(diagnosis: Diagnosis) -> str:
+    """What is said of the laws where none was fitted: those that the readings show directly are named all the same."""
+    if not diagnosis.findings:
+        return "no law of the library is confirmed for it"
+    names = " and ".join(cause_name(f.cause) for f in diagnosis.findings)
+    return f"{names} is seen in the readings themselves and takes no share"
 
 
 def family_shares(diagnosis: Diagnosis, table: SharesTable) -> list[tuple[Family, float]]:

@@ -17,6 +17,8 @@ FACTOR = re.compile(
 APPLIED = ("scale_factor",)  # which the CF conventions define
 MOST_UNITS = 6
 """Units among which an instrument changes."""
+MOST_RANGES = 20
+"""Factors that the ranges of an instrument have; a column of more numbers, such as what a glass scale reads, is measured. Judgement."""
 NI_SCALE = "NI_"  # begins the properties of scales that the reader of TDMS applies
 
 
@@ -49,7 +51,10 @@ def unapplied_columns(names: Sequence[str], columns: Sequence[np.ndarray]) -> li
                 said.append(
                     f"{name}: states units that differ from row to row ({', '.join(cells)}), not applied: write one"
                 )
-        elif FACTOR.search(name) and len(known := np.unique(column[np.isfinite(column.astype(float))])) > 1:
+        elif (
+            FACTOR.search(name)
+            and 1 < len(known := np.unique(column[np.isfinite(column.astype(float))])) <= MOST_RANGES
+        ):
             said.append(
                 f"{name}: goes from {known[0]:g} to {known[-1]:g} and is not applied, should numbers beside it lack it"
             )
