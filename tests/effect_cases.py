@@ -217,6 +217,7 @@ class Law:
             velocity=held["velocity"],
             force=held["force"],
             temperature=held["state"],
+            holding_heat=every[self.index],
             **{s.name: memory[i] for i, s in enumerate(self.effect.states)},
         )
 

@@ -60,6 +60,14 @@ def losing(u):
     return plant.pose(plant.displacement(T) - 5.0 * F)
 
 
+def cooled(u, b=2e-4):
+    """Every conductance to the surroundings rises by b a kelvin: R_th P = DT (1 + b DT), solved for DT."""
+    plant = Hexapod()
+    rise = plant.n.actuator.thermal_resistance * plant.power(u)
+    T = plant.n.actuator.ambient + (np.sqrt(1 + 4 * b * rise) - 1) / (2 * b)
+    return plant.pose(plant.displacement(T))
+
+
 ON_HEXAPOD = {
     "abbe_arm": (
         posed(lambda p: p + np.outer(p[:, 1] * 2e3, at(3, 1))),
@@ -79,6 +87,7 @@ ON_HEXAPOD = {
     ),
     "lever_ratio": (carried, Planted("stage:2X", {"gain": 0.02})),
     "lost_motion": (losing, Planted("stage:all", {"compliance": 5e-6})),
+    "heat_loss": (cooled, Planted("actuator:all", {"coefficient": 2e-4, "power": 1.0})),
     "heater_resistance": (
         lambda u: Hexapod(faults=Faults(resistance=5e-5), voltage=True).settled(
             np.sqrt(u * Hexapod().n.actuator.heater_resistance)

@@ -12,12 +12,13 @@ PARAMETERS = [(kind, p, prior_of(law).of(p)) for kind, law in Effect.library.ite
 every_parameter = pytest.mark.parametrize(
     "kind, p, prior", PARAMETERS, ids=[f"{kind}-{p.name}" for kind, p, _ in PARAMETERS]
 )
-# Shares of something that there is by itself once, and a metal's resistance, which rises
+# Shares of something that there is by itself once; a metal's resistance, and the loss of what is hot, which rise
 ONE_WAY = {
     "finite_rotation": (-2.0, 4.0),
     "link_load": (-2.0, 4.0),
     "low_pass": (-0.5, 1.5),
     "heater_resistance": (-1e-3, 1e-2),
+    "heat_loss": (-1e-3, 1e-2),
 }
 
 

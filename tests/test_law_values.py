@@ -36,6 +36,7 @@ def signals(rng: np.random.Generator, kind: str) -> SimpleNamespace:
         sample_time=H,
         temperature_at_rest=0.3,
         temperature=rng.uniform(0.5, 3),
+        holding_heat=rng.uniform(0.5, 3),
         scale=1.3,
         travel=0.7,
         second_order_kinematics=lambda: other,

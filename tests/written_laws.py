@@ -57,6 +57,12 @@ def turned(a: int, b: int):
     return change
 
 
+def lost(s, p):
+    """A conductance beyond the stated one: b DT (DT/T_rest)^0.6, but for the last thousandth of T_rest."""
+    rise, rest = s.temperature - s.temperature_at_rest, s.temperature_at_rest
+    return -s.holding_heat * p.coefficient * rise * (np.hypot(rise, rest / 1000) / rest) ** 0.6
+
+
 def dead(s, p):
     e = np.hypot(p.rounding * p.width, 1e-6 * s.scale)
     return -(np.hypot(s.value + p.width, e) - np.hypot(s.value - p.width, e)) / 2
@@ -309,6 +315,7 @@ LAWS = {
     "frame_rotation_y": ({}, turned(2, 0)),
     "frame_rotation_z": ({}, turned(0, 1)),
     "heat_crosstalk": ({}, lambda s, p: p.share * (s.all.sum() - s.value)),
+    "heat_loss": ({"power": 1.6}, lost),
     "heater_resistance": ({}, lambda s, p: s.value / (1 + p.slope * (s.temperature - s.temperature_at_rest)) - s.value),
     "home_offset": ({}, lambda s, p: p.offset),
     "hysteresis": ({"reach": 0.3, "taper": 0.5}, lambda s, p: -p.stiffness * weighted(s, p, s.displacement)),
@@ -388,7 +395,7 @@ LAWS = {
     "zero_per_record": ({}, lambda s, p: p.share * s.zero),
     "vibration": ({"frequency": 3.0, "phase": 0.9}, lambda s, p: p.amplitude * sin(TWO_PI * 3 * s.t + 0.9)),
 }
-AMPLITUDES = {"heater_resistance": 0.01, "expansion": 0.01}  # of a share, an angle, a gain: 0.3
+AMPLITUDES = {"heater_resistance": 0.01, "heat_loss": 0.01, "expansion": 0.01}  # of a share, an angle, a gain: 0.3
 
 
 def parameters(kind: str, amplitude: float | None = None) -> SimpleNamespace:

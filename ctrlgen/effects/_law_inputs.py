@@ -63,6 +63,8 @@ class LawInputs:
     """The state of this axis's heater."""
     temperature_at_rest: Expression = None
     """The same at rest."""
+    holding_heat: Expression = None
+    """The power that holds the heater at its temperature, which is what it loses there [W]; without the laws of the heat."""
 
     def with_states(self, states: Mapping[str, Expression]) -> Self:
         """The same with other values of some states."""

@@ -69,6 +69,7 @@ NEEDS: Mapping[str, LawNeeds] = MappingProxyType(
             ),
         ),
         "heater_resistance": _HEATER,
+        "heat_loss": _HEATER,
         "heat_crosstalk": _HEATER,
         "second_pole": _HEATER,
         "expansion": _HEATER,

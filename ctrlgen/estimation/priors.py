@@ -193,6 +193,11 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             "From a loss that ends within the recording to a steady one.",
             parameters={"levels_off": _starts((3.0, 30.0, 1e4))},
         ),
+        "heat_loss": LawPrior(
+            "No power of the rise is radiation: 1 %, as its file says. Starts: silicon that conducts less, a coefficient, radiation.",
+            model_form_error=0.01,
+            parameters={"power": ParameterPrior((0.6, 1.0, 1.6), usual=1.0)},
+        ),
         "reversed": LawPrior(
             "A wiring fault is rarer than a wrong gain: judgement. A lead is swapped or it is not.",
             log_prior_odds=ONE_IN_TEN,

@@ -175,7 +175,16 @@ class EffectTerms:
             "force": self.restoring_force[i],
             "temperature": None if heater is None else heater.expr[i],
             "temperature_at_rest": None if heater is None else self.physics.rest[i],
+            "holding_heat": None if heater is None else self.holding_heat[i],
         }
+
+    @cached_property
+    def holding_heat(self) -> ca.SX:
+        """The power (n_axes,) that holds each heater at its temperature, where the device's own rates, linear in the power, are zero."""
+        assert _has_heaters(self.physics) and self.physics.state is not None
+        heat = ca.SX.sym("heat", len(self.physics.axes))
+        rates = self.physics.rates(self.physics.state.expr, heat)
+        return -ca.substitute(rates, heat, 0 * heat) / ca.diag(ca.jacobian(rates, heat))
 
     @cached_property
     def restoring_force(self) -> ca.SX:

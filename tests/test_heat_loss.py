@@ -1,0 +1,71 @@
+"""A heater whose loss does not rise in proportion to its temperature: how fast it cools, what holds it warm, and which physics it meets."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import effect_device
+from scipy.integrate import solve_ivp
+from scipy.optimize import curve_fit
+
+from ctrlgen import build_model, simulate
+from ctrlgen.model.inverse import invert
+
+AMBIENT, R, TAU = 295.15, 550.0, 5e-3  # of the hexapod's heaters [K, K/W, s]
+B, N = 4e-4, 1.5
+
+
+def hotter(**numbers):
+    """The hexapod whose heaters lose more as they grow hot."""
+    return build_model(effect_device({"kind": "heat_loss", "at": "all", "coefficient": f"{B} 1/K", "power": str(N)}))
+
+
+def loss(rise):
+    """G DT [W], from the definition."""
+    return rise / R * (1 + B * rise * (rise / AMBIENT) ** (N - 1))
+
+
+def test_it_cools_and_warms_as_the_balance_of_heat_says():
+    """C dT/dt = P - G(T) DT, C = tau/R: warmed by 0.8 W for 20 ms, then left to cool; steps of a fortieth of the time constant."""
+    h, warm, end = TAU / 40, 20e-3, 40e-3
+    powers = np.where(h * np.arange(round(end / h) + 1) < warm, 0.8, 0.0)
+    found = simulate(hotter(), np.tile(powers[:, None], 6), h).signals["state"][: len(powers), 0] - AMBIENT
+    x = 0.0
+    rises = [x]
+    for P in powers[:-1]:
+        x = solve_ivp(lambda t, q, P=P: R / TAU * (P - loss(abs(q))), (0, h), [x], rtol=1e-10, atol=1e-10).y[0, -1]
+        rises.append(x)
+    # what a step takes for linear within it, of 350 K: with its square, 0.006 K here
+    assert np.abs(found - rises).max() < 0.01
+    # at the stated time constant it would cool less fast
+    first = np.flatnonzero(powers)[-1] + 1
+    assert found[-1] / found[first] < 0.95 * np.exp(-(end - h * first) / TAU)
+
+
+def test_the_inverse_asks_for_what_is_lost_at_the_temperature_that_is_wanted():
+    model = hotter()
+    powers = np.linspace(0.1, 0.6, 6)
+    still = simulate(model, np.tile(powers, (400, 1)), 1e-3)
+    x, z = still.x[-1], still.z[-1]
+    # the law rounds its power off below 0.3 K
+    assert loss(still.signals["state"][-1] - AMBIENT) == pytest.approx(powers, rel=1e-6)
+    kernels = invert(model, "pose", None)
+    asked = kernels.drive(x, z, z, kernels.state(x, z, z))
+    assert np.asarray(asked).ravel() == pytest.approx(powers, rel=1e-9)
+
+
+@pytest.mark.parametrize(("top", "sign"), [(200.0, 1), (500.0, 1), (200.0, -1), (500.0, -1)])
+def test_one_power_of_the_rise_is_radiation_or_a_conductivity_that_falls(top, sign):
+    """To 1.3 % of what they add at the highest rise, as its file says; a coefficient alone is off several times as far."""
+    T0, rise = 293.15, np.linspace(1, top, 200)
+    T = T0 + rise
+    radiation = T**4 - T0**4 - 4 * T0**3 * rise
+    silicon = T0 / 0.3 * (1 - (T / T0) ** -0.3) - rise  # integral of (T/T0)^-1.3
+    adds = radiation / radiation[-1] if sign > 0 else silicon / silicon[-1]
+
+    def off(form, start):
+        return np.abs(form(rise, *curve_fit(form, rise, adds, start)[0]) - adds).max()
+
+    power = off(lambda x, b, n: b * (x / top) ** (1 + n), (1.0, 1.0))
+    linear = off(lambda x, b: b * (x / top) ** 2, (1.0,))
+    assert power < 0.013 and 0.05 < linear < 0.13
