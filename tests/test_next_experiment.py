@@ -193,7 +193,8 @@ def test_what_is_read_otherwise_is_told_where_it_decides_and_where_nothing_does(
 
     both = "sensor_gain at sensor:axis from a wrong mechanism:height"
     first = (
-        f"To tell {both}, read the same poses with a turned specimen: they are 12 standard deviations apart then, "
+        f"To tell {both}, read the same poses, zeroed with the drives off, with a turned specimen: "
+        "they are 12 standard deviations apart then, "
         "and a second sensor does not (1.4)."
     )
     rows = ("a turned specimen", 12.0), ("a second sensor", 1.4)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from axis_records import SETTLING
+from axis_records import AXIS, SETTLING, axis_fitter
 from conftest import AXIS_FILE
 from sensor_or_device import DEVICE, LAWS, Specimen, drawn, recorded
 
@@ -17,11 +19,20 @@ from ctrlgen.core.units import Quantity
 from ctrlgen.devices.axis import Axis
 from ctrlgen.devices.usual_deviation import usual_deviation
 from ctrlgen.diagnosis.diagnose import diagnose_recording
-from ctrlgen.diagnosis.evidence.other_readings import other_readings, read_by_another, read_turned
+from ctrlgen.diagnosis.evidence.experiment_sums import Sums
+from ctrlgen.diagnosis.evidence.other_readings import (
+    OtherReadingEntry,
+    OtherReadings,
+    other_readings,
+    read_by_another,
+    read_turned,
+)
 from ctrlgen.diagnosis.report.answer import unlikely_rival
+from ctrlgen.diagnosis.report.experiment_sentences import experiment_sentence
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection, scored
 from ctrlgen.diagnosis.selection.rivals import rivals
 from ctrlgen.effects.gain import SensorGain
+from ctrlgen.effects.offset import HomeOffset
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, hypotheses, nominal_physics, numbers
 from ctrlgen.estimation.noise import estimate_noise
@@ -86,6 +97,43 @@ def test_the_turned_specimen_is_read_as_turned_about_the_axis(fits):
     assert np.degrees(turned.own_sd) == pytest.approx(0.5, rel=0.05)
     another = read_by_another(1e-3, fitter, ours, record)  # it has not the scale of the first, and no fit gives it one
     assert another.y == pytest.approx(straight, abs=1e-12) and not another.slopes[:, :, 0].any()
+
+
+@pytest.mark.parametrize("read", [partial(read_by_another, 1e-4), partial(read_turned, 0)])
+def test_another_reading_of_settled_poses_is_zeroed_with_the_drives_off(fits, read):
+    """A reading that is not zero at home is that of the first sensor, as it was put up: by 0.1 um, five standard deviations a pose."""
+    fitter, ours, _ = fits["delta_z"]
+    record, home = fitter.fit_records[0], HomeOffset("delta_z", {"offset": Quantity(1e-7, "0.1 um")})
+    moved = DEVICE.model_copy(update={"effect": (home,)})
+    there = replace(ours, structure=replace(ours.structure, device=moved))
+    assert fitter.predict(there, record)[:, 2] - fitter.predict(ours, record)[:, 2] == pytest.approx(1e-7)
+    assert read(fitter, there, record).y == pytest.approx(read(fitter, ours, record).y, abs=1e-15)
+
+
+def test_another_reading_of_a_motion_has_a_zero_of_its_own_and_tells_no_constant():
+    """Half of the travel, thousands of standard deviations of the noise."""
+    fitter = axis_fitter(n=200)
+    ours, record = fitter.fit(Structure(AXIS)), fitter.fit_records[0]
+    here = read_by_another(1e-4, fitter, ours, record)
+    span, nothing = np.ptp(here.y), Sums(np.zeros((len(ours.theta),) * 2), np.zeros(len(ours.theta)), 0.0)
+    beside, bare = replace(here, y=here.y + span / 2), replace(here, own=None, own_sd=None)
+    zeroed, absolute = (nothing.plus(fitter, beside, read, record).separation for read in (here, bare))
+    assert zeroed < 0.6 and absolute > 1000
+    told = OtherReadings(
+        OF_Z, HEIGHT, (OtherReadingEntry.model_construct(description="it", separation=9.0, settles=True),), False
+    )
+    found = SimpleNamespace(
+        readings=told,
+        offered=False,
+        settles=False,
+        alternative=None,
+        drives=(),
+        candidates=[SimpleNamespace(description="")],
+    )
+    assert "record the same motion with it" in experiment_sentence(found)
+    assert "read the same poses, zeroed with the drives off, with it" in experiment_sentence(
+        SimpleNamespace(**vars(found) | {"readings": replace(told, settled=True)})
+    )
 
 
 def test_a_size_is_judged_by_what_is_stated_or_usual(fits):

@@ -2,8 +2,9 @@
 
 The same poses are read once more, (i) by another sensor, which does not have what is suspected of this one, but scales of its own, of each
 channel and of all, known to `SECOND_SCALES`; or (ii) by the same sensor with the specimen turned by a right angle about an axis, mounted to
-`MOUNTED` about each axis: what the sensor does stays with its channels, what the device does goes round with it. Either reading is
-simulated under both models, and
+`MOUNTED` about each axis: what the sensor does stays with its channels, what the device does goes round with it. In settled poses either
+reading is zeroed with the drives off; elsewhere, where what the device remembers says where it then stands, each channel has a zero of its
+own, anywhere in the range that is read. Either reading is simulated under both models, and
 
     separation^2 = min over delta, e of |Delta - J delta - E e|^2 + |e/s|^2
 
@@ -33,6 +34,7 @@ from ctrlgen.estimation.free_parameters import FreeParameter
 from ctrlgen.estimation.hypothesis import Hypothesis, nominal_physics
 from ctrlgen.estimation.least_squares import initial_state_sd
 from ctrlgen.estimation.size_odds import of_sensor
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Record
 from ctrlgen.reporting.result_file import FiniteOrNull, Keys, Number
 
@@ -56,11 +58,13 @@ class OtherReadingEntry(Keys):
 
 @dataclass(frozen=True)
 class OtherReadings:
-    """The cause that is the sensor's, the one that is the device's, and what other readings decide between them, the best first."""
+    """The cause that is the sensor's, the one that is the device's, and what other readings decide between them, the best first; whether
+    what is read are settled poses."""
 
     of_sensor: Hypothesis
     of_device: Hypothesis
     entries: tuple[OtherReadingEntry, ...]
+    settled: bool = True
 
 
 class _Turned(FrameRotation, listed=False):
@@ -120,7 +124,7 @@ def other_readings(search: SearchResult, record: Record) -> OtherReadings | None
     # what decides; a turned specimen takes no second instrument
     ranked = sorted(entries, key=lambda e: (not e.settles, e.scale is not None))
     sensor, device = (here, there) if of_sensor(here) else (there, here)
-    return OtherReadings(sensor, device, tuple(ranked))
+    return OtherReadings(sensor, device, tuple(ranked), bool(np.isinf(record.sample_time)))
 
 
 Reading = Callable[[Fitter, Fit, Record], Prediction]
@@ -156,12 +160,11 @@ def read_by_another(scale: float, fitter: Fitter, fit: Fit, record: Record) -> P
     for i in ours:
         if free[i].amplitude:
             theta[i] = free[i].nominal
-    simulator = fitter.simulator(fit.structure, record)
-    y, slopes = simulator.sensitivities(record, theta)
-    slopes[:, :, ours] = 0.0
-    n_y = y.shape[1]
-    own = np.concatenate([y[:, :, None] * np.eye(n_y), y[:, :, None]], axis=2)
-    return Prediction(y, slopes, initial_state_sd(simulator), own, np.full(n_y + 1, scale))
+    read = _from_its_zero(fitter, fit.structure, record, theta)
+    read.slopes[:, :, ours] = 0.0
+    n_y = read.y.shape[1]
+    own = np.concatenate([read.y[:, :, None] * np.eye(n_y), read.y[:, :, None]], axis=2)
+    return _beside(read, own, np.full(n_y + 1, scale))
 
 
 def read_turned(axis: int, fitter: Fitter, fit: Fit, record: Record) -> Prediction:
@@ -176,7 +179,26 @@ def read_turned(axis: int, fitter: Fitter, fit: Fit, record: Record) -> Predicti
         FreeParameter(f"effect[{first + i}].angle", "rad", 0.0, -pi, pi, MOUNTED, MOUNTED) for i in range(PLANES)
     )
     turned = replace(turned, free=(*turned.free_parameters, *angles))
-    simulator = fitter.simulator(turned, record)
-    y, slopes = simulator.sensitivities(record, np.concatenate([fit.theta, np.zeros(PLANES)]))
-    own, rest = slopes[:, :, k : k + PLANES], np.delete(slopes, np.s_[k : k + PLANES], axis=2)
-    return Prediction(y, rest, initial_state_sd(simulator), own, np.full(PLANES, MOUNTED))
+    read = _from_its_zero(fitter, turned, record, np.concatenate([fit.theta, np.zeros(PLANES)]))
+    own, rest = read.slopes[:, :, k : k + PLANES], np.delete(read.slopes, np.s_[k : k + PLANES], axis=2)
+    return _beside(replace(read, slopes=rest), own, np.full(PLANES, MOUNTED))
+
+
+def _from_its_zero(fitter: Fitter, structure: Structure, record: Record, theta: np.ndarray) -> Prediction:
+    """The reading of a record from the place with the drives off, where the poses settle, else with zeros of its own."""
+    simulator = fitter.simulator(structure, record)
+    y, slopes = simulator.sensitivities(record, theta)
+    here = Prediction(y, slopes, initial_state_sd(simulator))
+    if np.isinf(record.sample_time):
+        y_off, slopes_off = simulator.sensitivities(replace(record, drive=np.zeros_like(record.drive)), theta)
+        return replace(here, y=y - y_off, slopes=slopes - slopes_off)
+    span = np.ptp(y, axis=0)
+    zeros = np.broadcast_to(np.eye(y.shape[1]), (len(y), *2 * y.shape[1:]))
+    return replace(here, own=zeros, own_sd=np.where(span > 0, span, 1.0))
+
+
+def _beside(read: Prediction, own: np.ndarray, sd: np.ndarray) -> Prediction:
+    """The reading with errors of its own (n, n_y, m), of deviations (m,), beside those that it has."""
+    if read.own is None or read.own_sd is None:
+        return replace(read, own=own, own_sd=sd)
+    return replace(read, own=np.concatenate([read.own, own], axis=2), own_sd=np.concatenate([read.own_sd, sd]))

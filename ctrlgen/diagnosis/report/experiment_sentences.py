@@ -29,8 +29,9 @@ def experiment_sentence(experiment: Experiment | None) -> str:
     rest = "".join(
         f", and {e.description} {'does too' if e.settles else 'does not'} ({number(e.separation, 2)})" for e in others
     )
-    told = f"To tell {between}, read the same poses with {first.description}: they are {number(first.separation, 2)} standard deviations "
-    told += f"apart then{rest}."
+    read = "read the same poses, zeroed with the drives off," if readings.settled else "record the same motion"
+    apart = number(first.separation, 2)
+    told = f"To tell {between}, {read} with {first.description}: they are {apart} standard deviations apart then{rest}."
     # a drive that nothing recorded shows, or none: what is read otherwise comes first
     return f"{said} {told}" if experiment.offered else told
 
