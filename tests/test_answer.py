@@ -19,7 +19,7 @@ def finding(cause, share: float | None, *alternatives, chance: ChanceEntry | Non
     return Finding(cause.effect, cause.location, {}, alternatives, taken, {}, "", cause, chance=chance)
 
 
-def told(verdict: Verdict, *findings: Finding, passed=False, after=2.0, untried=()) -> list[str]:
+def told(verdict: Verdict, *findings: Finding, passed=False, after=2.0, untried=(), taken=0.6) -> list[str]:
     errors = ChannelErrorEntry(
         rms_before=50.0,
         rms_after=after,
@@ -43,6 +43,7 @@ def told(verdict: Verdict, *findings: Finding, passed=False, after=2.0, untried=
             untried=SimpleNamespace(sentences=lambda: list(untried)),
             shares=None,
             unconfirmed=(),
+            attribution=SimpleNamespace(explained=taken),
         )
     )
 
@@ -53,6 +54,18 @@ def test_an_alternative_stands_beside_the_cause_that_it_is_one_of(share, says):
     first = told(Verdict.AMBIGUOUS, finding(GAIN, 0.6, CREEP), finding(DRIFT, share, CREEP))[0]
     assert "; this recording cannot tell it from creep at stage:axis" in first
     assert (", nor drift at sensor:axis from creep at stage:axis." in first) == says
+
+
+@pytest.mark.parametrize(
+    "taken, leaves", [(0.67, "33 %"), (0.0, "all"), (0.0004, "> 99.9 %"), (0.75, None), (0.9, None)]
+)
+def test_what_explains_nothing_says_how_much_it_leaves(taken, leaves):
+    """A column in another unit explains nothing either, whatever the causes take away: it is told elsewhere."""
+    first = told(Verdict.UNEXPLAINED, finding(GAIN, 0.6), taken=taken)[0]
+    assert (f"Unexplained: what was found leaves {leaves} of the error; the best of it is " in first) == (
+        leaves is not None
+    )
+    assert "what was found" not in told(Verdict.PARTLY, finding(GAIN, 0.6), taken=taken)[0]
 
 
 def test_of_many_alternatives_the_first_are_told():

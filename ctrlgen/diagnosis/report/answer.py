@@ -92,8 +92,15 @@ def _cause(diagnosis: Diagnosis) -> str:
     if not findings:
         known = "effect that could be tried" if diagnosis.untried.sentences() else "known effect"
         return f"{head}: the recording differs from {title}, and no {known} explains it."
-    best = "no confirmed cause takes away most of the error; the best is " if verdict == Verdict.UNEXPLAINED else ""
-    return f"{head}: {best}{_main(findings)}{_rivals(diagnosis)}{unlikely_rival(diagnosis)}."
+    return f"{head}: {_too_much_left(diagnosis)}{_main(findings)}{_rivals(diagnosis)}{unlikely_rival(diagnosis)}."
+
+
+def _too_much_left(diagnosis: Diagnosis) -> str:
+    """'what was found leaves 33 % of the error; the best of it is ', where that is why nothing is explained."""
+    left = 1 - diagnosis.attribution.explained
+    if diagnosis.verdict != Verdict.UNEXPLAINED or left <= 1 - VERDICT.most:
+        return ""
+    return f"what was found leaves {'all' if left >= 1 else per_cent(left)} of the error; the best of it is "
 
 
 def _main(findings: Sequence[Finding]) -> str:

@@ -175,7 +175,7 @@ def _steps(diagnosis: Diagnosis) -> list[str]:
             f"No held-out record shows {names}: hold out a record that covers the same range as the records to fit."
         )
     if verdict == Verdict.UNEXPLAINED:
-        steps.append("Check wiring, units and clocks of the set-up: no known effect takes away most of the mismatch.")
+        steps.append("Check wiring, units and clocks of the set-up: known effects do not explain the mismatch.")
     return [*steps, *(f"Not taken: {text}." for text in refusals(diagnosis))]
 
 

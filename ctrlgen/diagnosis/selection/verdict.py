@@ -38,8 +38,8 @@ def verdict(
 
     consistent: no cause is found, and what is left is noise or within the tolerance. explained: confirmed causes, and what is
     left is noise, within the tolerance, or too little to name. ambiguous: another cause explains the recording as well as a main one.
-    partly: confirmed causes take away most of the mismatch, or all of it with parameters too uncertain to predict, or the noise
-    is not known. unexplained: no cause takes away most, the fit agrees only with numbers that contradict the device file, or a
+    partly: confirmed causes take away `VERDICT.most` of the mismatch, or all of it with parameters too uncertain to predict, or the noise
+    is not known. unexplained: they take away less, the fit agrees only with numbers that contradict the device file, or a
     column's unit is wrong.
     """
     if another_unit:
