@@ -60,6 +60,29 @@ def test_what_creeps_stands_behind_the_play_whatever_the_order_in_the_file(effec
     assert np.abs(read - wanted).max() < 1e-3 * before
 
 
+@pytest.mark.parametrize(
+    "first, let_through",
+    [
+        (
+            {"kind": "dead_zone", "width": "10 um", "rounding": "0.01"},
+            lambda u: np.sign(u) * np.maximum(abs(u) - 1e-5, 0.0),
+        ),
+        ({"kind": "saturation", "share": "1", "level": "40 um"}, lambda u: np.clip(u, -4e-5, 4e-5)),
+    ],
+    ids=["dead zone", "limit"],
+)
+@pytest.mark.parametrize("law, gains", [("asymmetric_gain", (1.3, 0.7)), ("drive_gain", (1.3, 1.3))])
+def test_a_gain_acts_on_what_a_dead_zone_or_a_limit_lets_through(first, let_through, law, gains):
+    """f(u) times the gain of its sign. Beside each other, a dead zone would be off by 0.3 of its width and a limit by 0.3 of the
+    excess."""
+    u = np.array([0.0, 8e-6, 3e-5, 7e-5, -3e-5, -7e-5])
+    device = made(SERVO, {"kind": law, "at": "axis", "gain": "0.3"}, first | {"at": "axis"})
+    simulator = Simulator(device, (), ("reading.axis",), H)
+    read = simulator.simulate(record(u, np.zeros_like(u), "fit", h=H), np.zeros(0))[:, 0]
+    through = let_through(u)
+    assert np.abs(read - np.where(through > 0, *gains) * through).max() < 1e-7  # corners are round by a hundredth
+
+
 def test_a_play_before_a_tested_axis_carries_no_force_while_it_is_crossed():
     """Pulled through a gap of 4 mm at 50 mm/s and back: m a + c v + k w of what is dragged; nothing in the gap but what the
     thousandth of the motion takes that an inverse needs."""

@@ -20,7 +20,8 @@ from ctrlgen.diagnosis.report.answer import sentence
 from ctrlgen.diagnosis.selection.law_titles import TITLES, title
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.hypothesis import Hypothesis, hypotheses, nominal_physics
-from ctrlgen.estimation.law_needs import NEEDS, USUAL, not_offered, refusals, usual, with_odds
+from ctrlgen.estimation.law_needs import NEEDS, USUAL, not_offered, offered_as_faults, refusals, usual, with_odds
+from ctrlgen.estimation.law_prior import ONE_IN_A_HUNDRED
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Recording
 
@@ -120,16 +121,33 @@ def test_what_is_not_known_refuses_nothing():
     assert not not_offered(["cyclic"], parts(sensor="capacitive"))
     assert not not_offered(["cyclic"], parts(sensor="capacitive", transmission=("screw",), actuator="voice coil"))
     direct = parts(sensor="capacitive", transmission=("flexure",), actuator="voice coil")
-    assert list(not_offered(["cyclic", "backlash"], direct)) == ["cyclic", "backlash"]
+    assert list(not_offered(["cyclic", "worn_backlash"], direct)) == ["cyclic", "worn_backlash"]
     assert refusals(not_offered(["butterfly"], direct)) == [
         "butterfly: it needs a ferroelectric, and its actuator is a voice coil"
     ]
     assert [
-        line.split(":")[0] for line in refusals(not_offered(["backlash", "butterfly", "worn_backlash"], direct))
+        line.split(":")[0] for line in refusals(not_offered(["backlash_above", "butterfly", "worn_backlash"], direct))
     ] == [
-        "backlash, worn_backlash",
+        "backlash_above, worn_backlash",
         "butterfly",
     ]
+
+
+def test_play_is_offered_as_a_rare_fault_where_nothing_has_clearance():
+    """A joint that should have none works loose; a machine with a gear, or of unknown parts, has play as any other law."""
+    direct, geared = parts(transmission=("none",)), parts(transmission=("gear",))
+    play, law = Hypothesis("backlash", "stage:axis", "axis"), Effect.library["backlash"]
+    assert "backlash" not in not_offered(["backlash"], direct) and "backlash" in offered_as_faults(["backlash"], direct)
+    assert with_odds(play, direct).machine_odds == ONE_IN_A_HUNDRED
+    assert title(law, direct).endswith("something is loose")
+    for known in (geared, MachineParts()):
+        assert with_odds(play, known).machine_odds == 0 and not offered_as_faults(["backlash"], known)
+        assert "loose" not in title(law, known)
+
+
+def test_an_actuator_whose_name_is_an_adjective_has_no_article():
+    assert parts(actuator="hydraulic").cannot_be(frozenset({"piezo"})) == "its actuator is hydraulic"
+    assert parts(actuator="voice coil").cannot_be(frozenset({"piezo"})) == "its actuator is a voice coil"
 
 
 def test_check_says_each_reason_on_a_line_of_its_own(tmp_path, capsys):

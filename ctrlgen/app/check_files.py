@@ -20,7 +20,7 @@ from ctrlgen.devices.mechanism.mechanism_lines import summary
 from ctrlgen.devices.mechanism.point_compliance import point_compliance
 from ctrlgen.devices.sensor import describe
 from ctrlgen.effects import laws
-from ctrlgen.estimation.law_needs import not_offered, refusals, usual
+from ctrlgen.estimation.law_needs import not_offered, offered_as_faults, refusals, usual
 from ctrlgen.firmware.package import MANIFEST, verify_package
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.effect_terms import available
@@ -139,8 +139,13 @@ def _check_device(file: Path, figure: Path | None, point: str | None) -> None:
     physics = device.physics(device.values())
     parts, there = device.parts(physics), available(physics)
     out.print(f"  machine: {parts.text}", markup=False, soft_wrap=True)
-    for line in refusals(not_offered([name for name, law in sorted(laws().items()) if law.requires <= there], parts)):
-        out.print(f"  not offered in a diagnosis: {line}", markup=False, soft_wrap=True)
+    able = [name for name, law in sorted(laws().items()) if law.requires <= there]
+    for said, refused in (
+        ("not offered", not_offered(able, parts)),
+        ("offered as a fault", offered_as_faults(able, parts)),
+    ):
+        for line in refusals(refused):
+            out.print(f"  {said} in a diagnosis: {line}", markup=False, soft_wrap=True)
     for row in usual(parts):
         out.print(f"  usual: {row.text}", markup=False, soft_wrap=True)
     for remark in device.remarks():

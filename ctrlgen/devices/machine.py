@@ -58,6 +58,8 @@ FAMILIES: Mapping[str, str] = {
     "electrostatic": "electrostatic",
     **dict.fromkeys(("hydraulic", "pneumatic", "pump"), "fluid"),
 }
+# Names that are said without an article
+ADJECTIVES = frozenset({"thermal", "electrostatic", "hydraulic", "pneumatic"})
 # A ceramic strains by 0.1 to 0.15 % (Physik Instrumente, piezo tutorial), so that 2 mm take a stack of 1.4 m, or one of 0.1 m behind a
 # lever of 14; a tilting stage of twice 50 um over 5 mm does 0.02 rad. Twice as much is no piezo.
 LONGEST_PIEZO, WIDEST_PIEZO = 2e-3, 0.04
@@ -94,7 +96,8 @@ class MachineParts:
     def cannot_be(self, families: frozenset[str]) -> str:
         """Why its actuator is none of the `families`; empty where it may be one."""
         if self.family is not None:
-            kind = f"a {self.actuator}" if self.actuator else f"{self.family}"
+            named = self.actuator or self.family
+            kind = f"a {named}" if self.actuator and named not in ADJECTIVES else named
             return (
                 ""
                 if self.family in families

@@ -54,7 +54,7 @@ from ctrlgen.estimation.fit import Fit, Fitter, forget_predictions
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, hypotheses, nominal_physics, selected_laws
 from ctrlgen.estimation.isolated_outliers import mark_outliers
 from ctrlgen.estimation.late_readings import settling_time_of
-from ctrlgen.estimation.law_needs import not_offered, refusals, usual, with_odds
+from ctrlgen.estimation.law_needs import not_offered, offered_as_faults, refusals, usual, with_odds
 from ctrlgen.estimation.noise import Noise, estimate_noise
 from ctrlgen.estimation.noise_update import correct_stated_noise, update_guessed_noise
 from ctrlgen.estimation.profile_likelihood import profiles
@@ -69,6 +69,7 @@ from ctrlgen.reporting.numbers import number
 Progress = Callable[[str], None]
 RESTLESS = "{}: at rest the residual jumps or has memory, so it is not noise; something acts there that the device file does not describe"
 NOT_OFFERED = "not offered: {}"
+OFFERED_AS_FAULTS = "offered as a fault, as rare as one in a hundred: {}"
 WITHDRAWN = "{} is not confirmed: with it the held-out records are predicted worse than by the device as described"
 OFF_ITS_STAMPS = (
     "the drive is taken to come {} s {} its time stamps, {} of a sample: with that the held-out records are predicted better; it is a "
@@ -159,6 +160,8 @@ def _diagnose(
     told = (*marking_notes(live.recording, search.fitter.recording), *(s.sentence for s in spikes))
     told = (*told, *half_a_sample(search.fitter.recording, found), *nearly_as_large(found))
     told_of_machine = [NOT_OFFERED.format("; ".join(refusals(refused)))] if refused else []
+    if rare := offered_as_faults(list(dict.fromkeys(h.effect for h in suspected)), parts):
+        told_of_machine.append(OFFERED_AS_FAULTS.format("; ".join(refusals(rare))))
     if brought := [f"{law.kind} ({law.package})" for law in effects if law.package]:
         told_of_machine.append(f"laws of other packages were considered too: {', '.join(brought)}")
     told_of_machine += [f"usual: {row.text}" for row in usual(parts)]

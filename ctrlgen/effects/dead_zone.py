@@ -13,6 +13,7 @@ class DeadZone(Effect):
 
     place = Place.DRIVE
     family = Family.DRIVE
+    order = -1  # contacts, crossovers, overlaps of a valve stand before what gives the power, whose gain scales what they let through
     requires = frozenset({"actuator"})
     source = "G. Tao, P. V. Kokotovic, IEEE Trans. Autom. Control 39 (1994) 59: plants with unknown dead-zones"
     params = (

@@ -14,6 +14,7 @@ class Saturation(Effect):
 
     place = Place.DRIVE
     family = Family.DRIVE
+    order = -1  # before the gains, which act on what is delivered
     requires = frozenset({"actuator"})
     source = "R. Isermann, Fault-Diagnosis Systems (2006): actuator faults; smooth form ours"
     params = (

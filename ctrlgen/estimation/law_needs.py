@@ -1,6 +1,7 @@
 """What a law needs of a machine, and which laws a machine makes commoner: one row a law, each with its reason.
 
-A law that a machine cannot have is not offered as a hypothesis. A part that is not known refuses nothing.
+A law that a machine cannot have is not offered as a hypothesis; one that a fault gives it is offered as rare. A part that is not known
+refuses nothing.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from types import MappingProxyType
 
 from ctrlgen.devices.machine import MachineParts
 from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.law_prior import ONE_IN_A_HUNDRED
 
 _CLEARANCE = frozenset({"gear", "harmonic drive", "screw", "belt", "rack", "cable", "linkage"})
 _PERIODIC_SENSORS = frozenset({"interferometer", "encoder", "resolver"})
@@ -23,6 +25,7 @@ class LawNeeds:
     """What a law needs: of each row that is not empty one part. `any_part`: one part of any row is enough.
 
     families: of actuators (`ctrlgen.devices.machine.FAMILIES`). actuators, transmissions, sensors: by the names of `[machine]`.
+    by_fault: a fault gives it to a machine that was built without, as a screw that works loose does: the law is offered, and rare.
     """
 
     what: str
@@ -30,6 +33,7 @@ class LawNeeds:
     actuators: frozenset[str] = frozenset()
     transmissions: frozenset[str] = frozenset()
     sensors: frozenset[str] = frozenset()
+    by_fault: bool = False
 
     def missing(self, parts: MachineParts) -> str:
         """Why a machine of these parts cannot have the law; empty where it may."""
@@ -77,8 +81,9 @@ NEEDS: Mapping[str, LawNeeds] = MappingProxyType(
             "it needs beams or a winding that can break",
             families=frozenset({"thermal", "electromagnetic", "electrostatic"}),
         ),
+        "backlash": LawNeeds("it needs a part with clearance", transmissions=_CLEARANCE, by_fault=True),
         **dict.fromkeys(
-            ("backlash", "backlash_above", "backlash_below", "worn_backlash"),
+            ("backlash_above", "backlash_below", "worn_backlash"),
             LawNeeds("it needs a part with clearance", transmissions=_CLEARANCE),
         ),
         "cyclic": LawNeeds(
@@ -93,6 +98,15 @@ NEEDS: Mapping[str, LawNeeds] = MappingProxyType(
 
 def not_offered(laws: Sequence[str], parts: MachineParts) -> dict[str, str]:
     """Those of the `laws` that a machine of these parts cannot have, each with the reason."""
+    return {law: why for law, why in _lacking(laws, parts).items() if not NEEDS[law].by_fault}
+
+
+def offered_as_faults(laws: Sequence[str], parts: MachineParts) -> dict[str, str]:
+    """Those of the `laws` that a machine of these parts has by a fault alone, each with the reason; they are offered as rare."""
+    return {law: why for law, why in _lacking(laws, parts).items() if NEEDS[law].by_fault}
+
+
+def _lacking(laws: Sequence[str], parts: MachineParts) -> dict[str, str]:
     return {law: why for law in laws if law in NEEDS and (why := NEEDS[law].missing(parts))}
 
 
@@ -158,6 +172,8 @@ def usual(parts: MachineParts) -> list[Usual]:
 
 def with_odds(hypothesis: Hypothesis, parts: MachineParts) -> Hypothesis:
     """The hypothesis with the log odds that its law has in a machine of these parts beside those of the law itself."""
+    if offered_as_faults([hypothesis.effect], parts):
+        return replace(hypothesis, machine_odds=ONE_IN_A_HUNDRED)
     commoner = any(hypothesis.effect in row.laws for row in usual(parts))
     return replace(hypothesis, machine_odds=THREE_TO_ONE) if commoner else hypothesis
 

@@ -50,7 +50,13 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
             ("piezo", "A piezo, or its mount, keeps moving after the voltage has settled"),
             ("", "A displacement that goes on after the drive has settled"),
         ),
-        "dead_zone": (("position", "An axis that ignores small commands"),),
+        "dead_zone": (
+            ("position", "An axis that ignores small commands"),
+            *(
+                (word, "A valve, or what drives it, that ignores small drives: overlap")
+                for word in ("hydraulic", "pneumatic")
+            ),
+        ),
         "displacement_hysteresis": (
             ("cable", "Hysteresis of the cable: the joint lags"),
             ("piezo", "Hysteresis of the piezo, or of a joint behind it: the displacement lags"),
@@ -171,6 +177,8 @@ def title(law: type[Effect], parts: MachineParts) -> str:
         return f"An error that repeats along the path: {those}{more}"
     if law.kind == "backlash" and (those := _any_of(CLEARANCE, words)):
         return f"{'Slack' if those == CLEARANCE['cable'] else 'Play'} in {those}"
+    if law.kind == "backlash" and parts.transmission:
+        return "Play where this machine has no part with clearance: something is loose"
     return next((text for word, text in TITLES.get(law.kind, ()) if word in words), law.title)
 
 
