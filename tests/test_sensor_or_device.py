@@ -10,12 +10,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from axis_records import AXIS, SETTLING, axis_fitter
+from axis_records import record as drive_record
 from conftest import AXIS_FILE
 from sensor_or_device import DEVICE, LAWS, Specimen, drawn, recorded
 
 from battery.plant_hexapod import COMPONENTS
 from ctrlgen.core.files import validate
 from ctrlgen.core.units import Quantity
+from ctrlgen.devices import Device
 from ctrlgen.devices.axis import Axis
 from ctrlgen.devices.usual_deviation import usual_deviation
 from ctrlgen.diagnosis.diagnose import diagnose_recording
@@ -38,6 +40,7 @@ from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, hypotheses, nom
 from ctrlgen.estimation.noise import estimate_noise
 from ctrlgen.estimation.size_odds import known_deviation, odds_of_size, of_sensor, prior_odds, size_odds, size_of
 from ctrlgen.estimation.structure import Structure
+from ctrlgen.recordings.recording import Recording
 
 GAIN = 0.006
 EVERY, OF_Z = (Hypothesis("sensor_gain", f"sensor:{c}", c) for c in ("all", "delta_z"))
@@ -134,6 +137,28 @@ def test_another_reading_of_a_motion_has_a_zero_of_its_own_and_tells_no_constant
     assert "read the same poses, zeroed with the drives off, with it" in experiment_sentence(
         SimpleNamespace(**vars(found) | {"readings": replace(told, settled=True)})
     )
+
+
+@pytest.mark.parametrize("off, scale", [(4e-4, 1e-4), (4e-5, 1e-5), (4e-6, 1e-6)])
+def test_the_scale_of_one_channel_is_one_error_of_a_second_sensor(off, scale):
+    """A laser that reads 0.04 % too much, or an axis that goes as much too far: four deviations of a scale that is known to 0.01 %."""
+    servo = {"kind": "servo", "name": "servo", "title": "an axis", "source": "round numbers", "travel": "400 mm"}
+    device = validate(Device.library["servo"], servo, "device")
+    rng, records = np.random.default_rng(7), []
+    for role, turns in (("fit", 2), ("hold_out", 3)):
+        u = 0.2 - 0.2 * np.cos(2 * np.pi * turns * np.arange(200) / 200)
+        records.append(drive_record(u, (1 + off) * u + 1e-9 * rng.standard_normal(200), role, h=0.01))
+    recording = Recording("t", "servo", "series", ("reading.axis",), ("mm",), (1e-9,), tuple(records), ())
+    fitter = Fitter(recording, estimate_noise(recording, 0.0))
+    laser, axis = (
+        fitter.fit(Structure(device).with_cause(Hypothesis(f"{what}_gain", at, "axis"), {"gain": 0.0}))
+        for what, at in (("sensor", "sensor:axis"), ("drive", "actuator:axis"))
+    )
+    chosen = SimpleNamespace(fit=laser, causes=laser.structure.causes)
+    rival = SimpleNamespace(fit=axis, cause=axis.structure.causes[0])
+    found = other_readings(SimpleNamespace(fitter=fitter, chosen=chosen, rivals=((rival,),)), fitter.fit_records[0])
+    (entry,) = found.entries
+    assert entry.settles and entry.scale == scale and entry.separation == pytest.approx(4, rel=0.05)
 
 
 def test_a_size_is_judged_by_what_is_stated_or_usual(fits):

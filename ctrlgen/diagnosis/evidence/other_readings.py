@@ -1,10 +1,10 @@
 """Whether a second sensor or a turned specimen tells an error of the sensor from one of the device, where no drive does.
 
 The same poses are read once more, (i) by another sensor, which does not have what is suspected of this one, but scales of its own, of each
-channel and of all, known to `SECOND_SCALES`; or (ii) by the same sensor with the specimen turned by a right angle about an axis, mounted to
-`MOUNTED` about each axis: what the sensor does stays with its channels, what the device does goes round with it. In settled poses either
-reading is zeroed with the drives off; elsewhere, where what the device remembers says where it then stands, each channel has a zero of its
-own, anywhere in the range that is read. Either reading is simulated under both models, and
+channel and, of several, of all, known to `SECOND_SCALES`; or (ii) by the same sensor with the specimen turned by a right angle about an
+axis, mounted to `MOUNTED` about each axis: what the sensor does stays with its channels, what the device does goes round with it. In
+settled poses either reading is zeroed with the drives off; elsewhere, where what the device remembers says where it then stands, each
+channel has a zero of its own, anywhere in the range that is read. Either reading is simulated under both models, and
 
     separation^2 = min over delta, e of |Delta - J delta - E e|^2 + |e/s|^2
 
@@ -38,8 +38,9 @@ from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Record
 from ctrlgen.reporting.result_file import FiniteOrNull, Keys, Number
 
-SECOND_SCALES = (ASSUMED_SCALE, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4)
-"""Standard deviations of the scale of a second sensor: one as good as any, then calibrated ones."""
+SECOND_SCALES = (ASSUMED_SCALE, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 1e-5, 1e-6)
+"""Standard deviations of the scale of a second sensor: one as good as any, then calibrated ones, last a laser interferometer in air, whose
+refraction is not corrected, or is (N. Bobroff, Meas. Sci. Technol. 4 (1993) 907)."""
 MOUNTED = radians(0.5)
 """rad, by which a turned specimen stands otherwise than it did. Judgement: put up by hand against a stop."""
 PLANES = 3
@@ -154,7 +155,7 @@ def _second(separation: Callable[[Reading], float]) -> OtherReadingEntry:
 
 
 def read_by_another(scale: float, fitter: Fitter, fit: Fit, record: Record) -> Prediction:
-    """What another sensor reads: no cause of the first one acts on it, but a `scale` of each channel and one of all."""
+    """What another sensor reads: no cause of the first one acts on it, but a `scale` of each channel and, of several, one of all."""
     free, theta = fit.structure.free_parameters, fit.theta.copy()
     ours = [i for i, p in enumerate(free) if p.cause is not None and of_sensor(fit.structure.causes[p.cause])]
     for i in ours:
@@ -163,8 +164,10 @@ def read_by_another(scale: float, fitter: Fitter, fit: Fit, record: Record) -> P
     read = _from_its_zero(fitter, fit.structure, record, theta)
     read.slopes[:, :, ours] = 0.0
     n_y = read.y.shape[1]
-    own = np.concatenate([read.y[:, :, None] * np.eye(n_y), read.y[:, :, None]], axis=2)
-    return _beside(read, own, np.full(n_y + 1, scale))
+    own = read.y[:, :, None] * np.eye(n_y)
+    if n_y > 1:
+        own = np.concatenate([own, read.y[:, :, None]], axis=2)
+    return _beside(read, own, np.full(own.shape[2], scale))
 
 
 def read_turned(axis: int, fitter: Fitter, fit: Fit, record: Record) -> Prediction:
