@@ -43,7 +43,7 @@ def test_a_friction_in_proportion_to_the_speed_is_damping():
     """At the highest speed at which it creeps, and where the speeds recorded do not tell that one from its force; a sharp contact, which
     they do not tell from a sharper one, is friction."""
     fitter, _ = axis_fitter(n=800).described(AXIS)
-    friction = Hypothesis("coulomb", "stage:axis", "axis")
+    friction = Hypothesis("coulomb", "stage:axis", "axis", time=0.1)
 
     def against(force: float, smoothing: float) -> str:
         start = {"force": force, "reach": 1e-8, "smoothing": smoothing}

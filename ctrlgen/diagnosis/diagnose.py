@@ -39,6 +39,7 @@ from ctrlgen.diagnosis.selection.findings import findings, held_out_errors
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.search_result import SearchResult
+from ctrlgen.diagnosis.selection.speeds import counted_in_speeds
 from ctrlgen.diagnosis.selection.standing import answer_of, in_standing, possible
 from ctrlgen.diagnosis.selection.untried import refuse_without_trials, untried
 from ctrlgen.diagnosis.selection.verdict import Verdict, in_another_unit, verdict, within_tolerance
@@ -128,6 +129,7 @@ def _diagnose(
     parts = device.parts(nominal_physics(device))
     refused = not_offered(list(dict.fromkeys(h.effect for h in suspected)), parts) if laws is None else {}
     suspected = [with_odds(h, parts) for h in suspected if h.effect not in refused]
+    suspected = counted_in_speeds(suspected, fitter, device)
     step(f"refit of the device as described, {number_of(len(suspected), 'hypothesis', 'hypotheses')}")
     search = Searcher(fitter, Screen(fitter, suspected, seed), step, jobs).run(device)
     step("residual tests")

@@ -7,16 +7,16 @@ import casadi as ca
 from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, ShapeBounds, State, itself
 
 STILL = 1e-6  # of v_s: keeps speed/tanh(speed) from being 0/0 at rest
-SHARPEST = 1e-5  # typical travels a second: v_s of a contact that does not creep, as Dahl's
+SHARPEST = 1e-6  # of the speed that occurs: v_s of a contact that does not creep, as Dahl's
 CONTACT = (
     Param("force", "channel", (0.0, 1.0), "force of sliding", off=0.0),
     Param("reach", "travel", (1e-6, 0.03), "displacement over which the contact yields"),
-    Param("smoothing", "travel/s", (SHARPEST, 1e3), "v_s, below which it creeps"),
+    Param("smoothing", "travel/s", (SHARPEST, 100.0), "v_s, below which it creeps"),
 )
 FALLING = (
     Param("force", "channel", (0.0, 1.0), "force of sliding at speed", off=0.0),
     Param("breakaway", "1", (1.0, 5.0), "b: breakaway force per sliding force at speed"),
-    Param("speed", "travel/s", (1e-3, 1e3), "v_s: Stribeck speed, above which the excess has decayed"),
+    Param("speed", "travel/s", (1e-5, 100.0), "v_s: Stribeck speed, above which the excess has decayed"),
     Param("reach", "travel", (1e-6, 0.03), "displacement over which the contact yields"),
 )
 BRISTLES: tuple[State, ...] = (State("z", "1", 1.0),)

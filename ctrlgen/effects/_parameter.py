@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass, replace
 
 from ctrlgen.core.units import split_unit, to_si
 
 PLACEHOLDERS = ("channel", "travel", "partner")
+MOTION = (*PLACEHOLDERS, "s")
 
 
 @dataclass(frozen=True)
@@ -16,7 +18,8 @@ class Param:
 
     In `unit` the word `channel` stands for the unit of the signal that the effect acts on, `travel` for that of the stage
     displacement, and `partner` for that of the other channel of a pair. Bounds then count in typical sizes of these signals,
-    so that one law serves micrometres and degrees.
+    so that one law serves micrometres and degrees; beside `travel` the `s` counts in typical times (`Channel.time`), so that it serves
+    a fan and a resonator.
     """
 
     name: str
@@ -29,6 +32,11 @@ class Param:
     def relative(self) -> bool:
         """Whether the unit depends on where the effect acts."""
         return _is_relative(self.unit)
+
+    @property
+    def of_motion(self) -> bool:
+        """Whether it is a speed, or counts per speed or acceleration: how fast a machine moves no file says, but its records."""
+        return "travel" in split_unit(self.unit, MOTION)[0] and "s" in split_unit(self.unit, MOTION)[0]
 
 
 @dataclass(frozen=True)
@@ -56,7 +64,11 @@ class State:
 
 @dataclass(frozen=True)
 class Channel:
-    """One channel an effect can act on: unit and typical size (SI) of its signal and of the stage displacement."""
+    """One channel an effect can act on: unit and typical size (SI) of its signal and of the stage displacement.
+
+    `time` [s]: typical displacement over the speed that occurs, so that what counts in both is a speed, whatever stroke a file states;
+    1 s where no record says how fast the stage moves.
+    """
 
     name: str
     unit: str
@@ -66,6 +78,7 @@ class Channel:
     partner: str | None = None
     partner_unit: str = "1"
     partner_scale: float = 1.0
+    time: float = 1.0
 
     def paired_with(self, other: Channel) -> Channel:
         """The same channel as the first one of a pair."""
@@ -87,12 +100,19 @@ class Channel:
         """A bound, a start value or a scale of a law's number, in SI at this channel."""
         if not _is_relative(number.unit):
             return to_si(value, number.unit)
-        powers, rest = split_unit(number.unit, PLACEHOLDERS)
-        sizes = zip(PLACEHOLDERS, (self.scale, self.travel_scale, self.partner_scale), strict=True)
+        powers, rest = split_unit(number.unit, MOTION if "travel" in number.unit else PLACEHOLDERS)
+        sizes = zip(MOTION, (self.scale, self.travel_scale, self.partner_scale, self.time), strict=True)
         size = 1.0
         for word, scale in sizes:
             size *= scale ** powers.get(word, 0.0)
         return float(to_si(value, rest) * size)
+
+    def allowed(self, p: Param) -> tuple[float, float]:
+        """What a number of a law may be in a file [SI]: within its bounds; of one that counts in speeds only its sign is known."""
+        if not p.of_motion:
+            return self.si(p.bounds[0], p), self.si(p.bounds[1], p)
+        low = p.bounds[0]
+        return (-math.inf if low < 0 else math.ulp(0.0) if low > 0 else 0.0), math.inf
 
 
 def _is_relative(unit: str) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
@@ -89,7 +90,7 @@ def faults_at(effect: Effect, channel: Channel) -> list[tuple[str, str]]:
         if not param.relative:
             continue
         number, unit = effect.values[param.name], channel.unit_of(param)
-        low, high = (channel.si(bound, param) for bound in param.bounds)
+        low, high = channel.allowed(param)
         if not same_dimension(written_unit(number.text), unit):
             faults.append((param.name, f"{number.text!r} has the wrong unit at {channel.name}: {unit} is needed"))
         elif not _is_between(number.si, low, high):
@@ -98,11 +99,13 @@ def faults_at(effect: Effect, channel: Channel) -> list[tuple[str, str]]:
 
 
 def _is_between(si: float, low: float, high: float) -> bool:
-    rounding = 1e-12 * max(abs(low), abs(high))  # conversion between units rounds
+    rounding = 0.0 if math.inf in (-low, high) else 1e-12 * max(abs(low), abs(high))  # conversion between units rounds
     return low - rounding <= si <= high + rounding
 
 
 def _outside(param: Param, number: Quantity, low: float, high: float, unit: str) -> str:
+    if high == math.inf:
+        return f"{param.name} = {number.text} must be {'positive' if low > 0 else 'zero or positive'}"
     return f"{param.name} = {number.text} is outside {show(low, unit)} ... {show(high, unit)}"
 
 

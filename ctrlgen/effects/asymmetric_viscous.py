@@ -15,7 +15,7 @@ class AsymmetricViscous(Effect):
     family = Family.DYNAMICS
     requires = frozenset({"velocity"})
     source = "B. Armstrong-Helouvry et al., Automatica 30 (1994) 1083: direction-dependent friction"
-    params = (Param("damping", "channel*s/travel", (-10.0, 10.0), "forward minus backward damping", off=0.0),)
+    params = (Param("damping", "channel*s/travel", (-100.0, 100.0), "forward minus backward damping", off=0.0),)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -(p.damping * ca.fabs(s.velocity) + ca.fabs(p.damping) * s.velocity) / 2

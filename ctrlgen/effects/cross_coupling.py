@@ -37,7 +37,7 @@ class DampingCoupling(CrossCoupling):
     title = "A damper that two axes share"
     requires = frozenset({"force", "velocity"})
     active = True
-    params = (Param("damping", "channel*s/travel", (-10.0, 10.0), "cross damping", off=0.0),)
+    params = (Param("damping", "channel*s/travel", (-100.0, 100.0), "cross damping", off=0.0),)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.damping * s.velocities[s.partner]
@@ -50,7 +50,7 @@ class InertiaCoupling(CrossCoupling):
 
     title = "A mass that two axes share"
     requires = frozenset({"force", "acceleration"})
-    params = (Param("inertia", "channel*s^2/travel", (-10.0, 10.0), "cross inertia", off=0.0),)
+    params = (Param("inertia", "channel*s^2/travel", (-1e3, 1e3), "cross inertia", off=0.0),)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.inertia * s.accelerations[s.partner]

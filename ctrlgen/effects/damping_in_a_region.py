@@ -20,7 +20,7 @@ class ViscousAbove(RegionalDamping):
     Holds for slow flow."""
 
     title = "Damping in the upper part of the travel"
-    params = (Param("damping", "channel*s/travel", (0.0, 10.0), "c: damping beyond the edge", off=0.0), *EDGE)
+    params = (Param("damping", "channel*s/travel", (0.0, 100.0), "c: damping beyond the edge", off=0.0), *EDGE)
     at_bounds = above("damping everywhere")
     acts_in = ActsIn("position", "edge", Side.ABOVE, over="width")
 
@@ -47,8 +47,8 @@ class ViscousAtSpeed(RegionalDamping):
 
     title = "Damping above one speed alone"
     params = (
-        Param("damping", "channel*s/travel", (0.0, 10.0), "c: damping above the speed", off=0.0),
-        Param("speed", "travel/s", (1e-3, 1e3), "v_0: speed at which it sets in"),
+        Param("damping", "channel*s/travel", (0.0, 100.0), "c: damping above the speed", off=0.0),
+        Param("speed", "travel/s", (1e-5, 100.0), "v_0: speed at which it sets in"),
     )
     at_bounds = {"speed": ShapeBounds(low="damping everywhere")}
     acts_in = ActsIn("speed", "speed", Side.ABOVE)

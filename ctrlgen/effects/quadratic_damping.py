@@ -12,7 +12,7 @@ class QuadraticDamping(Effect):
     family = Family.DYNAMICS
     requires = frozenset({"velocity"})
     source = "definition: drag at constant drag coefficient"
-    params = (Param("damping", "channel*s^2/travel^2", (0.0, 10.0), "force per speed squared", off=0.0),)
+    params = (Param("damping", "channel*s^2/travel^2", (0.0, 1e4), "force per speed squared", off=0.0),)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.damping * s.velocity * ca.fabs(s.velocity)

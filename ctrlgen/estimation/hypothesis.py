@@ -63,6 +63,7 @@ class Hypothesis:
     machine_odds: ln of how many times commoner the law is in a machine of these parts than in any.
     longest: delay [s] that is looked for: shortest in the reading of a loop, where each sample of it is a state of the simulation.
     longest_period: way [SI] of a law that repeats along one, up to which the records show that it does.
+    time: typical displacement over the speed that occurs in the records [s], in which bounds per speed count (`Channel.time`).
     """
 
     effect: str
@@ -75,6 +76,7 @@ class Hypothesis:
     machine_odds: float = field(default=0.0, compare=False)
     longest: float = float("inf")
     longest_period: float = field(default=float("inf"), compare=False)
+    time: float = field(default=1.0, compare=False)
 
     def beside(self, causes: Sequence[Hypothesis]) -> Hypothesis | None:
         """The hypothesis to add to `causes`: itself, one more where it is there and repeatable, None where it cannot be added.
@@ -116,7 +118,7 @@ class Hypothesis:
     def channel_on(self, device: Device) -> Channel:
         """The channel of `device` at which the effect acts; the first one where it acts at several."""
         physics = nominal_physics(device)
-        channel = channels(physics, self.law.place)[self.acts_on(device)[0]]
+        channel = replace(channels(physics, self.law.place)[self.acts_on(device)[0]], time=self.time)
         if self.of is None:
             return channel
         return channel.paired_with(next(c for c in partner_channels(physics, self.law) if c.name == self.of))

@@ -10,6 +10,7 @@ import numpy as np
 from ctrlgen.diagnosis.selection.begun_again import begun_again
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.failures import FAILURES
+from ctrlgen.diagnosis.selection.far_off import nearer_when_simulated
 from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.diagnosis.selection.shifts import best_shift
 from ctrlgen.diagnosis.selection.subset_search import Suspect
@@ -24,7 +25,8 @@ from ctrlgen.estimation.structure import Structure
 def fit_candidates(trials: Trials, current: CandidateModel, screened: Screened) -> tuple[CandidateModel, ...]:
     """All that is tried beside `current`, the promising ones fitted to their end."""
 
-    candidates = fit_each(trials, current.fit, significant(trials, current, screened))
+    suspects = significant(trials, current, screened)
+    candidates = fit_each(trials, current.fit, [*suspects, *nearer_when_simulated(trials, current, screened, suspects)])
     alone = leaves_noise_alone(trials, current, candidates)
     if not current.errors.is_noise:
         begun = [t for t in candidates if not alone or takes_away_much(t, current)]

@@ -111,6 +111,16 @@ class SearchSettings:
     """The same of noise that only the misfit tells: it is the yardstick of everything else. Judgement."""
     candidates_per_round: int = 6
     """Single candidates fitted a round, and as many sets of each size."""
+    far_off: float = 0.1
+    """Residual over the motion that is read, both root mean squares, from which on the scores, of a linear model, tell little of which
+    cause a fit reaches: the others are simulated too. Judgement: a tenth of the motion moves what acts on it by about as much."""
+    far_off_factor: float = 4.0
+    """By which their amplitude is raised or lowered as long as that comes nearer: an amplitude within twice of the best begins a fit.
+    Judgement."""
+    far_off_steps: int = 8
+    """Times at most: five decades. Judgement."""
+    far_off_fits: int = 3
+    """Of them fitted, those that come nearest. Judgement."""
     cheap_factor: int = 3
     """Times as many for settled poses, whose fits are cheap."""
     regional_per_round: int = 3

@@ -104,7 +104,9 @@ def _smoothers(fit: Fit, table: SharesTable, channel: ChannelShares, signals: Se
         }
         rest = {p.name: 0.0 for p in law.params} | {law.amplitude().name: channel.rms}
         trials = tuple(rest | numbers for numbers in ranges[law.kind])
-        yield _Smoother(row.kind, Hypothesis(law.kind, f"mechanism:{at}", at, axis), trials)
+        # a speed is looked for about those that occur
+        time = nominal_physics(fit.structure.device).displacement_scale / (float(np.std(v)) or np.inf) or 1.0
+        yield _Smoother(row.kind, Hypothesis(law.kind, f"mechanism:{at}", at, axis, time=time), trials)
 
 
 def _position_and_speed(signals: Sequence[Signals], axis: str) -> tuple[list[np.ndarray], list[np.ndarray]]:
