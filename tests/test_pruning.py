@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from axis_records import AXIS, BACKLASH, LATE, fitter_of, played
+from axis_records import AXIS, BACKLASH, LATE, NOISE, H, axis_fitter, fitter_of, played
 
 from ctrlgen.diagnosis.selection import pruning
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
@@ -14,10 +14,12 @@ from ctrlgen.diagnosis.selection.pruning import all_pruned, pruned
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.trials import Trials
+from ctrlgen.diagnosis.settings import SEARCH
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.structure import Structure
 
 OFFSET = Hypothesis("drive_offset", "actuator:axis", "axis")
+CYCLIC, EVENT = Hypothesis("cyclic", "sensor:axis", "axis"), Hypothesis("sensor_step", "disturbance:axis", "axis")
 
 
 def nothing(_: str) -> None:
@@ -86,6 +88,37 @@ def test_what_takes_away_far_less_than_a_sound_cause_is_not_begun_elsewhere(pair
     assert begun == [((BACKLASH,), True), ((OFFSET,), False), ((BACKLASH, OFFSET), True)]
     all_pruned(trials, nominal, [bound], screened)
     assert begun[3:] == [((OFFSET,), True)]
+
+
+@pytest.mark.parametrize("refused", [(0, 1), (0,)])
+def test_causes_that_meet_an_objection_are_begun_in_the_starts_that_come_nearest(monkeypatch, refused):
+    """Of several causes as many starts as of one; those of one in their order. A fit ends where it will not reach what is there."""
+    pitch, n = 20e-6, 600
+    fitter = axis_fitter(n=n, change=lambda y, u: y + 20 * NOISE * np.sin(2 * np.pi * y / pitch))
+    trials = Trials(fitter, Screen(fitter, [CYCLIC, EVENT]), nothing)
+    line = {"amplitude": 10 * NOISE, "period": pitch, "phase": 0.0}
+    step = {"offset": 3 * NOISE, "moment": n * H / 2, "rise": 0.01}
+    before = trials.fit(Structure(AXIS))
+    candidate = trials.fit(Structure(AXIS).with_cause(CYCLIC, line).with_cause(EVENT, step))
+    starts = {
+        CYCLIC: [line, *(line | {"period": f * pitch} for f in (3.0, 0.6, 1.7, 0.3, 1.05))],
+        EVENT: [step, *(step | {"moment": f * n * H, "offset": 1e3 * NOISE} for f in (0.2, 0.3, 0.7, 0.8))],
+    }
+    monkeypatch.setattr(Trials, "objections", lambda *_: dict.fromkeys(refused, "it is another"))
+    begun, real = [], type(fitter).fit
+    monkeypatch.setattr(
+        type(fitter), "fit", lambda self, s, **more: begun.append((s, more.get("enough"))) or real(self, s, **more)
+    )
+    pruned(trials, candidate, (EVENT,) if refused == (0,) else (), starts, before)
+    elsewhere = [s.starts[0]["period"] / pitch for s, enough in begun if enough == before.fit.objective]
+    assert len(elsewhere) == SEARCH.restarts
+    if refused == (0,):
+        assert elsewhere == pytest.approx([3.0, 0.6, 1.7, 0.3])
+    else:
+        structure, most = candidate.fit.restarted, 1 + SEARCH.restarts
+        others = [structure.restarted(k, s) for k, c in enumerate((CYCLIC, EVENT)) for s in starts[c][1:most]]
+        nearest = sorted(map(fitter.rough_objective, others))[: SEARCH.restarts]
+        assert [fitter.rough_objective(s) for s, _ in begun] == pytest.approx(nearest)
 
 
 def test_a_trial_that_raises_is_noted_and_the_search_goes_on(monkeypatch):

@@ -136,3 +136,24 @@ def test_a_model_is_screened_again_where_errors_numbers_or_samples_have_changed(
     assert again(0.05, 1.005) and len(runs) == 1
     assert not again(0.2) and not again(fit_by=1.05) and not again(recording=replace(fitter.recording, notes=()))
     assert len(runs) == 4
+
+
+def test_what_ended_early_is_fitted_again_where_it_need_not_reach_as_much():
+    trials, current = trials_beside(fitter_of(played), [BACKLASH])
+    begun = current.fit.restarted.with_cause(BACKLASH, {"gap": 3e-8})
+    early = trials.fit(begun, BACKLASH, enough=-np.inf)
+    assert early.fit.values(0)["gap"] == 3e-8
+    whole = trials.fit(begun, BACKLASH, enough=early.fit.objective)
+    assert whole.fit.objective < 0.5 * early.fit.objective
+    assert trials.fit(begun, BACKLASH).fit is whole.fit
+
+
+def test_a_set_is_fitted_as_long_as_it_may_reach_what_a_smaller_one_did(monkeypatch):
+    trials, current = trials_beside(fitter_of(played), [BACKLASH, CLOCK])
+    screened = trials.screened(current)
+    single = trials.fit(current.fit.restarted.with_cause(CLOCK, {"delay": 1e-5}), CLOCK)
+    screened = replace(screened, subsets=((1e12, screened.suspects[:2]),))
+    asked = []
+    monkeypatch.setattr(Trials, "tried", lambda *_, enough: asked.append(enough) or [])
+    candidates.fit_subsets(trials, current, screened, [single])
+    assert asked == [pytest.approx(single.fit.objective)]

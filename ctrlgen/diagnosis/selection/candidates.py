@@ -267,7 +267,8 @@ def fit_subsets(
         structure = current.fit.restarted
         for s in suspects:
             structure = structure.with_cause(s.hypothesis, s.start)
-        return branch.tried(structure, suspects[-1].hypothesis, current.fit)
+        # more causes that leave more than fewer do are none
+        return branch.tried(structure, suspects[-1].hypothesis, current.fit, enough=current.fit.objective - best)
 
     for size in (2, 3, 4):
         explained = least <= (1 - MODEL_SELECTION.most_of_mismatch) * current.fitted.excess

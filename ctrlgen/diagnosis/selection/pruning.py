@@ -19,6 +19,7 @@ from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.estimation.structure import Structure
 
 
 def all_pruned(
@@ -89,18 +90,26 @@ def _begun_elsewhere(
     before: CandidateModel,
 ) -> CandidateModel | None:
     """The candidate that meets no objection and is better than `before`, one of its causes `against` which there is something
-    begun in its next starts, in their order; None where there is none."""
+    begun in its next starts; None where there is none. Those of one cause are taken in their order, as the screen saw them; of
+    several causes the few that come nearest when they are simulated."""
+    structure, begins = candidate.fit.restarted, list[tuple[float, Hypothesis, Structure]]()
+    several = len(against) > 1
     for k in against:
-        cause, structure = candidate.causes[k], candidate.fit.restarted
+        cause = candidate.causes[k]
         for start in _other_valleys(cause, starts.get(cause, ())):
             try:
                 begun = structure.restarted(k, start)
-                fit = trials.fitter.fit(begun, steps=SEARCH.candidate_steps)
-                again = trials.scored(begun, fit, candidate.cause)
-                if trials.selection.advantage(again, before) > 0 and not trials.objections(again, accepted):
-                    return again
+                begins.append((trials.fitter.rough_objective(begun) if several else 0.0, cause, begun))
             except FAILURES as error:
                 trials.note_failure(cause, error)
+    for _, cause, begun in sorted(begins, key=lambda b: b[0])[: SEARCH.restarts]:
+        try:
+            fit = trials.fitter.fit(begun, steps=SEARCH.candidate_steps, enough=before.fit.objective)
+            again = trials.scored(begun, fit, candidate.cause)
+            if trials.selection.advantage(again, before) > 0 and not trials.objections(again, accepted):
+                return again
+        except FAILURES as error:
+            trials.note_failure(cause, error)
     return None
 
 

@@ -159,7 +159,8 @@ class Trials:
         if not any(np.isfinite(self.fitter.predict(fit, r)).any() for r in self.fitter.fit_records):
             raise ArithmeticError("no reading that it predicts is finite")
         candidate = self.scored(structure, fit, cause)
-        self.fitted[key] = (candidate, steps)
+        # what ended early is no end of a fit that need not reach as much
+        self.fitted[key] = (candidate, steps if fit.objective <= enough else 0)
         return candidate
 
     def tried(
