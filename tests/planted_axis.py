@@ -6,7 +6,7 @@ Ramps, plays by the hundred, forces in steps of a tenth of a sample; each is dri
 from __future__ import annotations
 
 import numpy as np
-from axis_records import AXIS, H, move
+from axis_records import AXIS, KF, H, move
 from recovery import Planted
 from scipy.stats import norm
 
@@ -89,6 +89,15 @@ def cogging(u, t):
     return move(u, lambda time, q, v, memory: (-0.1 * np.sin(2 * np.pi * (q + v * H / 20) / 2.5e-5 + 0.7), memory))
 
 
+def force_factor(u, t):
+    """10 % less of the force at 50 um from 1e-5 m, in the middle of a step."""
+
+    def force(time, q, v, memory):
+        return -KF * u[min(int(time / H + 1e-6), len(u) - 1)] * 0.1 * ((q + v * H / 20 - 1e-5) / 5e-5) ** 2, memory
+
+    return move(u, force)
+
+
 def one_sided_stiffening(u, t):
     """2e8 N/m^2 beside a stiffness of 2e5 N/m: 10 % more of it at 100 um on the one side, less on the other."""
     return move(u, lambda time, q, v, memory: (-2e8 * (q + v * H / 20) ** 2, memory))  # in the middle of a step
@@ -158,6 +167,7 @@ ON_AXIS = {
     directional_friction: Planted(
         "stage:axis", {"force": 0.7, "skew": 2 / 7, "reach": 3e-6}, within={"force": 0.02, "skew": 0.05, "reach": 0.05}
     ),
+    force_factor: Planted("stage:axis", {"fall": 0.1 / 5e-5**2, "centre": 1e-5}, within={"fall": 0.02, "centre": 0.02}),
     one_sided_stiffening: Planted("stage:axis", {"k2": 2e8}, within={"k2": 0.02}),
     slack_friction: Planted(
         "stage:axis", {"force": 0.8, "slack": 2e-5, "reach": 8e-6}, within={"force": 0.02, "slack": 0.02, "reach": 0.05}

@@ -72,6 +72,8 @@ NEEDS: Mapping[str, LawNeeds] = MappingProxyType(
                 transmissions=_PERIODIC_PARTS,
             ),
         ),
+        # The field of a gap that a coil or an armature leaves; a ceramic has none
+        "force_factor": LawNeeds("it needs a coil or an armature", families=frozenset({"electromagnetic"})),
         "heater_resistance": _HEATER,
         "heat_loss": _HEATER,
         "heat_crosstalk": _HEATER,

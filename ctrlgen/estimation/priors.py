@@ -283,6 +283,11 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
                 "power": ParameterPrior((1.0, 1.5), usual=1.0),
             },
         ),
+        "force_factor": LawPrior(
+            "Higher orders of the force factor; 2 %: judgement. A coil is in the middle of its gap, or off it by as much as is usual.",
+            model_form_error=0.02,
+            parameters={"centre": ParameterPrior((-0.3, 0.0, 0.3), usual=0.0)},
+        ),
         "force_step": LawPrior(
             _EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, of_time=True, domain="disturbance", parameters=_EVENT
         ),
