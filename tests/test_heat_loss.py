@@ -1,4 +1,5 @@
-"""A heater whose loss does not rise in proportion to its temperature: how fast it cools, what holds it warm, and which physics it meets."""
+"""A heater whose loss does not rise in proportion to its temperature: how fast it cools, what holds it warm, which physics it meets, and
+how a diagnosis finds it, or does not where it has no such law."""
 
 from __future__ import annotations
 
@@ -8,7 +9,8 @@ from conftest import effect_device
 from scipy.integrate import solve_ivp
 from scipy.optimize import curve_fit
 
-from ctrlgen import build_model, simulate
+from ctrlgen import build_model, diagnose, simulate
+from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.model.inverse import invert
 
 AMBIENT, R, TAU = 295.15, 550.0, 5e-3  # of the hexapod's heaters [K, K/W, s]
@@ -69,3 +71,95 @@ def test_one_power_of_the_rise_is_radiation_or_a_conductivity_that_falls(top, si
     power = off(lambda x, b, n: b * (x / top) ** (1 + n), (1.0, 1.0))
     linear = off(lambda x, b: b * (x / top) ** 2, (1.0,))
     assert power < 0.013 and 0.05 < linear < 0.13
+
+
+CHEVRON = """kind = "mechanism"
+name = "chevron"
+title = "a chevron that pushes on a spring"
+source = "round numbers"
+
+[[material]]
+name = "silicon"
+young = "160 GPa"
+poisson = "0.22"
+expansion = "2.6e-6 1/K"
+expansion_slope = "5e-9 1/K^2"
+
+[[body]]
+name = "bar"
+
+[[element]]
+kind = "bent_beam"
+name = "beams"
+from = "ground"
+to = "bar"
+material = "silicon"
+at = ["0 mm", "0 mm", "0 mm"]
+along = [1, 0, 0]
+beams = "10"
+beam_angle = "4 deg"
+beam_length = "1 mm"
+beam_width = "12 um"
+beam_gap = "30 um"
+bar_width = "30 um"
+bar_half_height = "20 um"
+thickness = "30 um"
+
+[[actuator]]
+name = "heater"
+kind = "thermal"
+on = "beams"
+ambient = "20 degC"
+temperature_limit = "550 degC"
+thermal_resistance = { value = "500 K/W", sd = "2.5 K/W" }
+time_constant = { value = "20 ms", sd = "1 ms" }
+power_limit = "1 W"
+travel = "40 um"
+
+[output]
+body = "bar"
+at = ["0 mm", "0 mm", "0 mm"]
+channels = ["delta_x"]
+"""
+RECORDING = 'title = "a chevron"\ndevice = "chevron"\nkind = "series"\n' + "".join(
+    f'[[record]]\nfile = "{role}.csv"\nrole = "{role}"\ntime = {{ column = "t", unit = "s" }}\nbetween_samples = "held"\n'
+    for role in ("fit", "hold_out")
+)
+COLUMNS = """[columns]
+"drive.heater" = { column = "P", unit = "W" }
+"reading.delta_x" = { column = "x", unit = "um", noise = "10 nm" }
+"""
+STIFFNESS = 5770.673  # N/m, of the beams of this device
+
+
+def radiating(folder, seed=7, n=1000, h=4e-3, share=0.12):
+    """A record to fit and one to hold out of a heater that radiates `share` beside what it conducts at 700 K; steps of an eighth of a
+    sample."""
+    rng, cold = np.random.default_rng(seed), 293.15
+    beyond = share * (700 - cold) / (700**4 - cold**4 - 4 * cold**3 * (700 - cold))
+    for role in ("fit", "hold_out"):
+        powers, T, rows = np.repeat(rng.uniform(0.02, 0.9, n // 40 + 1), 40)[:n], cold, []
+        for k, P in enumerate(powers):
+            expands = (2.6e-6 + 5e-9 * (T - 273.15)) * (T - cold)
+            F = 20 * expands * 160e9 * 12e-6 * 30e-6 * np.sin(np.radians(4))
+            rows.append((k * h, P, F / STIFFNESS * 1e6 + 0.01 * rng.standard_normal()))
+            for _ in range(32):
+                lost = T - cold + beyond * (T**4 - cold**4 - 4 * cold**3 * (T - cold))
+                T += h / 32 * (500 * P - lost) / 20e-3
+        np.savetxt(folder / f"{role}.csv", rows, delimiter=",", header="t,P,x", comments="")
+    (folder / "device.toml").write_text(CHEVRON)
+    (folder / "recording.toml").write_text(RECORDING + COLUMNS)
+
+
+@pytest.mark.long
+def test_of_a_heater_that_radiates_no_law_is_certain_but_that_of_its_loss(tmp_path):
+    radiating(tmp_path)
+    rivals = ("bow", "expansion", "heater_resistance", "stiffening")
+    files = (tmp_path / "device.toml", tmp_path / "recording.toml")
+    without = diagnose(*files, laws=rivals, jobs=0)
+    assert without.verdict == Verdict.AMBIGUOUS
+    (first,) = without.findings
+    assert {first.effect, *(c.effect for c in first.alternatives)} > {"bow", "expansion"}
+    whole = diagnose(*files, laws=("heat_loss", *rivals), jobs=0)
+    (cause,) = whole.findings
+    assert whole.verdict == Verdict.EXPLAINED and cause.effect == "heat_loss" and not cause.contradicted

@@ -195,6 +195,7 @@ def test_what_fits_alike_and_is_unlikelier_of_its_size_is_told_and_nothing_likel
         ("counterparts", []),
         ("twins", []),
         ("as_plainer", []),
+        ("hidden_rivals", []),
         ("explains_alike_but_for_odds", True),
     ):
         monkeypatch.setattr(f"{module}.{name}", lambda *_, found=found: found)

@@ -9,7 +9,7 @@ import pytest
 from ctrlgen.diagnosis.report.nearly_as_large import nearly_as_large
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.findings import Finding, Role, WorthEntry, leading
-from ctrlgen.diagnosis.selection.standing import answer_of, in_standing, possible
+from ctrlgen.diagnosis.selection.standing import answer_of, by_heat, in_standing, possible
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.effects import Family
 from ctrlgen.estimation.hypothesis import Hypothesis
@@ -69,6 +69,16 @@ def test_alone_it_makes_the_answer_ambiguous_unless_noise_alone_is_left(verdict)
 def test_a_family_of_which_the_device_can_have_no_law_is_not_spoken_for():
     offered = [Hypothesis(effect, "sensor:axis", "axis") for effect in ("creep", "bow", "parameter")]
     assert possible(shares(0.9, 0.5), offered) == [(Family.CREEP, 0.5)]
+
+
+@pytest.mark.parametrize(("laws", "share"), [(["heat_loss", "creep"], 0.7), (["creep", "parameter"], 0.02)])
+def test_what_goes_by_the_place_of_a_heated_stage_may_be_of_its_heat(laws, share):
+    offered = [Hypothesis(effect, "actuator:axis", "axis") for effect in laws]
+    told = by_heat([(Family.ELASTIC, 0.7), (Family.THERMAL, 0.02)], offered)
+    assert told[0] == (Family.ELASTIC, 0.7) and dict(told)[Family.THERMAL] == share
+    assert dict(told).get(Family.DRIVE) == (share if share == 0.7 else None)
+    (found,) = in_standing([finding("heat_loss")], told)
+    assert found.contradicted == (share < 0.7)
 
 
 @pytest.mark.parametrize(

@@ -40,7 +40,7 @@ from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.selection.speeds import counted_in_speeds
-from ctrlgen.diagnosis.selection.standing import answer_of, in_standing, possible
+from ctrlgen.diagnosis.selection.standing import answer_of, by_heat, in_standing, possible
 from ctrlgen.diagnosis.selection.untried import refuse_without_trials, untried
 from ctrlgen.diagnosis.selection.verdict import Verdict, in_another_unit, verdict, within_tolerance
 from ctrlgen.diagnosis.selection.way_covered import where_it_turns, with_longest_periods
@@ -149,7 +149,7 @@ def _diagnose(
     found = (*findings(search, attribution, likelihoods), *detected)
     if shares is not None:
         noise = dict(zip(search.fitter.recording.channels, search.fitter.noise.floor.tolist(), strict=True))
-        spoken_for = ranking(shares.before, noise)
+        spoken_for = by_heat(ranking(shares.before, noise), suspected)
         spoken_for = spoken_for if laws is not None else possible(spoken_for, suspected)
         found = in_standing(found, spoken_for, alone(shares.before, noise))
         answer = answer_of(answer, found, search.chosen.errors.is_noise)

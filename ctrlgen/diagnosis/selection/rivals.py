@@ -11,6 +11,7 @@ from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, l
 from ctrlgen.diagnosis.selection.candidates import significant, trying
 from ctrlgen.diagnosis.selection.confusable import explains_alike, explains_better
 from ctrlgen.diagnosis.selection.failures import FAILURES
+from ctrlgen.diagnosis.selection.form_errors import hidden_rivals
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.other_laws import stands_for_another
 from ctrlgen.diagnosis.selection.precedence import counterparts, explains_alike_but_for_odds
@@ -161,7 +162,7 @@ Alike = tuple[CandidateModel, ...]
 
 def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Round] = ()) -> tuple[Alike, Alike]:
     """What explains alike in place of cause k, or is the plainer law that the fit does not exclude; with what the `rounds` tried in its
-    place. And what fits alike, and is unlikely of the size that it takes."""
+    place, and what an error of form hides. And what fits alike, and is unlikely of the size that it takes."""
     there, plainer = current.causes, as_plainer(trials, current, k)
     tried = [t for r in rounds for t in r.candidates if not current.errors.is_noise]
     candidates = [
@@ -170,15 +171,16 @@ def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Rou
         *twins(trials, current, k),
         *_in_place_of(k, there, tried),
     ]
+    hidden = hidden_rivals(trials, current, k, candidates)
     # what the cause stands for need not do quite as well
     slack = SEARCH.bound_slack if stands_for_another(current.fit, k) else 0.0
 
     def is_alike(t: CandidateModel) -> bool:
-        return t in plainer or explains_alike(trials.selection, t, current, slack)
+        return t in plainer or t in hidden or explains_alike(trials.selection, t, current, slack)
 
     alike = {
         t.cause: t
-        for t in reversed(candidates)
+        for t in reversed([*candidates, *hidden])
         if not (_same_name(t.cause, there[k]) or _contains(t, there[k]) or _one_law(t.cause, there[k])) and is_alike(t)
     }
     # a line and a pitch at one speed: how rare a line is does not tell them apart

@@ -18,7 +18,7 @@ from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.diagnosis.settings import STANDING
 from ctrlgen.diagnosis.shares.families import family_of
 from ctrlgen.effects import Family
-from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 
 NOTHING: Mapping[Family, float] = MappingProxyType({})
 
@@ -36,6 +36,17 @@ def possible(shares: Sequence[tuple[Family, float]], offered: Sequence[Hypothesi
     """The `shares` without families of which such a device has no law, as an axis without a spring has no nonlinear one."""
     families = {family_of(h.effect) for h in offered}
     return [(family, share) for family, share in shares if family in families]
+
+
+def by_heat(shares: Sequence[tuple[Family, float]], offered: Sequence[Hypothesis]) -> list[tuple[Family, float]]:
+    """The `shares` of a device that heaters move in balance, which has laws of the heat: its place goes by their temperature, and what is
+    a function of the place may be of the heat, or of how the heater takes its drive. Else as they are."""
+    if not any(h.effect != PARAMETER and "heat" in h.law.requires for h in offered):
+        return list(shares)
+    share = dict(shares)
+    for family in (Family.THERMAL, Family.DRIVE):
+        share[family] = max(share.get(family, 0.0), share.get(Family.ELASTIC, 0.0))
+    return sorted(share.items(), key=lambda pair: -pair[1])
 
 
 def answer_of(verdict: Verdict, findings: Sequence[Finding], exact: bool) -> Verdict:

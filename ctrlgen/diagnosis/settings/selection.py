@@ -177,6 +177,11 @@ class ConfusableSettings:
     """Difference of the criterion T below which two models explain alike: three standard deviations."""
     most_listed: int = 3
     """Causes that are listed as alike at most."""
+    form_samples: float = 6.0
+    """Independent samples of an error of form in a channel: a smooth curve over the way with as many bends. Two models whose errors differ
+    by less than a factor of 1.5 in both kinds of records are then not told apart. Judgement."""
+    unfinished: float = 3.0
+    """Multiple of the criterion within which a rival that was fitted for a few steps is fitted to its end: it leaves less then."""
 
 
 @dataclass(frozen=True)
