@@ -30,6 +30,17 @@ def drive_offset(u, t):
     return move(u + 0.05)
 
 
+def coil_heating(u, t):
+    """Copper of 4 Ohm that 8 W would heat by 80 K in the end, in steps of a sample; cold at first."""
+    resistance, warmth, out = 4.0, 0.0, []
+    for volts in u:
+        hot = resistance * (1 + 3.9e-3 * warmth)
+        out.append(volts * resistance / hot)
+        end = 10.0 * volts**2 / hot
+        warmth = end + (warmth - end) * np.exp(-H / 0.5)
+    return move(np.array(out))
+
+
 def cubic_sensor(u, t):
     y = move(u)
     return y + 2e6 * y**3
@@ -158,6 +169,7 @@ ON_AXIS = {
     asymmetric_gain: Planted("actuator:axis", {"gain": 0.03}),
     reversed: Planted("actuator:axis", {}),
     drive_offset: Planted("actuator:axis", {"offset": 0.05}),
+    coil_heating: Planted("actuator:axis", {"rise": 3.9e-3 * 10 / 4, "tau": 0.5}, within={"rise": 0.05, "tau": 0.05}),
     cubic_sensor: Planted("sensor:axis", {"curvature": 2e6}),
     stitching_error: Planted("sensor:axis", {"offset": 4e-7, "position": 2e-5, "width": 2e-6}, within={"width": 0.1}),
     sensor_step: Planted("disturbance:axis", {"offset": 2e-7, "moment": 1.1, "rise": 0.02}, within={"rise": 0.1}),

@@ -280,6 +280,11 @@ LAWS = {
     ),
     "cubic_sensor": ({}, lambda s, p: p.curvature * s.value**3),
     "cyclic": ({"period": 0.4, "phase": 0.9}, lambda s, p: p.amplitude * sin(TWO_PI * s.value / 0.4 + 0.9)),
+    "coil_heating": (
+        {"tau": 0.4},
+        lambda s, p: s.value / (1 + p.rise * s.w) - s.value,
+        lambda s, p: {"w": (s.value**2 / (1 + p.rise * s.w) - s.w) / 0.4},
+    ),
     "dead_zone": ({"rounding": 0.3}, dead),
     "degradation": ({"levels_off": 3.0}, lambda s, p: -p.rate * 3.0 * (1 - exp(-s.t / 3.0)) * s.value),
     "delay": None,  # below: exact for the polynomials that it interpolates by

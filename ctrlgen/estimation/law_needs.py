@@ -74,6 +74,8 @@ NEEDS: Mapping[str, LawNeeds] = MappingProxyType(
         ),
         # The field of a gap that a coil or an armature leaves; a ceramic has none
         "force_factor": LawNeeds("it needs a coil or an armature", families=frozenset({"electromagnetic"})),
+        # A stack takes no power to speak of, and a heater has laws of its own
+        "coil_heating": LawNeeds("it needs a coil", families=frozenset({"electromagnetic"})),
         "heater_resistance": _HEATER,
         "heat_loss": _HEATER,
         "heat_crosstalk": _HEATER,

@@ -17,6 +17,7 @@ from ctrlgen.effects import Effect
 from ctrlgen.estimation.law_prior import CREEPING, ONE_IN_A_HUNDRED, ONE_IN_TEN, LawPrior, ParameterPrior, peaks
 from ctrlgen.estimation.priors_in_a_region import IN_A_REGION
 from ctrlgen.estimation.priors_of_a_lag import HYSTERESIS, OF_A_LAG
+from ctrlgen.estimation.priors_of_heat import OF_HEAT
 
 
 def prior_of(law: type[Effect]) -> LawPrior:
@@ -193,11 +194,6 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             "From a loss that ends within the recording to a steady one.",
             parameters={"levels_off": _starts((3.0, 30.0, 1e4))},
         ),
-        "heat_loss": LawPrior(
-            "No power of the rise is radiation: 1 %, as its file says. Starts: silicon that conducts less, a coefficient, radiation.",
-            model_form_error=0.01,
-            parameters={"power": ParameterPrior((0.6, 1.0, 1.6), usual=1.0)},
-        ),
         "reversed": LawPrior(
             "A wiring fault is rarer than a wrong gain: judgement. A lead is swapped or it is not.",
             log_prior_odds=ONE_IN_TEN,
@@ -219,14 +215,6 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             log_prior_odds=ONE_IN_TEN,
             domain="mechanism",
             parameters={"share": ParameterPrior(fixed_range=(0.9, 1.1))},
-        ),
-        "thermal_lag": LawPrior(
-            "Three time constants stand for a continuous body; 2 %: judgement. Their ratio: between one mass and a rod (1/9) and above.",
-            model_form_error=0.02,
-            parameters={
-                "tau": _starts((0.01, 0.05, 0.3, 1.0, 3.0, 10.0, 60.0)),
-                "second": _starts((0.05, 0.3)),
-            },
         ),
         # Force ----------------------------------------------------------------------------------------------------------------
         "asymmetric_hysteresis": LawPrior(
@@ -266,6 +254,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             parameters={"reach": peaks(3e-4, 3e-3, 0.03), "smoothing": CREEPING},
         ),
         **IN_A_REGION,
+        **OF_HEAT,
         **OF_A_LAG,
         "directional_friction": LawPrior(
             "Dry friction alike in both directions is commoner: judgement. " + _DRY_FRICTION,
