@@ -28,10 +28,7 @@ def prior_of(law: type[Effect]) -> LawPrior:
 DEFAULT = LawPrior()
 _starts = ParameterPrior  # shorthand: _starts((0.1, 1.0)) is a parameter with these start values alone
 
-
 _LOOP = ParameterPrior((0.01, 0.03, 0.1, 0.3, 1.0))
-
-
 _EVENT = {"moment": ParameterPrior(start_from_data="moments"), "rise": peaks(1.0)}  # it may happen at any time
 _EVENTS_ARE_RARE = (
     "An event at any time. Laws that act always come first among equals: most of a hundred records have no event, and a step fits "
@@ -371,22 +368,18 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
                 "asymmetric_viscous",
                 "coupling",
                 "cubic_sensor",
-                "damping_coupling",
+                *(f"{what}_coupling" for what in ("damping", "inertia", "stiffness")),
                 "drive_gain",
                 "expansion",
-                "frame_rotation_x",
-                "frame_rotation_y",
-                "frame_rotation_z",
+                *(f"frame_rotation_{axis}" for axis in "xyz"),
                 "heat_crosstalk",
                 "heater_resistance",
-                "inertia_coupling",
                 "link_compliance",
                 "quadratic_damping",
                 "raised_point",
                 "screw_motion",
                 "stiffening",
                 "stiffness",
-                "stiffness_coupling",
             ),
             DEFAULT,
         ),
