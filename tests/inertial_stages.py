@@ -87,7 +87,7 @@ EFFECTS = {
     "saturation": 'share = "1"\nlevel = "1.5 V"',
     "resonance": 'stiffness = "0.05 N/um"\nfrequency = "300 Hz"\ndamping = "0.01"',
     "creep": 'gain = "3 %"\ntau = "0.5 s"\nslow = "30 %"',
-    "coil_heating": 'rise = "0.1 1/V^2"\ntau = "0.2 s"',
+    "coil_heating": 'rise = "0.05 1/V^2"\ntau = "0.2 s"',
     "thermal_lag": 'share = "0.2"\ntau = "0.01 s"\nsecond = "0.3"',
     "hysteresis": 'stiffness = "0.02 N/um"\nreach = "10 um"\ntaper = "0.5"',
     "drive_hysteresis": 'share = "0.1"\nreach = "1 V"\ntaper = "0.5"',

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from conftest import AXIS_FILE
 from law_inputs import law_inputs
-from written_laws import H
+from written_terms import H
 
 import ctrlgen.effects  # noqa: F401  fills the library
 from ctrlgen import build_model, load_device, simulate

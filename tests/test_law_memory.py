@@ -12,7 +12,8 @@ from conftest import AXIS_FILE
 from law_inputs import law_inputs
 from numpy import abs, exp, sign, tanh
 from scipy.integrate import solve_ivp
-from written_laws import H, parameters
+from written_laws import parameters
+from written_terms import H
 
 import ctrlgen.effects  # noqa: F401  fills the library
 from ctrlgen import build_model

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from law_inputs import law_inputs
 from numpy import sqrt
-from written_laws import AMPLITUDES, LAWS, ROUNDING, H, parameters
+from written_laws import AMPLITUDES, LAWS, parameters
+from written_terms import ROUNDING, H
 
 import ctrlgen.effects  # noqa: F401  fills the library
 from ctrlgen.effects import Effect, LawInputs

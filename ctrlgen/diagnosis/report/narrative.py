@@ -9,6 +9,7 @@ from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.experiment_sentences import experiment_sentence
 from ctrlgen.diagnosis.report.history_table import most_gained, quantity
 from ctrlgen.diagnosis.report.luck_sentences import luck_steps
+from ctrlgen.diagnosis.report.on_the_clock import used_for_another_run
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding, Role
@@ -147,7 +148,10 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
 
 def _steps(diagnosis: Diagnosis) -> list[str]:
     verdict = diagnosis.verdict
-    use = "Use device.next.toml in place of the device file: solve and generate the C with it, then record again to confirm."
+    use = used_for_another_run(
+        diagnosis.findings,
+        "Use device.next.toml in place of the device file: solve and generate the C with it, then record again to confirm.",
+    )
     errors = diagnosis.held_out.values()
     known = all(e.noise_floor is not None for e in errors)
     told = known and all(e.goes_with_motion is None for e in errors)
@@ -161,7 +165,10 @@ def _steps(diagnosis: Diagnosis) -> list[str]:
     if verdict == Verdict.AMBIGUOUS:
         return [
             experiment_sentence(diagnosis.next_experiment),
-            "device.next.toml holds the best of them, which predicts recordings of this kind as well as the others do."
+            used_for_another_run(
+                diagnosis.findings,
+                "device.next.toml holds the best of them, which predicts recordings of this kind as well as the others do.",
+            )
             + rest,
         ]
     steps = [_use(diagnosis)]
@@ -201,7 +208,7 @@ def _use(diagnosis: Diagnosis) -> str:
     """What device.next.toml may be used for where the answer is not certain."""
     if not diagnosis.findings:
         return EMPIRICAL_ALONE if diagnosis.empirical_terms else NOTHING_FOUND
-    return BETTER if predicts_better(diagnosis) else WORSE
+    return used_for_another_run(diagnosis.findings, BETTER) if predicts_better(diagnosis) else WORSE
 
 
 def predicts_better(diagnosis: Diagnosis) -> bool:

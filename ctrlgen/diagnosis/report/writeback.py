@@ -39,6 +39,7 @@ from ctrlgen.diagnosis.report.narrative import (
     hard,
     predicts_better,
 )
+from ctrlgen.diagnosis.report.on_the_clock import used_for_another_run
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.estimation.free_parameters import FreeParameter
 from ctrlgen.estimation.hypothesis import PARAMETER, numbers
@@ -141,7 +142,8 @@ def _header(diagnosis: Diagnosis, changed: list[str]) -> str:
     if changed:
         lines.append(f"Parameters changed above: {', '.join(changed)}.")
     if diagnosis.findings:
-        lines.append(BETTER if predicts_better(diagnosis) else WORSE)
+        better = predicts_better(diagnosis)
+        lines.append(used_for_another_run(diagnosis.findings, BETTER) if better else WORSE)
     if diagnosis.verdict == Verdict.UNEXPLAINED:
         lines.append("This does NOT explain the recording: the values are the best fit, not physical parameters.")
     kept = (hard(" ".join(line.split())) for line in lines)

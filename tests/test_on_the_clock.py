@@ -1,0 +1,54 @@
+"""What holds for one recording alone is told before C is generated with it."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+from axis_records import AXIS
+
+from ctrlgen.diagnosis.report.on_the_clock import runs_on_the_clock, used_for_another_run
+from ctrlgen.estimation.hypothesis import Hypothesis, hypotheses, nominal_physics
+
+USE = "Use it."
+CREEP, DRIFT, STEP = (
+    Hypothesis("creep", "stage:axis", "axis"),
+    Hypothesis("drift", "sensor:axis", "axis"),
+    Hypothesis("sensor_step", "disturbance:axis", "axis"),
+)
+MASS = Hypothesis("parameter", "axis", path="mechanics.mass")
+RUNS = "of which another run knows nothing"
+
+
+@pytest.mark.parametrize(
+    "causes, told",
+    [
+        ((), USE),
+        ((CREEP, MASS), USE),
+        (
+            (DRIFT,),
+            f"Generate no C with device.next.toml: drift at sensor:axis runs on the clock of these records, {RUNS}.",
+        ),
+        (
+            (DRIFT, STEP),
+            "Generate no C with device.next.toml: drift at sensor:axis and sensor_step at disturbance:axis run on the clock of these "
+            f"records, {RUNS}.",
+        ),
+        (
+            (CREEP, DRIFT),
+            "Before C is generated with device.next.toml, take out what holds for this recording alone: drift at sensor:axis runs on the "
+            f"clock of these records, {RUNS}. {USE}",
+        ),
+    ],
+)
+def test_what_runs_on_the_clock_of_the_records_is_taken_out_first(causes, told):
+    assert used_for_another_run([SimpleNamespace(cause=c) for c in causes], USE) == told
+
+
+def test_every_law_that_is_a_function_of_time_alone_runs_on_the_clock():
+    offered = hypotheses(AXIS, nominal_physics(AXIS), ("reading.axis",), None, False)
+    of_time = [h for h in offered if h.effect != "parameter" and h.prior.of_time]
+    assert len({h.effect for h in of_time}) > 3 and all(map(runs_on_the_clock, of_time))
+    assert not any(
+        map(runs_on_the_clock, (h for h in offered if h.effect in {"creep", "drive_gain", "delay", "coulomb"}))
+    )
