@@ -202,6 +202,13 @@ def test_an_interruption_that_a_callback_swallows_ends_the_work_too():
     assert done.returncode == 130 and "Traceback" not in done.stderr and "interrupted" in done.stderr
 
 
+def handles(pid: int, number: signal.Signals) -> bool:
+    """Whether a process has a handler of its own for a signal."""
+    status = Path(f"/proc/{pid}/status").read_text()
+    caught = next((line.split()[1] for line in status.splitlines() if line.startswith("SigCgt:")), "0")
+    return bool(int(caught, 16) >> (number - 1) & 1)
+
+
 MOMENTS = [(stop, after) for stop in (signal.SIGINT, signal.SIGTERM) for after in (0.05, 0.6, 1.4, 2.2, 3.0)]
 QUICK = ((signal.SIGINT, 0.05), (signal.SIGTERM, 2.2))
 
@@ -219,17 +226,17 @@ def test_an_interruption_at_any_moment_leaves_nothing_behind(tmp_path, stop, aft
         text=True,
         start_new_session=True,
     )
-    while not Path(f"/proc/{process.pid}/cmdline").read_bytes().count(b"ctrlgen"):
+    while not handles(
+        process.pid, signal.SIGTERM
+    ):  # before, on a busy machine for seconds, Python itself is not there yet
         time.sleep(0.005)
-    time.sleep(0.1 + after)
+    time.sleep(after)
     os.killpg(process.pid, stop)
     _, message = process.communicate(timeout=60)
     assert "Traceback" not in message
     if process.returncode == 0:  # too late: it had finished, and the result is whole
         assert {p.name for p in out.iterdir()} >= {"c", "figures", "summary.json", "trajectory.csv", "report.html"}
         assert list(tmp_path.iterdir()) == [out]
-    elif process.returncode == -stop and after < 0.1:  # too early: on a busy machine nothing of ctrlgen had run
-        assert not message and list(tmp_path.iterdir()) == []
     else:
         assert process.returncode == 130 and "nothing was written" in message
         assert list(tmp_path.iterdir()) == []
