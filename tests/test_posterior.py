@@ -13,7 +13,7 @@ from ctrlgen.estimation.posterior import Posterior
 from ctrlgen.estimation.prediction_uncertainty import prediction_uncertainty
 from ctrlgen.estimation.structure import Structure
 
-RUBBING = {"force": 0.05, "reach": 3e-8, "smoothing": 1e-9}  # the sharpest corner
+RUBBING = {"force": 0.05, "reach": 3e-8, "smoothing": 1e-10}  # the sharpest corner
 STRUCTURE = Structure(AXIS).with_cause(Hypothesis("coulomb", "stage:axis", "axis"), RUBBING)
 NAMES = [p.name for p in STRUCTURE.free_parameters]
 FORCE, CORNER = NAMES.index("force"), NAMES.index("smoothing")
@@ -34,8 +34,8 @@ def test_a_well_determined_number_has_the_deviation_of_the_curvature():
     posterior = Posterior.of(fit_with(slopes(force=1e-6)))
     assert posterior.sd[FORCE] == pytest.approx(1e-6, rel=1e-6)
     # by its logarithm
-    sharp = Posterior.of(fit_with(slopes(smoothing=1e-11)))
-    assert sharp.sd[CORNER] == pytest.approx(1e-2, rel=1e-4) and sharp.x(STRUCTURE.start)[CORNER] == np.log(1e-9)
+    sharp = Posterior.of(fit_with(slopes(smoothing=1e-12)))
+    assert sharp.sd[CORNER] == pytest.approx(1e-2, rel=1e-4) and sharp.x(STRUCTURE.start)[CORNER] == np.log(1e-10)
 
 
 def test_a_number_that_the_readings_hardly_show_is_somewhere_within_its_bounds():
@@ -49,7 +49,7 @@ def test_a_number_that_the_readings_hardly_show_is_somewhere_within_its_bounds()
 
 def test_a_step_that_ends_at_a_bound_is_the_best_of_the_other_numbers():
     """Two numbers of which the records see a sum: the corner cannot become sharper, so the force alone follows."""
-    posterior = Posterior.of(fit_with(slopes(force=1e-3, smoothing=1e-9)))
+    posterior = Posterior.of(fit_with(slopes(force=1e-3, smoothing=1e-10)))
     H, gradient = np.zeros((len(NAMES), len(NAMES))), np.zeros(len(NAMES))
     both = [FORCE, CORNER]
     H[np.ix_(both, both)] = 100.0
@@ -59,7 +59,7 @@ def test_a_step_that_ends_at_a_bound_is_the_best_of_the_other_numbers():
     inward = posterior.step(STRUCTURE.start, -gradient, H)
     assert inward[CORNER] > 0 and inward[FORCE] / posterior.sd[FORCE] == pytest.approx(100 / 201, rel=0.01)
     moved = posterior.moved(STRUCTURE.start, inward)
-    assert moved[CORNER] == pytest.approx(1e-9 * np.exp(inward[CORNER])) and posterior.penalty(moved) > 0
+    assert moved[CORNER] == pytest.approx(1e-10 * np.exp(inward[CORNER])) and posterior.penalty(moved) > 0
     assert posterior.penalty(STRUCTURE.start) == 0.0
 
 

@@ -15,16 +15,17 @@ from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.diagnosis.selection.shifts import best_shift
 from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.selection.trials import Trials
-from ctrlgen.diagnosis.settings import MODEL_SELECTION, REGIONS, SEARCH
+from ctrlgen.diagnosis.settings import MODEL_SELECTION, REGIONS, SEARCH, SUBSETS
 from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis
 from ctrlgen.estimation.settings import FIT
 from ctrlgen.estimation.structure import Structure
 
 
-def fit_candidates(trials: Trials, current: CandidateModel, screened: Screened) -> tuple[CandidateModel, ...]:
-    """All that is tried beside `current`, the promising ones fitted to their end."""
-
+def fit_candidates(
+    trials: Trials, current: CandidateModel, screened: Screened, most: int = SUBSETS.largest
+) -> tuple[CandidateModel, ...]:
+    """All that is tried beside `current`, `most` causes at once, the promising ones fitted to their end."""
     suspects = significant(trials, current, screened)
     candidates = fit_each(trials, current.fit, [*suspects, *nearer_when_simulated(trials, current, screened, suspects)])
     alone = leaves_noise_alone(trials, current, candidates)
@@ -42,7 +43,7 @@ def fit_candidates(trials: Trials, current: CandidateModel, screened: Screened) 
     if trials.selection.parameters_may_mask_cause(current.fit):
         candidates = (*candidates, *_as_stated(trials, current))
     if not alone:
-        candidates = (*candidates, *fit_subsets(trials, current, screened, candidates))
+        candidates = (*candidates, *fit_subsets(trials, current, screened, candidates, most))
     return _converge_promising(trials, current, candidates)
 
 
@@ -252,10 +253,14 @@ def _as_stated(trials: Trials, current: CandidateModel) -> tuple[CandidateModel,
 
 
 def fit_subsets(
-    trials: Trials, current: CandidateModel, screened: Screened, singles: Sequence[CandidateModel]
+    trials: Trials,
+    current: CandidateModel,
+    screened: Screened,
+    singles: Sequence[CandidateModel],
+    most: int = SUBSETS.largest,
 ) -> list[CandidateModel]:
-    """Sets of suspects that promise more than any single one gave; each size must promise more than the smaller. None where a
-    single one leaves noise alone."""
+    """Sets of suspects, `most` of them at most, that promise more than any single one gave; each size must promise more than the
+    smaller. None where a single one leaves noise alone."""
     known = bool(trials.fitter.noise.known.all())
     if known and any(t.errors.is_noise and not current.errors.is_noise for t in singles):
         return []
@@ -270,7 +275,7 @@ def fit_subsets(
         # more causes that leave more than fewer do are none
         return branch.tried(structure, suspects[-1].hypothesis, current.fit, enough=current.fit.objective - best)
 
-    for size in (2, 3, 4):
+    for size in range(2, min(most, SUBSETS.largest) + 1):
         explained = least <= (1 - MODEL_SELECTION.most_of_mismatch) * current.fitted.excess
         if size > 2 and explained and trials.fitter.recording.kind == "series":
             break

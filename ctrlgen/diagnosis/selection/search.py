@@ -211,7 +211,8 @@ class Searcher:
             if len(current.causes) >= most or trials.selection.residual_within_model_form_error(current):
                 return self._in_finer_form(current)
             screened = trials.screened(current)
-            candidates = all_pruned(trials, current, fit_candidates(trials, current, screened), screened)
+            tried = fit_candidates(trials, current, screened, int(most) - len(current.causes))
+            candidates = all_pruned(trials, current, tried, screened)
             candidates = trials.selection.ranked(candidates)
             better = [t for t in candidates if trials.selection.improves_enough(current, t)]
             best = self._most_parsimonious(current, better, screened) if better else current
