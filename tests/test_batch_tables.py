@@ -121,7 +121,7 @@ def test_a_batch_goes_on_after_its_scheduler_was_killed(tmp_path):
 
         with pytest.raises(InputError, match="is gone; what is finished stays"):
             run_batch(tasks, out, scheduler=scheduler.address, progress=told)
-    first = {p.parent.name for p in out.glob("*/diagnosis.json")}
+    first = {p.parent.name for p in out.glob("[!.]*/diagnosis.json")}
     assert len(first) == 1 and json.loads((out / "batch.json").read_text())["done"] == 1
     with Scheduler(tmp_path / "second") as scheduler:
         rows = run_batch(tasks, out, scheduler=scheduler.address)
