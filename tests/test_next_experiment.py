@@ -188,7 +188,9 @@ def test_what_is_read_otherwise_is_told_where_it_decides_and_where_nothing_does(
         entries = (
             OtherReadingEntry(kind=text, description=text, scale=None, separation=s, settles=s > 3) for text, s in rows
         )
-        design = replace(found, after=after, alternative=None, readings=OtherReadings(gain, height, tuple(entries)))
+        design = replace(
+            found, after=after, alternative=None, readings=OtherReadings(gain, height, tuple(entries), True)
+        )
         return experiment_sentence(design)
 
     both = "sensor_gain at sensor:axis from a wrong mechanism:height"

@@ -7,8 +7,8 @@ class CoilHeating(Effect):
     """dw/dt = (u^2/(1 + c w) - w)/tau, Delta u = -u c w/(1 + c w): the resistance rises by the share c w.
 
     Power compression: copper gains 0.39 % of its resistance a kelvin, and the power of a voltage, of which w is the lagged one in terms of
-    the cold coil, falls as the resistance rises. Holds for one thermal mass, at the temperature of its
-    surroundings when a record begins, well below the corner L/R, and for no amplifier that controls the current.
+    the cold coil, falls as the resistance rises. Holds for one thermal mass, at the temperature of its surroundings when a record begins,
+    well below the corner L/R, and for no amplifier that controls the current.
     """
 
     place = Place.DRIVE

@@ -65,7 +65,7 @@ class OtherReadings:
     of_sensor: Hypothesis
     of_device: Hypothesis
     entries: tuple[OtherReadingEntry, ...]
-    settled: bool = True
+    settled: bool
 
 
 class _Turned(FrameRotation, listed=False):

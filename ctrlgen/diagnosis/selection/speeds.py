@@ -18,9 +18,8 @@ from ctrlgen.estimation.described_device import described
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, nominal_physics
 
-LEAST_SHARE = (
-    1e-3  # of the motion foretold that is read, below which the reading is taken to be dead and not the motion small
-)
+# Share of the motion foretold that is read, below which the reading is taken to be dead and not the motion small: judgement
+LEAST_SHARE = 1e-3
 MOST_OF_MOTION = (0.02, 0.98)  # quantiles between which a reading moves, whatever its spikes
 
 
