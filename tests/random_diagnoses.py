@@ -58,7 +58,11 @@ def case(seed: int, folder: Path, whole_page: bool = False) -> Case:
     screen = diagnosis_first_screen(found, {})
     (folder / "screen.json").write_text(json.dumps([screen.answer, screen.numbers, screen.steps], indent=1))
     told = screen.answer, screen.numbers, screen.steps
-    wrong = [*contradictions(record), *screen_contradictions(record, *told), *_not_written(found, load_device(to))]
+    wrong = [
+        *contradictions(record),
+        *screen_contradictions(record, *told),
+        *_not_written(found, load_device(to).in_recording(found.recording.title)),
+    ]
     if whole_page:
         (folder / "report.html").write_text(page(found, Provenance({}, 0)))
     return Case(drawn, found, tuple(wrong))

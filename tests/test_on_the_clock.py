@@ -1,4 +1,4 @@
-"""What holds for one recording alone is told before C is generated with it."""
+"""What holds for one recording alone is in no C and in no other recording."""
 
 from __future__ import annotations
 
@@ -27,21 +27,22 @@ RUNS = "of which another run knows nothing"
         ((CREEP, MASS), USE),
         (
             (DRIFT,),
-            f"Generate no C with device.next.toml: drift at sensor:axis runs on the clock of these records, {RUNS}.",
+            f"No cause that was found makes the C better: drift at sensor:axis runs on the clock of these records, {RUNS}; "
+            "device.next.toml keeps it for this recording as [[recording_effect]].",
         ),
         (
             (DRIFT, STEP),
-            "Generate no C with device.next.toml: drift at sensor:axis and sensor_step at disturbance:axis run on the clock of these "
-            f"records, {RUNS}.",
+            "No cause that was found makes the C better: drift at sensor:axis and sensor_step at disturbance:axis run on the clock of "
+            f"these records, {RUNS}; device.next.toml keeps them for this recording as [[recording_effect]].",
         ),
         (
             (CREEP, DRIFT),
-            "Before C is generated with device.next.toml, take out what holds for this recording alone: drift at sensor:axis runs on the "
-            f"clock of these records, {RUNS}. {USE}",
+            f"{USE} Its C is without what holds for this recording alone: drift at sensor:axis runs on the clock of these records, {RUNS}; "
+            "device.next.toml keeps it for this recording as [[recording_effect]].",
         ),
     ],
 )
-def test_what_runs_on_the_clock_of_the_records_is_taken_out_first(causes, told):
+def test_that_no_c_has_what_runs_on_the_clock_of_the_records_is_told(causes, told):
     assert used_for_another_run([SimpleNamespace(cause=c) for c in causes], USE) == told
 
 

@@ -105,6 +105,8 @@ def _check_device(file: Path, figure: Path | None, point: str | None) -> None:
     device = load_device(file)
     asked = None if point is None else _point_of(device, point)
     model = build_model(device)
+    for title in dict.fromkeys(each.recording for each in device.recording_effect):
+        build_model(device.in_recording(title))  # says what its effects have wrong
     if figure is not None:
         from ctrlgen.devices.mechanism.figure import draw_mechanism  # matplotlib takes a moment to import
 
@@ -136,6 +138,8 @@ def _check_device(file: Path, figure: Path | None, point: str | None) -> None:
     units = dict(zip(model.signals["reading"].channels, model.signals["reading"].units, strict=True))
     for sensor in device.sensor:
         out.print(f"  sensor: {describe(sensor, units[sensor.at])}", markup=False, soft_wrap=True)
+    for each in device.recording_effect:
+        out.print(f"  in no path and no C: {each.text}", markup=False, soft_wrap=True)
     physics = device.physics(device.values())
     parts, there = device.parts(physics), available(physics)
     out.print(f"  machine: {parts.text}", markup=False, soft_wrap=True)

@@ -24,7 +24,7 @@ from ctrlgen.devices.run_time import RunTime, RunTimeConstant, run_time_constant
 from ctrlgen.devices.section import Section
 from ctrlgen.devices.sensor import AnySensor
 from ctrlgen.devices.structural_model import StructuralModel
-from ctrlgen.effects import EffectTable
+from ctrlgen.effects import EffectTable, RecordingEffectTable
 
 
 class Device(Shown, Section):
@@ -46,6 +46,10 @@ class Device(Shown, Section):
     """Where the numbers come from: a paper, a data sheet, a measurement."""
     effect: tuple[EffectTable, ...] = ()
     """`[[effect]]` tables: physical effects that the kind leaves out; each adds one term to the model."""
+    recording_effect: tuple[RecordingEffectTable, ...] = ()
+    """`[[recording_effect]]` tables: effects that one recording had alone, named by its title as `recording`, such as a drift on its clock.
+    They act where that recording is diagnosed, and nowhere else: no path, no C and no other recording has them.
+    """
     sensor: tuple[AnySensor, ...] = ()
     """`[[sensor]]` tables: what reads the channels of the pose. They do not enter the model; `ctrlgen check` gives
     their resolution and range, `ctrlgen.simulate_sensors` their recordings.
@@ -72,6 +76,12 @@ class Device(Shown, Section):
     def named_files(cls, table: dict[str, Any], path: Path) -> tuple[Path, ...]:
         """Those files."""
         return ()
+
+    def in_recording(self, title: str) -> Self:
+        """The device as it was in the recording of this title: the effects that this one had alone are among its effects, after the
+        others, and those of other recordings are gone."""
+        own = tuple(e.effect for e in self.recording_effect if e.recording == title)
+        return self.model_copy(update={"effect": (*self.effect, *own), "recording_effect": ()})
 
     def facts(self) -> dict[str, object]:
         """What it is, in a few words."""

@@ -76,6 +76,7 @@ OFF_ITS_STAMPS = (
     "the drive is taken to come {} s {} its time stamps, {} of a sample: with that the held-out records are predicted better; it is a "
     "number of the recording and not written to the device"
 )
+OF_OTHER_RECORDINGS = "left out, as other recordings had it alone: {}"
 RESTRICTED = "only these effects were considered, beside the device's own parameters: {}"
 
 
@@ -117,6 +118,7 @@ def _diagnose(
     jobs: int,
 ) -> Diagnosis:
     effects = selected_laws(laws)
+    device, recording = _in_this_recording(device, recording)
     refuse_what_memory_cannot_hold(recording)
     device = _in_units_of_the_reader(device, recording)
     recording = _relative_ambient(_with_both_roles(recording))
@@ -203,6 +205,13 @@ def _empirical_terms(
         return empirical_terms(search.fitter, search.chosen.fit, shares), ()
     except FAILURES as error:
         return (), (f"empirical terms are left out: {reason_of(error)}",)
+
+
+def _in_this_recording(device: Device, recording: Recording) -> tuple[Device, Recording]:
+    """The device with the effects that this recording had alone, and the recording with a note of those that others had."""
+    others = [each.text for each in device.recording_effect if each.recording != recording.title]
+    notes = [OF_OTHER_RECORDINGS.format("; ".join(others))] if others else []
+    return device.in_recording(recording.title), replace(recording, notes=(*recording.notes, *notes))
 
 
 def _in_units_of_the_reader(device: Device, recording: Recording) -> Device:

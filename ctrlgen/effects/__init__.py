@@ -29,6 +29,7 @@ from ctrlgen.effects._installed import Installed, LeftOut, installed, law_of, la
 from ctrlgen.effects._law_inputs import Expression, LawInputs, LawNumbers
 from ctrlgen.effects._parameter import Channel, Param, State
 from ctrlgen.effects._plainer import Plainer
+from ctrlgen.effects._recording_effect import RecordingEffect, RecordingEffectTable
 from ctrlgen.effects._region import ActsIn, Side
 from ctrlgen.effects._requirements import REQUIREMENTS
 from ctrlgen.effects._shape_bounds import ShapeBounds, either, itself
@@ -52,6 +53,8 @@ __all__ = [
     "Param",
     "Place",
     "Plainer",
+    "RecordingEffect",
+    "RecordingEffectTable",
     "ShapeBounds",
     "Side",
     "State",

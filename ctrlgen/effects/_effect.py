@@ -121,6 +121,11 @@ class Effect:
         return {key: text for key, text in keys.items() if text}
 
     @classmethod
+    def runs_on_the_clock(cls) -> bool:
+        """Whether what it does depends on when it is: it holds for the records whose clock it was found on, and for no other run."""
+        return any(state.clock for state in cls.states)
+
+    @classmethod
     def amplitude(cls) -> Param:
         """The parameter that switches the effect off."""
         return next(p for p in cls.params if p.off is not None)

@@ -109,6 +109,18 @@ def _outside(param: Param, number: Quantity, low: float, high: float, unit: str)
     return f"{param.name} = {number.text} is outside {show(low, unit)} ... {show(high, unit)}"
 
 
+def effect_schema(title: str, **before: dict[str, Any]) -> dict[str, Any]:
+    """JSON Schema of a table that states an effect, with the keys `before`, all of them required."""
+    kinds = {"type": "string", "enum": sorted(Effect.library)}
+    text = {"type": "string"}
+    return {
+        "type": "object",
+        "title": title,
+        "properties": {**before, "kind": kinds, "package": text, "at": text, "of": text},
+        "required": [*before, "kind", "at"],
+    }
+
+
 class _TableReader:
     """Tells pydantic how an [[effect]] table becomes an `Effect`."""
 
@@ -125,14 +137,7 @@ class _TableReader:
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
         """An [[effect]] table; the keys beside `kind`, `at` and `of` are the parameters of that kind of effect."""
-        kinds = {"type": "string", "enum": sorted(Effect.library)}
-        text = {"type": "string"}
-        return {
-            "type": "object",
-            "title": "effect",
-            "properties": {"kind": kinds, "package": text, "at": text, "of": text},
-            "required": ["kind", "at"],
-        }
+        return effect_schema("effect")
 
 
 EffectTable = Annotated[Effect, _TableReader()]

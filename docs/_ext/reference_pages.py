@@ -257,7 +257,7 @@ def device_page() -> str:
         "`source` where the number comes from. Unknown keys are errors; all faults of a file are reported at once.",
         "",
         "Any device file may hold `[[sensor]]` tables, `[[effect]]` tables for the [physical effects](effects.md) that "
-        "its kind leaves out, and a `[machine]` table.",
+        "its kind leaves out, `[[recording_effect]]` tables for those that one recording had alone, and a `[machine]` table.",
         "",
     ]
     for kind, device in sorted(Device.library.items()):

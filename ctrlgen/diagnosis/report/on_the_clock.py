@@ -1,6 +1,7 @@
 """What of the corrected device holds for its recording alone: a drift, an event, a line run on the clock of the records.
 
-In generated C that clock begins with the controller: a drift grows from there, a step comes again at its moment.
+In generated C that clock would begin with the controller: a drift would grow from there, a step would come again at its moment.
+device.next.toml therefore states them as [[recording_effect]].
 """
 
 from __future__ import annotations
@@ -14,17 +15,18 @@ from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 
 def runs_on_the_clock(cause: Hypothesis) -> bool:
     """Whether what a cause does depends on when it is."""
-    return cause.effect != PARAMETER and any(state.clock for state in cause.law.states)
+    return cause.effect != PARAMETER and cause.law.runs_on_the_clock()
 
 
 def used_for_another_run(findings: Sequence[Finding], use: str) -> str:
-    """What device.next.toml may be used for, `use`, where its findings hold for another run; else what to take out first, or that none of
-    it does."""
+    """What device.next.toml may be used for, `use`, and which findings no C takes from it; that no C is better for it where these are
+    all."""
     clocked = [cause_name(f.cause) for f in findings if runs_on_the_clock(f.cause)]
     if not clocked:
         return use
-    names = " and ".join(clocked)
-    runs = f"{names} {'runs' if len(clocked) == 1 else 'run'} on the clock of these records, of which another run knows nothing"
+    runs, it = ("runs", "it") if len(clocked) == 1 else ("run", "them")
+    why = f"{' and '.join(clocked)} {runs} on the clock of these records, of which another run knows nothing"
+    kept = f"device.next.toml keeps {it} for this recording as [[recording_effect]]"
     if len(clocked) == len(findings):
-        return f"Generate no C with device.next.toml: {runs}."
-    return f"Before C is generated with device.next.toml, take out what holds for this recording alone: {runs}. {use}"
+        return f"No cause that was found makes the C better: {why}; {kept}."
+    return f"{use} Its C is without what holds for this recording alone: {why}; {kept}."

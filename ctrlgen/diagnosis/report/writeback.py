@@ -1,8 +1,9 @@
 """device.next.toml: the device file as its author wrote it, with the findings written in.
 
 Parameters change in place and keep their comments; each states the source of its new value and its old value. Effects are
-appended under a comment with the recording, the verdict and the held-out errors. The file gives the model that the chosen
-fit predicts with, and beside it the empirical terms, whose own errors the comment tells.
+appended under a comment with the recording, the verdict and the held-out errors, those that run on the clock of the records as
+[[recording_effect]]. The file gives the model that the chosen fit predicts with, and beside it the empirical terms, whose own errors the
+comment tells.
 """
 
 from __future__ import annotations
@@ -47,6 +48,7 @@ from ctrlgen.estimation.robust_covariance import robust_deviations
 from ctrlgen.version import program
 
 WIDTH = 110
+RECORDING_EFFECT = "recording_effect"
 # relative change below which a parameter is left as it is
 MOVED = 1e-12
 
@@ -68,16 +70,22 @@ def next_text(diagnosis: Diagnosis, original: str) -> str:
     estimates = list(zip(fit.structure.free_parameters, fit.theta, robust_deviations(fit), strict=True))
     document = tomlkit.parse(original)
     changed = _change_numbers(document, diagnosis, estimates)
-    effects = _effects(diagnosis, estimates)
-    if effects and "effect" in document and not isinstance(document["effect"], AoT):
-        # effect = [{ ... }] in one line cannot be continued by [[effect]]
-        for table in effects:
-            document["effect"].append(inline_table(table))
-        effects = []
+    of_device, of_recording = _effects(diagnosis, estimates)
+    tables = _appended(document, "effect", of_device) + _appended(document, RECORDING_EFFECT, of_recording)
     text = document.as_string().rstrip("\n") + "\n"
-    if changed or effects or diagnosis.findings or diagnosis.empirical_terms:
+    if changed or tables or diagnosis.findings or diagnosis.empirical_terms:
         text += "\n" + _header(diagnosis, changed)
-    return text + "".join(_table(table) for table in effects)
+    return text + tables
+
+
+def _appended(document: Any, key: str, tables: Sequence[dict[str, Any]]) -> str:
+    """The text to append to the document for its list `key` to go on with the `tables`; empty where they were put into its own list."""
+    if key not in document or isinstance(document[key], AoT):
+        return "".join(_table(key, fields) for fields in tables)
+    # effect = [{ ... }] in one line cannot be continued by [[effect]]
+    for fields in tables:
+        document[key].append(inline_table(fields))
+    return ""
 
 
 def _change_numbers(
@@ -101,9 +109,13 @@ def _change_numbers(
     return changed
 
 
-def _effects(diagnosis: Diagnosis, estimates: Sequence[tuple[FreeParameter, float, float]]) -> list[dict[str, Any]]:
-    """One table for each effect found; parameters as {value, sd} where the recording determines them."""
-    fitted, tables = {unknown.path: (unknown, value, sd) for unknown, value, sd in estimates}, []
+def _effects(
+    diagnosis: Diagnosis, estimates: Sequence[tuple[FreeParameter, float, float]]
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """One table for each effect found, parameters as {value, sd} where the recording determines them: those of the device, and those that
+    run on the clock of the records."""
+    fitted = {unknown.path: (unknown, value, sd) for unknown, value, sd in estimates}
+    of_device, of_recording = [], []
     for k, effect in enumerate(diagnosis.corrected.effect):
         if k < len(diagnosis.device.effect):
             continue
@@ -114,14 +126,17 @@ def _effects(diagnosis: Diagnosis, estimates: Sequence[tuple[FreeParameter, floa
                 unknown, value, sd = fitted[path]
                 shown, spread = _within(value, unknown), sd_text(sd, unknown.unit)
                 table[name] = {"value": shown, "sd": spread} if spread else shown
-        tables.append(table)
-    return tables
+        if effect.runs_on_the_clock():
+            of_recording.append({"recording": diagnosis.recording.title, **table})
+        else:
+            of_device.append(table)
+    return of_device, of_recording
 
 
-def _table(fields: dict[str, Any]) -> str:
-    """[[effect]] with one line for each key."""
+def _table(name: str, fields: dict[str, Any]) -> str:
+    """[[effect]], or another `name`, with one line for each key."""
     width = max(map(len, fields))
-    return "\n[[effect]]\n" + "".join(f"{key:{width}} = {toml_text(value)}\n" for key, value in fields.items())
+    return f"\n[[{name}]]\n" + "".join(f"{key:{width}} = {toml_text(value)}\n" for key, value in fields.items())
 
 
 def _within(si: float, unknown: FreeParameter) -> str:
