@@ -128,7 +128,7 @@ def _verdict(d: dict[str, Any]) -> Iterator[str]:
     quiet = known and not any(map(_loud, errors))
     chance = "which chance allows so few samples" in d["sentence"]
     # told of the worst channel
-    moved = "with them moved within it" in d["sentence"] and all(
+    moved = known and "with them moved within it" in d["sentence"] and all(
         e["rms_refitted"] is not None and e["rms_refitted"] <= NOISE * e["noise_floor"] for e in errors
     )
     # size does not tell there, and the sentence says so
