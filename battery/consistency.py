@@ -128,8 +128,10 @@ def _verdict(d: dict[str, Any]) -> Iterator[str]:
     quiet = known and not any(map(_loud, errors))
     chance = "which chance allows so few samples" in d["sentence"]
     # told of the worst channel
-    moved = known and "with them moved within it" in d["sentence"] and all(
-        e["rms_refitted"] is not None and e["rms_refitted"] <= NOISE * e["noise_floor"] for e in errors
+    moved = (
+        known
+        and "with them moved within it" in d["sentence"]
+        and all(e["rms_refitted"] is not None and e["rms_refitted"] <= NOISE * e["noise_floor"] for e in errors)
     )
     # size does not tell there, and the sentence says so
     judged = [e["goes_with_motion"] for e in errors if e["goes_with_motion"] is not None]

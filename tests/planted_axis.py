@@ -46,6 +46,23 @@ def cubic_sensor(u, t):
     return y + 2e6 * y**3
 
 
+def high_pass(u, t):
+    """A leak of 0.2 s by its answer to a step, exp(-t/tau), in place of a state: reading = sum of what each step leaves."""
+    y = move(u)
+    kept = np.exp(-H * np.arange(len(y)) / 0.2)
+    return np.convolve(np.diff(y, prepend=0.0), kept)[: len(y)]
+
+
+def warm_up(u, t):
+    """A frame that a source of 1 K in the end heats with 0.7 s, in steps of a sample from the zero of the clock; 300 nm of it is read."""
+    warm = 1 - np.prod([(1 - H / 0.7)] * round(t[0] / H))
+    read = []
+    for _ in t:
+        read.append(warm)
+        warm += H / 0.7 * (1 - warm)
+    return move(u) + 3e-7 * np.array(read)
+
+
 def rectified(u, t):
     """What is negative is cut off."""
     return np.maximum(move(u), 0)
@@ -171,6 +188,8 @@ ON_AXIS = {
     drive_offset: Planted("actuator:axis", {"offset": 0.05}),
     coil_heating: Planted("actuator:axis", {"rise": 3.9e-3 * 10 / 4, "tau": 0.5}, within={"rise": 0.05, "tau": 0.05}),
     cubic_sensor: Planted("sensor:axis", {"curvature": 2e6}),
+    warm_up: Planted("sensor:axis", {"size": 3e-7, "tau": 0.7}, within={"size": 0.05, "tau": 0.05}),
+    high_pass: Planted("sensor:axis", {"share": 1.0, "tau": 0.2}),
     stitching_error: Planted("sensor:axis", {"offset": 4e-7, "position": 2e-5, "width": 2e-6}, within={"width": 0.1}),
     sensor_step: Planted("disturbance:axis", {"offset": 2e-7, "moment": 1.1, "rise": 0.02}, within={"rise": 0.1}),
     butterfly: Planted(

@@ -112,5 +112,6 @@ def test_the_laws_of_two_channels_and_those_with_a_clock_are_these():
         "sensor_step",
         "stribeck_after",
         "vibration",
+        "warm_up",
     }
     assert {k for k, law in library if any(s.clock for s in law.states)} == clocked

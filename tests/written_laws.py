@@ -187,6 +187,7 @@ LAWS = {
     "heat_crosstalk": ({}, lambda s, p: p.share * (s.all.sum() - s.value)),
     "heat_loss": ({"power": 1.6}, lost),
     "heater_resistance": ({}, lambda s, p: s.value / (1 + p.slope * (s.temperature - s.temperature_at_rest)) - s.value),
+    "high_pass": ({"tau": 0.3}, lambda s, p: -p.share * s.w, lambda s, p: {"w": (s.value - s.w) / 0.3}),
     "home_offset": ({}, lambda s, p: p.offset),
     "hysteresis": ({"reach": 0.3, "taper": 0.5}, lambda s, p: -p.stiffness * weighted(s, p, s.displacement)),
     "lever_ratio": ({}, lambda s, p: p.gain * s.value),
@@ -262,6 +263,7 @@ LAWS = {
         ),
     ),
     "worn_backlash": ({"wear": 0.4, "spread": 0.5}, lambda s, p: 0.999 * (s.w + s.start * p.gap / 2 - s.displacement)),
+    "warm_up": ({"tau": 0.4}, lambda s, p: p.size * (1 - exp(-s.t / 0.4))),
     "zero_per_record": ({}, lambda s, p: p.share * s.zero),
     "vibration": ({"frequency": 3.0, "phase": 0.9}, lambda s, p: p.amplitude * sin(TWO_PI * 3 * s.t + 0.9)),
 }

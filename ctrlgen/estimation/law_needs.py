@@ -90,6 +90,11 @@ NEEDS: Mapping[str, LawNeeds] = MappingProxyType(
             ("backlash_above", "backlash_below", "worn_backlash"),
             LawNeeds("it needs a part with clearance", transmissions=_CLEARANCE),
         ),
+        # What counts, or measures by a reference that lasts, keeps a constant
+        "high_pass": LawNeeds(
+            "it needs a sensor of charge or one coupled for alternating signals",
+            sensors=frozenset({"capacitive", "strain gauge", "load cell", "accelerometer"}),
+        ),
         "cyclic": LawNeeds(
             "it needs a sensor or a part that repeats",
             actuators=_PERIODIC_ACTUATORS,

@@ -14,10 +14,11 @@ from types import MappingProxyType
 
 from ctrlgen.devices.usual_deviation import ASSUMED_SCALE
 from ctrlgen.effects import Effect
-from ctrlgen.estimation.law_prior import CREEPING, ONE_IN_A_HUNDRED, ONE_IN_TEN, LawPrior, ParameterPrior, peaks
+from ctrlgen.estimation.law_prior import CREEPING, ONE_IN_TEN, LawPrior, ParameterPrior, peaks
 from ctrlgen.estimation.priors_in_a_region import IN_A_REGION
 from ctrlgen.estimation.priors_of_a_lag import HYSTERESIS, OF_A_LAG
 from ctrlgen.estimation.priors_of_heat import OF_HEAT
+from ctrlgen.estimation.priors_of_time import OF_TIME
 
 
 def prior_of(law: type[Effect]) -> LawPrior:
@@ -29,11 +30,6 @@ DEFAULT = LawPrior()
 _starts = ParameterPrior  # shorthand: _starts((0.1, 1.0)) is a parameter with these start values alone
 
 _LOOP = ParameterPrior((0.01, 0.03, 0.1, 0.3, 1.0))
-_EVENT = {"moment": ParameterPrior(start_from_data="moments"), "rise": peaks(1.0)}  # it may happen at any time
-_EVENTS_ARE_RARE = (
-    "An event at any time. Laws that act always come first among equals: most of a hundred records have no event, and a step fits "
-    "something of any structured residual. Judgement."
-)
 _DRY_FRICTION = "Forms of one contact. Measured friction differs by a few per cent from any of them; 2 % is judgement."
 _IN_BALANCE = (
     " In a stage in balance a force that lags and a displacement that lags show the same to first order; there the latter is "
@@ -81,16 +77,19 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             model_form_error=0.001,
             of_one_reference=True,
         ),
-        "drift": LawPrior(
-            "What drifts also wanders; 10 %: judgement. As rare as an event: it follows any residual that has a slow part.",
-            log_prior_odds=ONE_IN_A_HUNDRED,
-            model_form_error=0.1,
-            of_time=True,
-        ),
         "eccentricity": LawPrior(
             "Within a part of a turn it is a gain and a bow. With a wrong phase it explains little of a turn or two: every 30 deg.",
             once_a_turn=True,
             parameters={"phase": _starts((0.0, 30.0, 60.0, 90.0, 120.0, 150.0))},
+        ),
+        "high_pass": LawPrior(
+            "A leak acts on the whole reading: one that is fitted to a part of it stands for something else. From a coupling to a "
+            "charge amplifier.",
+            model_form_error=0.005,
+            parameters={
+                "share": ParameterPrior(plausible_range=(0.8, 1.2)),
+                "tau": _starts((0.02, 0.15, 1.0, 8.0, 60.0)),
+            },
         ),
         "home_offset": LawPrior(
             "Readings are zeroed before a run, and an offset fits the mean of any residual of one sign, as of friction in one "
@@ -117,9 +116,6 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             log_prior_odds=ONE_IN_TEN,
             parameters={"share": ParameterPrior(plausible_range=(0.4, 1.6))},
         ),
-        "sensor_step": LawPrior(
-            _EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, of_time=True, domain="disturbance", parameters=_EVENT
-        ),
         "sensor_gain": LawPrior(
             "As common as a wrong gain of the drive. Channels that one reference serves, a wavelength or the magnification of a "
             "camera, are off together.",
@@ -143,17 +139,6 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
         "temperature_sensitivity": LawPrior(
             "Right at the rise at which home was set, unless the fit says otherwise.",
             parameters={"reference": _starts((0.0,))},
-        ),
-        "vibration": LawPrior(
-            "From outside. Frequencies of mains and rotating machines, and the lines of the residual's spectrum. Rarer than a pitch, "
-            "which is the same at one speed: judgement.",
-            log_prior_odds=ONE_IN_TEN,
-            of_time=True,
-            domain="disturbance",
-            parameters={
-                "frequency": _starts((10.0, 16.7, 25.0, 33.0, 50.0, 60.0, 100.0, 120.0)),
-                "phase": _starts((0.0, 90.0)),
-            },
         ),
         "zero_per_record": LawPrior(
             "Within one record it is a home offset, and over several it fits the mean of whatever is missing: it is stated.",
@@ -187,10 +172,6 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             unless=frozenset({"displacement_command"}),
         ),
         "drive_offset": LawPrior("As common as a wrong gain.", constant=True),
-        "degradation": LawPrior(
-            "From a loss that ends within the recording to a steady one.",
-            parameters={"levels_off": _starts((3.0, 30.0, 1e4))},
-        ),
         "reversed": LawPrior(
             "A wiring fault is rarer than a wrong gain: judgement. A lead is swapped or it is not.",
             log_prior_odds=ONE_IN_TEN,
@@ -252,6 +233,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
         ),
         **IN_A_REGION,
         **OF_HEAT,
+        **OF_TIME,
         **OF_A_LAG,
         "directional_friction": LawPrior(
             "Dry friction alike in both directions is commoner: judgement. " + _DRY_FRICTION,
@@ -274,9 +256,6 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             model_form_error=0.02,
             parameters={"centre": ParameterPrior((-0.3, 0.0, 0.3), usual=0.0)},
         ),
-        "force_step": LawPrior(
-            _EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, of_time=True, domain="disturbance", parameters=_EVENT
-        ),
         "gravity": LawPrior(
             "Hanging, upright or out to either side.", parameters={"phase": _starts((-90.0, 0.0, 90.0, 180.0))}
         ),
@@ -287,7 +266,6 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             form_of="hysteresis",
             parameters={"reach": replace(_LOOP, start_values=(0.03, 0.1, 0.3, 1.0, 2.0)), "taper": _starts((0.5,))},
         ),
-        "lost_beams": LawPrior(_EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, of_time=True, parameters=_EVENT),
         "one_sided_stiffening": LawPrior(
             "A flexure that is straight at home stiffens alike to both sides: rarer than that. Judgement.",
             log_prior_odds=-1.0,

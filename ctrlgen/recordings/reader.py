@@ -19,12 +19,15 @@ from ctrlgen.core.file_format import in_this_format
 from ctrlgen.core.files import read_toml, validate
 from ctrlgen.model.model import Model
 from ctrlgen.recordings import preprocessing, thinning, validation
+from ctrlgen.recordings.common_clock import Stretch, common_clock
 from ctrlgen.recordings.formats import READERS
 from ctrlgen.recordings.plausible_rate import rate_notes
 from ctrlgen.recordings.record_reader import RecordReader
 from ctrlgen.recordings.recording import Record, Recording
 from ctrlgen.recordings.schema import FILE, Column, RecordingFile, RecordTable, check, deviation, fits, stated_noise
 from ctrlgen.recordings.units_of_columns import channel_names
+
+ONE_CLOCK = "the files go on from each other by their columns of time, which are taken as one clock: {}; `start` says otherwise."
 
 
 def load_recordings(paths: Sequence[Path | str], model: Model, *, hold_out: bool = True) -> Recording:
@@ -92,13 +95,16 @@ def load_recordings(paths: Sequence[Path | str], model: Model, *, hold_out: bool
 
 class _Read(NamedTuple):
     """One [[record]] as read before validation: its number, how it was read, the record of `rows`, None where it cannot be read or is read
-    again to be used, and how far it can be thinned where it is long."""
+    again to be used, how far it can be thinned where it is long, the times of its first and last row [s], and how much later than the
+    earliest file its file began, where the columns of time tell it."""
 
     k: int
     reader: RecordReader
     record: Record | None
     rows: int
     can: thinning.Thinnable | None
+    ends: tuple[float, float] | None
+    later: float | None = None
 
 
 def _rows_for_one(every: Sequence[Sequence[_Read]]) -> int:
@@ -109,6 +115,18 @@ def _rows_for_one(every: Sequence[Sequence[_Read]]) -> int:
     beside = [read.record for read in reads if read.can is None and read.record is not None and not _is_rest(read)]
     short = [thinning.thinnable(thinning.marked(record), thinning.FEWEST) for record in beside]
     return thinning.common([*(read.can for read in reads if read.can is not None and not _is_rest(read)), *short])
+
+
+def _on_one_clock(reads: list[_Read]) -> list[_Read]:
+    """The records of one recording.toml, each with how much `later` its file began [s], where their columns of time tell it."""
+    stretches = []
+    for read in reads:
+        begin = read.reader.first_time
+        if begin is None or read.ends is None:
+            return reads
+        stretches.append(Stretch(read.reader.table.file, begin, *(begin + end for end in read.ends)))
+    later = common_clock(stretches)
+    return reads if later is None else [read._replace(later=later[read.reader.table.file]) for read in reads]
 
 
 def _is_rest(read: _Read) -> bool:
@@ -181,8 +199,11 @@ class _File:
             if record is not None and by_itself and rows > thinning.LONG:
                 record = thinning.marked(record)
                 can = thinning.thinnable(record, thinning.ENOUGH)
-            reads.append(_Read(k, reader, record if can is None or alone else None, rows, can))
-        return reads
+            ends = (
+                None if record is None or not rows else (float(np.nanmin(record.time)), float(np.nanmax(record.time)))
+            )
+            reads.append(_Read(k, reader, record if can is None or alone else None, rows, can, ends))
+        return _on_one_clock(reads)
 
     def _read(self, k: int, names: validation.ChannelNames) -> tuple[RecordReader, Record | None]:
         assert self.written is not None  # it was read
@@ -198,6 +219,7 @@ class _File:
             record = self._read(read.k, names)[1]
         if record is None:
             return None, []
+        record = replace(record, time=record.time + (read.later or 0.0))
         if m == 1:
             said = [] if read.can is None else [thinning.not_thinned(record.name, read.rows, read.can.why)]
             return record, said
@@ -238,6 +260,8 @@ class _File:
             faults += result.faults
             if result.records:
                 spans.append((k, table, result.records[0].time[0], result.records[-1].time[-1]))
+        if later := {read.reader.table.file: read.later for read in reads if read.later is not None}:
+            notes.append(ONE_CLOCK.format(", ".join(f"{file} at {begin:.6g} s" for file, begin in later.items())))
         return _Content(tuple(records), tuple(places), tuple(notes), (*faults, *self._overlaps(spans)))
 
     def _overlaps(self, spans: list[tuple[int, RecordTable, float, float]]) -> list[Fault]:

@@ -26,6 +26,8 @@ class RecordReader:
         self.written, self.table, self.columns, self.where = written, table, columns, where
         self.read_from = RecordedColumns(folder, written, table, where)
         self.faults, self.rows, self.notes = self.read_from.faults, table.rows, self.read_from.notes
+        # [s] of the first row, by a column of time that says when the record was
+        self.first_time: float | None = None
         self.name = table.file + (f"[{table.rows[0]}:{table.rows[1]}]" if table.rows else "")
 
     def read(self, names: validation.ChannelNames) -> Record | None:
@@ -151,6 +153,7 @@ class RecordReader:
         begin = table.start.si if table.start else 0.0
         if clock is not None:
             finite = clock[np.isfinite(clock)]
+            self.first_time = None if table.start else self.read_from.begin
             return begin + clock - (finite[0] if len(finite) else 0.0), np.nan
         unclocked = 1 / table.sample_rate.si if kind == "series" and table.sample_rate else np.inf
         period = table.dwell.si if table.dwell else unclocked

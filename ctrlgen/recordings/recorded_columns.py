@@ -25,6 +25,8 @@ class RecordedColumns:
         self.folder, self.written, self.table, self.where = folder, written, table, where
         self.faults: list[Fault] = []
         self.notes: list[str] = []
+        # [s] when the record's first row was, by its column of time
+        self.begin = 0.0
         self.files: dict[str, MeasurementTable | None] = {}
         self.clocks: dict[str, Clock] = {}
         self.used: dict[str, list[str]] = {}
@@ -52,6 +54,8 @@ class RecordedColumns:
         except InputError as error:
             self.faults += [Fault(where, f"{file} {fault.what}") for fault in error.faults]
             return None
+        if is_time:
+            self.begin = given.begin
         self.used.setdefault(file, []).append(name)
         if not self.differing and (differing := table.differing_times(self.used[file])):
             self.differing = True

@@ -84,7 +84,9 @@ class RecordTable(Section):
     dwell: Annotated[Quantity, In("s", positive=True)] | None = None
     """Time from pose to pose, for poses that did not settle. Left out: every pose has settled."""
     start: Annotated[Quantity, In("s")] | None = None
-    """Time of the first row on the clock common to all records. Left out: 0 s."""
+    """Time of the first row on the clock common to all records. Left out everywhere: as the columns of time say, where files go on from
+    each other by them and lie close together; else 0 s.
+    """
     between_samples: Literal["held", "linear"] = "held"
     """Whether the drive is held at a sample's value until the next sample or is linear between them."""
     gap: Literal["linear", "held", "split"] | None = None

@@ -226,14 +226,16 @@ def _no_drift(recording: Recording, fit: Fit, k: int) -> str | None:
     channel = f"reading.{cause.at}"
     if cause.effect == PARAMETER or recording.kind != "series" or channel not in recording.channels:
         return None
-    rate = cause.law.amplitude()
-    if not (cause.prior.of_time and rate.unit == "channel/s"):
+    if cause.prior.form_of != "drift":
         return None
     i = recording.channels.index(channel)
     records = [r for r in recording.records if r.role == "fit"]
     read = np.concatenate([r.observed[r.valid[:, i], i] for r in records])
     time = max((float(r.time[-1] - r.time[0]) for r in records), default=0.0)
-    share = abs(fit.values(k)[rate.name]) * time / max(float(np.ptp(read)) if len(read) else 0.0, 1e-300)
+    numbers = fit.values(k)
+    levels_off = numbers.get("tau")
+    most = numbers["rate"] * time if levels_off is None else numbers["size"] * -np.expm1(-time / levels_off)
+    share = abs(most) / max(float(np.ptp(read)) if len(read) else 0.0, 1e-300)
     if share <= OBJECTIONS.largest_drift:
         return None
     return f"it would drift by {100 * share:.0f} % of the motion within a record"

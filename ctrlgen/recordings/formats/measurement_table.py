@@ -14,6 +14,7 @@ import numpy as np
 
 from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.units import to_si
 from ctrlgen.recordings.formats import number_cells, over_range, time_stamps, wrapped_counters
 from ctrlgen.recordings.formats.layout_question import Ambiguous, AmbiguousFile
 from ctrlgen.recordings.formats.number_cells import NumberStyle
@@ -31,10 +32,12 @@ class Clock(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """A column as float64 (n,), NaN where there is no reading, and what was interpreted on the way, one line each."""
+    """A column as float64 (n,), NaN where there is no reading, and what was interpreted on the way, one line each; of a time when the
+    first was, `begin` [s] on the column's own clock."""
 
     values: np.ndarray
     notes: tuple[str, ...] = ()
+    begin: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -155,7 +158,7 @@ class MeasurementTable:
                 raise self.fault(
                     f'column {name!r} holds time stamps, which are read as seconds: write unit = "s", not "{unit}"'
                 )
-            return Numbers(stamps.values, stamps.notes)
+            return Numbers(stamps.values, stamps.notes, stamps.begin)
         if column.dtype.kind == "O":
             column = self._exact(name, column)
         try:
@@ -163,7 +166,9 @@ class MeasurementTable:
         except ValueError as error:
             raise self.fault(f"column {name!r} {error}") from None
         values, told = wrapped_counters.unwrapped_clock(values, float(column[0]) if len(column) else 0.0)
-        return Numbers(values, (*notes, f"{name}: {told}") if told else notes)
+        known = np.asarray(column, dtype=float)[np.isfinite(values)]
+        begin = scale * to_si(float(known[0]), unit) if len(known) else 0.0
+        return Numbers(values, (*notes, f"{name}: {told}") if told else notes, begin)
 
     def _exact(self, name: str, column: np.ndarray) -> np.ndarray:
         """Cells of text as numbers, those of a long epoch as the whole numbers that they are."""

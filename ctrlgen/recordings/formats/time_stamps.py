@@ -47,10 +47,11 @@ PARTS = re.compile(r"(\d{1,4})[-./](\d{1,2})[-./](\d{1,4})", re.ASCII)
 
 
 class Stamps(NamedTuple):
-    """Seconds since the first time stamp (n,), and how they were read."""
+    """Seconds since the first time stamp (n,), how they were read, and when the first was: seconds since 1970, or since midnight."""
 
     values: np.ndarray
     notes: tuple[str, ...]
+    begin: float
 
 
 def seconds(column: np.ndarray, dates: str | None) -> Stamps | None:
@@ -151,7 +152,8 @@ def _instants(instants: np.ndarray, said: str, notes: tuple[str, ...]) -> Stamps
     values = np.where(np.isnat(instants), np.nan, since.astype("timedelta64[ns]") / unit * 1e-9)
     whole, _, fraction = str(known[0]).partition(".")
     begin = f"{whole}.{fraction.rstrip('0')}".rstrip(".")
-    return Stamps(values, (f"{said}; seconds since {begin}", *notes))
+    since_1970 = float((known[0] - np.datetime64(0, "s")) / unit) * 1e-9
+    return Stamps(values, (f"{said}; seconds since {begin}", *notes), since_1970)
 
 
 def _without_summer_time(stamps: Stamps) -> Stamps:
@@ -168,7 +170,7 @@ def _without_summer_time(stamps: Stamps) -> Stamps:
             notes.append(
                 f"the clock is put {said} by an hour before row {k + 1}, as summer time does: time goes on evenly"
             )
-    return Stamps(values, tuple(notes))
+    return Stamps(values, tuple(notes), stamps.begin)
 
 
 def _times_of_day(cells: list[str]) -> Stamps:
@@ -203,8 +205,8 @@ def _times_of_day(cells: list[str]) -> Stamps:
             notes.append(f"midnight passes before row {k}")
         values[k] = last = time + carried
     known = values[np.isfinite(values)]
-    values = np.round(values - known[0], 12) if len(known) else values
-    return Stamps(values, ("time is a time of day; seconds since the first", *notes))
+    begin = float(known[0]) if len(known) else 0.0
+    return Stamps(np.round(values - begin, 12), ("time is a time of day; seconds since the first", *notes), begin)
 
 
 def from_first(column: np.ndarray, unit: str, scale: float) -> tuple[np.ndarray, tuple[str, ...]]:

@@ -1,0 +1,54 @@
+"""What the search believes of laws that are functions of time: events, drifts, lines, what is lost little by little; rows of `priors`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ctrlgen.estimation.law_prior import ONE_IN_A_HUNDRED, ONE_IN_TEN, LawPrior, ParameterPrior, peaks
+
+EVENT = {"moment": ParameterPrior(start_from_data="moments"), "rise": peaks(1.0)}  # it may happen at any time
+EVENTS_ARE_RARE = (
+    "An event at any time. Laws that act always come first among equals: most of a hundred records have no event, and a step fits "
+    "something of any structured residual. Judgement."
+)
+
+OF_TIME: Mapping[str, LawPrior] = {
+    "degradation": LawPrior(
+        "From a loss that ends within the recording to a steady one.",
+        parameters={"levels_off": ParameterPrior((3.0, 30.0, 1e4))},
+    ),
+    "drift": LawPrior(
+        "What drifts also wanders; 10 %: judgement. As rare as an event: it follows any residual that has a slow part.",
+        log_prior_odds=ONE_IN_A_HUNDRED,
+        model_form_error=0.1,
+        form_of="drift",
+        of_time=True,
+    ),
+    "force_step": LawPrior(
+        EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, of_time=True, domain="disturbance", parameters=EVENT
+    ),
+    "lost_beams": LawPrior(EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, of_time=True, parameters=EVENT),
+    "sensor_step": LawPrior(
+        EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, of_time=True, domain="disturbance", parameters=EVENT
+    ),
+    "vibration": LawPrior(
+        "From outside. Frequencies of mains and rotating machines, and the lines of the residual's spectrum. Rarer than a pitch, "
+        "which is the same at one speed: judgement.",
+        log_prior_odds=ONE_IN_TEN,
+        of_time=True,
+        domain="disturbance",
+        parameters={
+            "frequency": ParameterPrior((10.0, 16.7, 25.0, 33.0, 50.0, 60.0, 100.0, 120.0)),
+            "phase": ParameterPrior((0.0, 90.0)),
+        },
+    ),
+    "warm_up": LawPrior(
+        "A drift that levels off, as rare as one and as far from its form. From within a twelfth of the recording to far beyond it.",
+        log_prior_odds=ONE_IN_A_HUNDRED,
+        model_form_error=0.1,
+        form_of="drift",
+        refines=frozenset({"drift"}),
+        of_time=True,
+        parameters={"tau": peaks(1.0, 4.0, 16.0)},
+    ),
+}
