@@ -177,6 +177,21 @@ def test_a_knee_that_is_no_exponential_has_a_form_of_its_own():
     assert simplified(trials, finer).causes == finer.causes
 
 
+def creeping(power: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Behind each step of the stage a strain that grows by `power` of time: 5 % after a second, by its answer to a step."""
+    return lambda u: (
+        (y := move(u)) + np.convolve(np.diff(y, prepend=0.0), 0.05 * (H * np.arange(len(y))) ** power)[: len(y)]
+    )
+
+
+@pytest.mark.long
+def test_a_creep_by_a_power_of_time_has_a_form_of_its_own():
+    trials, plain, (finer,) = reached("log_creep", {"gain": 0.02, "tau": 0.01, "decades": 6.0}, creeping(1 / 3))
+    assert [c.effect for c in finer.causes] == ["power_creep"] and trials.selection.improves_enough(plain, finer)
+    assert finer.fit.values(0)["exponent"] == pytest.approx(1 / 3, rel=0.1)
+    assert simplified(trials, finer).causes == finer.causes
+
+
 def test_a_finer_form_acts_where_the_plain_law_does():
     refined = [(law, Effect.library[plain]) for law in Effect.library.values() for plain in prior_of(law).refines]
     assert len(refined) > 10

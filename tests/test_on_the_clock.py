@@ -16,6 +16,7 @@ CREEP, DRIFT, STEP = (
     Hypothesis("drift", "sensor:axis", "axis"),
     Hypothesis("sensor_step", "disturbance:axis", "axis"),
 )
+BEGUN = Hypothesis("coulomb_after", "stage:axis", "axis")
 MASS = Hypothesis("parameter", "axis", path="mechanics.mass")
 RUNS = "of which another run knows nothing"
 
@@ -39,6 +40,12 @@ RUNS = "of which another run knows nothing"
             (CREEP, DRIFT),
             f"{USE} Its C is without what holds for this recording alone: drift at sensor:axis runs on the clock of these records, {RUNS}; "
             "device.next.toml keeps it for this recording as [[recording_effect]].",
+        ),
+        (
+            (BEGUN,),
+            f"No cause that was found makes the C better: coulomb_after at stage:axis runs on the clock of these records, {RUNS}; "
+            "device.next.toml keeps it for this recording as [[recording_effect]]. If coulomb_after at stage:axis lasts, state the law "
+            "without its moment as an [[effect]].",
         ),
     ],
 )

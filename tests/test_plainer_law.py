@@ -10,6 +10,7 @@ import pytest
 from axis_records import AXIS, NOISE, fitter_of
 from effect_cases import Law, rich, shapes
 
+from ctrlgen.diagnosis.selection.model_selection import ModelSelection
 from ctrlgen.diagnosis.selection.rivals import as_plainer, rivals, simplified
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.trials import Trials
@@ -198,3 +199,23 @@ def test_what_rubs_or_lags_alike_both_ways_is_named_by_the_plainer_law(law, monk
     # nothing that the machine cannot have
     without = Trials(fitter, Screen(fitter, [cause]), lambda _: None)
     assert simplified(without, without.fit(begun, cause, steps=12)).causes == (cause,)
+
+
+@pytest.mark.parametrize(
+    "plain, finer, noise, worth",
+    [
+        (0.10, 0.095, False, False),  # 0.5 % of the mismatch, and a twentieth of what the plain law leaves
+        (0.10, 0.085, False, True),  # 1.5 % of the mismatch
+        (0.01, 0.007, False, True),  # 0.3 % of it, but a third of what the plain law leaves
+        (0.01, 0.009, False, False),
+        (0.01, 0.009, True, True),  # the law leaves noise alone
+    ],
+)
+def test_what_a_law_has_more_than_its_plainer_one_is_worth_a_name_where_it_takes_enough(plain, finer, noise, worth):
+    """Squares that two laws leave on the held-out records, of a mismatch of 1; alone, and beside a channel that neither changes."""
+    whole, left = [1.0, 1.0], 0.5
+    fitter = SimpleNamespace(noise=SimpleNamespace(floor=np.array([1.0, 1.0])))
+    compare = ModelSelection(fitter, lambda *_: [], np.array(whole))
+    compare.reference = lambda candidates: SimpleNamespace(is_noise=noise)
+    two = [SimpleNamespace(held_out=SimpleNamespace(plain_mean=np.array([left, each]))) for each in (plain, finer)]
+    assert compare.worth_its_form(*two) is worth

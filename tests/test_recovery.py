@@ -204,6 +204,7 @@ STATED = {
 # found in tests/test_finer_forms.py
 FINER = {
     "bouc_wen_of_power",
+    "power_creep",
     "cogging_of_slots",
     "worn_backlash",
     "weighted_displacement_hysteresis",

@@ -68,6 +68,12 @@ def test_it_comes_before_a_law_everywhere_where_it_leaves_a_quarter(tried):
     trials.fitted[frozenset(near.causes)] = (near, 40)
     chosen = everywhere_first(trials, current, best, (near, best), hidden)
     assert [c.effect for c in chosen.causes] == ["coulomb"]
+    # friction comes to rest in held-out records where nobody can predict it: both kinds count together
+    there = replace(plain, fitted=replace(plain.fitted, plain=20 * best.fitted.plain))
+    there = replace(there, held_out=replace(there.held_out, plain=2.5 * best.held_out.plain))
+    trials.fitted[frozenset(there.causes)] = (there, 40)
+    assert everywhere_first(trials, current, best, (there, best), hidden) is best
+    trials.fitted[frozenset(near.causes)] = (near, 40)
     # a region that the residual shows stands
     assert (
         everywhere_first(

@@ -26,6 +26,7 @@ from written_terms import (
     lugre_rate,
     met,
     past,
+    powered,
     ramp,
     remembered,
     risen,
@@ -196,6 +197,11 @@ LAWS = {
     "log_creep": (
         {"tau": 0.1, "decades": 3.25},
         logarithmic,
+        lambda s, p: {f"z{j}": (s.value - getattr(s, f"z{j}")) / (0.1 * sqrt(10.0) ** j) for j in range(9)},
+    ),
+    "power_creep": (
+        {"tau": 0.1, "decades": 3.25, "exponent": 0.3},
+        powered,
         lambda s, p: {f"z{j}": (s.value - getattr(s, f"z{j}")) / (0.1 * sqrt(10.0) ** j) for j in range(9)},
     ),
     "lost_beams": (EVENT, lambda s, p: -p.share * s.value * event(s, p)),

@@ -120,6 +120,12 @@ def logarithmic(s, p):
     return p.gain / 2 * sum(min(max(2 * p.decades - j, 0), 1) * getattr(s, f"z{j}") for j in range(9))
 
 
+def powered(s, p):
+    """As `logarithmic`, each half a decade 10^(p/2) times as much."""
+    weights = [min(max(2 * p.decades - j, 0), 1) * 10 ** (p.exponent * j / 2) for j in range(9)]
+    return p.gain / 2 * sum(w * getattr(s, f"z{j}") for j, w in enumerate(weights))
+
+
 def weighted(s, p, here):
     """sum_j w_j (here - play_j); each play is counted from where it began, a share of its radius off the turn."""
     j = np.arange(1, 9)

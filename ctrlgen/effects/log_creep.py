@@ -1,10 +1,7 @@
 """Creep by the same amount in every decade of time."""
 
-import casadi as ca
-
-from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, State, itself
-
-CHAIN = range(9)
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, itself
+from ctrlgen.effects._relaxations import RELAXATIONS, SPECTRUM, relaxation_rates, relaxed, spacing, within
 
 
 class LogCreep(Effect):
@@ -18,24 +15,12 @@ class LogCreep(Effect):
     family = Family.CREEP
     order = 2  # what creeps is carried by the joints: behind their play and hysteresis
     source = "H. Jung, D.-G. Gweon, Rev. Sci. Instrum. 71 (2000) 1896: creep of piezoelectric actuators"
-    params = (
-        Param("gain", "1", (0.0, 0.5), "extra travel per decade of time, per travel", off=0.0),
-        Param("tau", "s", (1e-3, 1e2), "shortest relaxation time"),
-        Param("decades", "1", (1.0, 7.0), "D: decades after which it ends"),
-    )
+    params = (Param("gain", "1", (0.0, 0.5), "extra travel per decade of time, per travel", off=0.0), *SPECTRUM)
     at_bounds = itself("tau", "decades")
-    states = tuple(State(f"z{j}", "travel", 1.0) for j in CHAIN)
+    states = RELAXATIONS
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
-        apart = self._apart(p)
-        weights = [ca.fmin(ca.fmax(p.decades / apart - j, 0.0), 1.0) for j in CHAIN]
-        return p.gain * apart * sum(w * getattr(s.states, f"z{j}") for j, w in zip(CHAIN, weights, strict=True))
+        return p.gain * spacing(p) * relaxed(s, within(p))
 
     def rates(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
-        ratio = 10.0 ** self._apart(p)
-        return {f"z{j}": (s.value - getattr(s.states, f"z{j}")) / (ratio**j * p.tau) for j in CHAIN}
-
-    @staticmethod
-    def _apart(p: LawNumbers) -> Expression:
-        """Decades between two relaxation times: half a one, or more where nine of them have more to cover."""
-        return ca.fmax(p.decades / len(CHAIN), 0.5)
+        return relaxation_rates(s, p)

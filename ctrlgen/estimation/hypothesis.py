@@ -239,7 +239,7 @@ def _of_law(
                     yield Hypothesis(law.kind, f"{domain}:{channel.name}", channel.name, other.name, highest=highest)
         return
     fitting = [channel for channel in places if law.applies_to(channel)]
-    for channel in () if prior.acts_on_all else fitting:
+    for channel in () if prior.acts_on_all or prior.of_one_body else fitting:
         yield Hypothesis(law.kind, f"{domain}:{channel.name}", channel.name, highest=highest, longest=longest)
     whole = len(places) == every and (prior.acts_on_all or law.place is not Place.SENSOR)
     for at in _together(law, physics, fitting) if prior.of_one_reference or whole else ():
@@ -248,14 +248,15 @@ def _of_law(
 
 def _together(law: type[Effect], physics: DevicePhysics, fitting: Sequence[Channel]) -> list[str]:
     """The `at` of channels at which one number of the law may act: all, or more than one of those that measure the same, since the scale
-    of an angle says nothing of that of a way; when things are is one for all."""
+    of an angle says nothing of that of a way; when things are, and how a body stands, is one for all."""
     if prior_of(law).acts_on_all:
         return ["all"]
     if law.moves_in_time:
         return ["all"] if len(fitting) > 1 else []
     units = [c.unit for c in channels(physics, law.place) if law.applies_to(c)]
     groups = Counter(group(units, channel.unit) for channel in fitting)
-    return [at for at, count in groups.items() if count > 1]
+    several = [at for at, count in groups.items() if count > 1]
+    return [*several, "all"] if prior_of(law).of_one_body and "all" not in several else several
 
 
 def why_not_offered(

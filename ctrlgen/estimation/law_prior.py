@@ -75,6 +75,8 @@ class LawPrior:
     in_a_region: the law is another one in a part of the motion: it is tried beside the others and never takes their turn.
     repeatable: the law may act more than once at one place, as harmonics do.
     acts_on_all: the law is suspected at all channels at once only.
+    of_one_body: a rigid body has the law as a whole: it is suspected at no channel alone, at those that measure the same, and at all of
+        them with one number.
     of_one_reference: the law of a sensor is suspected at all channels at once too, read or not: one thing they share may be wrong.
     of_time: what it does is a function of time alone (an event, a drift, a line), whatever the machine does. A law that acts with
         the motion comes first where it explains nearly as much.
@@ -95,6 +97,7 @@ class LawPrior:
     in_a_region: bool = False
     repeatable: bool = False
     acts_on_all: bool = False
+    of_one_body: bool = False
     of_one_reference: bool = False
     of_time: bool = False
     constant: bool = False

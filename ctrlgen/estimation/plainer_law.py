@@ -20,7 +20,8 @@ def may_be_plainer(fit: Fit, k: int, bounds_tell: bool = True) -> Hypothesis | N
     (Bonferroni). Where `bounds_tell` is False a number that stopped at its bound, which is not measured, excludes nothing.
     """
     cause = fit.structure.causes[k]
-    if cause.effect == PARAMETER or cause.law.plainer is None:
+    plain = plainer(cause)
+    if plain is None or cause.law.plainer is None:
         return None
     relation, deviations = cause.law.plainer, robust_deviations(fit)
     channel = cause.channel_on(fit.structure.device)
@@ -29,7 +30,14 @@ def may_be_plainer(fit: Fit, k: int, bounds_tell: bool = True) -> Hypothesis | N
     rows = zip(fit.structure.free_parameters, fit.theta, deviations, strict=True)
     there = ((u, v, sd) for u, v, sd in rows if u.cause == k and u.name in neutral)
     told = ((u, v, sd) for u, v, sd in there if bounds_tell or not any(u.shape_ends(float(v))))
-    return None if any(abs(v - neutral[u.name]) > z * sd for u, v, sd in told) else replace(cause, effect=relation.kind)
+    return None if any(abs(v - neutral[u.name]) > z * sd for u, v, sd in told) else plain
+
+
+def plainer(cause: Hypothesis) -> Hypothesis | None:
+    """The plainer law that a cause generalises (`Effect.plainer`), at the same place; None where there is none."""
+    if cause.effect == PARAMETER or cause.law.plainer is None:
+        return None
+    return replace(cause, effect=cause.law.plainer.kind)
 
 
 def left_beside(fit: Fit, k: int, plain: Hypothesis) -> dict[Hypothesis, dict[str, float]]:

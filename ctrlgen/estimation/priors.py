@@ -318,11 +318,26 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             form_of="creep",
             parameters={"tau": _starts((0.01, 0.1, 1.0)), "decades": _starts((3.25, 6.0))},
         ),
+        "power_creep": LawPrior(
+            _CREEP,
+            model_form_error=0.01,
+            form_of="creep",
+            suspected=False,
+            refines=frozenset({"creep", "log_creep"}),
+            parameters={"tau": _starts((0.01, 0.1)), "decades": _starts((6.0,)), "exponent": _starts((-0.2, 0.3))},
+        ),
         "lost_motion": LawPrior(
             "On a stage of constant stiffness the same as a gain of the drive, which is named first: judgement.",
             log_prior_odds=ONE_IN_TEN,
         ),
         "payload": LawPrior("Upright, or hanging out sideways.", parameters={"lean": _starts((0.0, 90.0))}),
+        **dict.fromkeys(
+            (f"frame_rotation_{axis}" for axis in "xyz"),
+            LawPrior(
+                "A rigid platform stands turned as a whole; instruments of angles may be turned otherwise than those of ways.",
+                of_one_body=True,
+            ),
+        ),
         # Empirical: written where no law reaches what is left, never suspected ---------------------------------------------------
         **dict.fromkeys(
             ("empirical_history", "empirical_position", "empirical_speed"),
@@ -349,7 +364,6 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
                 *(f"{what}_coupling" for what in ("damping", "inertia", "stiffness")),
                 "drive_gain",
                 "expansion",
-                *(f"frame_rotation_{axis}" for axis in "xyz"),
                 "heat_crosstalk",
                 "heater_resistance",
                 "link_compliance",

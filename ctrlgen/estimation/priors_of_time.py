@@ -47,7 +47,6 @@ OF_TIME: Mapping[str, LawPrior] = {
         log_prior_odds=ONE_IN_A_HUNDRED,
         model_form_error=0.1,
         form_of="drift",
-        refines=frozenset({"drift"}),
         of_time=True,
         parameters={"tau": peaks(1.0, 4.0, 16.0)},
     ),

@@ -27,6 +27,8 @@ def used_for_another_run(findings: Sequence[Finding], use: str) -> str:
     runs, it = ("runs", "it") if len(clocked) == 1 else ("run", "them")
     why = f"{' and '.join(clocked)} {runs} on the clock of these records, of which another run knows nothing"
     kept = f"device.next.toml keeps {it} for this recording as [[recording_effect]]"
+    began = [cause_name(f.cause) for f in findings if runs_on_the_clock(f.cause) and f.cause.law.acts_in is not None]
+    lasts = f" If {' and '.join(began)} lasts, state the law without its moment as an [[effect]]." if began else ""
     if len(clocked) == len(findings):
-        return f"No cause that was found makes the C better: {why}; {kept}."
-    return f"{use} Its C is without what holds for this recording alone: {why}; {kept}."
+        return f"No cause that was found makes the C better: {why}; {kept}.{lasts}"
+    return f"{use} Its C is without what holds for this recording alone: {why}; {kept}.{lasts}"

@@ -198,6 +198,17 @@ class ModelSelection:
         gain = (before.held_out.plain_mean - after.held_out.plain_mean) * self.fitter.noise.floor**2
         return bool(np.any(gain > MODEL_SELECTION.least_share * self.mismatch)) or self.takes_much(before, after)
 
+    def worth_its_form(self, plain: CandidateModel, finer: CandidateModel) -> bool:
+        """Whether what a law has more than the plainer law that it generalises takes away a share of the whole mismatch of any channel on
+        the held-out records that is worth a name, or a share of what the plainer one leaves there that one more term must take; always
+        where it leaves noise alone."""
+        if self.mismatch is None or self.reference((plain, finer)).is_noise:
+            return True
+        left, was = finer.held_out.plain_mean, plain.held_out.plain_mean
+        much = (was - left) * self.fitter.noise.floor**2 > MODEL_SELECTION.least_share * self.mismatch
+        of_the_rest = left < (1 - MODEL_SELECTION.least_further_share) * was
+        return bool(np.any(much | of_the_rest))
+
     def takes_much(self, before: CandidateModel, after: CandidateModel) -> bool:
         """Whether `after` takes away much of what `before` leaves in any channel on the held-out records, however little that is
         of the whole mismatch; less is asked of one more term of a law that is there already, as a harmonic is."""

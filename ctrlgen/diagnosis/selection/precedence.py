@@ -52,7 +52,7 @@ def everywhere_first(
     screened: Screened,
 ) -> CandidateModel:
     """The best candidate; where it acts in a region that no test showed, rather the best law everywhere, unless that leaves several times
-    as much on either kind of records: an edge more follows the error of any law's form."""
+    as much, by the geometric mean of both kinds of records: an edge more follows the error of any law's form."""
     shown = {s.hypothesis for s in screened.suspects}
     if not any(c.prior.in_a_region and c not in shown for c in best.causes if c not in current.causes):
         return best
@@ -62,7 +62,8 @@ def everywhere_first(
     ends = trials.each(lambda branch, t: branch.converged(t), first)
     for t in compare.ranked([t for t in ends if not trials.objections(t, current.causes)]):
         pairs = ((best.fitted, t.fitted), (best.held_out, t.held_out))
-        if any(a.plain.sum() > REGIONS.share * b.plain.sum() for a, b in pairs):
+        ratios = [a.plain.sum() / max(b.plain.sum(), 1e-300) for a, b in pairs]
+        if np.sqrt(np.prod(ratios)) > REGIONS.share:
             return t
     return best
 

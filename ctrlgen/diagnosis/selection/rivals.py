@@ -20,7 +20,7 @@ from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import CONFUSABLE, MODEL_SELECTION, SEARCH
 from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis
-from ctrlgen.estimation.plainer_law import left_beside, may_be_plainer, plainer_start
+from ctrlgen.estimation.plainer_law import left_beside, may_be_plainer, plainer, plainer_start
 from ctrlgen.estimation.settings import FIT
 from ctrlgen.estimation.size_odds import size_odds
 from ctrlgen.estimation.structure import Structure
@@ -40,7 +40,8 @@ def swapped(trials: Trials, current: CandidateModel, before: int) -> CandidateMo
 
 def simplified(trials: Trials, current: CandidateModel) -> CandidateModel:
     """The model with the plainer law in place of each one that generalises it, where the fit does not exclude that both are one and it
-    explains alike: how the friction falls with speed, say, is then within what noise or discrepancy feigns."""
+    explains alike: how the friction falls with speed, say, is then within what noise or discrepancy feigns. Likewise where what the law
+    has more is too little to name beside what is left anyway: a friction that differs by 2 % between the directions is dry friction."""
     for k in range(len(current.causes)):
         coarser = _coarser(trials, current, k)
         if coarser is not current:
@@ -48,6 +49,10 @@ def simplified(trials: Trials, current: CandidateModel) -> CandidateModel:
         current = _in_usual_shape(trials, current, k)
         for t in as_plainer(trials, current, k, bounds_tell=False):
             if explains_alike(trials.selection, t, current) and not trials.objections(t, current.causes):
+                return simplified(trials, t)
+        plain = plainer(current.causes[k])
+        for t in _in_plain_law(trials, current, k, plain) if plain is not None else ():
+            if not trials.selection.worth_its_form(t, current) and not trials.objections(t, current.causes):
                 return simplified(trials, t)
     return current
 
@@ -57,6 +62,11 @@ def as_plainer(trials: Trials, current: CandidateModel, k: int, bounds_tell: boo
     this machine cannot have it. A part in proportion to the signal, which the plainer law has not, is taken over by the device's numbers
     or by a gain that is there; else a gain stands beside it."""
     plain = may_be_plainer(current.fit, k, bounds_tell)
+    return [] if plain is None else _in_plain_law(trials, current, k, plain)
+
+
+def _in_plain_law(trials: Trials, current: CandidateModel, k: int, plain: Hypothesis) -> list[CandidateModel]:
+    """The model with the law `plain`, which cause k generalises, in its place."""
     if plain not in trials.screen.hypotheses:
         return []
     begun = current.fit.restarted.without(k).with_cause(plain, plainer_start(current.fit, k, plain))

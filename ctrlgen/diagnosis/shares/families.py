@@ -64,6 +64,10 @@ SPEAKS_FOR: dict[Kind, tuple[tuple[Family, ...], str]] = {
     Kind.PAST: ((), "says that something is left that lasts longer than a sample, not what"),
 }
 
+OF_SEVERAL_AXES: dict[Kind, tuple[Family, ...]] = {Kind.DRIVE: (Family.GEOMETRY,)}
+"""What a kind speaks for besides where several axes move a reading: of poses that follow their drives a turned frame is a function of
+these, too."""
+
 
 def family_of(kind: str) -> Family | None:
     """The family that a law states of itself; None without one, as for a number of the device."""
@@ -85,7 +89,8 @@ def ranking(table: SharesTable, noise: dict[str, float] | None = None) -> list[t
     for channel in table.channels:
         selected, beside = dict.fromkeys(Family, 0.0), dict.fromkeys(Family, 0.0)
         for row in channel.kinds:
-            for k, family in enumerate(SPEAKS_FOR[row.kind][0]):
+            more = OF_SEVERAL_AXES.get(row.kind, ()) if len(channel.axes) > 1 else ()
+            for k, family in enumerate((*SPEAKS_FOR[row.kind][0], *more)):
                 if row.selected:
                     selected[family] += row.additional
                     place[family] = min(place[family], k)
