@@ -23,7 +23,9 @@ from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import SEARCH
 from ctrlgen.effects import Effect
+from ctrlgen.estimation.error_model import ErrorModel
 from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.noise import Noise, NoiseSource
 from ctrlgen.estimation.priors import prior_of
 from ctrlgen.estimation.structure import Structure
 
@@ -190,6 +192,25 @@ def test_a_creep_by_a_power_of_time_has_a_form_of_its_own():
     assert [c.effect for c in finer.causes] == ["power_creep"] and trials.selection.improves_enough(plain, finer)
     assert finer.fit.values(0)["exponent"] == pytest.approx(1 / 3, rel=0.1)
     assert simplified(trials, finer).causes == finer.causes
+
+
+@pytest.mark.parametrize("source, tried", [(NoiseSource.MISFIT, True), (NoiseSource.STATED, False)])
+def test_where_what_is_left_alone_tells_the_noise_finer_forms_are_tried(source, tried):
+    """Then nothing is left beyond it, and a play beside a hysteresis would be the only form that is."""
+    noise = Noise(np.array([READ]), (np.zeros(0),), (source,), (), np.array([0]))
+    structure = Structure(AXIS).with_cause(Hypothesis("bouc_wen", "stage:axis", "axis"), {"stiffness": 2e4})
+    current = SimpleNamespace(
+        errors=ErrorModel.of_noise(noise), causes=structure.causes, fit=SimpleNamespace(restarted=structure)
+    )
+    forms = []
+
+    def each(one, found, told):
+        forms.extend(found)
+        return []
+
+    current.fit.values = lambda k: {}
+    finer_forms(SimpleNamespace(fitter=SimpleNamespace(noise=noise), each=each), current)
+    assert [finer.effect for _, finer in forms] == (["bouc_wen_of_power"] if tried else [])
 
 
 def test_a_finer_form_acts_where_the_plain_law_does():

@@ -14,6 +14,7 @@ class WarmUp(Effect):
 
     place = Place.SENSOR
     family = Family.EVENTS
+    requires = frozenset({"sample_time"})  # poses are too few to tell it from a drift
     order = -1  # as `drift`
     source = "ISO 230-3:2020: thermal drift of a machine that warms up; the lumped body's exponential"
     params = (

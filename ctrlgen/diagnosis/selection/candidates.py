@@ -143,8 +143,9 @@ def as_meant(
 
 
 def finer_forms(trials: Trials, current: CandidateModel) -> tuple[CandidateModel, ...]:
-    """`current` with a finer form of one of its laws in that one's place, for each that has one, where more than noise is left."""
-    if current.errors.is_noise:
+    """`current` with a finer form of one of its laws in that one's place, for each that has one, where more than noise is left, or where
+    what is left alone tells the noise."""
+    if current.errors.is_noise and trials.fitter.noise.known.all():
         return ()
 
     def one(branch: Trials, form: tuple[int, Hypothesis]) -> list[CandidateModel]:
