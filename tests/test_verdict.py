@@ -181,6 +181,10 @@ def test_what_is_left_is_little_beside_the_mismatch_or_the_noise(before, after, 
         found = search(trial(before * N, before * N), trial(fit * N, held * N, causes=(GAIN,)), of=fitter())
         assert too_little_to_name(found, passed) == little
         assert not too_little_to_name(found, replace(passed, restless=("reading.axis",)))
+    # the error that the answer tells, not the one of numbers moved on the held-out records
+    told = trial(quiet, quiet, causes=(GAIN,))
+    moved = replace(told, unmoved=left(after * N, N))
+    assert too_little_to_name(search(trial(before * N, before * N), moved, of=fitter()), passed) == little
     unknown = search(trial(before * N, before * N), trial(0.0, 0.0, causes=(GAIN,)), of=fitter(known=False))
     assert not too_little_to_name(unknown, passed)
     guessed = fitter()

@@ -99,14 +99,14 @@ def within_tolerance(search: SearchResult) -> bool:
 def too_little_to_name(search: SearchResult, tests: ResidualTests) -> bool:
     """Whether causes leave so little beyond the noise that none is worth a name, however sure it is that something is left.
 
-    In every channel, of the records to fit and of those held out: less than `MODEL_SELECTION.least_share` of the mismatch, in squares,
-    below which the search names no cause; or no more than the noise itself, `VERDICT.no_larger`, and less than `VERDICT.unseen_share`
-    of the mismatch. Not where only the readings to be explained tell the noise, which may be motion, nor where a channel moves at rest by
-    itself.
+    In every channel, of the records to fit and of those held out, as they are predicted: less than `MODEL_SELECTION.least_share` of the
+    mismatch, in squares, below which the search names no cause; or no more than the noise itself, `VERDICT.no_larger`, and less than
+    `VERDICT.unseen_share` of the mismatch. Not where only the readings to be explained tell the noise, which may be motion, nor where a
+    channel moves at rest by itself.
     """
     if not search.chosen.causes or not search.fitter.noise.measured.all() or tests.restless:
         return False
-    pairs = [(search.nominal.fitted, search.chosen.fitted), (search.nominal.held_out, search.chosen.held_out)]
+    pairs = [(search.nominal.fitted, search.chosen.fitted), (search.nominal.predicted, search.chosen.predicted)]
     return all(bool(np.all(_is_little(was.plain_mean, left.plain_mean))) for was, left in pairs)
 
 
