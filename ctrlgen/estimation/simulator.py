@@ -51,9 +51,10 @@ class Simulator:
         sample_time: float,
         linear: bool = False,
         poses: bool = False,
+        resumed: bool = False,
         finer: int = 1,
     ) -> None:
-        self.finer, self.free, self.channels = finer, tuple(free), tuple(channels)
+        self.finer, self.free, self.channels, self.resumed = finer, tuple(free), tuple(channels), resumed
         self.sample_time, self.linear = sample_time, linear
         self.ambient = ca.SX.sym("ambient")
         look_back = sample_time if np.isfinite(sample_time) else None
@@ -87,12 +88,16 @@ class Simulator:
     @cached_property
     def free_initial_states(self) -> tuple[int, ...]:
         """Places in S of the initial states that are fitted: actuators' states, how far dry friction is bent and plays stand
-        off when a record begins, and, with inertia, velocity and displacement; of settled poses the plays alone."""
+        off when a record begins, and, with inertia, velocity and displacement; of settled poses the plays alone. Of a record that goes
+        on after a gap also what relaxes: lags, creep, loops that have a rate."""
         m = self.model
         if not np.isfinite(self.sample_time):
             return m.free_memories
-        moving = range(self.n_x - m.v.numel(), self.n_s) if m.inertial else ()
-        return (*range(m.n_states), *m.free_memories, *moving)
+        last = self.n_x - m.v.numel()
+        moving = range(last, self.n_s) if m.inertial else ()
+        kept = {*m.clocks, *m.stepped, *m.free_memories}
+        relaxing = [k for k in range(m.n_states, last) if k not in kept] if self.resumed else ()
+        return (*range(m.n_states), *m.free_memories, *relaxing, *moving)
 
     @cached_property
     def plays(self) -> tuple[tuple[int, int, int], ...]:

@@ -187,7 +187,7 @@ def stretches(
     notes = bridged_notes
     parts: list[Record] = []
     for a, b in cuts:
-        stretch = rows_between(record, a, b)
+        stretch = replace(rows_between(record, a, b), resumed=bool(parts))
         joined = _joined(parts[-1], stretch) if parts and gap != "split" else None
         if joined:
             missing = len(joined.time) - len(parts[-1].time) - len(stretch.time)

@@ -18,6 +18,7 @@ class Timing(NamedTuple):
     sample_time: float
     linear: bool = False
     poses: bool = False
+    resumed: bool = False
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -35,7 +36,8 @@ class Record(Shown):
     None where nothing was filtered. Half of `1/sample_time` is the highest frequency that the rows can hold. `spikes`: row,
     channel and deviation [SI] from its
     neighbours of each outlier that was marked. `held`: first row, row behind the last and channel of each stretch in which a
-    reading was found to be held although the device moves.
+    reading was found to be held although the device moves. `resumed`: it goes on after a gap in which the drive is not known, so that what
+    the device remembers of it is not known either.
     """
 
     name: str
@@ -52,6 +54,7 @@ class Record(Shown):
     spikes: tuple[tuple[int, int, float], ...] = ()
     poses: bool = False
     held: tuple[tuple[int, int, int], ...] = ()
+    resumed: bool = False
 
     def facts(self) -> dict[str, object]:
         """What it is, in a few words."""
@@ -70,7 +73,7 @@ class Record(Shown):
     @property
     def timing(self) -> Timing:
         """What a simulation of this record is built for."""
-        return Timing(self.sample_time, self.linear, self.poses)
+        return Timing(self.sample_time, self.linear, self.poses, self.resumed)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,0 +1,78 @@
+"""A record that goes on after a gap: what the device remembers of it is not known, and is fitted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from axis_records import AXIS, NOISE, H, move, record
+
+from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.noise import estimate_noise
+from ctrlgen.estimation.structure import Structure
+from ctrlgen.recordings import gaps
+from ctrlgen.recordings.recording import Recording
+
+N, TAU, GAIN = 3000, 0.4, 0.1
+GAP = slice(1300, 1600)
+CREEP, LAG = Hypothesis("creep", "stage:axis", "axis"), Hypothesis("thermal_lag", "actuator:axis", "axis")
+
+
+def lagging(x: np.ndarray) -> np.ndarray:
+    """x behind one time constant, which follows the middle between two samples."""
+    kept, out = 0.0, np.empty(len(x))
+    for k, middle in enumerate((x + np.append(x[1:], x[-1])) / 2):
+        out[k] = kept
+        kept += (1 - np.exp(-H / TAU)) * (middle - kept)
+    return out
+
+
+def cut(read: np.ndarray, u: np.ndarray) -> list:
+    """The two records beside the gap, of a drive that nobody can bridge."""
+    rng = np.random.default_rng(2)
+    whole = record(u, read + NOISE * rng.standard_normal(N), "fit")
+    there = np.ones(N, bool)
+    there[GAP] = False
+    parts, notes = gaps.stretches(gaps.rows_of(whole, there), "split")
+    assert [len(p.time) for p in parts] == [1300, 1400] and "cut before" in notes[-1]
+    return parts
+
+
+@pytest.fixture(scope="module")
+def moved():
+    steps = np.random.default_rng(1).uniform(-1, 1, N // 20)
+    u = np.repeat(steps + 0.8 * np.sign(np.sin(np.arange(N // 20) / 12)), 20)
+    return u, move(u)
+
+
+def test_only_what_follows_a_gap_goes_on(moved):
+    u, q = moved
+    before, after = cut(q, u)
+    assert (before.resumed, after.resumed) == (False, True)
+    assert before.timing != after.timing
+
+
+def test_a_creep_that_goes_on_is_foretold_after_the_gap(moved):
+    u, q = moved
+    after = cut(q + GAIN * lagging(q), u)[1]
+    structure = Structure(AXIS).with_cause(CREEP, {"gain": GAIN, "tau": TAU, "slow": 0.0})
+    left = {}
+    for name, part in (("unknown", after), ("at rest", replace(after, resumed=False))):
+        recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (NOISE,), (part,), ())
+        fitter = Fitter(recording, estimate_noise(recording, 0.5))
+        fit = fitter.fit(structure, steps=0)
+        left[name] = float(np.sqrt(np.nanmean((part.observed[:, 0] - fitter.predict(fit, part)[:, 0]) ** 2)))
+    assert left["unknown"] < 1.3 * NOISE and left["at rest"] > 5 * NOISE
+
+
+def test_a_record_from_rest_remembers_nothing_before_it(moved):
+    """A lag could feign any slow part of a record that began at rest."""
+    u, q = moved
+    before, after = cut(q, u)
+    structure = Structure(AXIS).with_cause(LAG, {"share": 0.1, "tau": TAU, "second": 0.1})
+    at_rest, going_on = (
+        len(structure.simulator(("reading.axis",), p.timing).free_initial_states) for p in (before, after)
+    )
+    assert going_on > at_rest
