@@ -27,6 +27,8 @@ def test_a_size_is_told_in_the_unit_in_which_it_is_read_best():
     assert interval(Estimate(6085.0, (6050.0, 6119.0), "ms")) == "6.085 s (6.05 ... 6.119 s)"
     assert interval(Estimate(0.0123, (0.0121, 0.0125), "s")) == "12.3 ms (12.1 ... 12.5 ms)"
     assert interval(Estimate(3.63e-10, (3.4e-10, 3.8e-10), "N/um^3")) == "363 pN/um^3 (340 ... 380 pN/um^3)"
+    assert interval(Estimate(0.2857, (0.2852, 0.2863), "1")) == "28.57 % (28.52 ... 28.63 %)"
+    assert interval(Estimate(0.2857, (0.2852, 0.2863), "1"), "exponent") == "0.2857 (0.2852 ... 0.2863)"
     assert (with_unit(999.6, "ms", 3), with_unit(999.4, "ms", 3)) == ("1 s", "999 ms")  # not 1000 ms
     assert with_unit(-1.26e-7, "(N*m)/urad", 3) == "-126 (nN*m)/urad" and with_unit(2.5e9, "N/m") == "2.5 GN/m"
     assert with_unit(0.0, "ms") == "0 ms" and with_unit(-3e-7, "s") == "-0.3 us" and with_unit(0.5, "1") == "0.5"

@@ -52,7 +52,7 @@ def print_diagnosis(diagnosis: Diagnosis) -> None:
         )
         for finding in diagnosis.findings:
             sets = (finding.parameters, *finding.terms)
-            rows = [(name, interval(e)) for numbers in sets for name, e in numbers.items()]
+            rows = [(name, interval(e, name)) for numbers in sets for name, e in numbers.items()]
             alike = ", ".join(map(cause_name, finding.alternatives))
             told = (finding.effect, finding.location, share_text(finding), chance_text(finding))
             for k, (name, text) in enumerate(rows):

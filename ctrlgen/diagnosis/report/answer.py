@@ -106,7 +106,7 @@ def _too_much_left(diagnosis: Diagnosis) -> str:
 def _main(findings: Sequence[Finding]) -> str:
     """The main cause with its first numbers and its share; the names of the others with theirs."""
     main, *others = findings
-    numbers = ", ".join([*(f"{name} = {interval(e)}" for name, e in _first_numbers(main).items()), *where(main)])
+    numbers = ", ".join([*(f"{name} = {interval(e, name)}" for name, e in _first_numbers(main).items()), *where(main)])
     share = f"; it takes away {_share(main.share)}" if main.share else ""
     causes = [f for f in others if f.role is Role.CAUSE]
     names = [f"{cause_name(f.cause)}{_in_brackets(f)}" for f in causes[:BESIDE]]

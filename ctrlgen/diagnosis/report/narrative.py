@@ -25,6 +25,8 @@ NAMED = 3
 SMALLEST = 0.1
 # a dimensionless number whose interval lies within this is shown in per cent
 WIDE = 1.0
+# numbers of laws that are a share of nothing
+EXPONENTS = frozenset({"exponent", "power"})
 HARD_SPACE = "\u00a0"
 # share of its interval within which an estimate counts as on the interval's end
 EDGE = 1e-6
@@ -48,10 +50,10 @@ def cause_text(finding: Finding) -> str:
     )
 
 
-def interval(e: Estimate) -> str:
-    """'4.12 % (3.93 ... 4.31 %)': value and 95 % interval, to two digits of the interval's width."""
+def interval(e: Estimate, name: str = "") -> str:
+    """'4.12 % (3.93 ... 4.31 %)': value and 95 % interval of the number of this name, to two digits of the interval's width."""
     ends = (e.value, *e.ci95)
-    percent = e.unit == "1" and all(abs(v) < WIDE for v in ends)
+    percent = e.unit == "1" and name not in EXPONENTS and all(abs(v) < WIDE for v in ends)
     best, factor = ("%", 100.0) if percent else sized(e.unit, e.value)
     unit = "" if best == "1" else f" {best}"
     value, low, high = (factor * v for v in ends)
