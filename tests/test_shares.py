@@ -247,3 +247,18 @@ def test_a_kind_that_another_one_took_the_place_of_still_speaks_alone():
     by_itself = alone(table, {"x": 1.0, "y": 1.0})
     assert by_itself[Family.HYSTERESIS] == pytest.approx(0.97) and by_itself[Family.DYNAMICS] == pytest.approx(0.96)
     assert by_itself[Family.CREEP] == 0.0
+
+
+@pytest.mark.parametrize(("axes", "geometry"), [({"x"}, 0.0), ({"x", "y"}, 0.2)])
+def test_what_is_constant_or_in_proportion_may_count_for_no_family(axes, geometry):
+    """A gain and an offset over a drive that a dead zone bends; a turned frame too is a function of the drives of several axes."""
+    rows = [
+        SimpleNamespace(kind=Kind.PROPORTION, additional=0.6, selected=1),
+        SimpleNamespace(kind=Kind.DRIVE, additional=0.2, selected=2),
+    ]
+    channel = SimpleNamespace(channel="x", rms=1.0, kinds=rows, constant=0.1, numbers=0.05, axes=frozenset(axes))
+    table = SimpleNamespace(channels=[channel], design=SimpleNamespace(one_way=lambda axes: False))
+    whole, bent = dict(ranking(table)), dict(ranking(table, linear=False))
+    assert whole[Family.GAIN] == pytest.approx(0.95) and whole[Family.GEOMETRY] == pytest.approx(0.6 + geometry)
+    assert bent[Family.DRIVE] == pytest.approx(0.2) and bent.get(Family.GEOMETRY, 0.0) == pytest.approx(geometry)
+    assert bent[Family.GAIN] == pytest.approx(0.2)  # by what the drive bends

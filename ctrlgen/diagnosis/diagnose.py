@@ -151,9 +151,10 @@ def _diagnose(
     found = (*findings(search, attribution, likelihoods), *detected)
     if shares is not None:
         noise = dict(zip(search.fitter.recording.channels, search.fitter.noise.floor.tolist(), strict=True))
-        spoken_for = by_heat(ranking(shares.before, noise), suspected)
-        spoken_for = spoken_for if laws is not None else possible(spoken_for, suspected)
-        found = in_standing(found, spoken_for, alone(shares.before, noise))
+        spoken_for, bent = (by_heat(ranking(shares.before, noise, linear), suspected) for linear in (True, False))
+        if laws is None:
+            spoken_for, bent = possible(spoken_for, suspected), possible(bent, suspected)
+        found = in_standing(found, spoken_for, bent, alone(shares.before, noise))
         answer = answer_of(answer, found, search.chosen.errors.is_noise)
     found = with_chances(found, search)
     answer = doubted(answer, found)

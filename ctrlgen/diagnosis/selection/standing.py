@@ -2,9 +2,12 @@
 
 A share says of what the residual of the device as described is a function, whatever the law. Where more than noise is left, a law
 whose family the shares put near zero, or far below another family, may be what fits best and still not be what acts: it does not
-stand first, and alone it makes the answer ambiguous. Not where a signal that speaks for its family predicts nearly as much alone: then
-the shares do not tell the two apart, and which was selected first is but an order. Where a model leaves noise alone, it has the better
-evidence.
+stand first, and alone it makes the answer ambiguous.
+
+What is in proportion to drive or place speaks against no law: settled creep, a play that is crossed at every pose, an axis that carries
+another one are gains to a reading. Whether a gain is all there is the search has tried, as no gain has another form than the
+library's. Nor does another family where a signal that speaks for the law's own predicts nearly as much alone: then the shares do not tell
+the two apart, and which was selected first is but an order. Where a model leaves noise alone, it has the better evidence.
 """
 
 from __future__ import annotations
@@ -24,11 +27,14 @@ NOTHING: Mapping[Family, float] = MappingProxyType({})
 
 
 def in_standing(
-    findings: Sequence[Finding], shares: Sequence[tuple[Family, float]], alone: Mapping[Family, float] = NOTHING
+    findings: Sequence[Finding],
+    shares: Sequence[tuple[Family, float]],
+    bent: Sequence[tuple[Family, float]],
+    alone: Mapping[Family, float] = NOTHING,
 ) -> tuple[Finding, ...]:
     """The findings with what the `shares` by family (the largest first), and those of its own kind `alone`, say of each; those that they
-    contradict after the others."""
-    told = [replace(f, support=_support(f, shares, alone)) for f in findings]
+    contradict after the others. `bent`: the shares without what is constant or in proportion, which alone speak against a law."""
+    told = [replace(f, support=_support(f, shares, bent, alone)) for f in findings]
     return tuple(sorted(told, key=lambda f: (f.role is not Role.CAUSE, f.contradicted)))
 
 
@@ -56,12 +62,15 @@ def answer_of(verdict: Verdict, findings: Sequence[Finding], exact: bool) -> Ver
 
 
 def _support(
-    finding: Finding, shares: Sequence[tuple[Family, float]], alone: Mapping[Family, float]
+    finding: Finding,
+    shares: Sequence[tuple[Family, float]],
+    bent: Sequence[tuple[Family, float]],
+    alone: Mapping[Family, float],
 ) -> SupportEntry | None:
     family = family_of(finding.effect)
     if family is None or not shares or finding.role is not Role.CAUSE:
         return None
-    leading, most = shares[0]
+    leading, most = bent[0] if bent else shares[0]
     own = dict(shares).get(family, 0.0)
     if (by_itself := alone.get(family, 0.0)) >= STANDING.as_much * most:
         own = max(own, min(by_itself, most))
@@ -71,5 +80,5 @@ def _support(
         share=own,
         leading=leading.value,
         leading_share=most,
-        contradicted=most >= STANDING.clear and weak,
+        contradicted=bool(bent) and most >= STANDING.clear and weak,
     )

@@ -75,20 +75,22 @@ def family_of(kind: str) -> Family | None:
     return law.family if law else None
 
 
-def ranking(table: SharesTable, noise: dict[str, float] | None = None) -> list[tuple[Family, float]]:
+def ranking(
+    table: SharesTable, noise: dict[str, float] | None = None, linear: bool = True
+) -> list[tuple[Family, float]]:
     """Families by the share that they could account for, the largest first; those with none are left out.
 
     Of each channel the gains of the selected kinds count for every family that their row names, and what a kind that was not
     selected adds counts where nothing selected speaks for the family. The mean and the device's numbers count for gain and
     offset. Of two with the same share the one that stands earlier in the rows goes first. Channels count by their energy over
-    the variance of their `noise` [SI]; alike without it.
+    the variance of their `noise` [SI]; alike without it. Where `linear` is False, what is constant or in proportion counts for none.
     """
     weights = _weights(table, noise)
     share = dict.fromkeys(Family, 0.0)
     place = dict.fromkeys(Family, len(Family))
     for channel in table.channels:
         selected, beside = dict.fromkeys(Family, 0.0), dict.fromkeys(Family, 0.0)
-        for row in channel.kinds:
+        for row in (r for r in channel.kinds if linear or r.kind is not Kind.PROPORTION):
             more = OF_SEVERAL_AXES.get(row.kind, ()) if len(channel.axes) > 1 else ()
             for k, family in enumerate((*SPEAKS_FOR[row.kind][0], *more)):
                 if row.selected:
@@ -96,7 +98,7 @@ def ranking(table: SharesTable, noise: dict[str, float] | None = None) -> list[t
                     place[family] = min(place[family], k)
                 else:
                     beside[family] = max(beside[family], row.additional)
-        selected[Family.GAIN] += channel.constant + channel.numbers
+        selected[Family.GAIN] += channel.constant + channel.numbers if linear else 0.0
         # friction without a change of direction is an offset
         if table.design.one_way(channel.axes):
             selected[Family.FRICTION] += channel.constant
