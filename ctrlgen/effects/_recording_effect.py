@@ -5,11 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic_core import PydanticCustomError, core_schema
-
 from ctrlgen.effects._effect import Effect
-from ctrlgen.effects._table import effect_schema, read_effect
+from ctrlgen.effects._table import TableReader, read_effect
 
 
 @dataclass(frozen=True)
@@ -41,23 +38,6 @@ def read_recording_effect(given: Any) -> RecordingEffect:
     return RecordingEffect(title, read_effect({key: value for key, value in given.items() if key != "recording"}))
 
 
-class _TableReader:
-    """Tells pydantic how a [[recording_effect]] table becomes a `RecordingEffect`."""
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
-        def validate(given: Any) -> RecordingEffect:
-            try:
-                return read_recording_effect(given)
-            except ValueError as error:
-                raise PydanticCustomError("effect", "{message}", {"message": str(error)}) from error
-
-        return core_schema.no_info_plain_validator_function(validate)
-
-    def __get_pydantic_json_schema__(
-        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        """An [[effect]] table and the title of the recording."""
-        return effect_schema("recording_effect", recording={"type": "string"})
-
-
-RecordingEffectTable = Annotated[RecordingEffect, _TableReader()]
+RecordingEffectTable = Annotated[
+    RecordingEffect, TableReader(read_recording_effect, "recording_effect", before=("recording",))
+]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
@@ -109,25 +111,31 @@ def _outside(param: Param, number: Quantity, low: float, high: float, unit: str)
     return f"{param.name} = {number.text} is outside {show(low, unit)} ... {show(high, unit)}"
 
 
-def effect_schema(title: str, **before: dict[str, Any]) -> dict[str, Any]:
-    """JSON Schema of a table that states an effect, with the keys `before`, all of them required."""
+def effect_schema(title: str, before: tuple[str, ...]) -> dict[str, Any]:
+    """JSON Schema of a table that states an effect, with the keys `before` of text, all of them required."""
     kinds = {"type": "string", "enum": sorted(Effect.library)}
     text = {"type": "string"}
     return {
         "type": "object",
         "title": title,
-        "properties": {**before, "kind": kinds, "package": text, "at": text, "of": text},
+        "properties": {**dict.fromkeys(before, text), "kind": kinds, "package": text, "at": text, "of": text},
         "required": [*before, "kind", "at"],
     }
 
 
-class _TableReader:
-    """Tells pydantic how an [[effect]] table becomes an `Effect`."""
+@dataclass(frozen=True)
+class TableReader:
+    """Tells pydantic how a table becomes what `read` makes of it, which raises ValueError; its JSON Schema is `effect_schema` of `title`
+    and the keys `before`."""
+
+    read: Callable[[Any], Any]
+    title: str
+    before: tuple[str, ...] = ()
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
-        def validate(given: Any) -> Effect:
+        def validate(given: Any) -> Any:
             try:
-                return read_effect(given)
+                return self.read(given)
             except ValueError as error:
                 raise PydanticCustomError("effect", "{message}", {"message": str(error)}) from error
 
@@ -136,8 +144,8 @@ class _TableReader:
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        """An [[effect]] table; the keys beside `kind`, `at` and `of` are the parameters of that kind of effect."""
-        return effect_schema("effect")
+        """The keys beside `kind`, `at` and `of` are the parameters of that kind of effect."""
+        return effect_schema(self.title, self.before)
 
 
-EffectTable = Annotated[Effect, _TableReader()]
+EffectTable = Annotated[Effect, TableReader(read_effect, "effect")]
