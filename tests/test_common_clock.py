@@ -28,6 +28,9 @@ A, B = Stretch("a", 0.0, 0.0, 10.0), Stretch("b", 12.0, 12.0, 20.0)
         ((A, Stretch("b", 0.0, 0.0, 5.0)), None),
         # overlapping
         ((A, Stretch("b", 9.0, 9.0, 20.0)), None),
+        # from the first row to the last twice what both took, less and more
+        ((A, Stretch("b", 27.9, 27.9, 35.9)), {"a": 0.0, "b": 27.9}),
+        ((A, Stretch("b", 28.1, 28.1, 36.1)), None),
         # an hour apart
         ((A, Stretch("b", 3600.0, 3600.0, 3610.0)), None),
     ],
