@@ -112,11 +112,14 @@ def test_a_law_that_acts_comes_before_a_drift_that_takes_away_twice_as_much(tria
 
 
 @pytest.mark.parametrize("rate, told", [(0.19, True), (0.21, False)])
-def test_a_drift_of_a_fifth_of_the_motion_is_none(rate, told):
-
+@pytest.mark.parametrize("levels_off", [False, True])
+def test_a_drift_of_a_fifth_of_the_motion_is_none(rate, told, levels_off):
+    """Of ten seconds; one that levels off with ten has gone by 1 - 1/e of what it comes to."""
+    drifted = {"size": -rate * 1e-5 / (1 - np.exp(-1)), "tau": 10.0} if levels_off else {"rate": -rate * 1e-6}
     recording = read_along(np.linspace(-5e-6, 5e-6, 11), 1.0)
-    structure = SimpleNamespace(causes=(DRIFT,), free_parameters=())
-    fit = SimpleNamespace(structure=structure, theta=(), values=lambda k: {"rate": -rate * 1e-6})
+    cause = Hypothesis("warm_up", "sensor:axis", "axis") if levels_off else DRIFT
+    structure = SimpleNamespace(causes=(cause,), free_parameters=())
+    fit = SimpleNamespace(structure=structure, theta=(), values=lambda k: drifted)
     reason = "it would drift by 21 % of the motion within a record"
     assert objections(recording, fit) == ({} if told else {0: reason})
     assert objections(recording, fit, exact=True) == {}
