@@ -10,7 +10,7 @@ from ctrlgen.numerics import batched_evaluation, compiled
 from ctrlgen.numerics.batched_evaluation import BLOCK, Recursion, evaluate, in_blocks, quick
 from ctrlgen.numerics.compiled import Compilable
 
-LONG = 1e6  # seconds that would pay for any compilation
+LONG, MANY = 1e6, 10_000  # seconds that would pay for any compilation, and samples for writing the code
 
 
 @pytest.fixture
@@ -57,7 +57,7 @@ def test_library_gives_the_numbers_of_the_virtual_machine_to_the_last_bit(cache)
     plain = Recursion(friction()).run(np.zeros(1), v, p)
     quick = Recursion(friction())
     quick.run(np.zeros(1), v, p)
-    assert quick.one.spent(LONG)
+    assert quick.one.spent(LONG, MANY)
     quick.unrolled.clear()
     for a, b in zip(plain, quick.run(np.zeros(1), v, p), strict=True):
         assert np.array_equal(a, b)
@@ -67,15 +67,33 @@ def test_library_gives_the_numbers_of_the_virtual_machine_to_the_last_bit(cache)
 def test_same_function_is_compiled_once(cache, monkeypatch):
     if compiled.compiler() is None:
         pytest.skip("no C compiler here")
-    assert Compilable(friction()).spent(LONG)
+    assert Compilable(friction()).spent(LONG, MANY)
     monkeypatch.setattr(compiled.subprocess, "run", lambda *_, **__: pytest.fail("compiled again"))
-    assert Compilable(friction()).spent(0.21)  # a library that is there costs nothing
+    assert Compilable(friction()).spent(0.21, MANY)  # a library that is there costs nothing
 
 
 def test_function_that_hardly_runs_is_not_compiled(cache):
     short = Compilable(friction())
-    assert not short.spent(1e-3)
+    assert not short.spent(1e-3, MANY)
     assert not cache.exists()
+
+
+def test_what_runs_in_less_than_its_c_takes_to_write_is_not_written(cache, monkeypatch):
+    """Hundreds of candidate models of a hexapod run over some poses each: writing their C took a third of a diagnosis, for nothing."""
+    if compiled.compiler() is None:
+        pytest.skip("no C compiler here")
+    written = []
+
+    def c_code(function):
+        written.append(function)
+        raise ValueError
+
+    monkeypatch.setattr(compiled, "c_code", c_code)
+    poses = 100
+    few = Compilable(friction())
+    assert not few.spent(1.0, poses, compiled.SAMPLES_TO_WRITE - 2 * poses) and not written
+    few.spent(1.0, poses, compiled.SAMPLES_TO_WRITE - 2 * poses)
+    assert len(written) == 1
 
 
 def test_without_a_compiler_nothing_changes(cache, monkeypatch):
@@ -83,7 +101,7 @@ def test_without_a_compiler_nothing_changes(cache, monkeypatch):
     compiled.compiler.cache_clear()
     function = friction()
     slow = Compilable(function)
-    assert not slow.spent(LONG)
+    assert not slow.spent(LONG, MANY)
     assert slow.function is function
 
 
@@ -91,9 +109,9 @@ def test_failing_compiler_leaves_the_virtual_machine(cache, monkeypatch):
     monkeypatch.setattr(compiled, "FLAGS", ("--no-such-flag",))
     broken = Compilable(friction())
     if compiled.compiler() is not None:
-        assert not broken.spent(LONG)
+        assert not broken.spent(LONG, MANY)
         assert not list(cache.glob("*.so"))
-        assert not broken.spent(LONG)
+        assert not broken.spent(LONG, MANY)
 
 
 def test_a_long_function_is_compiled_in_parts_and_gives_the_same_bits(cache, monkeypatch):
@@ -176,7 +194,7 @@ def assert_same_bits(one, state, *inputs):
     """States and results of the library are those of the virtual machine, whatever the sign of a zero; any two NaN are the same."""
     slow, library = Recursion(one), Compilable(one)
     slow.one.settled = True
-    assert library.spent(LONG)
+    assert library.spent(LONG, MANY)
     for a, b in zip(slow.run(state, *inputs), library.run(state, inputs, len(inputs[0])), strict=True):
         assert np.array_equal(a, b, equal_nan=True) and np.array_equal(np.signbit(a[a == 0]), np.signbit(b[b == 0]))
 
@@ -187,7 +205,7 @@ def test_a_damaged_library_leaves_the_virtual_machine(cache):
     cache.mkdir()
     (cache / compiled.library_name(compiled.c_code(friction()))).write_bytes(b"no library")
     broken = Recursion(friction())
-    assert not broken.one.spent(LONG)
+    assert not broken.one.spent(LONG, MANY)
     assert broken.run(np.zeros(1), np.ones((3, 1)), np.array([[0.3, 0.7]]))[0].shape == (3, 1)
 
 
@@ -200,7 +218,7 @@ def test_a_constant_input_is_given_once_and_one_of_another_length_is_refused(cac
         assert np.array_equal(a, b)
     if compiled.compiler() is None:
         pytest.skip("no C compiler here")
-    assert quick.one.is_compiled or quick.one.spent(LONG)
+    assert quick.one.is_compiled or quick.one.spent(LONG, MANY)
     for a, b in zip(expected, quick.run(np.zeros(1), v, p), strict=True):
         assert np.array_equal(a, b)
     for wrong in (p[:, :1], np.repeat(p, 3, axis=0)):

@@ -72,6 +72,6 @@ def test_no_cache_folder_or_one_that_cannot_be_written_is_no_error(
     assert cache_folder() is None and rendered(tmp_path) == "<"
     if compiler() is not None:
         x = ca.SX.sym("x")
-        assert not Compilable(ca.Function("f", [x], [x**2])).spent(1e6)  # stays with the virtual machine
+        assert not Compilable(ca.Function("f", [x], [x**2])).spent(1e6, 10_000)  # stays with the virtual machine
     with pytest.raises(jinja2.UndefinedError):
         environment(tmp_path).get_template("page").render()

@@ -78,6 +78,8 @@ def late_readings(
     model: Model, apart: Sequence[int], free: Sequence[str], observed: Sequence[str]
 ) -> tuple[list[LateReading], ca.SX]:
     """The channels `observed` that are late by the effects left out, and the rates (m,) that they need beside the channels."""
+    if not apart:
+        return [], ca.SX(0, 1)
     device = model.device
     sensors = channels(device.physics(device.values()), Place.SENSOR)
     names, units = [c.name for c in sensors], {c.name: c.unit for c in sensors}

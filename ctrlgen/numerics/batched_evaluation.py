@@ -101,7 +101,7 @@ class Recursion:
             after, values = evaluate(self.unrolled[size], state, *block)
             states[a:b], results[a:b], state = after[: b - a], values[: b - a], after[-1]
             seconds = time.process_time() - begin
-            if self.one.spent(seconds, seconds * ((n - b) + LIKELY_RUNS * n) / (b - a)):
+            if self.one.spent(seconds, b - a, (n - b) + LIKELY_RUNS * n):
                 self.unrolled.clear()
                 if b < n and self.one.is_compiled:
                     rest = [x[b:] if len(x) == n else x for x in inputs]

@@ -29,6 +29,8 @@ from ctrlgen.core.counts import number_of
 FLAGS = ("-Og", "-fPIC", "-shared", "-ffp-contract=off", "-w", *(("-nostdlib",) if sys.platform == "linux" else ()))
 # Of generated C, for the compiler: measured with gcc 12 on steps of an axis and a hexapod.
 SECONDS, SECONDS_PER_CHARACTER = 0.02, 4e-6
+# Samples that the virtual machine runs in the time that writing the C takes: on the same 120 to 600 of an axis, 400 to 1 300 of a hexapod.
+SAMPLES_TO_WRITE = 1000
 # Characters of generated C above which it is compiled in parts: the time of one function grows faster than its length. Plays before
 # creep, gcc 12: 0.6 instead of 1.0 s of 118,000 and 1.5 instead of 3.6 s of 270,000, and about the same time of a sample.
 LARGE = 100_000
@@ -82,20 +84,23 @@ class Compilable:
 
     def __init__(self, function: ca.Function) -> None:
         self.function = function
-        self.seconds = 0.0  # spent in the virtual machine so far
+        self.seconds, self.samples = 0.0, 0  # spent in the virtual machine so far
         self._code: str | None = None
         self._folder = cache_folder()
         self.settled = compiler() is None  # whether it is known already if the library takes the place
         self._loop: Callable[..., int] | None = None
 
-    def spent(self, seconds: float, expected: float = 0.0) -> bool:
-        """Counts `seconds` of the virtual machine, where it would take the `expected` ones beside; whether the library is there from
+    def spent(self, seconds: float, samples: int, to_come: int = 0) -> bool:
+        """Counts `samples` that took the virtual machine `seconds`, where as many are likely `to_come`; whether the library is there from
         now on."""
         if self.settled or self._folder is None:
             return False
         self.seconds += seconds
+        self.samples += samples
+        expected = seconds / samples * to_come
         if self._code is None:
-            if self.seconds + expected < 0.1:  # what hardly runs need not be written as C
+            # what hardly runs need not be written as C, nor what runs in less than that takes, whether it was compiled before or not
+            if self.seconds + expected < 0.1 or self.samples + to_come < SAMPLES_TO_WRITE:
                 return False
             try:
                 self._code = c_code(self.function)
