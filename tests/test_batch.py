@@ -212,6 +212,7 @@ def creeping(tmp_path_factory):
     return ctrlgen.diagnose(axis, folder, laws=("creep", "drive_gain", "stiffening"))
 
 
+@pytest.mark.long
 def test_replicates_agree_with_the_slopes_where_the_noise_is_white(creeping):
     found = bootstrap(creeping.search, 24, seed=3, jobs=0)
     assert found.replicates == 24 and found.failed == () and list(found.vanished.values()) == [0.0]
@@ -232,6 +233,7 @@ def test_replicates_are_the_same_in_other_processes(creeping):
     assert "too few" in a.note
 
 
+@pytest.mark.long
 def test_the_command_prints_and_keeps_the_intervals(jobs, tmp_path, monkeypatch, capsys):
     files = [str(tmp_path / "table.toml"), str(tmp_path / "runs" / "run0")]
     command = ["ctrlgen", "diagnose", *files, "--out", str(tmp_path / "out"), "--bootstrap", "20", "--jobs", "0"]

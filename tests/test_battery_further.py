@@ -349,6 +349,7 @@ WANTED = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", WANTED)
 def test_a_case_tells_nothing_and_its_seed_reproduces_it(tmp_path, monkeypatch, kind):
     monkeypatch.setattr(region_cases, "SECONDS", 1.0)

@@ -31,6 +31,7 @@ def linear(circle):
 
 
 # Figures measured on the circle with the drives of the device as described: the largest deviation of one translation.
+@pytest.mark.long
 def test_measured_figures_are_reproduced(circle, budget):
     lines = {line.name: line for line in budget.lines}
     R, tau = (number(circle, f"actuator.{name}") for name in ("thermal_resistance", "time_constant"))
@@ -46,6 +47,7 @@ def test_measured_figures_are_reproduced(circle, budget):
         assert 1e9 * steps * lines[name].sensitivity["translation"] == pytest.approx(simulated, rel=0.05), name
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "path",
     [
@@ -167,6 +169,7 @@ def test_a_number_in_a_list_is_called_by_the_name_of_its_table():
     assert device.called("output.at[0]") == "output.at[0]" and device.called("drive.gain") == "drive.gain"
 
 
+@pytest.mark.long
 def test_correlated_deviations_add_or_cancel(circle, tmp_path):
     two = '[numbers]\n"actuator.young" = { sd = "1 %", source = "a" }\n"actuator.expansion" = { sd = "1 %", source = "b" }\n'
     between = '[[correlation]]\nbetween = ["actuator.young", "actuator.expansion"]\ncoefficient = {}\nsource = "c"\n'
@@ -215,6 +218,7 @@ def test_the_safety_of_limits_is_that_of_the_draws(budget):
         assert abs(s.drawn - s.kept) < 0.5 * s.sd  # ten draws lie beyond the quantile of 99.9 %: it is known to 0.3 sd
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name, path, step",
     [

@@ -191,6 +191,7 @@ def test_the_command_states_the_difference_to_a_finer_model(tmp_path):
     assert other.returncode == 1 and "describe the same device" in " ".join(other.stderr.split())
 
 
+@pytest.mark.long
 def test_the_command_refuses_what_it_cannot_read(tmp_path):
     assert "is not a probability" in ctrlgen("budget", SCENARIOS / "circle20", "--probability", "often").stderr
     assert "does not exist" in ctrlgen("budget", SCENARIOS / "circle20", "--uncertainty", tmp_path / "none.toml").stderr

@@ -95,6 +95,7 @@ def test_drives_in_single_precision_are_off_by_what_numpys_are(circle, tmp_path)
     assert not together and np.sqrt(np.mean(rounding**2)) == pytest.approx(np.sqrt(np.mean(sd**2)), rel=0.04)
 
 
+@pytest.mark.long
 def test_replayed_drives_are_within_what_is_counted_for_the_player(circle, tmp_path):
     """The drives that the player's C computes, simulated for two laps; and draws that are uniform within the tolerance."""
     given = stated(circle, "[drive]\nplayer = true", tmp_path)

@@ -144,6 +144,7 @@ def test_parameters_are_learnt_from_record_to_record_and_initial_states_are_not(
     assert matched_innovations(records) == pytest.approx(by_cholesky(left, effect, every, numbers))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("off", "heavy"), [(0.0, False), (300.0, False), (3.0, True)])
 def test_the_level_holds_beside_numbers_with_errors(off, heavy):
     """Four numbers could take most of the effect; each is `off` by so many of its deviations, which move what is read by two."""

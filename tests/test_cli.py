@@ -213,6 +213,7 @@ MOMENTS = [(stop, after) for stop in (signal.SIGINT, signal.SIGTERM) for after i
 QUICK = ((signal.SIGINT, 0.05), (signal.SIGTERM, 2.2))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("stop", "after"), [m if m in QUICK else pytest.param(*m, marks=pytest.mark.long) for m in MOMENTS]
 )

@@ -136,6 +136,7 @@ def test_no_heap_no_globals_no_recursion_no_unbounded_loops(folder, compiler, tm
                 assert not re.search(r" [BbDdC] ", table), f"{real}: writable data\n{table}"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("real", list(Real))
 def test_the_shipped_test_of_reference_vectors_passes_and_can_fail(folder, compiler, tmp_path, real):
     online, *others = folder.sources(real)
@@ -330,6 +331,7 @@ def test_headers_state_names_units_limits_and_provenance(folder, circle):
         assert words in text, words
 
 
+@pytest.mark.long
 def test_the_cmake_project_builds_and_its_test_passes(folder, tmp_path):
     if not shutil.which("cmake"):
         pytest.skip("cmake is missing: the generated CMake project was not built")

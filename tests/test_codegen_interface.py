@@ -108,6 +108,7 @@ int main(void)
     assert subprocess.run([tmp_path / "main"]).returncode == 0
 
 
+@pytest.mark.long
 def test_two_controllers_link_into_one_program(circle_c, compiler, tmp_path):
     scenario = load_scenario(SCENARIOS / "rrr_circle")
     other = generate(scenario, build_model(scenario.device), tmp_path / "rrr")

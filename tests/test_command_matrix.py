@@ -70,6 +70,7 @@ def named(path: Path) -> str:
     return f"{path.parent.name}-{path.stem}"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_refuses_files_of_other_kinds_in_words(command, tmp_path, capsys):
     (tmp_path / "empty.toml").touch()
@@ -192,6 +193,7 @@ def test_check_of_every_recording(path):
     assert not reason if there else "is not here" in reason
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("path", slow(RECORDED, QUICK), ids=named)
 def test_calibration_of_every_device_without_constants_of_its_own_is_refused(path):
     device = of_device(path)

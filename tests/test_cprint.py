@@ -81,6 +81,7 @@ def listed(values: np.ndarray) -> str:
     return "{ " + ", ".join(repr(float(v)) for v in values) + " }"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 6))])
 def test_random_functions_compute_what_casadi_does_also_in_place_and_iterated(compiler, tmp_path, seed):
     rng = np.random.default_rng(seed)

@@ -317,6 +317,7 @@ def test_the_proposal_for_a_hexapod_is_a_scenario(meso, tmp_path):
     assert scenario.bind(build_model(device)).samples.shape[1] == 6
 
 
+@pytest.mark.long
 def test_what_is_called_detectable_is_seen_and_half_of_it_is_not():
     clean = axis_fitter()
     fit = clean.fit(Structure(AXIS))
@@ -349,6 +350,7 @@ def test_a_gain_shows_only_at_the_price_of_what_the_device_states():
     assert 0.05 < smallest.detectable_from < 4 * np.hypot(0.02, 0.05)
 
 
+@pytest.mark.long
 def test_evidence_is_numbers_that_json_knows(monkeypatch):
     fitter = axis_fitter(lambda t, q, v, memory: (cubic(t, q, v, 0)[0] + 0.02 * detent(t, q, v, 0)[0], 0), n=1000)
     search = Searcher(fitter, Screen(fitter, [CUBIC, DRIFT]), lambda _: None).run(AXIS)

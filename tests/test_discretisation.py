@@ -310,6 +310,7 @@ def test_steps_of_dry_friction_are_of_second_order(tmp_path, linear):
     assert off[0] / off[1] > 3.3 and off[1] / off[2] > 3.3  # four in the limit
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("linear", [False, True], ids=["held", "linear"])
 @pytest.mark.parametrize("samples", [1, 2])
 def test_dry_friction_that_reverses_gently_is_right_to_a_thousandth_however_long_the_sample(tmp_path, samples, linear):

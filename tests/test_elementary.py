@@ -248,6 +248,7 @@ def test_angles_beyond_the_exact_range_are_bounded_and_as_wrong_as_their_roundin
         assert np.max(np.abs(c(name, x) - exact(x.astype(EXACT))) / x) < 2 * real.epsilon
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("real", list(Real))
 def test_a_wrong_coefficient_is_seen(compiler, tmp_path, real, rng):
     """The last digits of a coefficient of each polynomial decide."""
@@ -318,6 +319,7 @@ def test_only_what_is_called_is_printed_and_no_library(real, compiler, tmp_path)
             assert unknown.stdout.split() == [], name
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("cross", ["zig", "arm-none-eabi-gcc"])
 def test_a_microcontroller_computes_the_same_bits(libraries, cross, tmp_path, rng):
     if not available() or cross not in cross_compilers():

@@ -163,6 +163,7 @@ def test_where_the_laws_leave_noise_nothing_is_written():
     assert diagnosed(lambda d: 1.02 * d).empirical_terms == ()
 
 
+@pytest.mark.long
 def test_a_named_cause_keeps_its_numbers_and_its_findings():
     """Bumps beside 2 % of gain: the gain is found, and what the term takes is not taken from it."""
     found = diagnosed(lambda d: bumps(d) + 0.02 * d)

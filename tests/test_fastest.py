@@ -202,6 +202,7 @@ def test_the_fourth_derivative_of_a_composition_is_faa_di_brunos():
     assert found == pytest.approx([d, 4 * a * c + 3 * b**2, 6 * a**2 * b, a**4])
 
 
+@pytest.mark.long
 def test_a_tripod_on_its_cone_is_faster_than_at_even_speed_and_keeps_its_currents():
     found = ctrlgen.fastest(SCENARIOS / "tripod_tilt")
     assert found.optimum.duration <= found.duration <= found.even
@@ -270,6 +271,7 @@ def test_a_periodic_list_of_poses_has_the_derivatives_of_its_curve():
         assert table[:, 0] == pytest.approx(wanted, abs=1e-6 * np.abs(wanted).max())
 
 
+@pytest.mark.long
 def test_the_command_writes_page_figures_numbers_scenario_and_player(tmp_path):
     done = run("fastest", AXIS, "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr

@@ -113,6 +113,7 @@ def test_at_even_speed_every_sample_leads_as_far_also_beyond_the_end(closed):
     assert steps == pytest.approx(np.full(11, 0.2))
 
 
+@pytest.mark.long
 def test_a_rate_that_never_binds_leaves_what_each_place_allows(tmp_path):
     """IPOPT over the whole path against the bound of each place: 0.5 %, of 216 intervals."""
     free = ctrlgen.fastest(written(tmp_path, lagging(None), ROUND))

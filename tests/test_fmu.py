@@ -25,6 +25,7 @@ def units(request, tmp_path_factory, compiler):
     return made.paths
 
 
+@pytest.mark.long
 def test_the_units_are_valid_fmi(units):
     for path in units:
         assert fmpy.validation.validate_fmu(str(path)) == []

@@ -204,6 +204,7 @@ def check_c(out: Path, compiler: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.long
 def test_nothing_foreign_is_in_the_c_its_package_and_the_report(tmp_path, compiler):
     def make(folder: Path, out: Path) -> None:
         title = tomllib.loads((folder / "devices" / DEVICE.name).read_text())["title"]

@@ -188,6 +188,7 @@ def with_law(law: str):
     return f'[[effect]]\nkind = "{law}"\nat = "axis"\n{lines}'
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", MEMORY)
 def test_a_law_with_memory_is_fitted_across_gaps_as_without_them(law, tmp_path):
     (tmp_path / "true.toml").write_text(AXIS_FILE.read_text() + with_law(law))

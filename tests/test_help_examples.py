@@ -50,6 +50,7 @@ def needed(line: str) -> set[str]:
     return folders | {next(e.name for e in examples() if e.device.stem == stem) for stem in stems}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "line"), MATCHES)
 def test_the_example_of_a_command_works_as_its_help_prints_it(name, line, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -71,6 +71,7 @@ def test_the_reading_matters_for_the_stretch():
     assert at[1] / at[0] == pytest.approx(1.281, abs=0.01)
 
 
+@pytest.mark.long
 def test_errors_of_the_equations_match_those_s3_prints():
     data = hinge_errors((0.05, 0.075, 0.1, 0.15, 0.2, 0.25, 0.374, 0.5, 0.65, 0.764, 0.8))
     for group, half in (("paros_weisbord", 0.1), ("paros_weisbord_simplified", 0.1), ("lobontiu", 0.1)):

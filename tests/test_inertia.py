@@ -283,6 +283,7 @@ def test_dry_friction_is_overcome_by_the_drive(tmp_path):
     assert (rubbing.drive - plain.drive)[middle] == pytest.approx(np.full((100, 1), 0.1), abs=1e-3)
 
 
+@pytest.mark.long
 def test_a_law_without_an_inverse_is_named(tmp_path):
     with pytest.raises(SolverError, match=r"no drive held .*the device has backlash"):
         solved(tmp_path, with_effect(tmp_path, "backlash", 'gap = "1 um"'), LINE)

@@ -85,6 +85,7 @@ TOO_FAST = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", TOO_FAST)
 def test_every_path_that_cannot_be_followed_is_explained_with_one_that_can(tmp_path, name):
     path, says = TOO_FAST[name]

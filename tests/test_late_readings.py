@@ -140,6 +140,7 @@ def fitter_of(recording: Recording) -> Fitter:
     return Fitter(recording, known)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("samples", [1.0, 2.5, 7.0, 24.3, 45.0, 60.0])
 def test_the_age_of_a_reading_is_found_whatever_it_is(samples):
     """The interval holds what was planted, and noise is all that is left, held out too."""

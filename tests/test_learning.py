@@ -86,6 +86,7 @@ def test_an_actuator_that_answers_otherwise_is_named_once_a_second_run_shows_it(
     assert names in fault and says in fault
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("changes", "says"),
     [

@@ -83,6 +83,7 @@ def test_a_stated_delay_and_a_filter_are_taken_out_of_the_readings(circle):
     assert found == pytest.approx(pose, abs=1e-10)
 
 
+@pytest.mark.long
 def test_what_is_left_to_the_sensor_never_lets_the_stage_be_worse(rng):
     """For every sensor within its budget the true deviation after, d - a, is no longer than before."""
     n, scale = 40, np.ones(2)
@@ -117,6 +118,7 @@ def test_scales_of_one_size_are_told_apart_by_no_basis():
         assert budget.of_sensor(3 * x) == pytest.approx(x, abs=1e-7)  # y takes no part
 
 
+@pytest.mark.long
 def test_the_condition_holds_for_lines_of_any_size_that_may_say_the_same(rng):
     """1/2 |a|^2 + sum |g_i . a| <= a . d to rounding, for lines from 1e-2 to 1e2 of the deviation, two of which are one line."""
     for _ in range(300):
@@ -229,6 +231,7 @@ def test_zero_clock_and_drift_of_later_runs_are_taken_out_and_named(circle, tmp_
         assert bench.error(found.next.drive) < 15e-9, name  # of 363 nm
 
 
+@pytest.mark.long
 def test_a_run_of_another_path_is_refused_by_name(circle, tmp_path):
     """Its readings under the drives of this path (a file of another run), or its drives and its readings."""
     bench = Bench(circle, tmp_path)

@@ -178,6 +178,7 @@ def check_status(met: tuple[str, ...], calls: list, status: ControllerStatus) ->
     assert bool(status & ControllerStatus.COMPOSITE) == (share == "over" or grows(calls)), met
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "device",
     [pytest.param(d, marks=pytest.mark.long) if d.rated or d.rounds > 1 or d == Device() else d for d in DEVICES],

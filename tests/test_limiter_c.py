@@ -104,6 +104,7 @@ def without_type(text: str) -> str:
     return re.sub(r"\breal\b", named[1], text.replace(named[0], "")) if named else text
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", DEVICES)
 def test_the_generated_limiter_is_the_limiter_with_the_configuration_of_the_device(name, written):
     if not shutil.which("gcc"):
@@ -112,6 +113,7 @@ def test_the_generated_limiter_is_the_limiter_with_the_configuration_of_the_devi
         assert tokens(folder / "generated.c", folder) == tokens(LIMITER / "limiter.c", folder)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", DEVICES)
 def test_the_limiter_compiles_as_it_stands_without_a_warning(name, compiler, written):
     for folder in written(name):

@@ -54,6 +54,7 @@ QUICK = ("flexure_axis.toml", "parallelogram.toml", "tilt_platform.py", "tripod.
 SHIPPED = sorted(path.name for path in DEVICES.iterdir() if path.suffix in (".toml", ".py"))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.long) for n in SHIPPED])
 def test_a_bode_plot_of_a_shipped_device_is_drawn_or_there_is_nothing_to_draw(name, tmp_path, recwarn):
     model, path = model_of(name), tmp_path / "bode.png"

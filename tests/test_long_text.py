@@ -85,6 +85,7 @@ def test_a_long_file_is_read_as_a_short_one(tmp_path, monkeypatch):
         assert len(taken) == before + (name in READ), name
 
 
+@pytest.mark.long
 def test_memory_holds_the_numbers_and_little_more(tmp_path, monkeypatch):
     """Twice the numbers while columns are joined, and a piece of text; a whole text and its lines would take ten times as much."""
     path = tmp_path / "log.csv"

@@ -208,6 +208,7 @@ def test_a_usual_law_is_commoner_and_told_with_its_source():
     assert odds[1] - odds[0] == there.machine_odds
 
 
+@pytest.mark.long
 def test_a_diagnosis_names_what_it_finds_in_the_words_of_the_machine():
     fitter = axis_fitter(force=lambda t, q, v, memory: (0.5, memory), n=500)
     coil = AXIS.model_copy(update={"machine": Machine(actuator="voice coil", transmission="flexure")})

@@ -89,6 +89,7 @@ def stage_of(J: np.ndarray) -> str:
     ).replace("'", '"')
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("drives", [6, 3])
 def test_the_controller_on_a_jacobian_of_planted_poses_leads_the_specimen(drives, tmp_path):
     """Poses of another Jacobian than the described one, from a home of its own, with noise: the file written is solved and made C of, and

@@ -133,6 +133,7 @@ def test_every_number_of_a_mechanism_may_be_free(tmp_path):
     assert np.abs((ends[1] - ends[0]) / (2 * step) - slope).max() < 1e-4 * np.abs(slope).max()
 
 
+@pytest.mark.long
 def test_check_describes_and_draws_a_mechanism(tmp_path):
     said = run_command("check", DEVICE.parent / "tip_tilt_mirror.toml", "--figure", tmp_path / "mirror.svg")
     assert (

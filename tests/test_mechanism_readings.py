@@ -64,6 +64,7 @@ def test_copies_of_a_reading_go_round_and_to_the_mirror_with_their_pattern(tmp_p
     assert rows[1] == pytest.approx(-rows[0], abs=1e-12) and np.abs(rows).max() > 1e-3
 
 
+@pytest.mark.long
 def test_a_recording_of_a_reading_on_a_body_names_what_the_description_leaves_out(tmp_path):
     """The edge's sensor alone has a wrong gain: 8 % is planted, in the output nothing."""
     text = TURNING + EDGE

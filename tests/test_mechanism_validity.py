@@ -140,6 +140,7 @@ def test_a_long_chain_of_bodies_loses_no_digits(tmp_path):
     assert np.abs(dm(c.stiffness) - stiffness).max() < 1e-11 * np.abs(stiffness).max()
 
 
+@pytest.mark.long
 def test_twice_the_elements_of_a_mechanism_are_twice_the_operations_of_its_jacobian(tmp_path):
     """With all diameters as symbols, so that nothing of the assembly is folded away, and with its derivatives by them along one direction:
     what a diagnosis evaluates. A chain is eliminated body by body; a dense matrix would take eight times as many."""

@@ -178,6 +178,7 @@ def test_rates_are_kept_by_the_best_drives_of_the_whole_path(tmp_path):
     assert np.linalg.norm(2 * s) > 0.1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "path", [circle(20, 4, 0), 'kind = "line"\nstart = { x = "-9 um" }\nend = { x = "12 um", y = "4 um" }\n']
 )

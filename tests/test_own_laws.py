@@ -193,6 +193,7 @@ def test_of_two_laws_of_one_name_neither_is_taken(tmp_path, monkeypatch):
     assert all("one and two both bring" in each.why for each in left_out)
 
 
+@pytest.mark.long
 def test_a_command_warns_once_of_what_is_left_out_and_goes_on(tmp_path, monkeypatch):
     install(tmp_path, "my-stage", {"slack_cable": "gone:SlackCable"})
     monkeypatch.syspath_prepend(str(tmp_path))

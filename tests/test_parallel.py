@@ -127,6 +127,7 @@ def cluster():
         yield cluster
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("default")
 def test_a_cluster_loses_nothing_when_a_worker_is_killed(cluster, tmp_path):
     found, killed = {}, None

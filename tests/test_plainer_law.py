@@ -163,6 +163,7 @@ def test_what_generalises_nothing_is_what_it_is():
     assert may_be_plainer(fit, 0) is None
 
 
+@pytest.mark.long
 @every_general_law
 def test_what_rubs_or_lags_alike_both_ways_is_named_by_the_plainer_law(law, monkeypatch):
     """Readings of the plainer law, fitted by the one that generalises it."""

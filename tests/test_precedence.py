@@ -51,6 +51,7 @@ def diagnosed(folder, error, *speeds):
     return finding
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("error", [pitched, hummed])
 def test_at_one_speed_a_pitch_comes_first_and_a_line_stands_beside_it(tmp_path, error):
     """Each is as good as the other there, whichever acts: the corrected device must hold at other speeds."""
@@ -60,6 +61,7 @@ def test_at_one_speed_a_pitch_comes_first_and_a_line_stands_beside_it(tmp_path, 
     assert "another speed tells them apart" in why_alike(finding.cause, finding.alternatives[0])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("error, effect", [(pitched, "cyclic"), (hummed, "vibration")])
 def test_where_speeds_differ_the_data_decide(tmp_path, error, effect):
     finding = diagnosed(tmp_path, error, SPEED, 0.6 * SPEED, 0.8 * SPEED)

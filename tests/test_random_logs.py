@@ -48,6 +48,7 @@ def outcomes(tmp_path_factory) -> dict[int, str]:
     return found
 
 
+@pytest.mark.long
 def test_what_is_refused_is_asked_with_the_key_that_answers(outcomes):
     for seed, said in outcomes.items():
         assert said == "read" or "layout = {" in said, (random_log(seed).described, said)

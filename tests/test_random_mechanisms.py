@@ -15,6 +15,7 @@ LONG = (3, 23, 25, 26, 53, 102, 127)  # the last three: Newton lost out of reach
 MORE = (24, *range(27, 48))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "seeds", [QUICK, pytest.param(LONG, marks=pytest.mark.long), pytest.param(MORE, marks=pytest.mark.exhaustive)]
 )

@@ -54,6 +54,7 @@ def turned(tmp_path_factory):
     )
 
 
+@pytest.mark.long
 def test_the_law_that_was_found_tells_from_where_to_where_its_numbers_went(creeping):
     first, score, attempt, *_ = explain(creeping, "creep")
     assert first == "creep at stage:axis is in the answer." and "where chance reaches" in score
@@ -81,6 +82,7 @@ def test_a_law_that_cannot_act_there_is_not_offered_and_an_unknown_one_is_a_faul
         explain(creeping, "no_such_law")
 
 
+@pytest.mark.long
 def test_a_refusal_that_mattered_is_told_with_what_it_would_leave(turned):
     """In the next steps, on the page and in diagnosis.json, with its numbers and its held-out error."""
     assert turned.findings == () and turned.verdict == "unexplained"

@@ -80,6 +80,7 @@ def hexapod() -> Device:
     return load_device(DEVICE)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("effect", ON_HEXAPOD)
 def test_of_settled_poses(effect):
     settle(effect, *ON_HEXAPOD[effect])
@@ -139,6 +140,7 @@ SHARED = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("effect", SHARED)
 def test_of_what_two_axes_share(effect):
     own = {

@@ -254,6 +254,7 @@ def test_rounded_data_move_a_mean_by_three_standard_deviations() -> None:
     assert moved == pytest.approx(3 * 0.5 / np.sqrt(3 * 300), rel=0.15)  # of 1000 draws: 2.6 to 3.4 sd
 
 
+@pytest.mark.long
 def test_every_row_has_its_own_place_and_says_why_it_differs(rows) -> None:
     assert len({row.where for row in rows}) == len(rows)
     assert all(

@@ -108,6 +108,7 @@ def test_a_planted_wrong_length_is_found(monkeypatch: pytest.MonkeyPatch) -> Non
             cached.cache_clear()
 
 
+@pytest.mark.long
 def test_table_6_is_reproduced_to_a_tenth_of_a_point_but_for_three_lost_signs() -> None:
     rows = printed_rows("Table 6")
     differing = [row for row in rows if row.status not in AGREES]

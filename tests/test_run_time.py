@@ -141,6 +141,7 @@ def controller(volts):
     return controller_of(build_model(volts.device), "pose", 1e-3)
 
 
+@pytest.mark.long
 def test_a_controller_with_another_slack_has_the_same_kernels_and_limits_of_its_own(controller):
     wide = replace(controller, slack=4e-6)
     assert wide.kernels is controller.kernels and len(wide.kernels.variants) > 10

@@ -89,6 +89,7 @@ def follows(c: Compiled, calls: int, seed: int) -> float:
     return float(worst)
 
 
+@pytest.mark.long
 def test_a_path_is_followed_at_any_times_that_were_said_before(both):
     """As at the clock of the scenario, on a device that goes on by itself: its error is that of rounding."""
     assert follows(both[Real.FLOAT], 400, 0) < POSITION

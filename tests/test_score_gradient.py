@@ -116,6 +116,7 @@ def test_the_sums_of_the_screen_are_those_of_a_plain_recursion(hexapod, monkeypa
         assert np.abs((getattr(found, name) - value) / size).max() < 1e-12, name
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", [h for h in LAWS if h.effect != PARAMETER], ids=lambda h: f"{h.effect}-{h.at}")
 def test_a_slope_is_the_difference_of_two_simulations(hexapod, law):
     fit = hexapod.fit(Structure(HEXAPOD))

@@ -77,6 +77,7 @@ def decided(fits, at):
     return found.entries[0], {e.kind: e for e in found.entries}
 
 
+@pytest.mark.long
 def test_a_turned_specimen_tells_a_channel_from_a_height_and_no_reference_of_all(fits):
     """The scale of one channel stays with it when the specimen turns; one of all goes round with it, as levers do: there another sensor
     decides, whose scale must be known to a sixth of the 0.6 % at three standard deviations."""

@@ -87,6 +87,7 @@ def test_a_solution_has_the_commanded_path_in_its_table(solution):
     assert np.allclose(frame["command.axis [um]"], frame["pose.axis [um]"], atol=1e-6)
 
 
+@pytest.mark.long
 def test_figures_are_drawn_by_name_and_written(solution, tmp_path):
     every = solution.plot()
     assert {"path", "drives", "margins"} <= set(every.figures) and len(repr(every)) < 200

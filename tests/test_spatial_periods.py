@@ -74,6 +74,7 @@ def test_a_way_below_the_shortest_is_not_told():
     assert spatial_periods(path, left, 6e-5) == ()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("pitch", [2.1e-4, 3.1e-4])
 def test_a_pitch_of_which_a_short_stroke_holds_two_periods_is_found(pitch):
     """Approaches of half a millimetre, with rests, on a travel of 25 mm: the law's own starts begin at 1.25 mm."""

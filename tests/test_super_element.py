@@ -65,6 +65,7 @@ def faults(folder: Path, text: str) -> str:
     return str(error.value)
 
 
+@pytest.mark.long
 def test_a_part_by_its_condensed_matrices_is_the_part(tmp_path):
     rng = np.random.default_rng(3)
     for name, taken in (

@@ -99,6 +99,7 @@ def test_the_shipped_test_enters_every_function_and_the_branches_that_can_be(nam
     assert [text for text in sorted(missed) if not any(re.search(known, text) for known in NOT_ENTERED)] == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("real", list(Real))
 def test_the_vectors_have_every_status_that_a_target_can_bring_about(real):
     """INPUT and LOST have calls of their own beside the vectors."""

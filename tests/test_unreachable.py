@@ -55,6 +55,7 @@ MORE = (
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.long) if n in MORE else n for n in CASES])
 def test_a_path_that_cannot_be_followed_is_explained(tmp_path, name):
     *given, says = CASES[name]
@@ -105,6 +106,7 @@ def moved(path, h, mass, damping, stiffness, force, limit):
     return np.abs(drive).max() <= 1.01 * limit  # the differences' error
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", OTHERS)
 def test_one_of_another_device_is_explained_too(tmp_path, name):
     device, (*changed,), rate, duration, path, says, reference = OTHERS[name]
@@ -160,6 +162,7 @@ SEEDS = range(24)
 QUICK = range(11, 19)  # of both kinds
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [s if s in QUICK else pytest.param(s, marks=pytest.mark.long) for s in SEEDS])
 def test_the_inverse_and_ipopt_agree_on_what_can_be_followed(tmp_path, seed):
     scenario = drawn(np.random.default_rng(seed), tmp_path)

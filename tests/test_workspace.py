@@ -91,6 +91,7 @@ def test_no_pose_lies_beyond_the_ends(workspace, model, rng):
     assert np.diff(alone)[0, 0] < 0.9 * size[0]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("channel", "side"), [(1, 1), (3, 0), (5, 1)])
 def test_the_ends_are_those_of_a_nonlinear_programme(workspace, model, channel, side):
     """IPOPT over (state, displacement, drive) with the model's own equations: no inverse, no tangent planes."""
