@@ -122,6 +122,26 @@ def test_of_poses_one_after_the_other(effect):
     recover(fitter, device, effect, planted)
 
 
+def test_of_a_grid_plate_that_is_not_square():
+    table = {
+        "kind": "matrix",
+        "name": "stage",
+        "title": "an X-Y stage",
+        "source": "round numbers",
+        "directions": ["delta_x", "delta_y"],
+        "channels": ["delta_x", "delta_y"],
+        "jacobian": [["0.2 um/V", "0 um/V"], ["0 um/V", "0.2 um/V"]],
+        "actuator": [{"name": name, "low": "0 V", "high": "100 V"} for name in ("x", "y")],
+    }
+    rng, device, parts = np.random.default_rng(10), validate(Device.library["matrix"], table, "device"), []
+    for n, role in ((60, "fit"), (30, "hold_out")):
+        u = rng.uniform(0, 100, (n, 2))
+        y = 2e-7 * u + np.outer(0.004 * 2e-7 * u[:, 1], [1, 0]) + SHIFTED * rng.standard_normal((n, 2))
+        parts.append(record(u, y, role, h=np.inf))
+    fitter = fitter_of(device, ("reading.delta_x", "reading.delta_y"), ("um", "um"), (SHIFTED, SHIFTED), "poses", parts)
+    recover(fitter, device, "squareness", Planted("sensor:delta_x", {"angle": 0.004}, "delta_y"))
+
+
 def test_of_a_table_out_of_balance():
     rng, device = np.random.default_rng(6), load_device(SCENARIOS / "rotary_axis" / "device.toml")
     parts = []
@@ -252,6 +272,7 @@ def test_no_law_is_left_out():
     here = in_joints_and_drives | {
         *(law.__name__ for law in ON_AXIS | IN_A_REGION),
         *ON_HEXAPOD,
+        "squareness",
         *SHARED,
         *IN_ORDER,
         "clock_offset",

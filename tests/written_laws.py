@@ -228,6 +228,7 @@ LAWS = {
     "second_pole": ({"tau": 0.3}, lambda s, p: p.share * (s.w - s.value), lambda s, p: {"w": (s.value - s.w) / 0.3}),
     "sensor_gain": ({}, lambda s, p: p.gain * s.value),
     "sensor_step": (EVENT, lambda s, p: p.offset * event(s, p)),
+    "squareness": ({}, lambda s, p: p.angle * s.all[s.partner]),
     "stiffening": ({}, lambda s, p: -p.k3 * s.displacement**3),
     "stiffness": ({}, lambda s, p: -p.stiffness * s.displacement),
     "stitching_error": (

@@ -338,6 +338,10 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
                 of_one_body=True,
             ),
         ),
+        "squareness": LawPrior(
+            "Of a pose of six components a frame that stands turned in one reading says the same.",
+            unless=frozenset({"spatial"}),
+        ),
         # Empirical: written where no law reaches what is left, never suspected ---------------------------------------------------
         **dict.fromkeys(
             ("empirical_history", "empirical_position", "empirical_speed"),
