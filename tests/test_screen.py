@@ -10,6 +10,7 @@ from axis_records import AXIS, axis_fitter
 
 from ctrlgen.diagnosis.evidence.detectability import detectability
 from ctrlgen.diagnosis.selection.confusable import explains_alike, explains_better, look_alike
+from ctrlgen.diagnosis.selection.findings import estimated_values
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
 from ctrlgen.diagnosis.selection.subset_search import SubsetSearch, Suspect
 from ctrlgen.effects import Channel
@@ -18,6 +19,9 @@ from ctrlgen.estimation.structure import Structure
 
 DRIVE_GAIN = Hypothesis("drive_gain", "actuator:axis", "axis")
 SENSOR_GAIN = Hypothesis("sensor_gain", "sensor:axis", "axis")
+OFFSET = Hypothesis("home_offset", "sensor:axis", "axis")
+BOW = Hypothesis("bow", "sensor:axis", "axis")
+FORCE = Hypothesis("drive_offset", "actuator:axis", "axis")
 
 
 def sets_of(*z: float) -> list[tuple[float, set[str]]]:
@@ -90,3 +94,44 @@ def test_a_law_that_cannot_be_evaluated_is_dropped_with_its_reason_and_the_other
     found = Screen(fitter, [SENSOR_GAIN, DRIVE_GAIN]).run(fit)
     assert found.dropped == {SENSOR_GAIN: "no such place"}
     assert [suspect.hypothesis for suspect in found.suspects] == [DRIVE_GAIN]
+
+
+def test_a_number_is_as_unsure_as_a_law_that_was_not_taken_would_move_it():
+    """An offset beside a bow, whose square of the reading has a mean: fitted alone, the offset takes that, and no residual tells it."""
+    offset, bow, span = 1e-8, 4e-9, 7.5e-5
+    fitter = axis_fitter(change=lambda y, u: y + offset + bow * y**2 / span**2)
+    alone = fitter.fit(Structure(AXIS).with_cause(OFFSET, {"offset": offset}))
+    screened = Screen(fitter, [BOW]).run(alone)
+    (suspect,) = screened.suspects
+    assert abs(suspect.z) > 3 * screened.threshold
+    both = fitter.fit(alone.restarted.with_cause(BOW, suspect.start))
+    path = "effect[0].offset"
+    plain, told = (estimated_values(alone, moves=m)[path] for m in (None, screened.moves))
+    together = estimated_values(both)[path]
+    k = [u.path for u in alone.structure.free_parameters].index(path)
+    assert abs(both.theta[k] - alone.theta[k]) == pytest.approx(screened.moves[k], rel=0.02)
+    assert not plain.ci95[0] <= together.value <= plain.ci95[1]
+    assert told.ci95[0] <= together.value <= told.ci95[1] and told.value == plain.value
+
+
+def test_a_law_that_is_not_suspected_or_is_the_same_as_a_number_moves_none():
+    """Where noise alone is left; and what is an offset but for a hundredth is told as its alternative."""
+    fitter = axis_fitter(change=lambda y, u: y + 1e-7)
+    fit = fitter.fit(Structure(AXIS).with_cause(OFFSET, {"offset": 1e-7}))
+    assert not Screen(fitter, [BOW]).run(fit).moves.any()
+    bent = axis_fitter(change=lambda y, u: y + 1e-7 + 4e-8 * y**2 / 7.5e-5**2)
+    fit = bent.fit(Structure(AXIS).with_cause(OFFSET, {"offset": 1e-7}))
+    assert not Screen(bent, [FORCE]).run(fit).moves.any()
+    assert Screen(bent, [FORCE, BOW]).run(fit).moves.any()
+
+
+def test_a_size_that_a_law_would_move_beyond_nothing_stays_one():
+    """The cause is there by other evidence; its interval ends short of nothing on that side, and reaches as far as it may on the other."""
+    fitter = axis_fitter(change=lambda y, u: y + 1e-8)
+    fit = fitter.fit(Structure(AXIS).with_cause(OFFSET, {"offset": 1e-8}))
+    k = [u.path for u in fit.structure.free_parameters].index("effect[0].offset")
+    moves = np.where(np.arange(len(fit.theta)) == k, 1e-8, 0.0)
+    found = estimated_values(fit, moves=moves)["effect[0].offset"]
+    unit = found.value / fit.theta[k]
+    low, high = (end / unit for end in found.ci95)
+    assert low == pytest.approx(1e-8 * np.exp(-1.96), rel=0.1) and high == pytest.approx(2.96e-8, rel=0.1)

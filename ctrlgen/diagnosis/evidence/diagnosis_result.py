@@ -79,7 +79,7 @@ class Diagnosis(Tabular, Reported):
 
         A device written in Python has no file: this is what to put into its code.
         """
-        return estimated_values(self.search.chosen.fit, self.profiles)
+        return estimated_values(self.search.chosen.fit, self.profiles, self.search.final_screen.moves)
 
     def columns(self) -> tuple[Column, ...]:
         """A row a number of each cause: its value with the ends of its 95 % interval, in the `unit` of the row."""

@@ -36,7 +36,8 @@ class EstimateEntry(Keys):
 
     value: Number = Field(description="Estimate.")
     ci95: Interval = Field(
-        description="95 % interval; both ends equal the value where it was not estimated but read from the data."
+        description="95 % interval, which holds what one more of the laws still suspected would move the number by; both ends equal "
+        "the value where it was not estimated but read from the data."
     )
     unit: str = Field(description="Unit of value and interval; 1 without one.")
 

@@ -24,7 +24,6 @@ from ctrlgen.diagnosis.selection.findings import Finding
 from ctrlgen.diagnosis.selection.precedence import why_alike
 from ctrlgen.diagnosis.settings import SHARES
 from ctrlgen.estimation.hypothesis import PARAMETER, numbers
-from ctrlgen.estimation.robust_covariance import robust_deviations
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.numbers import number
 from ctrlgen.reporting.page_figure import page_figures
@@ -137,7 +136,7 @@ def _changed(diagnosis: Diagnosis) -> list[dict[str, str]]:
     fit = diagnosis.search.chosen.fit
     known = {path: q for path, _, q in numbers(diagnosis.device)}
     rows = []
-    for unknown, value, sd in zip(fit.structure.free_parameters, fit.theta, robust_deviations(fit), strict=True):
+    for unknown, value, sd in zip(fit.structure.free_parameters, fit.theta, diagnosis.search.deviations(), strict=True):
         cause = None if unknown.cause is None else fit.structure.causes[unknown.cause]
         of_device = cause is None or cause.effect == PARAMETER
         if of_device and abs(value - unknown.nominal) > NEGLIGIBLE * sd:

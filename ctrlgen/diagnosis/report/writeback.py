@@ -44,7 +44,6 @@ from ctrlgen.diagnosis.report.on_the_clock import used_for_another_run
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.estimation.free_parameters import FreeParameter
 from ctrlgen.estimation.hypothesis import PARAMETER, numbers
-from ctrlgen.estimation.robust_covariance import robust_deviations
 from ctrlgen.version import program
 
 WIDTH = 110
@@ -67,7 +66,7 @@ def write_next(diagnosis: Diagnosis, original: Path, target: Path) -> None:
 def next_text(diagnosis: Diagnosis, original: str) -> str:
     """The text of the device file `original` with the findings in it."""
     fit = diagnosis.search.chosen.fit
-    estimates = list(zip(fit.structure.free_parameters, fit.theta, robust_deviations(fit), strict=True))
+    estimates = list(zip(fit.structure.free_parameters, fit.theta, diagnosis.search.deviations(), strict=True))
     document = tomlkit.parse(original)
     changed = _change_numbers(document, diagnosis, estimates)
     of_device, of_recording = _effects(diagnosis, estimates)

@@ -190,14 +190,19 @@ def held_out_errors(search: SearchResult, known: np.ndarray, tests: ResidualTest
     return errors
 
 
-def estimated_values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, Estimate]:
+def estimated_values(
+    fit: Fit, profiles: tuple[Profile, ...] = (), moves: np.ndarray | None = None
+) -> dict[str, Estimate]:
     """Every free parameter of a fit with its 95 % interval, by path, in the unit of its file.
 
     The interval is that of the parameter's profile likelihood where one was evaluated to its ends, else the wider of that and the
-    curvature's. It includes the model-form error of an amplitude's law.
+    curvature's. It includes the model-form error of an amplitude's law and, as a standard deviation, what one law more would move the
+    number by, its `moves` (k,): several that were not taken may act at once.
     """
     estimates, profiled = {}, {p.path: p for p in profiles}
-    for unknown, value, s in zip(fit.structure.free_parameters, fit.theta, robust_deviations(fit), strict=True):
+    moves = np.zeros(len(fit.theta)) if moves is None else moves
+    rows = zip(fit.structure.free_parameters, fit.theta, robust_deviations(fit), moves, strict=True)
+    for unknown, value, s, moved in rows:
         way, form = np.full(2, STATISTICS.z_95 * s), 0.0
         if profile := profiled.get(unknown.path):
             seen = np.abs([to_si(end, unknown.unit) - value for end in profile.ci95])
@@ -205,7 +210,8 @@ def estimated_values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, 
         cause = fit.structure.cause_of(unknown) if unknown.amplitude else None
         if cause is not None and cause.effect != PARAMETER:
             form = STATISTICS.z_95 * cause.prior.model_form_error * (value - unknown.nominal)
-        below, above = np.hypot(way, form)
+        size = value - unknown.nominal if unknown.amplitude else 0.0
+        below, above = np.hypot(np.hypot(way, form), _ways(size, STATISTICS.z_95 * moved))
         ends = (value, max(value - below, unknown.low), min(value + above, unknown.high))
         value, low, high = (float(from_si(v, unknown.unit)) for v in ends)
         # units round: a number at its bound is within its interval
@@ -213,9 +219,18 @@ def estimated_values(fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, 
     return estimates
 
 
-def finding_estimates(fitter: Fitter, fit: Fit, profiles: tuple[Profile, ...] = ()) -> dict[str, Estimate]:
+def _ways(size: float, moved: float) -> tuple[float, float]:
+    """How far below and above a number may be that one law more would move by `moved`. An amplitude of some `size`, 0 of other numbers,
+    goes toward nothing by factors: that the law acts is confirmed elsewhere, and the interval tells how much it does."""
+    toward_nothing = abs(size) * (1 - np.exp(-moved / abs(size))) if size else moved
+    return (toward_nothing, moved) if size > 0 else (moved, toward_nothing)
+
+
+def finding_estimates(
+    fitter: Fitter, fit: Fit, profiles: tuple[Profile, ...] = (), moves: np.ndarray | None = None
+) -> dict[str, Estimate]:
     """The `estimated_values`, the edges of regions with the intervals of `edge_intervals`."""
-    estimates = estimated_values(fit, profiles)
+    estimates = estimated_values(fit, profiles, moves)
     wide = edge_intervals(fitter, fit, {path: e.ci95 for path, e in estimates.items()})
     return estimates | {path: replace(estimates[path], ci95=ends) for path, ends in wide.items()}
 
@@ -227,7 +242,7 @@ def findings(search: SearchResult, shares: Attribution, profiles: tuple[Profile,
     Causes of one law at one place, such as harmonics, are one finding, with the numbers of the largest first, and its alternatives.
     """
     causes = search.chosen.causes
-    estimates = finding_estimates(search.fitter, search.chosen.fit, profiles)
+    estimates = finding_estimates(search.fitter, search.chosen.fit, profiles, search.final_screen.moves)
     unseen = set(unconfirmed(search))
     rows = []
     for first, *others in terms_of_findings(search):

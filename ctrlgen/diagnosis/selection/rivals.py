@@ -237,7 +237,7 @@ def replacements(trials: Trials, current: CandidateModel, k: int) -> list[Candid
     gained = without - current.fit.objective
     able = [
         s
-        for s in significant(trials, current, screened, max(SEARCH.most_rivals, trials.per_round))
+        for s in significant(trials, current, screened, SEARCH.most_rivals)
         if s.z**2 > SEARCH.rival_share * gained and s.hypothesis != structure.causes[k]
     ]
 

@@ -47,7 +47,8 @@ class Screened:
     each other; `undetectable` the hypotheses that this record cannot see, with the free number (its place in the fit's slopes)
     whose own effect looks most like theirs, -1 where they do not reach the readings at all; `twins` the hypotheses whose effect is
     that of a free number but for a factor, with the number and where they do what it does now; `dropped` the hypotheses whose law
-    could not be evaluated, with the reason; `regions` where most of what is left is."""
+    could not be evaluated, with the reason; `regions` where most of what is left is; `moves` (k,) [SI] by how much each free number of
+    the fit would move, at most, with one of the suspects beyond the threshold beside what is there."""
 
     suspects: tuple[Suspect, ...]
     cosine: np.ndarray
@@ -58,6 +59,7 @@ class Screened:
     twins: dict[Hypothesis, tuple[int, dict[str, float]]] = field(default_factory=dict)
     dropped: dict[Hypothesis, str] = field(default_factory=dict)
     regions: dict[Along, tuple[Region, ...]] = field(default_factory=dict)
+    moves: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 class Screen:
@@ -116,14 +118,15 @@ class Screen:
             here = slopes.sums(white, free, start)
             sums = here if sums is None else sums.plus(here)
         if not columns or sums is None:
-            return Screened((), np.zeros((0, 0)), np.inf, {}, dropped=dropped)
+            return Screened((), np.zeros((0, 0)), np.inf, {}, dropped=dropped, moves=np.zeros(len(fit.theta)))
         size = np.linalg.norm(fit.J[:first], axis=0)
         along = (back @ sums.US) / np.maximum(size, 1e-150)[:, None]
         screened = self._screened(columns, sums, U.T @ fit.residual, np.abs(along))
         free_numbers = fit.structure.free_parameters
         sizes = {k: v - u.nominal for k, (u, v) in enumerate(zip(free_numbers, fit.theta, strict=True)) if u.amplitude}
         twins = self._twins(columns, {k: size[k] * change for k, change in sizes.items()}, along, sums.SS)
-        return replace(screened, twins=twins, dropped=dropped, regions=regions)
+        moves = _moves(screened, sums, back)[: len(fit.theta)]
+        return replace(screened, twins=twins, dropped=dropped, regions=regions, moves=moves)
 
     def _twins(
         self, columns: list[CandidateTerm], does: dict[int, float], along: np.ndarray, SS: np.ndarray
@@ -335,6 +338,21 @@ def _without_sensor_causes(fit: Fit) -> Fit:
         if cause.effect != PARAMETER and cause.law.place is Place.SENSOR:
             theta[k] = u.nominal
     return replace(fit, theta=theta)
+
+
+def _moves(screened: Screened, sums: Sums, back: np.ndarray) -> np.ndarray:
+    """The largest change (k,) of each free number when one law everywhere that is suspected beyond the threshold joins the fit at its best
+    amplitude a: dx = J+ s a. What the number itself hardly differs from is told as its alternative instead."""
+    own = 1 - CONFUSABLE.cosine**2
+    loud = [
+        s
+        for s in screened.suspects
+        if abs(s.z) > screened.threshold and s.distinct_share > own and not s.hypothesis.prior.in_a_region
+    ]
+    at = [s.index for s in loud]
+    distinct = np.diag(sums.SS)[at] - np.sum(sums.US[:, at] ** 2, axis=0)
+    amplitudes = np.array([s.z for s in loud]) / np.sqrt(distinct)
+    return np.abs(np.linalg.pinv(back.T) @ (sums.US[:, at] * amplitudes)).max(axis=1, initial=0.0)
 
 
 def _directions(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ctrlgen.diagnosis.selection.attribution import Attribution
 from ctrlgen.diagnosis.selection.candidate_model import Attempt, CandidateModel, Round
 from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.robust_covariance import robust_deviations
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,3 +39,7 @@ class SearchResult:
     attempts: tuple[Attempt, ...] = ()
     offered: tuple[Hypothesis, ...] = ()
     unlikely: tuple[tuple[CandidateModel, ...], ...] = ()
+
+    def deviations(self) -> np.ndarray:
+        """Standard deviation (k,) [SI] of each free number of the chosen model, of which what one law more would move it by is a part."""
+        return np.hypot(robust_deviations(self.chosen.fit), self.final_screen.moves)
