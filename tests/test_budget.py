@@ -92,6 +92,7 @@ def test_draws_are_correlated_as_stated(tmp_path):
     assert found.drawn.pose.std(axis=0) == pytest.approx(expected, rel=0.04)
 
 
+@pytest.mark.long
 def test_draws_and_first_order_agree(budget):
     assert len(budget.agreements) == 2 and all(a.passed for a in budget.agreements) and budget.reasons == ()
     for a in budget.agreements:
@@ -115,6 +116,7 @@ def test_a_draw_is_a_simulated_device(circle, budget):
     assert np.all(off < 5 * scatter) and np.all(np.abs(deviation).max(axis=0) > 20 * scatter)
 
 
+@pytest.mark.long
 def test_the_ranking_is_by_what_is_left_without(circle, budget, tmp_path):
     assert [line.share for line in budget.lines] == sorted((line.share for line in budget.lines), reverse=True)
     first = budget.lines[0]

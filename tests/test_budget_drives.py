@@ -14,6 +14,7 @@ from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.player.compression import compress
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("bits, known", [(12, 9), (16, 0.46)])
 def test_a_converter_is_as_rough_as_measured(circle, tmp_path, bits, known):
     given = stated(circle, f'[drive]\nconverter = {{ bits = {bits}, source = "chosen" }}', tmp_path)

@@ -100,6 +100,7 @@ def test_where_first_order_and_draws_differ_it_is_said_why(circle, tmp_path):
     assert any("actuator.beam_width" in reason and "not linear" in reason for reason in found.reasons)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("turned", [False, True])
 def test_draws_far_off_are_counted_and_named(circle, tmp_path, turned):
     given = stated(circle, '[numbers]\n"actuator.thermal_resistance" = { sd = "5 %", source = "chosen" }', tmp_path)

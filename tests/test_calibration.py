@@ -117,6 +117,7 @@ def test_an_interval_holds_nineteen_of_twenty_normal_numbers_and_ends_at_the_bou
     assert CalibratedConstant(constant(), 550.0, 10.0, Determination.BOUNDS_ALONE).interval == (450.0, 650.0)
 
 
+@pytest.mark.long
 def test_in_a_budget_constants_vary_together_as_they_were_fitted_beside_what_the_path_states(tmp_path):
     """A fit that knows R_th and tau to 2 K/W and 50 us with the coefficient -0.8. Of uncertainty.toml the constants' own lines count no
     more, and a pair that is correlated there stays so; what is seen of each pair is the sum of squares with a mixed term."""
@@ -166,6 +167,7 @@ def test_in_a_budget_constants_vary_together_as_they_were_fitted_beside_what_the
     assert wide["actuator.time_constant"] == pytest.approx(1.01036e-3, rel=1e-4)
 
 
+@pytest.mark.long
 def test_of_a_list_the_numbers_that_are_no_constants_stay_uncertain(tmp_path):
     """One of six angles is a constant of the specimen: the other five count after the calibration as before it."""
     (tmp_path / "scenario.toml").write_text(

@@ -93,6 +93,7 @@ def test_golden_c_is_what_is_generated(online_f32, name, request):
         pytest.fail(f"{name} changed; if that is meant: pytest tests/test_codegen.py --update-golden\n{diff[:3000]}")
 
 
+@pytest.mark.long
 def test_the_golden_controller_is_the_one_of_the_generated_folder(folder, online_f32):
     for end in "ch":
         text = (folder.path / f"mems_hexapod_online_f32.{end}").read_text()

@@ -19,6 +19,7 @@ from ctrlgen.firmware.fmi.plant import plant_of, write_plant
 from ctrlgen.firmware.folder import generate
 
 
+@pytest.mark.long
 def test_null_and_hostile_calls_are_safe(circle_c, compiler, tmp_path):
     """NULL pointers, a state of garbage, times and indices out of range: a status and admissible drives."""
     online, player = circle_c.online[Real.FLOAT], circle_c.player[Real.FLOAT]

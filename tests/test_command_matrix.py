@@ -185,6 +185,7 @@ def test_check_of_every_device(path):
     assert tried("check", path) == ""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("path", slow(RECORDED, QUICK), ids=named)
 def test_check_of_every_recording(path):
     """Those whose data may not be copied are refused where the data are not there."""

@@ -297,6 +297,7 @@ def rubbing(force: float, reach: float, smoothing: float):
 RUBBING = (2.0, 3e-6, 20e-3)  # N, m, m/s: bristles that bend over a good part of the travel and slide gently
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("linear", [False, True], ids=["held", "linear"])
 def test_steps_of_dry_friction_are_of_second_order(tmp_path, linear):
     force, reach, smoothing = RUBBING

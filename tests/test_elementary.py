@@ -294,6 +294,7 @@ def test_constants_do_not_depend_on_the_mathematics_library(monkeypatch):
     assert calls
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("real", list(Real))
 def test_only_what_is_called_is_printed_and_no_library(real, compiler, tmp_path):
     assert elementary_text([], real) == ""

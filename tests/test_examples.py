@@ -29,6 +29,7 @@ def test_every_scenario_and_every_recording_is_an_example():
     }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", sorted(FOLDERS))
 def test_a_copy_holds_all_that_its_command_reads(tmp_path, name):
     (example,) = (example for example in examples() if example.name == name)

@@ -54,6 +54,7 @@ def slowness(temperatures):
     return np.maximum(tau * slope / (hottest - rise), -tau * slope / rise).max(axis=1)
 
 
+@pytest.mark.long
 def test_the_circle_takes_the_integral_of_the_slowness_of_its_heaters(circle20, temperatures):
     """1e-4: the sum over 1000 places, whose kinks lie between them."""
     assert circle20.optimum.duration == pytest.approx(slowness(temperatures).mean(), rel=1e-4)
@@ -91,6 +92,7 @@ def test_set_points_lie_on_the_path_and_keep_every_limit(circle20):
     assert np.mean(circle20.solution.drive.min(axis=1) < 1e-3) > 0.9  # of 1 W
 
 
+@pytest.mark.long
 def test_no_schedule_of_held_powers_is_shorter(temperatures):
     """A search over 3000 places: from each the furthest that powers held for 1 ms reach, T+ = T_amb + R P + (T - T_amb - R P) e^(-h/tau);
     the fewest such steps round the circle, from where the motion starts. Its grid may cost it a step."""

@@ -221,6 +221,7 @@ def test_nothing_is_promised_while_the_device_settles_cools_or_is_lost(circle):
         )  # until it is initialised, also where the bit flips back
 
 
+@pytest.mark.long
 def test_the_test_on_the_target_takes_every_branch_and_finds_a_wrong_number(circle, tmp_path):
     for program in ("gcc", "gcov"):
         if not shutil.which(program):

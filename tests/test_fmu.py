@@ -45,6 +45,7 @@ def test_the_same_input_gives_the_same_bytes(units, tmp_path):
         assert path.read_bytes() == other.read_bytes(), path.name
 
 
+@pytest.mark.long
 def test_the_controller_answers_as_the_reference(units, circle, tmp_path):
     controller, (path, _) = controller_of(circle.model, "pose", 1e-3), units
     state, ours, expected = controller.rest(), [], []

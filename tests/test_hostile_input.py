@@ -50,6 +50,7 @@ def scenario(folder: Path, path: str, device: str = str(DEVICE)) -> Path:
 POSES = '[path]\nkind = "poses"\nfile = "poses.csv"'
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("text", "says"),
     [
@@ -73,6 +74,7 @@ def test_an_effect_whose_kind_is_no_text(tmp_path):
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("path", "says"),
     [
@@ -156,6 +158,7 @@ def test_json_that_is_nested_without_end(tmp_path):
     refused(done, "record[0].file: run.json cannot be read as .json", status=2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("given", "says"),
     [
@@ -176,6 +179,7 @@ def test_a_result_folder_that_cannot_be_is_refused_before_anything_is_read(tmp_p
         refused(ctrlgen(command, *words, "--out", out), "--out: ", says)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("command", ["solve", "generate", "run", "verify"])
 def test_a_result_folder_that_is_a_link_to_itself(tmp_path, command):
     (tmp_path / "loop").symlink_to("loop")

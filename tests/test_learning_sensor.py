@@ -154,6 +154,7 @@ def scaled(y: np.ndarray) -> np.ndarray:
     return y * np.array([1, 1, 1, 1.008, 1.008, 1.008])
 
 
+@pytest.mark.long
 def test_a_scale_of_the_sensor_is_not_learnt_where_the_stage_is_right(circle, tmp_path):
     """Readings 0.8 % too large of a stage that follows its path: 0.8 % of 10 um were made of it."""
     bench = Bench(circle, tmp_path)

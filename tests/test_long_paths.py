@@ -28,6 +28,7 @@ def written(folder, effects, path, timing):
     return load_scenario(folder)
 
 
+@pytest.mark.long
 def test_the_inverse_of_a_long_path_is_what_one_programme_over_all_samples_gives(tmp_path, monkeypatch):
     """Closed and open, with memories and without, and settled poses."""
     in_time = 'sample_rate = "100 Hz"\nduration = "0.4 s"'

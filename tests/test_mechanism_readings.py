@@ -95,6 +95,7 @@ def test_a_recording_of_a_reading_on_a_body_names_what_the_description_leaves_ou
     assert gain == pytest.approx(0.08, abs=0.002)
 
 
+@pytest.mark.long
 def test_check_prints_and_draws_the_readings(tmp_path):
     (tmp_path / "device.toml").write_text(TURNING + EDGE + TILT)
     said = run_command("check", tmp_path / "device.toml", "--figure", tmp_path / "m.svg")

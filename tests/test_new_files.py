@@ -96,6 +96,7 @@ def test_every_answer_to_begin_with_is_one():
             assert read(question, question.answer) > 0
 
 
+@pytest.mark.long
 def test_the_command_writes_a_file_and_says_what_comes_next(tmp_path):
     done = ctrlgen("new", "device", tmp_path / "stage.toml", "--kind", "piezo", "--no-ask")
     assert done.returncode == 0, done.stderr

@@ -66,6 +66,7 @@ def beyond(drive: np.ndarray, seen: list[np.ndarray], h: float) -> list[str]:
     return faults
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("device", [AXIS, SERVO, STACK], ids=lambda d: d.name)
 def test_no_drive_leaves_what_was_recorded(device, form):

@@ -121,6 +121,7 @@ def test_causes_that_meet_an_objection_are_begun_in_the_starts_that_come_nearest
         assert [fitter.rough_objective(s) for s, _ in begun] == pytest.approx(nearest)
 
 
+@pytest.mark.long
 def test_a_trial_that_raises_is_noted_and_the_search_goes_on(monkeypatch):
     """Everything with a late creep fails, as where a balance does not exist."""
     fitter = fitter_of(played)

@@ -54,6 +54,7 @@ def test_what_is_refused_is_asked_with_the_key_that_answers(outcomes):
         assert said == "read" or "layout = {" in said, (random_log(seed).described, said)
 
 
+@pytest.mark.long
 def test_nothing_is_asked_that_the_file_tells(outcomes):
     asked = {seed: said for seed, said in outcomes.items() if said != "read" and not random_log(seed).may_ask}
     assert not asked, [(random_log(seed).described, said) for seed, said in asked.items()]

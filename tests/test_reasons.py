@@ -63,6 +63,7 @@ def test_the_law_that_was_found_tells_from_where_to_where_its_numbers_went(creep
         assert said in attempt, said
 
 
+@pytest.mark.long
 def test_a_law_that_no_reading_asks_for_never_exceeded_the_threshold(creeping):
     quiet = [law for law in LAWS if law != "creep"]
     said = [line for law in quiet for line in explain(creeping, law)]

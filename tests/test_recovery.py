@@ -46,14 +46,25 @@ def poses_of(parts, kind) -> Fitter:
     return fitter_of(hexapod(), channels, units, sds, kind, parts)
 
 
+BELOW = ("coulomb_below", "viscous_below", "backlash_below", "stiffness_below")
+ELSEWHERE = (
+    "coulomb_after",
+    "viscous_above",
+    "asymmetric_drive_hysteresis",
+    "asymmetric_hysteresis",
+    "slack_friction",
+    "butterfly",
+)
+
+
 def quick_but(laws, *mirrored):
-    """The laws as parameters; those that are others seen in a mirror are long."""
+    """The laws as parameters; those that are others seen in a mirror, or in another place, are long."""
     return [pytest.param(law, marks=pytest.mark.long) if law.__name__ in mirrored else law for law in laws]
 
 
 @pytest.mark.parametrize(
     "law",
-    quick_but(ON_AXIS | IN_A_REGION, "coulomb_below", "viscous_below", "backlash_below", "stiffness_below"),
+    quick_but(ON_AXIS | IN_A_REGION, *BELOW, *ELSEWHERE),
     ids=lambda law: law.__name__,
 )
 def test_of_an_axis(law):

@@ -262,6 +262,7 @@ def test_every_row_has_its_own_place_and_says_why_it_differs(rows) -> None:
     )
 
 
+@pytest.mark.long
 def test_what_follows_from_the_recordings_is_reproduced(rows) -> None:
     missed = [
         row.where

@@ -45,6 +45,7 @@ def keeps_its_promises(c: Compiled, calls: int, seed: int) -> None:
     assert np.max(np.abs(z - promised)) <= POSITION
 
 
+@pytest.mark.long
 def test_a_status_of_zero_is_true_whatever_resets_and_late_calls_were_before(floats):
     keeps_its_promises(floats, 3000, 0)
 

@@ -388,13 +388,9 @@ def test_a_constant_that_acts_on_what_is_compiled_in_is_refused_by_name(tmp_path
 
 
 def test_a_stage_with_inertia_is_refused(tmp_path):
-    device = (SCENARIOS / "devices" / "flexure_axis.toml").read_text()
-    number = next(
-        path
-        for path, q in load_device(SCENARIOS / "devices" / "flexure_axis.toml").quantities()
-        if not q.whole and q.si
-    )
-    (tmp_path / "device.toml").write_text(f'{device}\n[run_time]\nconstants = ["{number}"]\n')
+    file = SCENARIOS / "devices" / "flexure_axis.toml"
+    number = next(path for path, q in load_device(file).quantities() if not q.whole and q.si)
+    (tmp_path / "device.toml").write_text(f'{file.read_text()}\n[run_time]\nconstants = ["{number}"]\n')
     model = build_model(load_device(tmp_path / "device.toml"))
     assert model.inertial
     with pytest.raises(InputError, match="stage without inertia"):

@@ -126,6 +126,7 @@ def jittered(c: Compiled, calls: int, seed: int, latest: float = LONGEST) -> tup
     return late, told
 
 
+@pytest.mark.long
 def test_limits_hold_at_every_moment_however_calls_jitter(both):
     """The latest time is said: whatever comes before it, the device is between where it was and where it was led."""
     late, told = jittered(both[Real.FLOAT], 600, 2)

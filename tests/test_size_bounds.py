@@ -30,6 +30,7 @@ def bound(file: Path) -> None:
     _ = scenario.bind(build_model(scenario.device)).samples
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("timing", "diameter", "says"),
     [

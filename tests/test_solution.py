@@ -88,6 +88,7 @@ def test_a_path_too_fast_for_passive_cooling_names_the_heaters(scenario):
         solve(s, build_model(s.device))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "path",
     [

@@ -45,7 +45,13 @@ def trial(gone=0.0, held=0.0, cause=None, **more) -> CandidateModel:
 
 def search(nominal, chosen, bare=(), rivals=(), of=None) -> SimpleNamespace:
     return SimpleNamespace(
-        nominal=nominal, chosen=chosen, without_cause=bare, rivals=rivals, fitter=of or fitter(), withdrawn=()
+        nominal=nominal,
+        chosen=chosen,
+        without_cause=bare,
+        rivals=rivals,
+        fitter=of or fitter(),
+        withdrawn=(),
+        final_screen=SimpleNamespace(moves=None),
     )
 
 
