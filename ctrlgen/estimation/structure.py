@@ -19,6 +19,8 @@ from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 from ctrlgen.estimation.simulator import Simulator, compiled_simulator
 from ctrlgen.recordings.recording import Timing
 
+FAR = 0.05  # of a number, as far off as the file's own numbers usually are; judgement
+
 
 @dataclass(frozen=True, eq=False)
 class Structure:
@@ -68,6 +70,15 @@ class Structure:
         """The same with the fit of one cause begun elsewhere."""
         starts = (*self.starts[:index], start, *self.starts[index + 1 :])
         return replace(self, starts=starts, expansion=self.expanded_at)
+
+    def expanded_again(self) -> Structure:
+        """The same, expanded about the starts of those causes that are numbers of the device, where one is `FAR` from where it was first
+        suspected: the steps of an integrator that is expanded about another stiffness are as far off as if they were longer."""
+        here, there = list(self.expanded_at), self.starts
+        for k, cause in enumerate(self.causes):
+            if cause.effect == PARAMETER and abs(there[k]["value"] - here[k]["value"]) > FAR * abs(there[k]["value"]):
+                here[k] = there[k]
+        return self if tuple(here) == self.expanded_at else replace(self, expansion=tuple(here))
 
     def halved(self, known: Collection[Hypothesis]) -> Structure:
         """The same with the causes that are not `known` begun, and expanded, with half the amplitude: at the whole one, no such

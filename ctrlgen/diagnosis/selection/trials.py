@@ -192,7 +192,11 @@ class Trials:
     def converged(self, candidate: CandidateModel) -> CandidateModel:
         """The same candidate fitted until it converges, or as it was where that fails: candidates are first fitted for a few
         steps only."""
-        fitted = self.tried(candidate.fit.restarted, candidate.cause, steps=FIT.max_steps)
+        structure = candidate.fit.restarted.expanded_again()
+        if structure.expanded_at != candidate.fit.structure.expanded_at:
+            # what its steps missed bent its numbers, and made it look better than it is
+            self.fitted.pop(frozenset(structure.causes), None)
+        fitted = self.tried(structure, candidate.cause, steps=FIT.max_steps)
         return fitted[0] if fitted else candidate
 
     def begun_better(self, candidate: CandidateModel, starts: Sequence[Structure]) -> CandidateModel:
