@@ -25,6 +25,7 @@ from ctrlgen.diagnosis.evidence.experiment_sums import Sums
 from ctrlgen.diagnosis.evidence.other_readings import (
     OtherReadingEntry,
     OtherReadings,
+    leans,
     other_readings,
     read_by_another,
     read_turned,
@@ -99,11 +100,13 @@ def test_the_turned_specimen_is_read_as_turned_about_the_axis(fits):
     by_skew_about_z = np.stack([-expected[:, 1], expected[:, 0]], axis=1)  # of the specimen as it stands then
     assert turned.own[:, :2, 2] == pytest.approx(by_skew_about_z, rel=1e-6, abs=1e-12)
     assert np.degrees(turned.own_sd) == pytest.approx(0.5, rel=0.05)
-    another = read_by_another(1e-3, fitter, ours, record)  # it has not the scale of the first, and no fit gives it one
+    another = read_by_another(
+        1e-3, False, fitter, ours, record
+    )  # it has not the scale of the first, and no fit gives it one
     assert another.y == pytest.approx(straight, abs=1e-12) and not another.slopes[:, :, 0].any()
 
 
-@pytest.mark.parametrize("read", [partial(read_by_another, 1e-4), partial(read_turned, 0)])
+@pytest.mark.parametrize("read", [partial(read_by_another, 1e-4, False), partial(read_turned, 0)])
 def test_another_reading_of_settled_poses_is_zeroed_with_the_drives_off(fits, read):
     """A reading that is not zero at home is that of the first sensor, as it was put up: by 0.1 um, five standard deviations a pose."""
     fitter, ours, _ = fits["delta_z"]
@@ -114,11 +117,31 @@ def test_another_reading_of_settled_poses_is_zeroed_with_the_drives_off(fits, re
     assert read(fitter, there, record).y == pytest.approx(read(fitter, ours, record).y, abs=1e-15)
 
 
+def test_of_axes_that_are_not_square_a_second_sensor_may_lean_too(fits):
+    """A stage that carries four tenths of its neighbour's way along, or a plate that leans: a sensor that may lean by as much as its
+    scale is off tells them apart by no more than that many times."""
+    assert leans(Hypothesis("squareness", "sensor:delta_x", "delta_x", "delta_y")) and not leans(OF_Z)
+    fitter, ours, _ = fits["delta_z"]
+    record = fitter.fit_records[0]
+    square, leaning = (read_by_another(0.1, may, fitter, ours, record) for may in (False, True))
+    n_y = square.y.shape[1]
+    across = leaning.own[:, :, square.own.shape[2] :]
+    assert across.shape[2] == n_y * (n_y - 1) and np.all(leaning.own_sd == 0.1)
+    columns = {tuple(np.flatnonzero(np.abs(across[:, :, k]).max(axis=0))) for k in range(across.shape[2])}
+    assert columns == {(i,) for i in range(n_y)}  # each acts on one channel
+    of_first = [across[:, 0, k] for k in range(across.shape[2]) if across[:, 0, k].any()]
+    assert all(any(np.array_equal(c, square.y[:, j]) for c in of_first) for j in range(1, n_y))
+    nothing = Sums(np.zeros((len(ours.theta),) * 2), np.zeros(len(ours.theta)), 0.0)
+    carried = square.y + 0.4 * square.y[:, [1]] * np.eye(n_y)[:1]
+    apart = [nothing.plus(fitter, replace(read, y=carried), read, record).separation for read in (square, leaning)]
+    assert apart[0] > 10 and apart[1] == pytest.approx(4.0, rel=0.1)
+
+
 def test_another_reading_of_a_motion_has_a_zero_of_its_own_and_tells_no_constant():
     """Half of the travel, thousands of standard deviations of the noise."""
     fitter = axis_fitter(n=200)
     ours, record = fitter.fit(Structure(AXIS)), fitter.fit_records[0]
-    here = read_by_another(1e-4, fitter, ours, record)
+    here = read_by_another(1e-4, False, fitter, ours, record)
     span, nothing = np.ptp(here.y), Sums(np.zeros((len(ours.theta),) * 2), np.zeros(len(ours.theta)), 0.0)
     beside, bare = replace(here, y=here.y + span / 2), replace(here, own=None, own_sd=None)
     zeroed, absolute = (nothing.plus(fitter, beside, read, record).separation for read in (here, bare))

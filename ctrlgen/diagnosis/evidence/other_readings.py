@@ -31,7 +31,7 @@ from ctrlgen.effects import Param
 from ctrlgen.effects.frame_rotation import FrameRotation
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.free_parameters import FreeParameter
-from ctrlgen.estimation.hypothesis import Hypothesis, nominal_physics
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, nominal_physics
 from ctrlgen.estimation.least_squares import initial_state_sd
 from ctrlgen.estimation.size_odds import of_sensor
 from ctrlgen.estimation.structure import Structure
@@ -117,14 +117,14 @@ def other_readings(search: SearchResult, record: Record) -> OtherReadings | None
         a, b = (read(fitter, fit, record) for fit in (chosen, rival))
         return min(now[0].plus(fitter, a, b, record).separation, now[1].plus(fitter, b, a, record).separation)
 
-    entries = [_second(separation)]
+    sensor, device = (here, there) if of_sensor(here) else (there, here)
+    entries = [_second(separation, leans(sensor))]
     if len(nominal_physics(chosen.structure.device).components) == PLANES * 2:
         reached, axis = max((separation(partial(read_turned, axis)), axis) for axis in range(PLANES))
         text = f"the specimen turned by 90 deg about {'xyz'[axis]} under the same sensor"
         entries.append(_entry("turned specimen", text, None, reached))
     # what decides; a turned specimen takes no second instrument
     ranked = sorted(entries, key=lambda e: (not e.settles, e.scale is not None))
-    sensor, device = (here, there) if of_sensor(here) else (there, here)
     return OtherReadings(sensor, device, tuple(ranked), bool(np.isinf(record.sample_time)))
 
 
@@ -145,17 +145,26 @@ def _pair(search: SearchResult) -> tuple[Fit, Fit, Hypothesis, Hypothesis] | Non
     return None
 
 
-def _second(separation: Callable[[Reading], float]) -> OtherReadingEntry:
-    """The coarsest second sensor that decides, else the finest."""
+def leans(cause: Hypothesis) -> bool:
+    """Whether a cause of the sensor is that one of its axes reads a share of another of its kind: then those of a second sensor matter."""
+    law = None if cause.effect == PARAMETER else cause.law
+    return law is not None and law.pairs and law.partner_unit == law.channel_unit
+
+
+def _second(separation: Callable[[Reading], float], leaning: bool) -> OtherReadingEntry:
+    """The coarsest second sensor that decides, else the finest; of one that may be `leaning`, its axes too."""
     for scale in SECOND_SCALES:
-        reached = separation(partial(read_by_another, scale))
+        reached = separation(partial(read_by_another, scale, leaning))
         if reached >= EXPERIMENT.settles:
             break
-    return _entry("second sensor", f"a second sensor whose scale is known to {100 * scale:g} %", scale, reached)
+    text = f"a second sensor whose scale is known to {100 * scale:g} %"
+    text += f" and whose axes are square to {1000 * scale:g} mrad" if leaning else ""
+    return _entry("second sensor", text, scale, reached)
 
 
-def read_by_another(scale: float, fitter: Fitter, fit: Fit, record: Record) -> Prediction:
-    """What another sensor reads: no cause of the first one acts on it, but a `scale` of each channel and, of several, one of all."""
+def read_by_another(scale: float, leaning: bool, fitter: Fitter, fit: Fit, record: Record) -> Prediction:
+    """What another sensor reads: no cause of the first one acts on it, but a `scale` of each channel and, of several, one of all; where
+    its axes may be `leaning`, a share of each channel in each other one, too."""
     free, theta = fit.structure.free_parameters, fit.theta.copy()
     ours = [i for i, p in enumerate(free) if p.cause is not None and of_sensor(fit.structure.causes[p.cause])]
     for i in ours:
@@ -167,6 +176,9 @@ def read_by_another(scale: float, fitter: Fitter, fit: Fit, record: Record) -> P
     own = read.y[:, :, None] * np.eye(n_y)
     if n_y > 1:
         own = np.concatenate([own, read.y[:, :, None]], axis=2)
+    if leaning:
+        across = [read.y[:, [j], None] * np.eye(n_y)[:, [i]] for i in range(n_y) for j in range(n_y) if i != j]
+        own = np.concatenate([own, *across], axis=2)
     return _beside(read, own, np.full(own.shape[2], scale))
 
 
