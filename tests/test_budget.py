@@ -99,6 +99,7 @@ def test_draws_and_first_order_agree(budget):
         assert a.drawn == pytest.approx(a.linear, rel=0.1) and 0 < a.difference < 0.1
 
 
+@pytest.mark.long
 def test_a_draw_is_a_simulated_device(circle, budget):
     given = budget.uncertainties
     columns = [(line.kind, p) for line in given.lines for p in line.paths]

@@ -61,6 +61,7 @@ int main(void)
     assert done.returncode == 0, (done.returncode, done.stderr)
 
 
+@pytest.mark.long
 def test_a_lost_state_is_told_and_stays_so_until_it_is_initialised(circle_c, compiler, tmp_path):
     """NaN or an absurd temperature in one place, a struct of zeros or of any repeated byte; by step and by settle."""
     online = circle_c.online[Real.FLOAT]

@@ -180,6 +180,7 @@ def test_check_of_every_scenario(path):
     assert tried("check", path.parent) == ""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("path", DESCRIBED, ids=named)
 def test_check_of_every_device(path):
     assert tried("check", path) == ""

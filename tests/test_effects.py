@@ -112,6 +112,7 @@ def test_can_be_seen_in_the_slope_of_its_amplitude(effect):
     raise AssertionError("the slope is zero, or the same at all times, for every shape in the grid")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("effect", [e for e in Effect.library.values() if e.place is Place.FORCE], ids=lambda e: e.kind)
 def test_makes_no_energy(effect, rng):
     """Around a closed path of the displacement, from rest, everything else standing still."""

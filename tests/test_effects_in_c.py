@@ -127,6 +127,7 @@ def controller_with(effect: type[Effect]) -> Controller:
     )
 
 
+@pytest.mark.long
 @every_controlled
 def test_the_inverse_follows_without_knowing_the_effect(effect):
     """Controller with the effect -> model with the effect: the pose is the commanded one."""

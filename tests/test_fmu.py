@@ -62,6 +62,7 @@ def test_the_controller_answers_as_the_reference(units, circle, tmp_path):
     assert apart(np.array(ours), np.array(expected)) < 1e-12
 
 
+@pytest.mark.long
 def test_the_plant_moves_as_the_model(units, circle, tmp_path):
     expected = simulate(circle.model, circle.drive, 1e-3)
     roles = [role for role in expected.signals if role != "drive"]

@@ -71,6 +71,7 @@ LOGS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("logger", LOGS)
 def test_a_log_becomes_a_recording_without_an_edit(logger, axis, tmp_path):
     (tmp_path / "log.csv").write_text(LOGS[logger], encoding="utf-8")

@@ -61,6 +61,7 @@ def test_nothing_is_asked_that_the_file_tells(outcomes):
     assert sum(said == "read" for said in outcomes.values()) >= LEAST_READ * COUNT
 
 
+@pytest.mark.long
 def test_with_the_answer_it_is_read(outcomes, tmp_path):
     for seed in (seed for seed, said in outcomes.items() if said != "read"):
         log, path = random_log(seed), tmp_path / f"{seed}.csv"

@@ -72,6 +72,7 @@ def test_a_law_that_no_reading_asks_for_never_exceeded_the_threshold(creeping):
     )
 
 
+@pytest.mark.long
 def test_a_law_that_cannot_act_there_is_not_offered_and_an_unknown_one_is_a_fault(creeping):
     assert explain(creeping, "thermal_lag") == [
         "thermal_lag: not offered, because it was not among the effects to consider."

@@ -55,6 +55,7 @@ def test_a_status_of_zero_is_true_in_a_long_storm(floats):
     keeps_its_promises(floats, 100_000, 1)
 
 
+@pytest.mark.long
 def test_a_reset_that_is_taken_for_a_cold_start_breaks_what_was_promised(floats):
     """The storm finds it: what the tests above show is not for want of trying."""
     found = storm(floats, 3000, 0, forgets=False)

@@ -241,6 +241,7 @@ def test_what_an_explanation_offers_can_be_followed(tmp_path):
         assert solve(again, build_model(again.device)).model.probability == pytest.approx(0.999), what
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("given", "told"),
     [

@@ -133,6 +133,7 @@ def test_limits_hold_at_every_moment_however_calls_jitter(both):
     assert late == told == 0
 
 
+@pytest.mark.long
 def test_a_call_later_than_it_was_said_to_be_is_told_and_made_up_for(both):
     late, told = jittered(both[Real.FLOAT], 300, 3, latest=NOMINAL)
     assert late > 50 and abs(told - late) <= 1  # the last one is told by no call
