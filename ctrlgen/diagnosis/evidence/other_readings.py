@@ -27,7 +27,7 @@ from ctrlgen.devices.usual_deviation import ASSUMED_SCALE
 from ctrlgen.diagnosis.evidence.experiment_sums import Prediction, Sums
 from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.settings import EXPERIMENT
-from ctrlgen.effects import Param
+from ctrlgen.effects import Param, Place
 from ctrlgen.effects.frame_rotation import FrameRotation
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.free_parameters import FreeParameter
@@ -35,6 +35,7 @@ from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, nominal_physics
 from ctrlgen.estimation.least_squares import initial_state_sd
 from ctrlgen.estimation.size_odds import of_sensor
 from ctrlgen.estimation.structure import Structure
+from ctrlgen.model.effect_terms import channels
 from ctrlgen.recordings.recording import Record
 from ctrlgen.reporting.result_file import FiniteOrNull, Keys, Number
 
@@ -148,7 +149,7 @@ def _pair(search: SearchResult) -> tuple[Fit, Fit, Hypothesis, Hypothesis] | Non
 def leans(cause: Hypothesis) -> bool:
     """Whether a cause of the sensor is that one of its axes reads a share of another of its kind: then those of a second sensor matter."""
     law = None if cause.effect == PARAMETER else cause.law
-    return law is not None and law.pairs and law.partner_unit == law.channel_unit
+    return law is not None and law.pairs and law.channel_unit is not None and law.partner_unit == law.channel_unit
 
 
 def _second(separation: Callable[[Reading], float], leaning: bool) -> OtherReadingEntry:
@@ -164,7 +165,7 @@ def _second(separation: Callable[[Reading], float], leaning: bool) -> OtherReadi
 
 def read_by_another(scale: float, leaning: bool, fitter: Fitter, fit: Fit, record: Record) -> Prediction:
     """What another sensor reads: no cause of the first one acts on it, but a `scale` of each channel and, of several, one of all; where
-    its axes may be `leaning`, a share of each channel in each other one, too."""
+    its axes may be `leaning`, a share of each channel in each other one of its unit, too."""
     free, theta = fit.structure.free_parameters, fit.theta.copy()
     ours = [i for i, p in enumerate(free) if p.cause is not None and of_sensor(fit.structure.causes[p.cause])]
     for i in ours:
@@ -177,8 +178,10 @@ def read_by_another(scale: float, leaning: bool, fitter: Fitter, fit: Fit, recor
     if n_y > 1:
         own = np.concatenate([own, read.y[:, :, None]], axis=2)
     if leaning:
-        across = [read.y[:, [j], None] * np.eye(n_y)[:, [i]] for i in range(n_y) for j in range(n_y) if i != j]
-        own = np.concatenate([own, *across], axis=2)
+        units = {c.name: c.unit for c in channels(nominal_physics(fit.structure.device), Place.SENSOR)}
+        of = [units[c.removeprefix("reading.")] for c in fitter.recording.channels]
+        pairs = ((i, j) for i in range(n_y) for j in range(n_y) if i != j and of[i] == of[j])
+        own = np.concatenate([own, *(read.y[:, [j], None] * np.eye(n_y)[:, [i]] for i, j in pairs)], axis=2)
     return _beside(read, own, np.full(own.shape[2], scale))
 
 
