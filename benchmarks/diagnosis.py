@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import resource
 from importlib.util import find_spec
 
 import numpy as np
@@ -12,7 +11,7 @@ from battery.laws import simulate
 from battery.opponents import RUNNERS
 from battery.plant_axis import Axis, Planted
 from benchmarks.goals import goals
-from benchmarks.measure import Line, Note, interleave, timed
+from benchmarks.measure import Line, Note, interleave, peak_memory, timed
 from benchmarks.samples import SCENARIO, Disagreement
 from ctrlgen import build_model, diagnose, load_device
 from ctrlgen.diagnosis.selection.screen import Screen
@@ -32,7 +31,7 @@ SCREEN_AIM, DIAGNOSIS_AIM, MEMORY_AIM = 30.0, 60.0, 2048.0  # s, s, MB
 def run(repeat: int) -> list[Line | Note]:
     """Seconds of a screen and of a diagnosis, and the largest memory of both."""
     found = [*_screen(repeat), *_axis(repeat)]
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    peak = peak_memory()
     return [*found, Note(f"diagnosis: peak memory {peak:.0f} MB (aim: < {MEMORY_AIM:.0f} MB)"), *goals()]
 
 

@@ -21,7 +21,7 @@ from battery.axis_cases import Bench, Take, draw_noise, write_bench
 from battery.hexapod_cases import SD, PoseBench, device_text, write_poses
 from battery.plant_axis import Axis, Planted, Scene
 from battery.plant_hexapod import AXES, Faults, Hexapod, changed
-from benchmarks.measure import Note
+from benchmarks.measure import Note, peak_memory
 from benchmarks.samples import Disagreement
 from ctrlgen import build_model, diagnose, load_device
 from ctrlgen.recordings.reader import load_recordings
@@ -97,7 +97,7 @@ def measured(k: int) -> tuple[float, float, list[str]]:
         begin = _processor_time()
         found = diagnose(device, recording, jobs=0)
         seconds = _processor_time() - begin
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    peak = peak_memory()
     return seconds, peak, [cause.effect for cause in found.search.chosen.fit.structure.causes]
 
 

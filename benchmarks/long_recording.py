@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import resource
 import subprocess
 import sys
 import tempfile
@@ -12,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.measure import Note
+from benchmarks.measure import Note, peak_memory
 from benchmarks.samples import SCENARIO, Disagreement
 from ctrlgen import build_model, diagnose, load_device, simulate
 from ctrlgen.core.units import from_si
@@ -130,7 +129,7 @@ def main(what: str, ending: str, folder: str, rows: str = str(ROWS)) -> None:
         diagnose(model.device, recording, jobs=0)
     done = {
         "seconds": time.process_time() - begin,
-        "peak": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        "peak": peak_memory(),
         "rows": sum(len(r.time) for r in recording.records),
         "channels": len(recording.channels) + len(recording.drives),
         "notes": recording.notes,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from statistics import median
 from time import perf_counter
 from typing import TypeVar
@@ -83,6 +84,12 @@ def timed(work: Callable[[], object], count: int = 1) -> Callable[[], float]:
         return (perf_counter() - start) / count
 
     return run
+
+
+def peak_memory() -> float:
+    """Largest resident memory [MB] of this process alone: the system's ru_maxrss begins with what the process that started it held."""
+    status = Path("/proc/self/status").read_text()
+    return next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM:")) / 1024
 
 
 def duration(seconds: float) -> str:

