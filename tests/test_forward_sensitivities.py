@@ -7,7 +7,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
-from conftest import AXIS_FILE
+from conftest import AXIS_FILE, DEVICE
 from play_records import SERVO
 
 from ctrlgen import load_device
@@ -53,10 +53,11 @@ def record(amplitude) -> Record:
 
 
 def differentiated(r: Simulator, moved: Record, p: np.ndarray) -> np.ndarray:
-    """dy/dp and dy/dstart (n, n_y, m): D+ = F_S D + F_p, with whole samples differentiated by CasADi."""
+    """dy/dp and dy/dstart (n, n_y, m): D+ = F_S D + F_p, with whole samples differentiated by CasADi, through the steps that find a
+    root."""
     q = r.equations
-    by = [q.given[0], q.given[4]]
-    slopes = ca.Function("slopes", q.given, [ca.jacobian(value, s) for value in (q.following, q.y) for s in by])
+    by, values = [q.given[0], q.given[4]], q.roots.inserted([q.following, q.y])
+    slopes = ca.Function("slopes", q.given, [ca.jacobian(value, s) for value in values for s in by])
     after, _ = r.simulate_states(moved, p)
     before = np.vstack([r.initial_state(moved, p), after[:-1]])
     c, c_p = q.constants(p)
@@ -140,7 +141,7 @@ def test_slopes_of_plays_before_creep_are_few_and_those_of_the_whole_sample():
     assert len(plays) == 8 and not any(reached.has_nz(gain, k) for k in plays)
     q = r.equations
     usual, short = (f(q.following, q.given[0]) for f in (ca.jacobian, shortest_jacobian))
-    operations = [ca.Function("J", q.given, [J]).n_instructions() for J in (usual, short)]
+    operations = [q.one("J", [J]).n_instructions() for J in (usual, short)]
     assert operations[1] < 0.6 * operations[0]
     assert short.sparsity() == usual.sparsity()
 
@@ -196,3 +197,33 @@ def test_slopes_come_with_the_readings_after_a_good_step_and_wait_after_a_refuse
     sizes = [abs(x**3 - 20 * x + 30) for x in slopes]
     assert [k for k in range(1, len(sizes)) if sizes[k] > min(sizes[:k])] == [1]  # the first went too far
     assert set(slopes[2:4]) <= set(bent.residuals) and slopes[-1] == found[0]
+
+
+@pytest.mark.parametrize("dwell", [np.inf, 0.5], ids=["settled", "after a dwell"])
+def test_slopes_of_poses_are_those_through_newtons_steps_and_take_a_fifth_of_the_operations(dwell):
+    device, channels = load_device(DEVICE), tuple(f"reading.{name}" for name in ("delta_x", "delta_y", "theta_z"))
+    shapes = {
+        "displacement_hysteresis": {"reach": 5e-6, "taper": 0.5, "linear": 0.0, "share": 0.1, "reversible": 0.1},
+        "coupling": {"gain": 0.02},
+    }
+    structure = Structure(device)
+    for h in hypotheses(device, nominal_physics(device), channels, None if np.isinf(dwell) else dwell, True):
+        if h.effect in shapes and h.effect not in {c.effect for c in structure.causes}:
+            structure = structure.with_cause(h, shapes[h.effect])
+    free = [*(u.path for u in structure.free_parameters), "hexapod.height", "stage.half_stage_stiffness"]
+    r = Simulator(structure.device_with_causes, free, channels, dwell, poses=True)
+    p = np.asarray(r.model.p_nominal, float)
+    u = np.random.default_rng(4).uniform(0.02, 0.1, (12, r.model.u.numel()))
+    n = len(u)
+    moved = Record("fit", "fit", np.arange(n) * 1.0, dwell, u, np.zeros((n, 3)), False, None, np.ones((n, 3), bool))
+    Y, wanted = r.sensitivities(moved, p)[1], differentiated(r, moved, p)
+    agree(Y[:, :, : len(p)], wanted[:, :, : len(p)])
+    # of the plays' beginnings, a share of what is read; most of the plays are turned over by the first pose
+    assert np.allclose(Y, wanted, rtol=1e-9, atol=1e-12)
+    q = r.equations
+    open_, through = [q.following, q.y], q.roots.inserted([q.following, q.y])
+    of_root, of_steps = (
+        q.one("J", [ca.jacobian(value, s) for value in values for s in (q.given[0], q.given[4])]).n_instructions()
+        for values in (open_, through)
+    )
+    assert of_root < 0.2 * of_steps

@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from ctrlgen.numerics.newton import newton_root, newton_solver
+from ctrlgen.numerics.newton import ImplicitRoots, newton_root, newton_solver
 
 A = np.array([[2.0, 0.3], [-0.5, 1.5]])
 
@@ -64,3 +64,31 @@ def test_the_iterated_solver_finds_the_root_of_each_parameter_and_refuses_where_
         assert float(ca.norm_inf(ca.evalf(coupled(found, number)))) < 1e-13
     with pytest.raises(RuntimeError):
         solver([1.3, 2.2], 5.0)  # a parabola that stays above zero
+
+
+def test_roots_of_equations_are_differentiated_where_they_are_and_not_on_the_way_there():
+    """Of two roots, the second of which follows from the first: x'(k) = -A^-1 (1, 1) at k = 1, where the squares vanish. After one step
+    from (1.3, 2.2) the root is 5 % off, and so would a derivative be that is taken through the step."""
+    k, roots = ca.SX.sym("k"), ImplicitRoots()
+    x, y = ca.SX.sym("x", 2), ca.SX.sym("y")
+    first = roots(coupled(x, k), x, ca.SX([1.3, 2.2]), 5)
+    second = roots(y**3 + y - first[0] * k - 1, y, ca.SX(1.5), 6)
+    value, slope = roots.inserted([ca.vertcat(first, second), ca.jacobian(ca.vertcat(first, second), k)])
+    found, by_k = (v.full().ravel() for v in ca.Function("f", [k], [value, slope])(1.0))
+    by_k_of_x = -np.linalg.solve(A, [1.0, 1.0])
+    assert found == pytest.approx([1.0, 2.0, 1.0], rel=1e-13)
+    assert by_k == pytest.approx([*by_k_of_x, (by_k_of_x[0] + 1.0) / 4], rel=1e-12)
+
+
+def test_derivatives_of_a_root_take_no_more_operations_for_more_steps_than_the_steps_do():
+    k, x = ca.SX.sym("k", 2), ca.SX.sym("x", 2)
+
+    def operations(steps: int) -> int:
+        roots = ImplicitRoots()
+        z = roots(coupled(x, k) * ca.exp(x), x, ca.SX([1.3, 2.2]), steps)
+        return ca.Function("J", [k], roots.inserted([ca.jacobian(z, k)])).n_instructions()
+
+    def of_steps(steps: int) -> int:
+        return ca.Function("z", [k], [newton_root(coupled(x, k) * ca.exp(x), x, ca.SX([1.3, 2.2]), steps)]).n_instructions()
+
+    assert operations(8) - operations(4) == pytest.approx(of_steps(8) - of_steps(4), rel=0.05)

@@ -54,7 +54,7 @@ def forward_sensitivities(
         values = [equations.following, equations.y]
         transposed = _transposed_jacobians(values, symbols, jacobian_of(equations))
         # some dozens of poses are evaluated faster than what is common to two expressions is found: 0.2 s of 17,000 operations
-        one = ca.Function("one", equations.given, [*values, *transposed], {"cse": not equations.poses})
+        one = equations.one("one", [*values, *transposed], {"cse": not equations.poses})
         following, y, *by = one(*given)
         return following, chain(*by[: len(symbols)]), y, chain(*by[len(symbols) :])
     m = equations.model

@@ -6,7 +6,9 @@ on p alone (a Jacobian of struts, for instance), c holds those results; else c =
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import casadi as ca
 
@@ -14,11 +16,13 @@ from ctrlgen.estimation.settings import SIMULATION
 from ctrlgen.model.discretisation import Sample, one_step_map
 from ctrlgen.model.integrators import ExponentialRungeKutta, ImplicitRadau, integrator_of
 from ctrlgen.model.model import Model
+from ctrlgen.numerics.newton import ImplicitRoots
 
 
 @dataclass(frozen=True, eq=False)
 class SampleEquations:
-    """S at the next sample, `following`, and the readings `y`, as expressions in `given`: S, u, u+, ambient, c.
+    """S at the next sample, `following`, and the readings `y`, as expressions in `given`: S, u, u+, ambient, c, and in the symbols of
+    `roots`, which `one` inserts.
 
     `constants` is p -> c, dc/dp. A model with inertia takes the `steps` of its integrator within the sample, under a drive
     that is `linear` or held; `model` states its rates in terms of c. A sample is one of settled `poses`, or of a series.
@@ -32,6 +36,11 @@ class SampleEquations:
     y: ca.SX
     given: list[ca.SX]
     poses: bool
+    roots: ImplicitRoots
+
+    def one(self, name: str, values: Sequence[ca.SX], options: dict[str, Any] | None = None) -> ca.Function:
+        """The function `given` -> `values`, such as `following`, `y` and their derivatives."""
+        return ca.Function(name, self.given, self.roots.inserted(values), options or {})
 
     @property
     def integrator(self) -> ExponentialRungeKutta | ImplicitRadau:
@@ -46,13 +55,14 @@ def build_sample_equations(
 ) -> SampleEquations:
     """The sample equations of `model` with readings `y` (n_y,) for records of one `Timing`, in `finer` times its integrator's steps."""
     expressions = [model.sampled_rates, model.held_value, ca.vertcat(ca.SX(0, 1), *model.stepped.values()), y]
-    sample = None if model.inertial else _one_step(model, sample_time, linear, poses, finer)
+    roots = ImplicitRoots()
+    sample = None if model.inertial else _one_step(model, sample_time, linear, poses, finer, roots)
     if sample is not None:
         following = ca.vertcat(sample.x, sample.z)
         # read at the end of the dwell
         if poses:
             y = ca.substitute(y, ca.vertcat(model.x, model.z, model.u), ca.vertcat(following, sample.u_next))
-        expressions = [following, y]
+        expressions = [following, y, *roots.values]
     in_symbols, symbols, parametric = ca.extract_parametric(expressions, model.p, {"extract_trivial": True})
     c, value = model.p, model.p
     if ca.Function("work", [model.p], parametric).n_instructions() > SIMULATION.parametric_operations:
@@ -64,17 +74,19 @@ def build_sample_equations(
         stepped = dict(zip(model.stepped, ca.vertsplit(stepped), strict=True))
         nominal = constants(model.p_nominal)[0].full().ravel()
         model = replace(model, p=c, p_nominal=nominal, sampled_rates=rates, held_value=held, stepped=stepped)
-        sample = _one_step(model, sample_time, linear, poses, finer)
+        sample = _one_step(model, sample_time, linear, poses, finer, roots)
         following = ca.vertcat(sample.x, sample.z)
     else:
-        following, y = expressions
+        following, y, *roots.values = expressions
     # before differentiation: afterwards it takes ten times as long
-    following, y = ca.cse([following, y])
+    following, y, *roots.values = ca.cse([following, y, *roots.values])
     given = [ca.vertcat(model.x, model.z), model.u, sample.u_next, model.ambient_symbol, c]
     steps = integrator_of(model, sample_time, finer) if model.inertial else None
-    return SampleEquations(constants, model, steps, linear, following, y, given, poses)
+    return SampleEquations(constants, model, steps, linear, following, y, given, poses, roots)
 
 
-def _one_step(model: Model, sample_time: float, linear: bool, poses: bool, finer: int) -> Sample:
+def _one_step(
+    model: Model, sample_time: float, linear: bool, poses: bool, finer: int, roots: ImplicitRoots
+) -> Sample:
     newton_steps = SIMULATION.pose_newton_steps if poses else SIMULATION.newton_steps
-    return one_step_map(model, sample_time, linear, newton_steps, poses, finer)
+    return one_step_map(model, sample_time, linear, newton_steps, poses, finer, roots)

@@ -160,7 +160,7 @@ class Simulator:
         """S, u, u+, ambient, c -> F_S, F_c, H_S, H_c, a sample differentiated as a whole."""
         q = self.equations
         jacobians = [jacobian_of(q)(value, by) for value in (q.following, q.y) for by in (q.given[0], q.given[4])]
-        return ca.Function("jacobians", q.given, jacobians)
+        return q.one("jacobians", jacobians)
 
     def _jacobians_by_steps(self, pattern: ca.Sparsity) -> ca.Function:
         """S, u, u+, ambient, c, dc/df -> F_S, F_f, H_S, H_f from the sensitivities by S and f; dc/df of one `pattern`."""
@@ -270,7 +270,7 @@ class Simulator:
     def _recursion(self) -> Recursion:
         """The map (S, u, ...) -> (S+, y) of one sample."""
         q = self._with_rates
-        return Recursion(ca.Function("one", q.given, [ca.densify(q.following), ca.densify(q.y)]))
+        return Recursion(q.one("one", [ca.densify(q.following), ca.densify(q.y)]))
 
     def _recursion_with_sensitivities(self, by_free: bool) -> tuple[Recursion, ca.Sparsity]:
         """(S, T) -> (S+, T+), (y, Y), with the nonzeros of dc/dp as a further input; T by its entries that can differ from zero, and which

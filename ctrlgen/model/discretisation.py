@@ -7,6 +7,7 @@ A stage in balance: x by the exact step of its lags, under a drive held (zero-or
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 from math import ceil, log2
 from typing import NamedTuple
@@ -32,6 +33,10 @@ DWELL_STEPS = 4  # parts of such a sample: for states that settle in each, as ma
 SLOWEST_RATE = 1e-6  # [1/s] a slower state is taken to stand: an integrator, not a lag
 
 
+Root = Callable[[ca.SX, ca.SX, ca.SX, int], ca.SX]
+"""(residual, unknown, start, steps) -> the unknown at which the residual is zero, as `newton_root`."""
+
+
 class Sample(NamedTuple):
     """Symbols of the drive at the next sample, and x, z there."""
 
@@ -47,9 +52,10 @@ def one_step_map(
     newton_steps: int = NEWTON_STEPS,
     poses: bool = False,
     finer: int = 1,
+    root: Root = newton_root,
 ) -> Sample:
     """x and z one `sample_time` [s] on, with the drive held, or `linear` between samples; with inertia in `finer` times the steps of
-    its integrator.
+    its integrator. A displacement in balance is found by `root`.
 
     With `poses` the drive jumps to the next one first and is held for the sample time, the dwell; memories see the displacement
     of its end, which the actuators reach in a small part of it.
@@ -62,16 +68,16 @@ def one_step_map(
         x, z = _integrate(model, sample_time, u_next, linear, finer)
         return Sample(u_next, x, z)
     if not np.isfinite(sample_time):
-        x, z = _settle(model, u_next, newton_steps)
+        x, z = _settle(model, u_next, newton_steps, root)
         return Sample(u_next, x, z)
     if poses:
         x, held = model.x, held_step(model, sample_time)
         for _ in range(2):
-            z = balanced(model, x, u_next, newton_steps)
+            z = balanced(model, x, u_next, newton_steps, root)
             x = ca.substitute(held, ca.vertcat(model.z, model.u), ca.vertcat(z, u_next))
-        return Sample(u_next, x, balanced(model, x, u_next, newton_steps))
-    x = _ramp_step(model, sample_time, u_next, newton_steps) if linear else held_step(model, sample_time)
-    return Sample(u_next, x, balanced(model, x, u_next, newton_steps))
+        return Sample(u_next, x, balanced(model, x, u_next, newton_steps, root))
+    x = _ramp_step(model, sample_time, u_next, newton_steps, root) if linear else held_step(model, sample_time)
+    return Sample(u_next, x, balanced(model, x, u_next, newton_steps, root))
 
 
 def held_step(model: Model, sample_time: float, rates: ca.SX | None = None) -> ca.SX:
@@ -106,7 +112,7 @@ def acts_alone(model: Model) -> bool:
     return _uncoupled(ca.jacobian(model.rates_of_heat, model.x))
 
 
-def _ramp_step(model: Model, sample_time: float, u_next: ca.SX, newton_steps: int) -> ca.SX:
+def _ramp_step(model: Model, sample_time: float, u_next: ca.SX, newton_steps: int, root: Root) -> ca.SX:
     """x after a sample in which the drive goes linearly from u to `u_next` and the balanced displacement with it.
 
     x + h (phi_1(hA) f_0 + phi_2(hA) f' + phi_3(hA) f''), f' and f'' those of the parabola through the rates at the present x
@@ -121,7 +127,7 @@ def _ramp_step(model: Model, sample_time: float, u_next: ca.SX, newton_steps: in
 
     def rates_at(share: float) -> ca.SX:
         u = model.u + share * (u_next - model.u)
-        z = balanced(model, model.x, u, newton_steps) if through_z else model.z
+        z = balanced(model, model.x, u, newton_steps, root) if through_z else model.z
         return ca.substitute(model.rates, ca.vertcat(model.z, model.u), ca.vertcat(z, u))
 
     followed = ca.vertcat(model.rates, model.balance) if through_z else model.rates
@@ -163,18 +169,18 @@ def _doublings(model: Model, A: ca.SX, h: float) -> int:
     return max(0, ceil(log2(h * norm))) if norm else 0
 
 
-def balanced(model: Model, x: ca.SX, u: ca.SX, newton_steps: int = NEWTON_STEPS) -> ca.SX:
-    """The displacement (n_axes,) that balances the forces at `x` and `u`, by Newton's method from model.z.
+def balanced(model: Model, x: ca.SX, u: ca.SX, newton_steps: int = NEWTON_STEPS, root: Root = newton_root) -> ca.SX:
+    """The displacement (n_axes,) that balances the forces at `x` and `u`, by Newton's method from model.z, written out by `root`.
 
     `x` may be an expression in model.z. One step where the balance is linear in z.
     """
     # Both at once: x may hold the drive of the sample before
     balance = ca.substitute(model.balance, ca.vertcat(model.x, model.u), ca.vertcat(x, u))
     linear = not ca.depends_on(ca.jacobian(balance, model.z), model.z)
-    return newton_root(balance, model.z, model.z, 1 if linear else newton_steps)
+    return root(balance, model.z, model.z, 1 if linear else newton_steps)
 
 
-def _settle(model: Model, u: ca.SX, newton_steps: int) -> tuple[ca.SX, ca.SX]:
+def _settle(model: Model, u: ca.SX, newton_steps: int, root: Root) -> tuple[ca.SX, ca.SX]:
     """x at rest under `u`, and the displacement that balances with it.
 
     Newton's method by blocks: only states that act on one another are solved together, in `SETTLING_SWEEPS` sweeps, since a
@@ -189,7 +195,7 @@ def _settle(model: Model, u: ca.SX, newton_steps: int) -> tuple[ca.SX, ca.SX]:
         for block in blocks:
             corrected[block] = x[block] - ca.solve(slope[block, block], rate[block])
         x = corrected
-    z = balanced(model, x, u, newton_steps)
+    z = balanced(model, x, u, newton_steps, root)
     x = ca.substitute(x, model.z, z)
     for i in model.clocks:
         x[i] = model.x[i] + 1.0

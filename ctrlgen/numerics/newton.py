@@ -7,7 +7,7 @@ library are no case of it and say why: `ctrlgen.model.inverse` takes the closed 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import casadi as ca
 import numpy as np
@@ -48,6 +48,38 @@ def newton_root(residual: ca.SX, unknown: ca.SX, start: ca.SX, steps: int) -> ca
     for _ in range(steps):
         root = root - ca.solve(*ca.substitute([slope, residual], [unknown], [root]))  # a diagonal slope: divisions
     return root
+
+
+class ImplicitRoots:
+    """Roots of equations r(z, q) = 0 as symbols, so that what follows from them is differentiated by the implicit function theorem,
+
+        dz/dq = -(dr/dz)^-1 dr/dq,
+
+    and not through the steps that find them: z* - (dr/dz)^-1 r(z*, q) stands for a root, in which z* and the slope are `symbols`, which
+    keep still while an expression is differentiated, and `values` are what they stand for.
+    """
+
+    def __init__(self) -> None:
+        self.symbols: list[ca.SX] = []
+        self.values: list[ca.SX] = []
+
+    def __call__(self, residual: ca.SX, unknown: ca.SX, start: ca.SX, steps: int) -> ca.SX:
+        """`newton_root` and one step more, of which alone the derivatives are taken; arguments as there."""
+        slope = ca.jacobian(residual, unknown)
+        root = ca.SX.sym("root", unknown.numel())
+        self._keep(root, newton_root(residual, unknown, start, steps))
+        slope, residual = ca.substitute([slope, residual], [unknown], [root])
+        entries = ca.SX.sym("slope", slope.nnz())
+        self._keep(entries, ca.vertcat(*slope.nonzeros()))
+        return root - ca.solve(ca.SX(slope.sparsity(), entries), residual)
+
+    def _keep(self, symbol: ca.SX, value: ca.SX) -> None:
+        self.symbols.append(symbol)
+        self.values.append(value)
+
+    def inserted(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
+        """The `expressions` with the values of the roots in the place of their symbols."""
+        return list(ca.substitute_inplace(self.symbols, self.values, list(expressions), False)[1])
 
 
 def newton_solver(
