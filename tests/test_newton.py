@@ -89,6 +89,8 @@ def test_derivatives_of_a_root_take_no_more_operations_for_more_steps_than_the_s
         return ca.Function("J", [k], roots.inserted([ca.jacobian(z, k)])).n_instructions()
 
     def of_steps(steps: int) -> int:
-        return ca.Function("z", [k], [newton_root(coupled(x, k) * ca.exp(x), x, ca.SX([1.3, 2.2]), steps)]).n_instructions()
+        return ca.Function(
+            "z", [k], [newton_root(coupled(x, k) * ca.exp(x), x, ca.SX([1.3, 2.2]), steps)]
+        ).n_instructions()
 
     assert operations(8) - operations(4) == pytest.approx(of_steps(8) - of_steps(4), rel=0.05)

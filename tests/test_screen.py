@@ -46,7 +46,7 @@ def test_suspects_look_alike_by_the_cosine_of_what_they_do_to_the_readings():
     cosine = np.eye(5)
     cosine[0, 1:] = cosine[1:, 0] = 0.981, -0.999, 0.979, 0.5
     suspects = tuple(Suspect(Hypothesis(f"h{k}", "stage:axis"), {}, 5.0 - k, 1.0, k) for k in range(5))
-    alike = look_alike(Screened(suspects, cosine, 3.0, {}), suspects[0])
+    alike = look_alike(Screened(suspects, cosine, lambda: 3.0, {}), suspects[0])
     assert [s.hypothesis.effect for s in alike] == ["h2", "h1"]
 
 

@@ -47,7 +47,7 @@ def test_what_a_model_leaves_without_a_cause_is_screened_once_under_the_same_err
     trials = trials_of(fitter)
     fit = fitter.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 1e-7}), steps=0)
     monkeypatch.setattr(
-        trials.screen, "run", lambda bare: screens.append(bare) or Screened((), np.zeros((0, 0)), 1, {})
+        trials.screen, "run", lambda bare: screens.append(bare) or Screened((), np.zeros((0, 0)), lambda: 1.0, {})
     )
     first = trials.screened_without(fit, 0)
     assert trials.screened_without(fit, 0) == first and first[0].structure.causes == () and len(screens) == 1
@@ -89,7 +89,7 @@ def test_a_cause_that_leaves_more_than_noise_is_begun_again_in_another_shape():
     start = {"amplitude": 10 * NOISE, "frequency": 60.0, "phase": 0.0}
     nominal, stuck = (trials.fit(s, steps=40) for s in (Structure(AXIS), Structure(AXIS).with_cause(hum, start)))
     others = tuple({**start, "frequency": f} for f in (100.0, 50.0, 33.0))
-    screened = Screened((Suspect(hum, start, 100.0, 1.0, 0, others),), np.eye(1), 4.0, {})
+    screened = Screened((Suspect(hum, start, 100.0, 1.0, 0, others),), np.eye(1), lambda: 4.0, {})
     found = restart_elsewhere(trials, stuck, nominal, screened)
     assert not stuck.errors.is_noise and found.errors.is_noise
     assert found.fit.values(0)["frequency"] == pytest.approx(50.0, rel=1e-3)
@@ -206,7 +206,12 @@ def test_three_at_once_are_sought_only_while_more_than_a_tenth_is_unexplained(mo
     starts = {BACKLASH: {"gap": 3e-8}, LATE: {"gain": 0.01, "tau": 1.0, "decades": 3.0}, LIMIT: {"level": 0.5}}
     three = tuple(Suspect(h, s, 100.0, 1.0, k) for k, (h, s) in enumerate(starts.items()))
     together = ((0.8 * promised, three[:2]), (0.9 * promised, three))
-    assert fit_subsets(trials, current, Screened(tuple(three), np.eye(3), 4.0, {}, together), (single,), most) == []
+    assert (
+        fit_subsets(
+            trials, current, Screened(tuple(three), np.eye(3), lambda: 4.0, {}, lambda: together), (single,), most
+        )
+        == []
+    )
     assert tried == sizes
     assert list(map(str, trials.failed)) == [
         f"{three[n - 1].hypothesis.effect} at {three[n - 1].hypothesis.location}: no such device can be built"

@@ -122,7 +122,9 @@ def test_a_cause_is_asked_what_it_leaves_once_it_is_fitted_under_its_own_errors(
 def test_a_model_is_screened_again_where_errors_numbers_or_samples_have_changed(monkeypatch):
     trials, current = trials_beside(fitter_of(played), [BACKLASH])
     runs = []
-    monkeypatch.setattr(trials.screen, "run", lambda fit: runs.append(fit) or Screened((), np.zeros((0, 0)), 1, {}))
+    monkeypatch.setattr(
+        trials.screen, "run", lambda fit: runs.append(fit) or Screened((), np.zeros((0, 0)), lambda: 1.0, {})
+    )
     first, fitter = trials.screened(current), trials.fitter
     sd = np.sqrt(current.fit.covariance.diagonal())
 
@@ -152,7 +154,8 @@ def test_a_set_is_fitted_as_long_as_it_may_reach_what_a_smaller_one_did(monkeypa
     trials, current = trials_beside(fitter_of(played), [BACKLASH, CLOCK])
     screened = trials.screened(current)
     single = trials.fit(current.fit.restarted.with_cause(CLOCK, {"delay": 1e-5}), CLOCK)
-    screened = replace(screened, subsets=((1e12, screened.suspects[:2]),))
+    two = screened.suspects[:2]
+    screened = replace(screened, together=lambda: ((1e12, two),))
     asked = []
     monkeypatch.setattr(Trials, "tried", lambda *_, enough: asked.append(enough) or [])
     candidates.fit_subsets(trials, current, screened, [single])

@@ -85,8 +85,6 @@ def build_sample_equations(
     return SampleEquations(constants, model, steps, linear, following, y, given, poses, roots)
 
 
-def _one_step(
-    model: Model, sample_time: float, linear: bool, poses: bool, finer: int, roots: ImplicitRoots
-) -> Sample:
+def _one_step(model: Model, sample_time: float, linear: bool, poses: bool, finer: int, roots: ImplicitRoots) -> Sample:
     newton_steps = SIMULATION.pose_newton_steps if poses else SIMULATION.newton_steps
     return one_step_map(model, sample_time, linear, newton_steps, poses, finer, roots)

@@ -12,8 +12,9 @@ largest |z| is judged against simulations of that. |cos| near one says what this
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -38,28 +39,44 @@ from ctrlgen.model.effect_terms import channels
 from ctrlgen.numerics.spectral_peaks import highest_peaks, periodogram
 from ctrlgen.recordings.recording import Record, Timing
 
+Subsets = tuple[tuple[float, tuple[Suspect, ...]], ...]
+
 
 @dataclass(frozen=True, eq=False)
 class Screened:
-    """Suspects, the most conspicuous first; `cosine` between their projected slopes; `threshold` the |z| that a record
-    without mismatch exceeds with one percent chance, anywhere among all hypotheses; `amplitude_sd` [SI] of each;
-    `together` sets of two to four suspects that would jointly explain most, with the chi^2 they would: causes can hide
-    each other; `undetectable` the hypotheses that this record cannot see, with the free number (its place in the fit's slopes)
+    """Suspects, the most conspicuous first; `cosine` between their projected slopes; `amplitude_sd` [SI] of each;
+    `undetectable` the hypotheses that this record cannot see, with the free number (its place in the fit's slopes)
     whose own effect looks most like theirs, -1 where they do not reach the readings at all; `twins` the hypotheses whose effect is
     that of a free number but for a factor, with the number and where they do what it does now; `dropped` the hypotheses whose law
-    could not be evaluated, with the reason; `regions` where most of what is left is; `moves` (k,) [SI] by how much each free number of
-    the fit would move, at most, with one of the suspects beyond the threshold beside what is there."""
+    could not be evaluated, with the reason; `regions` where most of what is left is. What few screens are asked for is computed when it
+    is: `threshold` by `by_chance`, `subsets` by `together`, `moves` of the threshold by `moved`."""
 
     suspects: tuple[Suspect, ...]
     cosine: np.ndarray
-    threshold: float
+    by_chance: Callable[[], float]
     amplitude_sd: dict[tuple[str, str], float]
-    subsets: tuple[tuple[float, tuple[Suspect, ...]], ...] = ()
+    together: Callable[[], Subsets] = tuple
     undetectable: dict[Hypothesis, int] = field(default_factory=dict)
     twins: dict[Hypothesis, tuple[int, dict[str, float]]] = field(default_factory=dict)
     dropped: dict[Hypothesis, str] = field(default_factory=dict)
     regions: dict[Along, tuple[Region, ...]] = field(default_factory=dict)
-    moves: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    moved: Callable[[float], np.ndarray] = field(default=lambda _: np.zeros(0))
+
+    @cached_property
+    def threshold(self) -> float:
+        """The |z| that a record without mismatch exceeds with one percent chance, anywhere among all hypotheses."""
+        return self.by_chance()
+
+    @cached_property
+    def subsets(self) -> Subsets:
+        """Sets of two to four suspects that would jointly explain most, with the chi^2 they would: causes can hide each other."""
+        return self.together()
+
+    @cached_property
+    def moves(self) -> np.ndarray:
+        """By how much each free number of the fit would move (k,) [SI], at most, with one of the suspects beyond the threshold beside what
+        is there."""
+        return self.moved(self.threshold)
 
 
 class Screen:
@@ -118,15 +135,16 @@ class Screen:
             here = slopes.sums(white, free, start)
             sums = here if sums is None else sums.plus(here)
         if not columns or sums is None:
-            return Screened((), np.zeros((0, 0)), np.inf, {}, dropped=dropped, moves=np.zeros(len(fit.theta)))
+            none = np.zeros(len(fit.theta))
+            return Screened((), np.zeros((0, 0)), lambda: np.inf, {}, dropped=dropped, moved=lambda _: none)
         size = np.linalg.norm(fit.J[:first], axis=0)
         along = (back @ sums.US) / np.maximum(size, 1e-150)[:, None]
         screened = self._screened(columns, sums, U.T @ fit.residual, np.abs(along))
         free_numbers = fit.structure.free_parameters
         sizes = {k: v - u.nominal for k, (u, v) in enumerate(zip(free_numbers, fit.theta, strict=True)) if u.amplitude}
         twins = self._twins(columns, {k: size[k] * change for k, change in sizes.items()}, along, sums.SS)
-        moves = _moves(screened, sums, back)[: len(fit.theta)]
-        return replace(screened, twins=twins, dropped=dropped, regions=regions, moves=moves)
+        moved = partial(_moves, screened.suspects, np.diag(sums.SS), sums.US, back, len(fit.theta))
+        return replace(screened, twins=twins, dropped=dropped, regions=regions, moved=moved)
 
     def _twins(
         self, columns: list[CandidateTerm], does: dict[int, float], along: np.ndarray, SS: np.ndarray
@@ -152,7 +170,7 @@ class Screen:
                 # a residual falls with what the model adds
                 column, amplitude = columns[best], -float(length / along[k, best])
                 if column.range[0] <= amplitude <= column.range[1]:
-                    found[h] = likeness, k, self._suspect(column, 0.0, amplitude, 0.0, best).start
+                    found[h] = likeness, k, _suspect(column, 0.0, amplitude, 0.0, best).start
         return {h: (k, start) for h, (_, k, start) in sorted(found.items(), key=lambda f: -f[1][0])}
 
     def _laws(self, fit: Fit, timing: Timing) -> LawTerms:
@@ -288,9 +306,7 @@ class Screen:
         for j in sorted(seen, key=lambda j: -abs(z[j])):
             ranked.setdefault(columns[j].hypothesis, []).append(int(j))
         order = [js[0] for js in ranked.values()]
-        suspect = {
-            j: self._suspect(columns[j], z[j], score[j] / distinct[j], distinct_share[j], j) for j in map(int, seen)
-        }
+        suspect = {j: _suspect(columns[j], z[j], score[j] / distinct[j], distinct_share[j], j) for j in map(int, seen)}
         suspects = tuple(
             replace(suspect[j], other_starts=tuple(suspect[i].start for i in others[: SCREEN.most_other_starts]))
             for j, *others in ranked.values()
@@ -303,29 +319,34 @@ class Screen:
         }
         # a law in a region is tried alone: there are many, and each looks like the law everywhere
         everywhere = np.array([j for j in seen if not columns[j].hypothesis.prior.in_a_region], int)
-        together = SubsetSearch(columns, everywhere, score, distinct, distinct_share, cosine, self._suspect)
+
+        def together() -> Subsets:
+            return SubsetSearch(columns, everywhere, score, distinct, distinct_share, cosine, _suspect).search()
+
         resembles = np.argmax(likeness, axis=0) if len(likeness) else np.full(len(columns), -1)
         undetectable = {c.hypothesis: int(resembles[j]) if norm[j] > 0 else -1 for j, c in enumerate(columns)}
         undetectable = {h: k for h, k in undetectable.items() if h not in ranked}
-        threshold = self._threshold(cosine[np.ix_(seen, seen)])
-        return Screened(suspects, cosine, threshold, sds, together.search(), undetectable)
+        by_chance = partial(_largest_by_chance, cosine, seen, self.seed)
+        return Screened(suspects, cosine, by_chance, sds, together, undetectable)
 
-    def _suspect(self, column: CandidateTerm, z: float, amplitude: float, distinct_share: float, j: int) -> Suspect:
-        h = column.hypothesis
-        if h.effect == PARAMETER:
-            start = {"value": column.shape["value"] + amplitude * column.size}
-        else:
-            start = {**column.shape, h.law.amplitude().name: amplitude * column.size}
-        return Suspect(h, start, float(z), float(distinct_share), j)
 
-    def _threshold(self, cosine: np.ndarray) -> float:
-        """The 99th percentile of the largest |z| when nothing was left out."""
-        if not len(cosine):
-            return np.inf
-        values, vectors = np.linalg.eigh(cosine)
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        draws = np.random.default_rng(self.seed).standard_normal((SCREEN.null_draws, len(cosine)))
-        return float(np.quantile(np.abs(draws @ root.T).max(axis=1), SCREEN.false_alarm_quantile))
+def _suspect(column: CandidateTerm, z: float, amplitude: float, distinct_share: float, j: int) -> Suspect:
+    h = column.hypothesis
+    if h.effect == PARAMETER:
+        start = {"value": column.shape["value"] + amplitude * column.size}
+    else:
+        start = {**column.shape, h.law.amplitude().name: amplitude * column.size}
+    return Suspect(h, start, float(z), float(distinct_share), j)
+
+
+def _largest_by_chance(cosine: np.ndarray, seen: np.ndarray, seed: int) -> float:
+    """The 99th percentile of the largest |z| among those `seen` when nothing was left out."""
+    if not len(seen):
+        return np.inf
+    values, vectors = np.linalg.eigh(cosine[np.ix_(seen, seen)])
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    draws = np.random.default_rng(seed).standard_normal((SCREEN.null_draws, len(seen)))
+    return float(np.quantile(np.abs(draws @ root.T).max(axis=1), SCREEN.false_alarm_quantile))
 
 
 def _without_sensor_causes(fit: Fit) -> Fit:
@@ -340,19 +361,20 @@ def _without_sensor_causes(fit: Fit) -> Fit:
     return replace(fit, theta=theta)
 
 
-def _moves(screened: Screened, sums: Sums, back: np.ndarray) -> np.ndarray:
-    """The largest change (k,) of each free number when one law everywhere that is suspected beyond the threshold joins the fit at its best
-    amplitude a: dx = J+ s a. What the number itself hardly differs from is told as its alternative instead."""
+def _moves(
+    suspects: Sequence[Suspect], norm: np.ndarray, US: np.ndarray, back: np.ndarray, n: int, threshold: float
+) -> np.ndarray:
+    """The largest change (n,) of each of the first n free numbers when one law everywhere that is suspected beyond the threshold joins the
+    fit at its best amplitude a: dx = J+ s a. What the number itself hardly differs from is told as its alternative instead. `norm` s's
+    (m,), `US` U's."""
     own = 1 - CONFUSABLE.cosine**2
     loud = [
-        s
-        for s in screened.suspects
-        if abs(s.z) > screened.threshold and s.distinct_share > own and not s.hypothesis.prior.in_a_region
+        s for s in suspects if abs(s.z) > threshold and s.distinct_share > own and not s.hypothesis.prior.in_a_region
     ]
     at = [s.index for s in loud]
-    distinct = np.diag(sums.SS)[at] - np.sum(sums.US[:, at] ** 2, axis=0)
+    distinct = norm[at] - np.sum(US[:, at] ** 2, axis=0)
     amplitudes = np.array([s.z for s in loud]) / np.sqrt(distinct)
-    return np.abs(np.linalg.pinv(back.T) @ (sums.US[:, at] * amplitudes)).max(axis=1, initial=0.0)
+    return np.abs(np.linalg.pinv(back.T) @ (US[:, at] * amplitudes)).max(axis=1, initial=0.0)[:n]
 
 
 def _directions(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
