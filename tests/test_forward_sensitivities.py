@@ -227,3 +227,34 @@ def test_slopes_of_poses_are_those_through_newtons_steps_and_take_a_fifth_of_the
         for values in (open_, through)
     )
     assert of_root < 0.2 * of_steps
+
+
+def test_what_depends_on_the_devices_numbers_alone_is_differentiated_once_for_all_structures(monkeypatch):
+    device, channels = load_device(DEVICE), ("reading.delta_x",)
+    own = ["hexapod.height", "hexapod.base_radius"]
+    law = next(
+        h
+        for h in hypotheses(device, nominal_physics(device), channels, None, False)
+        if (h.effect, h.location) == ("drive_gain", "actuator:1X")
+    )
+    with_gain = Structure(device).with_cause(law, {"gain": 0.03})
+    operations, plain = [], ca.jacobian
+
+    def counted(value: ca.SX, *by: ca.SX) -> ca.SX:
+        operations.append(ca.Function("f", ca.symvar(value), [value]).n_instructions())
+        return plain(value, *by)
+
+    monkeypatch.setattr(ca, "jacobian", counted)
+    constants = [
+        Simulator(d, free, channels, np.inf, poses=True).equations.constants
+        for d, free in ((device, own), (with_gain.device_with_causes, [own[1], "effect[0].gain", own[0]]))
+    ]
+    assert sum(n > SIMULATION.parametric_operations for n in operations) <= 1
+    # by central differences: of a step of 1e-5 of 0.02 they are right to 2.5e-7
+    step = 1e-5
+    for f, p in zip(constants, (np.array([0.02, 0.03]), np.array([0.03, 0.03, 0.02])), strict=True):
+        slopes = f(p)[1].full()
+        for k, change in enumerate(step * np.eye(len(p))):
+            found = (f(p + change)[0].full() - f(p - change)[0].full()).ravel() / (2 * step)
+            assert np.abs(found).max() > 0
+            assert np.allclose(found, slopes[:, k], rtol=1e-5, atol=1e-6 * np.abs(found).max())

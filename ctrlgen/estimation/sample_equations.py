@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import casadi as ca
@@ -51,9 +52,16 @@ class SampleEquations:
 
 
 def build_sample_equations(
-    model: Model, y: ca.SX, sample_time: float, linear: bool, poses: bool = False, finer: int = 1
+    model: Model,
+    y: ca.SX,
+    sample_time: float,
+    linear: bool,
+    poses: bool = False,
+    finer: int = 1,
+    of_device: Sequence[int] = (),
 ) -> SampleEquations:
-    """The sample equations of `model` with readings `y` (n_y,) for records of one `Timing`, in `finer` times its integrator's steps."""
+    """The sample equations of `model` with readings `y` (n_y,) for records of one `Timing`, in `finer` times its integrator's steps.
+    `of_device`: the places in p of the device's own numbers."""
     expressions = [model.sampled_rates, model.held_value, ca.vertcat(ca.SX(0, 1), *model.stepped.values()), y]
     roots = ImplicitRoots()
     sample = None if model.inertial else _one_step(model, sample_time, linear, poses, finer, roots)
@@ -68,7 +76,7 @@ def build_sample_equations(
     if ca.Function("work", [model.p], parametric).n_instructions() > SIMULATION.parametric_operations:
         expressions = in_symbols
         c, value = ca.vertcat(ca.SX(0, 1), *symbols), ca.vertcat(ca.SX(0, 1), *parametric)
-    constants = ca.Function("constants", [model.p], [value, ca.jacobian(value, model.p)])
+    constants = _with_jacobian(value, model.p, of_device)
     if sample is None:
         rates, held, stepped, y = expressions
         stepped = dict(zip(model.stepped, ca.vertsplit(stepped), strict=True))
@@ -83,6 +91,31 @@ def build_sample_equations(
     given = [ca.vertcat(model.x, model.z), model.u, sample.u_next, model.ambient_symbol, c]
     steps = integrator_of(model, sample_time, finer) if model.inertial else None
     return SampleEquations(constants, model, steps, linear, following, y, given, poses, roots)
+
+
+def _with_jacobian(value: ca.SX, p: ca.SX, of_device: Sequence[int]) -> ca.Function:
+    """p (k,) -> `value` (n_c,), dvalue/dp. What depends on the device's numbers alone is differentiated once for all structures: that of
+    a hexapod's struts takes as long as the rest of each of the many structures that a search tries."""
+    if not of_device or ca.Function("value", [p], [value]).n_instructions() <= SIMULATION.parametric_operations:
+        return ca.Function("constants", [p], [value, ca.jacobian(value, p)])
+    numbers = ca.vertcat(*(p[i] for i in of_device))
+    (beside,), symbols, core = ca.extract_parametric([value], numbers, {"extract_trivial": True})
+    s = ca.vertcat(ca.SX(0, 1), *symbols)
+    derived = _core(ca.Function("core", [numbers], [ca.vertcat(ca.SX(0, 1), *core)]).serialize())
+    others = ca.Function("beside", [p, s], [beside, ca.jacobian(beside, p), ca.jacobian(beside, s)])
+    at = ca.MX.sym("p", p.numel())
+    c, c_p = derived(at[list(of_device)])
+    values, by_p, by_c = others(at, c)
+    places = ca.Sparsity.triplet(len(of_device), p.numel(), list(range(len(of_device))), list(of_device))
+    return ca.Function("constants", [at], [values, by_p + by_c @ c_p @ ca.DM(places, 1.0)])
+
+
+@lru_cache(maxsize=SIMULATION.kept_cores)
+def _core(serialised: str) -> ca.Function:
+    """A function of the device's numbers, as text, with its Jacobian."""
+    value = ca.Function.deserialize(serialised)
+    p = ca.SX.sym("p", value.numel_in(0))
+    return ca.Function("core", [p], [value(p), ca.jacobian(value(p), p)])
 
 
 def _one_step(model: Model, sample_time: float, linear: bool, poses: bool, finer: int, roots: ImplicitRoots) -> Sample:

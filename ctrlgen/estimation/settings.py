@@ -218,6 +218,9 @@ class SimulationSettings:
     parametric_operations: int = 500
     """Operations on parameters alone from which on they are evaluated once a record: passing their results to every sample
     costs time, too. Judgement."""
+    kept_cores: int = 8
+    """Functions of a device's own numbers kept with their Jacobian: of those to fit and of those suspected, with a record's readings.
+    A hexapod's take 10 MB."""
 
 
 @dataclass(frozen=True)

@@ -133,15 +133,18 @@ class Simulator:
     @cached_property
     def equations(self) -> SampleEquations:
         """F and H of one sample, symbolically; the readings as they are before they are late."""
-        return build_sample_equations(self.model, self._observed, self.sample_time, self.linear, self.poses, self.finer)
+        return self._equations_of(self._observed)
 
     @cached_property
     def _with_rates(self) -> SampleEquations:
         """The same with the rates of the readings that are late as further readings."""
         if not self._rates.numel():
             return self.equations
-        y = ca.vertcat(self._observed, self._rates)
-        return build_sample_equations(self.model, y, self.sample_time, self.linear, self.poses, self.finer)
+        return self._equations_of(ca.vertcat(self._observed, self._rates))
+
+    def _equations_of(self, y: ca.SX) -> SampleEquations:
+        own = [i for _, i in sorted((path, i) for i, path in enumerate(self.free) if not path.startswith("effect["))]
+        return build_sample_equations(self.model, y, self.sample_time, self.linear, self.poses, self.finer, own)
 
     def linearise(self, p: np.ndarray, chosen: Sequence[int]) -> Linearised:
         """F_S, F_f, H_S and H_f at `p` (k,) along any motion, f the m `chosen` parameters by their places in `free`."""
