@@ -177,7 +177,7 @@ def test_what_is_so_or_is_not_and_what_is_read_off_stand_in_the_next_device(foun
     read = Finding(
         "quantisation", "sensor:axis", steps, (), None, {}, "", Hypothesis("quantisation", "sensor:axis", "axis")
     )
-    screened = replace(found.search.final_screen, moves=np.zeros(len(fit.theta)))
+    screened = replace(found.search.final_screen, moved=lambda _: np.zeros(len(fit.theta)))
     search = replace(found.search, chosen=replace(trial, fit=fit), final_screen=screened)
     told = replace(found, findings=(*found.findings, read), search=search)
     (tmp_path / "next.toml").write_text(next_text(told, AXIS_FILE.read_text()))
