@@ -1,9 +1,10 @@
 """Recursions compiled to machine code where a C compiler is there, and left to CasADi's virtual machine elsewhere.
 
 Compiled libraries are kept in the user's cache folder under the SHA-256 of their code, so that another diagnosis of the same
-device need not compile them again. The code is compiled without contraction of products and sums: its results are those of the
-virtual machine to the last bit. A diagnosis compiles some hundred of them, most of them short: headers, CasADi's interface and the
-C library's start-up files, which nothing here needs, would take two thirds of the time of a short one.
+device need not compile them again; those used longest ago go (`kept_libraries.py`). The code is compiled without contraction of
+products and sums: its results are those of the virtual machine to the last bit. A diagnosis compiles some hundred of them, most of
+them short: headers, CasADi's interface and the C library's start-up files, which nothing here needs, would take two thirds of the
+time of a short one.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ import numpy as np
 
 from ctrlgen.core.compiled_templates import cache_folder
 from ctrlgen.core.counts import number_of
+from ctrlgen.numerics.kept_libraries import KeptLibraries
 
 FLAGS = ("-Og", "-fPIC", "-shared", "-ffp-contract=off", "-w", *(("-nostdlib",) if sys.platform == "linux" else ()))
 # Of generated C, for the compiler: measured with gcc 12 on steps of an axis and a hexapod.
@@ -42,6 +44,7 @@ IN_WORK_VECTOR = re.compile(r"  (w\[\d+\]=|if \(res\[\d+\]!=0\) )")
 PLACE = re.compile(r"w\[(\d+)\]")
 LONGEST = 6_000_000  # characters of generated C: beyond, the compiler takes longer than the diagnosis
 
+KEPT = KeptLibraries()
 INTERFACE = re.compile(r"^CASADI_SYMBOL_EXPORT int \w+\(.*\{\n  return (?P<main>casadi_f\d+)\(", re.M)
 KEEPS_NO_MEMORY = re.compile(r"_checkout\(void\) \{\n  return 0;\n\}")
 CONFIGURATION = re.compile(
@@ -120,6 +123,7 @@ class Compilable:
             self._loop = ctypes.CDLL(str(path)).run
         except OSError:  # a folder from which nothing may be run, a damaged file
             return False
+        KEPT.used(path)
         return True
 
     @property
@@ -244,6 +248,7 @@ def _compile(code: str, path: Path) -> bool:
             command = [str(compiler()), *FLAGS, str(source), "-o", str(library), "-lm"]
             subprocess.run(command, check=True, capture_output=True, timeout=300)
             library.replace(path)
+        KEPT.added(path.parent)
         return True
     except (OSError, subprocess.SubprocessError):
         return False
