@@ -10,7 +10,9 @@ from axis_records import AXIS, BACKLASH, NOISE, H, axis_fitter, drive, fitter_of
 
 from ctrlgen.diagnosis.selection import candidates
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
+from ctrlgen.diagnosis.selection.shifts import best_shift
 from ctrlgen.diagnosis.selection.trials import Trials
+from ctrlgen.diagnosis.settings import SEARCH
 from ctrlgen.estimation import simulator
 from ctrlgen.estimation.error_model import ErrorModel
 from ctrlgen.estimation.hypothesis import Hypothesis
@@ -160,3 +162,31 @@ def test_a_set_is_fitted_as_long_as_it_may_reach_what_a_smaller_one_did(monkeypa
     monkeypatch.setattr(Trials, "tried", lambda *_, enough: asked.append(enough) or [])
     candidates.fit_subsets(trials, current, screened, [single])
     assert asked == [pytest.approx(single.fit.objective)]
+
+
+@pytest.mark.parametrize("late, shift", [(3e-4, H), (7e-3, 7e-3)], ids=["within a sample", "seven samples"])
+def test_a_fit_takes_away_no_more_than_several_times_what_a_shift_promises(late, shift):
+    t = H * np.arange(LONG)
+    trials, current = trials_beside(axis_fitter(n=LONG, change=lambda y, u: np.interp(t - late, t, y)), [CLOCK])
+    begun, promised = best_shift(trials.fitter, current.fit, CLOCK, H)
+    fitted = trials.fit(current.fit.restarted.with_cause(CLOCK, {"delay": begun}), CLOCK)
+    took = current.fit.objective - fitted.fit.objective
+    assert begun == pytest.approx(shift) and took > 0.5 * current.fit.objective
+    assert 0.9 * promised < took < SEARCH.generous_promise * promised
+
+
+def test_a_shift_that_cannot_take_away_enough_is_not_fitted(monkeypatch):
+    trials, current = trials_beside(fitter_of(played), [BACKLASH, CLOCK])
+    rough = trials.fit(current.fit.restarted.with_cause(BACKLASH, {"gap": 3e-8}), BACKLASH, enough=-np.inf)
+    single = replace(rough, fit=replace(rough.fit, chi2=0.5 * current.fit.objective, penalty=0.0))
+    fitted, promises = [], {id(current.fit): 0.0, id(single.fit): 0.0}
+    monkeypatch.setattr(Trials, "tried", lambda _, structure, *__: fitted.append(structure.causes) or [])
+    monkeypatch.setattr(candidates, "best_shift", lambda _, fit, *__: (H, promises[id(fit)]))
+    # what a single takes away; what that leaves
+    need = (
+        0.5 * current.fit.objective * np.array([SEARCH.smallest_score, SEARCH.subset_share]) / SEARCH.generous_promise
+    )
+    for times, wanted in ((0.99, []), (1.01, [(CLOCK,), (BACKLASH, CLOCK)])):
+        promises |= dict(zip(promises, times * need, strict=True))
+        candidates.fit_other_clocks(trials, current, [single])
+        assert fitted == wanted

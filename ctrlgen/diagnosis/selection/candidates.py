@@ -213,22 +213,27 @@ def fit_other_clocks(
     trials: Trials, current: CandidateModel, singles: Sequence[CandidateModel]
 ) -> tuple[CandidateModel, ...]:
     """What a signal that is early or late explains, alone and beside the best of the `singles`, begun at the best of many
-    shifts. The screen hardly sees it: a shift of several samples is no multiple of a slope."""
+    shifts. The screen hardly sees it: a shift of several samples is no multiple of a slope. As every suspect, one alone must promise a
+    share of what the best single takes away; as every set, one beside another a share of what that leaves."""
     h = min(r.sample_time for r in trials.fitter.recording.records)
     open_ = (o for o in (h.beside(current.causes) for h in trials.screen.hypotheses) if o is not None)
     shifts = [o for o in open_ if o.effect != PARAMETER and o.law.moves_in_time]
     if current.errors.is_noise or trials.fitter.recording.kind == "poses" or not shifts:
         return ()
     alone = len(trials.fitter.recording.channels) == 1
+    most = max((current.fit.objective - t.fit.objective for t in singles), default=0.0)
 
     def one(branch: Trials, beside: CandidateModel) -> list[CandidateModel]:
         begun: list[tuple[float, Hypothesis, Structure]] = []
         # a drive that is early and a single reading that is late are one shift
         shifted = alone and any(c.effect != PARAMETER and c.law.moves_in_time for c in beside.causes)
+        need = SEARCH.smallest_score * most if beside is current else SEARCH.subset_share * beside.fit.objective
         for cause in () if shifted else shifts:
             try:
                 p = cause.law.amplitude()
-                shift = best_shift(branch.fitter, beside.fit, cause, h)
+                shift, promised = best_shift(branch.fitter, beside.fit, cause, h)
+                if SEARCH.generous_promise * promised < need:
+                    continue
                 structure = beside.fit.restarted.with_cause(cause, {p.name: shift})
                 begun.append((branch.fitter.rough_objective(structure), cause, structure))
             except FAILURES as error:

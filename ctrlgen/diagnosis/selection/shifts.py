@@ -23,8 +23,13 @@ def shifts_tried(h: float, low: float, high: float) -> np.ndarray:
     return within if len(within) else np.array([min(max(h, low), high)])
 
 
-def best_shift(fitter: Fitter, fit: Fit, cause: Hypothesis, h: float) -> float:
-    """The shift [s] of `shifts_tried` that leaves least of the residual of `fit` on the records to fit.
+def best_shift(fitter: Fitter, fit: Fit, cause: Hypothesis, h: float) -> tuple[float, float]:
+    """The shift [s] of `shifts_tried` that leaves least of the residual of `fit` on the records to fit, and by how much it promises to
+    lower the objective: what it takes away with all numbers as they are or, of a shift too short for that, with them refitted,
+
+        (s_perp'r)^2/|s_perp|^2,  s_perp = s - J (J'J)^-1 J's,
+
+    s the whitened slope of the readings by the shift.
 
     Exact for what `fit` predicts where nothing but the signal's own time is shifted; a start, not an estimate.
     """
@@ -33,12 +38,34 @@ def best_shift(fitter: Fitter, fit: Fit, cause: Hypothesis, h: float) -> float:
     there = channels(nominal_physics(device), cause.law.place)
     moved = {f"reading.{there[i].name}" for i in cause.acts_on(device)}
     rows = [i for i, channel in enumerate(fitter.recording.channels) if channel in moved]
-    left = np.zeros(len(shifts))
+    late = np.concatenate([[0.0], -shifts if cause.law.shifts_drive else shifts])
+    left, slopes = np.zeros(len(late)), []
     for k, record in enumerate(fitter.fit_records):
         start = fit.initial_states[k] if fit.initial_states else None
         y = fitter.simulator(fit.structure, record).simulate(record, fit.theta, start)
-        left += _left(fitter, record, y, list(rows), -shifts if cause.law.shifts_drive else shifts)
-    return float(shifts[np.argmin(left)])
+        left += _left(fitter, record, y, list(rows), late)
+        slopes.append(_slope(fitter, record, y, list(rows)))
+    best = 1 + int(np.argmin(left[1:]))
+    return float(shifts[best - 1]), max(float(left[0] - left[best]), _promised(fit, np.concatenate(slopes)))
+
+
+def _slope(fitter: Fitter, record: Record, y: np.ndarray, rows: list[int]) -> np.ndarray:
+    """The whitened slope (n n_y,) of the readings by how late those of `rows` come [s]."""
+    slope = np.zeros_like(y)
+    slope[:, rows] = -np.gradient(y[:, rows], record.time, axis=0)
+    return fitter.error.whiten(np.where(record.valid, slope, 0.0), record.valid).ravel()
+
+
+def _promised(fit: Fit, slope: np.ndarray) -> float:
+    """By how much one more number with the whitened `slope` (n,) would lower the objective of a fit, all others refitted."""
+    scale = np.linalg.norm(fit.J, axis=0)
+    scale[scale == 0] = 1.0
+    J = fit.J / scale
+    along = np.linalg.lstsq(J.T @ J, J[: len(slope)].T @ slope, rcond=None)[0]
+    distinct = -J @ along
+    distinct[: len(slope)] += slope
+    size = float(distinct @ distinct)
+    return float(distinct @ fit.residual) ** 2 / size if size > 0 else 0.0
 
 
 def _left(fitter: Fitter, record: Record, y: np.ndarray, rows: list[int], late: np.ndarray) -> np.ndarray:
