@@ -20,6 +20,7 @@ from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.plainer_law import left_beside, may_be_plainer, plainer_start
 from ctrlgen.estimation.priors import prior_of
 from ctrlgen.estimation.structure import Structure
+from ctrlgen.recordings.recording import Record
 
 GENERAL = {kind: law for kind, law in Effect.library.items() if law.plainer}
 every_general_law = pytest.mark.parametrize("law", GENERAL.values(), ids=GENERAL)
@@ -174,11 +175,13 @@ def test_what_rubs_or_lags_alike_both_ways_is_named_by_the_plainer_law(law, monk
     begun = Structure(AXIS).with_cause(cause, values)
     plain = Hypothesis(law.plainer.kind, cause.location, "axis")
     start = plainer_start(Fit(begun, begun.start, (), 0.0, 1, np.zeros(0), np.eye(len(begun.start)), 0.0), 0, plain)
-    truth, rng = model.fit(Structure(AXIS).with_cause(plain, start), steps=0), np.random.default_rng(0)
+    truth, rng = Structure(AXIS).with_cause(plain, start), np.random.default_rng(0)
+
+    def from_rest(r: Record) -> np.ndarray:
+        return truth.simulator(model.recording.channels, r.timing).simulate(r, truth.start)
+
     records = tuple(
-        r
-        if r.role == "rest"
-        else replace(r, observed=model.predict(truth, r) + NOISE * rng.standard_normal(r.observed.shape))
+        r if r.role == "rest" else replace(r, observed=from_rest(r) + NOISE * rng.standard_normal(r.observed.shape))
         for r in model.recording.records
     )
     fitter = replace(model, recording=replace(model.recording, records=records))

@@ -100,7 +100,7 @@ def unknown_input_place(physics: DevicePhysics) -> Place:
 
 
 def linearise_along(fitter: Fitter, fit: Fit, record: Record) -> LtvModel:
-    """The LTV model of `fit` along `record`."""
+    """The LTV model of `fit` along `record`. Raises ArithmeticError where the motion that it foretells leaves what is finite."""
     physics = nominal_physics(fit.structure.device)
     place = unknown_input_place(physics)
     simulator, p, chosen = _probed(fitter, fit, record, place)
@@ -109,6 +109,8 @@ def linearise_along(fitter: Fitter, fit: Fit, record: Record) -> LtvModel:
     if start is None:
         y = fitter.predict(fit, record)
     F_S, F_f, H_S, H_f = _linearised(simulator, record, p, chosen, before)
+    if not all(np.isfinite(part).all() for part in (F_S, F_f, H_S, H_f)):
+        raise ArithmeticError("the motion that the model foretells is not finite")
     at = after if record.poses else before
     m = simulator.model
     z = at[:, simulator.n_x :]
@@ -144,7 +146,9 @@ def _probed(fitter: Fitter, fit: Fit, record: Record, place: Place) -> tuple[Sim
     known = [unknown.path for unknown in fit.structure.free_parameters]
     device, probes = with_disturbance_inputs(fit.structure.expanded_device, nominal_physics(fit.structure.device))
     paths = [path for (where, _), path in probes.items() if where is place]
-    simulator = compiled_simulator(device, (*known, *paths), fitter.recording.channels, record.timing)
+    simulator = compiled_simulator(
+        device, (*known, *paths), fitter.recording.channels, record.timing, fit.structure.finer
+    )
     p = np.concatenate([fit.theta, np.zeros(len(paths))])
     return simulator, p, list(range(len(known), len(p)))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -59,6 +59,7 @@ class LocatedIn(StrEnum):
     NEITHER = "neither readings nor actuators"
     ONE_READING = "cannot be told from one reading"
     NO_EXCESS = "there is no significant excess"
+    UNKNOWN = "the motion could not be linearised"
 
 
 class CoordinatesEntry(Keys):
@@ -100,6 +101,16 @@ class ResidualLocationEntry(Keys):
     unmodelled_force: UnmodelledForceEntry | None = Field(
         default=None, description="In `after`, where the findings do not explain all."
     )
+
+    @classmethod
+    def unknown(cls) -> ResidualLocationEntry:
+        """Of a model whose motion could not be linearised: no part of the residual is located."""
+        coordinates = CoordinatesEntry(participation_ratio={}, explained_by_one={}, located_in=LocatedIn.UNKNOWN)
+        parts: dict[str, Any] = {
+            f"by_{name}": [] for name in ("reading", "actuator", "frequency", "time", "temperature")
+        }
+        parts |= {"by_travel": {}, "by_direction": {}, "spectral_lines": [], "statements": []}
+        return cls(excess=float("nan"), coordinates=coordinates, **parts)
 
     def groups(self) -> Iterator[tuple[str, list[tuple[str, ResidualPartEntry | FrequencyBandEntry]]]]:
         """The groups of parts by their name in a figure, each part with its label."""

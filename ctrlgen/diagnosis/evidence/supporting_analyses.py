@@ -9,12 +9,13 @@ from typing import TypeVar
 from ctrlgen.diagnosis.evidence.detectability import DetectabilityEntry, detectability
 from ctrlgen.diagnosis.evidence.experiment_design import Experiment, next_experiment
 from ctrlgen.diagnosis.evidence.experiment_files import files
-from ctrlgen.diagnosis.evidence.ltv_linearisation import linearise_along
+from ctrlgen.diagnosis.evidence.ltv_linearisation import LtvModel, linearise_along
 from ctrlgen.diagnosis.evidence.residual_localisation import localise_residual
-from ctrlgen.diagnosis.evidence.residual_location import ResidualLocations
+from ctrlgen.diagnosis.evidence.residual_location import ResidualLocationEntry, ResidualLocations
 from ctrlgen.diagnosis.evidence.unmodelled_dynamics import UnmodelledForce, describe_unmodelled_force
 from ctrlgen.diagnosis.selection.failures import FAILURES, reason_of
 from ctrlgen.diagnosis.selection.search_result import SearchResult
+from ctrlgen.estimation.fit import Fit
 
 # from the folder of the next experiment
 NEXT_DEVICE = "../device.next.toml"
@@ -38,9 +39,6 @@ def run_supporting_analyses(search: SearchResult, explained: bool, seed: int = 0
     fitter, recording = search.fitter, search.fitter.recording
     nominal, chosen = search.nominal.fit, search.chosen.fit
     records = [*fitter.fit_records, *fitter.held_out_records]
-    before = [linearise_along(fitter, nominal, record) for record in records]
-    after = before if chosen is nominal else [linearise_along(fitter, chosen, record) for record in records]
-    located = [localise_residual(models, recording.channels, recording.units, seed) for models in (before, after)]
     failed: list[str] = []
 
     def tried(name: str, analysis: Callable[[], Result]) -> Result | None:
@@ -51,12 +49,24 @@ def run_supporting_analyses(search: SearchResult, explained: bool, seed: int = 0
             failed.append(f"{name} is left out: {reason_of(error)}")
             return None
 
-    force = None if explained else tried("the unknown input", lambda: describe_unmodelled_force(fitter, after))
+    def motions(fit: Fit) -> list[LtvModel]:
+        return [linearise_along(fitter, fit, record) for record in records]
+
+    def located(models: list[LtvModel] | None) -> ResidualLocationEntry:
+        where = None if models is None else localise_residual(models, recording.channels, recording.units, seed)
+        return where or ResidualLocationEntry.unknown()
+
+    where = "where the residual is"
+    before = tried(f"{where} before the correction", lambda: motions(nominal))
+    after = before if chosen is nominal else tried(f"{where} after it", lambda: motions(chosen))
+    force = None
+    if after is not None and not explained:
+        force = tried("the unknown input", lambda: describe_unmodelled_force(fitter, after))
     experiment = tried("the next experiment", lambda: next_experiment(search, explained, seed))
     if experiment is not None:
         experiment = replace(experiment, files=files(fitter, chosen, experiment, NEXT_DEVICE))
     return SupportingAnalyses(
-        residual_location=ResidualLocations(before=located[0], after=located[1]),
+        residual_location=ResidualLocations(before=located(before), after=located(after)),
         unmodelled_force=force,
         detectability=detectability(chosen, search.final_screen, chosen.n),
         next_experiment=experiment,

@@ -55,7 +55,7 @@ def _probed(
     suspected = [h.path for h in hypotheses if h.effect == PARAMETER and h.path not in known]
     free = (*known, *suspected, *probes.values())
     entered = {where: free.index(path) for where, path in probes.items()}
-    return compiled_simulator(device, free, channels, timing), entered
+    return compiled_simulator(device, free, channels, timing, structure.finer), entered
 
 
 def law_terms(device: Device, hypotheses: Sequence[Hypothesis], channels: tuple[str, ...], timing: Timing) -> LawTerms:
