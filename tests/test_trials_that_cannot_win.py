@@ -190,3 +190,18 @@ def test_a_shift_that_cannot_take_away_enough_is_not_fitted(monkeypatch):
         promises |= dict(zip(promises, times * need, strict=True))
         candidates.fit_other_clocks(trials, current, [single])
         assert fitted == wanted
+
+
+def test_what_a_fit_leaves_without_a_cause_is_screened_once_and_forgotten_with_that_fit(monkeypatch):
+    trials, current = trials_beside(fitter_of(played), [BACKLASH, CLOCK])
+    first, second = (
+        trials.fit(current.fit.restarted.with_cause(cause, start), cause, steps=1).fit
+        for cause, start in ((BACKLASH, {"gap": 3e-8}), (CLOCK, {"delay": H}))
+    )
+    screens = []
+    monkeypatch.setattr(
+        trials.screen, "run", lambda fit: screens.append(fit) or Screened((), np.zeros((0, 0)), lambda: 1.0, {})
+    )
+    assert trials.screened_without(first, 0) == trials.screened_without(first, 0) and len(screens) == 1
+    trials.screened_without(second, 0)
+    assert len(screens) == 2 and [fit for fit, *_ in trials.bare.values()] == [second]

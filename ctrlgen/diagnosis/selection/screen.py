@@ -143,7 +143,7 @@ class Screen:
         free_numbers = fit.structure.free_parameters
         sizes = {k: v - u.nominal for k, (u, v) in enumerate(zip(free_numbers, fit.theta, strict=True)) if u.amplitude}
         twins = self._twins(columns, {k: size[k] * change for k, change in sizes.items()}, along, sums.SS)
-        moved = partial(_moves, screened.suspects, np.diag(sums.SS), sums.US, back, len(fit.theta))
+        moved = partial(_moves, screened.suspects, np.diag(sums.SS).copy(), sums.US, back, len(fit.theta))
         return replace(screened, twins=twins, dropped=dropped, regions=regions, moved=moved)
 
     def _twins(

@@ -45,7 +45,7 @@ class Trials:
         self.fitted: dict[frozenset[Any], tuple[CandidateModel, int]] = {}
         self.screens: dict[frozenset[Any], tuple[Fit, Screened]] = {}
         self.latest: tuple[Fitter, Fit, Screened] | None = None
-        self.bare: dict[tuple[int, int], tuple[Fit, Fit, Screened]] = {}
+        self.bare: dict[int, tuple[Fit, Fit, Screened]] = {}
         self.mismatch: np.ndarray | None = None
         self.refused: list[Refusal] = []
         self.failed: list[Failure] = []
@@ -243,12 +243,12 @@ class Trials:
 
     def screened_without(self, fit: Fit, k: int) -> tuple[Fit, Screened]:
         """The fit without cause k, its other numbers as they are, and the screen of what that leaves."""
-        known = self.bare.get((id(fit), k))
-        if known is None:
+        if any(known is not fit for known, *_ in self.bare.values()):
+            self.bare.clear()  # a screen of pose sets takes tens of MB
+        if k not in self.bare:
             bare = self.fitter.fit(fit.restarted.without(k), steps=0)
-            # the fit with them: its identity is its own as long as it is kept
-            known = self.bare[id(fit), k] = (fit, bare, self.screen.run(bare))
-        return known[1:]
+            self.bare[k] = (fit, bare, self.screen.run(bare))
+        return self.bare[k][1:]
 
     def objections(self, candidate: CandidateModel, accepted: Sequence[Hypothesis] = ()) -> dict[int, str]:
         """What speaks against the causes of a candidate that are not yet `accepted`."""
