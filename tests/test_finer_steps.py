@@ -21,10 +21,8 @@ from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.structure import Structure
 
-DAMPING = {
-    "damping": 2e3,
-    "speed": 6e-3,
-}  # N s/m beyond 6 mm/s: one step a sample overshoots more each time, two do not
+# N s/m beyond 6 mm/s: one step a sample overshoots more each time, two do not
+DAMPING = {"damping": 2e3, "speed": 6e-3}
 FINER = 2
 
 
@@ -61,5 +59,7 @@ def test_a_motion_that_cannot_be_linearised_leaves_a_diagnosis_its_findings(tmp_
     found = ctrlgen.diagnose(AXIS_FILE, creeping_recording(tmp_path), laws=LAWS)
     assert [c.effect for c in found.search.chosen.causes] == ["creep"]
     assert found.residual_location.after.coordinates.located_in is LocatedIn.UNKNOWN
-    assert any("where the residual is after it is left out: the motion that" in note for note in found.notes)
+    assert any(
+        "the place of the residual after the correction is left out: the motion that" in note for note in found.notes
+    )
     assert "creep" in page(found, Provenance({}, 0))

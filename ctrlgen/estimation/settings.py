@@ -220,7 +220,7 @@ class SimulationSettings:
     costs time, too. Judgement."""
     kept_cores: int = 8
     """Functions of a device's own numbers kept with their Jacobian: of those to fit and of those suspected, with a record's readings.
-    A hexapod's take 10 MB."""
+    Judgement."""
 
 
 @dataclass(frozen=True)

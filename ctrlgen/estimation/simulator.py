@@ -143,6 +143,7 @@ class Simulator:
         return self._equations_of(ca.vertcat(self._observed, self._rates))
 
     def _equations_of(self, y: ca.SX) -> SampleEquations:
+        # by name, so that structures with other laws, or with one number suspected, have the same function of the device's numbers
         own = [i for _, i in sorted((path, i) for i, path in enumerate(self.free) if not path.startswith("effect["))]
         return build_sample_equations(self.model, y, self.sample_time, self.linear, self.poses, self.finer, own)
 

@@ -44,7 +44,6 @@ IN_WORK_VECTOR = re.compile(r"  (w\[\d+\]=|if \(res\[\d+\]!=0\) )")
 PLACE = re.compile(r"w\[(\d+)\]")
 LONGEST = 6_000_000  # characters of generated C: beyond, the compiler takes longer than the diagnosis
 
-KEPT = KeptLibraries()
 INTERFACE = re.compile(r"^CASADI_SYMBOL_EXPORT int \w+\(.*\{\n  return (?P<main>casadi_f\d+)\(", re.M)
 KEEPS_NO_MEMORY = re.compile(r"_checkout\(void\) \{\n  return 0;\n\}")
 CONFIGURATION = re.compile(
@@ -79,6 +78,9 @@ CASADI_SYMBOL_EXPORT int run(casadi_int n, const casadi_real** given, const casa
   return 0;
 }}
 """
+
+# what this process has added and used
+KEPT = KeptLibraries()
 
 
 class Compilable:

@@ -49,24 +49,23 @@ def run_supporting_analyses(search: SearchResult, explained: bool, seed: int = 0
             failed.append(f"{name} is left out: {reason_of(error)}")
             return None
 
-    def motions(fit: Fit) -> list[LtvModel]:
-        return [linearise_along(fitter, fit, record) for record in records]
+    def located(fit: Fit) -> tuple[list[LtvModel], ResidualLocationEntry]:
+        models = [linearise_along(fitter, fit, record) for record in records]
+        return models, localise_residual(models, recording.channels, recording.units, seed)
 
-    def located(models: list[LtvModel] | None) -> ResidualLocationEntry:
-        where = None if models is None else localise_residual(models, recording.channels, recording.units, seed)
-        return where or ResidualLocationEntry.unknown()
-
-    where = "where the residual is"
-    before = tried(f"{where} before the correction", lambda: motions(nominal))
-    after = before if chosen is nominal else tried(f"{where} after it", lambda: motions(chosen))
+    nowhere: tuple[list[LtvModel], ResidualLocationEntry] = ([], ResidualLocationEntry.unknown())
+    before = tried("the place of the residual before the correction", lambda: located(nominal)) or nowhere
+    after = before
+    if chosen is not nominal:
+        after = tried("the place of the residual after the correction", lambda: located(chosen)) or nowhere
     force = None
-    if after is not None and not explained:
-        force = tried("the unknown input", lambda: describe_unmodelled_force(fitter, after))
+    if after[0] and not explained:
+        force = tried("the unknown input", lambda: describe_unmodelled_force(fitter, after[0]))
     experiment = tried("the next experiment", lambda: next_experiment(search, explained, seed))
     if experiment is not None:
         experiment = replace(experiment, files=files(fitter, chosen, experiment, NEXT_DEVICE))
     return SupportingAnalyses(
-        residual_location=ResidualLocations(before=located(before), after=located(after)),
+        residual_location=ResidualLocations(before=before[1], after=after[1]),
         unmodelled_force=force,
         detectability=detectability(chosen, search.final_screen, chosen.n),
         next_experiment=experiment,
