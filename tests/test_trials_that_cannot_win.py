@@ -164,7 +164,10 @@ def test_a_set_is_fitted_as_long_as_it_may_reach_what_a_smaller_one_did(monkeypa
     assert asked == [pytest.approx(single.fit.objective)]
 
 
-@pytest.mark.parametrize("late, shift", [(3e-4, H), (7e-3, 7e-3)], ids=["within a sample", "seven samples"])
+# the slope tells the first, the best of many shifts the last
+@pytest.mark.parametrize(
+    "late, shift", [(3e-4, H), (7e-3, 7e-3), (0.02, 0.02)], ids=["a third of a sample", "seven", "twenty"]
+)
 def test_a_fit_takes_away_no_more_than_several_times_what_a_shift_promises(late, shift):
     t = H * np.arange(LONG)
     trials, current = trials_beside(axis_fitter(n=LONG, change=lambda y, u: np.interp(t - late, t, y)), [CLOCK])
