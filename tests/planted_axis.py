@@ -30,6 +30,18 @@ def drive_offset(u, t):
     return move(u + 0.05)
 
 
+def slew_rate(u, t):
+    """12 V/s, as steps to the middle of each tenth of a sample."""
+    half = 12 * H / 20
+
+    def behind(now, q, v, out):
+        wanted = u[int(now / H + 1e-6)]
+        middle = out + np.clip(wanted - out, -half, half)
+        return KF * (middle - wanted), middle + np.clip(wanted - middle, -half, half)
+
+    return move(u, behind)
+
+
 def coil_heating(u, t):
     """Copper of 4 Ohm that 8 W would heat by 80 K in the end, in steps of a sample; cold at first."""
     resistance, warmth, out = 4.0, 0.0, []
@@ -186,6 +198,7 @@ ON_AXIS = {
     asymmetric_gain: Planted("actuator:axis", {"gain": 0.03}),
     reversed: Planted("actuator:axis", {}),
     drive_offset: Planted("actuator:axis", {"offset": 0.05}),
+    slew_rate: Planted("actuator:axis", {"rate": 12.0}),
     coil_heating: Planted("actuator:axis", {"rise": 3.9e-3 * 10 / 4, "tau": 0.5}, within={"rise": 0.05, "tau": 0.05}),
     cubic_sensor: Planted("sensor:axis", {"curvature": 2e6}),
     warm_up: Planted("sensor:axis", {"size": 3e-7, "tau": 0.7}, within={"size": 0.05, "tau": 0.05}),

@@ -48,16 +48,18 @@ class Simulated:
 def simulate_device(device: Path, drives: Path | None, step: str | None, duration: float, rate: float) -> Simulated:
     """The device at `device` from rest, under the drives of a file, or under a `step`, "1 V" or "1X=0.1 W, 2X=0.2 W", for a `duration`
     [s] at a `rate` [Hz]. Raises InputError, and SolverError where the motion has no end."""
-    model = build_model(load_device(device))
+    described = load_device(device)
+    model = build_model(described)
     if (drives is None) == (step is None):
         raise InputError("simulate", [Fault("drives", "name a file of drives, or give --step, one of the two")])
     given = stepped(step or "", duration, rate, model) if drives is None else read_drives(drives, model)
+    model = build_model(described, sample_time=given.sample_time)  # with the laws that look back by samples
     found = simulate(model, given.u, given.sample_time)
     if (pose := with_internal_modes(model, found)) is not None:
         label = "pose with the bodies' modes"
         signal = replace(model.signals["pose"], name=WITH_MODES, label=label, column=f"{WITH_MODES}.")
-        described = {**found.described, WITH_MODES: signal}
-        found = replace(found, signals={**found.signals, WITH_MODES: pose}, described=described)
+        signals = {**found.described, WITH_MODES: signal}
+        found = replace(found, signals={**found.signals, WITH_MODES: pose}, described=signals)
     return Simulated(model, found, given.measured)
 
 

@@ -76,6 +76,8 @@ class Effect:
     shifts_drive: ClassVar[bool] = False
     # Asks what reaches the readings from its place, and may find that nothing does: its amplitude may be free all the same.
     asks: ClassVar[bool] = False
+    # The parameter that bounds how fast a drive may change, if there is one: along a path it is a limit.
+    limits_rate: ClassVar[str] = ""
     # Its amplitude [s] moves a signal in time, so far that no slope at zero tells what it would explain.
     moves_in_time: ClassVar[bool] = False
     # The force at standstill takes any value that holds the stage there (dry friction). The integrator must then be

@@ -14,7 +14,9 @@ class Saturation(Effect):
 
     place = Place.DRIVE
     family = Family.DRIVE
-    order = -1  # before the gains, which act on what is delivered
+    order = (
+        -2
+    )  # before the gains, which act on what is delivered, and before a rate, at which what is clipped is reached
     requires = frozenset({"actuator"})
     source = "R. Isermann, Fault-Diagnosis Systems (2006): actuator faults; smooth form ours"
     params = (

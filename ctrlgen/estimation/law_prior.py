@@ -22,7 +22,7 @@ class ParameterPrior:
     start_values: values from which a fit may start; of an amplitude, values at which the law is also linearised (by the secant
         from `off`), for laws whose effect is not proportional to a small amplitude.
     scales_with_peak: the start values are multiples of the largest value in the recording of the signal of that unit: the
-        channel's, the travel's, the travel's rate, or, for a time, one twelfth of the recording's duration.
+        channel's, the travel's, their rates, or, for a time, one twelfth of the recording's duration.
     start_from_data: starts that the recording suggests are tried too: "spatial_periods" (periods along the path that stand
         out of the residual), "jump_positions" (places along the path at which it jumps), "moments" (times spread over the
         recording); where most of the residual is, by a test whose level holds: "edges_above", "edges_below", "edges_outward",

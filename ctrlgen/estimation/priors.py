@@ -188,6 +188,13 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
         "second_pole": LawPrior(
             "Time constants from a chip's to a room's.", parameters={"tau": _starts((2e-3, 0.01, 0.05, 0.3, 2.0, 20.0))}
         ),
+        "slew_rate": LawPrior(
+            "An amplifier slews or it does not; a step of the drive within a sample is hundreds of times as fast: judgement.",
+            parameters={
+                "share": ParameterPrior(fixed_range=(0.5, 1.5)),
+                "rate": peaks(3e-3, 0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 0.97),
+            },
+        ),
         "swapped": LawPrior(
             "A wiring fault is rarer than a wrong gain: judgement. Two leads are exchanged or they are not.",
             log_prior_odds=ONE_IN_TEN,

@@ -19,6 +19,7 @@ from ctrlgen.devices import Signal
 from ctrlgen.effects import Effect, Expression, LawInputs, LawNumbers, Param, Place, means
 from ctrlgen.learning.lifted import Lifted
 from ctrlgen.model.assembly import build_model
+from ctrlgen.model.effect_terms import LOOKS_BACK
 from ctrlgen.numerics.batched_evaluation import evaluate
 from ctrlgen.numerics.newton import NoRoot, newton_rows
 
@@ -61,7 +62,7 @@ class ImpliedPose:
         device, signal = lifted.solution.scenario.device, lifted.signal
         self.channels = signal.channels
         self.late = _late(device.effect, signal)
-        effects = tuple(e for e in device.effect if not (e.place is Place.SENSOR and "sample_time" in e.requires))
+        effects = tuple(e for e in device.effect if not (e.place is Place.SENSOR and LOOKS_BACK in e.requires))
         self.numbers = tuple(_numbers(effects, signal))
         of_pose = signal.channels == m.signals["pose"].channels
         self.acts = of_pose and any(e.place is Place.SENSOR for e in effects)

@@ -37,8 +37,8 @@ def build_model(
     """The symbolic model of `device`; the parameters named in `free` stay symbols, the others are numbers.
 
     `free` are dotted paths as in `device.quantities()` or, of how far single copies are off, as in `device.copies(path)`; `ambient` is
-    a symbol for the rise of the surroundings [K], where that is not zero; `sample_time` [s] is needed by effects that look back by
-    samples. With `per_record` the
+    a symbol for the rise of the surroundings [K], where that is not zero; without a `sample_time` [s] effects that look back by
+    samples do nothing, as at rest. With `per_record` the
     constants of a record (where a play begins, a zero that is set anew) are states; without, they are zero. The effects `apart`, by
     their places in the file, add no term; see `Effect.apart`. Raises InputError for a
     path that is no parameter or acts on nothing, an effect that does not fit the device, and a restoring force that
@@ -176,7 +176,7 @@ def _assemble(
             Law(name, f"{label} [{physics.force_unit}] of an axis", closed(expr), physics.documented.get(of, ()))
             for name, label, of, expr in named_forces(physics, z, v)
         ),
-        rate_limits=physics.rate_limits,
+        rate_limits=terms.rate_limits(),
         drive_weights=_drive_weights(physics),
         law_inputs=terms.law_inputs,
         x_names=tuple(c.name for c in x),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import SimpleNamespace
 from typing import TypeGuard
@@ -12,13 +12,15 @@ from typing import TypeGuard
 import casadi as ca
 
 from ctrlgen.core.errors import Fault
-from ctrlgen.core.units import same_dimension
+from ctrlgen.core.units import same_dimension, written_unit
 from ctrlgen.devices import BalancedPhysics, Device, DevicePhysics, ImposedPhysics, InertialPhysics
+from ctrlgen.devices.limit import Limit, rate_limit
 from ctrlgen.effects import REQUIREMENTS, Channel, Effect, LawInputs, Place, State, faults_at, is_group, means
 
 # Typical displacements beyond which a law reads the stage's force at that end: a search may try values farther out, where
 # no stage goes and a restoring force may have no value (a root of a negative number).
 REACH = 10.0
+LOOKS_BACK = "sample_time"  # what a law requires that looks back by samples
 
 
 @dataclass
@@ -50,7 +52,7 @@ class EffectTerms:
     `displacement` (n_axes,), `velocity` (n_axes, or none where it is not known) and `acceleration` are the model's
     symbols, `ambient` the rise of the surroundings [K]. `faults` lists the effects that do not fit the device. What the
     laws keep through a record is a state with `per_record`, zero without. The effects `apart`, by their places in the file, add no
-    term.
+    term; nor, without a `sample_time`, do those that look back by samples: at rest they do nothing.
     """
 
     def __init__(
@@ -75,6 +77,7 @@ class EffectTerms:
         self.signals_before: dict[Place, list[tuple[float, ca.SX]]] = {}  # (order, the signal before its terms)
         self.members: list[Member] = []
         self.faults: list[Fault] = []
+        self.effects = device.effect
         for k, effect in enumerate(device.effect):
             self._place(k, effect, p.effect[k])
 
@@ -82,7 +85,7 @@ class EffectTerms:
         """Adds one member for each channel on which the effect acts; collects its faults."""
         places = channels(self.physics, effect.place)
         names = [channel.name for channel in places]
-        for need in sorted(effect.requires - available(self.physics, sample_time=self.sample_time)):
+        for need in sorted(effect.requires - available(self.physics) - {LOOKS_BACK}):
             what = f"{effect.kind} does not fit this device: it needs {REQUIREMENTS[need]}"
             self.faults.append(Fault(f"effect[{k}].kind", what))
         chosen = [i for i, c in enumerate(places) if means(effect.at, c.name, c.unit)]
@@ -104,7 +107,7 @@ class EffectTerms:
                     self.faults.append(Fault(f"effect[{k}].at", f"{effect.kind} cannot act on {names[i]}: wrong unit"))
                 continue
             self.faults += [Fault(f"effect[{k}].{name}", text) for name, text in faults_at(effect, channel)]
-            if k in self.apart:
+            if k in self.apart or (LOOKS_BACK in effect.requires and self.sample_time is None):
                 continue
             amplitude = effect.amplitude().name
             try:
@@ -209,6 +212,20 @@ class EffectTerms:
         assert isinstance(self.physics, BalancedPhysics) and self.physics.tangent_compliance  # `available` says so
         return self.physics.tangent_compliance(self.within_reach)
 
+    def rate_limits(self) -> tuple[Limit, ...]:
+        """The limits on the drives' changes by time that the device states, and those of its effects (`Effect.limits_rate`), whatever the
+        sample time: one a drive, the tighter of both."""
+        drive, limits = self.physics.drive, {limit.name: limit for limit in self.physics.rate_limits}
+        for effect in (e for e in self.effects if e.limits_rate):
+            most = effect.values[effect.limits_rate]
+            for i, (name, unit) in enumerate(zip(drive.channels, drive.units, strict=True)):
+                if means(effect.at, name, unit):
+                    limit = rate_limit(drive, i, -most.si, most.si, written_unit(most.text))
+                    there = limits.get(limit.name, limit)
+                    (low, high), (lowest, highest) = there.bounds, limit.bounds
+                    limits[limit.name] = replace(there, lower=max(low, lowest), upper=min(high, highest))
+        return tuple(limits.values())
+
     def memories(self) -> list[tuple[Member, State, ca.SX]]:
         """(member, state, its symbol) of every state of the effects, in the order in which they stand in the model's x."""
         return [
@@ -263,7 +280,7 @@ def available(physics: DevicePhysics, sample_time: float | None = None) -> froze
         "velocity": not balanced,
         "acceleration": isinstance(physics, ImposedPhysics),
         "ambient": True,
-        "sample_time": sample_time is not None,
+        LOOKS_BACK: sample_time is not None,
         "displacement_command": balanced and same_dimension(physics.force_unit, physics.travel_unit),
         "force": any(same_dimension(physics.force_unit, unit) for unit in ("N", "N*m")),
         "spatial": len(physics.components) == 6,

@@ -19,6 +19,7 @@ from ctrlgen.core.shown import Shown
 from ctrlgen.devices import Device, files_of, load_device
 from ctrlgen.effects import Place
 from ctrlgen.model.assembly import build_model
+from ctrlgen.model.effect_terms import LOOKS_BACK
 from ctrlgen.model.model import Model
 from ctrlgen.physics.pivot import can_turn
 from ctrlgen.trajectory.inverse.clock import Clock, Sampled
@@ -165,7 +166,7 @@ def model_of(scenario: Scenario) -> Model:
     """The model that is led along the path: without laws of readings that look back by samples (delay, clock offset), which change no
     drive; a warning names them. Raises InputError where a feedback loop reads what they do, so that they do change its drive."""
     device = scenario.device
-    late = [effect for effect in device.effect if "sample_time" in effect.requires and effect.place is Place.SENSOR]
+    late = [effect for effect in device.effect if LOOKS_BACK in effect.requires and effect.place is Place.SENSOR]
     model = build_model(device.model_copy(update={"effect": tuple(e for e in device.effect if e not in late)}))
     if not late:
         return model

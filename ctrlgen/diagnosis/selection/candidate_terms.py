@@ -23,7 +23,7 @@ from ctrlgen.model.effect_terms import channels
 
 # by unit, SI
 Peaks = dict[tuple[Place, int], dict[str, float]]
-REACHED = ("channel", "travel", "travel/s")
+REACHED = ("channel", "travel", "travel/s", "channel/s")
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,8 @@ class CandidateTerm:
 
 
 def signals_along(fitter: Fitter, fit: Fit) -> list[dict[tuple[Place, int], np.ndarray]]:
-    """Of every record to fit the signals (3, n) at every place [SI]: the channel's, the displacement, and its rate."""
+    """Of every record to fit the signals (4, n) at every place [SI]: the channel's, the displacement, its rate, and the channel's change
+    from the sample before over the sample time."""
     physics = nominal_physics(fit.structure.device)
     reached = (Place.DRIVE, Place.FORCE, Place.DISPLACEMENT)
     places = [(place, i) for place in reached for i in range(len(channels(physics, place)))]
@@ -59,8 +60,9 @@ def signals_along(fitter: Fitter, fit: Fit) -> list[dict[tuple[Place, int], np.n
         values = f.map(n)(
             S.T, record.drive.T, simulator.ambient_of(record)[None, :], np.tile(fit.theta[:, None], (1, n))
         )
-        signals = np.nan_to_num(values.full()).reshape(len(places), len(REACHED), n)
-        along.append(dict(zip(places, signals, strict=True)))
+        signals = np.nan_to_num(values.full()).reshape(len(places), 3, n)
+        changes = np.diff(signals[:, :1], axis=2, prepend=signals[:, :1, :1]) / record.sample_time
+        along.append(dict(zip(places, np.concatenate([signals, changes], axis=1), strict=True)))
     return along
 
 

@@ -118,6 +118,10 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
             ("position", "An axis that stops short of its stated travel"),
             ("", "A drive that saturates below its stated limit"),
         ),
+        "slew_rate": (
+            ("position", "An axis that follows its command no faster than at one speed"),
+            ("", "An amplifier whose output changes at most so fast: slew rate"),
+        ),
         "stiffening": (
             ("flexible", "A clamped flexure stretches as it bends"),
             ("", "A stiffness that grows with the square of the displacement"),

@@ -28,7 +28,7 @@ def motion_of(
     if all(r.ambient is not None for r in records):
         along["temperature", None, 0] = np.concatenate([r.ambient for r in records if r.ambient is not None])
     for place, i in signals[0]:
-        value, displacement, velocity = np.hstack([record[place, i] for record in signals])
+        value, displacement, velocity, _ = np.hstack([record[place, i] for record in signals])
         if place is Place.DRIVE:
             along["drive", place, i] = np.abs(value)
         if place is Place.FORCE:

@@ -1,0 +1,56 @@
+"""An amplifier whose output changes at most so fast."""
+
+import casadi as ca
+
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, State, itself
+
+
+class SlewRate(Effect):
+    """dv/dt = R sign(u - v) until v = u; Delta u = g (v - u): g = 1 is limited throughout.
+
+    Over a sample h, with c the part of u - v before it that is within +-R h and k = |c|/(R h): v grows by c in the time k h, and then
+    stays. What acts is the line over the sample that has the mean v + c (1 - k/2) of this and its first moment: it rises by
+    c k (3 - 2 k), and is v itself where k = 1. Holds for a rate that is the same both ways and a drive held from sample to sample.
+    """
+
+    place = Place.DRIVE
+    family = Family.TIMING
+    order = -1  # of what is not clipped, and before the gains, which act on what is delivered
+    requires = frozenset({"actuator", "sample_time"})
+    source = "J. E. Solomon, IEEE J. Solid-State Circuits 9 (1974) 314: slew rate of a monolithic operational amplifier"
+    params = (
+        Param("share", "1", (0.0, 1.5), "1: nothing of the drive changes faster", off=0.0),
+        Param("rate", "channel/s", (1e-3, 1e6), "R: fastest change of what is delivered"),
+    )
+    at_bounds = itself("rate")
+    limits_rate = "rate"
+    states = (
+        State("v", "channel", 1.0, stepped=True, free=True),
+        State("mean", "channel", 1.0, stepped=True),
+        State("rise", "channel", 1.0, stepped=True),
+        State("w", "channel", 1.0),  # runs along the line, up or down: it stays within a rise of zero
+        State("begin", "channel", 1.0, stepped=True),  # w as the sample began
+    )
+
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        way = _way(s) * (s.states.w - s.states.begin)
+        return p.share * (s.states.mean - s.states.rise / 2 + way - s.value)
+
+    def rates(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
+        return {"w": _way(s) * s.states.rise / s.sample_time}
+
+    def update(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
+        most = p.rate * s.sample_time
+        c = ca.fmax(ca.fmin(s.value - s.states.v, most), -most)
+        k = ca.fabs(c) / most
+        return {
+            "v": s.states.v + c,
+            "mean": s.states.v + c * (1 - k / 2),
+            "rise": c * k * (3 - 2 * k),
+            "begin": s.states.begin + _way(s) * s.states.rise,
+        }
+
+
+def _way(s: LawInputs) -> Expression:
+    """The side to which w runs: back to zero."""
+    return ca.if_else(s.states.begin * s.states.rise > 0, -1.0, 1.0)
