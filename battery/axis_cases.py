@@ -143,7 +143,7 @@ def _drives(rng: Rng, axis: Axis, stated: Axis, counts: tuple[int, int], dt: flo
     scaled = []
     reach = rng.uniform(0.4, 0.75) * stated.stroke
     for shape in shapes:
-        peak = np.abs(simulate(axis, shape, scene=Scene(axis, sample_time=dt))).max()
+        peak = np.abs(simulate(axis, shape, scene=Scene(axis, sample_time=dt).rough)).max()
         scaled.append(shape * min(0.9 * axis.drive_limit, reach / peak))
     return scaled[0], scaled[1]
 
@@ -179,7 +179,7 @@ def draw_bench(rng: Rng, seconds: float = 6.0, loop: bool = False, ambient: bool
 
 def scene_of(axis: Axis, fit: Array, noise: float, span: float, dt: float) -> Scene:
     """The sizes of the motion under the drive `fit`."""
-    q = simulate(axis, fit, scene=Scene(axis, sample_time=dt))
+    q = simulate(axis, fit, scene=Scene(axis, sample_time=dt).rough)
     v = np.gradient(q, dt)
     drive_peak = float(np.abs(fit).max()) if axis.loop is None else 5.0
     return Scene(axis, float(q.std()), float(v.std()), float(np.abs(q).max()), drive_peak, span, noise, dt)

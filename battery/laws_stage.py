@@ -81,7 +81,7 @@ def make_backlash(scene: Scene, a: float) -> Hooks:
 def lugre(scene: Scene, level: Callable[[float], float], stiffness: float) -> Callable[[float, float, float], float]:
     """LuGre: dz/dt = v - s_0 |v| z/g(v), F = -(s_0 z + s_1 dz/dt). C. Canudas de Wit et al., IEEE TAC 40 (1995) 419.
 
-    The bristle's equation is solved exactly for v held over a step.
+    The bristle's equation is solved exactly for v held over a step; the force is that of the step's middle.
     """
     h, m = scene.step, scene.axis.mass
     s_1 = 0.3 * math.sqrt(stiffness * m)
@@ -91,9 +91,11 @@ def lugre(scene: Scene, level: Callable[[float], float], stiffness: float) -> Ca
         g = level(v)
         end = math.copysign(g / stiffness, v)
         before = z[0]
-        z[0] = end + (before - end) * math.exp(-stiffness * abs(v) / g * h) if v else before
+        kept = math.exp(-stiffness * abs(v) / g * h / 2)
+        middle = end + (before - end) * kept
+        z[0] = end + (middle - end) * kept
         # s_1 fades with speed, so that the bristles add no viscous drag while sliding
-        return -(stiffness * z[0] + s_1 * math.exp(-((v / (0.02 * scene.speed)) ** 2)) * (z[0] - before) / h)
+        return -(stiffness * middle + s_1 * math.exp(-((v / (0.02 * scene.speed)) ** 2)) * (z[0] - before) / h)
 
     return force
 

@@ -72,8 +72,9 @@ def make_clock_jitter(scene: Scene, a: float, seed: int) -> Hooks:
     """The sample is taken a n_k [s] late or early, n_k slow random numbers: an error that grows with speed."""
 
     def sensed(t: Array, y: Array, T: Array) -> Array:
-        n = np.random.default_rng([seed, round(t[0] * 1e3)]).standard_normal(len(t) // 200 + 3)
-        late = np.interp(t - t[0], np.arange(len(n)) * 200 * scene.step, n)
+        apart = 25 * scene.substeps
+        n = np.random.default_rng([seed, round(t[0] * 1e3)]).standard_normal(len(t) // apart + 3)
+        late = np.interp(t - t[0], np.arange(len(n)) * apart * scene.step, n)
         return np.interp(t - a * late, t, y)
 
     return Hooks(sensed=sensed)

@@ -163,7 +163,9 @@ def shares(bench: Bench, dominant: Sequence[Planted], small: Sequence[Planted], 
         t = takes[record]
         moved = {name: getattr(bench.axis, name) * (1 + share) for name, share in zip(names, x, strict=True)}
         axis = replace(bench.axis, **moved)
-        return simulate(axis, t.drive, planted, bench.scene, t.start, t.ambient, 0.0, bench.linear)[:, None] / noise
+        return (
+            simulate(axis, t.drive, planted, bench.scene.rough, t.start, t.ambient, 0.0, bench.linear)[:, None] / noise
+        )
 
     zero = np.zeros(len(names))
     observed = tuple(reading([*dominant, *small], zero, record) for record in (0, 1))

@@ -19,7 +19,7 @@ from scipy.optimize import least_squares
 from scipy.signal import savgol_filter
 
 from battery.judge import Judgement
-from battery.plant_axis import Array, Axis, Scene, move
+from battery.plant_axis import Array, Axis, Scene, move, read
 from battery.seal import unseal
 
 Series = tuple[Array, Array]
@@ -52,7 +52,7 @@ def nominal(axis: Axis, series: dict[str, Series], linear: bool) -> Array:
 
     def model(p: Array, u: Array) -> Array:
         a = replace(axis, mass=axis.mass * p[0], damping=axis.damping * p[1], stiffness=axis.stiffness * p[2])
-        return move(a, u, scene=Scene(a), linear=linear).position[::8] * 1e6 + p[3]
+        return read(move(a, u, scene=Scene(a).rough, linear=linear)) * 1e6 + p[3]
 
     u, y = series["fit"]
     scale = 3 * np.std(np.diff(y, 3)) / np.sqrt(20) + 1e-6

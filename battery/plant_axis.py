@@ -1,20 +1,21 @@
 """An independent single-axis flexure stage: m q'' + c q' + k q = k_f u + whatever the laws add.
 
-Integration: the linear part is discretised exactly (matrix exponential) at an eighth of the sample time; the laws' forces
-are taken at the predicted middle of that step (exponential midpoint rule, second order). Laws live in `battery.laws_*`.
+Integration: the linear part is discretised exactly (matrix exponential) at a part of the sample time; the laws' forces are taken at
+the predicted middle of that step (exponential midpoint rule, second order). Laws live in `battery.laws_*`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from scipy.linalg import expm
 
 Array = np.ndarray
-SUBSTEPS = 8
+SUBSTEPS = 32  # a sample: stops and friction are then right to a third of the noise
+ROUGH = 8  # where only the size of a law matters
 
 
 @dataclass(frozen=True)
@@ -57,11 +58,17 @@ class Scene:
     span: float = 20.0
     noise: float = 5e-9
     sample_time: float = 1e-3
+    substeps: int = SUBSTEPS
 
     @property
     def step(self) -> float:
         """Integration step [s]."""
-        return self.sample_time / SUBSTEPS
+        return self.sample_time / self.substeps
+
+    @property
+    def rough(self) -> Scene:
+        """The same in fewer steps."""
+        return replace(self, substeps=ROUGH)
 
 
 @dataclass(frozen=True)
@@ -103,30 +110,32 @@ def exact_step(axis: Axis, h: float) -> tuple[float, ...]:
     return tuple(map(float, steps))  # plain numbers are quick one at a time
 
 
-def fine_drive(drive: Array, linear: bool) -> Array:
-    """The command in the middle of every integration step, (n * SUBSTEPS,): held, or linear from sample to sample."""
+def fine_drive(drive: Array, linear: bool, substeps: int) -> Array:
+    """The command in the middle of every integration step, (n * substeps,): held, or linear from sample to sample."""
     if not linear:
-        return np.repeat(drive, SUBSTEPS)
-    middle = (np.arange(SUBSTEPS) + 0.5) / SUBSTEPS
+        return np.repeat(drive, substeps)
+    middle = (np.arange(substeps) + 0.5) / substeps
     following = np.append(drive[1:], drive[-1])
     return (drive[:, None] + (following - drive)[:, None] * middle).ravel()
 
 
-def fine_rise(drive: Array, linear: bool) -> Array:
-    """How much the command rises within every integration step, (n * SUBSTEPS,)."""
+def fine_rise(drive: Array, linear: bool, substeps: int) -> Array:
+    """How much the command rises within every integration step, (n * substeps,)."""
     if not linear:
-        return np.zeros(len(drive) * SUBSTEPS)
-    return np.repeat(np.diff(drive, append=drive[-1:]) / SUBSTEPS, SUBSTEPS)
+        return np.zeros(len(drive) * substeps)
+    return np.repeat(np.diff(drive, append=drive[-1:]) / substeps, substeps)
 
 
 @dataclass(frozen=True)
 class Motion:
-    """The motion on the fine grid: `time` [s, common clock], `position` [m], `speed` [m/s], `drive` [V] after the drive laws."""
+    """The motion on the fine grid, `substeps` a sample: `time` [s, common clock], `position` [m], `speed` [m/s], `drive` [V] after the
+    drive laws."""
 
     time: Array
     position: Array
     speed: Array
     drive: Array
+    substeps: int
 
 
 def move(
@@ -138,9 +147,10 @@ def move(
     linear: bool = False,
 ) -> Motion:
     """Motion from rest under `drive` [V], or under a reference [m] where the axis has a loop."""
+    scene = scene or Scene(axis)
     if axis.mass == 0:
-        return _follow(axis, np.asarray(drive, dtype=float), hooks, start, scene or Scene(axis), linear)
-    h = (scene or Scene(axis)).step
+        return _follow(axis, np.asarray(drive, dtype=float), hooks, start, scene, linear)
+    h, substeps = scene.step, scene.substeps
     a11, a12, a21, a22, b1, b2, r1, r2 = exact_step(axis, h)
     m, c, k, k_f, limit, loop = (
         axis.mass,
@@ -156,11 +166,11 @@ def move(
     t, half, F, felt = start, h / 2, 0.0, 0.0
     qs, vs, us = [], [], []
     given = np.asarray(drive, dtype=float)
-    rises = fine_rise(given, linear).tolist() if loop is None else [0.0] * (len(given) * SUBSTEPS)
-    for count, (u, rise) in enumerate(zip(fine_drive(given, linear).tolist(), rises, strict=True)):
+    rises = fine_rise(given, linear, substeps).tolist() if loop is None else [0.0] * (len(given) * substeps)
+    for count, (u, rise) in enumerate(zip(fine_drive(given, linear, substeps).tolist(), rises, strict=True)):
         if loop is not None:
-            if count % SUBSTEPS == 0:  # a digital controller: computed at the sample, held until the next
-                reference = float(given[count // SUBSTEPS])
+            if count % substeps == 0:  # a digital controller: computed at the sample, held until the next
+                reference = float(given[count // substeps])
                 asked = loop.velocity_gain * (loop.position_gain * (reference - q) - v) + loop.integral_gain * summed
             summed += (u - q) * h
             u = asked
@@ -183,26 +193,26 @@ def move(
         dF = k_f * rise
         q, v = a11 * q + a12 * v + b1 * F + r1 * dF, a21 * q + a22 * v + b2 * F + r2 * dF
         t += h
-    return Motion(start + h * np.arange(len(qs)), np.array(qs), np.array(vs), np.array(us))
+    return Motion(start + h * np.arange(len(qs)), np.array(qs), np.array(vs), np.array(us), substeps)
 
 
 def _follow(axis: Axis, drive: Array, hooks: Sequence[Hooks], start: float, scene: Scene, linear: bool) -> Motion:
     """The motion of an axis without mass: at the beginning of every step, where the samples are."""
-    h, n = scene.step, len(drive)
-    t = start + h * np.arange(n * SUBSTEPS)
-    u = np.interp(np.arange(n * SUBSTEPS) / SUBSTEPS, np.arange(n), drive) if linear else np.repeat(drive, SUBSTEPS)
+    h, n, substeps = scene.step, len(drive), scene.substeps
+    t = start + h * np.arange(n * substeps)
+    u = np.interp(np.arange(n * substeps) / substeps, np.arange(n), drive) if linear else np.repeat(drive, substeps)
     for hook in hooks:
         if hook.drive:
             u = np.array([hook.drive(time, value) for time, value in zip(t.tolist(), u.tolist(), strict=True)])
     q = axis.force_constant * u / axis.stiffness
-    return Motion(t, q, np.gradient(q, h), u)
+    return Motion(t, q, np.gradient(q, h), u, substeps)
 
 
 def read(motion: Motion, hooks: Sequence[Hooks] = (), ambient: Array | None = None) -> Array:
     """The sensor's signal at the samples, noise-free, (n,) [m]; `ambient` (n,) [K]."""
-    n = len(motion.time) // SUBSTEPS
+    n = len(motion.time) // motion.substeps
     T = np.full(n, 295.15) if ambient is None else ambient
-    T_fine = np.repeat(T, SUBSTEPS)
+    T_fine = np.repeat(T, motion.substeps)
     y = motion.position
     for x in hooks:
         if x.carried:
@@ -210,7 +220,7 @@ def read(motion: Motion, hooks: Sequence[Hooks] = (), ambient: Array | None = No
     for x in hooks:
         if x.sensed:
             y = x.sensed(motion.time, y, T_fine)
-    return y[::SUBSTEPS]
+    return y[:: motion.substeps]
 
 
 def digitise(time: Array, y: Array, hooks: Sequence[Hooks]) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 
 from battery import axis_cases, laws, laws_region, messy, rough_cases
 from battery.axis_cases import Array, Bench, Rng, Take
-from battery.plant_axis import SUBSTEPS, Planted, move
+from battery.plant_axis import Planted, move
 from battery.region import Region
 
 SECONDS = 3.0  # of the record to fit
@@ -74,7 +74,7 @@ def samples_of(bench: Bench, take: Take, planted: list[Planted]) -> dict[str, Ar
     """Where the plant is at each sample, (n,) SI."""
     hooks = laws.build(planted, bench.scene)
     m = move(bench.axis, take.drive, hooks, take.start, bench.scene, bench.linear)
-    out = {"position": m.position[::SUBSTEPS], "velocity": m.speed[::SUBSTEPS], "drive": take.drive}
+    out = {"position": m.position[:: m.substeps], "velocity": m.speed[:: m.substeps], "drive": take.drive}
     out["time"] = take.start + bench.scene.sample_time * np.arange(len(take.drive))
     return out if take.ambient is None else out | {"temperature": take.ambient}
 

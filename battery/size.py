@@ -82,8 +82,8 @@ class Ruler(Gauge):
     def __init__(
         self, axis: Axis, scene: Scene, drive: Array, start: float, ambient: Array | None, noise: Array, linear: bool
     ) -> None:
-        self.axis, self.scene = axis, scene
-        self._run = lambda axis, planted=(): simulate(axis, drive, planted, scene, start, ambient, noise, linear)
+        self.axis, self.scene = axis, scene.rough
+        self._run = lambda axis, planted=(): simulate(axis, drive, planted, self.scene, start, ambient, noise, linear)
         self.plain = self._run(axis)
         self.columns = sensitivities(axis, self._run)
 

@@ -11,7 +11,7 @@ import pytest
 from conftest import ROOT
 
 from battery import cases, judge, laws, opponents, plant_hexapod, rows, score
-from battery.plant_axis import SUBSTEPS, Axis, Loop, Planted, Scene, move
+from battery.plant_axis import Axis, Loop, Planted, Scene, move
 from battery.seal import seal, unseal
 from battery.size import left_over
 from ctrlgen.devices.mems_hexapod import matrices
@@ -50,8 +50,22 @@ def test_energy_never_rises_without_a_drive_whatever_friction_does():
     for name in ("viscous", "quadratic_damping", "stribeck"):
         planted = laws.draw(name, np.random.default_rng(1), SCENE)
         m = move(AXIS, u, laws.build([planted], SCENE), scene=SCENE)
-        energy = (AXIS.mass * m.speed**2 + AXIS.stiffness * m.position**2)[200 * SUBSTEPS :] / 2
+        energy = (AXIS.mass * m.speed**2 + AXIS.stiffness * m.position**2)[200 * m.substeps :] / 2
         assert np.diff(energy).max() < 1e-4 * energy[0], name  # the bristles give back what they stored
+
+
+@pytest.mark.parametrize("name", ["coulomb", "stribeck", "end_stop"])
+def test_what_the_steps_of_the_plant_miss_is_small_beside_its_noise(name):
+    """Against four times the steps. Where they missed more than noise, a diagnosis would look for physics in them."""
+    u = 1.4 * np.sin(2 * np.pi * 2.3e-3 * np.arange(900)) + 0.3 * np.sin(2 * np.pi * 13.1e-3 * np.arange(900))
+    planted = laws.draw(name, np.random.default_rng(3), SCENE)
+    fine = replace(SCENE, substeps=4 * SCENE.substeps)
+    missed = laws.simulate(AXIS, u, [planted], SCENE) - laws.simulate(AXIS, u, [planted], fine)
+    assert 0 < missed.std() < SCENE.noise / 3
+    assert (
+        missed.std()
+        < 0.1 * (laws.simulate(AXIS, u, [planted], SCENE.rough) - laws.simulate(AXIS, u, [planted], fine)).std()
+    )
 
 
 @pytest.mark.parametrize("name", ["coulomb", "stribeck"])

@@ -9,7 +9,7 @@ import pytest
 
 from battery import cases, gap_cases, judge, laws, laws_region, memory, region_cases, rough_cases, score, spike_cases
 from battery.judge_further import agreement
-from battery.plant_axis import SUBSTEPS, Axis, Planted, Scene
+from battery.plant_axis import Axis, Planted, Scene
 from battery.region import Region, overlap, stated
 from battery.score_further import evidence_table
 from battery.seal import unseal
@@ -385,6 +385,6 @@ def test_a_plant_is_where_the_answer_says():
     take = region_cases.Take("fit", np.sin(np.arange(300) / 30), np.zeros(300), None, 2.0)
     bench = region_cases.Bench(AXIS, AXIS, scene, (take,), False, True)
     at = region_cases.samples_of(bench, take, [law])
-    assert at["time"][0] == 2.0 and len(at["position"]) == 300 and SUBSTEPS > 1
+    assert at["time"][0] == 2.0 and len(at["position"]) == 300 and scene.substeps > 1
     speed = np.gradient(at["position"], 1e-3)
     assert at["velocity"][20:-20] == pytest.approx(speed[20:-20], abs=0.05 * np.abs(speed).max())

@@ -11,7 +11,7 @@ import pytest
 from battery import __main__ as program
 from battery import axis_cases, cases, judge, laws, memory, messy, pose_cases, rough_cases, score, servo_cases, truth
 from battery.accepted import is_right
-from battery.plant_axis import SUBSTEPS, Axis, Scene, move
+from battery.plant_axis import Axis, Scene, move
 from battery.plant_hexapod import Hexapod
 from battery.seal import unseal
 from ctrlgen.devices.meso_hexapod import matrices
@@ -93,8 +93,8 @@ def test_an_axis_without_mass_reads_its_drive_at_the_sample():
     u = np.random.default_rng(1).standard_normal(50)
     for linear in (False, True):
         assert laws.simulate(axis, u, [], Scene(axis, sample_time=0.01), linear=linear) == pytest.approx(4e-7 * u)
-    between = move(axis, u, scene=Scene(axis, sample_time=0.01), linear=True).position[SUBSTEPS // 2]
-    assert between == pytest.approx(2e-7 * (u[0] + u[1]))
+    between = move(axis, u, scene=Scene(axis, sample_time=0.01), linear=True)
+    assert between.position[between.substeps // 2] == pytest.approx(2e-7 * (u[0] + u[1]))
 
 
 def test_the_kinematics_of_the_hexapod_commanded_in_displacement_are_the_printed_ones(meso_device):
