@@ -227,7 +227,8 @@ class Searcher:
             if any(explains_alike(trials.selection, v, current) for v in before):
                 # no better than when it was there before
                 return current
-            current = trials.with_noise_update(self._converged(current))
+            # what too long steps miss would be read as a further cause
+            current = self._finely_stepped(trials.with_noise_update(self._converged(current)))
             visited.append(current)
 
     def _in_finer_form(self, current: CandidateModel) -> CandidateModel:

@@ -23,6 +23,7 @@ from ctrlgen.diagnosis.selection.screen import Screen, Screened
 from ctrlgen.diagnosis.settings import SEARCH
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.integration_error import with_steps_that_suffice
 from ctrlgen.estimation.noise_update import update_noise_size
 from ctrlgen.estimation.settings import DISCREPANCY, FIT
 from ctrlgen.estimation.structure import Structure
@@ -276,10 +277,13 @@ class Trials:
         return candidate
 
     def leaves_noise_alone(self, candidate: CandidateModel) -> bool:
-        """Whether the structure of a candidate, fitted under the discrepancy that it leaves itself as in `with_errors`, leaves noise
-        alone. Nothing is kept of these fits."""
-        errors, structure = candidate.errors, candidate.fit.restarted
+        """Whether the structure of a candidate, fitted in steps that suffice under the discrepancy that it leaves itself as in
+        `with_errors`, leaves noise alone. Nothing is kept of these fits."""
+        errors = candidate.errors
+        if errors.is_noise:
+            return True
         try:
+            structure = with_steps_that_suffice(self.fitter, candidate.fit)
             for _ in range(DISCREPANCY.updates):
                 if errors.is_noise:
                     break
