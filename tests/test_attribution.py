@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,6 +17,7 @@ from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.settings import ATTRIBUTION
 from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.misfit import Misfit
 
 STIFFENING = Hypothesis("stiffening", "stage:axis", "axis")
 HUM = Hypothesis("vibration", "disturbance:axis", "axis")
@@ -24,10 +26,14 @@ HUM = Hypothesis("vibration", "disturbance:axis", "axis")
 def shared(
     monkeypatch, energy, causes: int, held: float = 1.0, blocks=None, described=None, known=True, names=(), laws=()
 ) -> Attribution:
-    """Shares of `causes` causes where those of a set S leave energy(S) on the records to fit; held out `held` times as much."""
+    """Shares of `causes` causes where those of a set S leave energy(S) on the records to fit, one number or one a channel; held out `held`
+    times as much."""
+    n_y = np.size(energy(frozenset()))
 
     def misfit_of(present, times=1.0):
-        return left(times * energy(frozenset(present)), blocks=blocks(set(present)) if callable(blocks) else blocks)
+        by_block = blocks(set(present)) if callable(blocks) else blocks
+        each = [left(times * e, blocks=by_block) for e in np.atleast_1d(energy(frozenset(present)))]
+        return Misfit(*(np.hstack([getattr(m, f.name) for m in each]) for f in fields(Misfit)))
 
     def of_records(records):
         return held if records == ["held"] else 1.0
@@ -40,8 +46,8 @@ def shared(
         with_errors_of=lambda fit: None,
         held_out_records=["held"],
         fit_records=["fit"],
-        noise=SimpleNamespace(known=np.array([known])),
-        recording=SimpleNamespace(channels=("reading.axis",)),
+        noise=SimpleNamespace(known=np.array([known] * n_y)),
+        recording=SimpleNamespace(channels=("reading.axis", "reading.other")[:n_y]),
     )
     places = names or tuple(f"stage:{k}" for k in range(causes))
     kinds = laws or ("coulomb",) * causes
@@ -115,6 +121,21 @@ def test_a_cause_that_takes_nothing_away_has_no_share_and_says_whom_it_serves(mo
     first, second, third = found.shares
     assert first is None and found.serves[0] == 1
     assert (second.value, third.value, found.rest.value) == pytest.approx((0.2, 0.05, 0.75))
+
+
+def test_what_a_cause_without_a_share_takes_away_in_one_channel_is_shared_among_those_that_have_one(monkeypatch):
+    """The last of so many that pairs of them were not tried: in the other channel it alone takes 30 of 100 away, and adds more in the
+    first. The channels' shares are told of the causes that have one, and of what is left: they are one."""
+    n = ATTRIBUTION.most_causes + 1
+
+    def energy(S):
+        last = n - 1 in S
+        return 1e5 - 1e4 * len(S - {n - 1}) + 4e4 * last, 5e4 + 1e3 * len(S - {n - 1}) - 3e4 * last
+
+    found = shared(monkeypatch, energy, n)
+    assert found.shares[-1] is None and None not in found.shares[:-1] and found.serves[-1] is None
+    for channel in found.channels.values():
+        assert channel[-2] == 0.0 and sum(channel) == pytest.approx(1.0)
 
 
 def test_of_two_causes_that_make_up_for_one_another_one_has_what_both_take(monkeypatch):

@@ -93,8 +93,8 @@ def attribute(
     parts, told = _counted(np.array([_shapley(left, g, n) for g in range(n)]), before, after, serves, seed)
     back = [float(np.sum(left[frozenset(range(n)) - {g}] - after) / np.sum(before - after)) for g in range(n)]
     _lead_constants(parts, told, serves, back, [causes[of.index(g)].prior.constant for g in range(n)])
-    shares = [ShareEntry(value=v, ci95=(a, b)) for v, a, b in _with_intervals(parts, before, after, seed)]
-    by_channel = _shares(*(v.sum(axis=-2) for v in (parts, before, after)))
+    shares = [ShareEntry(value=v, ci95=(a, b)) for v, a, b in _with_intervals(parts, before, after, seed, told)]
+    by_channel = _shares(*(v.sum(axis=-2) for v in (parts, before, after)), told)
     shown = before.sum(axis=0) > ATTRIBUTION.least_excess * described.predicted.n_plain.sum(axis=0)
     channels = {
         name: tuple(float(by_channel[g, i]) for g in (*of, -1))
@@ -152,13 +152,16 @@ def _lead_constants(
             serves[g] = law if g != law else serves[g]
 
 
-def _with_intervals(parts: np.ndarray, before: np.ndarray, after: np.ndarray, seed: int) -> np.ndarray:
-    """Shares over all channels with the ends of their 95 % intervals, (n + 1, 3), from (n, b, n_y), (b, n_y) and (b, n_y)."""
+def _with_intervals(
+    parts: np.ndarray, before: np.ndarray, after: np.ndarray, seed: int, told: np.ndarray | None = None
+) -> np.ndarray:
+    """Shares over all channels with the ends of their 95 % intervals, (n + 1, 3), from (n, b, n_y), (b, n_y), (b, n_y) and `told`, those
+    causes that have a share."""
     parts, before, after = (v.sum(axis=-1) for v in (parts, before, after))
     drawn = np.random.default_rng(seed).integers(0, len(before), (ATTRIBUTION.draws, len(before)))
-    sampled = _shares(*(v[..., drawn].sum(axis=-1) for v in (parts, before, after)))
+    sampled = _shares(*(v[..., drawn].sum(axis=-1) for v in (parts, before, after)), told)
     low, high = np.quantile(sampled, (0.025, 0.975), axis=1)
-    value = _shares(*(v.sum(axis=-1) for v in (parts, before, after)))
+    value = _shares(*(v.sum(axis=-1) for v in (parts, before, after)), told)
     return np.column_stack([value, np.minimum(low, value), np.maximum(high, value)])
 
 
@@ -191,14 +194,17 @@ def _groups(causes: tuple[Hypothesis, ...]) -> list[int]:
     return [places.index(one_finding(cause)) for cause in causes]
 
 
-def _shares(parts: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Shares (n + 1, ...) of n causes and of the rest, from their `parts` (n, ...) and the energies `before` and `after` (...)."""
+def _shares(parts: np.ndarray, before: np.ndarray, after: np.ndarray, told: np.ndarray | None = None) -> np.ndarray:
+    """Shares (n + 1, ...) of n causes and of the rest, from their `parts` (n, ...) and the energies `before` and `after` (...); of those
+    causes alone that are `told` (n,), where some are."""
     # by chance less may be left than noise
     rest = np.maximum(after, 0.0) / np.maximum(before, 1e-300)
     taken = np.maximum(parts, 0.0)
     whole = taken.sum(axis=0)
     # where none takes anything away alone, they do together
-    each = np.where(whole > 0, taken / np.maximum(whole, 1e-300), 1.0 / len(parts))
+    alike = np.ones(len(parts)) if told is None or not told.any() else told.astype(float)
+    alike = (alike / alike.sum()).reshape(-1, *(1,) * whole.ndim)
+    each = np.where(whole > 0, taken / np.maximum(whole, 1e-300), alike)
     return np.concatenate([np.maximum(1 - rest, 0.0) * each, np.asarray(rest)[None]])
 
 
