@@ -6,7 +6,7 @@ Ramps, plays by the hundred, forces in steps of a tenth of a sample; each is dri
 from __future__ import annotations
 
 import numpy as np
-from axis_records import AXIS, KF, H, move
+from axis_records import AXIS, KF, H, K, move
 from recovery import Planted
 from scipy.stats import norm
 
@@ -28,6 +28,19 @@ def reversed(u, t):
 
 def drive_offset(u, t):
     return move(u + 0.05)
+
+
+def square_drive(u, t):
+    return move(u + 0.02 * u**2)
+
+
+def cubic_drive(u, t):
+    return move(u - 0.012 * u**3)
+
+
+def stiffness_drift(u, t):
+    """Softer by 4 % a second, in the middle of each tenth of a sample."""
+    return move(u, lambda now, q, v, memory: (0.04 * (t[0] + now + H / 20) * K * (q + v * H / 20), memory))
 
 
 def slew_rate(u, t):
@@ -198,6 +211,9 @@ ON_AXIS = {
     asymmetric_gain: Planted("actuator:axis", {"gain": 0.03}),
     reversed: Planted("actuator:axis", {}),
     drive_offset: Planted("actuator:axis", {"offset": 0.05}),
+    square_drive: Planted("actuator:axis", {"curvature": 0.02}),
+    cubic_drive: Planted("actuator:axis", {"curvature": -0.012}),
+    stiffness_drift: Planted("stage:axis", {"rate": 0.04}, within={"rate": 0.02}),
     slew_rate: Planted("actuator:axis", {"rate": 12.0}),
     coil_heating: Planted("actuator:axis", {"rise": 3.9e-3 * 10 / 4, "tau": 0.5}, within={"rise": 0.05, "tau": 0.05}),
     cubic_sensor: Planted("sensor:axis", {"curvature": 2e6}),

@@ -113,6 +113,7 @@ def test_the_laws_of_two_channels_and_those_with_a_clock_are_these():
         "force_step",
         "lost_beams",
         "sensor_step",
+        "stiffness_drift",
         "stribeck_after",
         "vibration",
         "warm_up",

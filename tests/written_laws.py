@@ -144,6 +144,7 @@ LAWS = {
         lambda s, p: p.gain * (0.8 * s.z + 0.2 * s.w),
         lambda s, p: {"z": (s.value - s.z) / 0.3, "w": (s.value - s.w) / 1.2},
     ),
+    "cubic_drive": ({}, lambda s, p: p.curvature * s.value**3),
     "cubic_sensor": ({}, lambda s, p: p.curvature * s.value**3),
     "cyclic": ({"period": 0.4, "phase": 0.9}, lambda s, p: p.amplitude * sin(TWO_PI * s.value / 0.4 + 0.9)),
     "coil_heating": (
@@ -234,9 +235,11 @@ LAWS = {
     "second_pole": ({"tau": 0.3}, lambda s, p: p.share * (s.w - s.value), lambda s, p: {"w": (s.value - s.w) / 0.3}),
     "sensor_gain": ({}, lambda s, p: p.gain * s.value),
     "sensor_step": (EVENT, lambda s, p: p.offset * event(s, p)),
+    "square_drive": ({}, lambda s, p: p.curvature * s.value**2),
     "squareness": ({}, lambda s, p: p.angle * s.all[s.partner]),
     "stiffening": ({}, lambda s, p: -p.k3 * s.displacement**3),
     "stiffness": ({}, lambda s, p: -p.stiffness * s.displacement),
+    "stiffness_drift": ({"levels_off": 3.0}, lambda s, p: p.rate * 3.0 * (1 - exp(-s.t / 3.0)) * s.force),
     "stitching_error": (
         {"position": 0.2, "width": 0.3},
         lambda s, p: p.offset / (1 + exp(-4 * (s.value - 0.2) / 0.3)),

@@ -162,6 +162,15 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
                 "taper": _starts((0.0,)),
             },
         ),
+        **dict.fromkeys(
+            ("cubic_drive", "square_drive"),
+            LawPrior(
+                "Most amplifiers and coils are straighter than sensors and flexures: judgement. In balance a curve of the drive is one of "
+                "the displacement.",
+                log_prior_odds=ONE_IN_TEN,
+                unless=frozenset({"balanced"}),
+            ),
+        ),
         "dead_zone": LawPrior(
             "Between contacts that open (0.03) and an electronic crossover (1).",
             parameters={"rounding": _starts((0.3,))},

@@ -31,6 +31,12 @@ OF_TIME: Mapping[str, LawPrior] = {
     "sensor_step": LawPrior(
         EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, of_time=True, domain="disturbance", parameters=EVENT
     ),
+    "stiffness_drift": LawPrior(
+        "As `degradation`, which it is in slow motion, and rarer: judgement. In balance both are one.",
+        log_prior_odds=ONE_IN_TEN,
+        unless=frozenset({"balanced"}),
+        parameters={"levels_off": ParameterPrior((3.0, 30.0, 1e4))},
+    ),
     "vibration": LawPrior(
         "From outside. Frequencies of mains and rotating machines, and the lines of the residual's spectrum. Rarer than a pitch, "
         "which is the same at one speed: judgement.",

@@ -1,0 +1,27 @@
+"""A stage that softens, or stiffens, in the course of time."""
+
+import casadi as ca
+
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, State, itself
+
+
+class StiffnessDrift(Effect):
+    """Delta F = r T (1 - exp(-t/T)) F_s(d), t from the common zero of the records' clock, F_s the force that the stage takes: it softens
+    by r per second at first, by r T in the end.
+
+    With T far beyond the recording it softens steadily. Holds while the change is below 0.3: a flexure that warms, glue that gives way.
+    """
+
+    place = Place.FORCE
+    family = Family.EVENTS
+    requires = frozenset({"force"})
+    source = "R. Isermann, Fault-Diagnosis Systems (2006): incipient faults, of a parameter of the process"
+    params = (
+        Param("rate", "1/s", (-0.1, 0.1), "relative loss of stiffness per time, at first", off=0.0),
+        Param("levels_off", "s", (0.3, 1e6), "T: time constant with which the loss levels off"),
+    )
+    at_bounds = itself("levels_off")
+    states = (State("t", "s", 1.0, clock=True),)
+
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return p.rate * p.levels_off * (1 - ca.exp(-s.states.t / p.levels_off)) * s.force
