@@ -18,6 +18,9 @@ ORDER = 2  # of the error in the length of a step, where a force has a corner
 # Error of the steps over what else is left, noise at least, that the accepted model may have: it adds a hundredth to the squares.
 LARGEST = 0.1
 MOST_FINER = 8  # times the integrator's own steps that it may take for that: a sixty-fourth of the error; judgement
+MOST_IN_SEARCH = (
+    2  # while causes are sought, of which each trial then takes twice as long: a quarter of the error; judgement
+)
 
 
 def integration_error(fitter: Fitter, fit: Fit) -> float:
@@ -41,10 +44,11 @@ def integration_error(fitter: Fitter, fit: Fit) -> float:
     return largest / (1 - 0.5**ORDER)
 
 
-def with_steps_that_suffice(fitter: Fitter, fit: Fit) -> Structure:
-    """The fitted structure, restarted, with as many steps as make their error a small share of what else is left."""
+def with_steps_that_suffice(fitter: Fitter, fit: Fit, most: int = MOST_FINER) -> Structure:
+    """The fitted structure, restarted, with as many steps as make their error a small share of what else is left, `most` times the
+    integrator's own at most."""
     error = integration_error(fitter, fit)
     finer = fit.structure.finer
-    while error > LARGEST and finer < MOST_FINER:
+    while error > LARGEST and finer < most:
         finer, error = 2 * finer, error / 2**ORDER
     return replace(fit.restarted, finer=finer)

@@ -37,7 +37,7 @@ from ctrlgen.diagnosis.settings import SEARCH
 from ctrlgen.estimation.described_device import described
 from ctrlgen.estimation.drive_clock import with_drive_clock
 from ctrlgen.estimation.fit import Fitter
-from ctrlgen.estimation.integration_error import with_steps_that_suffice
+from ctrlgen.estimation.integration_error import MOST_FINER, MOST_IN_SEARCH, with_steps_that_suffice
 from ctrlgen.estimation.isolated_outliers import mark_again
 from ctrlgen.estimation.noise_update import update_noise
 from ctrlgen.estimation.settings import FIT
@@ -149,12 +149,13 @@ class Searcher:
             return found
         return self._settled(self.forward_rounds(found, rounds, len(current.causes) + 1))
 
-    def _finely_stepped(self, current: CandidateModel) -> CandidateModel:
-        """The same model fitted and judged with as many steps of its integrator as it needs, where those of the search do not suffice:
-        what they miss of an impact bends the numbers of a stop that is touched, which then foretell no run into it."""
+    def _finely_stepped(self, current: CandidateModel, most: int = MOST_FINER) -> CandidateModel:
+        """The same model fitted and judged with as many steps of its integrator as it needs, `most` times its own at most, where those of
+        the search do not suffice: what they miss of an impact bends the numbers of a stop that is touched, which then foretell no run into
+        it."""
         trials = self.trials
         try:
-            structure = with_steps_that_suffice(trials.fitter, current.fit)
+            structure = with_steps_that_suffice(trials.fitter, current.fit, most)
         except FAILURES as error:
             trials.note_failure(current.cause, error)
             return current
@@ -228,7 +229,7 @@ class Searcher:
                 # no better than when it was there before
                 return current
             # what too long steps miss would be read as a further cause
-            current = self._finely_stepped(trials.with_noise_update(self._converged(current)))
+            current = self._finely_stepped(trials.with_noise_update(self._converged(current)), MOST_IN_SEARCH)
             visited.append(current)
 
     def _in_finer_form(self, current: CandidateModel) -> CandidateModel:

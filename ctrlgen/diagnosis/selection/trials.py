@@ -23,7 +23,7 @@ from ctrlgen.diagnosis.selection.screen import Screen, Screened
 from ctrlgen.diagnosis.settings import SEARCH
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
-from ctrlgen.estimation.integration_error import with_steps_that_suffice
+from ctrlgen.estimation.integration_error import MOST_IN_SEARCH, with_steps_that_suffice
 from ctrlgen.estimation.noise_update import update_noise_size
 from ctrlgen.estimation.settings import DISCREPANCY, FIT
 from ctrlgen.estimation.structure import Structure
@@ -283,7 +283,7 @@ class Trials:
         if errors.is_noise:
             return True
         try:
-            structure = with_steps_that_suffice(self.fitter, candidate.fit)
+            structure = with_steps_that_suffice(self.fitter, candidate.fit, MOST_IN_SEARCH)
             for _ in range(DISCREPANCY.updates):
                 if errors.is_noise:
                     break
