@@ -20,7 +20,7 @@ class SquareDrive(Effect):
 class CubicDrive(Effect):
     """Delta u = c u^3. Holds while c u^2 is a few tenths; with c u^2 < -1/3 more drive would do less."""
 
-    title = "A drive whose gain falls, or rises, with its size: iron that saturates, an amplifier that gives way"
+    title = "A drive whose gain falls, or rises, with its size"
     place = Place.DRIVE
     family = Family.DRIVE
     requires = frozenset({"actuator"})

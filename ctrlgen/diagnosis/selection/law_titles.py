@@ -50,6 +50,10 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
             ("piezo", "A piezo, or its mount, keeps moving after the voltage has settled"),
             ("", "A displacement that goes on after the drive has settled"),
         ),
+        "cubic_drive": (
+            ("electromagnetic", "A drive whose gain falls, or rises, with its size: iron that saturates"),
+            ("", "A drive whose gain falls, or rises, with its size"),
+        ),
         "dead_zone": (
             ("position", "An axis that ignores small commands"),
             *(
@@ -120,7 +124,11 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
         ),
         "slew_rate": (
             ("position", "An axis that follows its command no faster than at one speed"),
-            ("", "An amplifier whose output changes at most so fast: slew rate"),
+            *(
+                (word, "An amplifier whose output changes at most so fast: slew rate")
+                for word in ("piezo", "electromagnetic")
+            ),
+            ("", "A drive that follows its command no faster than at one rate: slew rate"),
         ),
         "stiffening": (
             ("flexible", "A clamped flexure stretches as it bends"),
