@@ -94,7 +94,7 @@ def attribute(
     back = [float(np.sum(left[frozenset(range(n)) - {g}] - after) / np.sum(before - after)) for g in range(n)]
     _lead_constants(parts, told, serves, back, [causes[of.index(g)].prior.constant for g in range(n)])
     shares = [ShareEntry(value=v, ci95=(a, b)) for v, a, b in _with_intervals(parts, before, after, seed, told)]
-    by_channel = _shares(*(v.sum(axis=-2) for v in (parts, before, after)), told)
+    by_channel = _shares(told, *(v.sum(axis=-2) for v in (parts, before, after)))
     shown = before.sum(axis=0) > ATTRIBUTION.least_excess * described.predicted.n_plain.sum(axis=0)
     channels = {
         name: tuple(float(by_channel[g, i]) for g in (*of, -1))
@@ -159,9 +159,9 @@ def _with_intervals(
     causes that have a share."""
     parts, before, after = (v.sum(axis=-1) for v in (parts, before, after))
     drawn = np.random.default_rng(seed).integers(0, len(before), (ATTRIBUTION.draws, len(before)))
-    sampled = _shares(*(v[..., drawn].sum(axis=-1) for v in (parts, before, after)), told)
+    sampled = _shares(told, *(v[..., drawn].sum(axis=-1) for v in (parts, before, after)))
     low, high = np.quantile(sampled, (0.025, 0.975), axis=1)
-    value = _shares(*(v.sum(axis=-1) for v in (parts, before, after)), told)
+    value = _shares(told, *(v.sum(axis=-1) for v in (parts, before, after)))
     return np.column_stack([value, np.minimum(low, value), np.maximum(high, value)])
 
 
@@ -194,7 +194,7 @@ def _groups(causes: tuple[Hypothesis, ...]) -> list[int]:
     return [places.index(one_finding(cause)) for cause in causes]
 
 
-def _shares(parts: np.ndarray, before: np.ndarray, after: np.ndarray, told: np.ndarray | None = None) -> np.ndarray:
+def _shares(told: np.ndarray | None, parts: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """Shares (n + 1, ...) of n causes and of the rest, from their `parts` (n, ...) and the energies `before` and `after` (...); of those
     causes alone that are `told` (n,), where some are."""
     # by chance less may be left than noise
