@@ -126,6 +126,7 @@ def test_a_touch_is_simulated_in_as_many_steps_as_the_noise_asks_for(touched):
     # half the steps tell the error to a third: where in a step the corner lies changes it
     assert missed(fine) < 1.33 * LARGEST
     assert with_steps_that_suffice(fitter, fitter.fit(Structure(AXIS), steps=0)).finer == 1
+    assert with_steps_that_suffice(fitter, usual, most=2).finer == 2
 
 
 def test_a_spring_beyond_an_edge_that_is_refused_shows_where_the_stop_stands(touched):
