@@ -60,7 +60,7 @@ def test_a_simulation_reads_late_and_slews(tmp_path):
 
 
 def test_the_rate_of_an_amplifier_is_a_limit_along_a_path(tmp_path):
-    """The path needs 1773 V/s. Beside a rate that the device states the tighter one counts."""
+    """The path needs 1773 V/s. Of two amplifiers in series the slower one counts."""
     with_law(tmp_path, "slew_rate", 'at = "axis"\nshare = "1"\nrate = "4 V/ms"')
     fast = line(tmp_path)
     (limit,) = fast.model.rate_limits

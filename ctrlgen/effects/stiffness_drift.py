@@ -1,8 +1,7 @@
 """A stage that softens, or stiffens, in the course of time."""
 
-import casadi as ca
-
-from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, State, itself
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, itself
+from ctrlgen.effects._incipient import CLOCK, lost_share
 
 
 class StiffnessDrift(Effect):
@@ -21,7 +20,7 @@ class StiffnessDrift(Effect):
         Param("levels_off", "s", (0.3, 1e6), "T: time constant with which the loss levels off"),
     )
     at_bounds = itself("levels_off")
-    states = (State("t", "s", 1.0, clock=True),)
+    states = CLOCK
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
-        return p.rate * p.levels_off * (1 - ca.exp(-s.states.t / p.levels_off)) * s.force
+        return lost_share(s, p) * s.force
