@@ -192,6 +192,7 @@ class Law:
         clocks = [i for i, s in enumerate(effect.states) if s.clock]
         for i in clocks:
             after[i] = held["time"] if still else memory[i] + h
+        after[[i for i, s in enumerate(effect.states) if s.ramp]] = 0
         self.one = ca.Function("one", [memory, signals, p], [after, term], ["m", "s", "p"], ["next", "term"])
         self.whole = ca.Function("whole", [memory, signals, p], [ca.vertcat(after, term)], ["m", "s", "p"], ["result"])
 

@@ -177,13 +177,20 @@ class Effect:
         """Each stepped state after the present sample, from its value before; `term` sees the new one."""
         return {}
 
+    def resting(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
+        """Stepped states where nothing has changed for long, of those that one `update` does not bring there."""
+        return {}
+
     def kept(self, sample_time: float | None, free: bool) -> tuple[State, ...]:
         """The states at this sample time [s], of which a law that looks back by samples needs more the shorter it is; `free`: its
         amplitude may be moved from the file's. Raises ValueError, of its amplitude, where they are too many to build."""
         return self.states
 
     def after_sample(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
-        """`update`, with the states that keep their value through a record."""
-        return {state.name: getattr(s.states, state.name) for state in self.states if state.per_record} | self.update(
-            s, p
-        )
+        """`update`, with the states that keep their value through a record, and ramps, which begin anew."""
+        kept = {state.name: getattr(s.states, state.name) for state in self.states if state.per_record}
+        return kept | dict.fromkeys(self.ramps(), 0.0) | self.update(s, p)
+
+    def ramps(self) -> frozenset[str]:
+        """The states that are integrated within each sample, from zero: of them `term` sees how far they are."""
+        return frozenset(state.name for state in self.states if state.ramp)

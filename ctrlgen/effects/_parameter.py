@@ -43,7 +43,8 @@ class Param:
 class State:
     """A memory of the effect, zero at rest; `scale` is a typical size in `unit`, counted as in `Param`.
 
-    A `stepped` one changes once a sample, by `update`; a `clock` is the time since the record's common zero. With what a
+    A `stepped` one changes once a sample, by `update`; a `ramp` is zero at the beginning of each sample and is integrated within it; a
+    `clock` is the time since the record's common zero. With what a
     `free` one begins is unknown and differs by record: a diagnosis fits it there; elsewhere it begins at zero. One
     `per_record` is free and keeps its value through the record: outside a diagnosis it is the number zero, and no state.
     """
@@ -52,6 +53,7 @@ class State:
     unit: str
     scale: float
     stepped: bool = False
+    ramp: bool = False
     clock: bool = False
     free: bool = False
     per_record: bool = False
@@ -59,6 +61,7 @@ class State:
     def __post_init__(self) -> None:
         if self.per_record:  # it changes by no law of its own
             object.__setattr__(self, "free", True)
+        if self.per_record or self.ramp:
             object.__setattr__(self, "stepped", True)
 
 

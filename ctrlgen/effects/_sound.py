@@ -108,7 +108,8 @@ def _evaluated(law: type[Effect]) -> Iterator[str]:
     effect, symbols = law("axis", {}), _symbols(law)
     try:
         s, p = _inputs(law, symbols), SimpleNamespace(**values)
-        s = s.with_states({name: ca.SX(value) for name, value in effect.after_sample(s, p).items()})
+        new = effect.after_sample(s, p).items()
+        s = s.with_states({name: ca.SX(value) for name, value in new if name not in effect.ramps()})
         parts = {"term()": effect.term(s, p), **{f"rates()[{k!r}]": v for k, v in effect.rates(s, p).items()}}
         expressions = {name: ca.SX(part) for name, part in parts.items()}
     # of a stranger's expressions

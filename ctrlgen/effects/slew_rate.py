@@ -28,16 +28,17 @@ class SlewRate(Effect):
         State("v", "channel", 1.0, stepped=True, free=True),
         State("mean", "channel", 1.0, stepped=True),
         State("rise", "channel", 1.0, stepped=True),
-        State("w", "channel", 1.0),  # runs along the line, up or down: it stays within a rise of zero
-        State("begin", "channel", 1.0, stepped=True),  # w as the sample began
+        State("w", "channel", 1.0, ramp=True),  # along the line, from its beginning
     )
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
-        way = _way(s) * (s.states.w - s.states.begin)
-        return p.share * (s.states.mean - s.states.rise / 2 + way - s.value)
+        return p.share * (s.states.mean - s.states.rise / 2 + s.states.w - s.value)
 
     def rates(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
-        return {"w": _way(s) * s.states.rise / s.sample_time}
+        return {"w": s.states.rise / s.sample_time}
+
+    def resting(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
+        return {"v": s.value, "mean": s.value, "rise": 0.0}
 
     def update(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         most = p.rate * s.sample_time
@@ -47,10 +48,4 @@ class SlewRate(Effect):
             "v": s.states.v + c,
             "mean": s.states.v + c * (1 - k / 2),
             "rise": c * k * (3 - 2 * k),
-            "begin": s.states.begin + _way(s) * s.states.rise,
         }
-
-
-def _way(s: LawInputs) -> Expression:
-    """The side to which w runs: back to zero."""
-    return ca.if_else(s.states.begin * s.states.rise > 0, -1.0, 1.0)

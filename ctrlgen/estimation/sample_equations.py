@@ -62,7 +62,8 @@ def build_sample_equations(
 ) -> SampleEquations:
     """The sample equations of `model` with readings `y` (n_y,) for records of one `Timing`, in `finer` times its integrator's steps.
     `of_device`: the places in p of the device's own numbers."""
-    expressions = [model.sampled_rates, model.held_value, ca.vertcat(ca.SX(0, 1), *model.stepped.values()), y]
+    stepped, resting = (ca.vertcat(ca.SX(0, 1), *those.values()) for those in (model.stepped, model.resting))
+    expressions = [model.sampled_rates, model.held_value, stepped, resting, y]
     roots = ImplicitRoots()
     sample = None if model.inertial else _one_step(model, sample_time, linear, poses, finer, roots)
     if sample is not None:
@@ -78,10 +79,14 @@ def build_sample_equations(
         c, value = ca.vertcat(ca.SX(0, 1), *symbols), ca.vertcat(ca.SX(0, 1), *parametric)
     constants = _with_jacobian(value, model.p, of_device)
     if sample is None:
-        rates, held, stepped, y = expressions
-        stepped = dict(zip(model.stepped, ca.vertsplit(stepped), strict=True))
+        rates, held, *placed, y = expressions
+        stepped, resting = (
+            dict(zip(those, ca.vertsplit(values), strict=True))
+            for those, values in zip((model.stepped, model.resting), placed, strict=True)
+        )
         nominal = constants(model.p_nominal)[0].full().ravel()
-        model = replace(model, p=c, p_nominal=nominal, sampled_rates=rates, held_value=held, stepped=stepped)
+        numbers = {"p": c, "p_nominal": nominal, "sampled_rates": rates, "held_value": held}
+        model = replace(model, **numbers, stepped=stepped, resting=resting)
         sample = _one_step(model, sample_time, linear, poses, finer, roots)
         following = ca.vertcat(sample.x, sample.z)
     else:

@@ -90,6 +90,7 @@ def allocate(model: Model) -> Allocation:
         sampled_rates=of(model.sampled_rates),
         balance=of(model.balance),
         stepped={i: of(e) for i, e in model.stepped.items()},
+        resting={i: of(e) for i, e in model.resting.items()},
     )
     return Allocation(ganged, ca.Function("least_effort", [model.z, f], [u], ["z", "f"], ["u"], {"cse": True}))
 

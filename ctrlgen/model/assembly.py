@@ -164,6 +164,7 @@ def _assemble(
         balance=closed(equations.balance),
         mass=equations.mass,
         stepped=places.stepped,
+        resting=places.resting,
         clocks=places.clocks,
         set_valued_axes=_set_valued_axes(terms, v, equations.own_force),
         bristles=places.bristles,

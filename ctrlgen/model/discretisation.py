@@ -195,12 +195,14 @@ def _settle(model: Model, u: ca.SX, newton_steps: int, root: Root) -> tuple[ca.S
         for block in blocks:
             corrected[block] = x[block] - ca.solve(slope[block, block], rate[block])
         x = corrected
+    for i, value in model.resting.items():
+        x[i] = ca.substitute(value, model.u, u)
     z = balanced(model, x, u, newton_steps, root)
     x = ca.substitute(x, model.z, z)
     for i in model.clocks:
         x[i] = model.x[i] + 1.0
-    for i, value in model.stepped.items():
-        x[i] = ca.substitute(value, ca.vertcat(model.z, model.u), ca.vertcat(z, u))
+    for i in model.stepped.keys() - model.resting.keys():
+        x[i] = ca.substitute(model.stepped[i], ca.vertcat(model.z, model.u), ca.vertcat(z, u))
     return x, z
 
 

@@ -25,7 +25,8 @@ LOOKS_BACK = "sample_time"  # what a law requires that looks back by samples
 
 @dataclass
 class Member:
-    """One effect on one channel, with the symbols of the states that are `kept`; `rates` and `stepped` are its law's answers."""
+    """One effect on one channel, with the symbols of the states that are `kept`; `rates`, `stepped` and `resting` are its law's
+    answers."""
 
     effect: Effect
     values: SimpleNamespace
@@ -36,12 +37,14 @@ class Member:
     kept: tuple[State, ...]
     rates: dict[str, ca.SX] = field(default_factory=dict)
     stepped: dict[str, ca.SX] = field(default_factory=dict)
+    resting: dict[str, ca.SX] = field(default_factory=dict)
 
     def apply(self, s: LawInputs) -> ca.SX:
         """The term for the inputs `s`; keeps the states' rates and the new values of those that change once a sample."""
         by_default = {state.name: ca.SX(float(state.clock)) for state in self.kept}
         self.stepped = {name: ca.SX(value) for name, value in self.effect.after_sample(s, self.values).items()}
-        s = s.with_states(self.stepped)
+        self.resting = {name: ca.SX(value) for name, value in self.effect.resting(s, self.values).items()}
+        s = s.with_states({name: value for name, value in self.stepped.items() if name not in self.effect.ramps()})
         self.rates = {**by_default, **self.effect.rates(s, self.values)}
         return self.effect.term(s, self.values)
 

@@ -17,7 +17,10 @@ from functools import cached_property, lru_cache
 import casadi as ca
 import numpy as np
 
+from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.effects import Place
 from ctrlgen.model.discretisation import held_step, varied_step
+from ctrlgen.model.effect_terms import LOOKS_BACK
 from ctrlgen.model.model import Model
 from ctrlgen.numerics.newton import newton_root
 
@@ -66,7 +69,9 @@ def invert(
     Free parameters take their nominal values, and where it is `symbolic` stay a last argument "p" of every kernel: the
     inverse at the nominal values, with its numbers as formulas of the parameters (those of the followed signal excepted).
     With a `longest` sample time [s] it is a last argument "h" of every kernel, and `sample_time` where they are expanded.
+    Raises InputError for a model whose drives are delivered with a memory of samples.
     """
+    _check_delivered(model)
     x, z, u, n, n_s, heat = model.x, model.z, model.u, len(model.axes), model.n_states, model.heat
     end = _SampleEnd.of(model, follow, symbolic)
     x_1, z_1, u_1, target = end.x, end.z, end.u, end.target
@@ -108,6 +113,21 @@ def invert(
     }
     more = ({"p": model.p} if symbolic else {}) | ({} if longest is None else {"h": h})
     return Inverse(**{name: _kernel(name, arguments | more, result) for name, (arguments, result) in results.items()})
+
+
+def _check_delivered(model: Model) -> None:
+    """Refuses a model between whose drives and motion a law looks back by samples: such a law is not inverted. Raises InputError."""
+    kept = [
+        Fault(
+            f"effect[{k}].kind",
+            f"{e.kind} looks back by samples and is not inverted: build the model without a sample time",
+        )
+        for k, e in enumerate(model.device.effect)
+        if LOOKS_BACK in e.requires and e.place is not Place.SENSOR
+        if any(name.startswith(f"{e.kind}_{k}_") for name in model.x_names)
+    ]
+    if kept:
+        raise InputError(model.name, kept)
 
 
 @dataclass(frozen=True)

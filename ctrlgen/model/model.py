@@ -64,6 +64,7 @@ class Model(Shown):
 
     # Places in x of states that are not integrated, and of those that need an implicit integrator
     stepped: dict[int, ca.SX]  # change once a sample: place -> new value
+    resting: dict[int, ca.SX]  # of these, where they come to rest only after many samples: place -> value at rest
     clocks: tuple[int, ...]  # count time
     set_valued_axes: tuple[int, ...]  # axes with inertia on which dry friction may hold the stage at rest
     bristles: tuple[int, ...]  # the states of that friction
@@ -112,18 +113,18 @@ class Model(Shown):
     @cached_property
     def settling(self) -> ca.SX:
         """(n_x,) zero at an equilibrium: the rates; for velocities, whose rates are the balance, and for states that change once a
-        sample and clocks, which have no equilibrium, the states themselves."""
+        sample and clocks, which have no equilibrium, the states themselves, or how far they are from rest."""
         rows, first = self.rates[:], self.x.numel() - self.v.numel()
         for i in (*self.stepped, *self.clocks, *range(first, self.x.numel())):
-            rows[i] = self.x[i]
+            rows[i] = self.x[i] - self.resting.get(i, 0)
         return rows
 
     @cached_property
     def starting(self) -> ca.SX:
         """(n_x,) zero where an open path starts: settled, states that change once a sample one sample after zero, clocks at zero."""
         rows, stepped = self.settling[:], list(self.stepped)
-        for i, value in self.stepped.items():
-            rows[i] = self.x[i] - ca.substitute(value, self.x[stepped], ca.SX.zeros(len(stepped)))
+        for i in self.stepped.keys() - self.resting.keys():
+            rows[i] = self.x[i] - ca.substitute(self.stepped[i], self.x[stepped], ca.SX.zeros(len(stepped)))
         return rows
 
     @property

@@ -50,6 +50,7 @@ class MemoryPlaces:
     """Places in x of the effects' states that are not integrated, or that need an implicit integrator; see `Model`."""
 
     stepped: dict[int, ca.SX]
+    resting: dict[int, ca.SX]
     clocks: tuple[int, ...]
     bristles: tuple[int, ...]
     free: tuple[int, ...]
@@ -61,6 +62,7 @@ def memory_places(memories: Sequence[Memory], first: int, closed: Callable[[ca.S
     bristles = tuple(k for k, m, s in placed if m.effect.set_valued and not (s.stepped or s.clock))
     return MemoryPlaces(
         {k: closed(m.stepped[s.name]) for k, m, s in placed if s.stepped},
+        {k: closed(m.resting[s.name]) for k, m, s in placed if s.name in m.resting},
         tuple(k for k, _, s in placed if s.clock),
         bristles,
         tuple(k for k, _, s in placed if s.free or k in bristles),

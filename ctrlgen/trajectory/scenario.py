@@ -11,6 +11,7 @@ from pathlib import Path
 
 import casadi as ca
 
+from ctrlgen.core.edited_toml import value_text
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.file_format import in_this_format
 from ctrlgen.core.files import decoded, encoded, read_bytes, read_text, read_toml, validate
@@ -164,8 +165,10 @@ def check_tightened(scenario: Scenario, model: Model) -> None:
 
 def model_of(scenario: Scenario) -> Model:
     """The model that is led along the path: without laws of readings that look back by samples (delay, clock offset), which change no
-    drive; a warning names them. Raises InputError where a feedback loop reads what they do, so that they do change its drive."""
+    drive; a warning names them. Of a drive whose rate is limited it has the limit, not the ramp within a sample: a warning says by how
+    much that is late. Raises InputError where a feedback loop reads what late readings do, so that they do change its drive."""
     device = scenario.device
+    _warn_of_ramps(scenario)
     late = [effect for effect in device.effect if LOOKS_BACK in effect.requires and effect.place is Place.SENSOR]
     model = build_model(device.model_copy(update={"effect": tuple(e for e in device.effect if e not in late)}))
     if not late:
@@ -178,6 +181,16 @@ def model_of(scenario: Scenario) -> Model:
         raise InputError(device.name, [Fault("effect", what)])
     warnings.warn(f"{device.name}: {kinds} is of the reading and changes no drive along a path; left out", stacklevel=2)
     return model
+
+
+def _warn_of_ramps(scenario: Scenario) -> None:
+    """Says what a path leaves out of an amplifier that slews. A change c of the drive takes c/R of a sample h, h at most within the limit;
+    its mean over the sample is that of a step that comes c/(2 R) <= h/2 later."""
+    kinds = ", ".join(sorted({effect.kind for effect in scenario.device.effect if effect.limits_rate}))
+    if kinds and isinstance(scenario.clock, Sampled):
+        late = value_text(scenario.clock.sample_time / 2, "ms", 3)
+        what = f"{kinds} limits how fast the drive changes; within a sample the drive is taken as a step, while the amplifier ramps"
+        warnings.warn(f"{scenario.device.name}: {what}: it acts up to {late} late", stacklevel=3)
 
 
 def _with_late_readings(scenario: Scenario) -> Model:

@@ -35,7 +35,7 @@ from ctrlgen.firmware.fmi.plant import Plant, plant_of, write_plant
 from ctrlgen.firmware.online.online import online_context
 from ctrlgen.firmware.player_only import check_online
 from ctrlgen.model.model import Model
-from ctrlgen.trajectory.scenario import Scenario, check_tightened
+from ctrlgen.trajectory.scenario import Scenario, check_tightened, model_of
 from ctrlgen.version import __version__, program
 
 VERSIONS = (3, 2)
@@ -117,8 +117,7 @@ def write_fmus(scenario: Scenario, out: Path, fmi: int = 3, limited: Model | Non
         what = 'is missing: FMI co-simulation advances by samples; add sample_rate = "1 kHz" and duration = "1 s"'
         raise InputError(scenario.path, [Fault("sample_rate", what)])
     plant, remark = plant_of(scenario), ""
-    limited = plant.model if limited is None else plant.model.limited_as(limited)
-    check_tightened(scenario, limited)
+    check_tightened(scenario, limited or plant.model)
     try:
         compiler: str | None = next(iter(find_compilers()))
     except ToolError as error:
@@ -126,7 +125,8 @@ def write_fmus(scenario: Scenario, out: Path, fmi: int = 3, limited: Model | Non
     with whole_folder(Path(out)) as draft, tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch:
         units = [_plant_unit(scenario, plant, Path(scratch))]
         try:
-            units.insert(0, _controller_unit(scenario, limited, plant.sample_time, Path(scratch)))
+            led = model_of(scenario) if limited is None else model_of(scenario).limited_as(limited)
+            units.insert(0, _controller_unit(scenario, led, plant.sample_time, Path(scratch)))
         except InputError as error:
             if not (plant.inertial or plant.model.redundant or plant.model.rate_limits):
                 raise

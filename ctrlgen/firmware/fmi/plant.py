@@ -74,7 +74,7 @@ class Plant:
         rows = [i for i in range(x.numel()) if i not in m.stepped and i not in m.clocks and not m.rates[i].is_zero()]
         rates, states = m.rates[rows], m.x[rows]
         x[rows] = states - ca.solve(ca.jacobian(rates, states), rates)
-        for i, value in m.stepped.items():
+        for i, value in (m.stepped | m.resting).items():
             x[i] = value
         return self._kernel("rest", x)
 
