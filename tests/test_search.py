@@ -101,7 +101,7 @@ def test_what_a_set_does_not_seem_to_need_is_swapped_before_it_is_dropped(monkey
     fitter, given = fitter_of(played), []
     bend = Hypothesis("cubic_sensor", "sensor:axis", "axis")
 
-    def both(trials, current, screened, most):
+    def both(trials, current, screened, most, plainly):
         structure = current.fit.restarted.with_cause(BACKLASH, {"gap": 5e-8}).with_cause(bend, {"curvature": 1e3})
         return tuple(trials.tried(structure, bend, current.fit))
 

@@ -106,6 +106,48 @@ def test_beside_a_cause_that_leaves_noise_alone_no_regions_sets_or_shifts_are_tr
     assert beside == [()] and {t.causes for t in found} == {(BACKLASH,), (CLOCK,)}
 
 
+def test_of_what_is_too_little_for_a_name_only_much_is_sought(monkeypatch):
+    """On the held-out records less than a hundredth of the squares that the device as described leaves there."""
+    trials, described = trials_beside(fitter_of(played), [BACKLASH, CLOCK])
+    held = trials.tried(described.fit.restarted.with_cause(BACKLASH, {"gap": 5e-8}), BACKLASH, described.fit)[0]
+    trials.mismatch = described.held_out.plain_mean * trials.fitter.noise.floor**2
+
+    def leaving(share: float) -> candidates.CandidateModel:
+        left = replace(described.held_out, plain=share * described.held_out.plain)
+        return replace(held, errors=described.errors, fitted=described.fitted, held_out=left)
+
+    little, more = leaving(0.009), leaving(0.02)
+    assert trials.selection.only_much_matters(little) and not trials.selection.only_much_matters(more)
+    assert not trials.selection.only_much_matters(replace(little, errors=held.errors))  # noise alone
+    start = {"amplitude": 10 * NOISE, "period": PITCH, "phase": 0.0}
+    (harmonic,) = trials.tried(described.fit.restarted.with_cause(CYCLIC, start), CYCLIC, described.fit)
+    assert not trials.selection.only_much_matters(replace(little, fit=harmonic.fit))
+    sets, begun, singles, fit_each = [], [], [], candidates.fit_each
+    monkeypatch.setattr(candidates, "leaves_noise_alone", lambda *_: False)
+    monkeypatch.setattr(candidates, "fit_subsets", lambda *given: sets.append(given[-2:]) or ())
+    monkeypatch.setattr(candidates, "restart_elsewhere", lambda trials, t, *_: begun.append(t) or t)
+    monkeypatch.setattr(
+        candidates, "fit_each", lambda t, fit, all_: singles.append(list(all_)) or fit_each(t, fit, all_)
+    )
+    screened = trials.screened(described)
+    need = candidates.much_of(little)
+    assert need == pytest.approx(0.375 * described.fitted.white.sum())
+    loud, weak = (replace(screened.suspects[0], z=z * np.sqrt(need)) for z in (1.01, 0.99))
+    for suspects in ((loud,), (weak,)):
+        candidates.fit_candidates(trials, little, replace(screened, suspects=suspects), 4, plainly=True)
+    assert (singles, sets, begun) == ([[loud], []], [(2, need)] * 2, [])
+    candidates.fit_candidates(trials, more, replace(screened, suspects=(weak,)), 4)
+    assert singles[2][0] is weak and sets[-1] == (4, 0.0) and begun
+
+
+def test_of_suspects_that_look_alike_the_loudest_is_taken():
+    trials, described = trials_beside(fitter_of(played), [BACKLASH])
+    some = trials.screened(described).suspects[0]
+    loud, same, quiet = (replace(some, z=z, index=i) for z, i in ((9.0, 0), (-8.0, 1), (7.0, 2)))
+    alike = Screened((same, quiet, loud), np.array([[1, -0.99, 0.5], [-0.99, 1, 0.6], [0.5, 0.6, 1]]), lambda: 4.0, {})
+    assert candidates.unlike(alike, alike.suspects) == [loud, quiet]
+
+
 def test_a_cause_is_asked_what_it_leaves_once_it_is_fitted_under_its_own_errors():
     trials, current = trials_beside(fitter_of(played), [BACKLASH])
     held = trials.tried(current.fit.restarted.with_cause(BACKLASH, {"gap": 5e-8}), BACKLASH, current.fit)[0]

@@ -9,13 +9,14 @@ import numpy as np
 
 from ctrlgen.diagnosis.selection.begun_again import begun_again
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
+from ctrlgen.diagnosis.selection.confusable import likeness
 from ctrlgen.diagnosis.selection.failures import FAILURES
 from ctrlgen.diagnosis.selection.far_off import nearer_when_simulated
 from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.diagnosis.selection.shifts import best_shift
 from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.selection.trials import Trials
-from ctrlgen.diagnosis.settings import MODEL_SELECTION, REGIONS, SEARCH, SUBSETS
+from ctrlgen.diagnosis.settings import CONFUSABLE, MODEL_SELECTION, REGIONS, SEARCH, SUBSETS
 from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis
 from ctrlgen.estimation.settings import FIT
@@ -23,13 +24,19 @@ from ctrlgen.estimation.structure import Structure
 
 
 def fit_candidates(
-    trials: Trials, current: CandidateModel, screened: Screened, most: int = SUBSETS.largest
+    trials: Trials, current: CandidateModel, screened: Screened, most: int = SUBSETS.largest, plainly: bool = False
 ) -> tuple[CandidateModel, ...]:
-    """All that is tried beside `current`, `most` causes at once, the promising ones fitted to their end."""
+    """All that is tried beside `current`, `most` causes at once, the promising ones fitted to their end; `plainly`: one and two causes
+    that promise to take much away (`ModelSelection.only_much_matters`), each from its best start, of suspects that look alike the loudest,
+    and none to its end: what is accepted meets its rivals later."""
     suspects = significant(trials, current, screened)
-    candidates = fit_each(trials, current.fit, [*suspects, *nearer_when_simulated(trials, current, screened, suspects)])
+    if plainly:
+        suspects = [s for s in unlike(screened, suspects) if s.z**2 >= much_of(current)]
+    else:
+        suspects = [*suspects, *nearer_when_simulated(trials, current, screened, suspects)]
+    candidates = fit_each(trials, current.fit, suspects)
     alone = leaves_noise_alone(trials, current, candidates)
-    if not current.errors.is_noise:
+    if not (plainly or current.errors.is_noise):
         begun = [t for t in candidates if not alone or takes_away_much(t, current)]
         ends = trials.each(lambda branch, t: restart_elsewhere(branch, t, current, screened), begun)
         after = dict(zip(map(id, begun), ends, strict=True))
@@ -43,8 +50,9 @@ def fit_candidates(
     if trials.selection.parameters_may_mask_cause(current.fit):
         candidates = (*candidates, *_as_stated(trials, current))
     if not alone:
-        candidates = (*candidates, *fit_subsets(trials, current, screened, candidates, most))
-    return _converge_promising(trials, current, candidates)
+        most, least = (min(most, SEARCH.causes_of_little), much_of(current)) if plainly else (most, 0.0)
+        candidates = (*candidates, *fit_subsets(trials, current, screened, candidates, most, least))
+    return candidates if plainly else _converge_promising(trials, current, candidates)
 
 
 def leaves_noise_alone(trials: Trials, current: CandidateModel, singles: Sequence[CandidateModel]) -> bool:
@@ -74,6 +82,21 @@ def significant(trials: Trials, current: CandidateModel, screened: Screened, mos
     regional = [s for s in loud if s.hypothesis.prior.in_a_region]
     most, beside = most or trials.per_round, SEARCH.regional_per_round
     return [*_loudest(everywhere, most, most // 3), *_loudest(regional, beside, beside)]
+
+
+def much_of(current: CandidateModel) -> float:
+    """The score z^2 at which a suspect, or a set, may take much of what `current` leaves in the channel that weighs least. As a rival's,
+    the score is short of what a fit of the shapes reaches."""
+    return SEARCH.rival_share * MODEL_SELECTION.much * float(current.fitted.white.sum(axis=0).min())
+
+
+def unlike(screened: Screened, suspects: Sequence[Suspect]) -> list[Suspect]:
+    """The suspects without those that look like a louder one."""
+    chosen: list[Suspect] = []
+    for s in sorted(suspects, key=lambda s: -abs(s.z)):
+        if all(likeness(screened, s, louder) < CONFUSABLE.cosine for louder in chosen):
+            chosen.append(s)
+    return chosen
 
 
 def _loudest(suspects: Sequence[Suspect], most: int, of_one_law: int) -> list[Suspect]:
@@ -264,9 +287,10 @@ def fit_subsets(
     screened: Screened,
     singles: Sequence[CandidateModel],
     most: int = SUBSETS.largest,
+    least_promised: float = 0.0,
 ) -> list[CandidateModel]:
-    """Sets of suspects, `most` of them at most, that promise more than any single one gave; each size must promise more than the
-    smaller. None where a single one leaves noise alone."""
+    """Sets of suspects, `most` of them at most, that promise more than any single one gave, and at least so much; each size must promise
+    more than the smaller. None where a single one leaves noise alone."""
     known = bool(trials.fitter.noise.known.all())
     if known and any(t.errors.is_noise and not current.errors.is_noise for t in singles):
         return []
@@ -287,7 +311,7 @@ def fit_subsets(
             break
         left = current.fit.objective - best
         enough = best + max(trials.selection.required_z2(current, screened), SEARCH.subset_share * left)
-        sets = _promising_sets(screened, size, enough, trials.per_round)
+        sets = _promising_sets(screened, size, max(enough, least_promised), trials.per_round)
         tried = trials.each(one, sets, lambda suspects: trying(*(s.hypothesis for s in suspects)))
         candidates += [t for fitted in tried for t in fitted]
         sound = [t for t in candidates if not trials.objections(t)]

@@ -198,6 +198,17 @@ class ModelSelection:
         gain = (before.held_out.plain_mean - after.held_out.plain_mean) * self.fitter.noise.floor**2
         return bool(np.any(gain > MODEL_SELECTION.least_share * self.mismatch)) or self.takes_much(before, after)
 
+    def only_much_matters(self, current: CandidateModel) -> bool:
+        """Whether more than noise is left, and on the held-out records in every channel less of the whole mismatch than is worth a name:
+        a further cause, other than a finer form of a law, must take much of it (`matters`). Never beside a law of several terms, of
+        which one more must take less, and has many valleys."""
+        if self.mismatch is None or current.errors.is_noise or any(c.prior.repeatable for c in current.causes):
+            return False
+        if self.parameters_may_mask_cause(current.fit) or self.unseen_in_held_out(current):
+            return False
+        left = current.held_out.plain_mean * self.fitter.noise.floor**2
+        return bool(np.all(left <= MODEL_SELECTION.least_share * self.mismatch))
+
     def worth_its_form(self, plain: CandidateModel, finer: CandidateModel) -> bool:
         """Whether what a law has more than the plainer law that it generalises takes away a share of the whole mismatch of any channel on
         the held-out records that is worth a name, or a share of what the plainer one leaves there that one more term must take; always

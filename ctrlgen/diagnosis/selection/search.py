@@ -212,8 +212,9 @@ class Searcher:
             if len(current.causes) >= most or trials.selection.residual_within_model_form_error(current):
                 return self._in_finer_form(current)
             screened = trials.screened(current)
-            tried = fit_candidates(trials, current, screened, int(most) - len(current.causes))
-            candidates = all_pruned(trials, current, tried, screened)
+            plainly = trials.selection.only_much_matters(current)
+            tried = fit_candidates(trials, current, screened, int(most) - len(current.causes), plainly)
+            candidates = all_pruned(trials, current, tried, None if plainly else screened)
             candidates = trials.selection.ranked(candidates)
             better = [t for t in candidates if trials.selection.improves_enough(current, t)]
             best = self._most_parsimonious(current, better, screened) if better else current

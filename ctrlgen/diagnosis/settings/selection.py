@@ -127,6 +127,8 @@ class SearchSettings:
     """Laws in a region fitted a round, beside them. Judgement."""
     candidate_steps: int = 8
     """Levenberg-Marquardt steps of a candidate at first; the promising ones are fitted until they converge."""
+    causes_of_little: int = 2
+    """Causes at once that are tried where what is left is too little to be worth a name but as a whole. Judgement."""
     converged_candidates: int = 2
     """Candidates a round that are fitted until they converge although they look useless: laws with corners and events need
     many steps."""
