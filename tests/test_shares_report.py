@@ -192,12 +192,12 @@ def test_the_ceiling_names_what_has_most_first(shares, said):
     [
         (
             channel({Kind.TRAVEL_HISTORY: 0.64}, 0.7),
-            "What is left in axis is mostly a function of the history of travel, 64 % (54 ... 74 % alone), where hysteresis or "
+            "What is left in axis is mostly a function of the history of travel, 64 %, alone 64 % (54 ... 74 %), where hysteresis or "
             "dry friction would show, which no confirmed law of the library reaches.",
         ),
         (
             channel({Kind.POSITION: 0.3}, 0.4, past=0.2),
-            "What is left in axis is in part a function of position, 30 % (20 ... 40 % alone), where elastic nonlinearity or "
+            "What is left in axis is in part a function of position, 30 %, alone 30 % (20 ... 40 %), where elastic nonlinearity or "
             "sensor geometry would show, which no confirmed law of the library reaches; its own past predicts 20 % more.",
         ),
         (channel({}, 0.6, constant=0.6), "What is left in axis is mostly a constant, 60 %."),
@@ -211,6 +211,14 @@ def test_the_ceiling_names_what_has_most_first(shares, said):
 )
 def test_what_is_left_is_said_by_its_kind(shares, said):
     assert rest_sentence(shares) == said
+
+
+def test_the_interval_of_a_signal_alone_stands_at_its_own_share():
+    """Beside others a place in a pitch may explain more than alone, and the interval of the one need not hold the other."""
+    beside = channel({Kind.TRAVEL_HISTORY: 0.43}, 0.6)
+    alone = replace(beside.selected[0], alone=Share(0.12, (0.0, 0.32)))
+    said = rest_sentence(replace(beside, kinds=(alone,)))
+    assert "the history of travel, 43 %, alone 12 % (0 ... 32 %), where" in said
 
 
 def test_shares_are_shown_in_whole_per_cent_and_near_the_whole_in_tenths():

@@ -104,7 +104,7 @@ def ceiling_sentence(c: ChannelShares) -> str:
 
 
 def rest_sentence(c: ChannelShares) -> str:
-    """'What is left in axis is mostly a function of travel history, 64 % (50 ... 71 %), which ...'."""
+    """'What is left in axis is mostly a function of travel history, 64 %, alone 60 % (50 ... 71 %), which ...'."""
     left = f"What is left in {short(c.channel)}"
     past = f"its own past predicts {per_cent(c.rest_own_past)}" if c.rest_own_past >= SHARES.told else None
     part, share = next(iter(named_parts(c)), (None, 0.0))
@@ -120,7 +120,7 @@ def rest_sentence(c: ChannelShares) -> str:
     families = [f.value for f in SPEAKS_FOR[row.kind][0][:FAMILIES]]
     where = f", where {' or '.join(families)} would show" if families else ""
     return (
-        f"{left} is {_mostly(share)} a function of {part_name(c, part)}, {per_cent(share)} ({interval(row.alone.ci95)} alone){where}, "
+        f"{left} is {_mostly(share)} a function of {part_name(c, part)}, {per_cent(share)}, alone {with_interval(row.alone)}{where}, "
         f"which no confirmed law of the library reaches{memory}."
     )
 
