@@ -228,8 +228,8 @@ LAWS = {
     "saturation": ({"level": 0.4}, clipped),
     "slew_rate": (
         {"rate": 40.0},
-        lambda s, p: p.share * (s.mean - s.rise / 2 - sign(s.begin * s.rise) * (s.w - s.begin) - s.value),
-        lambda s, p: {"w": -sign(s.begin * s.rise) * s.rise / H},
+        lambda s, p: p.share * (s.mean - s.rise / 2 + s.w - s.value),
+        lambda s, p: {"w": s.rise / H},
     ),
     "screw_motion": ({}, lambda s, p: p.share * cross(s.all[:3], s.all[3:])[s.index - 3] / 2),
     "second_pole": ({"tau": 0.3}, lambda s, p: p.share * (s.w - s.value), lambda s, p: {"w": (s.value - s.w) / 0.3}),
