@@ -132,6 +132,10 @@ def test_of_what_is_too_little_for_a_name_only_much_is_sought(monkeypatch):
     screened = trials.screened(described)
     need = candidates.much_of(little)
     assert need == pytest.approx(0.375 * described.fitted.white.sum())
+    two = replace(described.fitted, white=np.array([[4.0, 1.0], [4.0, 2.0]]))
+    assert candidates.much_of(replace(little, fitted=two)) == pytest.approx(
+        0.375 * 3.0
+    )  # of the channel that weighs least
     loud, weak = (replace(screened.suspects[0], z=z * np.sqrt(need)) for z in (1.01, 0.99))
     for suspects in ((loud,), (weak,)):
         candidates.fit_candidates(trials, little, replace(screened, suspects=suspects), 4, plainly=True)

@@ -18,9 +18,8 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
-from ctrlgen.effects import Place
+from ctrlgen.effects import Effect
 from ctrlgen.model.discretisation import held_step, varied_step
-from ctrlgen.model.effect_terms import LOOKS_BACK
 from ctrlgen.model.model import Model
 from ctrlgen.numerics.newton import newton_root
 
@@ -116,18 +115,12 @@ def invert(
 
 
 def _check_delivered(model: Model) -> None:
-    """Refuses a model between whose drives and motion a law looks back by samples: such a law is not inverted. Raises InputError."""
-    kept = [
-        Fault(
-            f"effect[{k}].kind",
-            f"{e.kind} looks back by samples and is not inverted: build the model without a sample time",
-        )
-        for k, e in enumerate(model.device.effect)
-        if LOOKS_BACK in e.requires and e.place is not Place.SENSOR
-        if any(name.startswith(f"{e.kind}_{k}_") for name in model.x_names)
-    ]
-    if kept:
-        raise InputError(model.name, kept)
+    """Refuses a model with memories that rest only after many samples, such as those of a drive whose rate is limited: over one sample what
+    a drive is beyond that rate moves nothing, and there is no root. Raises InputError."""
+    what = "looks back by samples and is not inverted: build the model without a sample time"
+    if model.resting:
+        kinds = [(k, e.kind) for k, e in enumerate(model.device.effect) if type(e).resting is not Effect.resting]
+        raise InputError(model.name, [Fault(f"effect[{k}].kind", f"{kind} {what}") for k, kind in kinds])
 
 
 @dataclass(frozen=True)

@@ -125,7 +125,8 @@ def write_fmus(scenario: Scenario, out: Path, fmi: int = 3, limited: Model | Non
     with whole_folder(Path(out)) as draft, tempfile.TemporaryDirectory(prefix="ctrlgen-") as scratch:
         units = [_plant_unit(scenario, plant, Path(scratch))]
         try:
-            led = model_of(scenario) if limited is None else model_of(scenario).limited_as(limited)
+            led = model_of(scenario)
+            led = led if limited is None else led.limited_as(limited)
             units.insert(0, _controller_unit(scenario, led, plant.sample_time, Path(scratch)))
         except InputError as error:
             if not (plant.inertial or plant.model.redundant or plant.model.rate_limits):
