@@ -15,8 +15,8 @@ FORCE_CONSTANT = "parameter@force_constant"
 ACCEPTED: dict[str, tuple[str, ...]] = {
     "softening": ("stiffening",),
     "hysteresis": ("hysteresis", "bouc_wen"),
-    "creep": ("creep", "log_creep", "thermal_lag", "second_pole"),
-    "log_creep": ("log_creep", "creep"),
+    "creep": ("creep", "log_creep", "power_creep", "thermal_lag", "second_pole"),
+    "log_creep": ("log_creep", "creep", "power_creep"),
     "thermal_lag": ("thermal_lag", "second_pole", "creep"),
     "viscous": ("viscous", "asymmetric_viscous"),
     "step": ("step", "force_step"),

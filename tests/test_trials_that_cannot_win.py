@@ -131,25 +131,21 @@ def test_of_what_is_too_little_for_a_name_only_much_is_sought(monkeypatch):
     )
     screened = trials.screened(described)
     need = candidates.much_of(little)
-    assert need == pytest.approx(0.375 * described.fitted.white.sum())
-    two = replace(described.fitted, white=np.array([[4.0, 1.0], [4.0, 2.0]]))
-    assert candidates.much_of(replace(little, fitted=two)) == pytest.approx(
-        0.375 * 3.0
-    )  # of the channel that weighs least
+    n, errors = described.fitted.n_plain.sum(), described.errors
+    assert need == pytest.approx(0.375 * n / errors.tau[0])
+    assert screened.suspects[0].hypothesis == BACKLASH and screened.suspects[0].z ** 2 > need  # it is all that is left
+    two = replace(
+        described.fitted, n_plain=np.array([[40.0, 9.0], [40.0, 9.0]]), white=np.array([[7e3, 4.0], [7e3, 2.0]])
+    )
+    both = replace(errors, rms=np.array([1e-7, 0.0]), tau=np.array([20.0, 1.0]))
+    assert replace(little, fitted=two, errors=both).squares == pytest.approx([4.0, 6.0])
+    assert candidates.much_of(replace(little, fitted=two, errors=both)) == pytest.approx(0.375 * 4)  # of the lightest
     loud, weak = (replace(screened.suspects[0], z=z * np.sqrt(need)) for z in (1.01, 0.99))
     for suspects in ((loud,), (weak,)):
         candidates.fit_candidates(trials, little, replace(screened, suspects=suspects), 4, plainly=True)
     assert (singles, sets, begun) == ([[loud], []], [(2, need)] * 2, [])
     candidates.fit_candidates(trials, more, replace(screened, suspects=(weak,)), 4)
     assert singles[2][0] is weak and sets[-1] == (4, 0.0) and begun
-
-
-def test_of_suspects_that_look_alike_the_loudest_is_taken():
-    trials, described = trials_beside(fitter_of(played), [BACKLASH])
-    some = trials.screened(described).suspects[0]
-    loud, same, quiet = (replace(some, z=z, index=i) for z, i in ((9.0, 0), (-8.0, 1), (7.0, 2)))
-    alike = Screened((same, quiet, loud), np.array([[1, -0.99, 0.5], [-0.99, 1, 0.6], [0.5, 0.6, 1]]), lambda: 4.0, {})
-    assert candidates.unlike(alike, alike.suspects) == [loud, quiet]
 
 
 def test_a_cause_is_asked_what_it_leaves_once_it_is_fitted_under_its_own_errors():

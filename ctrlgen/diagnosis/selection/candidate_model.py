@@ -42,6 +42,13 @@ class CandidateModel:
         """The causes of its structure."""
         return self.fit.structure.causes
 
+    @property
+    def squares(self) -> np.ndarray:
+        """The squares (n_y,) that it leaves on the records to fit, weighed as the scores of a screen are: by noise, and where it has
+        discrepancy by that, under which a residual leaves one for each independent sample (`ErrorModel`)."""
+        of_discrepancy = self.fitted.n_plain.sum(axis=0) / self.errors.tau
+        return np.where(self.errors.rms > 0, of_discrepancy, self.fitted.white.sum(axis=0))
+
 
 @dataclass(frozen=True, eq=False)
 class Refusal:

@@ -9,14 +9,13 @@ import numpy as np
 
 from ctrlgen.diagnosis.selection.begun_again import begun_again
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
-from ctrlgen.diagnosis.selection.confusable import likeness
 from ctrlgen.diagnosis.selection.failures import FAILURES
 from ctrlgen.diagnosis.selection.far_off import nearer_when_simulated
 from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.diagnosis.selection.shifts import best_shift
 from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.selection.trials import Trials
-from ctrlgen.diagnosis.settings import CONFUSABLE, MODEL_SELECTION, REGIONS, SEARCH, SUBSETS
+from ctrlgen.diagnosis.settings import MODEL_SELECTION, REGIONS, SEARCH, SUBSETS
 from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis
 from ctrlgen.estimation.settings import FIT
@@ -27,11 +26,11 @@ def fit_candidates(
     trials: Trials, current: CandidateModel, screened: Screened, most: int = SUBSETS.largest, plainly: bool = False
 ) -> tuple[CandidateModel, ...]:
     """All that is tried beside `current`, `most` causes at once, the promising ones fitted to their end; `plainly`: one and two causes
-    that promise to take much away (`ModelSelection.only_much_matters`), each from its best start, of suspects that look alike the loudest,
-    and none to its end: what is accepted meets its rivals later."""
+    that promise to take much away (`ModelSelection.only_much_matters`), each from its best start and none to its end: what is accepted
+    meets its rivals later."""
     suspects = significant(trials, current, screened)
     if plainly:
-        suspects = [s for s in unlike(screened, suspects) if s.z**2 >= much_of(current)]
+        suspects = [s for s in suspects if s.z**2 >= much_of(current)]
     else:
         suspects = [*suspects, *nearer_when_simulated(trials, current, screened, suspects)]
     candidates = fit_each(trials, current.fit, suspects)
@@ -87,16 +86,7 @@ def significant(trials: Trials, current: CandidateModel, screened: Screened, mos
 def much_of(current: CandidateModel) -> float:
     """The score z^2 at which a suspect, or a set, may take much of what `current` leaves in the channel that weighs least. As a rival's,
     the score is short of what a fit of the shapes reaches."""
-    return SEARCH.rival_share * MODEL_SELECTION.much * float(current.fitted.white.sum(axis=0).min())
-
-
-def unlike(screened: Screened, suspects: Sequence[Suspect]) -> list[Suspect]:
-    """The suspects without those that look like a louder one."""
-    chosen: list[Suspect] = []
-    for s in sorted(suspects, key=lambda s: -abs(s.z)):
-        if all(likeness(screened, s, louder) < CONFUSABLE.cosine for louder in chosen):
-            chosen.append(s)
-    return chosen
+    return SEARCH.rival_share * MODEL_SELECTION.much * float(current.squares.min())
 
 
 def _loudest(suspects: Sequence[Suspect], most: int, of_one_law: int) -> list[Suspect]:
