@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from axis_records import AXIS, BACKLASH, NOISE, H, axis_fitter, drive, fitter_of, played, record
 
-from ctrlgen.diagnosis.selection import candidates
+from ctrlgen.diagnosis.selection import candidates, rivals
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
 from ctrlgen.diagnosis.selection.shifts import best_shift
 from ctrlgen.diagnosis.selection.trials import Trials
@@ -204,6 +204,21 @@ def test_a_set_is_fitted_as_long_as_it_may_reach_what_a_smaller_one_did(monkeypa
     monkeypatch.setattr(Trials, "tried", lambda *_, enough: asked.append(enough) or [])
     candidates.fit_subsets(trials, current, screened, [single])
     assert asked == [pytest.approx(single.fit.objective)]
+
+
+def test_rivals_of_what_leaves_noise_alone_are_fitted_to_their_end_where_they_may_leave_about_as_little(monkeypatch):
+    trials, described = trials_beside(fitter_of(played), [BACKLASH, CLOCK])
+    held = trials.tried(described.fit.restarted.with_cause(BACKLASH, {"gap": 5e-8}), BACKLASH, described.fit)[0]
+    held = trials.converged(held)
+    late = trials.fit(described.fit.restarted.with_cause(CLOCK, {"delay": 1e-5}), CLOCK, steps=1)
+    asked, converged = [], Trials.converged
+    monkeypatch.setattr(Trials, "close_contenders", lambda *_: [late])
+    monkeypatch.setattr(
+        Trials, "converged", lambda self, t, enough=np.inf: asked.append(enough) or converged(self, t, enough)
+    )
+    rivals.replacements(trials, held, 0)
+    rivals.replacements(trials, replace(held, errors=described.errors), 0)
+    assert held.errors.is_noise and asked == [pytest.approx(2 * held.fit.objective), np.inf]
 
 
 # the slope tells the first, the best of many shifts the last

@@ -173,7 +173,8 @@ def finer_forms(trials: Trials, current: CandidateModel) -> tuple[CandidateModel
         starts = [others.with_cause(finer, shape | begun(shape)) for shape in shapes]
         if len(starts) > 1:
             starts = sorted(starts, key=branch.fitter.rough_objective)[: SEARCH.restarts]
-        fitted = branch.tried(starts[0], finer, steps=FIT.max_steps)
+        # a finer form that leaves more than the plain one is none
+        fitted = branch.tried(starts[0], finer, steps=FIT.max_steps, enough=current.fit.objective)
         return [branch.begun_better(t, starts[1:]) for t in fitted]
 
     def peaks(finer: Hypothesis) -> DataHints:

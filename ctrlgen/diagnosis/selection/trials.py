@@ -190,14 +190,14 @@ class Trials:
         """Keeps why a trial of a cause could not be made."""
         self.failed.append(Failure(cause, reason_of(error)))
 
-    def converged(self, candidate: CandidateModel) -> CandidateModel:
-        """The same candidate fitted until it converges, or as it was where that fails: candidates are first fitted for a few
-        steps only."""
+    def converged(self, candidate: CandidateModel, enough: float = np.inf) -> CandidateModel:
+        """The same candidate fitted until it converges, or cannot reach an objective that is `enough`, or as it was where that fails:
+        candidates are first fitted for a few steps only."""
         structure = candidate.fit.restarted.expanded_again()
         if structure.expanded_at != candidate.fit.structure.expanded_at:
             # what its steps missed bent its numbers, and made it look better than it is
             self.fitted.pop(frozenset(structure.causes), None)
-        fitted = self.tried(structure, candidate.cause, steps=FIT.max_steps)
+        fitted = self.tried(structure, candidate.cause, steps=FIT.max_steps, enough=enough)
         return fitted[0] if fitted else candidate
 
     def begun_better(self, candidate: CandidateModel, starts: Sequence[Structure]) -> CandidateModel:
