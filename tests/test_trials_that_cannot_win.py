@@ -10,6 +10,7 @@ from axis_records import AXIS, BACKLASH, NOISE, H, axis_fitter, drive, fitter_of
 
 from ctrlgen.diagnosis.selection import candidates, rivals
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
+from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.shifts import best_shift
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import SEARCH
@@ -146,6 +147,21 @@ def test_of_what_is_too_little_for_a_name_only_much_is_sought(monkeypatch):
     assert (singles, sets, begun) == ([[loud], []], [(2, need)] * 2, [])
     candidates.fit_candidates(trials, more, replace(screened, suspects=(weak,)), 4)
     assert singles[2][0] is weak and sets[-1] == (4, 0.0) and begun
+
+
+def test_a_cause_of_a_thousandth_of_the_mismatch_is_found_where_it_is_most_of_the_rest():
+    """A reading bent by 300 times the noise, and a play of twelve times: the rest is five times the noise."""
+    bend = Hypothesis("cubic_sensor", "sensor:axis", "axis")
+    fitter = fitter_of(played, after=lambda y: y + 1e7 * y**3)
+    found = Searcher(fitter, Screen(fitter, [bend, BACKLASH, CYCLIC]), lambda _: None).run(AXIS)
+    rounds = [r.before for r in found.rounds]
+    trials = Trials(fitter, Screen(fitter, []), lambda _: None)
+    trials.mismatch = rounds[0].held_out.plain_mean * fitter.noise.floor**2
+    assert rounds[1].causes == (bend,) and trials.selection.only_much_matters(rounds[1])
+    assert found.chosen.causes == (bend, BACKLASH)
+    assert found.chosen.fit.values(1)["gap"] == pytest.approx(6e-8, rel=0.05)
+    # squares over those of the noise
+    assert rounds[1].held_out.plain_mean > 20 and found.chosen.held_out.plain_mean < 1.5
 
 
 def test_a_cause_is_asked_what_it_leaves_once_it_is_fitted_under_its_own_errors():
