@@ -222,7 +222,8 @@ def test_a_set_is_fitted_as_long_as_it_may_reach_what_a_smaller_one_did(monkeypa
     assert asked == [pytest.approx(single.fit.objective)]
 
 
-def test_rivals_of_what_leaves_noise_alone_are_fitted_to_their_end_where_they_may_leave_about_as_little(monkeypatch):
+def test_rivals_are_fitted_to_their_end_where_they_may_leave_about_as_little(monkeypatch):
+    """Of few independent samples, twenty say, a ratio of the squares tells little: T is 20 ln of it."""
     trials, described = trials_beside(fitter_of(played), [BACKLASH, CLOCK])
     held = trials.tried(described.fit.restarted.with_cause(BACKLASH, {"gap": 5e-8}), BACKLASH, described.fit)[0]
     held = trials.converged(held)
@@ -232,9 +233,10 @@ def test_rivals_of_what_leaves_noise_alone_are_fitted_to_their_end_where_they_ma
     monkeypatch.setattr(
         Trials, "converged", lambda self, t, enough=np.inf: asked.append(enough) or converged(self, t, enough)
     )
-    rivals.replacements(trials, held, 0)
-    rivals.replacements(trials, replace(held, errors=described.errors), 0)
-    assert held.errors.is_noise and asked == [pytest.approx(2 * held.fit.objective), np.inf]
+    slow = ErrorModel(trials.fitter.noise, np.array([NOISE]), held.fitted.n_plain.sum(axis=0) / 20)
+    for model in (held, replace(held, errors=slow)):
+        rivals.replacements(trials, model, 0)
+    assert asked == pytest.approx([2 * held.fit.objective, np.exp(3) * held.fit.objective])
 
 
 # the slope tells the first, the best of many shifts the last

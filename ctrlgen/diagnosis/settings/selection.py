@@ -135,9 +135,9 @@ class SearchSettings:
     rival_share: float = 0.5
     """Share of what a cause explains that a rival must promise by its score to be fitted: shape parameters between the
     start values lose so much."""
+    rival_margin: float = 60.0
+    """By how much T may rise, by the records to fit, of a rival fitted to its end; or its objective `rival_reach` times. Judgement."""
     rival_reach: float = 2.0
-    """Objective, over that of a model that leaves noise alone, that a rival of one of its causes must be able to reach to be fitted to
-    its end. What explains alike differs by some tens; the rest is margin. Judgement."""
     most_rivals: int = 8
     """Rivals fitted for a cause, beside those in a region: some of them meet an objection."""
     bound_slack: float = 9.0
