@@ -130,14 +130,14 @@ class SearchSettings:
     causes_of_little: int = 2
     """Causes at once that are tried where what is left is too little to be worth a name but as a whole. Judgement."""
     converged_candidates: int = 2
-    """Candidates a round that are fitted until they converge although they look useless: laws with corners and events need
-    many steps."""
+    """Candidates a round that are fitted until they converge although they look useless: corners and events need many steps."""
     rival_share: float = 0.5
     """Share of what a cause explains that a rival must promise by its score to be fitted: shape parameters between the
     start values lose so much."""
     rival_margin: float = 60.0
-    """By how much T may rise, by the records to fit, of a rival fitted to its end; or its objective `rival_reach` times. Judgement."""
+    """By how much the criterion T of a rival that is fitted to its end may be worse, by the records to fit. Judgement."""
     rival_reach: float = 2.0
+    """Ratio of its squares to those of the model that is allowed in any case. Judgement."""
     most_rivals: int = 8
     """Rivals fitted for a cause, beside those in a region: some of them meet an objection."""
     bound_slack: float = 9.0
