@@ -12,6 +12,7 @@ from ctrlgen.diagnosis.report.answer import answer
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.findings import ChanceEntry, ChannelErrorEntry, Finding
 from ctrlgen.diagnosis.selection.verdict import Verdict
+from ctrlgen.recordings.plausibility import Implausible
 
 
 def finding(cause, share: float | None, *alternatives, chance: ChanceEntry | None = None) -> Finding:
@@ -19,7 +20,7 @@ def finding(cause, share: float | None, *alternatives, chance: ChanceEntry | Non
     return Finding(cause.effect, cause.location, {}, alternatives, taken, {}, "", cause, chance=chance)
 
 
-def told(verdict: Verdict, *findings: Finding, passed=False, after=2.0, untried=(), taken=0.6) -> list[str]:
+def told(verdict: Verdict, *findings: Finding, passed=False, after=2.0, untried=(), taken=0.6, notes=()) -> list[str]:
     errors = ChannelErrorEntry(
         rms_before=50.0,
         rms_after=after,
@@ -44,6 +45,7 @@ def told(verdict: Verdict, *findings: Finding, passed=False, after=2.0, untried=
             shares=None,
             unconfirmed=(),
             attribution=SimpleNamespace(explained=taken),
+            notes=notes,
         )
     )
 
@@ -96,3 +98,13 @@ def test_what_could_not_be_tried_is_told_last():
     without, beside = (told(Verdict.UNEXPLAINED, untried=lost) for lost in ((), ("3 of 4 causes could not be.",)))
     assert without[0].endswith("and no known effect explains it.") and len(without) == 2
     assert beside[0].endswith("and no effect that could be tried explains it.") and beside[-1].startswith("3 of 4")
+
+
+def test_what_cannot_be_right_of_the_recording_is_told_before_any_cause():
+    notes = ("axis was sampled at 1 kHz", Implausible("axis is 10 times too large"), Implausible("axis is early"))
+    first, second, *_ = told(Verdict.PARTLY, finding(GAIN, 0.6), notes=notes)
+    assert first == "Check this first: axis is 10 times too large (1 more in the notes)."
+    assert second.startswith("Partly explained: ")
+    (asked, *_) = told(Verdict.PARTLY, finding(GAIN, 0.6), notes=(Implausible("was a sign changed?"),))
+    assert asked == "Check this first: was a sign changed?"
+    assert told(Verdict.PARTLY, finding(GAIN, 0.6), notes=notes[:1])[0].startswith("Partly explained: ")

@@ -163,6 +163,57 @@ def test_a_wrong_rate_is_told_where_the_readings_show_the_dynamics(written, name
     assert any(what in s for s in said), said
 
 
+def altered(folder, model, text: str, name: str, fit: float, held: float) -> list[str]:
+    """What is said of a log whose reading is multiplied in its first half, which is fitted, and in its second one, held out."""
+    head, *rows = (folder / "log.csv").read_text().splitlines()
+    place = head.split(",").index(name)
+    half = len(rows) // 2
+    for file, factor, part in (("fit.csv", fit, rows[:half]), ("held.csv", held, rows[half:])):
+        numbers = [[float(v) for v in row.split(",")] for row in part]
+        lines = [[factor * v if i == place else v for i, v in enumerate(row)] for row in numbers]
+        (folder / file).write_text("\n".join([head, *(",".join(f"{v:.9g}" for v in line) for line in lines)]) + "\n")
+    before, record, after = re.split(r"(\[\[record\]\].*)(?=\[columns\])", text, flags=re.DOTALL)
+    poses = "poses" in before
+    records = [
+        record.replace("log.csv", "fit.csv"),
+        record.replace("log.csv", "held.csv").replace('"fit"', '"hold_out"'),
+    ]
+    starts = ["", ""] if poses else ['start = "0 s"\n', 'start = "100 s"\n']
+    both = "".join(r + start for r, start in zip(records, starts, strict=True))
+    return said_of(before + both + after, folder, model)
+
+
+SIZES = {"turned round": (1.0, -1.0), "another range": (1.0, 10.0), "another unit": (1.0, 1e-3), "both": (-1.0, 10.0)}
+OF_LOGS = pytest.mark.parametrize(
+    "log", ["axis", "poses", *(pytest.param(n, marks=pytest.mark.long) for n in ("levers", "mirror"))]
+)
+
+
+@OF_LOGS
+def test_a_reading_of_another_size_or_sign_in_one_record_is_told(written, log):
+    folder, model, text = written(log)
+    for name in LOGS[log].readings:
+        assert altered(folder, model, text, name, 1.0, 1.0) == []
+        for what, (fit, held) in SIZES.items():
+            said = [s for s in altered(folder, model, text, name, fit, held) if "changed between them" in s]
+            assert len(said) == 1 and said[0].startswith(f"reading.{name} is "), (name, what, said)
+            sizes = {file: float(size) for size, file in re.findall(r"(\S+) times [^,]*?in (\w+)\.csv", said[0])}
+            # the second half does not begin settled, as the model does
+            assert sizes == {"fit": pytest.approx(fit, rel=0.1), "held": pytest.approx(held, rel=0.1)}, said
+
+
+@OF_LOGS
+def test_a_reading_so_large_as_no_description_is_off_is_told_where_no_unit_makes_it(written, log):
+    folder, model, text = written(log)
+    for name in LOGS[log].readings:
+        for times in (5.0, 0.2):
+            (said,) = altered(folder, model, text, name, times, times)
+            assert "the sensor's scale" in said
+            told = re.match(rf"reading\.{name} is (\S+) times ", said)
+            assert told and float(told[1]) == pytest.approx(times, rel=0.1)
+        assert altered(folder, model, text, name, 2.0, 2.0) == []  # a description may be as far off
+
+
 def test_a_speed_that_is_no_slope_of_its_position_is_told(tmp_path):
     model, t = build_model(load_device(SCENARIOS / "servo_motor" / "device.toml")), 0.01 * np.arange(1000)
     x, v, f = np.sin(t), np.cos(t), 1e-4 * np.cos(t)

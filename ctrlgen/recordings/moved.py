@@ -21,12 +21,13 @@ MOST_STRETCHES = 4
 @dataclass(frozen=True)
 class Stretch:
     """`u` (n, n_u) and `y` (n, n_y) [SI], NaN where nothing was read, every `step` [s], infinite for settled poses; `linear`: the drive is
-    linear between samples."""
+    linear between samples; `name` of its record."""
 
     u: np.ndarray
     y: np.ndarray
     step: float
     linear: bool
+    name: str = ""
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def moved(recording: Recording, model: Model) -> Moved | None:
     places = [i for i, name in enumerate(recording.channels) if name.partition(".")[0] in ("reading", "pose")]
     readings = tuple((recording.channels[i], recording.units[i]) for i in places)
     stretches = [
-        Stretch(r.drive, np.where(r.valid, r.observed, np.nan)[:, places], r.sample_time, r.linear)
+        Stretch(r.drive, np.where(r.valid, r.observed, np.nan)[:, places], r.sample_time, r.linear, r.name)
         for r in recording.records
         if r.role != "rest"
     ]

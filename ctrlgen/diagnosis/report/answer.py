@@ -1,5 +1,5 @@
 """The answer of a diagnosis in three sentences at most: the main cause, the held-out error, what is left and of what kind it is. What
-errors kept from being tried follows where that is much of what there was to try.
+errors kept from being tried follows where that is much of what there was to try; what cannot be right of the recording comes first.
 
 Every number is one of a table: shares are of the error that the table calls before, in the channel or in all, and the largest
 error that is left stands beside its noise.
@@ -15,6 +15,7 @@ from ctrlgen.diagnosis.report.luck_sentences import doubt_of_luck, short_doubt
 from ctrlgen.diagnosis.report.narrative import (
     cause_text,
     channel_sentence,
+    implausible_notes,
     interval,
     per_cent,
     short,
@@ -59,11 +60,18 @@ def sentence(diagnosis: Diagnosis) -> str:
 
 
 def answer(diagnosis: Diagnosis) -> list[str]:
-    """The answer sentence by sentence: cause, size, share; held-out error of the channel that was worst; what is left; what could not be
-    tried."""
+    """The answer sentence by sentence: what is to be checked before anything is believed; cause, size, share; held-out error of the channel
+    that was worst; what is left; what could not be tried."""
     channel = worst_channel(diagnosis)
     errors = channel_sentence(channel, diagnosis.held_out[channel])
-    return [_cause(diagnosis), errors, *_left(diagnosis), *diagnosis.untried.sentences()]
+    return [*_to_check(diagnosis), _cause(diagnosis), errors, *_left(diagnosis), *diagnosis.untried.sentences()]
+
+
+def _to_check(diagnosis: Diagnosis) -> list[str]:
+    """What cannot be right of the recording as it is stated: whatever is found may be that alone."""
+    first, *others = implausible_notes(diagnosis) or [""]
+    more = f" ({len(others)} more in the notes)" if others else ""
+    return [f"Check this first: {first}{more}{'' if first.endswith('?') and not more else '.'}"] if first else []
 
 
 def worst_channel(diagnosis: Diagnosis) -> str:

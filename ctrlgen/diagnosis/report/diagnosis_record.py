@@ -15,6 +15,7 @@ from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.evidence.experiment_design import NextExperimentEntry
 from ctrlgen.diagnosis.evidence.residual_location import ResidualLocations
 from ctrlgen.diagnosis.report.answer import sentence
+from ctrlgen.diagnosis.report.narrative import implausible_notes
 from ctrlgen.diagnosis.report.shares_sentences import noise_of, shares_sentences
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.cause_entry import Cause
@@ -24,7 +25,6 @@ from ctrlgen.diagnosis.selection.precedence import why_alike
 from ctrlgen.diagnosis.selection.search_history import RoundEntry, search_history
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.diagnosis.shares.shares_record import FractionEntry, SharesEntry, table_record
-from ctrlgen.recordings.plausibility import Implausible
 from ctrlgen.reporting.result_file import Keys, Number, Origin, origin
 
 # 95 %
@@ -155,7 +155,7 @@ def diagnosis_record(diagnosis: Diagnosis, provenance: Provenance) -> DiagnosisR
         **origin(provenance.inputs, provenance.seed, d.notes),
         verdict=d.verdict,
         sentence=sentence(d),
-        implausible=[note for note in d.notes if isinstance(note, Implausible)],
+        implausible=implausible_notes(d),
         findings=[_finding_entry(f) for f in d.findings],
         attribution=AttributionEntry(
             explained=d.attribution.explained,

@@ -17,6 +17,7 @@ from ctrlgen.diagnosis.selection.not_taken import that_matter
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.hypothesis import PARAMETER
+from ctrlgen.recordings.plausibility import Implausible
 from ctrlgen.reporting.numbers import number, sized
 
 # refusals that are told
@@ -145,7 +146,16 @@ def per_cent(share: float) -> str:
 
 def next_steps(diagnosis: Diagnosis) -> list[str]:
     """What to do next, in order."""
-    return [*_steps(diagnosis), *luck_steps(diagnosis.findings)]
+    first = [UNCHECKED] if implausible_notes(diagnosis) else []
+    return [*first, *_steps(diagnosis), *luck_steps(diagnosis.findings)]
+
+
+def implausible_notes(diagnosis: Diagnosis) -> list[str]:
+    """The notes on what cannot be of the device as it is stated."""
+    return [note for note in diagnosis.notes if isinstance(note, Implausible)]
+
+
+UNCHECKED = "Before device.next.toml is used, check what the first sentence names, and diagnose again: the findings may be that alone."
 
 
 def _steps(diagnosis: Diagnosis) -> list[str]:
