@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import json
 
 import pytest
@@ -17,6 +18,7 @@ from ctrlgen.diagnosis.report.diagnosis_first_screen import diagnosis_first_scre
 from ctrlgen.diagnosis.report.diagnosis_record import Provenance, diagnosis_record
 from ctrlgen.diagnosis.report.narrative import channel_sentence
 from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry
+from ctrlgen.recordings.plausibility import Implausible
 from ctrlgen.reporting.result_file import json_text
 
 
@@ -222,3 +224,15 @@ def test_errors_that_no_step_may_follow_from_are_found(sound, screen, findings, 
 def test_parts_that_are_no_part_of_the_whole_are_found(sound, screen, said, sound_one):
     shares = (sound["shares"] or {}) | {"statements": [said]}
     assert (screen_contradictions(sound | {"shares": shares}, **screen) == []) == sound_one
+
+
+def test_what_cannot_be_right_of_the_recording_stands_before_the_answer(found):
+    doubted = dataclasses.replace(found, notes=(*found.notes, Implausible("reading.axis is 10 times too large")))
+    record = json.loads(json_text(diagnosis_record(doubted, Provenance({}, 0))))
+    assert record["sentence"].startswith("Check this first: reading.axis is 10 times too large. Explained: ")
+    assert contradictions(record) == []
+    first = diagnosis_first_screen(doubted, {})
+    assert first.steps[0].startswith("Before device.next.toml is used")
+    assert screen_contradictions(record, list(first.answer), [list(n) for n in first.numbers], list(first.steps)) == []
+    for wrong in ({"implausible": []}, {"sentence": record["sentence"].partition(". ")[2]}):
+        assert contradictions(record | wrong)
