@@ -62,7 +62,9 @@ def test_a_column_of_another_unit_is_no_agreement(clean, unit):
     path = clean / "recording.toml"
     path.write_text(path.read_text().replace('"nm"', f'"{unit}"').replace('"5 nm"', f'"5 {unit}"'))
     found = ctrlgen.diagnose(AXIS_FILE, clean)
-    assert found.verdict == Verdict.UNEXPLAINED and sentence(found).startswith("Unexplained")
+    first, _, answered = sentence(found).partition(" Unexplained: ")
+    assert found.verdict == Verdict.UNEXPLAINED and answered
+    assert first.startswith("Check this first: reading.axis is ") and 'write unit = "nm"' in first
     assert "units" in " ".join(next_steps(found))
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ctrlgen.recordings.moved import Moved
 from ctrlgen.recordings.plausible_units import RIGHT
+from ctrlgen.reporting.numbers import number
 
 FOLLOWS_CLOSELY = 0.9
 """Share of a reading's variance that all drives together explain, from which its coefficient in a single record is believed."""
@@ -32,10 +33,11 @@ def size_notes(seen: Moved) -> list[str]:
         if _apart(ends[0][1], ends[1][1]):
             # the one that is further from once is the one to look at
             (odd, off), (usual, other) = sorted(ends, key=lambda k: -_off(k[1]))
-            what = f"{name} is {off:.3g} times what the device's model makes of the drives in {odd}, and {other:.3g} times in {usual}"
+            model = "what the device's model makes of the drives"
+            what = f"{name} is {number(off, 3)} times {model} in {odd}, and {number(other, 3)} times in {usual}"
             said.append(f"{what}: was a sign, a range or a unit changed between them?")
         elif size > 0 and _apart(size, 1.0):
-            what = f"{name} is {size:.3g} times what the device's model makes of the drives"
+            what = f"{name} is {number(size, 3)} times what the device's model makes of the drives"
             said.append(
                 f"{what}: the sensor's scale, the amplifier's gain, or stiffness or force in the device file is not as stated"
             )

@@ -17,6 +17,7 @@ from scipy.signal import lfilter
 
 from ctrlgen.recordings.alike_units import FULL, alike, size_of, unit_within
 from ctrlgen.recordings.moved import Moved
+from ctrlgen.reporting.numbers import number
 
 WRONG = 1.0
 """Powers of ten by which a coefficient is off, from which a unit is suspected: no description of a device is so far off."""
@@ -162,7 +163,7 @@ def _suspect(
     if not other or others[other] > RIGHT:
         return []
     names, times = ", ".join(name for name, _ in signals), 10 ** float(np.median(powers))
-    size = f"{times:.2g} times as large" if times > 1 else f"{1 / times:.2g} times smaller"
+    size = f"{number(times, 2)} times as large" if times > 1 else f"{number(1 / times, 2)} times smaller"
     whose = "the device's model makes of the drives" if sign > 0 else "the readings need in the device's model"
     verb = "is" if len(signals) == 1 else "are"
     what = f"{names} {verb} {size} {'as' if times > 1 else 'than'} {whose}"
