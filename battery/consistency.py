@@ -161,8 +161,7 @@ def _verdict(d: dict[str, Any]) -> Iterator[str]:
 def _sentence(d: dict[str, Any]) -> Iterator[str]:
     """The sentence: head, names and numbers are those of the verdict, the findings and the tables."""
     said = d["sentence"].replace("\u00a0", " ")
-    if d.get("implausible"):
-        # before the answer
+    if d["implausible"]:
         asked, head, rest = said.partition(f" {HEADS[d['verdict']]}: ")
         if not asked.startswith(f"Check this first: {d['implausible'][0]}"):
             yield f"what cannot be right of the recording does not come first: {said[:40]}"

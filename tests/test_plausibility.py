@@ -198,6 +198,8 @@ def test_a_reading_of_another_size_or_sign_in_one_record_is_told(written, log):
             said = [s for s in altered(folder, model, text, name, fit, held) if "changed between them" in s]
             assert len(said) == 1 and said[0].startswith(f"reading.{name} is "), (name, what, said)
             sizes = {file: float(size) for size, file in re.findall(r"(\S+) times [^,]*?in (\w+)\.csv", said[0])}
+            # the one that is further from once is named first
+            assert next(iter(sizes)) == ("fit" if what == "both" else "held"), said
             # the second half does not begin settled, as the model does
             assert sizes == {"fit": pytest.approx(fit, rel=0.1), "held": pytest.approx(held, rel=0.1)}, said
 

@@ -250,7 +250,7 @@ def replacements(trials: Trials, current: CandidateModel, k: int) -> list[Candid
     tried = trials.each(one, able, lambda s: f"{trying(s.hypothesis)} instead")
     fits = [t for fitted in tried for t in fitted]
     near = trials.close_contenders(without, current, trials.selection.ranked(fits))
-    # nor is what cannot leave about as little
+    # what cannot come near by the criterion is not fitted to its end
     n = max(trials.selection.samples(current.fitted, current.errors), 1.0)
     last = current.fit.objective * max(SEARCH.rival_reach, float(np.exp(SEARCH.rival_margin / n)))
     ends = trials.each(lambda branch, t: branch.converged(t, last), near)

@@ -137,7 +137,7 @@ class SearchSettings:
     rival_margin: float = 60.0
     """By how much the criterion T of a rival that is fitted to its end may be worse, by the records to fit. Judgement."""
     rival_reach: float = 2.0
-    """Ratio of its squares to those of the model that is allowed in any case. Judgement."""
+    """Objective of such a rival, over that of the model, that is allowed in any case. Judgement."""
     most_rivals: int = 8
     """Rivals fitted for a cause, beside those in a region: some of them meet an objection."""
     bound_slack: float = 9.0
