@@ -77,7 +77,11 @@ def friction_found(breakaway: float, plain_kind: str = "coulomb_after"):
 
 @pytest.mark.long
 def test_friction_that_sticks_from_a_moment_on_falls_with_the_speed(monkeypatch):
-    trials, plain, (finer,) = friction_found(2.0)
+    asked, tried = [], Trials.tried
+    with monkeypatch.context() as m:
+        m.setattr(Trials, "tried", lambda self, *a, **k: asked.append(k.get("enough")) or tried(self, *a, **k))
+        trials, plain, (finer,) = friction_found(2.0)
+    assert asked[0] == plain.fit.objective  # what leaves more than the plain form is not fitted to its end
     assert [c.effect for c in finer.causes] == ["stribeck_after"] and trials.selection.improves_enough(plain, finer)
     values = finer.fit.values(0)
     assert values["breakaway"] == pytest.approx(2.0, rel=0.05) and values["force"] == pytest.approx(0.2, rel=0.05)
