@@ -27,6 +27,7 @@ AXIS = AXIS_FILE.read_text()
 LOOP = '\n[loop]\nposition_gain = "60 1/s"\nvelocity_gain = "20 V/(m/s)"\nintegral_gain = "5e4 V/(m*s)"\n'
 SHAPES = {
     "creep": {"gain": 0.05, "tau": 0.1, "slow": 0.2},
+    "log_creep": {"gain": 0.05, "tau": 0.01, "decades": 2.0},
     "bouc_wen": {"stiffness": 1e4, "reach": 3e-5, "loop": 0.9},
     "resonance": {"stiffness": 2e4, "frequency": 160.0, "damping": 0.1},
     "coulomb": {"force": 0.5, "reach": 1e-6, "smoothing": 1e-3},
@@ -95,7 +96,10 @@ def agree(found: np.ndarray, wanted: np.ndarray) -> None:
 @pytest.mark.parametrize("linear", [False, pytest.param(True, marks=pytest.mark.long)], ids=["held", "linear"])
 @pytest.mark.parametrize("steps", [pytest.param(1, marks=pytest.mark.long), 3])
 @pytest.mark.parametrize("text, size", [(AXIS, 1.0), (AXIS + LOOP, 4e-5)], ids=["open", "loop"])
-@pytest.mark.parametrize("effects", [("creep", "bouc_wen", "resonance", "coulomb"), ("creep", "bouc_wen", "resonance")])
+@pytest.mark.parametrize(
+    "effects",
+    [("creep", "bouc_wen", "resonance", "coulomb"), ("log_creep", "coulomb"), ("creep", "bouc_wen", "resonance")],
+)
 def test_carried_slopes_are_those_of_the_whole_sample(monkeypatch, tmp_path, effects, text, size, steps, linear, worth):
     monkeypatch.setattr(integrators, "substeps", lambda *_: steps)
     # To the end: where N is solved for, slopes of steps on the way are others

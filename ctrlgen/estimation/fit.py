@@ -163,8 +163,9 @@ class Fitter:
         """
         problem = self.problem(structure)
         start = np.concatenate([structure.start if theta is None else theta, np.zeros(problem.n_initial)])
-        begun = self._optimum(problem, start, steps, enough if nested is None else min(enough, nested.objective))
-        first = self._from_turning_points(problem, begun, steps)
+        if nested is not None:
+            enough = min(enough, nested.objective)
+        first = self._from_turning_points(problem, self._optimum(problem, start, steps, enough), steps, enough)
         if nested is None or first.objective <= nested.objective:
             return first
         near = start.copy()
@@ -201,8 +202,8 @@ class Fitter:
         again = self.fit(structure, theta, steps, enough=best.objective)
         return min(best, again, key=lambda fit: fit.objective)
 
-    def _from_turning_points(self, problem: LeastSquaresProblem, fit: Fit, steps: int) -> Fit:
-        """The fit, or the one reached with its plays at the turning points before the records that begin worse than they go on."""
+    def _from_turning_points(self, problem: LeastSquaresProblem, fit: Fit, steps: int, enough: float) -> Fit:
+        """The fit, or the better one reached with its plays at the turning points before the records that begin worse than they go on."""
         states, first = list(fit.initial_states), 0
         for i, record in enumerate(self.fit_records):
             white = fit.residual[first : first + record.observed.size]
@@ -215,7 +216,7 @@ class Fitter:
                 states[i] = states[i] if turned is begun else sd * turned
         if all(a is b for a, b in zip(states, fit.initial_states, strict=True)):
             return fit
-        again = self._optimum(problem, np.concatenate([fit.theta, *states]), steps)
+        again = self._optimum(problem, np.concatenate([fit.theta, *states]), steps, min(enough, fit.objective))
         return min(fit, again, key=lambda f: f.objective)
 
     def described(self, device: Device) -> tuple[Fitter, Fit]:

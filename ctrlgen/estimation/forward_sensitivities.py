@@ -18,18 +18,19 @@ import numpy as np
 
 from ctrlgen.estimation.sample_equations import SampleEquations
 from ctrlgen.model.integrators import ExponentialRungeKutta, ImplicitRadau
+from ctrlgen.numerics.right_division import over
 
 # at which a step of ETD-RK4 evaluates N
 POINTS = 4
-# Operations up to which a step is written out number by number: beyond, the compiler takes longer than the products of matrices.
-LONGEST_WRITTEN = 6_000
+# Operations up to which a step is written out number by number: 7,500 of them, of friction beside the nine lags of a creep, take half
+# the time of products of matrices, and gcc 12 0.6 s once. Judgement: a longer step is compiled for longer than it runs.
+LONGEST_WRITTEN = 10_000
 # The same of a whole sample in balance, whose derivatives are mostly its own operations: 14,000 of them, of plays before creep, take
 # two thirds of the time, and the compiler no longer.
 LONGEST_SAMPLE = 20_000
 # Operations of a value from which on its derivatives are taken in both directions: of a shorter one they are few in either. Judgement.
 LONG = 100
 REVERSE = {"helper_options": {"ad_weight": 1.0, "ad_weight_sp": 1.0}}
-LARGEST_WRITTEN = 6  # rows of a matrix whose inverse is written out: a few hundred operations
 
 Jacobian = Callable[[ca.SX, ca.SX], ca.SX]
 Step = Callable[[ca.MX, ca.MX, list[ca.MX]], tuple[ca.MX, ca.MX]]
@@ -165,27 +166,13 @@ def _implicit_step(equations: SampleEquations, steps: ImplicitRadau, c_varies: b
         after, by_Y_1, by_Y_2, by_constant_1, by_constant_2 = evaluate(*given)
 
         def derivative_of_n(base: ca.MX, M: ca.DM, by_Y: ca.MX, by_constant: ca.MX) -> ca.MX:
-            return (base @ by_Y + seed @ by_constant) @ _inverse(ca.DM.eye(M.size1()) - M @ by_Y)
+            return over(base @ by_Y + seed @ by_constant, ca.DM.eye(M.size1()) - M @ by_Y)
 
         first = derivative_of_n(T @ E_c, P, by_Y_1, by_constant_1)
         base = T @ E + first @ W
         return after, base + derivative_of_n(base, V, by_Y_2, by_constant_2) @ V
 
     return step
-
-
-def _inverse(A: ca.MX) -> ca.MX:
-    """The inverse of a small matrix, by its entries; of a larger one by a QR decomposition at run time.
-
-    Minors lose digits to the stiffness of friction's bristles; one step of Schulz, X (2 - A X), squares what is missing
-    (G. Schulz, Z. angew. Math. Mech. 13 (1933) 57).
-    """
-    if A.size1() > LARGEST_WRITTEN:
-        return ca.inv(A)
-    entries = ca.SX.sym("A", A.sparsity())
-    rough = ca.inv(entries)
-    better = rough @ (2 * ca.SX.eye(A.size1()) - entries @ rough)
-    return ca.Function("inverse", [entries], [better])(A)
 
 
 def _explicit_step(equations: SampleEquations, steps: ExponentialRungeKutta, c_varies: bool) -> Step:
