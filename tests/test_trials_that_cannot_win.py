@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -237,6 +238,25 @@ def test_rivals_are_fitted_to_their_end_where_they_may_leave_about_as_little(mon
     for model in (held, replace(held, errors=slow)):
         rivals.replacements(trials, model, 0)
     assert asked == pytest.approx([2 * held.fit.objective, np.exp(3) * held.fit.objective])
+
+
+@pytest.mark.parametrize("told", [True, False], ids=["far", "hardly told"])
+def test_what_came_nowhere_near_in_a_place_is_not_fitted_there_again(monkeypatch, told):
+    trials, described = trials_beside(fitter_of(played), [BACKLASH, CLOCK])
+    held = trials.tried(described.fit.restarted.with_cause(BACKLASH, {"gap": 5e-8}), BACKLASH, described.fit)[0]
+    held, fitted, tried = trials.converged(held), [], Trials.tried
+    monkeypatch.setattr(rivals, "hardly_told", lambda *_: not told)
+    monkeypatch.setattr(rivals, "significant", lambda *_: [SimpleNamespace(hypothesis=CLOCK, z=1e9)])
+    begun = described.fit.restarted.with_cause(CLOCK, {"delay": 1e-5})
+    monkeypatch.setattr(rivals, "replace_cause", lambda *_: begun)
+    monkeypatch.setattr(Trials, "tried", lambda self, s, *a, **kw: fitted.append(s.causes) or tried(self, s, *a, **kw))
+    (rival,) = rivals.replacements(trials, held, 0)
+    assert rival.fit.objective > SEARCH.rival_reach * held.fit.objective and set(fitted) == {(CLOCK,)}
+    fitted.clear()
+    trials.use(replace(trials.fitter))  # as with other errors
+    assert len(rivals.replacements(trials, held, 0)) == len(set(fitted)) == (not told)
+    trials.without_kin(BACKLASH).beaten.add("learnt for itself")
+    assert trials.beaten == ({(frozenset({BACKLASH}), frozenset({CLOCK}))} if told else set())
 
 
 # the slope tells the first, the best of many shifts the last

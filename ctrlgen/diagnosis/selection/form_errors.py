@@ -34,10 +34,10 @@ def hidden_rivals(
     if current.errors.is_noise or not trials.fitter.noise.known.all():
         return []
     # by what they leave: those of earlier rounds have an objective under other errors
-    behind = {id(t): advantage_in_form(current, t) for t in candidates if _may_replace(t, current, k)}
+    near = [t for t in candidates if _may_replace(t, current, k) and hardly_told(current, t)]
     best: dict[Hypothesis | None, CandidateModel] = {}
-    for t in sorted((t for t in candidates if id(t) in behind), key=lambda t: behind[id(t)]):
-        if behind[id(t)] < CONFUSABLE.unfinished * CONFUSABLE.criterion and not trials.objections(t, current.causes):
+    for t in sorted(near, key=lambda t: advantage_in_form(current, t)):
+        if not trials.objections(t, current.causes):
             best.setdefault(t.cause, t)
     ends = trials.each(lambda branch, t: branch.converged(t), list(best.values())[: CONFUSABLE.most_listed])
     bare = trials.tried(current.fit.restarted.without(k), None)
@@ -46,6 +46,11 @@ def hidden_rivals(
         for t in ends
         if advantage_in_form(current, t) < CONFUSABLE.criterion and all(_explains_as_much(b, current, t) for b in bare)
     ]
+
+
+def hardly_told(current: CandidateModel, rival: CandidateModel) -> bool:
+    """Whether `rival`, fitted to its end, may be one of the `hidden_rivals`."""
+    return advantage_in_form(current, rival) < CONFUSABLE.unfinished * CONFUSABLE.criterion
 
 
 def advantage_in_form(a: CandidateModel, b: CandidateModel) -> float:

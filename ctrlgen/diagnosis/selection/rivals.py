@@ -11,7 +11,7 @@ from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, l
 from ctrlgen.diagnosis.selection.candidates import significant, trying
 from ctrlgen.diagnosis.selection.confusable import explains_alike, explains_better
 from ctrlgen.diagnosis.selection.failures import FAILURES
-from ctrlgen.diagnosis.selection.form_errors import hidden_rivals
+from ctrlgen.diagnosis.selection.form_errors import hardly_told, hidden_rivals
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.other_laws import stands_for_another
 from ctrlgen.diagnosis.selection.precedence import counterparts, explains_alike_but_for_odds
@@ -225,8 +225,11 @@ def _in_place_of(k: int, there: Sequence[Hypothesis], tried: Sequence[CandidateM
 
 
 def replacements(trials: Trials, current: CandidateModel, k: int) -> list[CandidateModel]:
-    """What would be suspected instead of cause k, with all the rest as it is now: refitted, it may have gone astray."""
+    """What would be suspected instead of cause k, with all the rest as it is now: refitted, it may have gone astray. What came nowhere
+    near in the place of the same cause before is not fitted again."""
     structure = current.fit.structure
+    there = frozenset(current.causes)
+    rest = there - {structure.causes[k]}
     others = current.fit.restarted.without(k)
     try:
         bare, screened = trials.screened_without(current.fit, k)
@@ -238,7 +241,9 @@ def replacements(trials: Trials, current: CandidateModel, k: int) -> list[Candid
     able = [
         s
         for s in significant(trials, current, screened, SEARCH.most_rivals)
-        if s.z**2 > SEARCH.rival_share * gained and s.hypothesis != structure.causes[k]
+        if s.z**2 > SEARCH.rival_share * gained
+        and s.hypothesis != structure.causes[k]
+        and (there, rest | {s.hypothesis}) not in trials.beaten
     ]
 
     # what cannot take away so much of it is no rival
@@ -247,14 +252,17 @@ def replacements(trials: Trials, current: CandidateModel, k: int) -> list[Candid
     def one(branch: Trials, s: Suspect) -> list[CandidateModel]:
         return branch.tried(replace_cause(branch, current.fit, k, others, s), s.hypothesis, enough=enough)
 
-    tried = trials.each(one, able, lambda s: f"{trying(s.hypothesis)} instead")
-    fits = [t for fitted in tried for t in fitted]
+    fits = [t for fitted in trials.each(one, able, lambda s: f"{trying(s.hypothesis)} instead") for t in fitted]
     near = trials.close_contenders(without, current, trials.selection.ranked(fits))
     # what cannot come near by the criterion is not fitted to its end
     n = max(trials.selection.samples(current.fitted, current.errors), 1.0)
     last = current.fit.objective * max(SEARCH.rival_reach, float(np.exp(SEARCH.rival_margin / n)))
     ends = trials.each(lambda branch, t: branch.converged(t, last), near)
-    return trials.selection.ranked([*ends, *(t for t in fits if t not in near)])
+    tried = trials.selection.ranked([*ends, *(t for t in fits if t not in near)])
+    trials.beaten |= {
+        (there, frozenset(t.causes)) for t in tried if t.fit.objective > last and not hardly_told(current, t)
+    }
+    return tried
 
 
 def twins(trials: Trials, current: CandidateModel, k: int) -> list[CandidateModel]:
