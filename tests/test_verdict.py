@@ -22,6 +22,7 @@ from ctrlgen.diagnosis.selection.verdict import (
     terms_of_findings,
     too_little_to_name,
     unconfirmed,
+    untold_noise_drowns,
     verdict,
     within_tolerance,
 )
@@ -205,6 +206,36 @@ def test_little_that_is_left_is_no_reason_against_an_explanation():
     assert judged(passed=False, left_over=9e3) == Verdict.EXPLAINED and judged(passed=False, left_over=2e4) == "partly"
     assert judged(passed=False, left_over=9e3, apart=6.0) == Verdict.PARTLY  # at the price of a number that is excluded
     assert judged(passed=False, left_over=0.0, causes=()) == Verdict.UNEXPLAINED
+
+
+def following(left_rms: float, read_rms: float, source: NoiseSource) -> SimpleNamespace:
+    """A search whose model leaves so much of what is read of a channel of noise 1."""
+    rng = np.random.default_rng(1)
+    y = rng.standard_normal((N, 1))
+    record = SimpleNamespace(observed=5.0 + read_rms * (y - y.mean()) / y.std(), valid=np.ones((N, 1), bool))
+    noise = replace(noise_of(), sources=(source,))
+    of = SimpleNamespace(noise=noise, held_out_records=[record])
+    return search(trial(), trial(0.0, (left_rms**2 - 1) * N), of=of)
+
+
+@pytest.mark.parametrize(
+    "left_rms, read_rms, source, drowns",
+    [
+        (10 + JUST, 20.0, NoiseSource.FASTEST_PART, True),
+        (10 - JUST, 20.0, NoiseSource.FASTEST_PART, False),
+        (30.0 + JUST, 100.0, NoiseSource.FASTEST_PART, True),
+        (30.0 - JUST, 100.0, NoiseSource.FASTEST_PART, False),
+        (90.0, 100.0, NoiseSource.REST, False),
+    ],
+)
+def test_a_noise_that_nobody_told_is_not_nearly_all_that_is_read(left_rms, read_rms, source, drowns):
+    assert untold_noise_drowns(following(left_rms, read_rms, source)) == drowns
+
+
+def test_what_such_a_noise_would_explain_is_not_explained(monkeypatch):
+    monkeypatch.setattr("ctrlgen.diagnosis.selection.verdict.untold_noise_drowns", lambda found: True)
+    assert judged(share=0.4, left_over=1e5) == Verdict.UNEXPLAINED and judged(causes=()) == Verdict.UNEXPLAINED
+    assert judged(share=0.9, left_over=1e5) == Verdict.PARTLY
 
 
 def test_numbers_that_contradict_the_data_sheet_are_no_explanation():

@@ -40,13 +40,13 @@ def verdict(
     left is noise, within the tolerance, or too little to name. ambiguous: another cause explains the recording as well as a main one.
     partly: confirmed causes take away `VERDICT.most` of the mismatch, or all of it with parameters too uncertain to predict, or the noise
     is not known. unexplained: they take away less, the fit agrees only with numbers that contradict the device file, or a
-    column's unit is wrong.
+    column's unit is wrong; likewise where only a noise that nobody told, and nearly as large as what is read, would make it more.
     """
     if another_unit:
         return Verdict.UNEXPLAINED
     fitter, named = search.fitter, detected or search.chosen.causes
     known = bool(fitter.noise.known.all())
-    enough = (known and tests.passed) or within_tolerance(search)
+    enough = (known and tests.passed and not untold_noise_drowns(search)) or within_tolerance(search)
     contradicted = bool(contradicts_datasheet(search.chosen.fit))
     if not named:
         left_out = search.withdrawn or (known and not enough)
@@ -59,6 +59,21 @@ def verdict(
         return Verdict.EXPLAINED
     sound = enough or not known or shares.explained >= VERDICT.most
     return Verdict.PARTLY if sound and not (contradicted and shares.explained < VERDICT.most) else Verdict.UNEXPLAINED
+
+
+def untold_noise_drowns(search: SearchResult) -> bool:
+    """Whether what is left of the held-out readings of a channel could only be noise that is `VERDICT.beyond_guess` times what is guessed
+    of it and `VERDICT.as_read` of what is read, where nothing but these readings tells the noise. Then they follow the model so
+    loosely that they may be of anything else."""
+    fitter, left = search.fitter, search.chosen.predicted
+    beyond = np.sqrt(left.plain_mean) > VERDICT.beyond_guess
+    for i in np.flatnonzero(fitter.noise.guessed & beyond).tolist():
+        read = [r.observed[r.valid[:, i], i] for r in fitter.held_out_records]
+        about_mean = np.concatenate([y - y.mean() for y in read if len(y)] or [np.zeros(1)])
+        size = np.sqrt(left.plain_mean[i]) * fitter.noise.floor[i]
+        if size > VERDICT.as_read * np.sqrt(np.mean(about_mean**2)):
+            return True
+    return False
 
 
 def in_another_unit(search: SearchResult) -> bool:

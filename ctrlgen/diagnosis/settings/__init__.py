@@ -27,11 +27,10 @@ from ctrlgen.diagnosis.settings.selection import (
     SCREEN,
     SEARCH,
     SPATIAL_PERIODS,
-    STANDING,
     SUBSETS,
-    VERDICT,
 )
 from ctrlgen.diagnosis.settings.shares import SHARES
+from ctrlgen.diagnosis.settings.verdict import STANDING, VERDICT
 
 __all__ = [
     "ATTRIBUTION",
