@@ -149,7 +149,7 @@ def stuck_samples(observed: np.ndarray, drive: np.ndarray) -> np.ndarray:
     A stretch of eight equal samples or more counts where the channel is known to be noisy while the drive rests, or,
     where the drive never rests, where the drive (n, n_u) moves meanwhile and the channel repeats itself nowhere else.
     At the end of the channel's range five samples suffice where the channel is noisy otherwise, or where it ran into the
-    end at speed while the drive moved: it is clipped.
+    end at speed while the drive moved: it is clipped. What else stands there is clipped too, however short.
     Coarsely quantised channels at rest, and stages held by friction, repeat themselves rightly and are not marked.
     """
     marked = np.zeros(len(observed), dtype=bool)
@@ -163,7 +163,9 @@ def stuck_samples(observed: np.ndarray, drive: np.ndarray) -> np.ndarray:
         moves = bool((np.ptp(first_half, axis=0) > STUCK.moves * span)[span > 0].any())
         frozen = b - a >= STUCK.shortest_run and (at_rest or (at_rest is None and moves and elsewhere))
         clipped = observed[a] in ends and ((moves and _at_speed(observed, a, b)) or (elsewhere and alternates))
-        if frozen or clipped:
+        if clipped:
+            marked |= observed == observed[a]
+        elif frozen:
             marked[a:b] = True
     return marked
 
