@@ -163,14 +163,15 @@ def test_a_wrong_rate_is_told_where_the_readings_show_the_dynamics(written, name
     assert any(what in s for s in said), said
 
 
-def altered(folder, model, text: str, name: str, fit: float, held: float) -> list[str]:
-    """What is said of a log whose reading is multiplied in its first half, which is fitted, and in its second one, held out."""
+def altered(folder, model, text: str, name: str, fit: float, held: float, apart: float = 0.0) -> list[str]:
+    """What is said of a log whose reading is multiplied in its first half, which is fitted, and in its second one, held out, where it also
+    stands so far off."""
     head, *rows = (folder / "log.csv").read_text().splitlines()
     place = head.split(",").index(name)
     half = len(rows) // 2
-    for file, factor, part in (("fit.csv", fit, rows[:half]), ("held.csv", held, rows[half:])):
+    for file, factor, off, part in (("fit.csv", fit, 0.0, rows[:half]), ("held.csv", held, apart, rows[half:])):
         numbers = [[float(v) for v in row.split(",")] for row in part]
-        lines = [[factor * v if i == place else v for i, v in enumerate(row)] for row in numbers]
+        lines = [[factor * v + off if i == place else v for i, v in enumerate(row)] for row in numbers]
         (folder / file).write_text("\n".join([head, *(",".join(f"{v:.9g}" for v in line) for line in lines)]) + "\n")
     before, record, after = re.split(r"(\[\[record\]\].*)(?=\[columns\])", text, flags=re.DOTALL)
     poses = "poses" in before
@@ -202,6 +203,19 @@ def test_a_reading_of_another_size_or_sign_in_one_record_is_told(written, log):
             assert next(iter(sizes)) == ("fit" if what == "both" else "held"), said
             # the second half does not begin settled, as the model does
             assert sizes == {"fit": pytest.approx(fit, rel=0.1), "held": pytest.approx(held, rel=0.1)}, said
+
+
+@OF_LOGS
+def test_a_zero_that_is_another_in_one_record_is_told(written, log):
+    folder, model, text = written(log)
+    for name, unit in LOGS[log].readings.items():
+        rows = np.genfromtxt(folder / "log.csv", delimiter=",", names=True)[name]
+        for apart in (-6 * np.std(rows), 6 * np.std(rows)):
+            (said,) = altered(folder, model, text, name, 1.0, 1.0, apart)
+            assert said.startswith(f"the zero of reading.{name} is at ") and "zero_per_record" in said
+            zeros = {file: float(v) for v, file in re.findall(rf"(\S+) {unit} in (\w+)\.csv", said)}
+            assert zeros["held"] - zeros["fit"] == pytest.approx(apart, rel=0.1)
+        assert altered(folder, model, text, name, 1.0, 1.0, 0.1 * np.std(rows)) == []  # a mean that a law may shift
 
 
 @OF_LOGS
