@@ -18,6 +18,8 @@ CREEP, DRIFT, STEP = (
 )
 BEGUN = Hypothesis("coulomb_after", "stage:axis", "axis")
 MASS = Hypothesis("parameter", "axis", path="mechanics.mass")
+DEAD = Hypothesis("stuck", "sensor:axis", "axis")
+MEND = "stuck at sensor:axis: nothing of the motion is read there; mend the sensor or its wiring, and record again."
 RUNS = "of which another run knows nothing"
 
 
@@ -26,6 +28,8 @@ RUNS = "of which another run knows nothing"
     [
         ((), USE),
         ((CREEP, MASS), USE),
+        ((DEAD,), f"No cause that was found makes the C better. {MEND}"),
+        ((CREEP, DEAD), f"{USE} {MEND}"),
         (
             (DRIFT,),
             f"No cause that was found makes the C better: drift at sensor:axis runs on the clock of these records, {RUNS}; "

@@ -12,6 +12,8 @@ from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.findings import Finding
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 
+DEAD = "stuck"  # the law of a channel that reports one number, whatever the motion
+
 
 def runs_on_the_clock(cause: Hypothesis) -> bool:
     """Whether what a cause does depends on when it is."""
@@ -20,7 +22,16 @@ def runs_on_the_clock(cause: Hypothesis) -> bool:
 
 def used_for_another_run(findings: Sequence[Finding], use: str) -> str:
     """What device.next.toml may be used for, `use`, and which findings no C takes from it; that no C is better for it where these are
-    all."""
+    all. A channel that is dead tells of nothing but itself."""
+    dead = [cause_name(f.cause) for f in findings if f.cause.effect == DEAD]
+    if dead:
+        mend = f"{' and '.join(dead)}: nothing of the motion is read there; mend the sensor or its wiring, and record again"
+        alive = [f for f in findings if f.cause.effect != DEAD]
+        return (
+            f"{used_for_another_run(alive, use)} {mend}."
+            if alive
+            else f"No cause that was found makes the C better. {mend}."
+        )
     clocked = [cause_name(f.cause) for f in findings if runs_on_the_clock(f.cause)]
     if not clocked:
         return use
