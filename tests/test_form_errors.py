@@ -31,14 +31,16 @@ def model(cause: Hypothesis, times: float, n: int = 1000, numbers: int = 1, odds
     return CandidateModel(fit, errors_of(found), found, found, cause=cause)
 
 
-def told(current: CandidateModel, *rivals: CandidateModel, known=True, objections=None, without=1000.0):
-    """The causes of the rivals that are hidden, where the device without the cause leaves so much."""
-    n = float(current.fitted.n_plain.sum())
+def told(current: CandidateModel, *rivals: CandidateModel, known=True, objections=None, without=1000.0, asked=None):
+    """The causes of the rivals that are hidden, where the device without the cause leaves so much; what each had to reach, of an objective
+    of 100, is appended to `asked`."""
+    n, fitter, asked = float(current.fitted.n_plain.sum()), weighed_by(known=known), [] if asked is None else asked
+    fitter.initial_objective = lambda structure: 100.0
     trials = SimpleNamespace(
-        fitter=weighed_by(known=known),
+        fitter=fitter,
         objections=lambda t, accepted: objections or {},
         each=lambda function, items: [function(trials, t) for t in items],
-        converged=lambda t: t,
+        converged=lambda t, enough: asked.append(enough) or t,
         tried=lambda structure, cause: [model(GAIN, without, round(n))],
     )
     return [t.cause for t in hidden_rivals(trials, current, 0, rivals)]
@@ -79,3 +81,12 @@ def test_beside_what_other_laws_leave_it_takes_away_nearly_as_much(leaves, hidde
 def test_the_same_law_is_fitted_to_its_end_once_and_from_where_it_leaves_least():
     near, far = model(STIFFER, 9.0), model(STIFFER, 30.0)
     assert told(model(GAIN, 10.0), far, near, model(CREEP, 8.0), model(GAIN, 5.0)) == [CREEP, STIFFER]
+
+
+@pytest.mark.parametrize(
+    ("times", "reach"), [(0.9, 100.0), (ALIKE * 0.99, 100.0), (ALIKE * np.exp(4 / 12), 100.0 * np.exp(-4 / 12))]
+)
+def test_its_fit_ends_where_it_cannot_come_near_enough(times, reach):
+    asked = []
+    told(model(GAIN, 10.0), model(STIFFER, 10.0 * times), asked=asked)
+    assert asked == [pytest.approx(reach)]

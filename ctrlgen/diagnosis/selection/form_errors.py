@@ -39,13 +39,24 @@ def hidden_rivals(
     for t in sorted(near, key=lambda t: advantage_in_form(current, t)):
         if not trials.objections(t, current.causes):
             best.setdefault(t.cause, t)
-    ends = trials.each(lambda branch, t: branch.converged(t), list(best.values())[: CONFUSABLE.most_listed])
+    ends = trials.each(
+        lambda branch, t: branch.converged(t, _enough(branch, current, t)),
+        list(best.values())[: CONFUSABLE.most_listed],
+    )
     bare = trials.tried(current.fit.restarted.without(k), None)
     return [
         t
         for t in ends
         if advantage_in_form(current, t) < CONFUSABLE.criterion and all(_explains_as_much(b, current, t) for b in bare)
     ]
+
+
+def _enough(trials: Trials, current: CandidateModel, t: CandidateModel) -> float:
+    """The objective to which a rival must come at least to be told no more, where it leaves less of all readings alike as it is fitted."""
+    readings = 2 * t.fitted.plain.shape[1]  # of both kinds of records
+    behind = max(advantage_in_form(current, t) - CONFUSABLE.criterion, 0.0)
+    begun = trials.fitter.initial_objective(t.fit.restarted)
+    return begun * float(np.exp(-behind / (readings * CONFUSABLE.form_samples)))
 
 
 def hardly_told(current: CandidateModel, rival: CandidateModel) -> bool:
