@@ -47,7 +47,9 @@ def test_what_a_model_leaves_without_a_cause_is_screened_once_under_the_same_err
     trials = trials_of(fitter)
     fit = fitter.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 1e-7}), steps=0)
     monkeypatch.setattr(
-        trials.screen, "run", lambda bare: screens.append(bare) or Screened((), np.zeros((0, 0)), lambda: 1.0, {})
+        trials.screen,
+        "run",
+        lambda bare, threshold: screens.append(bare) or Screened((), np.zeros((0, 0)), lambda: 1.0, {}),
     )
     first = trials.screened_without(fit, 0)
     assert trials.screened_without(fit, 0) == first and first[0].structure.causes == () and len(screens) == 1
@@ -63,7 +65,7 @@ def test_a_model_to_which_nothing_is_added_is_not_screened(monkeypatch):
     def rounds_end(trials, current):
         raise InterruptedError
 
-    monkeypatch.setattr(screen, "run", lambda fit: pytest.fail("screened"))
+    monkeypatch.setattr(screen, "run", lambda *_, **__: pytest.fail("screened"))
     monkeypatch.setattr(search, "simplified", rounds_end)
     monkeypatch.setattr(ModelSelection, "residual_within_model_form_error", lambda self, model: True)
     with pytest.raises(InterruptedError):

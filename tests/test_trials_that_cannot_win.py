@@ -298,8 +298,12 @@ def test_what_a_fit_leaves_without_a_cause_is_screened_once_and_forgotten_with_t
     )
     screens = []
     monkeypatch.setattr(
-        trials.screen, "run", lambda fit: screens.append(fit) or Screened((), np.zeros((0, 0)), lambda: 1.0, {})
+        trials.screen,
+        "run",
+        lambda fit, threshold: screens.append((fit, threshold)) or Screened((), np.zeros((0, 0)), lambda: 1.0, {}),
     )
     assert trials.screened_without(first, 0) == trials.screened_without(first, 0) and len(screens) == 1
+    # what chance reaches was told by the latest screen
+    trials.latest = trials.fitter, first, Screened((), np.zeros((0, 0)), lambda: 3.0, {})
     trials.screened_without(second, 0)
-    assert len(screens) == 2 and [fit for fit, *_ in trials.bare.values()] == [second]
+    assert [level for _, level in screens] == [None, 3.0] and [fit for fit, *_ in trials.bare.values()] == [second]

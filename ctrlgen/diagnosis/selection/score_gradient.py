@@ -29,20 +29,25 @@ from ctrlgen.recordings.recording import Record, Timing
 @dataclass(eq=False)
 class Sums:
     """Inner products over all samples of the m hypotheses' slopes S: with the k free directions U (k, m), with the residual
-    (m,), and with one another (m, m)."""
+    (m,), and with one another (m, m), or each with itself alone (m,)."""
 
     US: np.ndarray
     Sr: np.ndarray
     SS: np.ndarray
 
     @classmethod
-    def none(cls, k: int, m: int) -> Sums:
+    def none(cls, k: int, m: int, each_alone: bool = False) -> Sums:
         """The sums over no sample, from which adding begins."""
-        return cls(np.zeros((k, m)), np.zeros(m), np.zeros((m, m)))
+        return cls(np.zeros((k, m)), np.zeros(m), np.zeros(m if each_alone else (m, m)))
 
     def plus(self, other: Sums) -> Sums:
         """The sums over the samples of both."""
         return Sums(self.US + other.US, self.Sr + other.Sr, self.SS + other.SS)
+
+    @property
+    def squares(self) -> np.ndarray:
+        """(m,) of each with itself."""
+        return self.SS if self.SS.ndim == 1 else np.diag(self.SS)
 
 
 def _probed(
@@ -94,14 +99,15 @@ class ScoreGradient:
         self.linear = self.simulator.linearise(self.p, range(len(free)))
         self.spread = LtvPropagation(self.linear.patterns, self.columns)
 
-    def sums(self, white: np.ndarray, U: np.ndarray, start: np.ndarray | None) -> Sums:
-        """This record's inner products with its whitened residual `white` (n, n_y) and free directions U (n, n_y, k)."""
+    def sums(self, white: np.ndarray, U: np.ndarray, start: np.ndarray | None, each_alone: bool = False) -> Sums:
+        """This record's inner products with its whitened residual `white` (n, n_y) and free directions U (n, n_y, k). Of many slopes those
+        with one another take half of the time, and are left out where `each_alone` is asked for."""
         noise, seen = self.fitter.error, self.spread.seen
         corner = noise.corner
         usable = noise.usable(self.record.valid)
-        SS = [np.zeros((len(s), len(s))) for s in seen]
+        SS = [np.zeros(len(s) if each_alone else (len(s), len(s))) for s in seen]
         tails = [np.zeros((len(ar), len(s))) for ar, s in zip(noise.ar, seen, strict=True)]
-        total = Sums.none(U.shape[2], len(self.columns))
+        total = Sums.none(U.shape[2], len(self.columns), each_alone)
         lost = np.zeros(len(self.laws.terms) + len(self.sizes), bool)
         h = self.record.sample_time
         late = {r.row: LateSlopes(r.age(self.p), h) for r in self.simulator.late}
@@ -118,13 +124,13 @@ class ScoreGradient:
                 S *= np.minimum(1.0, corner[i] / np.maximum(np.abs(white[a:b, i]), 1e-300))[:, None]
                 if not np.isfinite(S.sum()):
                     S = np.nan_to_num(S)
-                SS[i] += S.T @ S
+                SS[i] += np.einsum("ij,ij->j", S, S) if each_alone else S.T @ S
                 total.US[:, seen[i]] += U[a:b, i].T @ S
                 total.Sr[seen[i]] += white[a:b, i] @ S
         for products, columns in zip(SS, seen, strict=True):
-            total.SS[np.ix_(columns, columns)] += products
+            total.SS[columns if each_alone else np.ix_(columns, columns)] += products
         gone = [j for j, column in enumerate(self.columns) if lost[list(column.terms)].any()]
-        total.US[:, gone], total.Sr[gone], total.SS[gone], total.SS[:, gone] = 0.0, 0.0, 0.0, 0.0
+        total.US[:, gone], total.Sr[gone], total.SS[gone], total.SS[..., gone] = 0.0, 0.0, 0.0, 0.0
         return total
 
     def blocks(self, start: np.ndarray | None, lost: np.ndarray) -> Iterator[tuple[int, int, Iterator[np.ndarray]]]:

@@ -108,10 +108,11 @@ class Screen:
         fit: Fit,
         dropped: dict[Hypothesis, str] | None = None,
         regions: dict[Along, tuple[Region, ...]] | None = None,
+        threshold: float | None = None,
     ) -> Screened:
         """All hypotheses that the fit does not contain yet, without those `dropped`, any whose law cannot be evaluated, and offsets
         of the recorders' clocks, which no term of the model shows; laws in a region begun in the `regions`, those of what is left
-        unless given."""
+        unless given. With the `threshold`, where another screen has told it, each hypothesis is looked at alone: no cosines, no sets."""
         beside, dropped = (h.beside(fit.structure.causes) for h in self.hypotheses), dropped or {}
         shown = (h for h in beside if h is not None and (h.effect == PARAMETER or not h.law.shifts_drive))
         open_ = [h for h in shown if h not in dropped]
@@ -126,24 +127,26 @@ class Screen:
             slopes = ScoreGradient(self.fitter, fit, record, open_, seen, self._laws(fit, record.timing))
             # the columns must be the same on every record
             if slopes.laws.unusable:
-                return self.run(fit, dropped | slopes.laws.unusable, regions)
+                return self.run(fit, dropped | slopes.laws.unusable, regions, threshold)
             columns = slopes.columns
             n = record.valid.size
             white = fit.residual[first : first + n].reshape(record.valid.shape)
             free = U[first : first + n].reshape(*record.valid.shape, -1)
             first += n
-            here = slopes.sums(white, free, start)
+            here = slopes.sums(white, free, start, each_alone=threshold is not None)
             sums = here if sums is None else sums.plus(here)
         if not columns or sums is None:
             none = np.zeros(len(fit.theta))
             return Screened((), np.zeros((0, 0)), lambda: np.inf, {}, dropped=dropped, moved=lambda _: none)
         size = np.linalg.norm(fit.J[:first], axis=0)
         along = (back @ sums.US) / np.maximum(size, 1e-150)[:, None]
-        screened = self._screened(columns, sums, U.T @ fit.residual, np.abs(along))
+        screened = self._screened(columns, sums, U.T @ fit.residual, np.abs(along), threshold)
         free_numbers = fit.structure.free_parameters
         sizes = {k: v - u.nominal for k, (u, v) in enumerate(zip(free_numbers, fit.theta, strict=True)) if u.amplitude}
+        if threshold is not None:
+            return replace(screened, dropped=dropped, regions=regions)
         twins = self._twins(columns, {k: size[k] * change for k, change in sizes.items()}, along, sums.SS)
-        moved = partial(_moves, screened.suspects, np.diag(sums.SS).copy(), sums.US, back, len(fit.theta))
+        moved = partial(_moves, screened.suspects, sums.squares.copy(), sums.US, back, len(fit.theta))
         return replace(screened, twins=twins, dropped=dropped, regions=regions, moved=moved)
 
     def _twins(
@@ -286,17 +289,19 @@ class Screen:
         return find_regions(Leftover.of(fit), self.motion, stretches, self.seed)
 
     def _screened(
-        self, columns: list[CandidateTerm], sums: Sums, gradient: np.ndarray, likeness: np.ndarray
+        self,
+        columns: list[CandidateTerm],
+        sums: Sums,
+        gradient: np.ndarray,
+        likeness: np.ndarray,
+        threshold: float | None = None,
     ) -> Screened:
         """`gradient` U'r (k,), zero at an optimum inside all bounds; `likeness` |J's|/|J| (free numbers, columns)."""
-        norm = np.diag(sums.SS)
+        norm = sums.squares
         distinct = norm - np.sum(sums.US**2, axis=0)
         score = sums.Sr - gradient @ sums.US
         distinct_share = np.where(norm > 0, distinct / np.where(norm > 0, norm, 1.0), 0.0)
         seen = np.flatnonzero((distinct_share > SCREEN.own_share) & (norm > 0) & np.isfinite(norm))
-        gram = sums.SS - sums.US.T @ sums.US
-        d = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-        cosine = np.clip(gram / np.outer(d, d), -1, 1)
         z = np.zeros(len(columns))
         z[seen] = score[seen] / np.sqrt(distinct[seen])
         for j in seen:
@@ -317,15 +322,20 @@ class Screen:
             )
             for j in order
         }
+        resembles = np.argmax(likeness, axis=0) if len(likeness) else np.full(len(columns), -1)
+        undetectable = {c.hypothesis: int(resembles[j]) if norm[j] > 0 else -1 for j, c in enumerate(columns)}
+        undetectable = {h: k for h, k in undetectable.items() if h not in ranked}
+        if threshold is not None:
+            return Screened(suspects, np.zeros((0, 0)), lambda: threshold, sds, undetectable=undetectable)
+        gram = sums.SS - sums.US.T @ sums.US
+        d = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        cosine = np.clip(gram / np.outer(d, d), -1, 1)
         # a law in a region is tried alone: there are many, and each looks like the law everywhere
         everywhere = np.array([j for j in seen if not columns[j].hypothesis.prior.in_a_region], int)
 
         def together() -> Subsets:
             return SubsetSearch(columns, everywhere, score, distinct, distinct_share, cosine, _suspect).search()
 
-        resembles = np.argmax(likeness, axis=0) if len(likeness) else np.full(len(columns), -1)
-        undetectable = {c.hypothesis: int(resembles[j]) if norm[j] > 0 else -1 for j, c in enumerate(columns)}
-        undetectable = {h: k for h, k in undetectable.items() if h not in ranked}
         by_chance = partial(_largest_by_chance, cosine, seen, self.seed)
         return Screened(suspects, cosine, by_chance, sds, together, undetectable)
 

@@ -246,12 +246,14 @@ class Trials:
         return screened if close and bool(np.all(moved)) else None
 
     def screened_without(self, fit: Fit, k: int) -> tuple[Fit, Screened]:
-        """The fit without cause k, its other numbers as they are, and the screen of what that leaves."""
+        """The fit without cause k, its other numbers as they are, and the screen of what that leaves: each hypothesis alone, where the
+        latest screen tells what chance reaches."""
         if any(known is not fit for known, *_ in self.bare.values()):
             self.bare.clear()  # a screen of 1,400 columns holds 16 MB
         if k not in self.bare:
             bare = self.fitter.fit(fit.restarted.without(k), steps=0)
-            self.bare[k] = (fit, bare, self.screen.run(bare))
+            known = None if self.latest is None else self.latest[2].threshold
+            self.bare[k] = (fit, bare, self.screen.run(bare, threshold=known))
         return self.bare[k][1:]
 
     def objections(self, candidate: CandidateModel, accepted: Sequence[Hypothesis] = ()) -> dict[int, str]:
