@@ -255,8 +255,15 @@ def test_what_came_nowhere_near_in_a_place_is_not_fitted_there_again(monkeypatch
     fitted.clear()
     trials.use(replace(trials.fitter))  # as with other errors
     assert len(rivals.replacements(trials, held, 0)) == len(set(fitted)) == (not told)
-    trials.without_kin(BACKLASH).beaten.add("learnt for itself")
-    assert trials.beaten == ({(frozenset({BACKLASH}), frozenset({CLOCK}))} if told else set())
+    trials.without_kin(BACKLASH).beaten["what it learns"] = ()
+    assert trials.beaten == ({(BACKLASH, CLOCK): (frozenset(),)} if told else {})
+    # it was nowhere near beside this cause too, or has not been tried beside it
+    start = {"amplitude": NOISE, "period": PITCH, "phase": 0.0}
+    (both,) = trials.tried(held.fit.restarted.with_cause(CYCLIC, start), CYCLIC, steps=1)
+    for beside in (frozenset({CYCLIC, EVENT}), frozenset({EVENT})):
+        trials.beaten, fitted[:] = {(BACKLASH, CLOCK): (beside,)}, []
+        rivals.replacements(trials, both, 0)
+        assert bool(fitted) == (CYCLIC not in beside)
 
 
 # the slope tells the first, the best of many shifts the last

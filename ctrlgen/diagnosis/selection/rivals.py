@@ -226,10 +226,9 @@ def _in_place_of(k: int, there: Sequence[Hypothesis], tried: Sequence[CandidateM
 
 def replacements(trials: Trials, current: CandidateModel, k: int) -> list[CandidateModel]:
     """What would be suspected instead of cause k, with all the rest as it is now: refitted, it may have gone astray. What came nowhere
-    near in the place of the same cause before is not fitted again."""
+    near in the place of the same cause before, beside the same causes or more, is not fitted again."""
     structure = current.fit.structure
-    there = frozenset(current.causes)
-    rest = there - {structure.causes[k]}
+    place, rest = structure.causes[k], frozenset(current.causes) - {structure.causes[k]}
     others = current.fit.restarted.without(k)
     try:
         bare, screened = trials.screened_without(current.fit, k)
@@ -242,8 +241,8 @@ def replacements(trials: Trials, current: CandidateModel, k: int) -> list[Candid
         s
         for s in significant(trials, current, screened, SEARCH.most_rivals)
         if s.z**2 > SEARCH.rival_share * gained
-        and s.hypothesis != structure.causes[k]
-        and (there, rest | {s.hypothesis}) not in trials.beaten
+        and s.hypothesis != place
+        and not any(rest <= beside for beside in trials.beaten.get((place, s.hypothesis), ()))
     ]
 
     # what cannot take away so much of it is no rival
@@ -259,9 +258,9 @@ def replacements(trials: Trials, current: CandidateModel, k: int) -> list[Candid
     last = current.fit.objective * max(SEARCH.rival_reach, float(np.exp(SEARCH.rival_margin / n)))
     ends = trials.each(lambda branch, t: branch.converged(t, last), near)
     tried = trials.selection.ranked([*ends, *(t for t in fits if t not in near)])
-    trials.beaten |= {
-        (there, frozenset(t.causes)) for t in tried if t.fit.objective > last and not hardly_told(current, t)
-    }
+    for t in tried:
+        if t.cause is not None and t.fit.objective > last and not hardly_told(current, t):
+            trials.beaten[place, t.cause] = (*trials.beaten.get((place, t.cause), ()), rest)
     return tried
 
 

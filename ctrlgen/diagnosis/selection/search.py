@@ -196,7 +196,7 @@ class Searcher:
         if recording is fitter.recording:
             return current
         self.markings += 1
-        trials.beaten = set()  # by readings that were not all right
+        trials.beaten = {}  # by readings that were not all right
         trials.use(replace(fitter, recording=recording))
         self._learn_mismatch(scored(trials.fitter, trials.fitter.described(current.fit.structure.device)[1]))
         return trials.with_noise_update(trials.with_errors(trials.converged(current)))

@@ -48,8 +48,8 @@ class Trials:
         self.latest: tuple[Fitter, Fit, Screened] | None = None
         self.bare: dict[int, tuple[Fit, Fit, Screened]] = {}
         self.mismatch: np.ndarray | None = None
-        # the causes of a model, and those of what came nowhere near with another in the place of one of them
-        self.beaten: set[tuple[frozenset[Hypothesis], frozenset[Hypothesis]]] = set()
+        # of a cause and another that came nowhere near in its place: the sets of causes that were beside them
+        self.beaten: dict[tuple[Hypothesis, Hypothesis], tuple[frozenset[Hypothesis], ...]] = {}
         self.refused: list[Refusal] = []
         self.failed: list[Failure] = []
         self.log: list[Attempt] = []
@@ -79,7 +79,7 @@ class Trials:
         branch = copy.copy(self)
         branch.screen = self.screen.without(is_kin)
         branch.fitted, branch.screens, branch.bare, branch.latest = dict(self.fitted), {}, {}, None
-        branch.beaten = set(self.beaten)
+        branch.beaten = dict(self.beaten)
         branch.refused, branch.failed, branch.log = [], [], []
         return branch
 
@@ -108,7 +108,7 @@ class Trials:
         def work(item: Item) -> tuple[Result, _Learnt]:
             branch = copy.copy(self)
             branch.jobs, branch.step = 1, (lambda _: None)
-            branch.fitted, branch.screens, branch.beaten = dict(self.fitted), dict(self.screens), set(self.beaten)
+            branch.fitted, branch.screens, branch.beaten = dict(self.fitted), dict(self.screens), dict(self.beaten)
             branch.refused, branch.failed, branch.log = [], [], []
             optima: _Optima = {}
             with nullcontext(optima) if checkpoint is None else checkpoint.branch() as optima:
