@@ -266,6 +266,21 @@ def test_what_came_nowhere_near_in_a_place_is_not_fitted_there_again(monkeypatch
         assert bool(fitted) == (CYCLIC not in beside)
 
 
+def test_what_one_rival_leaves_far_behind_is_not_fitted_in_its_place(monkeypatch):
+    trials, described = trials_beside(fitter_of(played), [BACKLASH, CLOCK, CYCLIC])
+    late = trials.fit(described.fit.restarted.with_cause(CLOCK, {"delay": 1e-5}), CLOCK, steps=1)
+    begun = {BACKLASH: {"gap": 5e-8}, CYCLIC: {"amplitude": NOISE, "period": PITCH, "phase": 0.0}}
+    monkeypatch.setattr(rivals, "hardly_told", lambda *_: False)
+    monkeypatch.setattr(rivals, "significant", lambda *_: [SimpleNamespace(hypothesis=h, z=1e9) for h in begun])
+    monkeypatch.setattr(
+        rivals,
+        "replace_cause",
+        lambda *given: described.fit.restarted.with_cause(given[-1].hypothesis, begun[given[-1].hypothesis]),
+    )
+    assert len(rivals.replacements(trials, late, 0)) == 2
+    assert trials.beaten == {(BACKLASH, CYCLIC): (frozenset(),)}
+
+
 # the slope tells the first, the best of many shifts the last
 @pytest.mark.parametrize(
     "late, shift", [(3e-4, H), (7e-3, 7e-3), (0.02, 0.02)], ids=["a third of a sample", "seven", "twenty"]

@@ -255,12 +255,20 @@ def replacements(trials: Trials, current: CandidateModel, k: int) -> list[Candid
     near = trials.close_contenders(without, current, trials.selection.ranked(fits))
     # what cannot come near by the criterion is not fitted to its end
     n = max(trials.selection.samples(current.fitted, current.errors), 1.0)
-    last = current.fit.objective * max(SEARCH.rival_reach, float(np.exp(SEARCH.rival_margin / n)))
-    ends = trials.each(lambda branch, t: branch.converged(t, last), near)
+    reach = max(SEARCH.rival_reach, float(np.exp(SEARCH.rival_margin / n)))
+    ends = trials.each(lambda branch, t: branch.converged(t, reach * current.fit.objective), near)
     tried = trials.selection.ranked([*ends, *(t for t in fits if t not in near)])
-    for t in tried:
-        if t.cause is not None and t.fit.objective > last and not hardly_told(current, t):
-            trials.beaten[place, t.cause] = (*trials.beaten.get((place, t.cause), ()), rest)
+    # one of them may stand there next
+    for winner, best in ((place, current), *((t.cause, t) for t in tried)):
+        for t in tried:
+            if (
+                winner is None
+                or t.cause is None
+                or t.fit.objective <= reach * best.fit.objective
+                or hardly_told(best, t)
+            ):
+                continue
+            trials.beaten[winner, t.cause] = (*trials.beaten.get((winner, t.cause), ()), rest)
     return tried
 
 
