@@ -334,18 +334,6 @@ def test_what_is_called_detectable_is_seen_and_half_of_it_is_not():
     assert seen == {0.5: 0, 1.5: 3}
 
 
-def test_each_hypothesis_alone_scores_as_it_does_beside_the_others():
-    fitter = axis_fitter(cubic)
-    fit = fitter.fit(Structure(AXIS))
-    both, alone = (Screen(fitter, [CUBIC, CREEP, DRIFT]).run(fit, threshold=level) for level in (None, 4.5))
-    assert alone.threshold == 4.5 and both.threshold != 4.5 and both.cosine.size and not alone.cosine.size
-    rows = [[(s.hypothesis, s.start, s.z, s.index) for s in found.suspects] for found in (alone, both)]
-    assert len(rows[0]) == 3 and [r[0] for r in rows[0]] == [r[0] for r in rows[1]]
-    for one, other in zip(*rows, strict=True):
-        assert one[1] == pytest.approx(other[1]) and one[2:] == pytest.approx(other[2:], rel=1e-9)
-    assert alone.amplitude_sd == pytest.approx(both.amplitude_sd)
-
-
 def test_what_a_record_at_one_place_hides_is_said():
     fitter = axis_fitter(u=np.full(600, 1e-9))
     fit = fitter.fit(Structure(AXIS))

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from test_plausibility import LOGS, _written, said_of
+from model_logs import LOGS, said_of, write_log
 
 SETTLED, MOVING = "poses", "heaters"
 
@@ -18,7 +18,7 @@ def logged(tmp_path_factory):
 
     def log(name):
         if name not in kept:
-            folder, model, text = _written(LOGS[name], tmp_path_factory.mktemp(name))
+            folder, model, text = write_log(LOGS[name], tmp_path_factory.mktemp(name))
             head, *rows = (folder / "log.csv").read_text().splitlines()
             kept[name] = (
                 folder,

@@ -22,6 +22,7 @@ SENSOR_GAIN = Hypothesis("sensor_gain", "sensor:axis", "axis")
 OFFSET = Hypothesis("home_offset", "sensor:axis", "axis")
 BOW = Hypothesis("bow", "sensor:axis", "axis")
 FORCE = Hypothesis("drive_offset", "actuator:axis", "axis")
+CREEP = Hypothesis("creep", "stage:axis", "axis")
 
 
 def sets_of(*z: float) -> list[tuple[float, set[str]]]:
@@ -39,6 +40,18 @@ def test_sets_come_in_the_order_of_what_they_explain_and_none_has_one_member():
     gains, members = zip(*sets_of(3.0, 4.0, 5.0), strict=True)
     assert gains == pytest.approx((50.0, 41.0, 34.0, 25.0), rel=1e-6)  # the ridge is far below
     assert members == ({"h0", "h1", "h2"}, {"h1", "h2"}, {"h0", "h2"}, {"h0", "h1"})
+
+
+def test_each_hypothesis_alone_scores_as_it_does_beside_the_others():
+    fitter = axis_fitter(lambda t, q, v, memory: (-2e10 * q**3, memory))
+    fit = fitter.fit(Structure(AXIS))
+    both, alone = (Screen(fitter, [BOW, CREEP, OFFSET]).run(fit, threshold=level) for level in (None, 4.5))
+    assert alone.threshold == 4.5 and both.threshold != 4.5 and both.cosine.size and not alone.cosine.size
+    rows = [[(s.hypothesis, s.start, s.z, s.index) for s in found.suspects] for found in (alone, both)]
+    assert len(rows[0]) == 3 and [r[0] for r in rows[0]] == [r[0] for r in rows[1]]
+    for one, other in zip(*rows, strict=True):
+        assert one[1] == pytest.approx(other[1]) and one[2:] == pytest.approx(other[2:], rel=1e-9)
+    assert alone.amplitude_sd == pytest.approx(both.amplitude_sd)
 
 
 def test_suspects_look_alike_by_the_cosine_of_what_they_do_to_the_readings():

@@ -30,7 +30,7 @@ from ctrlgen.diagnosis.settings.selection import (
     SUBSETS,
 )
 from ctrlgen.diagnosis.settings.shares import SHARES
-from ctrlgen.diagnosis.settings.verdict import STANDING, VERDICT
+from ctrlgen.diagnosis.settings.verdict_settings import STANDING, VERDICT
 
 __all__ = [
     "ATTRIBUTION",
