@@ -10,6 +10,7 @@ from ctrlgen.diagnosis.report.experiment_sentences import experiment_sentence
 from ctrlgen.diagnosis.report.history_table import most_gained, quantity
 from ctrlgen.diagnosis.report.luck_sentences import luck_steps
 from ctrlgen.diagnosis.report.on_the_clock import used_for_another_run
+from ctrlgen.diagnosis.report.time_base import time_base_step
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding, Role
@@ -146,7 +147,7 @@ def per_cent(share: float) -> str:
 
 def next_steps(diagnosis: Diagnosis) -> list[str]:
     """What to do next, in order."""
-    first = [UNCHECKED] if implausible_notes(diagnosis) else []
+    first = [*([UNCHECKED] if implausible_notes(diagnosis) else []), *time_base_step(diagnosis)]
     return [*first, *_steps(diagnosis), *luck_steps(diagnosis.findings)]
 
 
