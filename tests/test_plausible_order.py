@@ -100,6 +100,21 @@ def test_a_reading_that_is_turned_round_or_exchanged_is_told(logged, name):
     assert pairs == {(readings[i], readings[j]), (readings[j], readings[i])}
 
 
+@pytest.mark.parametrize(
+    "name", ["axis", pytest.param(MOVING, marks=pytest.mark.long), pytest.param("levers", marks=pytest.mark.long)]
+)
+def test_a_speed_in_the_place_of_a_position_is_told(logged, name):
+    log = logged(name)
+    names, rows = log[3:]
+    for reading in list(LOGS[name].readings)[:2]:
+        y = rows[:, names.index(reading)]
+        for rate in (np.gradient(y), np.diff(y, prepend=y[0])):
+            kept = rows.copy()
+            kept[:, names.index(reading)] = 300.0 * rate  # of about the size of a position
+            assert [s for s in said(log, kept) if s.startswith(f"reading.{reading} follows how fast")]
+    assert said(log, rows) == []
+
+
 def test_what_the_library_has_a_law_for_is_left_to_it(logged):
     """Two exchanged drives, and one that is turned round: a machine is wired so, and the C may be."""
     log = logged(SETTLED)

@@ -12,7 +12,7 @@ from ctrlgen.core.errors import Fault
 from ctrlgen.model.model import Model
 from ctrlgen.recordings.alike_units import alike, size_of
 from ctrlgen.recordings.moved import Moved, moved
-from ctrlgen.recordings.plausible_order import column_notes, row_notes
+from ctrlgen.recordings.plausible_order import column_notes, row_notes, speed_notes
 from ctrlgen.recordings.plausible_rate import dynamics_notes
 from ctrlgen.recordings.plausible_scale import size_notes, zero_notes
 from ctrlgen.recordings.plausible_units import WRONG, unit_notes
@@ -52,7 +52,7 @@ def implausible(seen: Moved) -> list[str]:
         # a unit that is wrong makes the size wrong too
         sizes = unit_notes(seen) or size_notes(seen) or zero_notes(seen)
         # in another order the sizes mean nothing
-        order = column_notes(seen) or row_notes(seen)
+        order = column_notes(seen) or row_notes(seen) or speed_notes(seen)
         return [*(order or sizes), *motion_notes(seen), *dynamics_notes(seen), *order_notes(seen)]
 
 

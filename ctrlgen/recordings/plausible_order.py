@@ -1,4 +1,5 @@
-"""Whether rows and columns belong together: readings that stand a row off their drives, and drives or readings in another order.
+"""Whether rows and columns belong together: readings that stand a row off their drives, drives or readings in another order, and speeds in
+the place of positions.
 
 The device's linear response to its drives, about the means and but for a factor of each reading,
 
@@ -12,6 +13,7 @@ laws of the library, as they are of a machine that is wired so.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -29,7 +31,7 @@ WELL = 0.95
 FAIRLY = 0.85
 """Share from which other columns do, which play does not exchange: of a device whose laws are far from linear more is left over."""
 BETTER = 0.3
-"""Of what the columns as they are leave over, what others leave at most."""
+"""Of what the columns as they are leave over, what others leave at most; share that the position explains of a speed at most."""
 ALIKE = 2.0
 """Times what one order leaves, up to which another leaves as little: on a machine with a plane of symmetry they may be the same."""
 FEWEST = 12
@@ -72,6 +74,31 @@ def _split(before: np.ndarray, after: np.ndarray) -> tuple[float, int]:
     """The least sum of the first so many values of one array (n,) and the others of another, and how many these are."""
     sums = np.concatenate([[0.0], np.cumsum(before)]) + np.concatenate([np.cumsum(after[::-1])[::-1], [0.0]])
     return float(sums.min()), int(np.argmin(sums))
+
+
+def speed_notes(seen: Moved) -> list[str]:
+    """A sentence for each reading of a series that follows how fast the model moves, and not where it is: as a speed does, or the way from
+    row to row. No device comes a quarter of a period before what moves it."""
+    stretches = [s for s in seen.stretches if np.isfinite(s.step) and len(s.u) >= FEWEST]
+    if not stretches:
+        return []
+    parts = [_about_mean(seen, s) for s in stretches]
+    y, made = map(np.concatenate, zip(*parts, strict=True))
+    # the slope at a row, and the way to it
+    rates = [
+        np.concatenate([taken(part[1]) / s.step for part, s in zip(parts, stretches, strict=True)])
+        for taken in (partial(np.gradient, axis=0), _way)
+    ]
+    return [
+        f"{name} follows how fast the device's model moves, not where it is: is it a speed, or the way from row to row?"
+        for i, (name, _) in enumerate(seen.readings)
+        if _explained(y[:, [i]], made[:, [i]]) < BETTER
+        and max(_explained(y[:, [i]], rate[:, [i]]) for rate in rates) > FAIRLY
+    ]
+
+
+def _way(made: np.ndarray) -> np.ndarray:
+    return np.diff(made, axis=0, prepend=made[:1])
 
 
 def column_notes(seen: Moved) -> list[str]:
