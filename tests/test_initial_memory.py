@@ -79,6 +79,13 @@ def test_a_record_to_fit_begins_with_the_memory_of_what_was_before():
     assert fit.values(0)["share"] == pytest.approx(SHARE, rel=0.01)
 
 
+def test_a_fit_from_there_ends_where_it_cannot_win_as_any_other_does():
+    fitter, structure = cut(280, 0)
+    early, whole = fitter.fit(structure, enough=-np.inf), fitter.fit(structure)
+    assert np.array_equal(early.theta, structure.start) and not np.array_equal(whole.theta, structure.start)
+    assert whole.objective < early.objective < 0.1 * fitter.initial_objective(structure)  # from there, but no step on
+
+
 @pytest.mark.parametrize("way", (0.0, *INITIAL_MEMORY.ways_back))
 @pytest.mark.parametrize("side, back", [(-1.0, 1), (1.0, -1), (0.0, 1), (0.0, -1)])
 def test_a_turning_point_is_sought_where_the_record_begins_and_every_way_back(monkeypatch, way, side, back):
