@@ -84,11 +84,13 @@ def test_drives_in_another_order_are_told(logged, name, seed):
 
 
 @pytest.mark.parametrize(
-    "name", [SETTLED, pytest.param("levers", marks=pytest.mark.long), pytest.param("mirror", marks=pytest.mark.long)]
+    "name", [SETTLED, *(pytest.param(n, marks=pytest.mark.long) for n in (MOVING, "levers", "mirror"))]
 )
 def test_a_reading_that_is_turned_round_or_exchanged_is_told(logged, name):
     log, readings = logged(name), list(LOGS[name].readings)
     for i, turned in enumerate(readings):
+        if (name, turned) == (MOVING, "delta_z"):  # its motion is far from linear in all drives
+            continue
         signs = [-1 if k == i else 1 for k in range(len(readings))]
         (told,) = said(log, exchanged(log, list(range(len(readings))), signs, drives=False))
         assert told.startswith(f"the column of reading.{turned} is turned round")

@@ -283,8 +283,9 @@ class Fitter:
     def begun(self, fit: Fit, record: Record) -> tuple[np.ndarray, np.ndarray]:
         """What is added to the free initial states [SI] so that they suit a record best, and the readings (n, n_y) [SI] from there.
 
-        One Gauss-Newton step from rest, shortened until it lowers the objective; from rest where no step does. Where the record then
-        begins worse than it goes on and a law has plays, another from the turning point before it, or from a place in its gap.
+        Gauss-Newton steps from rest, each shortened until it lowers the objective, as long as one brings much less than it promised: a
+        single one where the readings are linear in the states. From rest where no step does. Where the record then begins worse than it
+        goes on and a law has plays, another from the turning point before it, or from a place in its gap.
         """
         simulator, error = self.simulator(fit.structure, record), self.error.weighted
         key = (id(simulator), id(record), fit.theta.tobytes(), error.sd.tobytes(), *(a.tobytes() for a in error.ar))
@@ -311,25 +312,37 @@ class Fitter:
     def _begun_near(
         self, simulator: Simulator, theta: np.ndarray, record: Record, begun: np.ndarray
     ) -> tuple[float, np.ndarray, np.ndarray]:
-        """The objective, the initial states in their prior deviations and the readings, one Gauss-Newton step from `begun`."""
+        """The objective, the initial states in their prior deviations and the readings, some Gauss-Newton steps from `begun`."""
+        for _ in range(HELD_OUT_REFIT.max_steps_to_begin):
+            was, objective, promised, begun, y = self._one_step_to_begin(simulator, theta, record, begun)
+            least = HELD_OUT_REFIT.unsettled * objective
+            if objective - promised <= least or was - objective <= least:
+                break
+        return objective, begun, y
+
+    def _one_step_to_begin(
+        self, simulator: Simulator, theta: np.ndarray, record: Record, begun: np.ndarray
+    ) -> tuple[float, float, float, np.ndarray, np.ndarray]:
+        """The objective before a Gauss-Newton step from `begun`, after it, and as it promised; the states and the readings after it."""
         sd = initial_state_sd(simulator)
         y, Y = simulator.sensitivities(record, theta, sd * begun, by_free=False)
         white = self._white(record, y)
         objective = float(white @ white + begun @ begun)
         J = self.error.whiten(Y, record.valid).reshape(len(white), len(sd)) * sd
         if not (np.isfinite(white).all() and np.isfinite(J).all()):
-            return np.inf, begun, y
-        with_prior = np.vstack([J, np.eye(len(sd))])
-        step = np.linalg.lstsq(with_prior, np.concatenate([white, -begun]), rcond=None)[0]
+            return np.inf, np.inf, np.inf, begun, y
+        with_prior, wanted = np.vstack([J, np.eye(len(sd))]), np.concatenate([white, -begun])
+        step = np.linalg.lstsq(with_prior, wanted, rcond=None)[0]
+        promised = float(np.sum((wanted - with_prior @ step) ** 2))
         # a gap or a friction threshold makes the first step useless
         for _ in range(HELD_OUT_REFIT.halvings):
             there = begun + step
             shifted = simulator.simulate(record, theta, sd * there)
             residual = self._white(record, shifted)
             if (value := float(residual @ residual + there @ there)) <= objective:
-                return value, there, shifted
+                return objective, value, promised, there, shifted
             step = step / 4
-        return objective, begun, y
+        return objective, objective, promised, begun, y
 
     def _white(self, record: Record, y: np.ndarray) -> np.ndarray:
         """The whitened residual (n n_y,); large values are not limited."""

@@ -265,6 +265,10 @@ class HeldOutRefitSettings:
     """Gauss-Newton steps before the residual tests, which need the minimum itself."""
     halvings: int = 6
     """Halvings of a step that does not lower the objective."""
+    max_steps_to_begin: int = 12
+    """Gauss-Newton steps to the initial states of a record: a hexapod whose heaters are hot takes seven. Judgement."""
+    unsettled: float = 0.01
+    """Share of the objective by which a step brings less than it promised, or brings at all, from which on another follows."""
     settled: float = 0.1
     """Decrease of the objective [squared standard deviations] below which the refit ends."""
 

@@ -197,6 +197,13 @@ class Simulator:
         z = balanced(m, m.x, m.u, SIMULATION.start_newton_steps)
         return ca.Function("balance", [m.x, m.z, m.u, m.p, self.ambient], [z])
 
+    @cached_property
+    def _slopes_of_balance(self) -> ca.Function:
+        """The same arguments -> dz/dx (n_axes, n_x) and dz/dp (n_axes, k)."""
+        given = self._balance.sx_in()
+        z = self._balance(*given)
+        return ca.Function("slopes", given, [ca.jacobian(z, given[0]), ca.jacobian(z, given[3])])
+
     @staticmethod
     def ambient_of(record: Record) -> np.ndarray:
         """Ambient (n,), zero where none was recorded."""
@@ -233,9 +240,13 @@ class Simulator:
         c, c_p = self._with_rates.constants(p)
         k, n_i, n_y, n = len(self.free) * by_free, len(self.free_initial_states), len(self.channels), len(record.time)
         recursion, reached = self._recursion_with_sensitivities(by_free)
-        T_0 = np.zeros((k + n_i, self.n_s))
+        S_0, T_0 = self.starting_state(record, p, start), np.zeros((k + n_i, self.n_s))
         T_0[k + np.arange(n_i), list(self.free_initial_states)] = 1.0
-        first = np.concatenate([self.starting_state(record, p, start), T_0[reached.row(), reached.get_col()]])
+        if self._begins_in_balance:
+            by_x, by_p = self._slopes_of_balance(*self._first_balance(record, p, S_0))
+            T_0[k:, self.n_x :] += by_x.full()[:, list(self.free_initial_states)].T
+            T_0[:k, self.n_x :] = by_p.full().T[:k]
+        first = np.concatenate([S_0, T_0[reached.row(), reached.get_col()]])
         constant = (np.reshape(v, (1, -1)) for v in (c.full(), np.array(c_p.nonzeros())))
         values = recursion.run(first, *self.inputs(record), *constant)[1]
         rows = n_y + self._rates.numel()
@@ -307,11 +318,22 @@ class Simulator:
         return [ca.MX.sym(name, n) for name, n in (("S", self.n_s), ("u", n_u), ("u1", n_u), ("e", 1), ("c", n_c))]
 
     def starting_state(self, record: Record, p: np.ndarray, start: np.ndarray | None) -> np.ndarray:
-        """S (n_s,) before the first sample, `start` added at `free_initial_states`."""
+        """S (n_s,) before the first sample, `start` added at `free_initial_states`; a displacement without inertia in balance with that."""
         S = self.initial_state(record, p)
         if start is not None:
             S[list(self.free_initial_states)] += start
+            if self._begins_in_balance:
+                S[self.n_x :] = self._balance(*self._first_balance(record, p, S)).full().ravel()
         return S
+
+    @property
+    def _begins_in_balance(self) -> bool:
+        """Whether the first reading is of a displacement in balance."""
+        return not (self.model.inertial or self.poses)
+
+    def _first_balance(self, record: Record, p: np.ndarray, S: np.ndarray) -> tuple[Any, ...]:
+        """The arguments of `_balance` with the states of S at the first sample."""
+        return S[: self.n_x], self.model.z_scale, record.drive[0], p, self.ambient_of(record)[0]
 
     def inputs(self, record: Record) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Drive u and u+ (n, n_u), ambient (n, 1). Of poses u+ is the pose's own drive and u that of the pose before."""

@@ -89,11 +89,11 @@ def speed_notes(seen: Moved) -> list[str]:
         np.concatenate([taken(part[1]) / s.step for part, s in zip(parts, stretches, strict=True)])
         for taken in (partial(np.gradient, axis=0), _way)
     ]
+    position, speed = _explained(y, made), np.max([_explained(y, rate) for rate in rates], axis=0)
     return [
         f"{name} follows how fast the device's model moves, not where it is: is it a speed, or the way from row to row?"
-        for i, (name, _) in enumerate(seen.readings)
-        if _explained(y[:, [i]], made[:, [i]]) < BETTER
-        and max(_explained(y[:, [i]], rate[:, [i]]) for rate in rates) > FAIRLY
+        for (name, _), by_position, by_speed in zip(seen.readings, position, speed, strict=True)
+        if by_position < BETTER and by_speed > FAIRLY
     ]
 
 
@@ -108,8 +108,7 @@ def column_notes(seen: Moved) -> list[str]:
     if not stretches:
         return []
     y, made = map(np.concatenate, zip(*(_about_mean(seen, s) for s in stretches), strict=True))
-    as_it_is = _explained(y, made)
-    if as_it_is > POORLY or not np.isfinite(made).all():
+    if not np.isfinite(made).all() or np.all(_explained(y, made) > POORLY):
         return []
     wired, read = np.concatenate([_crossed(seen, s) for s in stretches]), np.zeros((*y.shape, y.shape[1], y.shape[1]))
     for i in range(y.shape[1]):
@@ -122,8 +121,10 @@ def column_notes(seen: Moved) -> list[str]:
         own = np.arange(len(order))
         changed = int(np.count_nonzero((order != own) | (signs < 0)))
         mended = np.einsum("nijk,jk->ni", each, signs[:, None] * (order[:, None] == own))
-        explained = _explained(y, mended)
-        if not changed or explained < FAIRLY or 1 - explained > BETTER * (1 - as_it_is):
+        # of the readings, those that are changed; of drives all
+        rows = np.flatnonzero((order != own) | (signs < 0)) if columns is seen.readings else np.arange(y.shape[1])
+        was, explained = (float(np.mean(_explained(y, v)[rows])) if len(rows) else 0.0 for v in (made, mended))
+        if not changed or was > POORLY or explained < FAIRLY or 1 - explained > BETTER * (1 - was):
             continue
         # as the sizes are stated: what is of one shape may be told by them
         left = float(np.mean(np.nansum((y - mended) ** 2, axis=0) / np.maximum(np.nansum(y**2, axis=0), 1e-300)))
@@ -178,12 +179,12 @@ def _crossed(seen: Moved, s: Stretch) -> np.ndarray:
     return crossed - crossed.mean(axis=0)
 
 
-def _explained(y: np.ndarray, made: np.ndarray) -> float:
-    """Share of the variance of y (n, n_y) that a positive multiple of `made` explains of each reading, on average; 0 where that grows
-    beyond all numbers."""
+def _explained(y: np.ndarray, made: np.ndarray) -> np.ndarray:
+    """Share (n_y,) of the variance of y (n, n_y) that a positive multiple of `made` explains of each reading; 0 where that grows beyond all
+    numbers."""
     if not np.isfinite(made).all():
-        return 0.0
+        return np.zeros(y.shape[1])
     x = np.where(np.isfinite(y), made, 0.0)
     size = np.sum(x**2, axis=0)
     times = np.maximum(np.nansum(x * y, axis=0), 0.0) / np.where(size > 0, size, 1.0)
-    return float(np.mean(1 - np.nansum((y - times * x) ** 2, axis=0) / np.maximum(np.nansum(y**2, axis=0), 1e-300)))
+    return np.asarray(1 - np.nansum((y - times * x) ** 2, axis=0) / np.maximum(np.nansum(y**2, axis=0), 1e-300))

@@ -1,0 +1,52 @@
+"""A record that goes on in the middle of a run begins with the displacement of its hot heaters, and these are found."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import DEVICES
+from model_logs import LOGS, write_log
+
+from ctrlgen import load_device
+from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.noise import Noise, NoiseSource
+from ctrlgen.estimation.structure import Structure
+from ctrlgen.recordings.reader import load_recordings
+
+
+@pytest.fixture(scope="module")
+def split(tmp_path_factory):
+    """A fitter of a log that is held out from its row 840 on, the numbers as stated, and the noise of its readings, which have none."""
+    folder, model, text = write_log(LOGS["heaters"], tmp_path_factory.mktemp("hot"))
+    (folder / "recording.toml").write_text(text)
+    recording = load_recordings([folder / "recording.toml"], model)
+    sd = np.array([1e-6 if "theta" in c else 2e-9 for c in recording.channels])
+    n_y = len(sd)
+    noise = Noise(sd, (np.zeros(0),) * n_y, (NoiseSource.STATED,) * n_y, ("",) * n_y, np.full(n_y, np.inf))
+    fitter = Fitter(recording, noise)
+    return fitter, fitter.fit(Structure(load_device(DEVICES / LOGS["heaters"].file)), steps=0), sd
+
+
+def test_the_states_with_which_a_part_begins_are_found_from_rest(split):
+    fitter, fit, sd = split
+    (held,) = fitter.held_out_records
+    left = np.sqrt(np.mean((held.observed - fitter.predict(fit, held)) ** 2, axis=0))
+    assert np.all(left < 0.1 * sd)  # 60 um from rest
+
+
+def test_the_first_reading_and_its_slopes_are_those_of_the_states(split):
+    fitter, fit, _ = split
+    (record,), (held,) = fitter.fit_records, fitter.held_out_records
+    r = fitter.simulator(fit.structure, record)
+    after, _ = r.simulate_states(record, fit.theta)
+    free = list(r.free_initial_states)
+    hot = (after[-1] - r.initial_state(held, fit.theta))[free]
+    y, Y = r.sensitivities(held, fit.theta, hot, by_free=False)
+    assert np.abs(y[0] - held.observed[0]).max() < 1e-9 and np.abs(hot).min() > 100.0
+    assert np.array_equal(y, r.simulate(held, fit.theta, hot))
+    first = replace(held, **{name: getattr(held, name)[:3] for name in ("time", "drive", "observed", "valid")})
+    for k, step in enumerate(np.eye(len(hot))):
+        slope = (r.simulate(first, fit.theta, hot + step) - r.simulate(first, fit.theta, hot - step)) / 2
+        assert np.allclose(Y[:3, :, k], slope, rtol=0, atol=2e-3 * np.abs(slope).max())
