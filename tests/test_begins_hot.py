@@ -12,6 +12,7 @@ from model_logs import LOGS, write_log
 from ctrlgen import load_device
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.noise import Noise, NoiseSource
+from ctrlgen.estimation.settled_start import start_of, states_to_begin
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.reader import load_recordings
 
@@ -34,6 +35,14 @@ def test_the_states_with_which_a_part_begins_are_found_from_rest(split):
     (held,) = fitter.held_out_records
     left = np.sqrt(np.mean((held.observed - fitter.predict(fit, held)) ** 2, axis=0))
     assert np.all(left < 0.1 * sd)  # 60 um from rest
+
+
+def test_what_begins_cold_begins_at_rest(split):
+    fitter, fit, _ = split
+    (cold,), (hot,) = fitter.fit_records, fitter.held_out_records
+    starts = [start_of(fitter.simulator(fit.structure, r), fitter.error, fit.theta, r) for r in (cold, hot)]
+    assert not starts[0].any() and np.all(starts[1] > 100.0)
+    assert np.array_equal(states_to_begin(fitter.problem(fit.structure), fit.theta), starts[0])
 
 
 def test_the_first_reading_and_its_slopes_are_those_of_the_states(split):

@@ -21,6 +21,7 @@ from ctrlgen.estimation.least_squares import LeastSquaresProblem, initial_state_
 from ctrlgen.estimation.moved_drive import with_drive_at
 from ctrlgen.estimation.noise import Noise
 from ctrlgen.estimation.settings import DISCREPANCY, FIT, HELD_OUT_REFIT, LEADING_PART, SIMULATION
+from ctrlgen.estimation.settled_start import start_of, states_to_begin
 from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
@@ -162,7 +163,8 @@ class Fitter:
         stand in for the new causes. The best of them is returned. A fit ends before where it cannot reach an objective that is `enough`.
         """
         problem = self.problem(structure)
-        start = np.concatenate([structure.start if theta is None else theta, np.zeros(problem.n_initial)])
+        begun = structure.start if theta is None else theta
+        start = np.concatenate([begun, states_to_begin(problem, begun)])
         if nested is not None:
             enough = min(enough, nested.objective)
         first = self._from_turning_points(problem, self._optimum(problem, start, steps, enough), steps, enough)
@@ -174,7 +176,7 @@ class Fitter:
                 near[i] = p.nominal + FIT.restart_amplitude * (near[i] - p.nominal)
         if len(states := np.concatenate([np.zeros(0), *nested.initial_states])) == problem.n_initial:
             near[problem.k :] = states
-        stated = np.concatenate([structure.start, np.zeros(problem.n_initial)])
+        stated = np.concatenate([structure.start, start[problem.k :]])
         for i, p in enumerate(structure.free_parameters):
             if p.cause is None:
                 stated[i] = p.nominal
@@ -192,7 +194,7 @@ class Fitter:
         theta, part = None, leading_part(self.recording)
         if part is not None and not any(c.prior.in_time for c in structure.causes):
             rough, same = (LeastSquaresProblem(s, part, self.error) for s in (structure, best.structure))
-            start = rough.to_scaled(np.concatenate([structure.start, np.zeros(rough.n_initial)]))
+            start = rough.to_scaled(np.concatenate([structure.start, states_to_begin(rough, structure.start)]))
             x = levenberg_marquardt(rough, start, steps, negligible=LEADING_PART.negligible * len(start))
             r = rough.residual(x)
             own = same.residual(same.to_scaled(np.concatenate([best.theta, *best.initial_states])))
@@ -239,7 +241,7 @@ class Fitter:
     def initial_objective(self, structure: Structure) -> float:
         """The objective at the structure's starting values."""
         problem = self.problem(structure)
-        start = np.concatenate([structure.start, np.zeros(problem.n_initial)])
+        start = np.concatenate([structure.start, states_to_begin(problem, structure.start)])
         residual = problem.residual(problem.to_scaled(start))
         return float(residual @ residual)
 
@@ -283,9 +285,9 @@ class Fitter:
     def begun(self, fit: Fit, record: Record) -> tuple[np.ndarray, np.ndarray]:
         """What is added to the free initial states [SI] so that they suit a record best, and the readings (n, n_y) [SI] from there.
 
-        Gauss-Newton steps from rest, each shortened until it lowers the objective, as long as one brings much less than it promised: a
-        single one where the readings are linear in the states. From rest where no step does. Where the record then begins worse than it
-        goes on and a law has plays, another from the turning point before it, or from a place in its gap.
+        Gauss-Newton steps from rest, or from where its actuators have settled under its first drive, each shortened until it lowers the
+        objective, as long as one brings much less than it promised: a single one where the readings are linear in the states. Where the
+        record then begins worse than it goes on and a law has plays, another from the turning point before it, or from a place in its gap.
         """
         simulator, error = self.simulator(fit.structure, record), self.error.weighted
         key = (id(simulator), id(record), fit.theta.tobytes(), error.sd.tobytes(), *(a.tobytes() for a in error.ar))
@@ -301,7 +303,8 @@ class Fitter:
         sd = initial_state_sd(simulator)
         if len(sd) == 0:
             return sd, simulator.simulate(record, fit.theta)
-        objective, begun, y = self._begun_near(simulator, fit.theta, record, np.zeros(len(sd)))
+        begun = start_of(simulator, self.error, fit.theta, record) / sd
+        objective, begun, y = self._begun_near(simulator, fit.theta, record, begun)
         if (simulator.plays or simulator.gaps) and begins_worse(record, self._white(record, y)):
             other = memory_before(simulator, fit.theta, record, begun, self._white)
             if other is not begun:

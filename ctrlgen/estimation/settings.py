@@ -207,6 +207,8 @@ class SimulationSettings:
     """Predictions of records kept at a time: what one fit is judged by, on as many records. Judgement."""
     start_newton_steps: int = 12
     """Newton steps from home to the first displacement in balance, unrolled. Later samples start from the one before."""
+    settling_samples: int = 2000
+    """Samples at most under the first drive of a record after which its actuators are taken to have settled there. Judgement."""
     newton_steps: int = 4
     """Newton steps a sample of a device in balance: from the sample before, each doubles the digits."""
     pose_newton_steps: int = 8

@@ -36,6 +36,7 @@ from ctrlgen.estimation.free_parameters import FreeParameter
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.least_squares import LeastSquaresProblem
 from ctrlgen.estimation.misfit import Misfit, misfit
+from ctrlgen.estimation.settled_start import states_to_begin
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 from ctrlgen.recordings.recording import Record
@@ -279,7 +280,7 @@ class CausesAsFound(LeastSquaresProblem):
 
     def __init__(self, structure: Structure, fitter: Fitter, theta: np.ndarray) -> None:
         super().__init__(structure, fitter.recording, fitter.error)
-        self.start = self.to_scaled(np.concatenate([theta, np.zeros(self.n_initial)]))
+        self.start = self.to_scaled(np.concatenate([theta, states_to_begin(self, theta)]))
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
