@@ -13,6 +13,7 @@ from ctrlgen import load_device
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.noise import Noise, NoiseSource
 from ctrlgen.estimation.settled_start import start_of, states_to_begin
+from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.reader import load_recordings
 
@@ -59,3 +60,18 @@ def test_the_first_reading_and_its_slopes_are_those_of_the_states(split):
     for k, step in enumerate(np.eye(len(hot))):
         slope = (r.simulate(first, fit.theta, hot + step) - r.simulate(first, fit.theta, hot - step)) / 2
         assert np.allclose(Y[:3, :, k], slope, rtol=0, atol=2e-3 * np.abs(slope).max())
+
+
+def test_where_it_has_no_slopes_it_is_asked_once(split, monkeypatch):
+    fitter, fit, _ = split
+    (held,) = fitter.held_out_records
+    asked, real = [], Simulator.sensitivities
+
+    def none(self, *given, **more):
+        asked.append(1)
+        y, Y = real(self, *given, **more)
+        return y, np.full_like(Y, np.inf)
+
+    monkeypatch.setattr(Simulator, "sensitivities", none)
+    start, y = replace(fitter, noise=replace(fitter.noise, sd=2 * fitter.noise.sd)).begun(fit, held)
+    assert len(asked) == 1 and np.isfinite(y).all() and np.isfinite(start).all()

@@ -27,7 +27,7 @@ def said(times: dict[str, float], suspected=("mass", "damping"), sd: float = 0.0
 
 
 @pytest.mark.parametrize(
-    "clock, how", [(2.0, "2 times too slow"), (0.5, "2 times too fast"), (1.2, "1.2 times too slow")]
+    "clock, how", [(2.0, "2 times too long"), (0.5, "2 times too short"), (1.2, "1.2 times too long")]
 )
 @pytest.mark.parametrize("stiffness", [None, 1.1])
 def test_a_clock_moves_mass_by_its_square_and_damping_by_itself(clock, how, stiffness):

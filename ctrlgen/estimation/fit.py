@@ -316,11 +316,15 @@ class Fitter:
         self, simulator: Simulator, theta: np.ndarray, record: Record, begun: np.ndarray
     ) -> tuple[float, np.ndarray, np.ndarray]:
         """The objective, the initial states in their prior deviations and the readings, some Gauss-Newton steps from `begun`."""
-        for _ in range(HELD_OUT_REFIT.max_steps_to_begin):
-            was, objective, promised, begun, y = self._one_step_to_begin(simulator, theta, record, begun)
+        was, objective, promised, begun, y = self._one_step_to_begin(simulator, theta, record, begun)
+        for _ in range(HELD_OUT_REFIT.max_steps_to_begin - 1):
             least = HELD_OUT_REFIT.unsettled * objective
-            if objective - promised <= least or was - objective <= least:
+            if not np.isfinite(objective) or objective - promised <= least or was - objective <= least:
                 break
+            there = self._one_step_to_begin(simulator, theta, record, begun)
+            if not np.isfinite(there[1]):  # it has no slopes there
+                break
+            was, objective, promised, begun, y = there
         return objective, begun, y
 
     def _one_step_to_begin(

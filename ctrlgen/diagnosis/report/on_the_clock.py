@@ -1,7 +1,7 @@
 """What of the corrected device holds for its recording alone: a drift, an event, a line run on the clock of the records.
 
 In generated C that clock would begin with the controller: a drift would grow from there, a step would come again at its moment.
-device.next.toml therefore states them as [[recording_effect]].
+device.next.toml therefore states them as [[recording_effect]]. What a dead channel reports is no more of use to a controller.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A time that was recorded wrongly, by what it makes of an axis: m x'' + c x' + k x is, in a time that runs s times too slowly,
+"""A time that was recorded wrongly, by what it makes of an axis: m x'' + c x' + k x is, in times that are s times too long,
 
     s^2 m x'' + s c x' + k x.
 
@@ -20,17 +20,17 @@ def time_base_step(diagnosis: Diagnosis) -> list[str]:
     found = [c.path for c in diagnosis.search.chosen.causes if c.effect == PARAMETER]
     for mass in (path for path in found if path.endswith(".mass")):
         axis = mass.removesuffix("mass")
-        times = _times_too_slow(diagnosis, axis) if f"{axis}damping" in found else None
+        times = _times_too_long(diagnosis, axis) if f"{axis}damping" in found else None
         if times is not None:
-            how = f"{number(times, 3)} times too slow" if times > 1 else f"{number(1 / times, 3)} times too fast"
+            how = f"{number(times, 3)} times too long" if times > 1 else f"{number(1 / times, 3)} times too short"
             return [
-                f"Check the time first: {mass} and {axis}damping are off as a clock that is {how} would make them (a sample time, "
+                f"Check the time first: {mass} and {axis}damping are off as times that are {how} would make them (a sample time, "
                 "a rate or the unit of a column); the readings cannot tell which."
             ]
     return []
 
 
-def _times_too_slow(diagnosis: Diagnosis, axis: str) -> float | None:
+def _times_too_long(diagnosis: Diagnosis, axis: str) -> float | None:
     """s, where the numbers of an axis are off by that within `VERDICT.clock_deviations` of what the fit tells of them."""
     fit = diagnosis.search.chosen.fit
     places = {u.path: i for i, u in enumerate(fit.structure.free_parameters)}

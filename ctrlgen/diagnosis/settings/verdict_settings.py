@@ -37,9 +37,9 @@ class VerdictSettings:
     """Times the guess of a noise that nothing tells from which on what is left is doubted to be it. Judgement: slow noise of a sensor is
     several times its fastest part."""
     clock_deviations: float = 3.0
-    """Standard deviations of a mass and a damping about those of a device whose clock was wrong, within which that may be it."""
+    """Standard deviations of a mass and a damping about those that wrong times would make, within which that may be it."""
     clock_off: float = 1.1
-    """Times too slow, or too fast, from which a clock is doubted: numbers of a device are known no better. Judgement."""
+    """Times too long, or too short, from which the time is doubted: numbers of a device are known no better. Judgement."""
     as_read: float = 0.3
     """Share of what is read, root mean square, from which on so much noise would have been told. Judgement."""
 
