@@ -62,6 +62,18 @@ def test_the_first_reading_and_its_slopes_are_those_of_the_states(split):
         assert np.allclose(Y[:3, :, k], slope, rtol=0, atol=2e-3 * np.abs(slope).max())
 
 
+def test_the_first_reading_has_slopes_by_the_numbers_of_the_device(split):
+    fitter, fit, _ = split
+    (held,) = fitter.held_out_records
+    first = replace(held, **{name: getattr(held, name)[:2] for name in ("time", "drive", "observed", "valid")})
+    r = Simulator(fit.structure.device, ("stage.half_stage_stiffness",), fitter.recording.channels, held.sample_time)
+    p, hot = np.asarray(r.model.p_nominal, float), np.full(len(r.free_initial_states), 250.0)
+    slope = r.sensitivities(first, p, hot)[1][0, :, 0]
+    ends = [r.simulate(first, p * (1 + sign * 1e-4), hot)[0] for sign in (1, -1)]
+    wanted = (ends[0] - ends[1]) / (2e-4 * p[0])
+    assert np.abs(wanted).max() * p[0] > 1e-6 and np.allclose(slope, wanted, rtol=0, atol=1e-4 * np.abs(wanted).max())
+
+
 def test_where_it_has_no_slopes_it_is_asked_once(split, monkeypatch):
     fitter, fit, _ = split
     (held,) = fitter.held_out_records
