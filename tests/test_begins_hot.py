@@ -11,6 +11,7 @@ from model_logs import LOGS, write_log
 
 from ctrlgen import load_device
 from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.noise import Noise, NoiseSource
 from ctrlgen.estimation.settled_start import start_of, states_to_begin
 from ctrlgen.estimation.simulator import Simulator
@@ -44,6 +45,24 @@ def test_what_begins_cold_begins_at_rest(split):
     starts = [start_of(fitter.simulator(fit.structure, r), fitter.error, fit.theta, r) for r in (cold, hot)]
     assert not starts[0].any() and np.all(starts[1] > 100.0)
     assert np.array_equal(states_to_begin(fitter.problem(fit.structure), fit.theta), starts[0])
+
+
+def test_they_are_found_under_a_large_discrepancy_of_one_reading(split):
+    fitter, fit, sd = split
+    recording = fitter.recording
+    late = []
+    for record in recording.records:
+        observed = record.observed.copy()
+        observed[3:, 0], observed[:3, 0] = observed[:-3, 0], observed[0, 0]
+        late.append(replace(record, observed=observed))
+    plain = replace(fitter, recording=replace(recording, records=tuple(late))).with_errors_of(fit)
+    beside = plain.errors.rms / sd
+    assert beside[0] > 100.0 * beside[1:].max()
+    delay = Hypothesis("delay", "sensor:theta_x", "theta_x")
+    right = plain.fit(fit.structure.with_cause(delay, {"delay": 3e-3}), steps=0)
+    (held,) = plain.held_out_records
+    left = np.sqrt(np.mean((held.observed - plain.predict(right, held)) ** 2, axis=0))
+    assert np.all(left[1:] < 0.1 * sd[1:])
 
 
 def test_the_first_reading_and_its_slopes_are_those_of_the_states(split):

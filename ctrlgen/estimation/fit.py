@@ -20,7 +20,8 @@ from ctrlgen.estimation.leading_part import leading_part
 from ctrlgen.estimation.least_squares import LeastSquaresProblem, initial_state_sd, limited, whiten_residual
 from ctrlgen.estimation.moved_drive import with_drive_at
 from ctrlgen.estimation.noise import Noise
-from ctrlgen.estimation.settings import DISCREPANCY, FIT, HELD_OUT_REFIT, LEADING_PART, SIMULATION
+from ctrlgen.estimation.record_states import begun_near
+from ctrlgen.estimation.settings import DISCREPANCY, FIT, LEADING_PART, SIMULATION
 from ctrlgen.estimation.settled_start import start_of, states_to_begin
 from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.estimation.structure import Structure
@@ -285,9 +286,8 @@ class Fitter:
     def begun(self, fit: Fit, record: Record) -> tuple[np.ndarray, np.ndarray]:
         """What is added to the free initial states [SI] so that they suit a record best, and the readings (n, n_y) [SI] from there.
 
-        Gauss-Newton steps from rest, or from where its actuators have settled under its first drive, each shortened until it lowers the
-        objective, as long as one brings much less than it promised: a single one where the readings are linear in the states. Where the
-        record then begins worse than it goes on and a law has plays, another from the turning point before it, or from a place in its gap.
+        Found from rest, or from where its actuators have settled under its first drive. Where the record then begins worse than it goes on
+        and a law has plays, once more from the turning point before it, or from a place in its gap.
         """
         simulator, error = self.simulator(fit.structure, record), self.error.weighted
         key = (id(simulator), id(record), fit.theta.tobytes(), error.sd.tobytes(), *(a.tobytes() for a in error.ar))
@@ -304,52 +304,13 @@ class Fitter:
         if len(sd) == 0:
             return sd, simulator.simulate(record, fit.theta)
         begun = start_of(simulator, self.error, fit.theta, record) / sd
-        objective, begun, y = self._begun_near(simulator, fit.theta, record, begun)
-        if (simulator.plays or simulator.gaps) and begins_worse(record, self._white(record, y)):
-            other = memory_before(simulator, fit.theta, record, begun, self._white)
-            if other is not begun:
-                again = self._begun_near(simulator, fit.theta, record, other)
-                objective, begun, y = min((objective, begun, y), again, key=lambda found: found[0])
-        return sd * begun, y
-
-    def _begun_near(
-        self, simulator: Simulator, theta: np.ndarray, record: Record, begun: np.ndarray
-    ) -> tuple[float, np.ndarray, np.ndarray]:
-        """The objective, the initial states in their prior deviations and the readings, some Gauss-Newton steps from `begun`."""
-        was, objective, promised, begun, y = self._one_step_to_begin(simulator, theta, record, begun)
-        for _ in range(HELD_OUT_REFIT.max_steps_to_begin - 1):
-            least = HELD_OUT_REFIT.unsettled * objective
-            if not np.isfinite(objective) or objective - promised <= least or was - objective <= least:
-                break
-            there = self._one_step_to_begin(simulator, theta, record, begun)
-            if not np.isfinite(there[1]):  # it has no slopes there
-                break
-            was, objective, promised, begun, y = there
-        return objective, begun, y
-
-    def _one_step_to_begin(
-        self, simulator: Simulator, theta: np.ndarray, record: Record, begun: np.ndarray
-    ) -> tuple[float, float, float, np.ndarray, np.ndarray]:
-        """The objective before a Gauss-Newton step from `begun`, after it, and as it promised; the states and the readings after it."""
-        sd = initial_state_sd(simulator)
-        y, Y = simulator.sensitivities(record, theta, sd * begun, by_free=False)
-        white = self._white(record, y)
-        objective = float(white @ white + begun @ begun)
-        J = self.error.whiten(Y, record.valid).reshape(len(white), len(sd)) * sd
-        if not (np.isfinite(white).all() and np.isfinite(J).all()):
-            return np.inf, np.inf, np.inf, begun, y
-        with_prior, wanted = np.vstack([J, np.eye(len(sd))]), np.concatenate([white, -begun])
-        step = np.linalg.lstsq(with_prior, wanted, rcond=None)[0]
-        promised = float(np.sum((wanted - with_prior @ step) ** 2))
-        # a gap or a friction threshold makes the first step useless
-        for _ in range(HELD_OUT_REFIT.halvings):
-            there = begun + step
-            shifted = simulator.simulate(record, theta, sd * there)
-            residual = self._white(record, shifted)
-            if (value := float(residual @ residual + there @ there)) <= objective:
-                return objective, value, promised, there, shifted
-            step = step / 4
-        return objective, objective, promised, begun, y
+        found = begun_near(simulator, self.error, fit.theta, record, begun)
+        if (simulator.plays or simulator.gaps) and begins_worse(record, self._white(record, found.y)):
+            other = memory_before(simulator, fit.theta, record, found.states, self._white)
+            if other is not found.states:
+                again = begun_near(simulator, self.error, fit.theta, record, other)
+                found = min(found, again, key=lambda begun: begun.objective)
+        return sd * found.states, found.y
 
     def _white(self, record: Record, y: np.ndarray) -> np.ndarray:
         """The whitened residual (n n_y,); large values are not limited."""

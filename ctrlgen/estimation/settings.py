@@ -267,10 +267,11 @@ class HeldOutRefitSettings:
     """Gauss-Newton steps before the residual tests, which need the minimum itself."""
     halvings: int = 6
     """Halvings of a step that does not lower the objective."""
-    max_steps_to_begin: int = 12
-    """Gauss-Newton steps to the initial states of a record: a hexapod whose heaters are hot takes seven. Judgement."""
+    max_steps_to_begin: int = 20
+    """Levenberg-Marquardt steps to the initial states of a record after the first: of a hexapod whose heaters are hot, under a large
+    discrepancy, 7 to 12 were needed. Judgement."""
     unsettled: float = 0.01
-    """Share of the objective by which a step brings less than it promised, or brings at all, from which on another follows."""
+    """Share of the objective by which the first step brings less than it promised, and brings at all, from which on others follow."""
     settled: float = 0.1
     """Decrease of the objective [squared standard deviations] below which the refit ends."""
 

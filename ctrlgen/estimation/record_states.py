@@ -1,0 +1,97 @@
+"""The initial states that suit one record best, at given parameters: what the readings of a record are predicted from.
+
+min |W (y - y(p, s))|^2 + sum (s_j/sd_j)^2 over the free initial states s of that record alone.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ctrlgen.estimation.error_model import ErrorModel
+from ctrlgen.estimation.least_squares import initial_state_sd, whiten_residual
+from ctrlgen.estimation.settings import FIT, HELD_OUT_REFIT
+from ctrlgen.estimation.simulator import Simulator
+from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
+from ctrlgen.recordings.recording import Record
+
+
+class Begun(NamedTuple):
+    """The objective, the states (n_s,) in their prior deviations, and the readings (n, n_y) [SI] from there."""
+
+    objective: float
+    states: np.ndarray
+    y: np.ndarray
+
+
+class StatesProblem:
+    """Residual (m,) and Jacobian (m, n_s) by the states in their prior deviations: rows of the readings, then of the prior.
+
+    Large values are not limited: a record may begin far from where it is looked for.
+    """
+
+    def __init__(self, simulator: Simulator, error: ErrorModel, theta: np.ndarray, record: Record) -> None:
+        self.simulator, self.error, self.theta, self.record = simulator, error, theta, record
+        self.sd = initial_state_sd(simulator)
+        self.k = len(self.sd)
+        self.step_limit = np.full(self.k, np.inf)
+        self._last: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Those of a fit."""
+        most = np.full(self.k, FIT.start_reach)
+        return -most, most
+
+    def readings(self, x: np.ndarray) -> np.ndarray:
+        """The readings (n, n_y) [SI]."""
+        return self.simulator.simulate(self.record, self.theta, self.sd * x)
+
+    def residual(self, x: np.ndarray) -> np.ndarray:
+        """The residual (m,)."""
+        return self.rows(self.readings(x), x)
+
+    def evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The residual (m,) and its Jacobian (m, n_s); the last result is kept."""
+        if self._last is None or not np.array_equal(self._last[0], x):
+            y, Y = self.simulator.sensitivities(self.record, self.theta, self.sd * x, by_free=False)
+            J = np.vstack([-self.error.whiten(Y, self.record.valid).reshape(-1, self.k) * self.sd, np.eye(self.k)])
+            self._last = x.copy(), self.rows(y, x), np.nan_to_num(J, posinf=0.0, neginf=0.0)
+        return self._last[1:]
+
+    def normal_matrix(self, J: np.ndarray) -> np.ndarray:
+        """J'J (n_s, n_s)."""
+        return J.T @ J
+
+    def rows(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """The residual (m,) of the readings `y` [SI], followed by that of the prior."""
+        return np.concatenate([whiten_residual(self.error, self.record, y).ravel(), x])
+
+
+def begun_near(simulator: Simulator, error: ErrorModel, theta: np.ndarray, record: Record, states: np.ndarray) -> Begun:
+    """The states reached from `states`: by one Gauss-Newton step, shortened until it lowers the objective, where the readings are linear
+    in them; by Levenberg-Marquardt from there where that step brings much less than it promised. As given where they have no slopes."""
+    problem = StatesProblem(simulator, error, theta, record)
+    r, J = problem.evaluate(states)
+    was = float(r @ r)
+    best = Begun(was, states, problem.readings(states))
+    if not J[: -problem.k].any():
+        return best
+    step = np.linalg.lstsq(J, -r, rcond=None)[0]
+    promised = float(np.sum((r + J @ step) ** 2))
+    for _ in range(HELD_OUT_REFIT.halvings):  # a gap or a friction threshold makes the first step useless
+        there = states + step
+        y = problem.readings(there)
+        residual = problem.rows(y, there)
+        if (value := float(residual @ residual)) <= was:
+            best = Begun(value, there, y)
+            break
+        step = step / 4
+    least = HELD_OUT_REFIT.unsettled * best.objective
+    if best.objective - promised <= least or was - best.objective <= least:
+        return best
+    found = levenberg_marquardt(problem, best.states, HELD_OUT_REFIT.max_steps_to_begin)
+    r = problem.residual(found)
+    value = float(r @ r)
+    return Begun(value, found, problem.readings(found)) if value < best.objective else best
