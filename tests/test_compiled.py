@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import platform
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -62,6 +64,35 @@ def test_library_gives_the_numbers_of_the_virtual_machine_to_the_last_bit(cache)
     for a, b in zip(plain, quick.run(np.zeros(1), v, p), strict=True):
         assert np.array_equal(a, b)
     assert len(list(cache.glob("*.so"))) == 1
+
+
+def test_what_decays_below_the_least_normal_number_is_zero_in_the_library_and_nowhere_else(cache):
+    if compiled.compiler() is None:
+        pytest.skip("no C compiler here")
+    state, given = ca.SX.sym("state"), ca.SX.sym("given")
+    one = Compilable(ca.Function("one", [state, given], [0.5 * state + given, 2 * state]))
+    assert one.spent(LONG, MANY)
+    least = np.finfo(float).tiny
+    states, _ = one.run(np.array([1.0]), [np.zeros((1100, 1))], 1100)
+    normal = 0.5 ** np.arange(1, 1101) >= least
+    assert np.array_equal(states[normal, 0], 0.5 ** np.arange(1, 1101)[normal])
+    if platform.machine() == "x86_64":
+        assert not states[~normal].any()
+    assert np.array([least])[0] / 4 > 0
+
+
+def test_without_a_state_it_is_a_map_before_and_after_it_is_compiled(cache):
+    a, b = ca.SX.sym("a", 2), ca.SX.sym("b")
+    one = ca.Function("one", [ca.SX.sym("none", 0), a, b], [ca.SX(0, 1), ca.vertcat(a[0] * b, ca.sin(a[1]))])
+    rows = np.random.default_rng(5).standard_normal((1700, 2))
+    wanted = np.column_stack([3.0 * rows[:, 0], one.map(1700)(ca.DM(0, 1700), rows.T, 3.0)[1].full()[1]])
+    quick = Recursion(one, block=501)
+    states, results = quick.run(np.zeros(0), rows, np.array([[3.0]]))
+    assert states.shape == (1700, 0) and np.array_equal(results, wanted)
+    if compiled.compiler() is None:
+        pytest.skip("no C compiler here")
+    assert quick.one.is_compiled or quick.one.spent(LONG, MANY)
+    assert np.array_equal(quick.run(np.zeros(0), rows, np.array([[3.0]]))[1], wanted)
 
 
 def test_same_function_is_compiled_once(cache, monkeypatch):

@@ -46,7 +46,7 @@ def shows_nothing(place, i):
 def terms_at(record):
     """The terms of the laws of the hexapod, that any structure shares."""
     channels = tuple(f"reading.{name}" for name in build_model(HEXAPOD).signals["reading"].channels)
-    return law_terms(HEXAPOD, LAWS, channels, record.timing)
+    return law_terms(HEXAPOD, LAWS, channels, record.timing, len(record.time))
 
 
 @pytest.fixture(scope="module")

@@ -36,7 +36,8 @@ class StatesProblem:
         self.sd = initial_state_sd(simulator)
         self.k = len(self.sd)
         self.step_limit = np.full(self.k, np.inf)
-        self._last: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        self._readings: tuple[np.ndarray, np.ndarray] | None = None
+        self._slopes: tuple[np.ndarray, np.ndarray] | None = None
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
@@ -45,28 +46,26 @@ class StatesProblem:
         return -most, most
 
     def readings(self, x: np.ndarray) -> np.ndarray:
-        """The readings (n, n_y) [SI]."""
-        return self.simulator.simulate(self.record, self.theta, self.sd * x)
+        """The readings (n, n_y) [SI]; the last are kept."""
+        if self._readings is None or not np.array_equal(self._readings[0], x):
+            self._readings = x.copy(), self.simulator.simulate(self.record, self.theta, self.sd * x)
+        return self._readings[1]
 
     def residual(self, x: np.ndarray) -> np.ndarray:
         """The residual (m,)."""
-        return self.rows(self.readings(x), x)
+        return np.concatenate([whiten_residual(self.error, self.record, self.readings(x)).ravel(), x])
 
     def evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The residual (m,) and its Jacobian (m, n_s); the last result is kept."""
-        if self._last is None or not np.array_equal(self._last[0], x):
+        """The residual (m,) and its Jacobian (m, n_s); the last is kept."""
+        if self._slopes is None or not np.array_equal(self._slopes[0], x):
             y, Y = self.simulator.sensitivities(self.record, self.theta, self.sd * x, by_free=False)
             J = np.vstack([-self.error.whiten(Y, self.record.valid).reshape(-1, self.k) * self.sd, np.eye(self.k)])
-            self._last = x.copy(), self.rows(y, x), np.nan_to_num(J, posinf=0.0, neginf=0.0)
-        return self._last[1:]
+            self._readings, self._slopes = (x.copy(), y), (x.copy(), np.nan_to_num(J, posinf=0.0, neginf=0.0))
+        return self.residual(x), self._slopes[1]
 
     def normal_matrix(self, J: np.ndarray) -> np.ndarray:
         """J'J (n_s, n_s)."""
         return J.T @ J
-
-    def rows(self, y: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """The residual (m,) of the readings `y` [SI], followed by that of the prior."""
-        return np.concatenate([whiten_residual(self.error, self.record, y).ravel(), x])
 
 
 def begun_near(simulator: Simulator, error: ErrorModel, theta: np.ndarray, record: Record, states: np.ndarray) -> Begun:
@@ -82,10 +81,9 @@ def begun_near(simulator: Simulator, error: ErrorModel, theta: np.ndarray, recor
     promised = float(np.sum((r + J @ step) ** 2))
     for _ in range(HELD_OUT_REFIT.halvings):  # a gap or a friction threshold makes the first step useless
         there = states + step
-        y = problem.readings(there)
-        residual = problem.rows(y, there)
+        residual = problem.residual(there)
         if (value := float(residual @ residual)) <= was:
-            best = Begun(value, there, y)
+            best = Begun(value, there, problem.readings(there))
             break
         step = step / 4
     least = HELD_OUT_REFIT.unsettled * best.objective

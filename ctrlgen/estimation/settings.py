@@ -360,6 +360,8 @@ class CandidateTermsSettings:
     """Sample time [s] of a settled pose: every lag has passed."""
     block: int = 500
     """Samples that are propagated at a time: their sensitivities stay in the processor's cache."""
+    likely_screens: float = 3.0
+    """Screens of a diagnosis, by which it is decided whether to compile what they evaluate: with one cause there are three."""
     diverged: float = 1e100
     """Magnitude of a state above which a candidate has diverged and is left out."""
     samples_in_loop: float = 8.0

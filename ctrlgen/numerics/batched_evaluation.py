@@ -77,10 +77,11 @@ def quick(function: ca.Function) -> QuickCall:
 
 class Recursion:
     """The recursion `one` (state, inputs ...) -> (next state, result), sample after sample: in unrolled blocks by CasADi's virtual
-    machine, in one loop where it has been compiled."""
+    machine, in one loop where it has been compiled. Without a state it is a map. It is unrolled over `block` samples, and is likely to
+    run `likely_runs` times more over as many."""
 
-    def __init__(self, one: ca.Function) -> None:
-        self.one = Compilable(one)
+    def __init__(self, one: ca.Function, block: int = BLOCK, likely_runs: float = LIKELY_RUNS) -> None:
+        self.one, self.block, self.likely_runs = Compilable(one), block, likely_runs
         self.unrolled: dict[int, ca.Function] = {}
 
     def run(self, state: np.ndarray, *inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -89,9 +90,9 @@ class Recursion:
         n = max(map(len, inputs))
         if self.one.is_compiled:
             return self.one.run(state, inputs, n)
-        one, size = self.one.function, min(n, BLOCK)
+        one, size = self.one.function, min(n, self.block)
         if size not in self.unrolled:
-            self.unrolled[size] = one.mapaccum(size)
+            self.unrolled[size] = one.mapaccum(size) if one.numel_out(0) else one.map(size)
         states, results = np.empty((n, one.size1_out(0))), np.empty((n, one.size1_out(1)))
         for a in range(0, n, size):
             begin = time.process_time()
@@ -101,7 +102,7 @@ class Recursion:
             after, values = evaluate(self.unrolled[size], state, *block)
             states[a:b], results[a:b], state = after[: b - a], values[: b - a], after[-1]
             seconds = time.process_time() - begin
-            if self.one.spent(seconds, b - a, (n - b) + LIKELY_RUNS * n):
+            if self.one.spent(seconds, b - a, int((n - b) + self.likely_runs * n)):
                 self.unrolled.clear()
                 if b < n and self.one.is_compiled:
                     rest = [x[b:] if len(x) == n else x for x in inputs]

@@ -154,7 +154,7 @@ class CandidateTerms:
     @cached_property
     def signals(self) -> SignalsRead:
         """The signals that the laws read."""
-        return SignalsRead(self.simulator, self.laws.symbols)
+        return SignalsRead(self.simulator, self.laws.symbols, self.laws.samples)
 
     @cached_property
     def driven(self) -> list[int]:

@@ -19,7 +19,7 @@ from ctrlgen.effects import Effect, LawInputs, Place
 from ctrlgen.estimation.settings import CANDIDATE_TERMS
 from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.model.model import Model
-from ctrlgen.numerics.batched_evaluation import evaluate
+from ctrlgen.numerics.batched_evaluation import Recursion
 from ctrlgen.numerics.phi_functions import lag_increment, phi_matrices
 from ctrlgen.recordings.recording import Timing
 
@@ -106,14 +106,14 @@ class LawTerm:
 
 
 class LawTerms:
-    """The terms of laws along motions of one timing; `symbols` of what they read.
+    """The terms of laws along motions of one timing, of so many `samples` in all; `symbols` of what they read.
 
     What a law reads that is a number, such as a typical size, is that of the `described` device in every structure: a term is the
     same whichever structure needs it first.
     """
 
-    def __init__(self, timing: Timing, described: Model) -> None:
-        self.timing, self.described = timing, described
+    def __init__(self, timing: Timing, described: Model, samples: int) -> None:
+        self.timing, self.described, self.samples = timing, described, samples
         self.symbols: dict[Read, ca.SX] = {}
         self._terms: dict[tuple[Any, ...], LawTerm] = {}
         self._compiled: dict[tuple[Any, ...], CompiledTerms] = {}
@@ -184,24 +184,29 @@ class CompiledTerms:
         (at_end,) = ca.substitute([chosen], [memory, read], [after, end]) if chosen.numel() else (NONE,)
         if laws.timing.poses:
             slopes = ca.substitute(slopes, memory, after)
-        results = [ca.densify(value) for value in (after, slopes, at_end)]
-        self._one = ca.Function("laws", [memory, read, end], results, {"cse": True})
-        self._many: dict[int, ca.Function] = {}
+        results = [ca.densify(value) for value in (after, ca.vertcat(slopes, at_end))]
+        one = ca.Function("laws", [memory, read, end], results, {"cse": True})
+        self._one = _in_blocks(one, CANDIDATE_TERMS.likely_screens * laws.samples)
+        self._slopes = slopes.numel()
 
     def along(self, memory: np.ndarray, read: np.ndarray, end: np.ndarray) -> list[np.ndarray]:
         """Memories after each of n samples, terms and those at the end of the sample, (n, .) each, from `memory` on, of what is
         read at the samples (n, .) and at their ends."""
-        n = len(read)
-        if n not in self._many:
-            self._many[n] = self._one.mapaccum(n) if self._one.numel_out(0) else self._one.map(n)
-        return evaluate(self._many[n], memory, read, end)
+        after, terms = self._one.run(memory, read, end)
+        return [after, terms[:, : self._slopes], terms[:, self._slopes :]]
+
+
+def _in_blocks(one: ca.Function, samples: float) -> Recursion:
+    """(state, given ...) -> (next state, result) along blocks of so many samples in all, with the sample after each block."""
+    block = CANDIDATE_TERMS.block + 1
+    return Recursion(one, block, samples / block)
 
 
 class SignalsRead:
     """What the laws read of one structure: its signals at a sample and at its end, where the drive is what it was. `jumping` are
     the names of the symbols, of those given with what is read, whose signals jump with a held drive."""
 
-    def __init__(self, simulator: Simulator, reads: Mapping[Read, ca.SX]) -> None:
+    def __init__(self, simulator: Simulator, reads: Mapping[Read, ca.SX], samples: int) -> None:
         m = simulator.model
         S, S_next = ca.vertcat(m.x, m.z), ca.SX.sym("S_next", m.x.numel() + m.z.numel())
         values = [r.of(m) for r in reads]
@@ -213,16 +218,16 @@ class SignalsRead:
         jumps = ca.which_depends(open_, jumping, 1, True) if open_.numel() else []
         names = [s.name() for symbol in reads.values() for s in ca.vertsplit(symbol)]
         self.jumping = frozenset(name for name, jump in zip(names, jumps, strict=True) if jump)
-        given = [S, m.u, simulator.ambient, S_next, m.p]
-        self._one = ca.Function("read", given, [ca.densify(m.closed(v)) for v in (open_, end)], {"cse": True})
-        self._many: dict[int, ca.Function] = {}
+        given = [ca.SX.sym("none", 0), S, m.u, simulator.ambient, S_next, m.p]
+        both = ca.densify(m.closed(ca.vertcat(open_, end)))
+        # another structure has other signals: one screen
+        self._one = _in_blocks(ca.Function("read", given, [NONE, both], {"cse": True}), samples)
+        self._signals = open_.numel()
 
     def along(self, p: np.ndarray, *given: np.ndarray) -> list[np.ndarray]:
         """The signals (n, .) at n samples and at their ends, with the numbers `p`."""
-        n = len(given[0])
-        if n not in self._many:
-            self._many[n] = self._one.map(n)
-        return evaluate(self._many[n], *given, np.tile(p, (n, 1)))
+        both = self._one.run(np.zeros(0), *given, p[None, :])[1]
+        return [both[:, : self._signals], both[:, self._signals :]]
 
     def columns(self, reads: Sequence[Read]) -> np.ndarray:
         """The places of some signals among all."""

@@ -63,9 +63,11 @@ def _probed(
     return compiled_simulator(device, free, channels, timing, structure.finer), entered
 
 
-def law_terms(device: Device, hypotheses: Sequence[Hypothesis], channels: tuple[str, ...], timing: Timing) -> LawTerms:
-    """The terms of laws in any structure of a device."""
-    return LawTerms(timing, _probed(Structure(device), hypotheses, channels, timing)[0].model)
+def law_terms(
+    device: Device, hypotheses: Sequence[Hypothesis], channels: tuple[str, ...], timing: Timing, samples: int
+) -> LawTerms:
+    """The terms of laws in any structure of a device, along so many `samples` of one timing."""
+    return LawTerms(timing, _probed(Structure(device), hypotheses, channels, timing)[0].model, samples)
 
 
 class ScoreGradient:

@@ -180,7 +180,8 @@ class Screen:
         """The terms of the hypotheses' laws for records of one timing."""
         if timing not in self.laws:
             channels = self.fitter.recording.channels
-            self.laws[timing] = law_terms(fit.structure.device, self.stated, channels, timing)
+            samples = sum(len(r.time) for r in self.fitter.fit_records if r.timing == timing)
+            self.laws[timing] = law_terms(fit.structure.device, self.stated, channels, timing, samples)
         return self.laws[timing]
 
     def _follow(self, fit: Fit) -> Peaks:
