@@ -14,14 +14,14 @@ import numpy as np
 
 from ctrlgen.devices import Device
 from ctrlgen.estimation.checkpoint import Checkpoint, key_of
-from ctrlgen.estimation.error_model import ErrorModel, error_model
+from ctrlgen.estimation.error_model import ErrorModel, error_model, huber
 from ctrlgen.estimation.initial_memory import begins_worse, memory_before
 from ctrlgen.estimation.leading_part import leading_part
 from ctrlgen.estimation.least_squares import LeastSquaresProblem, initial_state_sd, limited, whiten_residual
 from ctrlgen.estimation.moved_drive import with_drive_at
 from ctrlgen.estimation.noise import Noise
 from ctrlgen.estimation.record_states import begun_near
-from ctrlgen.estimation.settings import DISCREPANCY, FIT, LEADING_PART, SIMULATION
+from ctrlgen.estimation.settings import DISCREPANCY, FIT, HELD_OUT_REFIT, LEADING_PART, SIMULATION
 from ctrlgen.estimation.settled_start import start_of, states_to_begin
 from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.estimation.structure import Structure
@@ -146,8 +146,13 @@ class Fitter:
         return structure.simulator(self.recording.channels, record.timing)
 
     def problem(self, structure: Structure) -> LeastSquaresProblem:
-        """The least-squares problem of a structure."""
-        return LeastSquaresProblem(structure, self.recording, self.error)
+        """The least-squares problem of a structure, the initial states of its records expected where they suit its starting values."""
+        return self._problem_of(structure, self.recording)
+
+    def _problem_of(self, structure: Structure, recording: Recording) -> LeastSquaresProblem:
+        problem = LeastSquaresProblem(structure, recording, self.error)
+        problem.expected = states_to_begin(problem, structure.start)
+        return problem
 
     def fit(
         self,
@@ -164,8 +169,7 @@ class Fitter:
         stand in for the new causes. The best of them is returned. A fit ends before where it cannot reach an objective that is `enough`.
         """
         problem = self.problem(structure)
-        begun = structure.start if theta is None else theta
-        start = np.concatenate([begun, states_to_begin(problem, begun)])
+        start = np.concatenate([structure.start if theta is None else theta, problem.expected])
         if nested is not None:
             enough = min(enough, nested.objective)
         first = self._from_turning_points(problem, self._optimum(problem, start, steps, enough), steps, enough)
@@ -194,8 +198,8 @@ class Fitter:
         """
         theta, part = None, leading_part(self.recording)
         if part is not None and not any(c.prior.in_time for c in structure.causes):
-            rough, same = (LeastSquaresProblem(s, part, self.error) for s in (structure, best.structure))
-            start = rough.to_scaled(np.concatenate([structure.start, states_to_begin(rough, structure.start)]))
+            rough, same = (self._problem_of(s, part) for s in (structure, best.structure))
+            start = rough.to_scaled(np.concatenate([structure.start, rough.expected]))
             x = levenberg_marquardt(rough, start, steps, negligible=LEADING_PART.negligible * len(start))
             r = rough.residual(x)
             own = same.residual(same.to_scaled(np.concatenate([best.theta, *best.initial_states])))
@@ -242,8 +246,7 @@ class Fitter:
     def initial_objective(self, structure: Structure) -> float:
         """The objective at the structure's starting values."""
         problem = self.problem(structure)
-        start = np.concatenate([structure.start, states_to_begin(problem, structure.start)])
-        residual = problem.residual(problem.to_scaled(start))
+        residual = problem.residual(problem.to_scaled(np.concatenate([structure.start, problem.expected])))
         return float(residual @ residual)
 
     def rough_objective(self, structure: Structure) -> float:
@@ -259,7 +262,7 @@ class Fitter:
         s, noise, corner = problem.structure, self.error.weighted, self.error.corner
         valid = [r.valid for r in self.recording.records]
         begun = (s.starts, s.expanded_at, sorted(s.nominal_starts.items()), s.free, s.finer, self.clock)
-        key = key_of(s.causes, *begun, start, steps, enough, noise.sd, corner, *noise.ar, *valid)
+        key = key_of(s.causes, *begun, start, problem.expected, steps, enough, noise.sd, corner, *noise.ar, *valid)
         optimum = self.checkpoint.recall(key)
         if optimum is None:
             optimum = self._descended(problem, problem.to_scaled(start), steps, enough)
@@ -272,6 +275,7 @@ class Fitter:
         part = leading_part(self.recording) if steps else None
         if part is not None:
             rough = LeastSquaresProblem(problem.structure, part, self.error)
+            rough.expected = problem.expected
             near = levenberg_marquardt(rough, x, steps, negligible=LEADING_PART.negligible * len(x))
             if not np.array_equal(near, x):
                 here, there = problem.residual(x), problem.evaluate(near)[0]
@@ -286,11 +290,13 @@ class Fitter:
     def begun(self, fit: Fit, record: Record) -> tuple[np.ndarray, np.ndarray]:
         """What is added to the free initial states [SI] so that they suit a record best, and the readings (n, n_y) [SI] from there.
 
-        Found from rest, or from where its actuators have settled under its first drive. Where the record then begins worse than it goes on
-        and a law has plays, once more from the turning point before it, or from a place in its gap.
+        Those of the fit where it was fitted to the record. Else found from rest, or from where its actuators have settled under its first
+        drive; where the record then begins worse than it goes on and a law has plays, once more from the turning point before it, or from
+        a place in its gap.
         """
         simulator, error = self.simulator(fit.structure, record), self.error.weighted
-        key = (id(simulator), id(record), fit.theta.tobytes(), error.sd.tobytes(), *(a.tobytes() for a in error.ar))
+        numbers = (fit.theta, *fit.initial_states, error.sd, *error.ar)
+        key = (id(simulator), id(record), *(a.tobytes() for a in numbers))
         if key not in _BEGUN:
             # what has the identities is kept as long
             _BEGUN[key] = (simulator, record, *self._begun(simulator, fit, record))
@@ -303,14 +309,35 @@ class Fitter:
         sd = initial_state_sd(simulator)
         if len(sd) == 0:
             return sd, simulator.simulate(record, fit.theta)
-        begun = start_of(simulator, self.error, fit.theta, record) / sd
-        found = begun_near(simulator, self.error, fit.theta, record, begun)
+        if (own := self._as_fitted(simulator, fit, record)) is not None:
+            return own
+        expected = start_of(simulator, self.error, fit.theta, record) / sd
+        found = begun_near(simulator, self.error, fit.theta, record, expected, expected)
         if (simulator.plays or simulator.gaps) and begins_worse(record, self._white(record, found.y)):
             other = memory_before(simulator, fit.theta, record, found.states, self._white)
             if other is not found.states:
-                again = begun_near(simulator, self.error, fit.theta, record, other)
+                again = begun_near(simulator, self.error, fit.theta, record, other, expected)
                 found = min(found, again, key=lambda begun: begun.objective)
         return sd * found.states, found.y
+
+    def _as_fitted(self, simulator: Simulator, fit: Fit, record: Record) -> tuple[np.ndarray, np.ndarray] | None:
+        """The states and the readings of the fit itself, of a record that it was fitted to under the same errors, where a step of the
+        states would bring next to nothing; else None."""
+        records = self.fit_records
+        k = next((k for k, r in enumerate(records) if r is record), None)
+        if k is None or len(fit.initial_states) <= k or fit.shapes != tuple(r.observed.shape for r in records):
+            return None
+        states = fit.initial_states[k]
+        here = slice(at := len(fit.theta) + sum(map(len, fit.initial_states[:k])), at + len(states))
+        J = fit.J[:, here]
+        gradient = J.T @ fit.residual
+        if gradient @ np.linalg.lstsq(J.T @ J, gradient, rcond=None)[0] > HELD_OUT_REFIT.unsettled * fit.objective:
+            return None
+        y = simulator.simulate(record, fit.theta, states)
+        first = sum(a * b for a, b in fit.shapes[:k])
+        left = huber(limited(whiten_residual(self.error, record, y)), self.error.corner)[0].ravel()
+        same = np.allclose(left, fit.residual[first : first + left.size], rtol=0, atol=SIMULATION.same_residual)
+        return (states, y) if same else None
 
     def _white(self, record: Record, y: np.ndarray) -> np.ndarray:
         """The whitened residual (n n_y,); large values are not limited."""

@@ -1,8 +1,8 @@
 """The least-squares problem of one structure: whitened residual and Jacobian, in scaled variables.
 
-min rho(W (y - y(p, s))) + sum ((p_i - nominal_i)/sd_i)^2 + sum (s_j/sd_j)^2 over the free parameters p and the initial states
-s of the records to fit. W whitens with the error model, rho is Huber's loss; the second sum holds the device's own numbers
-near what is stated of them.
+min rho(W (y - y(p, s))) + sum ((p_i - nominal_i)/sd_i)^2 + sum ((s_j - s0_j)/sd_j)^2 over the free parameters p and the initial
+states s of the records to fit, s0 where these are expected. W whitens with the error model, rho is Huber's loss; the second sum holds
+the device's own numbers near what is stated of them.
 """
 
 from __future__ import annotations
@@ -57,7 +57,8 @@ class LeastSquaresProblem:
 
     Rows: the readings of each record to fit, sample by sample; then the parameters with a stated standard deviation; then
     the initial states. Variables: the free parameters, then the initial states of each record. x is a value over its typical
-    size; of a time or a speed that shapes a law, which may lie anywhere within decades, x is the logarithm.
+    size; of a time or a speed that shapes a law, which may lie anywhere within decades, x is the logarithm. `expected` (n_s,) [SI] are the
+    initial states about which the prior of these lies.
     """
 
     def __init__(self, structure: Structure, recording: Recording, error: ErrorModel) -> None:
@@ -66,6 +67,7 @@ class LeastSquaresProblem:
         self.simulators = {t: structure.simulator(recording.channels, t) for t in {r.timing for r in self.records}}
         self.initial_sd = [initial_state_sd(self.simulators[r.timing]) for r in self.records]
         self.n_initial = sum(map(len, self.initial_sd))
+        self.expected = np.zeros(self.n_initial)
         parameters = structure.free_parameters
         self.k = len(parameters)
         self.scale = np.concatenate([[p.size for p in parameters], *self.initial_sd]).astype(float)
@@ -161,7 +163,7 @@ class LeastSquaresProblem:
         """The residual of the readings, by record, followed by that of the prior."""
         values = self.to_si(x)
         prior = [(values[i] - p.nominal) / p.sd for i, p in self.prior]
-        return limited(np.concatenate([*rows, prior, x[self.k :]]))
+        return limited(np.concatenate([*rows, prior, (values[self.k :] - self.expected) / self.scale[self.k :]]))
 
 
 def _clipped(sensitivities: np.ndarray) -> np.ndarray:

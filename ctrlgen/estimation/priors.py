@@ -99,10 +99,10 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
         ),
         "low_pass": LawPrior(
             "No filter has exactly two poles; 0.5 %: judgement. A real filter acts on the whole reading: one that is fitted to a part "
-            "of it stands for something else.",
+            "of it stands for something else. In firmware, y += (new - y)/2^k, it lets a quarter of a reading through at once where k = 2.",
             model_form_error=0.005,
             parameters={
-                "share": ParameterPrior(plausible_range=(0.8, 1.2)),
+                "share": ParameterPrior(plausible_range=(0.7, 1.2)),
                 "tau": _starts((1e-3, 8e-3, 0.06, 0.5)),
                 "damping": _starts((0.7, 4.0)),
             },

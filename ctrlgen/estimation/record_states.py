@@ -1,6 +1,6 @@
 """The initial states that suit one record best, at given parameters: what the readings of a record are predicted from.
 
-min |W (y - y(p, s))|^2 + sum (s_j/sd_j)^2 over the free initial states s of that record alone.
+min |W (y - y(p, s))|^2 + sum ((s_j - s0_j)/sd_j)^2 over the free initial states s of that record alone, s0 where they are expected.
 """
 
 from __future__ import annotations
@@ -26,13 +26,16 @@ class Begun(NamedTuple):
 
 
 class StatesProblem:
-    """Residual (m,) and Jacobian (m, n_s) by the states in their prior deviations: rows of the readings, then of the prior.
+    """Residual (m,) and Jacobian (m, n_s) by the states in their prior deviations: rows of the readings, then of the prior about those
+    `expected` (n_s,).
 
     Large values are not limited: a record may begin far from where it is looked for.
     """
 
-    def __init__(self, simulator: Simulator, error: ErrorModel, theta: np.ndarray, record: Record) -> None:
-        self.simulator, self.error, self.theta, self.record = simulator, error, theta, record
+    def __init__(
+        self, simulator: Simulator, error: ErrorModel, theta: np.ndarray, record: Record, expected: np.ndarray
+    ) -> None:
+        self.simulator, self.error, self.theta, self.record, self.expected = simulator, error, theta, record, expected
         self.sd = initial_state_sd(simulator)
         self.k = len(self.sd)
         self.step_limit = np.full(self.k, np.inf)
@@ -53,7 +56,7 @@ class StatesProblem:
 
     def residual(self, x: np.ndarray) -> np.ndarray:
         """The residual (m,)."""
-        return np.concatenate([whiten_residual(self.error, self.record, self.readings(x)).ravel(), x])
+        return np.concatenate([whiten_residual(self.error, self.record, self.readings(x)).ravel(), x - self.expected])
 
     def evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The residual (m,) and its Jacobian (m, n_s); the last is kept."""
@@ -68,10 +71,13 @@ class StatesProblem:
         return J.T @ J
 
 
-def begun_near(simulator: Simulator, error: ErrorModel, theta: np.ndarray, record: Record, states: np.ndarray) -> Begun:
-    """The states reached from `states`: by one Gauss-Newton step, shortened until it lowers the objective, where the readings are linear
-    in them; by Levenberg-Marquardt from there where that step brings much less than it promised. As given where they have no slopes."""
-    problem = StatesProblem(simulator, error, theta, record)
+def begun_near(
+    simulator: Simulator, error: ErrorModel, theta: np.ndarray, record: Record, states: np.ndarray, expected: np.ndarray
+) -> Begun:
+    """The states reached from `states`, where `expected` ones are likeliest: by one Gauss-Newton step, shortened until it lowers the
+    objective, where the readings are linear in them; by Levenberg-Marquardt from there where that step brings much less than it promised.
+    As given where they have no slopes."""
+    problem = StatesProblem(simulator, error, theta, record, expected)
     r, J = problem.evaluate(states)
     was = float(r @ r)
     best = Begun(was, states, problem.readings(states))

@@ -1,7 +1,7 @@
-"""Where the actuators stood when a record began: at rest, or settled under its first drive, as in the last part of a log.
+"""Where what a device remembers stood when a record began: at rest, or settled under its first drive, as in the last part of a log.
 
 Hot heaters are several of their prior deviations from cold ones, and of a device that is far from linear Gauss-Newton steps from there may
-end elsewhere. The better of both is where they begin.
+end elsewhere. The better of both is where they are expected, and where a fit begins.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ctrlgen.estimation.error_model import ErrorModel
-from ctrlgen.estimation.least_squares import LeastSquaresProblem, initial_state_sd
+from ctrlgen.estimation.least_squares import LeastSquaresProblem
 from ctrlgen.estimation.settings import SIMULATION
 from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.recordings.recording import Record
@@ -24,9 +24,8 @@ def states_to_begin(problem: LeastSquaresProblem, theta: np.ndarray) -> np.ndarr
 
 
 def start_of(simulator: Simulator, error: ErrorModel, theta: np.ndarray, record: Record) -> np.ndarray:
-    """Those of one record: zero at rest, else what is added where its actuators have settled under its first drive."""
-    sd = initial_state_sd(simulator)
-    rest = np.zeros(len(sd))
+    """Those of one record: zero at rest, else what is added where the device has settled under its first drive."""
+    rest = np.zeros(len(simulator.free_initial_states))
     settled = _settled(simulator, theta, record)
     if settled is None:
         return rest
@@ -34,19 +33,22 @@ def start_of(simulator: Simulator, error: ErrorModel, theta: np.ndarray, record:
     def objective(start: np.ndarray) -> float:
         y = simulator.simulate(record, theta, start)
         white = error.whiten(np.where(record.valid, record.observed - y, 0.0), record.valid)
-        value = float(np.sum(white**2) + np.sum((start / sd) ** 2))
+        value = float(np.sum(white**2))
         return value if np.isfinite(value) else np.inf
 
     return min((rest, settled), key=objective)
 
 
 def _settled(simulator: Simulator, theta: np.ndarray, record: Record) -> np.ndarray | None:
-    """What is added to the free initial states where the actuators have been under the first drive of a record as long as it, at most
-    `SIMULATION.settling_samples`; None where they have no state, or rest is that."""
-    n, free = simulator.model.n_states, simulator.free_initial_states
+    """What is added to the free initial states where the device has been under the first drive of a record as long as it, at most
+    `SIMULATION.settling_samples`: to those of actuators without inertia behind them, and where the record goes on from what it does not
+    tell, to those of relaxing laws and of the motion. None where there are none of these, or rest is that."""
+    m, free = simulator.model, simulator.free_initial_states
+    kept = set(m.free_memories) | (set() if simulator.resumed else set(range(m.n_states, simulator.n_s)))
+    settling = [(place, k) for place, k in enumerate(free) if k not in kept]
     if (
-        simulator.model.inertial
-        or not n
+        not settling
+        or (m.inertial and not simulator.resumed)
         or simulator.poses
         or not np.isfinite(simulator.sample_time)
         or not record.drive[0].any()
@@ -58,7 +60,6 @@ def _settled(simulator: Simulator, theta: np.ndarray, record: Record) -> np.ndar
     held = replace(record, drive=np.repeat(record.drive[:1], rows, axis=0), ambient=ambient, **same)
     end = simulator.simulate_states(held, theta)[0][-1]
     start, rest = np.zeros(len(free)), simulator.initial_state(record, theta)
-    for place, k in enumerate(free):
-        if k < n:
-            start[place] = end[k] - rest[k]
+    for place, k in settling:
+        start[place] = end[k] - rest[k]
     return start if np.isfinite(start).all() else None

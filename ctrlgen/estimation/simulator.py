@@ -88,16 +88,21 @@ class Simulator:
     @cached_property
     def free_initial_states(self) -> tuple[int, ...]:
         """Places in S of the initial states that are fitted: actuators' states, how far dry friction is bent and plays stand
-        off when a record begins, and, with inertia, velocity and displacement; of settled poses the plays alone. Of a record that goes
-        on after a gap also what relaxes: lags, creep, loops that have a rate."""
+        off when a record begins, and, with inertia, velocity and displacement; of settled poses the plays alone. Of a record before
+        which the device had moved also what relaxes: lags, creep, loops that have a rate."""
         m = self.model
         if not np.isfinite(self.sample_time):
             return m.free_memories
         last = self.n_x - m.v.numel()
         moving = range(last, self.n_s) if m.inertial else ()
+        return (*range(m.n_states), *m.free_memories, *(self.relaxing if self.resumed else ()), *moving)
+
+    @cached_property
+    def relaxing(self) -> tuple[int, ...]:
+        """Places in S of the states of laws that relax."""
+        m = self.model
         kept = {*m.clocks, *m.stepped, *m.free_memories}
-        relaxing = [k for k in range(m.n_states, last) if k not in kept] if self.resumed else ()
-        return (*range(m.n_states), *m.free_memories, *relaxing, *moving)
+        return tuple(k for k in range(m.n_states, self.n_x - m.v.numel()) if k not in kept)
 
     @cached_property
     def plays(self) -> tuple[tuple[int, int, int], ...]:
@@ -356,7 +361,12 @@ def _with_unknown(read: np.ndarray, record: Record, late: LateReading, age: floa
 def compiled_simulator(
     device: Device, free: tuple[str, ...], channels: tuple[str, ...], timing: Timing, finer: int = 1
 ) -> Simulator:
-    """The simulator of these arguments, by their value: whether one was compiled before changes no result."""
+    """The simulator of these arguments, by their value: whether one was compiled before changes no result. Of a device without laws that
+    relax it is the same for a record before which the device had moved."""
+    if timing.resumed:
+        plain = compiled_simulator(device, free, channels, timing._replace(resumed=False), finer)
+        if not plain.relaxing:
+            return plain
     return Simulator(device, free, channels, *timing, finer)
 
 

@@ -19,6 +19,7 @@ from ctrlgen.core.file_format import in_this_format
 from ctrlgen.core.files import read_toml, validate
 from ctrlgen.model.model import Model
 from ctrlgen.recordings import preprocessing, thinning, validation
+from ctrlgen.recordings.begun_elsewhere import begun_elsewhere
 from ctrlgen.recordings.common_clock import Stretch, common_clock
 from ctrlgen.recordings.formats import READERS
 from ctrlgen.recordings.plausible_rate import rate_notes
@@ -73,7 +74,7 @@ def load_recordings(paths: Sequence[Path | str], model: Model, *, hold_out: bool
     noise, noise_notes = _stated(channels, columns, "noise")
     noise = tuple(None if sd is None else sd / np.sqrt(m) for sd in noise)
     tolerance, tolerance_notes = _stated(channels, columns, "tolerance")
-    return Recording(
+    recording = Recording(
         title=" + ".join(dict.fromkeys(written.title for _, written in readable)),
         device=model.device.name,
         kind=kind,
@@ -91,6 +92,7 @@ def load_recordings(paths: Sequence[Path | str], model: Model, *, hold_out: bool
         drive_units=names.drive_units,
         drives=names.drives,
     )
+    return begun_elsewhere(recording, model)
 
 
 class _Read(NamedTuple):

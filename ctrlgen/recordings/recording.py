@@ -36,8 +36,8 @@ class Record(Shown):
     None where nothing was filtered. Half of `1/sample_time` is the highest frequency that the rows can hold. `spikes`: row,
     channel and deviation [SI] from its
     neighbours of each outlier that was marked. `held`: first row, row behind the last and channel of each stretch in which a
-    reading was found to be held although the device moves. `resumed`: it goes on after a gap in which the drive is not known, so that what
-    the device remembers of it is not known either.
+    reading was found to be held although the device moves. `resumed`: the device had moved before it, after a gap in which the drive is not
+    known, in the rest of a divided record or before the first row, so that what it remembers of that is not known either.
     """
 
     name: str

@@ -277,7 +277,8 @@ def _repeats(held_out: Record, fitted: Record) -> bool:
 
 
 def with_hold_out(records: Sequence[Record], kind: str) -> Validated:
-    """The records with a held-out part: as given, else the end of the longest series, or every third of its poses.
+    """The records with a held-out part: as given, else the end of the longest series, which goes on from what the device remembers of
+    the rest, or every third of its poses.
 
     Held-out poses keep their place: both parts have every row, with the other part's samples marked not valid, so that
     a device with a memory is simulated over the whole sequence.
@@ -295,7 +296,7 @@ def with_hold_out(records: Sequence[Record], kind: str) -> Validated:
         return Validated(faults=(Fault("record", f"{what}; record a second run{thinned}"),))
     if kind == "series":
         cut = round((1 - HELD_OUT) * n)
-        parts = [rows_between(longest, 0, cut), replace(rows_between(longest, cut, n), role="hold_out")]
+        parts = [rows_between(longest, 0, cut), replace(rows_between(longest, cut, n), role="hold_out", resumed=True)]
         labels = (f"first {cut} of {n}", f"last {n - cut} of {n}")
         how = f"its last {n - cut} of {n} samples"
     else:
