@@ -14,6 +14,7 @@ alone: there the parameters are refitted under their posterior (`estimation.held
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from enum import StrEnum
 
 import numpy as np
@@ -46,7 +47,8 @@ def scored(fitter: Fitter, fit: Fit, cause: Hypothesis | None = None) -> Candida
     records = fitter.fit_records
     left = [np.nan_to_num(r.observed - fitter.predict(fit, r), nan=1e150) for r in records]
     errors = error_model(fitter.noise, records, left)
-    unseen = fitter.held_out_records
+    # where a record began is told by what the model leaves, not by what those before it did
+    fitter, unseen = replace(fitter, errors=errors), fitter.held_out_records
     unmoved = misfit(fitter.noise, unseen, [r.observed - fitter.predict(fit, r) for r in unseen])
     held_out, penalty = unmoved, 0.0
     if errors.is_noise and fitter.noise.known.all():

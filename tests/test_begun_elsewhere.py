@@ -1,0 +1,107 @@
+"""A record whose first reading is where its first drive holds the device began while it ran."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from axis_records import AXIS, H, move, record
+from conftest import DEVICES
+from scipy.signal import lfilter
+
+from ctrlgen import build_model, load_device, simulate
+from ctrlgen.diagnosis.selection.model_selection import scored
+from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.noise import estimate_noise
+from ctrlgen.estimation.structure import Structure
+from ctrlgen.recordings.begun_elsewhere import begun_elsewhere
+from ctrlgen.recordings.recording import Recording
+from ctrlgen.recordings.validation import with_hold_out
+
+N, NOISE = 1200, 1e-7
+
+
+def flagged(*records):
+    channels = ("reading.axis",)
+    recording = Recording(
+        "t", AXIS.name, "series", channels, ("um",), (None,), records, (), drive_units=("V",), drives=("drive.axis",)
+    )
+    return [r.resumed for r in begun_elsewhere(recording, build_model(AXIS)).records]
+
+
+@pytest.fixture(scope="module")
+def run():
+    u = 1.5 + np.sin(2 * np.pi * 3.0 * H * np.arange(2 * N))
+    return u, move(u)
+
+
+def test_one_from_home_is_at_rest_whatever_its_first_drive(run):
+    u, y = run
+    assert abs(u[0]) > 1.0 and flagged(record(u, y, "fit")) == [False]
+
+
+def test_one_cut_out_of_a_run_is_not(run):
+    u, y = run
+    assert flagged(record(u[N:], y[N:], "fit")) == [True]
+    unread = record(u[N:], y[N:], "fit")
+    hidden = np.where(np.arange(N)[:, None] < 5, np.nan, unread.observed)
+    assert flagged(replace(unread, observed=hidden, valid=np.isfinite(hidden))) == [True]
+
+
+def test_a_zero_that_is_off_by_a_tenth_of_the_motion_tells_nothing(run):
+    u, y = run
+    assert flagged(record(u, y + 0.1 * np.ptp(y), "fit")) == [False]
+
+
+def test_one_that_begins_where_the_drive_is_off_is_left(run):
+    u, y = run
+    still = np.concatenate([np.zeros(N), u])
+    assert flagged(record(still, move(still) + 0.2 * np.ptp(y), "fit")) == [False]
+
+
+def test_one_without_readings_or_without_motion_is_left(run):
+    u, y = run
+    blind = record(u, y, "fit")
+    nothing = replace(blind, observed=np.full_like(blind.observed, np.nan), valid=np.zeros_like(blind.valid))
+    assert flagged(record(u[N:], y[N:], "fit"), nothing, record(u, 0 * y, "fit")) == [True, False, False]
+
+
+def test_a_filter_of_firmware_in_a_log_of_a_settled_stage_is_found_whole():
+    """An average of the last readings, an eighth of each new one, of a stage in balance that had moved before the first row."""
+    device = load_device(DEVICES / "parallelogram.toml")
+    model, t = build_model(device), np.arange(2400) * H
+    u = (
+        0.2
+        + 0.3 * np.sin(2 * np.pi * 1.3 * t)
+        + 0.2 * np.sin(2 * np.pi * 7.7 * t + 1)
+        + 0.1 * np.sin(2 * np.pi * 19 * t)
+    )
+    signal = model.signals["reading"]
+    y = signal.channels.index("delta_x")
+    followed = lfilter([1 / 8], [1, -7 / 8], simulate(model, u[:, None], H).signals["reading"][1:, y])
+    read = (followed + NOISE * np.random.default_rng(1).standard_normal(len(u)))[400:]
+    halves = [record(u[400:][a], read[a], role) for a, role in ((slice(1400), "fit"), (slice(1400, None), "hold_out"))]
+    channels, drives = ("reading.delta_x",), tuple(f"drive.{c}" for c in model.signals["drive"].channels)
+    recording = Recording(
+        "t", device.name, "series", channels, ("um",), (NOISE,), tuple(halves), (), drive_units=("A",), drives=drives
+    )
+    recording = begun_elsewhere(recording, model)
+    assert [r.resumed for r in recording.records] == [True, True]
+    fitter, _ = Fitter(recording, estimate_noise(recording, 0.5)).described(device)
+    assert fitter.error.rms[0] > 100 * NOISE
+    low_pass = Hypothesis("low_pass", "sensor:delta_x", "delta_x")
+    begun = {"share": 0.4, "tau": 8e-3, "damping": 0.7}
+    fit = fitter.reweighted(fitter.fit(Structure(device).with_cause(low_pass, begun)))
+    values = fit.values(0)
+    assert values["share"] == pytest.approx(7 / 8, abs=0.03)
+    assert 2 * values["damping"] * values["tau"] == pytest.approx(8 * H, rel=0.1)
+    left = scored(fitter, fit).held_out.plain_mean[0]
+    assert left < 4.0  # of the noise: a sampled filter is no continuous one, 1.3 deviations
+
+
+def test_the_rest_of_a_divided_record_goes_on(run):
+    u, y = run
+    parts = with_hold_out([record(u, y, "fit")], "series").records
+    assert [(p.role, p.resumed) for p in parts] == [("fit", False), ("hold_out", True)]
