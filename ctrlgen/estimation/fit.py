@@ -21,11 +21,11 @@ from ctrlgen.estimation.least_squares import LeastSquaresProblem, initial_state_
 from ctrlgen.estimation.moved_drive import with_drive_at
 from ctrlgen.estimation.noise import Noise
 from ctrlgen.estimation.record_states import begun_near
-from ctrlgen.estimation.settings import DISCREPANCY, FIT, HELD_OUT_REFIT, LEADING_PART, SIMULATION
+from ctrlgen.estimation.settings import DISCREPANCY, FIT, LEADING_PART, SIMULATION
 from ctrlgen.estimation.settled_start import start_of, states_to_begin
 from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.estimation.structure import Structure
-from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
+from ctrlgen.numerics.levenberg_marquardt import NEGLIGIBLE, levenberg_marquardt
 from ctrlgen.recordings.recording import Record, Recording
 
 
@@ -345,7 +345,7 @@ class Fitter:
         here = slice(at := len(fit.theta) + sum(map(len, fit.initial_states[:k])), at + len(states))
         J = fit.J[:, here]
         gradient = J.T @ fit.residual
-        if gradient @ np.linalg.lstsq(J.T @ J, gradient, rcond=None)[0] > HELD_OUT_REFIT.unsettled * fit.objective:
+        if gradient @ np.linalg.lstsq(J.T @ J, gradient, rcond=None)[0] > NEGLIGIBLE:
             return None
         y = simulator.simulate(record, fit.theta, states)
         first = sum(a * b for a, b in fit.shapes[:k])
