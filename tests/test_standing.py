@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
 from ctrlgen.diagnosis.report.nearly_as_large import nearly_as_large
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.findings import Finding, Role, WorthEntry, leading
-from ctrlgen.diagnosis.selection.standing import answer_of, by_heat, in_standing, possible
+from ctrlgen.diagnosis.selection.standing import Evidence, answer_of, borne_out_instead, by_heat, in_standing, possible
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.effects import Family
 from ctrlgen.estimation.hypothesis import Hypothesis
@@ -39,7 +40,7 @@ def shares(friction: float, creep: float) -> list[tuple[Family, float]]:
 )
 def test_a_cause_whose_family_is_far_behind_a_clear_one_does_not_stand_first(friction, creep, stands):
     """A fifth of the largest share, or a twentieth of the residual; half of it makes a family clear."""
-    first, second = in_standing([finding("creep"), finding("coulomb", 0.3)], *2 * [shares(friction, creep)])
+    first, second = in_standing([finding("creep"), finding("coulomb", 0.3)], Evidence(*2 * [shares(friction, creep)]))
     assert (first.effect == "creep") == stands
     assert {f.effect: f.contradicted for f in (first, second)}["creep"] == (not stands)
 
@@ -47,7 +48,7 @@ def test_a_cause_whose_family_is_far_behind_a_clear_one_does_not_stand_first(fri
 @pytest.mark.parametrize(("by_itself", "stands"), [(0.95, True), (0.86, True), (0.8, False)])
 def test_a_family_that_predicts_as_much_alone_is_not_contradicted(by_itself, stands):
     """As the history of travel and the speed in a sine, of which only the first one selected adds anything."""
-    (first, *_) = in_standing([finding("creep")], *2 * [shares(0.95, 0.02)], {Family.CREEP: by_itself})
+    (first, *_) = in_standing([finding("creep")], Evidence(*2 * [shares(0.95, 0.02)], {Family.CREEP: by_itself}))
     assert first.contradicted == (not stands)
     assert first.support.share == (min(by_itself, 0.95) if stands else 0.02)
 
@@ -56,25 +57,45 @@ def test_a_family_that_predicts_as_much_alone_is_not_contradicted(by_itself, sta
 def test_what_is_in_proportion_speaks_against_no_law(friction, stands):
     """Settled creep is a gain to a reading, and gains were tried; another family may still contradict it."""
     bent = shares(friction, 0.0)
-    (first, *_) = in_standing([finding("creep")], [(Family.GAIN, 0.96), *bent], bent)
+    (first, *_) = in_standing([finding("creep")], Evidence([(Family.GAIN, 0.96), *bent], bent))
     assert first.contradicted == (not stands)
     # nothing is bent at all
-    (first, *_) = in_standing([finding("creep")], [(Family.GAIN, 0.96)], [])
+    (first, *_) = in_standing([finding("creep")], Evidence([(Family.GAIN, 0.96)], []))
     assert not first.contradicted
 
 
 def test_what_is_no_cause_stays_behind_the_causes_and_is_not_judged():
-    found = in_standing([finding("creep"), finding("drift", role=Role.MINOR)], *2 * [shares(0.9, 0.0)])
+    found = in_standing([finding("creep"), finding("drift", role=Role.MINOR)], Evidence(*2 * [shares(0.9, 0.0)]))
     assert [f.effect for f in found] == ["creep", "drift"] and found[1].support is None
 
 
 @pytest.mark.parametrize("verdict", Verdict)
 def test_alone_it_makes_the_answer_ambiguous_unless_noise_alone_is_left(verdict):
-    found = in_standing([finding("creep")], *2 * [shares(0.9, 0.0)])
+    found = in_standing([finding("creep")], Evidence(*2 * [shares(0.9, 0.0)]))
     doubted = verdict in (Verdict.PARTLY, Verdict.EXPLAINED)
     assert answer_of(verdict, found, exact=False) == (Verdict.AMBIGUOUS if doubted else verdict)
     assert answer_of(verdict, found, exact=True) == verdict
-    assert answer_of(verdict, in_standing([finding("coulomb")], *2 * [shares(0.9, 0.0)]), exact=False) == verdict
+    assert (
+        answer_of(verdict, in_standing([finding("coulomb")], Evidence(*2 * [shares(0.9, 0.0)])), exact=False) == verdict
+    )
+
+
+def test_of_two_that_explain_alike_the_one_that_the_shares_bear_out_takes_the_place_of_the_other():
+    def model(effect: str):
+        return SimpleNamespace(cause=Hypothesis(effect, "sensor:axis", "axis"))
+
+    cause, lag, gain = Hypothesis("thermal_lag", "actuator:axis", "axis"), model("low_pass"), model("gain")
+    number = SimpleNamespace(cause=Hypothesis("parameter", "stage:axis", "axis"))
+    timing = Evidence([(Family.TIMING, 0.99)], [(Family.TIMING, 0.99)])
+
+    def instead(evidence: Evidence, *rivals):
+        return borne_out_instead(SimpleNamespace(chosen=SimpleNamespace(causes=(cause,)), rivals=(rivals,)), evidence)
+
+    assert instead(timing, number, gain, lag) is lag
+    assert instead(timing, gain) is None and instead(timing) is None
+    both = [(Family.TIMING, 0.99), (Family.THERMAL, 0.97)]
+    assert instead(Evidence(both, both), lag) is None
+    assert instead(Evidence([(Family.TIMING, 0.99)], []), lag) is None
 
 
 def test_a_family_of_which_the_device_can_have_no_law_is_not_spoken_for():
@@ -88,7 +109,7 @@ def test_what_goes_by_the_place_of_a_heated_stage_may_be_of_its_heat(laws, share
     told = by_heat([(Family.ELASTIC, 0.7), (Family.THERMAL, 0.02)], offered)
     assert told[0] == (Family.ELASTIC, 0.7) and dict(told)[Family.THERMAL] == share
     assert dict(told).get(Family.DRIVE) == (share if share == 0.7 else None)
-    (found,) = in_standing([finding("heat_loss")], told, told)
+    (found,) = in_standing([finding("heat_loss")], Evidence(told, told))
     assert found.contradicted == (share < 0.7)
 
 

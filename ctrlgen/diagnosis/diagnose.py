@@ -40,12 +40,11 @@ from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.selection.speeds import counted_in_speeds
-from ctrlgen.diagnosis.selection.standing import answer_of, by_heat, in_standing, possible
+from ctrlgen.diagnosis.selection.standing import answer_of, borne_out_instead, evidence_of, in_standing
 from ctrlgen.diagnosis.selection.untried import refuse_without_trials, untried
 from ctrlgen.diagnosis.selection.verdict import Verdict, in_another_unit, verdict, within_tolerance
 from ctrlgen.diagnosis.selection.way_covered import where_it_turns, with_longest_periods
 from ctrlgen.diagnosis.shares.empirical_terms import EmpiricalTerm, empirical_terms
-from ctrlgen.diagnosis.shares.families import alone, ranking
 from ctrlgen.diagnosis.shares.gather import ResidualShares, residual_shares
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.checkpoint import Checkpoint
@@ -133,7 +132,14 @@ def _diagnose(
     suspected = [with_odds(h, parts) for h in suspected if h.effect not in refused]
     suspected = counted_in_speeds(suspected, fitter, device)
     step(f"refit of the device as described, {number_of(len(suspected), 'hypothesis', 'hypotheses')}")
-    search = Searcher(fitter, Screen(fitter, suspected, seed), step, jobs).run(device)
+    searcher = Searcher(fitter, Screen(fitter, suspected, seed), step, jobs)
+    search = searcher.run(device)
+    shares = residual_shares(search.fitter, search.nominal.fit, search.chosen.fit, seed)
+    evidence = None if shares is None else evidence_of(search, shares.before, suspected, laws is None)
+    rival = None if evidence is None else borne_out_instead(search, evidence)
+    if rival is not None and (instead := searcher.with_rival(search, rival)) is not search:
+        search = instead
+        shares = residual_shares(search.fitter, search.nominal.fit, search.chosen.fit, seed)
     step("residual tests")
     tests = run_residual_tests(search.fitter, search.chosen.fit)
     attribution = search.account
@@ -147,14 +153,9 @@ def _diagnose(
     step("supporting analyses")
     likelihoods = profiles(search.fitter, search.chosen.fit)
     analyses = run_supporting_analyses(search, tests.passed, seed)
-    shares = residual_shares(search.fitter, search.nominal.fit, search.chosen.fit, seed)
     found = (*findings(search, attribution, likelihoods), *detected)
-    if shares is not None:
-        noise = dict(zip(search.fitter.recording.channels, search.fitter.noise.floor.tolist(), strict=True))
-        spoken_for, bent = (by_heat(ranking(shares.before, noise, linear), suspected) for linear in (True, False))
-        if laws is None:
-            spoken_for, bent = possible(spoken_for, suspected), possible(bent, suspected)
-        found = in_standing(found, spoken_for, bent, alone(shares.before, noise))
+    if evidence is not None:
+        found = in_standing(found, evidence)
         answer = answer_of(answer, found, search.chosen.errors.is_noise)
     found = with_chances(found, search)
     answer = doubted(answer, found)

@@ -17,7 +17,7 @@ import numpy as np
 
 from ctrlgen.core.counts import number_of
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.selection.attribution import attribute
+from ctrlgen.diagnosis.selection.attribution import Attribution, attribute
 from ctrlgen.diagnosis.selection.begun_again import begun_again
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round
 from ctrlgen.diagnosis.selection.candidates import finer_forms, fit_candidates, restart_elsewhere
@@ -37,6 +37,7 @@ from ctrlgen.diagnosis.settings import SEARCH
 from ctrlgen.estimation.described_device import described
 from ctrlgen.estimation.drive_clock import with_drive_clock
 from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.integration_error import MOST_FINER, MOST_IN_SEARCH, with_steps_that_suffice
 from ctrlgen.estimation.isolated_outliers import mark_again
 from ctrlgen.estimation.noise_update import update_noise
@@ -80,13 +81,33 @@ class Searcher:
         current = no_worse(trials, nominal, current) if current.causes else nominal
         if current is not found:
             account = attribute(trials.fitter, nominal, current, trials.screen.seed, trials.jobs)
-        each = range(len(current.causes))
+        withdrawn = tuple(c for c in found.causes if c not in current.causes)
+        return self._result(nominal, current, account, rounds, withdrawn)
+
+    def with_rival(self, result: SearchResult, rival: CandidateModel) -> SearchResult:
+        """The result with a model that explains alike in place of the chosen one, which is its rival now; as given where it does not."""
+        trials = self.trials
+        rival = trials.converged(rival)
+        if not explains_alike(trials.selection, rival, result.chosen):
+            return result
+        account = attribute(trials.fitter, result.nominal, rival, trials.screen.seed, trials.jobs)
+        return self._result(result.nominal, rival, account, result.rounds, result.withdrawn)
+
+    def _result(
+        self,
+        nominal: CandidateModel,
+        current: CandidateModel,
+        account: Attribution,
+        rounds: Sequence[Round],
+        withdrawn: tuple[Hypothesis, ...],
+    ) -> SearchResult:
+        """The chosen model `current` with its account, and with the rivals of each of its causes."""
+        trials, each = self.trials, range(len(current.causes))
         bare = tuple(trials.each(lambda branch, k: _without(branch, current, k, nominal), each))
         screened = trials.screened(current)
         found_alike = trials.each(lambda branch, k: rivals(branch, current, k, rounds), each)
         alike, unlikely = (tuple(rows[i] for rows in found_alike) for i in (0, 1))
         log = (tuple(trials.log), tuple(trials.screen.hypotheses))
-        withdrawn = tuple(c for c in found.causes if c not in current.causes)
         return SearchResult(
             trials.fitter, nominal, current, account, bare, alike, tuple(rounds), screened, withdrawn, *log, unlikely
         )

@@ -7,34 +7,80 @@ stand first, and alone it makes the answer ambiguous.
 What is in proportion to drive or place speaks against no law: settled creep, a play that is crossed at every pose, an axis that carries
 another one are gains to a reading. Whether a gain is all there is the search has tried, as no gain has another form than the
 library's. Nor does another family where a signal that speaks for the law's own predicts nearly as much alone: then the shares do not tell
-the two apart, and which was selected first is but an order. Where a model leaves noise alone, it has the better evidence.
+the two apart, and which was selected first is but an order. Where a model leaves noise alone, it has the better evidence; but of two that
+explain alike the one stands first that the shares bear out.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from types import MappingProxyType
+from dataclasses import dataclass, field, replace
 
+from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.findings import Finding, Role, SupportEntry
+from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.diagnosis.settings import STANDING
-from ctrlgen.diagnosis.shares.families import family_of
+from ctrlgen.diagnosis.shares.families import alone, family_of, ranking
+from ctrlgen.diagnosis.shares.shares_table import SharesTable
 from ctrlgen.effects import Family
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 
-NOTHING: Mapping[Family, float] = MappingProxyType({})
+
+@dataclass(frozen=True)
+class Evidence:
+    """The shares of what the device as described leaves, by family, the largest first: `bent` without what is constant or in proportion,
+    which alone speaks against a law; `alone` those that a kind reaches by itself."""
+
+    shares: Sequence[tuple[Family, float]]
+    bent: Sequence[tuple[Family, float]]
+    alone: Mapping[Family, float] = field(default_factory=dict)
+
+    def of(self, effect: str) -> SupportEntry | None:
+        """What they say of a law; None of what has no family."""
+        family = family_of(effect)
+        if family is None or not self.shares:
+            return None
+        leading, most = (self.bent or self.shares)[0]
+        own = dict(self.shares).get(family, 0.0)
+        if (by_itself := self.alone.get(family, 0.0)) >= STANDING.as_much * most:
+            own = max(own, min(by_itself, most))
+        weak = own < STANDING.near_zero or own < STANDING.far_below * most
+        return SupportEntry(
+            family=family.value,
+            share=own,
+            leading=leading.value,
+            leading_share=most,
+            contradicted=bool(self.bent) and most >= STANDING.clear and weak,
+        )
 
 
-def in_standing(
-    findings: Sequence[Finding],
-    shares: Sequence[tuple[Family, float]],
-    bent: Sequence[tuple[Family, float]],
-    alone: Mapping[Family, float] = NOTHING,
-) -> tuple[Finding, ...]:
-    """The findings with what the `shares` by family (the largest first), and those of its own kind `alone`, say of each; those that they
-    contradict after the others. `bent`: the shares without what is constant or in proportion, which alone speak against a law."""
-    told = [replace(f, support=_support(f, shares, bent, alone)) for f in findings]
+def evidence_of(search: SearchResult, before: SharesTable, offered: Sequence[Hypothesis], every_law: bool) -> Evidence:
+    """That of the shares `before`, of families of which such a device has a law where `every_law` was offered."""
+    noise = dict(zip(search.fitter.recording.channels, search.fitter.noise.floor.tolist(), strict=True))
+    shares, bent = (by_heat(ranking(before, noise, linear), offered) for linear in (True, False))
+    if every_law:
+        shares, bent = possible(shares, offered), possible(bent, offered)
+    return Evidence(shares, bent, alone(before, noise))
+
+
+def borne_out_instead(search: SearchResult, evidence: Evidence) -> CandidateModel | None:
+    """Of what explains alike in place of a cause that the shares contradict, the first of the family that they put first; None where
+    there is none."""
+    for cause, rivals in zip(search.chosen.causes, search.rivals, strict=True):
+        told = None if cause.effect == PARAMETER else evidence.of(cause.effect)
+        if told is None or not told.contradicted:
+            continue
+        for rival in rivals:
+            other = None if rival.cause is None else evidence.of(rival.cause.effect)
+            if other is not None and other.family == other.leading:
+                return rival
+    return None
+
+
+def in_standing(findings: Sequence[Finding], evidence: Evidence) -> tuple[Finding, ...]:
+    """The findings with what the shares say of each cause; those that they contradict after the others."""
+    told = [replace(f, support=evidence.of(f.effect) if f.role is Role.CAUSE else None) for f in findings]
     return tuple(sorted(told, key=lambda f: (f.role is not Role.CAUSE, f.contradicted)))
 
 
@@ -59,26 +105,3 @@ def answer_of(verdict: Verdict, findings: Sequence[Finding], exact: bool) -> Ver
     """The verdict: ambiguous where the first cause is contradicted by the shares, unless the model leaves noise alone (`exact`)."""
     doubted = bool(findings) and findings[0].contradicted and not exact
     return Verdict.AMBIGUOUS if doubted and verdict in (Verdict.PARTLY, Verdict.EXPLAINED) else verdict
-
-
-def _support(
-    finding: Finding,
-    shares: Sequence[tuple[Family, float]],
-    bent: Sequence[tuple[Family, float]],
-    alone: Mapping[Family, float],
-) -> SupportEntry | None:
-    family = family_of(finding.effect)
-    if family is None or not shares or finding.role is not Role.CAUSE:
-        return None
-    leading, most = bent[0] if bent else shares[0]
-    own = dict(shares).get(family, 0.0)
-    if (by_itself := alone.get(family, 0.0)) >= STANDING.as_much * most:
-        own = max(own, min(by_itself, most))
-    weak = own < STANDING.near_zero or own < STANDING.far_below * most
-    return SupportEntry(
-        family=family.value,
-        share=own,
-        leading=leading.value,
-        leading_share=most,
-        contradicted=bool(bent) and most >= STANDING.clear and weak,
-    )
