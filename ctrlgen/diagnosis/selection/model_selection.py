@@ -27,7 +27,7 @@ from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.held_out import refit_to_held_out
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 from ctrlgen.estimation.misfit import Misfit, misfit
-from ctrlgen.estimation.settings import FIT, HELD_OUT_REFIT, RESIDUAL_TESTS, STATISTICS
+from ctrlgen.estimation.settings import DISCREPANCY, FIT, HELD_OUT_REFIT, RESIDUAL_TESTS, STATISTICS
 from ctrlgen.estimation.size_odds import prior_odds
 from ctrlgen.estimation.structure import Structure
 
@@ -47,8 +47,10 @@ def scored(fitter: Fitter, fit: Fit, cause: Hypothesis | None = None) -> Candida
     records = fitter.fit_records
     left = [np.nan_to_num(r.observed - fitter.predict(fit, r), nan=1e150) for r in records]
     errors = error_model(fitter.noise, records, left)
-    # where a record began is told by what the model leaves, not by what those before it did
-    fitter, unseen = replace(fitter, errors=errors), fitter.held_out_records
+    unseen = fitter.held_out_records
+    # errors that are far too large tell nothing of where a record began
+    if fit.objective < DISCREPANCY.overstated * fit.n:
+        fitter = replace(fitter, errors=errors)
     unmoved = misfit(fitter.noise, unseen, [r.observed - fitter.predict(fit, r) for r in unseen])
     held_out, penalty = unmoved, 0.0
     if errors.is_noise and fitter.noise.known.all():
