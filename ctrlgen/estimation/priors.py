@@ -102,7 +102,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             "of it stands for something else. In firmware, y += (new - y)/2^k, it lets a quarter of a reading through at once where k = 2.",
             model_form_error=0.005,
             parameters={
-                "share": ParameterPrior(plausible_range=(0.7, 1.2)),
+                "share": ParameterPrior(plausible_range=(0.7, 1.3)),
                 "tau": _starts((1e-3, 8e-3, 0.06, 0.5)),
                 "damping": _starts((0.7, 4.0)),
             },
