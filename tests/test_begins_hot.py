@@ -47,6 +47,19 @@ def test_what_begins_cold_begins_at_rest(split):
     assert np.array_equal(states_to_begin(fitter.problem(fit.structure), fit.theta), starts[0])
 
 
+def test_where_a_record_is_expected_to_begin_costs_a_fit_nothing(split):
+    fitter, fit, _ = split
+    (hot,) = fitter.held_out_records
+    alone = replace(fitter, recording=replace(fitter.recording, records=(replace(hot, role="fit"),)))
+    problem = alone.problem(fit.structure)
+    assert np.all(problem.expected > 100.0)
+    priors = [
+        problem.residual(problem.to_scaled(np.concatenate([fit.structure.start, states])))[-len(states) :]
+        for states in (problem.expected, np.zeros_like(problem.expected))
+    ]
+    assert not priors[0].any() and np.allclose(priors[1], -problem.expected / problem.initial_sd[0])
+
+
 def test_they_are_found_under_a_large_discrepancy_of_one_reading(split):
     fitter, fit, sd = split
     recording = fitter.recording

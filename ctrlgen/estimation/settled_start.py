@@ -44,8 +44,7 @@ def _settled(simulator: Simulator, theta: np.ndarray, record: Record) -> np.ndar
     `SIMULATION.settling_samples`: to those of actuators without inertia behind them, and where the record goes on from what it does not
     tell, to those of relaxing laws and of the motion. None where there are none of these, or rest is that."""
     m, free = simulator.model, simulator.free_initial_states
-    kept = set(m.free_memories) | (set() if simulator.resumed else set(range(m.n_states, simulator.n_s)))
-    settling = [(place, k) for place, k in enumerate(free) if k not in kept]
+    settling = [(place, k) for place, k in enumerate(free) if k not in m.free_memories]
     if (
         not settling
         or (m.inertial and not simulator.resumed)
