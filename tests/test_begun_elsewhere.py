@@ -99,7 +99,10 @@ def test_a_filter_of_firmware_in_a_log_of_a_settled_stage_is_found_whole(filtere
     assert fitter.error.rms[0] > 30 * NOISE
     low_pass = Hypothesis("low_pass", "sensor:delta_x", "delta_x")
     begun = {"share": 0.4, "tau": 8e-3, "damping": 0.7}
-    fit = fitter.reweighted(fitter.fit(Structure(device).with_cause(low_pass, begun)))
+    fit = fitter.fit(Structure(device).with_cause(low_pass, begun))
+    for _ in range(3):  # under what it leaves, as the search weighs a model that it accepts
+        fitter = fitter.with_errors_of(fit)
+        fit = fitter.fit(fit.restarted)
     values = fit.values(0)
     assert values["share"] == pytest.approx(7 / 8, abs=0.03)
     assert 2 * values["damping"] * values["tau"] == pytest.approx(8 * H, rel=0.1)

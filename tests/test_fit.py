@@ -112,7 +112,7 @@ def test_held_out_records_are_predicted_as_fitted_unless_noise_alone_is_left(mon
         return HeldOutRefit(fit, penalty=3.0, log_det=2.0)
 
     monkeypatch.setattr(model_selection, "refit_to_held_out", refit)
-    found = model_selection.scored(fitter, SimpleNamespace(objective=N, n=N))
+    found = model_selection.scored(fitter, SimpleNamespace())
     assert asked == ([4] if refitted else []) and found.refit_penalty == (5.0 if refitted else 0.0)
     assert found.errors.is_noise == refitted
     assert found.held_out.plain_mean == pytest.approx(np.mean(y**2)) and found.fitted.n_plain.sum() == N

@@ -190,20 +190,6 @@ class Fitter:
             best = min(best, self._optimum(problem, x, steps, best.objective), key=lambda fit: fit.objective)
         return best
 
-    def reweighted(self, fit: Fit, steps: int = FIT.max_steps) -> Fit:
-        """The fit, or where it leaves far less than the errors under which it was fitted, the same fitted under what it leaves, and held
-        under these errors again: beside errors that are much too large the priors bend it, and the rest of the mismatch weighs nothing."""
-        fitter, best = self, fit
-        for _ in range(DISCREPANCY.updates):
-            if best.objective >= DISCREPANCY.overstated * best.n:
-                break
-            fitter = fitter.with_errors_of(best)
-            best = fitter.fit(best.restarted, steps=steps)
-        if best is fit:
-            return fit
-        problem = self.problem(best.structure)
-        return _fit_at(problem, problem.to_scaled(np.concatenate([best.theta, *best.initial_states])))
-
     def better_of(self, best: Fit, structure: Structure, steps: int) -> Fit:
         """`best`, or the optimum reached in so many steps from other starting values of the same causes where that is better.
 

@@ -332,8 +332,6 @@ class DiscrepancySettings:
     """Most times that discrepancy and fit are estimated in turn: three do where the numbers are nearly right, more in a stiff loop."""
     same: float = 0.05
     """Relative change of the errors' deviation below which they count as unchanged."""
-    overstated: float = 0.1
-    """Objective over independent samples below which errors are far too large for a fit: it leaves a third of them. Judgement."""
     blocks: int = 20
     """Blocks of a record in which squares of two models are compared: enough for a bootstrap, long beside most memories. Judgement."""
     huber_corner: float = 3.0

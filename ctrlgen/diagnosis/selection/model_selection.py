@@ -14,7 +14,6 @@ alone: there the parameters are refitted under their posterior (`estimation.held
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from enum import StrEnum
 
 import numpy as np
@@ -27,7 +26,7 @@ from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.held_out import refit_to_held_out
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 from ctrlgen.estimation.misfit import Misfit, misfit
-from ctrlgen.estimation.settings import DISCREPANCY, FIT, HELD_OUT_REFIT, RESIDUAL_TESTS, STATISTICS
+from ctrlgen.estimation.settings import FIT, HELD_OUT_REFIT, RESIDUAL_TESTS, STATISTICS
 from ctrlgen.estimation.size_odds import prior_odds
 from ctrlgen.estimation.structure import Structure
 
@@ -48,9 +47,6 @@ def scored(fitter: Fitter, fit: Fit, cause: Hypothesis | None = None) -> Candida
     left = [np.nan_to_num(r.observed - fitter.predict(fit, r), nan=1e150) for r in records]
     errors = error_model(fitter.noise, records, left)
     unseen = fitter.held_out_records
-    # errors that are far too large tell nothing of where a record began
-    if fit.objective < DISCREPANCY.overstated * fit.n:
-        fitter = replace(fitter, errors=errors)
     unmoved = misfit(fitter.noise, unseen, [r.observed - fitter.predict(fit, r) for r in unseen])
     held_out, penalty = unmoved, 0.0
     if errors.is_noise and fitter.noise.known.all():

@@ -157,8 +157,6 @@ class Trials:
         if known is not None and done >= steps and known.fit.objective <= self.fitter.initial_objective(structure):
             return replace(known, cause=cause)
         fit = self.fitter.fit(structure, steps=steps, nested=nested, enough=enough)
-        if structure.causes:
-            fit = self.fitter.reweighted(fit, steps)
         if known is not None and known.fit.objective <= fit.objective:
             self.fitted[key] = (known, steps)
             return replace(known, cause=cause)
