@@ -14,7 +14,7 @@ import numpy as np
 
 from ctrlgen.devices import Device
 from ctrlgen.estimation.checkpoint import Checkpoint, key_of
-from ctrlgen.estimation.error_model import ErrorModel, error_model, huber
+from ctrlgen.estimation.error_model import ErrorModel, error_model
 from ctrlgen.estimation.initial_memory import begins_worse, memory_before
 from ctrlgen.estimation.leading_part import leading_part
 from ctrlgen.estimation.least_squares import LeastSquaresProblem, initial_state_sd, limited, whiten_residual
@@ -25,7 +25,7 @@ from ctrlgen.estimation.settings import DISCREPANCY, FIT, LEADING_PART, SIMULATI
 from ctrlgen.estimation.settled_start import start_of, states_to_begin
 from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.estimation.structure import Structure
-from ctrlgen.numerics.levenberg_marquardt import NEGLIGIBLE, levenberg_marquardt
+from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 from ctrlgen.recordings.recording import Record, Recording
 
 
@@ -290,13 +290,11 @@ class Fitter:
     def begun(self, fit: Fit, record: Record) -> tuple[np.ndarray, np.ndarray]:
         """What is added to the free initial states [SI] so that they suit a record best, and the readings (n, n_y) [SI] from there.
 
-        Those of the fit where it was fitted to the record. Else found from rest, or from where its actuators have settled under its first
-        drive; where the record then begins worse than it goes on and a law has plays, once more from the turning point before it, or from
-        a place in its gap.
+        Found from rest, or from where the device has settled under its first drive. Where the record then begins worse than it goes on and
+        a law has plays, once more from the turning point before it, or from a place in its gap.
         """
         simulator, error = self.simulator(fit.structure, record), self.error.weighted
-        numbers = (fit.theta, *fit.initial_states, error.sd, *error.ar)
-        key = (id(simulator), id(record), *(a.tobytes() for a in numbers))
+        key = (id(simulator), id(record), fit.theta.tobytes(), error.sd.tobytes(), *(a.tobytes() for a in error.ar))
         if key not in _BEGUN:
             # what has the identities is kept as long
             _BEGUN[key] = (simulator, record, *self._begun(simulator, fit, record))
@@ -309,8 +307,6 @@ class Fitter:
         sd = initial_state_sd(simulator)
         if len(sd) == 0:
             return sd, simulator.simulate(record, fit.theta)
-        if (own := self._as_fitted(simulator, fit, record)) is not None:
-            return own
         expected = start_of(simulator, self.error, fit.theta, record) / sd
         found = begun_near(simulator, self.error, fit.theta, record, expected, expected)
         if (simulator.plays or simulator.gaps) and begins_worse(record, self._white(record, found.y)):
@@ -319,25 +315,6 @@ class Fitter:
                 again = begun_near(simulator, self.error, fit.theta, record, other, expected)
                 found = min(found, again, key=lambda begun: begun.objective)
         return sd * found.states, found.y
-
-    def _as_fitted(self, simulator: Simulator, fit: Fit, record: Record) -> tuple[np.ndarray, np.ndarray] | None:
-        """The states and the readings of the fit itself, of a record that it was fitted to under the same errors, where a step of the
-        states would bring next to nothing; else None."""
-        records = self.fit_records
-        k = next((k for k, r in enumerate(records) if r is record), None)
-        if k is None or len(fit.initial_states) <= k or fit.shapes != tuple(r.observed.shape for r in records):
-            return None
-        states = fit.initial_states[k]
-        here = slice(at := len(fit.theta) + sum(map(len, fit.initial_states[:k])), at + len(states))
-        J = fit.J[:, here]
-        gradient = J.T @ fit.residual
-        if gradient @ np.linalg.lstsq(J.T @ J, gradient, rcond=None)[0] > NEGLIGIBLE:
-            return None
-        y = simulator.simulate(record, fit.theta, states)
-        first = sum(a * b for a, b in fit.shapes[:k])
-        left = huber(limited(whiten_residual(self.error, record, y)), self.error.corner)[0].ravel()
-        same = np.allclose(left, fit.residual[first : first + left.size], rtol=0, atol=SIMULATION.same_residual)
-        return (states, y) if same else None
 
     def _white(self, record: Record, y: np.ndarray) -> np.ndarray:
         """The whitened residual (n n_y,); large values are not limited."""

@@ -205,8 +205,6 @@ class SimulationSettings:
     """Splines through the drives of records kept at a time: a search has as many records in turn. Judgement."""
     kept_predictions: int = 16
     """Predictions of records kept at a time: what one fit is judged by, on as many records. Judgement."""
-    same_residual: float = 1e-6
-    """Difference of two whitened residuals below which they are of the same numbers, simulated twice."""
     start_newton_steps: int = 12
     """Newton steps from home to the first displacement in balance, unrolled. Later samples start from the one before."""
     settling_samples: int = 2000
