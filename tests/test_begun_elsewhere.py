@@ -6,15 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from axis_records import AXIS, H, move, record
+from axis_records import AXIS, KF, H, K, move, record
 from conftest import DEVICES
 from scipy.signal import lfilter
 
 from ctrlgen import build_model, diagnose, load_device, simulate
 from ctrlgen.diagnosis.selection.model_selection import scored
+from ctrlgen.effects import Effect
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.noise import estimate_noise
+from ctrlgen.estimation.priors import prior_of
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.begun_elsewhere import begun_elsewhere
 from ctrlgen.recordings.recording import Recording
@@ -53,6 +55,49 @@ def test_one_cut_out_of_a_run_is_not(run):
 def test_a_zero_that_is_off_by_a_tenth_of_the_motion_tells_nothing(run):
     u, y = run
     assert flagged(record(u, y + 0.1 * np.ptp(y), "fit")) == [False]
+
+
+GAIN = KF / K  # m/V, settled
+
+
+@pytest.mark.parametrize("way, told", [(0.48, False), (0.52, True)])
+def test_one_nearer_to_where_its_drive_holds_it_than_to_home_is_not(way, told):
+    u = 1.0 + 0.5 * np.sin(2 * np.pi * 3.0 * H * np.arange(N))
+    y = GAIN * u
+    assert flagged(record(u, np.r_[way * y[0], y[1:]], "fit")) == [told]
+
+
+@pytest.mark.parametrize("first, told", [(0.048, False), (0.052, True)])
+def test_one_that_is_hardly_held_anywhere_tells_nothing(first, told):
+    """A twentieth of what the reading moves."""
+    u = np.r_[first, 0.5 * np.sin(2 * np.pi * 3.0 * H * np.arange(2 * N))]
+    assert flagged(record(u, GAIN * u, "fit")) == [told]
+
+
+@pytest.mark.parametrize("begin, told", [(0, False), (50, True)])
+def test_heaters_that_are_driven_by_their_voltage_hold_by_its_square(tmp_path, begin, told):
+    """About 6 V the slope is three times the one by which the first drive, of 2 V, holds the device where it is."""
+    file = tmp_path / "device.toml"
+    text = (DEVICES / "mems_hexapod.toml").read_text()
+    file.write_text(text.replace('drive = "power"', 'drive = "voltage"'))
+    device = load_device(file)
+    model = build_model(device)
+    u = np.r_[np.full((60, 6), 2.0), np.full((200, 6), 7.0)]
+    y = simulate(model, u, H).signals["reading"][1:]
+    drives, readings = (tuple(f"{r}.{c}" for c in model.signals[r].channels) for r in ("drive", "reading"))
+    recording = Recording(
+        "t",
+        device.name,
+        "series",
+        readings,
+        6 * ("um",),
+        6 * (None,),
+        (record(u[begin:], y[begin:], "fit"),),
+        (),
+        drive_units=6 * ("V",),
+        drives=drives,
+    )
+    assert [r.resumed for r in begun_elsewhere(recording, model).records] == [told]
 
 
 def test_one_that_begins_where_the_drive_is_off_is_left(run):
@@ -124,3 +169,10 @@ def test_the_rest_of_a_divided_record_goes_on(run):
     u, y = run
     parts = with_hold_out([record(u, y, "fit")], "series").records
     assert [(p.role, p.resumed) for p in parts] == [("fit", False), ("hold_out", True)]
+
+
+@pytest.mark.parametrize("k, share", [(1, 1 / 2), (2, 3 / 4), (3, 7 / 8)])
+def test_a_filter_of_firmware_lies_in_what_is_plausible_of_a_filter(k, share):
+    """y += (new - y)/2^k lets 1/2^k of each new reading through at once: half of it, with k = 1, is no filter that is suspected."""
+    low, high = prior_of(Effect.library["low_pass"]).parameters["share"].plausible_range
+    assert (low <= share <= high) == (k > 1)

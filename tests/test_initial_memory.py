@@ -68,7 +68,7 @@ def test_the_driven_side_of_a_gap_is_looked_for_where_one_step_led_astray():
         return ((record.observed - readings) / NOISE).ravel()
 
     assert begins_worse(part, white(part, simulator.simulate(part, structure.start, sd * astray)))
-    found = memory_before(simulator, structure.start, part, astray, white)
+    found = memory_before(simulator, structure.start, part, astray, np.zeros(len(sd)), white)
     assert sd[start] * found[start] == pytest.approx(-0.7, abs=0.125)
 
 
@@ -99,5 +99,48 @@ def test_a_turning_point_is_sought_where_the_record_begins_and_every_way_back(mo
         simulate_states=lambda record, theta, states: (np.array([[here - states[0]]]),),
     )
     monkeypatch.setattr(initial_memory, "initial_state_sd", lambda _: np.ones(2))
-    found = memory_before(simulator, at_rest, record(at_rest, at_rest, "fit"), at_rest, lambda _, y: 1e3 * (y - turned))
+    part = record(at_rest, at_rest, "fit")
+    found = memory_before(simulator, at_rest, part, at_rest, at_rest, lambda _, y: 1e3 * (y - turned))
     assert found == pytest.approx(turned, abs=1e-12)
+
+
+def test_a_fit_and_a_prediction_look_for_the_memory_about_the_states_that_they_expect(monkeypatch):
+    """In prior deviations: each of its own record."""
+    fitter, structure = cut(280, 280)
+    sd = initial_state_sd(fitter.simulator(structure, fitter.fit_records[0]))
+    asked, about = [], 1.0 + np.arange(len(sd))
+    monkeypatch.setattr("ctrlgen.estimation.fit.states_to_begin", lambda *_: 0.01 * sd * about)
+    monkeypatch.setattr("ctrlgen.estimation.fit.begins_worse", lambda *_: True)
+    monkeypatch.setattr("ctrlgen.estimation.fit.start_of", lambda *_: 0.02 * sd * about)
+    monkeypatch.setattr("ctrlgen.estimation.fit.memory_before", lambda *a: asked.append(a[4]) or a[3])
+    fitted = fitter.fit(structure, steps=0)
+    fitter.predict(fitted, fitter.held_out_records[0])
+    assert np.array(asked) == pytest.approx(np.outer([0.01, 0.02], about))
+
+
+def only_a_prior(monkeypatch, plays, gaps, n):
+    """A simulator whose readings tell nothing of where its n states began, each of a prior deviation of one."""
+    monkeypatch.setattr(initial_memory, "initial_state_sd", lambda _: np.ones(n))
+    return SimpleNamespace(
+        plays=plays,
+        gaps=gaps,
+        simulate=lambda record, theta, states: states,
+        simulate_states=lambda record, theta, states: (np.zeros((1, n)),),
+    )
+
+
+def test_a_memory_is_weighed_by_how_far_it_is_from_where_it_is_expected(monkeypatch):
+    """From rest, the first states that are tried lie nearer to what is expected, and from that none does."""
+    simulator, rest = only_a_prior(monkeypatch, ((0, 0, 1),), (), 2), np.zeros(2)
+    part, expected = record(rest, rest, "fit"), np.array([INITIAL_MEMORY.ways_back[-1], -1.0])
+    nothing = lambda *_: rest[:0]  # noqa: E731
+    assert memory_before(simulator, rest, part, rest, expected, nothing) == pytest.approx(expected)
+    assert memory_before(simulator, rest, part, expected, expected, nothing) is expected
+
+
+def test_the_driven_side_of_a_gap_moves_nothing_else_from_where_it_is_expected(monkeypatch):
+    simulator, rest = only_a_prior(monkeypatch, (), (0,), 2), np.zeros(2)
+    side, expected = INITIAL_MEMORY.sides[0], np.array([0.0, 3.0])
+    told = np.array([side, 3.0])
+    found = memory_before(simulator, rest, record(rest, rest, "fit"), rest, expected, lambda _, y: 1e3 * (y - told))
+    assert found == pytest.approx(told)

@@ -8,8 +8,10 @@ from types import SimpleNamespace
 import pytest
 
 from ctrlgen.diagnosis.report.nearly_as_large import nearly_as_large
+from ctrlgen.diagnosis.selection import search
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.findings import Finding, Role, WorthEntry, leading
+from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.standing import Evidence, answer_of, borne_out_instead, by_heat, in_standing, possible
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.effects import Family
@@ -140,3 +142,19 @@ def test_why_the_largest_share_does_not_stand_first_is_told():
     (told,) = nearly_as_large([loop, lag])
     assert "0.705 um is left without it, 0.589 um without the other" in told and "(48 % and 52 %)" in told
     assert nearly_as_large([]) == []
+
+
+@pytest.mark.parametrize("alike, no_worse, taken", [(True, True, True), (False, True, False), (True, False, False)])
+def test_a_rival_takes_the_place_where_it_explains_alike_and_foretells_no_worse(monkeypatch, alike, no_worse, taken):
+    """No worse than the device as described does; else a cause would be named that the search itself withdraws."""
+    rival, fewer = SimpleNamespace(), SimpleNamespace()
+    searcher = Searcher.__new__(Searcher)
+    searcher.trials = SimpleNamespace(
+        converged=lambda t: t, selection=None, fitter=None, jobs=1, screen=SimpleNamespace(seed=0)
+    )
+    result = SimpleNamespace(chosen=None, nominal=None, rounds=(), withdrawn=())
+    monkeypatch.setattr(search, "explains_alike", lambda *_: alike)
+    monkeypatch.setattr(search, "no_worse", lambda *_: rival if no_worse else fewer)
+    monkeypatch.setattr(search, "attribute", lambda *_: None)
+    searcher._result = lambda nominal, current, *_: current
+    assert searcher.with_rival(result, rival) is (rival if taken else result)

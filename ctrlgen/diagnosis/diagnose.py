@@ -134,6 +134,7 @@ def _diagnose(
     step(f"refit of the device as described, {number_of(len(suspected), 'hypothesis', 'hypotheses')}")
     searcher = Searcher(fitter, Screen(fitter, suspected, seed), step, jobs)
     search = searcher.run(device)
+    step("shares of the residual")
     shares = residual_shares(search.fitter, search.nominal.fit, search.chosen.fit, seed)
     evidence = None if shares is None else evidence_of(search, shares.before, suspected, laws is None)
     rival = None if evidence is None else borne_out_instead(search, evidence)

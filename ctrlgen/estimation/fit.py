@@ -211,15 +211,16 @@ class Fitter:
 
     def _from_turning_points(self, problem: LeastSquaresProblem, fit: Fit, steps: int, enough: float) -> Fit:
         """The fit, or the better one reached with its plays at the turning points before the records that begin worse than they go on."""
-        states, first = list(fit.initial_states), 0
+        states, first, along = list(fit.initial_states), 0, 0
         for i, record in enumerate(self.fit_records):
             white = fit.residual[first : first + record.observed.size]
             first += record.observed.size
             simulator = self.simulator(fit.structure, record)
+            expected, along = problem.expected[along : along + len(states[i])], along + len(states[i])
             if simulator.plays and begins_worse(record, white):
                 sd = initial_state_sd(simulator)
                 begun = states[i] / sd
-                turned = memory_before(simulator, fit.theta, record, begun, self._white)
+                turned = memory_before(simulator, fit.theta, record, begun, expected / sd, self._white)
                 states[i] = states[i] if turned is begun else sd * turned
         if all(a is b for a, b in zip(states, fit.initial_states, strict=True)):
             return fit
@@ -310,7 +311,7 @@ class Fitter:
         expected = start_of(simulator, self.error, fit.theta, record) / sd
         found = begun_near(simulator, self.error, fit.theta, record, expected, expected)
         if (simulator.plays or simulator.gaps) and begins_worse(record, self._white(record, found.y)):
-            other = memory_before(simulator, fit.theta, record, found.states, self._white)
+            other = memory_before(simulator, fit.theta, record, found.states, expected, self._white)
             if other is not found.states:
                 again = begun_near(simulator, self.error, fit.theta, record, other, expected)
                 found = min(found, again, key=lambda begun: begun.objective)

@@ -27,17 +27,18 @@ def begins_worse(record: Record, white: np.ndarray) -> bool:
 
 
 def memory_before(
-    simulator: Simulator, theta: np.ndarray, record: Record, begun: np.ndarray, white: White
+    simulator: Simulator, theta: np.ndarray, record: Record, begun: np.ndarray, expected: np.ndarray, white: White
 ) -> np.ndarray:
-    """The free initial states in their prior deviations with which the first part of a record is foretold best: as `begun`, or with a
-    turning point before the record at one of several ways back from where it begins, or the driven side of a gap at one of several
-    places in it: what is crossed soon leaves one step of its slope no guide, which then bends the speed instead."""
+    """The free initial states in their prior deviations, likeliest at those `expected`, with which the first part of a record is foretold
+    best: as `begun`, or with a turning point before the record at one of several ways back from where it begins, or, from what is
+    expected, the driven side of a gap at one of several places in it: what is crossed soon leaves one step of its slope no guide, which
+    then bends the speed instead."""
     sd = initial_state_sd(simulator)
     first = rows_of(record, np.arange(len(record.time)) < _first_rows(record))
 
     def squares(states: np.ndarray) -> float:
         residual = white(first, simulator.simulate(first, theta, sd * states))
-        return float(residual @ residual + states @ states)
+        return float(residual @ residual + (states - expected) @ (states - expected))
 
     def moved(turn: int, start: int, place: float, side: float) -> np.ndarray:
         states = best.copy()
@@ -57,7 +58,7 @@ def memory_before(
                     best, least = states, value
     for start in simulator.gaps:
         for side in INITIAL_MEMORY.sides:
-            states = np.zeros_like(begun)
+            states = expected.copy()
             states[start] = side / sd[start]
             if (value := squares(states)) < least:
                 best, least = states, value

@@ -2,6 +2,9 @@
 
 A device that was switched on with the first row is at home there, whatever its drive; one that was already running is near where that
 drive holds it. What lags, creep or loops that have a rate remember of the time before is then not known (`Record.resumed`).
+
+Where the drive holds it: its slope at half the drive times the drive, which is exact for a reading of the drive's square, as of a heater
+by its voltage.
 """
 
 from __future__ import annotations
@@ -21,14 +24,16 @@ NEARER = 0.5  # of the way from home to where it is held, from which on the firs
 def begun_elsewhere(recording: Recording, model: Model) -> Recording:
     """The recording with the records `resumed` that did not begin at home."""
     seen = moved(recording, model) if recording.kind == "series" else None
-    gain = None if seen is None else seen.system.gain()
-    if seen is None or gain is None:
+    if seen is None:
         return recording
     places = [recording.channels.index(name) for name, _ in seen.readings]
     records = []
     for record in recording.records:
         y = np.where(record.valid, record.observed, np.nan)[:, places]
-        elsewhere = not (record.resumed or record.poses) and _was_held(gain @ record.drive[0], y)
+        first = record.drive[0]
+        looked_at = not (record.resumed or record.poses) and bool(np.isfinite(first).all() and first.any())
+        gain = seen.system_about(first / 2).gain() if looked_at else None
+        elsewhere = gain is not None and _was_held(gain @ first, y)
         records.append(replace(record, resumed=True) if elsewhere else record)
     return replace(recording, records=tuple(records))
 

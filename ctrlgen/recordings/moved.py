@@ -40,12 +40,20 @@ class Moved:
     stretches: tuple[Stretch, ...]
 
     @cached_property
+    def bare(self) -> Model:
+        """The device without its effects."""
+        return build_model(self.model.device.model_copy(update={"effect": ()}))
+
+    @cached_property
     def system(self) -> LinearSystem:
         """The device without its effects, about the mean of the drives within its bounds."""
-        bare = build_model(self.model.device.model_copy(update={"effect": ()}))
+        return self.system_about(np.mean([s.u.mean(axis=0) for s in self.stretches], axis=0))
+
+    def system_about(self, u: np.ndarray) -> LinearSystem:
+        """The device without its effects, at rest about the drives u (n_u,) [SI] as far as its bounds allow them."""
+        bare = self.bare
         outputs = ca.vertcat(*(bare.signals[role].expr[k] for role, k in (_place(n, bare) for n, _ in self.readings)))
-        u = np.clip(np.mean([s.u.mean(axis=0) for s in self.stretches], axis=0), *bare.u_bounds)
-        return linear_system(bare, outputs, bare.rest, np.zeros(bare.z.numel()), u)
+        return linear_system(bare, outputs, bare.rest, np.zeros(bare.z.numel()), np.clip(u, *bare.u_bounds))
 
     @cached_property
     def sizes(self) -> np.ndarray:

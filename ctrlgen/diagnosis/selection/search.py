@@ -85,10 +85,13 @@ class Searcher:
         return self._result(nominal, current, account, rounds, withdrawn)
 
     def with_rival(self, result: SearchResult, rival: CandidateModel) -> SearchResult:
-        """The result with a model that explains alike in place of the chosen one, which is its rival now; as given where it does not."""
+        """The result with a model that explains alike in place of the chosen one, which is its rival now; as given where it does not, or
+        would not stay as it is beside the device as described (`no_worse`)."""
         trials = self.trials
         rival = trials.converged(rival)
         if not explains_alike(trials.selection, rival, result.chosen):
+            return result
+        if no_worse(trials, result.nominal, rival) is not rival:
             return result
         account = attribute(trials.fitter, result.nominal, rival, trials.screen.seed, trials.jobs)
         return self._result(result.nominal, rival, account, result.rounds, result.withdrawn)

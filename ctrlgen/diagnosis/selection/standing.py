@@ -68,7 +68,7 @@ def borne_out_instead(search: SearchResult, evidence: Evidence) -> CandidateMode
     """Of what explains alike in place of a cause that the shares contradict, the first of the family that they put first; None where
     there is none."""
     for cause, rivals in zip(search.chosen.causes, search.rivals, strict=True):
-        told = None if cause.effect == PARAMETER else evidence.of(cause.effect)
+        told = evidence.of(cause.effect)
         if told is None or not told.contradicted:
             continue
         for rival in rivals:
