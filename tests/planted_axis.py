@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from axis_records import AXIS, KF, H, K, move
 from recovery import Planted
+from scipy.linalg import expm
 from scipy.stats import norm
 
 
@@ -53,6 +54,27 @@ def slew_rate(u, t):
         return KF * (middle - wanted), middle + np.clip(wanted - middle, -half, half)
 
     return move(u, behind)
+
+
+def amplifier_lag(u, t):
+    """An amplifier of 30 Hz that rings, D = 0.5, in exact steps of a twentieth of a sample."""
+    tau = 1 / (2 * np.pi * 30)
+    late = np.array([[0, 1 / tau], [-1 / tau, -2 * 0.5 / tau]])
+    half, whole = expm(late * H / 20), expm(late * H / 10)
+
+    def behind(now, q, v, off):
+        """`off`: what is delivered and its slope, both less what is asked for now."""
+        k = int(now / H + 1e-6)
+        if abs(now - k * H) < H / 20 and k:
+            off = off - np.array([u[k] - u[k - 1], 0.0])
+        off = np.zeros(2) - np.array([u[0], 0.0]) if k == 0 and now < H / 20 else off
+        return KF * (half @ off)[0], whole @ off
+
+    return move(u, behind)
+
+
+def one_sided_saturation(u, t):
+    return move(np.maximum(u, -1.1))
 
 
 def coil_heating(u, t):
@@ -214,6 +236,8 @@ ON_AXIS = {
     square_drive: Planted("actuator:axis", {"curvature": 0.02}),
     cubic_drive: Planted("actuator:axis", {"curvature": -0.012}),
     stiffness_drift: Planted("stage:axis", {"rate": 0.04}, within={"rate": 0.02}),
+    amplifier_lag: Planted("actuator:axis", {"share": 1.0, "tau": 1 / (2 * np.pi * 30), "damping": 0.5}),
+    one_sided_saturation: Planted("actuator:axis", {"level": -1.1}),
     slew_rate: Planted("actuator:axis", {"rate": 12.0}),
     coil_heating: Planted("actuator:axis", {"rise": 3.9e-3 * 10 / 4, "tau": 0.5}, within={"rise": 0.05, "tau": 0.05}),
     cubic_sensor: Planted("sensor:axis", {"curvature": 2e6}),

@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 from axis_records import AXIS, KF, H, K, move, record
 from conftest import DEVICES
+from recovery import fitter_of
 from scipy.signal import lfilter
 
 from ctrlgen import build_model, diagnose, load_device, simulate
 from ctrlgen.diagnosis.selection.model_selection import scored
+from ctrlgen.diagnosis.selection.score_gradient import ScoreGradient, law_terms
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.fit import Fitter
-from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.hypothesis import DataHints, Hypothesis
 from ctrlgen.estimation.noise import estimate_noise
 from ctrlgen.estimation.priors import prior_of
 from ctrlgen.estimation.structure import Structure
@@ -111,6 +113,32 @@ def test_one_without_readings_or_without_motion_is_left(run):
     blind = record(u, y, "fit")
     nothing = replace(blind, observed=np.full_like(blind.observed, np.nan), valid=np.zeros_like(blind.valid))
     assert flagged(record(u[N:], y[N:], "fit"), nothing, record(u, 0 * y, "fit")) == [True, False, False]
+
+
+@pytest.mark.parametrize("resumed", [True, False])
+def test_a_law_is_screened_from_where_it_has_settled_in_a_record_that_began_before_its_first_row(run, resumed):
+    """From rest a lag would bring its beginning, which hides what it does later; a clock goes on as it is."""
+    u, y = run
+    lag, late = (Hypothesis(*named, "axis") for named in (("thermal_lag", "actuator:axis"), ("drift", "sensor:axis")))
+    part = replace(record(u[N:], y[N:], "fit", first=5.0), resumed=resumed)
+    fitter = fitter_of(AXIS, ("reading.axis",), ("um",), (NOISE,), "series", [part, replace(part, role="hold_out")])
+    terms = law_terms(AXIS, [lag, late], fitter.recording.channels, part.timing, N)
+    fit = fitter.fit(Structure(AXIS), steps=0)
+    slopes = ScoreGradient(fitter, fit, part, [lag, late], lambda *_: DataHints(), terms)
+    begun, along = [], slopes.laws.along
+    slopes.laws.along = lambda p, memories, *motion: (
+        begun.append((len(set(motion[1][:, 0])), memories)) or along(p, memories, *motion)
+    )
+    lost = np.zeros(len(slopes.laws.terms), bool)
+    list(slopes.blocks(fit.initial_states[0], lost))
+    first = next(memories for drives, memories in begun if drives > 1)
+    kinds = {slopes.laws.terms[places[0]].kind: k for k, (places, _) in enumerate(slopes.laws.groups)}
+    slow = [p.shape["tau"] for p in slopes.columns if p.hypothesis == lag]
+    states = first[kinds["thermal_lag"]].reshape(-1, 3)[: len(slow)]
+    quick = [s for s, tau in zip(states, slow, strict=True) if tau < 0.1]
+    assert quick and quick == pytest.approx(np.full((len(quick), 3), u[N] if resumed else 0.0), rel=1e-6)
+    clocks = [clock for k in slopes.laws.groups[kinds["drift"]][0] for clock in slopes.laws.terms[k].clocks]
+    assert set(first[kinds["drift"]][clocks]) == {5.0}
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from axis_records import AXIS, BACKLASH, FINE, H, fine, record
+from axis_records import AXIS, BACKLASH, FINE, H, fine, move, record
+from planted_axis import slew_rate
 from play_records import NOISE, SERVO, lagging, moved
 from recovery import fitter_of
 
@@ -95,6 +96,7 @@ def test_a_turning_point_is_sought_where_the_record_begins_and_every_way_back(mo
     simulator = SimpleNamespace(
         plays=((0, 0, 1),),
         gaps=(),
+        slews=(),
         simulate=lambda record, theta, states: states,
         simulate_states=lambda record, theta, states: (np.array([[here - states[0]]]),),
     )
@@ -110,7 +112,7 @@ def test_a_fit_and_a_prediction_look_for_the_memory_about_the_states_that_they_e
     sd = initial_state_sd(fitter.simulator(structure, fitter.fit_records[0]))
     asked, about = [], 1.0 + np.arange(len(sd))
     monkeypatch.setattr("ctrlgen.estimation.fit.states_to_begin", lambda *_: 0.01 * sd * about)
-    monkeypatch.setattr("ctrlgen.estimation.fit.begins_worse", lambda *_: True)
+    monkeypatch.setattr("ctrlgen.estimation.fit.begins_elsewhere", lambda *_: True)
     monkeypatch.setattr("ctrlgen.estimation.fit.start_of", lambda *_: 0.02 * sd * about)
     monkeypatch.setattr("ctrlgen.estimation.fit.memory_before", lambda *a: asked.append(a[4]) or a[3])
     fitted = fitter.fit(structure, steps=0)
@@ -124,6 +126,7 @@ def only_a_prior(monkeypatch, plays, gaps, n):
     return SimpleNamespace(
         plays=plays,
         gaps=gaps,
+        slews=(),
         simulate=lambda record, theta, states: states,
         simulate_states=lambda record, theta, states: (np.zeros((1, n)),),
     )
@@ -144,3 +147,25 @@ def test_the_driven_side_of_a_gap_moves_nothing_else_from_where_it_is_expected(m
     told = np.array([side, 3.0])
     found = memory_before(simulator, rest, record(rest, rest, "fit"), rest, expected, lambda _, y: 1e3 * (y - told))
     assert found == pytest.approx(told)
+
+
+SLEWS = Hypothesis("slew_rate", "actuator:axis", "axis")
+
+
+def cut_while_it_slews():
+    """The axis from where its amplifier, of 12 V/s, is farthest behind its drive; a record to fit and the same to hold out."""
+    n, rng = 2400, np.random.default_rng(1)
+    t, noise = H * np.arange(n), 5e-9
+    u = 1.5 * np.sin(2 * np.pi * 2.3 * t) + 0.3 * np.sin(2 * np.pi * 13.1 * t + 1)
+    y = slew_rate(u, t)
+    begin = 1000 + int(np.argmax(np.abs(y - move(u))[1000:1400]))
+    part = record(u[begin:], y[begin:] + noise * rng.standard_normal(n - begin), "hold_out", h=H)
+    part = replace(part, resumed=True)
+    return fitter_of(AXIS, ("reading.axis",), ("um",), (noise,), "series", [replace(part, role="fit"), part]), noise
+
+
+def test_an_amplifier_that_slews_when_a_record_begins_is_behind_its_drive_there():
+    fitter, noise = cut_while_it_slews()
+    (part,) = fitter.held_out_records
+    fit = fitter.fit(Structure(AXIS).with_cause(SLEWS, {"share": 1.0, "rate": 12.0}), steps=0)
+    assert np.sqrt(np.mean((part.observed - fitter.predict(fit, part)) ** 2)) < 1.1 * noise  # 100 of it before

@@ -16,6 +16,7 @@ every_parameter = pytest.mark.parametrize(
 ONE_WAY = {
     "finite_rotation": (-2.0, 4.0),
     "link_load": (-2.0, 4.0),
+    "amplifier_lag": (-0.5, 1.5),
     "low_pass": (-0.5, 1.5),
     "coil_heating": (-0.1, 1.0),
     "heater_resistance": (-1e-3, 1e-2),

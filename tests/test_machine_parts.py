@@ -79,6 +79,8 @@ def test_a_machine_of_unknown_parts_is_told_in_neutral_words():
         "drive_gain",
         "cubic_drive",
         "square_drive",
+        "amplifier_lag",
+        "one_sided_saturation",
         "slew_rate",
         "saturation",
         "stiffening",

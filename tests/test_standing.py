@@ -147,14 +147,21 @@ def test_why_the_largest_share_does_not_stand_first_is_told():
 @pytest.mark.parametrize("alike, no_worse, taken", [(True, True, True), (False, True, False), (True, False, False)])
 def test_a_rival_takes_the_place_where_it_explains_alike_and_foretells_no_worse(monkeypatch, alike, no_worse, taken):
     """No worse than the device as described does; else a cause would be named that the search itself withdraws."""
-    rival, fewer = SimpleNamespace(), SimpleNamespace()
+    rival, fewer, described = SimpleNamespace(causes=()), SimpleNamespace(), SimpleNamespace()
+    screen = SimpleNamespace(seed=0, hypotheses=())
     searcher = Searcher.__new__(Searcher)
     searcher.trials = SimpleNamespace(
-        converged=lambda t: t, selection=None, fitter=None, jobs=1, screen=SimpleNamespace(seed=0)
+        converged=lambda t: t,
+        selection=None,
+        fitter=None,
+        jobs=1,
+        screen=screen,
+        log=(),
+        screened=lambda _: None,
+        each=lambda do, items: [do(None, k) for k in items],
     )
-    result = SimpleNamespace(chosen=None, nominal=None, rounds=(), withdrawn=())
+    result = SimpleNamespace(chosen=described, nominal=described, rounds=(), withdrawn=())
     monkeypatch.setattr(search, "explains_alike", lambda *_: alike)
     monkeypatch.setattr(search, "no_worse", lambda *_: rival if no_worse else fewer)
     monkeypatch.setattr(search, "attribute", lambda *_: None)
-    searcher._result = lambda nominal, current, *_: current
-    assert searcher.with_rival(result, rival) is (rival if taken else result)
+    assert searcher.with_rival(result, rival).chosen is (rival if taken else described)

@@ -208,10 +208,19 @@ LAWS = {
     ),
     "lost_beams": (EVENT, lambda s, p: -p.share * s.value * event(s, p)),
     "lost_motion": ({}, lambda s, p: -p.compliance * s.force),
+    "amplifier_lag": (
+        {"tau": 0.06, "damping": 0.7},
+        lambda s, p: p.share * (s.w - s.value),
+        lambda s, p: {"w": s.v / 0.06, "v": (s.value - s.w - 1.4 * s.v) / 0.06},
+    ),
     "low_pass": (
         {"tau": 0.06, "damping": 0.7},
         lambda s, p: p.share * (s.w - s.value),
         lambda s, p: {"w": s.v / 0.06, "v": (s.value - s.w - 1.4 * s.v) / 0.06},
+    ),
+    "one_sided_saturation": (
+        {"level": -0.4},
+        lambda s, p: p.share * (-0.4 - s.value) ** 2 / (-0.4 - s.value + 4e-5) if s.value < -0.4 else 0.0,
     ),
     "mirror_tilt": ({}, lambda s, p: p.tilt * s.all[s.partner]),
     "plane_mirror": ({"position": 0.4}, met),
@@ -228,8 +237,8 @@ LAWS = {
     "saturation": ({"level": 0.4}, clipped),
     "slew_rate": (
         {"rate": 40.0},
-        lambda s, p: p.share * (s.mean - s.rise / 2 + s.w - s.value),
-        lambda s, p: {"w": s.rise / H},
+        lambda s, p: p.share * (s.v + s.tilt * (1 - s.w) + s.bend * (1 - s.w) ** 2 - s.value),
+        lambda s, p: {"w": 1 / H},
     ),
     "screw_motion": ({}, lambda s, p: p.share * cross(s.all[:3], s.all[3:])[s.index - 3] / 2),
     "second_pole": ({"tau": 0.3}, lambda s, p: p.share * (s.w - s.value), lambda s, p: {"w": (s.value - s.w) / 0.3}),

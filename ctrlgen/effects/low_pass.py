@@ -1,6 +1,7 @@
 """A sensor, or its filter, of limited bandwidth."""
 
-from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, State, itself
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, itself
+from ctrlgen.effects._second_order import DAMPING, FILTER_STATES, TAU, behind_filter, filter_rates
 
 
 class LowPass(Effect):
@@ -14,16 +15,12 @@ class LowPass(Effect):
     family = Family.TIMING
     order = 2
     source = "A. J. Fleming, Sensors and Actuators A 190 (2013) 106: sensor bandwidth"
-    params = (
-        Param("share", "1", (-0.5, 1.5), "share of the reading that is filtered", off=0.0),
-        Param("tau", "s", (1e-4, 1e2), "one over the corner frequency in rad/s"),
-        Param("damping", "1", (0.3, 20.0), "D: damping ratio"),
-    )
+    params = (Param("share", "1", (-0.5, 1.5), "share of the reading that is filtered", off=0.0), TAU, DAMPING)
     at_bounds = itself("tau", "damping")
-    states = (State("w", "channel", 1.0), State("v", "channel", 1.0))
+    states = FILTER_STATES
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
-        return p.share * (s.states.w - s.value)
+        return behind_filter(s, p)
 
     def rates(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
-        return {"w": s.states.v / p.tau, "v": (s.value - s.states.w - 2 * p.damping * s.states.v) / p.tau}
+        return filter_rates(s, p)

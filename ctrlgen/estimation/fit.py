@@ -15,7 +15,7 @@ import numpy as np
 from ctrlgen.devices import Device
 from ctrlgen.estimation.checkpoint import Checkpoint, key_of
 from ctrlgen.estimation.error_model import ErrorModel, error_model
-from ctrlgen.estimation.initial_memory import begins_worse, memory_before
+from ctrlgen.estimation.initial_memory import begins_elsewhere, memory_before
 from ctrlgen.estimation.leading_part import leading_part
 from ctrlgen.estimation.least_squares import LeastSquaresProblem, initial_state_sd, limited, whiten_residual
 from ctrlgen.estimation.moved_drive import with_drive_at
@@ -217,7 +217,7 @@ class Fitter:
             first += record.observed.size
             simulator = self.simulator(fit.structure, record)
             expected, along = problem.expected[along : along + len(states[i])], along + len(states[i])
-            if simulator.plays and begins_worse(record, white):
+            if (simulator.plays or simulator.slews) and begins_elsewhere(simulator, record, white):
                 sd = initial_state_sd(simulator)
                 begun = states[i] / sd
                 turned = memory_before(simulator, fit.theta, record, begun, expected / sd, self._white)
@@ -310,7 +310,7 @@ class Fitter:
             return sd, simulator.simulate(record, fit.theta)
         expected = start_of(simulator, self.error, fit.theta, record) / sd
         found = begun_near(simulator, self.error, fit.theta, record, expected, expected)
-        if (simulator.plays or simulator.gaps) and begins_worse(record, self._white(record, found.y)):
+        if begins_elsewhere(simulator, record, self._white(record, found.y)):
             other = memory_before(simulator, fit.theta, record, found.states, expected, self._white)
             if other is not found.states:
                 again = begun_near(simulator, self.error, fit.theta, record, other, expected)

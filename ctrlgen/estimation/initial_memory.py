@@ -1,4 +1,4 @@
-"""Where the plays of a hysteresis stood when a record began: what moved before it is not recorded.
+"""Where the plays of a hysteresis stood when a record began, or what a rate limits: what moved before it is not recorded.
 
 Plays that were dragged along remember where the motion turned last. One that the motion does not drag along at first has no slope by
 that place, and a search from the middle of all plays stays there: a few places are tried first.
@@ -19,11 +19,18 @@ from ctrlgen.recordings.recording import Record
 White = Callable[[Record, np.ndarray], np.ndarray]  # (record, readings) -> whitened residual (n n_y,)
 
 
-def begins_worse(record: Record, white: np.ndarray) -> bool:
-    """Whether the whitened residual (n n_y,) of a record is larger in its first part than after it."""
+def begins_elsewhere(simulator: Simulator, record: Record, white: np.ndarray) -> bool:
+    """Whether a device with a memory that is looked for here begins worse than it goes on: one with plays or gaps beyond what is taken for
+    its errors, one that slews even within these, where a beginning that is far off would hide that the rest is right."""
+    beyond = 1.0 if simulator.plays or simulator.gaps else 0.0
+    return bool(simulator.plays or simulator.gaps or simulator.slews) and begins_worse(record, white, beyond)
+
+
+def begins_worse(record: Record, white: np.ndarray, beyond: float = 1.0) -> bool:
+    """Whether the mean square of a record's whitened residual (n n_y,) is larger in its first part than after it, and than `beyond`."""
     squares = white.reshape(len(record.time), -1) ** 2
     rows = _first_rows(record)
-    return bool(squares[:rows].mean() > INITIAL_MEMORY.worse * max(squares[rows:].mean(), 1.0))
+    return bool(squares[:rows].mean() > INITIAL_MEMORY.worse * max(squares[rows:].mean(), beyond))
 
 
 def memory_before(
@@ -32,7 +39,7 @@ def memory_before(
     """The free initial states in their prior deviations, likeliest at those `expected`, with which the first part of a record is foretold
     best: as `begun`, or with a turning point before the record at one of several ways back from where it begins, or, from what is
     expected, the driven side of a gap at one of several places in it: what is crossed soon leaves one step of its slope no guide, which
-    then bends the speed instead."""
+    then bends the speed instead. Or with what a rate limits so far behind: what has caught up with the drive has no slope."""
     sd = initial_state_sd(simulator)
     first = rows_of(record, np.arange(len(record.time)) < _first_rows(record))
 
@@ -60,6 +67,12 @@ def memory_before(
         for side in INITIAL_MEMORY.sides:
             states = expected.copy()
             states[start] = side / sd[start]
+            if (value := squares(states)) < least:
+                best, least = states, value
+    for start in simulator.slews:
+        for behind in INITIAL_MEMORY.behind:
+            states = best.copy()
+            states[start] = expected[start] + behind
             if (value := squares(states)) < least:
                 best, least = states, value
     return best

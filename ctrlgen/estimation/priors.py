@@ -17,6 +17,7 @@ from ctrlgen.effects import Effect
 from ctrlgen.estimation.law_prior import CREEPING, ONE_IN_TEN, LawPrior, ParameterPrior, peaks
 from ctrlgen.estimation.priors_in_a_region import IN_A_REGION
 from ctrlgen.estimation.priors_of_a_lag import HYSTERESIS, OF_A_LAG
+from ctrlgen.estimation.priors_of_drives import OF_DRIVES
 from ctrlgen.estimation.priors_of_heat import OF_HEAT
 from ctrlgen.estimation.priors_of_time import OF_TIME
 
@@ -146,70 +147,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             constant=True,
             parameters={"share": ParameterPrior(fixed_range=(0.8, 1.2))},
         ),
-        # Drive and heat -------------------------------------------------------------------------------------------------------
-        "asymmetric_gain": LawPrior(
-            "Rarer than a gain that is wrong in both directions: judgement.", log_prior_odds=ONE_IN_TEN
-        ),
-        "butterfly": LawPrior(
-            "Actuators without bias are rare: judgement. " + HYSTERESIS,
-            log_prior_odds=ONE_IN_TEN,
-            unless=frozenset({"heat"}),
-            model_form_error=0.02,
-            form_of="hysteresis",
-            parameters={
-                "linear": _starts((0.0, 1.0)),
-                "reach": _starts((0.03, 0.1, 0.3, 1.0)),
-                "taper": _starts((0.0,)),
-            },
-        ),
-        **dict.fromkeys(
-            ("cubic_drive", "square_drive"),
-            LawPrior(
-                "Most amplifiers and coils are straighter than sensors and flexures: judgement. In balance a curve of the drive is one of "
-                "the displacement.",
-                log_prior_odds=ONE_IN_TEN,
-                unless=frozenset({"balanced"}),
-            ),
-        ),
-        "dead_zone": LawPrior(
-            "Between contacts that open (0.03) and an electronic crossover (1).",
-            parameters={"rounding": _starts((0.3,))},
-        ),
-        "drive_crosstalk": LawPrior(
-            "Rarer than a stage that carries its neighbour, which is just the same where drives are displacements: judgement.",
-            log_prior_odds=ONE_IN_TEN,
-            unless=frozenset({"displacement_command"}),
-        ),
-        "drive_offset": LawPrior("As common as a wrong gain.", constant=True),
-        "reversed": LawPrior(
-            "A wiring fault is rarer than a wrong gain: judgement. A lead is swapped or it is not.",
-            log_prior_odds=ONE_IN_TEN,
-            domain="mechanism",
-            parameters={"share": ParameterPrior(fixed_range=(0.9, 1.1))},
-        ),
-        "saturation": LawPrior(
-            "A limit beyond the peak shows nowhere; one far below it would have been noticed. An amplifier clips or it does not.",
-            parameters={
-                "share": ParameterPrior(fixed_range=(0.5, 1.5)),
-                "level": peaks(0.2, 0.4, 0.6, 0.8, 0.9, 0.97),
-            },
-        ),
-        "second_pole": LawPrior(
-            "Time constants from a chip's to a room's.", parameters={"tau": _starts((2e-3, 0.01, 0.05, 0.3, 2.0, 20.0))}
-        ),
-        "slew_rate": LawPrior(
-            "An amplifier slews or it does not; a step of the drive within a sample is hundreds of times as fast: judgement.",
-            parameters={
-                "share": ParameterPrior(fixed_range=(0.5, 1.5)),
-                "rate": peaks(3e-3, 0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 0.97),
-            },
-        ),
-        "swapped": LawPrior(
-            "A wiring fault is rarer than a wrong gain: judgement. Two leads are exchanged or they are not.",
-            log_prior_odds=ONE_IN_TEN,
-            domain="mechanism",
-            parameters={"share": ParameterPrior(fixed_range=(0.9, 1.1))},
-        ),
+        **OF_DRIVES,
         # Force ----------------------------------------------------------------------------------------------------------------
         "asymmetric_hysteresis": LawPrior(
             "Rarer than a symmetric loop: judgement. " + HYSTERESIS + _IN_BALANCE,

@@ -18,6 +18,10 @@ OF_HEAT: Mapping[str, LawPrior] = {
         model_form_error=0.01,
         parameters={"power": ParameterPrior((0.6, 1.0, 1.6), usual=1.0)},
     ),
+    "second_pole": LawPrior(
+        "Time constants from a chip's to a room's.",
+        parameters={"tau": ParameterPrior((2e-3, 0.01, 0.05, 0.3, 2.0, 20.0))},
+    ),
     "thermal_lag": LawPrior(
         "Three time constants stand for a continuous body; 2 %: judgement. Their ratio: between one mass and a rod (1/9) and above.",
         model_form_error=0.02,

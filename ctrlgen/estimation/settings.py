@@ -270,6 +270,8 @@ class HeldOutRefitSettings:
     max_steps_to_begin: int = 20
     """Levenberg-Marquardt steps to the initial states of a record after the first: of a hexapod whose heaters are hot, under a large
     discrepancy, 7 to 12 were needed. Judgement."""
+    times_where_it_slews: int = 4
+    """How often these are begun again, at most, where an amplifier slews: the kink where it catches up with its drive ends them early."""
     unsettled: float = 0.01
     """Share of the objective by which the first step brings less than it promised, and brings at all, from which on others follow."""
     settled: float = 0.1
@@ -290,6 +292,8 @@ class InitialMemorySettings:
     """From where every play is dragged along, in the same."""
     sides: tuple[float, ...] = (-0.875, -0.625, -0.375, -0.125, 0.125, 0.375, 0.625, 0.875)
     """Places of a driven side in its gap, in halves of it, from which a search begins, so near that a step reaches the next. Judgement."""
+    behind: tuple[float, ...] = (-0.5, -0.25, -0.1, -0.03, 0.03, 0.1, 0.25, 0.5)
+    """How far what a rate limits is behind its drive when a record begins, in prior deviations, from which a search begins. Judgement."""
 
 
 @dataclass(frozen=True)

@@ -41,10 +41,11 @@ def start_of(simulator: Simulator, error: ErrorModel, theta: np.ndarray, record:
 
 def _settled(simulator: Simulator, theta: np.ndarray, record: Record) -> np.ndarray | None:
     """What is added to the free initial states where the device has been under the first drive of a record as long as it, at most
-    `SIMULATION.settling_samples`: to those of actuators without inertia behind them, and where the record goes on from what it does not
-    tell, to those of relaxing laws and of the motion. None where there are none of these, or rest is that."""
+    `SIMULATION.settling_samples`: to those of actuators without inertia behind them and of what slews, and where the record goes on from
+    what it does not tell, to those of relaxing laws and of the motion. None where there are none of these, or rest is that."""
     m, free = simulator.model, simulator.free_initial_states
-    settling = [(place, k) for place, k in enumerate(free) if k not in m.free_memories]
+    slewing = set(simulator.slews)
+    settling = [(place, k) for place, k in enumerate(free) if k not in m.free_memories or place in slewing]
     if (
         not settling
         or (m.inertial and not simulator.resumed)

@@ -127,6 +127,13 @@ class Simulator:
         return tuple(i for i, name in free if "_start_" in name and name.replace("_start_", "_turn_") not in names)
 
     @cached_property
+    def slews(self) -> tuple[int, ...]:
+        """Of each law that limits a rate: the place among the free initial states of what was delivered before a record."""
+        names, kinds = self.model.x_names, tuple(e.kind for e in self.model.device.effect if e.limits_rate)
+        free = ((i, names[k]) for i, k in enumerate(self.free_initial_states) if k < len(names))
+        return tuple(i for i, name in free if name.startswith(kinds))
+
+    @cached_property
     def _observed(self) -> ca.SX:
         signals = self.model.signals
         rows = []

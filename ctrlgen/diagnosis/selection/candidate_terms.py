@@ -17,6 +17,7 @@ from ctrlgen.diagnosis.selection.law_terms import CompiledTerms, LawTerm, LawTer
 from ctrlgen.effects import Effect, Place
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import DataHints, Hypothesis, nominal_physics
+from ctrlgen.estimation.settings import CANDIDATE_TERMS
 from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.model.effect_terms import channels
@@ -169,6 +170,18 @@ class CandidateTerms:
         begin = time if np.isfinite(self.simulator.sample_time) else 0.0
         clocks = ([clock for k in places for clock in self.terms[k].clocks] for places, _ in self.groups)
         return [np.where(np.array(each, bool), begin, 0.0) for each in clocks]
+
+    def settled(self, p: np.ndarray, memories: list[np.ndarray], rows: int, *first: np.ndarray) -> list[np.ndarray]:
+        """The laws' states after so many rows of one motion, the `first` row of what `along` is given, from `memories` on; clocks as they
+        are. As far as they settle, they are then where a device is that had moved before the record."""
+        size = CANDIDATE_TERMS.block
+        held = [np.repeat(x[None, :], size + 1, axis=0) for x in first]
+        found = memories
+        for _ in range(-(-rows // size)):
+            found = [states[size - 1] for states in self.along(p, found, *held)[0]]
+        clocks = ([clock for k in places for clock in self.terms[k].clocks] for places, _ in self.groups)
+        begun = zip(clocks, memories, found, strict=True)
+        return [np.where(np.array(each, bool) | ~np.isfinite(new), old, new) for each, old, new in begun]
 
     def along(
         self, p: np.ndarray, memories: list[np.ndarray], *motion: np.ndarray

@@ -15,6 +15,11 @@ from ctrlgen.effects import Effect
 # actuators, the name of a part, "position" for a drive that is a position, or "flexible" for a stage on flexures.
 TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
     {
+        "amplifier_lag": (
+            ("position", "An axis that follows its command late: a controller of limited bandwidth"),
+            *((word, "An amplifier of limited bandwidth") for word in ("piezo", "electromagnetic")),
+            ("", "A drive that follows its command late: limited bandwidth"),
+        ),
         "asymmetric_gain": (
             ("position", "An axis that goes farther to one side than to the other"),
             ("electromagnetic", "An amplifier, or motor, that is stronger in one direction"),
@@ -61,6 +66,7 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
                 for word in ("hydraulic", "pneumatic")
             ),
         ),
+        "delay": (("", "A fixed time between drive and reading: the reading, or the drive, is late"),),
         "displacement_hysteresis": (
             ("cable", "Hysteresis of the cable: the joint lags"),
             ("piezo", "Hysteresis of the piezo, or of a joint behind it: the displacement lags"),
@@ -104,6 +110,10 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
             ("thermal", "Beams that break at one moment"),
             ("electromagnetic", "A winding that breaks at one moment"),
             ("", "A part of the actuator that fails at one moment"),
+        ),
+        "one_sided_saturation": (
+            ("position", "An axis that stops short of its stated travel in one direction"),
+            ("", "A drive that saturates in one direction"),
         ),
         "one_sided_stiffening": (
             ("flexible", "A flexure that is bent or loaded already at home: stiffer to one side than to the other"),

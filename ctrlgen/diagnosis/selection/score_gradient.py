@@ -20,7 +20,7 @@ from ctrlgen.estimation.disturbance_inputs import with_disturbance_inputs
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis, nominal_physics
 from ctrlgen.estimation.late_readings import LateSlopes
-from ctrlgen.estimation.settings import CANDIDATE_TERMS
+from ctrlgen.estimation.settings import CANDIDATE_TERMS, SIMULATION
 from ctrlgen.estimation.simulator import Simulator, compiled_simulator
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Record, Timing
@@ -150,6 +150,8 @@ class ScoreGradient:
         seen = (before if series else after, record.drive, inputs[3], after)
         size = min(CANDIDATE_TERMS.block, n)
         memory = self.laws.start(record.time[0])
+        if record.resumed and series:
+            memory = self.laws.settled(self.p, memory, min(n, SIMULATION.settling_samples), *(x[0] for x in seen))
         for a in range(0, n, size):
             # the last block is filled up
             here = np.minimum(np.arange(a, a + size + 1), n - 1)

@@ -1,0 +1,90 @@
+"""What the search believes of laws of a drive: rows of `priors`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ctrlgen.estimation.law_prior import ONE_IN_TEN, LawPrior, ParameterPrior, peaks
+from ctrlgen.estimation.priors_of_a_lag import HYSTERESIS
+
+OF_DRIVES: Mapping[str, LawPrior] = {
+    "amplifier_lag": LawPrior(
+        "As a filter of a reading, of the drive: behind a stage without play or friction the two are one, and most of what is slow "
+        "in a loop is a filter of its readings: judgement.",
+        log_prior_odds=ONE_IN_TEN,
+        model_form_error=0.005,
+        parameters={
+            "share": ParameterPrior(plausible_range=(0.7, 1.3)),
+            "tau": ParameterPrior((1e-3, 8e-3, 0.06, 0.5)),
+            "damping": ParameterPrior((0.7, 4.0)),
+        },
+    ),
+    "asymmetric_gain": LawPrior(
+        "Rarer than a gain that is wrong in both directions: judgement.", log_prior_odds=ONE_IN_TEN
+    ),
+    "butterfly": LawPrior(
+        "Actuators without bias are rare: judgement. " + HYSTERESIS,
+        log_prior_odds=ONE_IN_TEN,
+        unless=frozenset({"heat"}),
+        model_form_error=0.02,
+        form_of="hysteresis",
+        parameters={
+            "linear": ParameterPrior((0.0, 1.0)),
+            "reach": ParameterPrior((0.03, 0.1, 0.3, 1.0)),
+            "taper": ParameterPrior((0.0,)),
+        },
+    ),
+    **dict.fromkeys(
+        ("cubic_drive", "square_drive"),
+        LawPrior(
+            "Most amplifiers and coils are straighter than sensors and flexures: judgement. In balance a curve of the drive is one of "
+            "the displacement.",
+            log_prior_odds=ONE_IN_TEN,
+            unless=frozenset({"balanced"}),
+        ),
+    ),
+    "dead_zone": LawPrior(
+        "Between contacts that open (0.03) and an electronic crossover (1).",
+        parameters={"rounding": ParameterPrior((0.3,))},
+    ),
+    "drive_crosstalk": LawPrior(
+        "Rarer than a stage that carries its neighbour, which is just the same where drives are displacements: judgement.",
+        log_prior_odds=ONE_IN_TEN,
+        unless=frozenset({"displacement_command"}),
+    ),
+    "drive_offset": LawPrior("As common as a wrong gain.", constant=True),
+    "one_sided_saturation": LawPrior(
+        "As a limit both ways, and rarer: judgement.",
+        log_prior_odds=ONE_IN_TEN,
+        parameters={
+            "share": ParameterPrior(fixed_range=(0.5, 1.5)),
+            "level": peaks(-0.9, -0.7, -0.4, -0.2, 0.2, 0.4, 0.7, 0.9),
+        },
+    ),
+    "reversed": LawPrior(
+        "A wiring fault is rarer than a wrong gain: judgement. A lead is swapped or it is not.",
+        log_prior_odds=ONE_IN_TEN,
+        domain="mechanism",
+        parameters={"share": ParameterPrior(fixed_range=(0.9, 1.1))},
+    ),
+    "saturation": LawPrior(
+        "A limit beyond the peak shows nowhere; one far below it would have been noticed. An amplifier clips or it does not.",
+        parameters={
+            "share": ParameterPrior(fixed_range=(0.5, 1.5)),
+            "level": peaks(0.2, 0.4, 0.6, 0.8, 0.9, 0.97),
+        },
+    ),
+    "slew_rate": LawPrior(
+        "An amplifier slews or it does not; a step of the drive within a sample is hundreds of times as fast: judgement.",
+        parameters={
+            "share": ParameterPrior(fixed_range=(0.5, 1.5)),
+            "rate": peaks(3e-3, 0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 0.97),
+        },
+    ),
+    "swapped": LawPrior(
+        "A wiring fault is rarer than a wrong gain: judgement. Two leads are exchanged or they are not.",
+        log_prior_odds=ONE_IN_TEN,
+        domain="mechanism",
+        parameters={"share": ParameterPrior(fixed_range=(0.9, 1.1))},
+    ),
+}
