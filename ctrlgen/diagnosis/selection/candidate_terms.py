@@ -172,16 +172,16 @@ class CandidateTerms:
         return [np.where(np.array(each, bool), begin, 0.0) for each in clocks]
 
     def settled(self, p: np.ndarray, memories: list[np.ndarray], rows: int, *first: np.ndarray) -> list[np.ndarray]:
-        """The laws' states after so many rows of one motion, the `first` row of what `along` is given, from `memories` on; clocks as they
-        are. As far as they settle, they are then where a device is that had moved before the record."""
+        """The laws' states after so many rows of one motion, the `first` row of what `along` is given, from `memories` on, of those that
+        settle: they are then where a device is that had moved before the record."""
         size = CANDIDATE_TERMS.block
         held = [np.repeat(x[None, :], size + 1, axis=0) for x in first]
         found = memories
         for _ in range(-(-rows // size)):
             found = [states[size - 1] for states in self.along(p, found, *held)[0]]
-        clocks = ([clock for k in places for clock in self.terms[k].clocks] for places, _ in self.groups)
-        begun = zip(clocks, memories, found, strict=True)
-        return [np.where(np.array(each, bool) | ~np.isfinite(new), old, new) for each, old, new in begun]
+        settle = ([settles for k in places for settles in self.terms[k].settle] for places, _ in self.groups)
+        begun = zip(settle, memories, found, strict=True)
+        return [np.where(np.array(each, bool) & np.isfinite(new), new, old) for each, old, new in begun]
 
     def along(
         self, p: np.ndarray, memories: list[np.ndarray], *motion: np.ndarray

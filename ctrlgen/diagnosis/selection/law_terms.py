@@ -67,7 +67,8 @@ class _SymbolicInputs(LawInputs):
 @dataclass(frozen=True, eq=False)
 class LawTerm:
     """One law at one place: the `slope` of its term by the amplitude at `off`, or from there to a finite amplitude, times a step
-    of the amplitude; with the symbols of its states, their rates and new values (`stepped`, None where a state is not)."""
+    of the amplitude; with the symbols of its states, their rates and new values (`stepped`, None where a state is not). Those `settle` that
+    time alone brings to rest: neither clocks, nor what a contact keeps, nor what differs by record unless the law says where it rests."""
 
     kind: str
     slope: ca.SX
@@ -76,6 +77,7 @@ class LawTerm:
     rates: tuple[ca.SX, ...]
     stepped: tuple[ca.SX | None, ...]
     clocks: tuple[bool, ...]
+    settle: tuple[bool, ...]
 
     @cached_property
     def reads(self) -> frozenset[str]:
@@ -156,6 +158,9 @@ class LawTerms:
                 tuple(ca.substitute(ca.SX(change[state.name]), a, at) for state in law.states),
                 tuple(ca.substitute(ca.SX(new[state.name]), a, at) if state.stepped else None for state in law.states),
                 tuple(state.clock for state in law.states),
+                tuple(
+                    not (state.clock or law.set_valued or (state.free and not law.limits_rate)) for state in law.states
+                ),
             )
         return self._terms[key]
 
