@@ -237,8 +237,8 @@ LAWS = {
     "saturation": ({"level": 0.4}, clipped),
     "slew_rate": (
         {"rate": 40.0},
-        lambda s, p: p.share * (s.v + s.tilt * (1 - s.w) + s.bend * (1 - s.w) ** 2 - s.value),
-        lambda s, p: {"w": 1 / H},
+        lambda s, p: p.share * (s.mean - s.rise / 2 + s.w - s.value),
+        lambda s, p: {"w": s.rise / H},
     ),
     "screw_motion": ({}, lambda s, p: p.share * cross(s.all[:3], s.all[3:])[s.index - 3] / 2),
     "second_pole": ({"tau": 0.3}, lambda s, p: p.share * (s.w - s.value), lambda s, p: {"w": (s.value - s.w) / 0.3}),

@@ -13,7 +13,7 @@ class AmplifierLag(Effect):
 
     place = Place.DRIVE
     family = Family.TIMING
-    order = 1  # of what is clipped and slews
+    order = 1  # of what is clipped, slews and is scaled
     requires = frozenset({"actuator", "unheated"})
     source = "A. J. Fleming, K. K. Leang, Design, Modeling and Control of Nanopositioning Systems (2014), ch. 14: electrical considerations"
     params = (Param("share", "1", (-0.5, 1.5), "share of the drive that is late", off=0.0), TAU, DAMPING)

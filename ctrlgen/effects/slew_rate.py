@@ -9,9 +9,8 @@ class SlewRate(Effect):
     """dv/dt = R sign(u - v) until v = u; Delta u = g (v - u): g = 1 is limited throughout.
 
     Over a sample h, with c the part of u - v before it that is within +-R h and k = |c|/(R h): v grows by c in the time k h, and then
-    stays. What acts is the parabola that ends with the sample where v does, and has its mean and first moment: of sigma, the part of the
-    sample that is left, v + c + c k (3 - 4 k) sigma - 6 c k (1 - k) sigma^2; v itself where k = 1. So a stage that has no inertia is
-    where v holds it when it is read. Holds for a rate that is the same both ways and a drive held from sample to sample.
+    stays. What acts is the line over the sample that has the mean v + c (1 - k/2) of this and its first moment: it rises by
+    c k (3 - 2 k), and is v itself where k = 1. Holds for a rate that is the same both ways and a drive held from sample to sample.
     """
 
     place = Place.DRIVE
@@ -27,23 +26,26 @@ class SlewRate(Effect):
     limits_rate = "rate"
     states = (
         State("v", "channel", 1.0, stepped=True, free=True),
-        State("tilt", "channel", 1.0, stepped=True),
-        State("bend", "channel", 1.0, stepped=True),
-        State("w", "1", 1.0, ramp=True),  # part of the sample that has passed
+        State("mean", "channel", 1.0, stepped=True),
+        State("rise", "channel", 1.0, stepped=True),
+        State("w", "channel", 1.0, ramp=True),  # along the line, from its beginning
     )
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
-        left = 1 - s.states.w
-        return p.share * (s.states.v + s.states.tilt * left + s.states.bend * left**2 - s.value)
+        return p.share * (s.states.mean - s.states.rise / 2 + s.states.w - s.value)
 
     def rates(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
-        return {"w": 1 / s.sample_time}
+        return {"w": s.states.rise / s.sample_time}
 
     def resting(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
-        return {"v": s.value, "tilt": 0.0, "bend": 0.0}
+        return {"v": s.value, "mean": s.value, "rise": 0.0}
 
     def update(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         most = p.rate * s.sample_time
         c = ca.fmax(ca.fmin(s.value - s.states.v, most), -most)
         k = ca.fabs(c) / most
-        return {"v": s.states.v + c, "tilt": c * k * (3 - 4 * k), "bend": -6 * c * k * (1 - k)}
+        return {
+            "v": s.states.v + c,
+            "mean": s.states.v + c * (1 - k / 2),
+            "rise": c * k * (3 - 2 * k),
+        }

@@ -20,17 +20,15 @@ White = Callable[[Record, np.ndarray], np.ndarray]  # (record, readings) -> whit
 
 
 def begins_elsewhere(simulator: Simulator, record: Record, white: np.ndarray) -> bool:
-    """Whether a device with a memory that is looked for here begins worse than it goes on: one with plays or gaps beyond what is taken for
-    its errors, one that slews even within these, where a beginning that is far off would hide that the rest is right."""
-    beyond = 1.0 if simulator.plays or simulator.gaps else 0.0
-    return bool(simulator.plays or simulator.gaps or simulator.slews) and begins_worse(record, white, beyond)
+    """Whether a device with a memory that is looked for here begins worse than it goes on."""
+    return bool(simulator.plays or simulator.gaps or simulator.slews) and begins_worse(record, white)
 
 
-def begins_worse(record: Record, white: np.ndarray, beyond: float = 1.0) -> bool:
-    """Whether the mean square of a record's whitened residual (n n_y,) is larger in its first part than after it, and than `beyond`."""
+def begins_worse(record: Record, white: np.ndarray) -> bool:
+    """Whether the whitened residual (n n_y,) of a record is larger in its first part than after it."""
     squares = white.reshape(len(record.time), -1) ** 2
     rows = _first_rows(record)
-    return bool(squares[:rows].mean() > INITIAL_MEMORY.worse * max(squares[rows:].mean(), beyond))
+    return bool(squares[:rows].mean() > INITIAL_MEMORY.worse * max(squares[rows:].mean(), 1.0))
 
 
 def memory_before(

@@ -96,11 +96,7 @@ def begun_near(
     settled = best.objective - promised <= least or was - best.objective <= least
     if settled and not simulator.slews:  # where it catches up with its drive, a step promises too little
         return best
-    for _ in range(HELD_OUT_REFIT.times_where_it_slews if simulator.slews else 1):
-        found = levenberg_marquardt(problem, best.states, HELD_OUT_REFIT.max_steps_to_begin)
-        r, was = problem.residual(found), best.objective
-        if (value := float(r @ r)) < was:
-            best = Begun(value, found, problem.readings(found))
-        if was - best.objective <= HELD_OUT_REFIT.unsettled * was:
-            break
-    return best
+    found = levenberg_marquardt(problem, best.states, HELD_OUT_REFIT.max_steps_to_begin)
+    r = problem.residual(found)
+    value = float(r @ r)
+    return Begun(value, found, problem.readings(found)) if value < best.objective else best

@@ -270,8 +270,6 @@ class HeldOutRefitSettings:
     max_steps_to_begin: int = 20
     """Levenberg-Marquardt steps to the initial states of a record after the first: of a hexapod whose heaters are hot, under a large
     discrepancy, 7 to 12 were needed. Judgement."""
-    times_where_it_slews: int = 4
-    """How often these are begun again, at most, where an amplifier slews: the kink where it catches up with its drive ends them early."""
     unsettled: float = 0.01
     """Share of the objective by which the first step brings less than it promised, and brings at all, from which on others follow."""
     settled: float = 0.1

@@ -148,6 +148,7 @@ class LawTerms:
             s = _SymbolicInputs(self, law.place, law.order, actual, states | new)
             change = {state.name: ca.SX(float(state.clock)) for state in law.states} | law.rates(s, p)
             value, at = ca.SX(law.term(s, p)), finite or off
+            rests = type(law).resting is not Effect.resting
             if finite:
                 value = ca.substitute(value, a, finite) * (a - off) / (finite - off)
             self._terms[key] = LawTerm(
@@ -158,9 +159,7 @@ class LawTerms:
                 tuple(ca.substitute(ca.SX(change[state.name]), a, at) for state in law.states),
                 tuple(ca.substitute(ca.SX(new[state.name]), a, at) if state.stepped else None for state in law.states),
                 tuple(state.clock for state in law.states),
-                tuple(
-                    not (state.clock or law.set_valued or (state.free and not law.limits_rate)) for state in law.states
-                ),
+                tuple(not (s.clock or law.set_valued or (s.free and not rests)) for s in law.states),
             )
         return self._terms[key]
 
