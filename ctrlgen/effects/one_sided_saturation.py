@@ -9,7 +9,8 @@ from ctrlgen.effects._region import ramp
 class OneSidedSaturation(Effect):
     """Delta u = -g sgn(L) x^2/(x + e), x = sgn(L) (u - L) where positive: u, but at most L > 0, or at least L < 0; e = |L|/1e4.
 
-    g = 1 clips, and what is beyond L cannot be recovered from what is delivered. Holds for a limit away from zero drive.
+    g = 1 clips, and what is beyond L cannot be recovered from what is delivered. Holds for a limit away from zero drive. A stop that does
+    not give does the same to a stage without inertia; one that does, or that a mass runs into, is `end_stop`.
     """
 
     place = Place.DRIVE

@@ -113,7 +113,8 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
         ),
         "one_sided_saturation": (
             ("position", "An axis that stops short of its stated travel in one direction"),
-            ("", "A drive that saturates in one direction"),
+            # a stage without inertia does not tell them apart
+            ("", "A drive that saturates in one direction, or a stop that does not give"),
         ),
         "one_sided_stiffening": (
             ("flexible", "A flexure that is bent or loaded already at home: stiffer to one side than to the other"),
