@@ -195,13 +195,14 @@ def test_a_filter_of_firmware_in_a_log_of_a_settled_stage_is_found_whole(filtere
 
 
 @pytest.mark.long
-def test_it_stands_before_a_lag_of_the_drive_which_explains_alike(filtered):
-    """The shares speak for timing; the search alone prefers the lag of the drive, which is of the family of heat."""
+def test_it_stands_before_a_lag_of_heat_which_explains_alike(filtered):
+    """The shares speak for timing. A filter of the reading and one of the drive are one behind such a stage, and either may stand first."""
     found = diagnose(*filtered, jobs=1)
     first = found.findings[0]
-    assert (first.effect, first.support.family, first.support.contradicted) == ("low_pass", "timing", False)
-    assert "thermal_lag" in {c.effect for c in first.alternatives} and found.verdict == "ambiguous"
-    assert found.search.chosen.causes[0].effect == "low_pass"
+    others = {c.effect for c in first.alternatives}
+    assert {first.effect, *others} >= {"low_pass", "amplifier_lag", "thermal_lag"} and first.effect != "thermal_lag"
+    assert (first.support.family, first.support.contradicted, found.verdict) == ("timing", False, "ambiguous")
+    assert found.search.chosen.causes[0].effect == first.effect
 
 
 def test_a_stage_in_balance_whose_amplifier_slews_when_its_log_begins_is_behind_its_drive():
