@@ -111,6 +111,18 @@ def test_a_reading_passes_the_laws_in_the_order_of_its_chain(first, then, why):
     assert Effect.library[first].order < Effect.library[then].order, why
 
 
+@pytest.mark.parametrize(
+    "first, then, why",
+    [
+        ("one_sided_saturation", "slew_rate", "what is clipped is reached at a rate"),
+        ("slew_rate", "amplifier_lag", "what slews is followed late"),
+        ("drive_gain", "amplifier_lag", "the amplifier follows what it is told, scaled"),
+    ],
+)
+def test_a_drive_passes_the_laws_in_the_order_of_its_chain(first, then, why):
+    assert Effect.library[first].order < Effect.library[then].order, why
+
+
 def test_an_event_is_looked_for_on_either_side_of_the_zero_of_time():
     events = [p for law in Effect.library.values() for p in law.params if p.name == "moment"]
     assert events and all(p.bounds[0] == -p.bounds[1] for p in events)

@@ -1,10 +1,10 @@
 """A sensor, or its filter, of limited bandwidth."""
 
-from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, itself
-from ctrlgen.effects._second_order import DAMPING, FILTER_STATES, TAU, behind_filter, filter_rates
+from ctrlgen.effects import Param, Place
+from ctrlgen.effects._second_order import DAMPING, TAU, SecondOrderFilter
 
 
-class LowPass(Effect):
+class LowPass(SecondOrderFilter):
     """tau dw/dt = v, tau dv/dt = y - w - 2 D v, Delta y = g (w - y): g = 1 is a second-order filter; below, only that share is filtered.
 
     D < 1 rings, D = 1/sqrt(2) is Butterworth's, a large D is a single pole of time constant 2 D tau. Holds where
@@ -12,15 +12,6 @@ class LowPass(Effect):
     """
 
     place = Place.SENSOR
-    family = Family.TIMING
     order = 2
     source = "A. J. Fleming, Sensors and Actuators A 190 (2013) 106: sensor bandwidth"
     params = (Param("share", "1", (-0.5, 1.5), "share of the reading that is filtered", off=0.0), TAU, DAMPING)
-    at_bounds = itself("tau", "damping")
-    states = FILTER_STATES
-
-    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
-        return behind_filter(s, p)
-
-    def rates(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
-        return filter_rates(s, p)

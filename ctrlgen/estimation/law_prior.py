@@ -60,6 +60,14 @@ def peaks(*multiples: float) -> ParameterPrior:
 CREEPING = ParameterPrior((1e-4, 0.1), scales_with_peak=True, again_at_low=True)
 """Of the speed below which a contact creeps under a lasting load."""
 
+SECOND_ORDER_FILTER = {
+    "share": ParameterPrior(plausible_range=(0.7, 1.3)),
+    "tau": ParameterPrior((1e-3, 8e-3, 0.06, 0.5)),
+    "damping": ParameterPrior((0.7, 4.0)),
+}
+"""Of a filter of a reading or of a drive: it acts on the whole of it, and one that is fitted to a part stands for something else. In
+firmware, y += (new - y)/2^k, it lets a quarter through at once where k = 2."""
+
 
 @dataclass(frozen=True)
 class LawPrior:

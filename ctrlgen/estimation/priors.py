@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 from ctrlgen.devices.usual_deviation import ASSUMED_SCALE
 from ctrlgen.effects import Effect
-from ctrlgen.estimation.law_prior import CREEPING, ONE_IN_TEN, LawPrior, ParameterPrior, peaks
+from ctrlgen.estimation.law_prior import CREEPING, ONE_IN_TEN, SECOND_ORDER_FILTER, LawPrior, ParameterPrior, peaks
 from ctrlgen.estimation.priors_in_a_region import IN_A_REGION
 from ctrlgen.estimation.priors_of_a_lag import HYSTERESIS, OF_A_LAG
 from ctrlgen.estimation.priors_of_drives import OF_DRIVES
@@ -99,14 +99,9 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             constant=True,
         ),
         "low_pass": LawPrior(
-            "No filter has exactly two poles; 0.5 %: judgement. A real filter acts on the whole reading: one that is fitted to a part "
-            "of it stands for something else. In firmware, y += (new - y)/2^k, it lets a quarter of a reading through at once where k = 2.",
+            "No filter has exactly two poles; 0.5 %: judgement.",
             model_form_error=0.005,
-            parameters={
-                "share": ParameterPrior(plausible_range=(0.7, 1.3)),
-                "tau": _starts((1e-3, 8e-3, 0.06, 0.5)),
-                "damping": _starts((0.7, 4.0)),
-            },
+            parameters=SECOND_ORDER_FILTER,
         ),
         "quantisation": LawPrior(
             "Steps of half a decade each, from 1e-4 to 0.1 of the typical size.",

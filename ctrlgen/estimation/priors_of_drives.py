@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ctrlgen.estimation.law_prior import ONE_IN_TEN, LawPrior, ParameterPrior, peaks
+from ctrlgen.estimation.law_prior import ONE_IN_TEN, SECOND_ORDER_FILTER, LawPrior, ParameterPrior, peaks
 from ctrlgen.estimation.priors_of_a_lag import HYSTERESIS
 
 OF_DRIVES: Mapping[str, LawPrior] = {
@@ -13,11 +13,7 @@ OF_DRIVES: Mapping[str, LawPrior] = {
         "in a loop is a filter of its readings: judgement.",
         log_prior_odds=ONE_IN_TEN,
         model_form_error=0.005,
-        parameters={
-            "share": ParameterPrior(plausible_range=(0.7, 1.3)),
-            "tau": ParameterPrior((1e-3, 8e-3, 0.06, 0.5)),
-            "damping": ParameterPrior((0.7, 4.0)),
-        },
+        parameters=SECOND_ORDER_FILTER,
     ),
     "asymmetric_gain": LawPrior(
         "Rarer than a gain that is wrong in both directions: judgement.", log_prior_odds=ONE_IN_TEN
