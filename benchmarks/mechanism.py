@@ -15,7 +15,7 @@ from benchmarks.measure import Line, Note, interleave, timed
 from benchmarks.samples import Disagreement
 from ctrlgen.devices import load_device
 from ctrlgen.devices.mechanism.condensed import Condensed
-from ctrlgen.numerics import compiled
+from ctrlgen.numerics import compiled, generated_c
 from ctrlgen.physics.rigid_bodies import GROUND, point_force, point_motion
 from ctrlgen.physics.screw import inverse_adjoint
 
@@ -115,7 +115,7 @@ def _made(folder: Path, compile_it: Callable[[ca.Function, Path], None]) -> Call
 
 
 def _in_parts(function: ca.Function, folder: Path) -> None:
-    _compile(compiled.casadi_c(function), folder / f"{_in_parts.__name__}.so")
+    _compile(generated_c.casadi_c(function), folder / f"{_in_parts.__name__}.so")
 
 
 def _as_casadi_writes_it(function: ca.Function, folder: Path) -> None:

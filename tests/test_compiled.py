@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from ctrlgen.numerics import batched_evaluation, compiled
+from ctrlgen.numerics import batched_evaluation, compiled, generated_c
 from ctrlgen.numerics.batched_evaluation import BLOCK, Recursion, evaluate, in_blocks, quick
 from ctrlgen.numerics.compiled import Compilable
 
@@ -157,10 +157,29 @@ def test_a_long_function_is_compiled_in_parts_and_gives_the_same_bits(cache, mon
     step, at, by = ca.Function("step", [x], [y + first]), ca.MX.sym("at", 3), ca.MX.sym("by")
     after = step(step(at)) + by * step(2 * at)
     whole = ca.Function("whole", [at, by], [after, ca.sum1(after)])
-    monkeypatch.setattr(compiled, "LARGE", 1000)
-    code = compiled.c_code(whole)
+    monkeypatch.setattr(generated_c, "LARGE", 1000)
+    code = generated_c.c_code(whole)
     assert 2 <= code.count("__attribute__((noinline)) static void casadi_f") <= 10
     assert_same_bits(whole, np.array([0.1, -0.2, 0.3]), np.random.default_rng(2).standard_normal((20, 1)))
+
+
+@pytest.mark.parametrize("rows", [*range(1, 27), 40])
+def test_products_of_full_matrices_have_the_bits_of_the_virtual_machine(cache, rows):
+    """Of any number of rows, by columns with no entry, one and several; what is not written to stays as it is."""
+    if compiled.compiler() is None:
+        pytest.skip("no C compiler here")
+    rng = np.random.default_rng(rows)
+    by = rng.standard_normal((5, 7)) * (rng.random((5, 7)) < 0.4)
+    by[:, 2], by[:, 4] = 0.0, 1.0
+    state, p = ca.MX.sym("state", 5 * rows), ca.MX.sym("p", rows)
+    X = ca.reshape(state, rows, 5)
+    Z = ca.mac(X, ca.MX(ca.sparsify(ca.DM(by))), ca.repmat(p, 1, 7))
+    after = ca.mac(Z, ca.MX(ca.sparsify(ca.DM(by.T))), ca.DM.zeros(rows, 5))
+    one = ca.Function(
+        "one", [state, p], [ca.vec(after) / (1 + ca.sumsqr(after)), ca.vertcat(ca.vec(Z), ca.vec(after), ca.vec(X))]
+    )
+    assert "casadi_four" in generated_c.c_code(one)
+    assert_same_bits(one, rng.standard_normal(5 * rows), rng.standard_normal((9, rows)))
 
 
 OF_ONE = (
@@ -234,7 +253,7 @@ def test_a_damaged_library_leaves_the_virtual_machine(cache):
     if compiled.compiler() is None:
         pytest.skip("no C compiler here")
     cache.mkdir()
-    (cache / compiled.library_name(compiled.c_code(friction()))).write_bytes(b"no library")
+    (cache / compiled.library_name(generated_c.c_code(friction()))).write_bytes(b"no library")
     broken = Recursion(friction())
     assert not broken.one.spent(LONG, MANY)
     assert broken.run(np.zeros(1), np.ones((3, 1)), np.array([[0.3, 0.7]]))[0].shape == (3, 1)

@@ -22,9 +22,10 @@ from ctrlgen.numerics.right_division import over
 
 # at which a step of ETD-RK4 evaluates N
 POINTS = 4
-# Operations up to which a step is written out number by number: 7,500 of them, of friction beside the nine lags of a creep, take half
-# the time of products of matrices, and gcc 12 0.6 s once. Judgement: a longer step is compiled for longer than it runs.
-LONGEST_WRITTEN = 10_000
+# Operations up to which a step is written out number by number. An implicit one of 7,500, of friction beside the nine lags of a creep,
+# takes half the time of products of matrices then, and gcc 12 0.5 s once. An explicit one of 4,000 takes the same time either way, a
+# longer one is compiled for three times as long.
+LONGEST_IMPLICIT, LONGEST_EXPLICIT = 10_000, 4_000
 # The same of a whole sample in balance, whose derivatives are mostly its own operations: 14,000 of them, of plays before creep, take
 # two thirds of the time, and the compiler no longer.
 LONGEST_SAMPLE = 20_000
@@ -45,19 +46,16 @@ def forward_sensitivities(
 
     `T` (m, n_s) is (dS/dp)', `seed` (m, n_c) is (dc/dp)', `given` are the values of `equations.given`.
     """
-    symbols = [equations.given[0], equations.given[4]] if seed.nnz() else equations.given[:1]
-
-    def chain(*derivatives: ca.MX) -> ca.MX:
-        """(d value/dp)' from the transposed derivatives by S and, where there is a seed, by c."""
-        return sum((V @ derivative for V, derivative in zip((T, seed), derivatives, strict=False)))
-
+    c_varies = seed.nnz() > 0
+    symbols = [equations.given[0], equations.given[4]] if c_varies else equations.given[:1]
     if equations.steps is None:
         values = [equations.following, equations.y]
         transposed = _transposed_jacobians(values, symbols, jacobian_of(equations))
         # some dozens of poses are evaluated faster than what is common to two expressions is found: 0.2 s of 17,000 operations
         one = equations.one("one", [*values, *transposed], {"cse": not equations.poses})
         following, y, *by = one(*given)
-        return following, chain(*by[: len(symbols)]), y, chain(*by[len(symbols) :])
+        T, Y = _chained(T, seed, by, len(symbols))
+        return following, T, y, Y
     m = equations.model
     # once a sample, at its beginning
     once = [equations.y, m.held_value, ca.vertcat(ca.SX(0, 1), *m.stepped.values())]
@@ -65,13 +63,29 @@ def forward_sensitivities(
         "first", equations.given, [*once, *_transposed_jacobians(once, symbols, shortest_jacobian)], {"cse": True}
     )
     y, held, stepped, *by = first(*given)
-    Y, of_held, of_stepped = (chain(*by[i * len(symbols) : (i + 1) * len(symbols)]) for i in range(3))
-    constant = ca.horzcat(of_held, seed) if seed.nnz() else of_held
-    following, T = _all_steps(equations, T, constant, given, held)
-    if m.stepped:
-        places = list(m.stepped)
-        following[places], T[:, places] = stepped, of_stepped
-    return following, T, y, Y
+    step, longest = _step_of(equations, c_varies)
+
+    def whole(T: ca.MX, seed: ca.MX) -> tuple[ca.Function, tuple[ca.MX, ca.MX, ca.MX, ca.MX]]:
+        """One integrator step, and the sample."""
+        Y, of_held, of_stepped = _chained(T, seed, by, len(symbols))
+        constant = ca.horzcat(of_held, seed) if c_varies else of_held
+        one, following, T = _all_steps(equations, step, longest, T, constant, given, held)
+        if m.stepped:
+            places = list(m.stepped)
+            following[places], T[:, places] = stepped, of_stepped
+        return one, (following, T, y, Y)
+
+    one, sample = whole(T, seed)
+    if one.class_name() == "MXFunction":
+        # products of a full matrix by a sparse one run along columns, without indices of the former
+        one, sample = whole(ca.densify(T), ca.densify(seed) if c_varies else seed)
+    return sample
+
+
+def _chained(T: ca.MX, seed: ca.MX, by: Sequence[ca.MX], symbols: int) -> list[ca.MX]:
+    """(d value/dp)' of several values from their transposed derivatives: of each by S and, where there are two `symbols`, by c."""
+    each = (by[i : i + symbols] for i in range(0, len(by), symbols))
+    return [sum(V @ derivative for V, derivative in zip((T, seed), one, strict=False)) for one in each]
 
 
 def reached_entries(equations: SampleEquations, k: int, initial: Sequence[int]) -> ca.Sparsity:
@@ -120,33 +134,29 @@ def _operations(value: ca.SX) -> int:
     return int(ca.Function("f", ca.symvar(value), [value]).n_instructions())
 
 
-def _all_steps(
-    equations: SampleEquations, T: ca.MX, seed: ca.MX, given: list[ca.MX], held: ca.MX
-) -> tuple[ca.MX, ca.MX]:
-    """S and T after all integrator steps of a sample; `seed` by the `held` values, then by c where c has a seed."""
-    S, u, u_next, e, c = given
-    c_varies = seed.size2() > held.numel()
+def _step_of(equations: SampleEquations, c_varies: bool) -> tuple[Step, int]:
+    """A step of the integrator with its derivatives, `c_varies` where c has a seed too; and up to how many operations it is written out."""
     steps = equations.integrator
-    step = (
-        _implicit_step(equations, steps, c_varies)
-        if isinstance(steps, ImplicitRadau)
-        else _explicit_step(equations, steps, c_varies)
-    )
-    written = _written_out(step, T, seed, [S, u, u_next, held, e, c])
-    for u_start, u_end in pairwise(steps.drives(u, u_next, equations.linear)):
-        S, T = written(T, seed, S, u_start, u_end, held, e, c)
-    return S, T
+    if isinstance(steps, ImplicitRadau):
+        return _implicit_step(equations, steps, c_varies), LONGEST_IMPLICIT
+    return _explicit_step(equations, steps, c_varies), LONGEST_EXPLICIT
 
 
-def _written_out(step: Step, T: ca.MX, seed: ca.MX, given: list[ca.MX]) -> ca.Function:
-    """(T, seed, *given) -> Y and T one step on."""
-    like = [ca.MX.sym("like", value.sparsity()) for value in (ca.densify(T), seed, *given)]
-    return written_out(ca.Function("step", like, list(step(like[0], like[1], like[2:]))))
+def _all_steps(
+    equations: SampleEquations, step: Step, longest: int, T: ca.MX, seed: ca.MX, given: list[ca.MX], held: ca.MX
+) -> tuple[ca.Function, ca.MX, ca.MX]:
+    """The function of one step, and S and T after all integrator steps of a sample; `seed` by the `held` values, then by c where c has a
+    seed."""
+    S, u, u_next, e, c = given
+    like = [ca.MX.sym("like", value.sparsity()) for value in (ca.densify(T), seed, S, u, u, held, e, c)]
+    one = written_out(ca.Function("step", like, list(step(like[0], like[1], like[2:]))), longest)
+    for u_start, u_end in pairwise(equations.integrator.drives(u, u_next, equations.linear)):
+        S, T = one(T, seed, S, u_start, u_end, held, e, c)
+    return one, S, T
 
 
-def written_out(one: ca.Function, longest: int = LONGEST_WRITTEN) -> ca.Function:
-    """The function number by number where that is at most so many operations: as machine code it takes half the time of products of
-    small matrices."""
+def written_out(one: ca.Function, longest: int) -> ca.Function:
+    """The function number by number where that is at most so many operations."""
     try:
         written = one.expand()
     except RuntimeError:  # it solves a system that is too large for that
@@ -184,9 +194,11 @@ def _explicit_step(equations: SampleEquations, steps: ExponentialRungeKutta, c_v
 
     def step(T: ca.MX, seed: ca.MX, given: list[ca.MX]) -> tuple[ca.MX, ca.MX]:
         after, *by = evaluate(*given)
-        by_Y, entering = by[:POINTS], [ca.densify(seed @ by_constant) for by_constant in by[POINTS:]]
+        by_Y, none = by[:POINTS], ca.MX(ca.DM.zeros(T.size1(), len(steps.acting)))
+        # mac(A, B, C) is A B + C
+        entering = [ca.mac(seed, by_constant, none) for by_constant in by[POINTS:]]
         halfway, whole = T @ half, T @ steps.E.T
-        # dN at the four points; mac(A, B, C) is A B + C
+        # dN at the four points
         first = ca.mac(T, by_Y[0], entering[0])
         second = ca.mac(ca.mac(first, Q, halfway), by_Y[1], entering[1])
         third = ca.mac(ca.mac(second, Q, halfway), by_Y[2], entering[2])
@@ -206,15 +218,25 @@ def _step_with_jacobians(equations: SampleEquations, c_varies: bool) -> ca.Funct
     held, u_end = equations.model.held, ca.SX.sym("end", u.numel())
     constant = ca.vertcat(held, c) if c_varies else held
     value = equations.integrator.nonlinear_rates(equations.model)
-    N = ca.Function("N", [Y, u, held, e, c], [value])
-    jacobians = ca.Function(
-        "jacobians", [Y, u, held, e, c], _transposed_jacobians([value], [Y, constant], shortest_jacobian), {"cse": True}
-    )
+    slopes = _transposed_jacobians([value], [Y, constant], shortest_jacobian)
+    sloped = ca.Function("sloped", [Y, u, held, e, c], [value, *slopes], {"cse": True})
     if isinstance(equations.integrator, ExponentialRungeKutta):
         # called at each point, not written out there: a quarter of the code, which takes longer to compile than to run
         Y, u, u_end, held, e, c = (ca.MX.sym("given", value.numel()) for value in (Y, u, u_end, held, e, c))
-    after, points = equations.integrator.points(lambda Y, u: N(Y, u, held, e, c), Y, u, u_end)
-    by_Y, by_constant = zip(*(jacobians(*point, held, e, c) for point in points), strict=True)
+        by: list[list[ca.MX]] = []
+
+        def N_with_slopes(Y: ca.MX, u: ca.MX) -> ca.MX:
+            n, *at_point = sloped(Y, u, held, e, c)
+            by.append(at_point)
+            return n
+
+        after, _ = equations.integrator.points(N_with_slopes, Y, u, u_end)
+    else:
+        # Newton's steps take N at more points than slopes are wanted at
+        N = ca.Function("N", [Y, u, held, e, c], [value])
+        after, points = equations.integrator.points(lambda Y, u: N(Y, u, held, e, c), Y, u, u_end)
+        by = [sloped(*point, held, e, c)[1:] for point in points]
+    by_Y, by_constant = zip(*by, strict=True)
     return ca.Function("step", [Y, u, u_end, held, e, c], [after, *by_Y, *by_constant], {"cse": True})
 
 

@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.model.model import Model
+from ctrlgen.numerics.constant_product import product
 from ctrlgen.numerics.phi_functions import phi_matrices
 
 # Step length: time times the fastest rate (magnitude of an eigenvalue of A) per step, and steps a sample
@@ -96,15 +97,15 @@ class ExponentialRungeKutta(ExponentialIntegrator):
     def points(self, N: NonlinearRates, y: ca.SX, u: ca.SX, u_end: ca.SX) -> tuple[ca.SX, list[tuple[ca.SX, ca.SX]]]:
         """y one step on, and the four (y, u) where N was evaluated."""
         middle = (u + u_end) / 2
-        half, whole = self.half @ y, self.E @ y
+        half, whole = product(self.half, y), product(self.E, y)
         first = N(y, u)
-        a = half + self.Q @ first
+        a = half + product(self.Q, first)
         second = N(a, middle)
-        b = half + self.Q @ second
+        b = half + product(self.Q, second)
         third = N(b, middle)
-        c = whole + self.R @ first + 2 * (self.Q @ third)
+        c = whole + product(self.R, first) + 2 * product(self.Q, third)
         values = first, second, third, N(c, u_end)
-        after = whole + sum(W @ value for W, value in zip(self.W, values, strict=True))
+        after = whole + sum(product(W, value) for W, value in zip(self.W, values, strict=True))
         return after, [(y, u), (a, middle), (b, middle), (c, u_end)]
 
 

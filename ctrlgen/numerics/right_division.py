@@ -2,27 +2,47 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import casadi as ca
 import numpy as np
 
-LARGEST_WRITTEN = 6  # rows of a matrix whose inverse is written out: a few hundred operations
+LARGEST_WRITTEN = 6  # rows all coupled with each other that are eliminated one by one: beyond, a thousand operations
 
 
 def over(B: ca.MX, A: ca.MX) -> ca.MX:
-    """B A^-1, (m, n), of B (m, n) and a regular A (n, n) whose diagonal has no zero. Of a larger A, the rows that stand `_apart` are
-    eliminated first: with A = [[P, Q], [R, D]], D diagonal, and X A = B,
+    """B A^-1, (m, n), of B (m, n) and a regular A (n, n) whose diagonal has no zero. The rows that stand `_apart` are eliminated first,
+    then the others where these are few. Where they are many: with A = [[P, Q], [R, D]], D diagonal, and X A = B,
 
     X_1 (P - Q D^-1 R) = B_1 - B_2 D^-1 R,  X_2 = (B_2 - X_1 Q) D^-1.
     """
-    n = A.size1()
-    if n <= LARGEST_WRITTEN:
-        return B @ _inverse(A)
     apart = _apart(A.sparsity())
-    core = [i for i in range(n) if i not in apart]
+    core = [i for i in range(A.size1()) if i not in apart]
+    if len(core) <= LARGEST_WRITTEN:
+        given = ca.SX.sym("B", B.sparsity()), ca.SX.sym("A", A.sparsity())
+        return ca.Function("over", list(given), [_by_elimination(*given, [*apart, *core])])(B, A)
     P, Q, R, D = A[core, core], A[core, apart], A[apart, core], ca.diag(1 / ca.diag(A[apart, apart]))
     X_2 = B[:, apart] @ D
-    X_1 = (B[:, core] - X_2 @ R) @ _inverse(P - Q @ D @ R)
+    X_1 = (B[:, core] - X_2 @ R) @ ca.inv(P - Q @ D @ R)
     return ca.horzcat(X_1, X_2 - X_1 @ Q @ D)[:, np.argsort([*core, *apart]).tolist()]
+
+
+def _by_elimination(B: ca.SX, A: ca.SX, order: Sequence[int]) -> ca.SX:
+    """B A^-1 by Gauss's elimination in an `order` of the diagonal, without a search for pivots: A is the one less what a step is too short
+    to change much, or stiff and stable, and has no small ones."""
+    A, B, over_pivot = ca.SX(A), ca.SX(B), {}
+    for i, k in enumerate(order):
+        over_pivot[k] = 1 / A[k, k]
+        later = list(order[i + 1 :])
+        for j in (j for j in later if A[k, j].nnz()):
+            times = A[k, j] * over_pivot[k]
+            A[later, j] -= A[later, k] * times
+            B[:, j] -= B[:, k] * times
+    for i, k in reversed(list(enumerate(order))):
+        for j in (j for j in order[i + 1 :] if A[j, k].nnz()):
+            B[:, k] -= B[:, j] * A[j, k]
+        B[:, k] *= over_pivot[k]
+    return B
 
 
 def _apart(pattern: ca.Sparsity) -> list[int]:
@@ -36,17 +56,3 @@ def _apart(pattern: ca.Sparsity) -> list[int]:
         if not coupled[i, found].any():
             found.append(i)
     return sorted(found)
-
-
-def _inverse(A: ca.MX) -> ca.MX:
-    """The inverse of a small matrix, by its entries; of a larger one by a QR decomposition at run time.
-
-    Minors lose digits to the stiffness of friction's bristles; one step of Schulz, X (2 - A X), squares what is missing
-    (G. Schulz, Z. angew. Math. Mech. 13 (1933) 57).
-    """
-    if A.size1() > LARGEST_WRITTEN:
-        return ca.inv(A)
-    entries = ca.SX.sym("A", A.sparsity())
-    rough = ca.inv(entries)
-    better = rough @ (2 * ca.SX.eye(A.size1()) - entries @ rough)
-    return ca.Function("inverse", [entries], [better])(A)
