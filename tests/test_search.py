@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from axis_records import AXIS, BACKLASH, LATE, LIMIT, NOISE, H, fitter_of, move, played
+from axis_records import AXIS, BACKLASH, LATE, LIMIT, NOISE, H, axis_fitter, fitter_of, move, played
 from misfits import errors_of, left, weighed_by
 from scipy.signal import lfilter
 
@@ -20,6 +20,7 @@ from ctrlgen.diagnosis.selection.screen import Screen, Screened
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.selection.trials import Trials
+from ctrlgen.diagnosis.settings import CONFUSABLE
 from ctrlgen.estimation.error_model import ErrorModel
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
@@ -127,6 +128,22 @@ def test_what_explains_better_once_all_is_fitted_takes_the_place_of_a_cause():
     found = searcher.best_settled(taken)
     assert found.causes == (BACKLASH,) and found.held_out.plain_mean[0] < 0.5 * taken.held_out.plain_mean[0]
     assert searcher.best_settled(found).causes == (BACKLASH,)
+
+
+def test_of_two_laws_that_do_the_same_the_commoner_is_the_answer():
+    """Behind a linear stage a lag of the reading and one of the amplifier are one; the first is ten times as common."""
+    sensor, amplifier = (
+        Hypothesis("low_pass", "sensor:axis", "axis"),
+        Hypothesis("amplifier_lag", "actuator:axis", "axis"),
+    )
+    fitter = axis_fitter(change=lambda y, u: lfilter([0.2], [1, -0.8], y), n=900)
+    searcher = Searcher(fitter, Screen(fitter, [sensor, amplifier]), lambda _: None)
+    for taken in (amplifier, sensor):
+        start = {"share": 1.0, "tau": 6e-4, "damping": 4.0}
+        begun = searcher.trials.converged(searcher.trials.fit(Structure(AXIS).with_cause(taken, start), taken))
+        found = searcher.best_settled(begun)
+        assert found.causes == (sensor,)
+        assert abs(searcher.trials.selection.advantage(found, begun)) < CONFUSABLE.criterion
 
 
 def test_a_rival_of_the_same_family_begins_with_the_numbers_they_have_in_common():

@@ -100,9 +100,10 @@ class Noise:
         """`values` (n, ...) [SI] of channel i whitened, (n - order, ...): without the first samples, as many as the order."""
         sd, a = self.sd[i], self.ar[i]
         n, order = len(values), len(a)
-        white = values[order:] / sd
-        for lag, coefficient in enumerate(a, 1):
-            white -= coefficient / sd * values[order - lag : n - lag]
+        with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that runs away
+            white = values[order:] / sd
+            for lag, coefficient in enumerate(a, 1):
+                white -= coefficient / sd * values[order - lag : n - lag]
         return white
 
     def usable(self, valid: np.ndarray) -> np.ndarray:

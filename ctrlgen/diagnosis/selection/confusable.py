@@ -21,6 +21,7 @@ from ctrlgen.diagnosis.selection.model_selection import ModelSelection
 from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.settings import CONFUSABLE
+from ctrlgen.estimation.size_odds import prior_odds
 
 
 def likeness(screened: Screened, a: Suspect, b: Suspect) -> float:
@@ -43,3 +44,10 @@ def explains_alike(compare: ModelSelection, rival: CandidateModel, model: Candid
 def explains_better(compare: ModelSelection, rival: CandidateModel, model: CandidateModel) -> bool:
     """Whether a rival explains the recording so much better that it is no alternative of the model but takes its place."""
     return compare.advantage(rival, model) > CONFUSABLE.criterion
+
+
+def is_commoner(compare: ModelSelection, rival: CandidateModel, model: CandidateModel) -> bool:
+    """Whether a rival explains no worse than a model does and is likelier beforehand, where noise alone is left: of twins the commoner
+    stands first. Where more is left, what is commoner may fit the rest."""
+    likelier = prior_odds(rival.fit) > prior_odds(model.fit)
+    return likelier and compare.reference((rival, model)).is_noise and compare.advantage(rival, model) > 0

@@ -9,7 +9,7 @@ import numpy as np
 
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, linearised_optimum
 from ctrlgen.diagnosis.selection.candidates import significant, trying
-from ctrlgen.diagnosis.selection.confusable import explains_alike, explains_better
+from ctrlgen.diagnosis.selection.confusable import explains_alike, explains_better, is_commoner
 from ctrlgen.diagnosis.selection.failures import FAILURES
 from ctrlgen.diagnosis.selection.form_errors import hardly_told, hidden_rivals
 from ctrlgen.diagnosis.selection.model_selection import scored
@@ -32,7 +32,8 @@ def swapped(trials: Trials, current: CandidateModel, before: int) -> CandidateMo
     causes = len(current.causes)
     for k in range(before if causes == before + 1 else causes):
         for rival in replacements(trials, current, k):
-            if explains_better(trials.selection, rival, current) and not trials.objections(rival, current.causes):
+            takes_place = (f(trials.selection, rival, current) for f in (explains_better, is_commoner))
+            if any(takes_place) and not trials.objections(rival, current.causes):
                 current = trials.converged(rival)
                 break
     return current

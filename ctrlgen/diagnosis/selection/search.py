@@ -249,7 +249,9 @@ class Searcher:
             if not better:
                 return current
             kept = sum(c in current.causes for c in best.causes)
-            current = without_needless(trials, swapped(trials, best, kept))
+            # where one cause more leaves noise alone, all are compared at the end (`best_settled`)
+            at_end = best.errors.is_noise and len(best.causes) == kept + 1
+            current = without_needless(trials, best if at_end else swapped(trials, best, kept))
             before = (v for v in visited if frozenset(v.causes) == frozenset(current.causes))
             if any(explains_alike(trials.selection, v, current) for v in before):
                 # no better than when it was there before
