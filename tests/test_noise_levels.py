@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 from scipy.signal import lfilter
 
-from ctrlgen.estimation.noise import estimate_noise, ljung_box, stationary_deviation, without_lines
+from ctrlgen.estimation.noise import Noise, NoiseSource, estimate_noise, ljung_box, stationary_deviation, without_lines
 from ctrlgen.estimation.noise_update import longest_stretch
 from ctrlgen.estimation.residual_noise import noise_from_residual
 from ctrlgen.estimation.settings import NOISE_UPDATE
@@ -175,6 +175,12 @@ def test_poses_that_repeat_tell_the_noise_from_all_but_the_first_of_each(repeats
     found = estimate_noise(recording(poses, kind="poses"), SETTLING)
     n = places * (repeats - 1)
     assert found.count[0] == n and found.sd[0] == pytest.approx(sd, rel=SIGMAS / np.sqrt(2 * n))
+
+
+def test_a_simulation_that_runs_away_is_whitened_to_no_number_and_without_a_warning():
+    noise = Noise(np.array([1e-9]), (np.array([0.5]),), (NoiseSource.REST,), ("",), np.array([np.inf]))
+    white = noise.whiten(np.array([[1e-9], [3e-9], [1e300], [np.inf], [np.inf]]), np.ones((5, 1), bool))[:, 0]
+    assert white[1] == pytest.approx(2.5) and np.array_equal(white[2:], [np.inf, np.nan, np.nan], equal_nan=True)
 
 
 @every_colour

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from axis_records import AXIS, BACKLASH, LATE, LIMIT, NOISE, H, axis_fitter, fit
 from misfits import errors_of, left, weighed_by
 from scipy.signal import lfilter
 
-from ctrlgen.diagnosis.selection import search
+from ctrlgen.diagnosis.selection import confusable, search
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, linearised_optimum
 from ctrlgen.diagnosis.selection.candidates import fit_subsets, restart_elsewhere
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection
@@ -120,6 +121,34 @@ def test_what_a_set_does_not_seem_to_need_is_swapped_before_it_is_dropped(monkey
     assert given == [((BACKLASH, bend), 0)]
 
 
+def test_causes_are_compared_in_a_round_that_leaves_more_than_noise_and_else_once_at_the_end(monkeypatch):
+    """A play that leaves noise alone beside a needless bend of the reading; a lag of the reading beside it, which leaves more."""
+    fitter, compared = fitter_of(played), []
+    bend = Hypothesis("cubic_sensor", "sensor:axis", "axis")
+    searcher = Searcher(fitter, Screen(fitter, [BACKLASH, LATE, bend]), lambda _: None)
+    begun = searcher.trials.fit(Structure(AXIS).with_cause(bend, {"curvature": 1e3}), bend)
+
+    def rounds_with(cause, start) -> list[tuple[Hypothesis, ...]]:
+        compared.clear()
+        structure = begun.fit.restarted.with_cause(cause, start)
+        tried = iter([tuple(searcher.trials.tried(structure, cause, begun.fit)), ()])
+        monkeypatch.setattr(search, "fit_candidates", lambda *_: next(tried, ()))
+        searcher.forward_rounds(begun, [])
+        return list(compared)
+
+    monkeypatch.setattr(search, "swapped", lambda trials, current, before: compared.append(current.causes) or current)
+    monkeypatch.setattr(search, "all_pruned", lambda trials, current, candidates, screened: list(candidates))
+    assert rounds_with(BACKLASH, {"gap": 5e-8}) == []
+    assert rounds_with(LATE, {"gain": 1e-3, "tau": 0.01, "decades": 2.0}) == [(bend, LATE)]
+    # a search that goes on from a model compares at its end
+    trials, play = searcher.trials, Structure(AXIS).with_cause(BACKLASH, {"gap": 6e-8})
+    whole, bare = trials.converged(trials.fit(play, BACKLASH)), trials.fit(Structure(AXIS))
+    tried = iter([tuple(trials.tried(play, BACKLASH)), ()])
+    monkeypatch.setattr(search, "fit_candidates", lambda *_: next(tried, ()))
+    compared.clear()
+    assert searcher.searched_on(bare, whole, []).causes == (BACKLASH,) and compared == [(BACKLASH,)]
+
+
 def test_what_explains_better_once_all_is_fitted_takes_the_place_of_a_cause():
     """Play, for which creep was taken: in the end the better one is the answer, not its alternative."""
     fitter = fitter_of(played, n=700)
@@ -144,6 +173,17 @@ def test_of_two_laws_that_do_the_same_the_commoner_is_the_answer():
         found = searcher.best_settled(begun)
         assert found.causes == (sensor,)
         assert abs(searcher.trials.selection.advantage(found, begun)) < CONFUSABLE.criterion
+
+
+@pytest.mark.parametrize("noise, ahead, expected", [(True, 1.0, True), (True, -1.0, False), (False, 1.0, False)])
+def test_a_commoner_law_takes_the_place_of_another_only_where_noise_alone_is_left(monkeypatch, noise, ahead, expected):
+    monkeypatch.setattr(confusable, "prior_odds", lambda odds: odds)
+    common, rare = SimpleNamespace(fit=0.0), SimpleNamespace(fit=-2.3)
+    compare = SimpleNamespace(
+        reference=lambda _: SimpleNamespace(is_noise=noise), advantage=lambda a, b: ahead if a is common else -ahead
+    )
+    assert confusable.is_commoner(compare, common, rare) is expected
+    assert not confusable.is_commoner(compare, rare, common)
 
 
 def test_a_rival_of_the_same_family_begins_with_the_numbers_they_have_in_common():

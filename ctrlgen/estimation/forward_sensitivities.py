@@ -23,8 +23,8 @@ from ctrlgen.numerics.right_division import over
 # at which a step of ETD-RK4 evaluates N
 POINTS = 4
 # Operations up to which a step is written out number by number. An implicit one of 7,500, of friction beside the nine lags of a creep,
-# takes half the time of products of matrices then, and gcc 12 0.5 s once. An explicit one of 4,000 takes the same time either way, a
-# longer one is compiled for three times as long.
+# takes half the time of products of matrices then, and gcc 12 0.5 s once. Explicit ones of 4,300 to 6,600 take about the same time either
+# way (14 % more to 23 % less), and gcc twice as long.
 LONGEST_IMPLICIT, LONGEST_EXPLICIT = 10_000, 4_000
 # The same of a whole sample in balance, whose derivatives are mostly its own operations: 14,000 of them, of plays before creep, take
 # two thirds of the time, and the compiler no longer.
@@ -76,7 +76,7 @@ def forward_sensitivities(
         return one, (following, T, y, Y)
 
     one, sample = whole(T, seed)
-    if one.class_name() == "MXFunction":
+    if not one.is_a("SXFunction"):
         # products of a full matrix by a sparse one run along columns, without indices of the former
         one, sample = whole(ca.densify(T), ca.densify(seed) if c_varies else seed)
     return sample
@@ -221,22 +221,10 @@ def _step_with_jacobians(equations: SampleEquations, c_varies: bool) -> ca.Funct
     slopes = _transposed_jacobians([value], [Y, constant], shortest_jacobian)
     sloped = ca.Function("sloped", [Y, u, held, e, c], [value, *slopes], {"cse": True})
     if isinstance(equations.integrator, ExponentialRungeKutta):
-        # called at each point, not written out there: a quarter of the code, which takes longer to compile than to run
+        # called once at each point, not written out there: a quarter of the code, which takes longer to compile than to run
         Y, u, u_end, held, e, c = (ca.MX.sym("given", value.numel()) for value in (Y, u, u_end, held, e, c))
-        by: list[list[ca.MX]] = []
-
-        def N_with_slopes(Y: ca.MX, u: ca.MX) -> ca.MX:
-            n, *at_point = sloped(Y, u, held, e, c)
-            by.append(at_point)
-            return n
-
-        after, _ = equations.integrator.points(N_with_slopes, Y, u, u_end)
-    else:
-        # Newton's steps take N at more points than slopes are wanted at
-        N = ca.Function("N", [Y, u, held, e, c], [value])
-        after, points = equations.integrator.points(lambda Y, u: N(Y, u, held, e, c), Y, u, u_end)
-        by = [sloped(*point, held, e, c)[1:] for point in points]
-    by_Y, by_constant = zip(*by, strict=True)
+    after, points = equations.integrator.points(lambda Y, u: sloped(Y, u, held, e, c)[0], Y, u, u_end)
+    by_Y, by_constant = zip(*(sloped(*point, held, e, c)[1:] for point in points), strict=True)
     return ca.Function("step", [Y, u, u_end, held, e, c], [after, *by_Y, *by_constant], {"cse": True})
 
 

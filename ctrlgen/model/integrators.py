@@ -13,7 +13,6 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.model.model import Model
-from ctrlgen.numerics.constant_product import product
 from ctrlgen.numerics.phi_functions import phi_matrices
 
 # Step length: time times the fastest rate (magnitude of an eigenvalue of A) per step, and steps a sample
@@ -97,15 +96,15 @@ class ExponentialRungeKutta(ExponentialIntegrator):
     def points(self, N: NonlinearRates, y: ca.SX, u: ca.SX, u_end: ca.SX) -> tuple[ca.SX, list[tuple[ca.SX, ca.SX]]]:
         """y one step on, and the four (y, u) where N was evaluated."""
         middle = (u + u_end) / 2
-        half, whole = product(self.half, y), product(self.E, y)
+        half, whole = _product(self.half, y), _product(self.E, y)
         first = N(y, u)
-        a = half + product(self.Q, first)
+        a = half + _product(self.Q, first)
         second = N(a, middle)
-        b = half + product(self.Q, second)
+        b = half + _product(self.Q, second)
         third = N(b, middle)
-        c = whole + product(self.R, first) + 2 * product(self.Q, third)
+        c = whole + _product(self.R, first) + 2 * _product(self.Q, third)
         values = first, second, third, N(c, u_end)
-        after = whole + sum(product(W, value) for W, value in zip(self.W, values, strict=True))
+        after = whole + sum(_product(W, value) for W, value in zip(self.W, values, strict=True))
         return after, [(y, u), (a, middle), (b, middle), (c, u_end)]
 
 
@@ -194,6 +193,15 @@ class ImplicitRadau(ExponentialIntegrator):
             Y[self.bristles] = ca.substitute(bristles, at, Y)
         value, slope = ca.substitute([value, slope], [at], [Y])
         return Y, value, slope
+
+
+def _product(M: ca.DM, v: ca.SX | ca.MX) -> ca.SX | ca.MX:
+    """M (m, n) v of a vector v (n,). Of an MX it is a function with the entries of M written out: CasADi's product of a sparse matrix by a
+    vector looks up their places in every step."""
+    if isinstance(v, ca.SX):
+        return M @ v
+    entries = ca.SX.sym("v", v.numel())
+    return ca.Function("product", [entries], [ca.densify(M @ entries)])(v)
 
 
 def _sparse(M: np.ndarray) -> ca.DM:

@@ -28,8 +28,8 @@ def over(B: ca.MX, A: ca.MX) -> ca.MX:
 
 
 def _by_elimination(B: ca.SX, A: ca.SX, order: Sequence[int]) -> ca.SX:
-    """B A^-1 by Gauss's elimination in an `order` of the diagonal, without a search for pivots: A is the one less what a step is too short
-    to change much, or stiff and stable, and has no small ones."""
+    """B A^-1 by Gauss's elimination in an `order` of the diagonal, without a search for pivots. In an implicit step A is 1 - M N_Y, near
+    the identity where the rates N are slow, of a large positive diagonal where they are stiff and stable: no pivot is small."""
     A, B, over_pivot = ca.SX(A), ca.SX(B), {}
     for i, k in enumerate(order):
         over_pivot[k] = 1 / A[k, k]

@@ -47,7 +47,7 @@ def explains_better(compare: ModelSelection, rival: CandidateModel, model: Candi
 
 
 def is_commoner(compare: ModelSelection, rival: CandidateModel, model: CandidateModel) -> bool:
-    """Whether a rival explains no worse than a model does and is likelier beforehand, where noise alone is left: of twins the commoner
-    stands first. Where more is left, what is commoner may fit the rest."""
+    """Whether a rival explains no worse than a model does and is likelier beforehand, where noise alone is left: of laws that do the same
+    the commoner stands first. Where more is left, a rival may be ahead by what it fits of that."""
     likelier = prior_odds(rival.fit) > prior_odds(model.fit)
     return likelier and compare.reference((rival, model)).is_noise and compare.advantage(rival, model) > 0

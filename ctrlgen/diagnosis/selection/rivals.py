@@ -28,12 +28,12 @@ from ctrlgen.estimation.structure import Structure
 
 def swapped(trials: Trials, current: CandidateModel, before: int) -> CandidateModel:
     """Each cause against what would be suspected in its place, now that the others are there; not what came alone to those
-    `before`, which has been compared already."""
-    causes = len(current.causes)
+    `before`, which has been compared already. What explains better takes the place, or, at the noise, no worse and is commoner."""
+    causes, compare = len(current.causes), trials.selection
     for k in range(before if causes == before + 1 else causes):
         for rival in replacements(trials, current, k):
-            takes_place = (f(trials.selection, rival, current) for f in (explains_better, is_commoner))
-            if any(takes_place) and not trials.objections(rival, current.causes):
+            takes_place = explains_better(compare, rival, current) or is_commoner(compare, rival, current)
+            if takes_place and not trials.objections(rival, current.causes):
                 current = trials.converged(rival)
                 break
     return current

@@ -171,7 +171,7 @@ class Searcher:
         found = self._settled(begun)
         if self.trials.selection.advantage(current, found) <= 0:
             return found
-        return self._settled(self.forward_rounds(found, rounds, len(current.causes) + 1))
+        return self.best_settled(self.forward_rounds(found, rounds, len(current.causes) + 1))
 
     def _finely_stepped(self, current: CandidateModel, most: int = MOST_FINER) -> CandidateModel:
         """The same model fitted and judged with as many steps of its integrator as it needs, `most` times its own at most, where those of
