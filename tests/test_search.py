@@ -11,7 +11,7 @@ from axis_records import AXIS, BACKLASH, LATE, LIMIT, NOISE, H, axis_fitter, fit
 from misfits import errors_of, left, weighed_by
 from scipy.signal import lfilter
 
-from ctrlgen.diagnosis.selection import confusable, search
+from ctrlgen.diagnosis.selection import candidates, confusable, rivals, search
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, linearised_optimum
 from ctrlgen.diagnosis.selection.candidates import fit_subsets, restart_elsewhere
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection
@@ -21,7 +21,7 @@ from ctrlgen.diagnosis.selection.screen import Screen, Screened
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.selection.trials import Trials
-from ctrlgen.diagnosis.settings import CONFUSABLE
+from ctrlgen.diagnosis.settings import CONFUSABLE, SEARCH
 from ctrlgen.estimation.error_model import ErrorModel
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
@@ -146,6 +146,38 @@ def test_causes_are_compared_in_a_round_that_leaves_more_than_noise_and_else_onc
     monkeypatch.setattr(search, "fit_candidates", lambda *_: next(tried, ()))
     compared.clear()
     assert searcher.searched_on(bare, whole, []).causes == (BACKLASH,) and compared == [(BACKLASH,)]
+
+
+def test_fits_of_the_last_comparison_serve_the_rivals(monkeypatch):
+    """They are compared as they are judged: in steps that suffice and on the drive's clock, after which earlier fits are no fits of it."""
+    fitter, fits, kinds = fitter_of(played, n=700), [], {"swapped": [], "rivals": []}
+
+    def counted(name):
+        real = getattr(search, name)
+
+        def within(*given):
+            fits.clear()
+            told = real(*given)
+            kinds[name] += fits
+            return told
+
+        return within
+
+    def clocked(self, current):
+        self.trials.use(self.trials.fitter)
+        return self.trials.converged(current)
+
+    fit = Fitter.fit
+    monkeypatch.setattr(Fitter, "fit", lambda self, s, *g, **how: fits.append(s.causes) or fit(self, s, *g, **how))
+    monkeypatch.setattr(Searcher, "clocked", clocked)
+    for name in kinds:
+        monkeypatch.setattr(search, name, counted(name))
+    # what explains little is a rival too, and stays one
+    monkeypatch.setattr(candidates, "SEARCH", replace(SEARCH, smallest_score=0.0))
+    monkeypatch.setattr(rivals, "SEARCH", replace(SEARCH, rival_share=0.0, rival_reach=np.inf))
+    found = Searcher(fitter, Screen(fitter, [BACKLASH, LATE]), lambda _: None).run(AXIS)
+    assert found.chosen.causes == (BACKLASH,)
+    assert (LATE,) in kinds["swapped"] and (LATE,) not in kinds["rivals"]
 
 
 def test_what_explains_better_once_all_is_fitted_takes_the_place_of_a_cause():

@@ -69,11 +69,14 @@ class Searcher:
             current = self._settled(current)
             if np.allclose(noise.floor, before.floor, rtol=SEARCH.same_noise, atol=0):
                 break
-        current = self._in_plainest_form(self.clocked(self._finely_stepped(self.best_settled(current))))
+        # compared as it will be judged: fits of rivals then serve both
+        current = self._finely_timed(self._settled(current))
+        better = self._compared(current)
+        current = self._in_plainest_form(current if better is current else self._finely_timed(better))
         found = self.without_other_laws(current, rounds)
         trials = self.trials
         if found is not current:
-            current = self._in_plainest_form(self.clocked(self._finely_stepped(found)))
+            current = self._in_plainest_form(self._finely_timed(found))
         # its numbers are not bent by the errors of a better model
         nominal = scored(trials.fitter, trials.fitter.described(device)[1])
         current, account = supported(trials, nominal, current, trials.screen.seed)
@@ -124,9 +127,12 @@ class Searcher:
         return self.trials.with_errors(begun_again(self.trials, self.trials.converged(current)))
 
     def best_settled(self, current: CandidateModel) -> CandidateModel:
-        """The model `_settled`, and what then explains better in the place of one of its causes: none of them is an alternative of it.
-        In the round that added the cause, a rival had not been fitted to its end, nor weighed by these errors."""
-        current = self._settled(current)
+        """The model `_settled`, and what then explains better in the place of one of its causes: none of them is an alternative of it."""
+        return self._compared(self._settled(current))
+
+    def _compared(self, current: CandidateModel) -> CandidateModel:
+        """The settled model, or what explains better in the place of one of its causes, settled too. In the round that added the cause, a
+        rival had not been fitted to its end, nor weighed by these errors."""
         better = swapped(self.trials, current, len(current.causes))
         return current if better is current else self._settled(better)
 
@@ -189,6 +195,10 @@ class Searcher:
         trials.use(trials.fitter)  # what was fitted in longer ones is no fit of it
         fitted = trials.tried(structure, current.cause, steps=FIT.max_steps)
         return self._settled(fitted[0]) if fitted else current
+
+    def _finely_timed(self, current: CandidateModel) -> CandidateModel:
+        """The same model in steps that suffice, and with the drive where its records tell that it was."""
+        return self.clocked(self._finely_stepped(current))
 
     def clocked(self, current: CandidateModel) -> CandidateModel:
         """The same model with the drive as far off its time stamps as both kinds of records tell: that bends the numbers of what is
