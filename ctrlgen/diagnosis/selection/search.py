@@ -69,7 +69,7 @@ class Searcher:
             current = self._settled(current)
             if np.allclose(noise.floor, before.floor, rtol=SEARCH.same_noise, atol=0):
                 break
-        # compared as it will be judged: fits of rivals then serve both
+        # in the steps and on the clock in which it is told: its rivals, which the report lists, are fitted once
         current = self._finely_timed(self._settled(current))
         better = self._compared(current)
         current = self._in_plainest_form(current if better is current else self._finely_timed(better))
