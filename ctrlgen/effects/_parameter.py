@@ -10,6 +10,9 @@ from ctrlgen.core.units import split_unit, to_si
 
 PLACEHOLDERS = ("channel", "travel", "partner")
 MOTION = (*PLACEHOLDERS, "s")
+TIME = (*PLACEHOLDERS, "s", "Hz")
+PACES = (1e-6, 1e6)
+"""`Channel.pace` of a sample a nanosecond, and of one in a quarter of an hour: how fast any machine is."""
 
 
 @dataclass(frozen=True)
@@ -19,7 +22,8 @@ class Param:
     In `unit` the word `channel` stands for the unit of the signal that the effect acts on, `travel` for that of the stage
     displacement, and `partner` for that of the other channel of a pair. Bounds then count in typical sizes of these signals,
     so that one law serves micrometres and degrees; beside `travel` the `s` counts in typical times (`Channel.time`), so that it serves
-    a fan and a resonator.
+    a fan and a resonator. Of one that is `paced` bounds are those of records with a sample a millisecond and go with the sample time
+    (`Channel.pace`): a scanner's filter and an oven's.
     """
 
     name: str
@@ -27,6 +31,7 @@ class Param:
     bounds: tuple[float, float]
     doc: str
     off: float | None = None
+    paced: bool = False
 
     @property
     def relative(self) -> bool:
@@ -37,6 +42,17 @@ class Param:
     def of_motion(self) -> bool:
         """Whether it is a speed, or counts per speed or acceleration: how fast a machine moves no file says, but its records."""
         return "travel" in split_unit(self.unit, MOTION)[0] and "s" in split_unit(self.unit, MOTION)[0]
+
+    @property
+    def powers_of_time(self) -> float:
+        """With which power of a time it goes: -1 of a rate or a frequency."""
+        powers = split_unit(self.unit, TIME)[0]
+        return powers.get("s", 0.0) - powers.get("Hz", 0.0)
+
+    def at_any_pace(self, low: float, high: float) -> tuple[float, float]:
+        """Its bounds over all `PACES`, from those of records with a sample a millisecond."""
+        ends = [bound * pace**self.powers_of_time for bound in (low, high) for pace in PACES]
+        return min(ends), max(ends)
 
 
 @dataclass(frozen=True)
@@ -70,7 +86,7 @@ class Channel:
     """One channel an effect can act on: unit and typical size (SI) of its signal and of the stage displacement.
 
     `time` [s]: typical displacement over the speed that occurs, so that what counts in both is a speed, whatever stroke a file states;
-    1 s where no record says how fast the stage moves.
+    1 s where no record says how fast the stage moves. `pace`: the sample time of the records over a millisecond, to the nearest decade.
     """
 
     name: str
@@ -82,6 +98,7 @@ class Channel:
     partner_unit: str = "1"
     partner_scale: float = 1.0
     time: float = 1.0
+    pace: float = 1.0
 
     def paired_with(self, other: Channel) -> Channel:
         """The same channel as the first one of a pair."""
@@ -101,6 +118,8 @@ class Channel:
 
     def si(self, value: float, number: Param | State) -> float:
         """A bound, a start value or a scale of a law's number, in SI at this channel."""
+        if isinstance(number, Param) and number.paced:
+            value *= self.pace**number.powers_of_time
         if not _is_relative(number.unit):
             return to_si(value, number.unit)
         powers, rest = split_unit(number.unit, MOTION if "travel" in number.unit else PLACEHOLDERS)
@@ -111,9 +130,11 @@ class Channel:
         return float(to_si(value, rest) * size)
 
     def allowed(self, p: Param) -> tuple[float, float]:
-        """What a number of a law may be in a file [SI]: within its bounds; of one that counts in speeds only its sign is known."""
+        """What a number of a law may be in a file [SI]: within its bounds; of one that is paced, at any pace; of one that counts in speeds
+        only its sign is known."""
         if not p.of_motion:
-            return self.si(p.bounds[0], p), self.si(p.bounds[1], p)
+            low, high = self.si(p.bounds[0], p), self.si(p.bounds[1], p)
+            return p.at_any_pace(low, high) if p.paced else (low, high)
         low = p.bounds[0]
         return (-math.inf if low < 0 else math.ulp(0.0) if low > 0 else 0.0), math.inf
 

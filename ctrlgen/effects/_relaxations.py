@@ -10,7 +10,7 @@ from ctrlgen.effects._parameter import Param, State
 CHAIN = range(9)
 RELAXATIONS = tuple(State(f"z{j}", "travel", 1.0) for j in CHAIN)
 SPECTRUM = (
-    Param("tau", "s", (1e-3, 1e2), "shortest relaxation time"),
+    Param("tau", "s", (1e-3, 1e2), "shortest relaxation time", paced=True),
     Param("decades", "1", (1.0, 7.0), "D: decades after which it ends"),
 )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, State, itself
 
-TAU = Param("tau", "s", (1e-4, 1e2), "one over the corner frequency in rad/s")
+TAU = Param("tau", "s", (1e-4, 1e2), "one over the corner frequency in rad/s", paced=True)
 DAMPING = Param("damping", "1", (0.3, 20.0), "D: damping ratio")
 
 

@@ -8,7 +8,7 @@ from ctrlgen.effects import LawInputs, LawNumbers, Param, State
 
 WHEN = (
     Param("moment", "s", (-1e6, 1e6), "time of the middle of the step"),
-    Param("rise", "s", (1e-4, 1.0), "duration of the step"),
+    Param("rise", "s", (1e-4, 1.0), "duration of the step", paced=True),
 )
 CLOCK = (State("t", "s", 1.0, clock=True),)
 

@@ -80,6 +80,8 @@ def _read_parameter(param: Param, given: dict[str, Any]) -> Quantity:
         raise ValueError(f"{param.name}: {error}") from error
     if not param.relative:
         low, high = (to_si(bound, param.unit) for bound in param.bounds)
+        if param.paced:
+            low, high = param.at_any_pace(low, high)
         if not _is_between(number.si, low, high):
             raise ValueError(_outside(param, number, low, high, param.unit))
     return number

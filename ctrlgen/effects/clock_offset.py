@@ -16,7 +16,7 @@ class ClockOffset(Effect):
     family = Family.TIMING
     requires = frozenset({"sample_time"})
     source = "definition"
-    params = (Param("offset", "ms", (0.0, 50.0), "how far the readings are ahead of the drive", off=0.0),)
+    params = (Param("offset", "ms", (0.0, 3.6e6), "how far the readings are ahead of the drive", off=0.0),)
     shifts_drive = True
     moves_in_time = True
 

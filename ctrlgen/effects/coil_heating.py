@@ -17,7 +17,7 @@ class CoilHeating(Effect):
     source = "D. J. Button, J. Audio Eng. Soc. 40 (1992) 32: heat dissipation and power compression in loudspeakers"
     params = (
         Param("rise", "1/channel^2", (-0.1, 1.0), "c: relative rise of the resistance per voltage squared", off=0.0),
-        Param("tau", "s", (1e-2, 1e5), "time constant"),
+        Param("tau", "s", (1e-2, 1e5), "time constant", paced=True),
     )
     at_bounds = itself("tau")
     states = (State("w", "channel^2", 1.0),)

@@ -19,7 +19,7 @@ class Creep(Effect):
     )
     params = (
         Param("gain", "1", (0.0, 3.0), "extra travel after infinite time, per travel", off=0.0),
-        Param("tau", "s", (1e-3, 1e5), "relaxation time"),
+        Param("tau", "s", (1e-3, 1e5), "relaxation time", paced=True),
         Param("slow", "1", (0.0, 0.5), "s: share that relaxes four times as slowly"),
     )
     # what has followed within a millisecond crept nowhere

@@ -15,8 +15,8 @@ class Degradation(Effect):
     requires = frozenset({"actuator"})
     source = "R. Isermann, Fault-Diagnosis Systems (2006): incipient faults"
     params = (
-        Param("rate", "1/s", (-0.1, 0.1), "relative loss per time, at first", off=0.0),
-        Param("levels_off", "s", (0.3, 1e6), "T: time constant with which the loss levels off"),
+        Param("rate", "1/s", (-0.1, 0.1), "relative loss per time, at first", off=0.0, paced=True),
+        Param("levels_off", "s", (0.3, 1e6), "T: time constant with which the loss levels off", paced=True),
     )
     at_bounds = itself("levels_off")
     states = CLOCK

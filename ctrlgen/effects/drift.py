@@ -10,7 +10,7 @@ class Drift(Effect):
     family = Family.EVENTS
     order = -1  # before `cyclic`: what drifts moves the target along the fringes
     source = "definition"
-    params = (Param("rate", "channel/s", (-1.0, 1.0), "drift per time", off=0.0),)
+    params = (Param("rate", "channel/s", (-1.0, 1.0), "drift per time", off=0.0, paced=True),)
     states = (State("t", "s", 1.0, clock=True),)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

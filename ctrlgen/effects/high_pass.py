@@ -17,7 +17,7 @@ class HighPass(Effect):
     source = "Kistler Instrumente AG, glossary: time constant of a charge amplifier, R C of its feedback"
     params = (
         Param("share", "1", (0.0, 1.2), "g: share of a constant reading that is lost in the end", off=0.0),
-        Param("tau", "s", (1e-3, 1e4), "time constant of the leak"),
+        Param("tau", "s", (1e-3, 1e4), "time constant of the leak", paced=True),
     )
     # what is forgotten within a millisecond is a gain
     at_bounds = MappingProxyType({"tau": ShapeBounds(low="sensor_gain")})

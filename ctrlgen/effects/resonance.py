@@ -17,7 +17,7 @@ class Resonance(Effect):
     source = "J. P. Den Hartog, Mechanical Vibrations (1956), chapter 3: two degrees of freedom"
     params = (
         Param("stiffness", "channel/travel", (0.0, 1e2), "spring of the second mass", off=0.0),
-        Param("frequency", "Hz", (0.5, 2e3), "resonance with the stage held"),
+        Param("frequency", "Hz", (0.5, 2e3), "resonance with the stage held", paced=True),
         Param("damping", "1", (1e-3, 1.0), "damping ratio"),
     )
     at_bounds = itself("frequency", "damping")

@@ -15,7 +15,7 @@ class SecondPole(Effect):
     source = "J. H. Lienhard, A Heat Transfer Textbook (2019), chapter 5: lumped bodies"
     params = (
         Param("share", "1", (0.0, 1.2), "share of the power that comes late", off=0.0),
-        Param("tau", "s", (1e-3, 1e4), "time constant"),
+        Param("tau", "s", (1e-3, 1e4), "time constant", paced=True),
     )
     at_bounds = itself("tau")
     states = (State("w", "channel", 1.0),)

@@ -20,7 +20,7 @@ class SlewRate(Effect):
     source = "J. E. Solomon, IEEE J. Solid-State Circuits 9 (1974) 314: slew rate of a monolithic operational amplifier"
     params = (
         Param("share", "1", (0.0, 1.5), "1: nothing of the drive changes faster", off=0.0),
-        Param("rate", "channel/s", (1e-3, 1e6), "R: fastest change of what is delivered"),
+        Param("rate", "channel/s", (1e-3, 1e6), "R: fastest change of what is delivered", paced=True),
     )
     at_bounds = itself("rate")
     limits_rate = "rate"

@@ -16,8 +16,8 @@ class StiffnessDrift(Effect):
     requires = frozenset({"force"})
     source = "R. Isermann, Fault-Diagnosis Systems (2006): incipient faults, of a parameter of the process"
     params = (
-        Param("rate", "1/s", (-0.1, 0.1), "relative loss of stiffness per time, at first", off=0.0),
-        Param("levels_off", "s", (0.3, 1e6), "T: time constant with which the loss levels off"),
+        Param("rate", "1/s", (-0.1, 0.1), "relative loss of stiffness per time, at first", off=0.0, paced=True),
+        Param("levels_off", "s", (0.3, 1e6), "T: time constant with which the loss levels off", paced=True),
     )
     at_bounds = itself("levels_off")
     states = CLOCK

@@ -19,7 +19,7 @@ class ThermalLag(Effect):
     source = "H. S. Carslaw, J. C. Jaeger, Conduction of Heat in Solids (1959), section 3.4: rod, one end insulated"
     params = (
         Param("share", "1", (0.0, 1.2), "share that acts late", off=0.0),
-        Param("tau", "s", (1e-3, 1e4), "time constant"),
+        Param("tau", "s", (1e-3, 1e4), "time constant", paced=True),
         Param("second", "1", (0.01, 1.0), "r: second over first time constant"),
     )
     at_bounds = itself("tau", "second")

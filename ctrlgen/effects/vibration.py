@@ -16,7 +16,7 @@ class Vibration(Effect):
     source = "definition"
     params = (
         Param("amplitude", "channel", (-1.0, 1.0), "amplitude of the vibration", off=0.0),
-        Param("frequency", "Hz", (1e-3, 1e5), "frequency of the vibration"),
+        Param("frequency", "Hz", (1e-6, 1e9), "frequency of the vibration"),
         Param("phase", "deg", (-360.0, 360.0), "phase at time zero"),
     )
     at_bounds = itself("frequency", "phase")

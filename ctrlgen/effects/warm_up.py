@@ -19,7 +19,7 @@ class WarmUp(Effect):
     source = "ISO 230-3:2020: thermal drift of a machine that warms up; the lumped body's exponential"
     params = (
         Param("size", "channel", (-1.0, 1.0), "A: drift in the end", off=0.0),
-        Param("tau", "s", (0.3, 1e6), "time constant of the warming"),
+        Param("tau", "s", (0.3, 1e6), "time constant of the warming", paced=True),
     )
     at_bounds = itself("tau")
     states = (State("t", "s", 1.0, clock=True),)

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import product
+from math import log10
 from types import MappingProxyType
 
 from ctrlgen.core.errors import Fault, InputError
@@ -31,8 +32,14 @@ DOMAIN = {
     Place.POSE: "mechanism",
     Place.SENSOR: "sensor",
 }
+USUAL_SAMPLE_TIME = 1e-3
+"""Sample time [s] of the records for which bounds and starts of times are stated (`Param.paced`)."""
+TWELFTHS = 12
+"""Parts of the records' duration, of which `DataHints.peaks` holds the length."""
 SECONDS_LATE, SAMPLES_LATE = 0.5, 100.0
 """Up to which a reading is taken to be late: a camera, a bus; samples where these are slow, the dead time of a process. Judgement."""
+SECONDS_APART, SAMPLES_APART = 0.05, 50.0
+"""Up to which the clocks of two recorders are taken to disagree; samples where these are slow. Judgement."""
 PARAMETER = "parameter"
 NOTHING: Mapping[str, float] = MappingProxyType({})
 DEVICES_KEPT = 8
@@ -61,7 +68,8 @@ class Hypothesis:
     count: how many of the same effect a structure has there already, where the effect is repeatable.
     highest: frequency [Hz] up to which samples are told from their aliases; infinite for settled poses, which have no clock.
     machine_odds: ln of how many times commoner the law is in a machine of these parts than in any.
-    longest: delay [s] that is looked for: shortest in the reading of a loop, where each sample of it is a state of the simulation.
+    longest: delay [s] that is looked for, or offset of clocks: shortest in a loop, where each sample of a delay is a state of
+        the simulation.
     longest_period: way [SI] of a law that repeats along one, up to which the records show that it does.
     time: typical displacement over the speed that occurs in the records [s], in which bounds per speed count (`Channel.time`).
     """
@@ -106,6 +114,13 @@ class Hypothesis:
         return tuple(replace(self, effect=kind) for kind in kinds)
 
     @property
+    def pace(self) -> float:
+        """The sample time of the records over a millisecond, to the nearest decade: starts of times are decades apart, and those of records
+        that are thinned out by two should be the same. 1 for settled poses."""
+        sample_time = CANDIDATE_TERMS.highest_frequency / self.highest
+        return 10.0 ** round(log10(sample_time / USUAL_SAMPLE_TIME)) if sample_time > 0 else 1.0
+
+    @property
     def prior(self) -> LawPrior:
         """What the search believes of the law; the default for a number of the device."""
         return DEFAULT if self.effect == PARAMETER else prior_of(self.law)
@@ -118,7 +133,8 @@ class Hypothesis:
     def channel_on(self, device: Device) -> Channel:
         """The channel of `device` at which the effect acts; the first one where it acts at several."""
         physics = nominal_physics(device)
-        channel = replace(channels(physics, self.law.place)[self.acts_on(device)[0]], time=self.time)
+        channel = channels(physics, self.law.place)[self.acts_on(device)[0]]
+        channel = replace(channel, time=self.time, pace=self.pace)
         if self.of is None:
             return channel
         return channel.paired_with(next(c for c in partner_channels(physics, self.law) if c.name == self.of))
@@ -160,6 +176,9 @@ class Hypothesis:
             return [value for value in suggested if low <= value <= high]
         starts = prior.start_values or (() if suggested else (sum(p.bounds) / 2,))
         tried = [*(channel.si(value, p) for value in starts), *(value for value in suggested if value >= low)]
+        if p.unit == "Hz" and "s" in hints.peaks:
+            # what takes longer than the records for a period is a drift
+            return [value for value in tried if 1 / (TWELFTHS * hints.peaks["s"]) <= value <= high]
         return [value for value in tried if value <= high] or [(low + high) / 2]
 
     def bounds(self, p: Param, channel: Channel) -> tuple[float, float]:
@@ -225,6 +244,8 @@ def _of_law(
         longest = max(SAMPLES_LATE * sample_time, SECONDS_LATE)
         if in_loop(physics):
             longest = CANDIDATE_TERMS.samples_in_loop * sample_time
+    if law.shifts_drive and sample_time:
+        longest = max(SAMPLES_APART * sample_time, SECONDS_APART)
     places = channels(physics, law.place)
     seen = {channel.removeprefix("reading.") for channel in observed}
     if law.place is Place.SENSOR:
