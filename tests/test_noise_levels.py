@@ -7,8 +7,9 @@ import pytest
 from scipy import stats
 from scipy.signal import lfilter
 
-from ctrlgen.estimation.noise import Noise, NoiseSource, estimate_noise, ljung_box, stationary_deviation, without_lines
+from ctrlgen.estimation.noise import Noise, NoiseSource, estimate_noise, ljung_box, stationary_deviation
 from ctrlgen.estimation.noise_update import longest_stretch
+from ctrlgen.estimation.quiet_stretches import without_lines
 from ctrlgen.estimation.residual_noise import noise_from_residual
 from ctrlgen.estimation.settings import NOISE_UPDATE
 from ctrlgen.recordings.recording import Record, Recording

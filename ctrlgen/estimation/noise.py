@@ -1,25 +1,32 @@
 """Step 1: the noise of every channel, estimated before any model is fitted.
 
 The misfit of a model is never taken as noise while another source exists. Of a time series, in order of trust: a record at
-rest; differences of repeated periods; dwells of the drive; the stated standard deviation; last, with a note, the fastest
-part of the readings, which `residual_noise` then refines. The noise is autoregressive, its order chosen by BIC. Of settled
-poses: the stated standard deviation; then the scatter of repeated poses, which lost motion and creep widen.
+rest; differences of repeated periods; dwells of the drive, unless they are several times as loud as stated; the stated standard
+deviation; last, with a note, the fastest part of the readings, which `residual_noise` then refines. The noise is
+autoregressive, its order chosen by BIC. Of settled poses: the stated standard deviation; then the scatter of repeated
+poses, which lost motion and creep widen.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
-from itertools import pairwise
 
 import numpy as np
 from scipy import stats
 from scipy.signal import lfilter
 
 from ctrlgen.core.counts import number_of
+from ctrlgen.estimation.quiet_stretches import (
+    at_rest,
+    detrended,
+    dwells,
+    period_differences,
+    without_events,
+    without_lines,
+)
 from ctrlgen.estimation.settings import NOISE, STATISTICS
 from ctrlgen.numerics.quantisation_step import quantisation_step
-from ctrlgen.numerics.spectral_peaks import local_floor, periodogram
 from ctrlgen.recordings.recording import Record, Recording
 
 
@@ -175,21 +182,30 @@ def _of_series(recording: Recording, i: int, settling: float) -> _ChannelNoise:
     # standard deviation of a uniform rounding error
     rounding = quantisation_step(values) / np.sqrt(12.0)
     moving = [r for r in recording.records if r.role != "rest"]
+    stated, stated_details = recording.noise[i], ""
     # degree of the polynomial to subtract, stretches of noise
     sources = {
-        NoiseSource.REST: (1, [_at_rest(r, i) for r in recording.records if r.role == "rest"]),
-        NoiseSource.PERIODS: (1, [e for r in moving for e in _period_differences(r, i)]),
-        NoiseSource.DWELLS: (NOISE.dwell_degree, [e for r in moving for e in _dwells(r, i, settling)]),
+        NoiseSource.REST: (1, [at_rest(r, i) for r in recording.records if r.role == "rest"]),
+        NoiseSource.PERIODS: (1, [e for r in moving for e in period_differences(r, i)]),
+        NoiseSource.DWELLS: (NOISE.dwell_degree, [e for r in moving for e in dwells(r, i, settling)]),
     }
     for source, (degree, stretches) in sources.items():
         # a constant stretch is a dead or coarse channel: it tells no noise
         long = [s for s in stretches if len(s) >= NOISE.shortest_stretch and np.ptp(s) > 0]
-        quiet = _without_events([without_lines(_detrended(s, degree)) for s in long])
+        quiet = without_events([without_lines(detrended(s, degree)) for s in long])
         if quiet:
-            return _from_stretches(quiet, source, rounding, degree + 1)
-    if stated := recording.noise[i]:
+            found = _from_stretches(quiet, source, rounding, degree + 1)
+            ratio = (
+                stationary_deviation(found.sd, found.ar) / stated if stated and source is NoiseSource.DWELLS else 0.0
+            )
+            if ratio <= NOISE.moves_in_dwells:
+                return found
+            stated_details = (
+                f"; in dwells of the drive it scatters by {ratio:.2g} times that, which is taken for motion"
+            )
+    if stated:
         sd, _ = _with_rounding(stated, np.zeros(0), rounding)
-        return _ChannelNoise(sd, NoiseSource.STATED_WHITE, NOISE.stated_samples)
+        return _ChannelNoise(sd, NoiseSource.STATED_WHITE, NOISE.stated_samples, stated_details)
     deviation, n = fastest_part(recording, i)
     # third differences of white noise have 1 + 9 + 9 + 1 = 20 times its variance
     sd, count = deviation / np.sqrt(20.0), n / NOISE.robust_cost
@@ -236,43 +252,6 @@ def repeatability(records: tuple[Record, ...], i: int) -> tuple[float, int]:
     return float(np.sqrt(np.sum((y - mean[group]) ** 2) / max(count, 1))), count
 
 
-def _at_rest(record: Record, i: int) -> np.ndarray:
-    """The valid readings of channel i without their regression on the recorded ambient, which is a cause and no noise."""
-    good = record.valid[:, i]
-    y = record.observed[good, i]
-    if record.ambient is None or not len(y):
-        return y
-    T = record.ambient[good] - np.mean(record.ambient[good])
-    return y - T * (T @ y) / (T @ T) if T @ T > 0 else y
-
-
-def _detrended(stretch: np.ndarray, degree: int) -> np.ndarray:
-    """A stretch without its polynomial of `degree` by least squares: what still settles is no noise."""
-    t = np.linspace(-1, 1, len(stretch))
-    return stretch - np.polynomial.legendre.legval(t, np.polynomial.legendre.legfit(t, stretch, degree))
-
-
-def without_lines(stretch: np.ndarray) -> np.ndarray:
-    """A stretch (n,) without the sinusoids that stand out of its spectrum: a vibration is a disturbance, not noise."""
-    n, padding = len(stretch), 8
-    for _ in range(NOISE.most_lines):
-        power = periodogram(stretch, np.hanning(n), padding)
-        level = local_floor(power, padding * NOISE.level_bins)
-        peak = int(np.argmax(power / np.maximum(level, 1e-300)))
-        if power[peak] < NOISE.line_ratio * level[peak]:
-            break
-        phase = 2 * np.pi * peak / (padding * n) * np.arange(n)
-        basis = np.column_stack([np.sin(phase), np.cos(phase)])
-        stretch = stretch - basis @ np.linalg.lstsq(basis, stretch, rcond=None)[0]
-    return stretch
-
-
-def _without_events(stretches: list[np.ndarray]) -> list[np.ndarray]:
-    """The stretches whose variance is not far above the median: in the others something happened."""
-    power = [float(np.var(s)) for s in stretches]
-    return [s for s, p in zip(stretches, power, strict=True) if p <= NOISE.loudest_stretch * np.median(power)]
-
-
 def _with_rounding(sd: float, a: np.ndarray, rounding: float) -> tuple[float, np.ndarray]:
     """Noise of a device that moves, from noise at rest and the standard deviation of the rounding error [SI].
 
@@ -300,53 +279,6 @@ def _quiet_deviation(values: np.ndarray) -> float:
 def _robust_deviation(values: np.ndarray) -> float:
     """Standard deviation of normal values (n,) by their median absolute deviation."""
     return float(STATISTICS.mad_to_sd * np.median(np.abs(values - np.median(values))))
-
-
-def drive_period(drive: np.ndarray) -> int | None:
-    """Samples after which the drive (n, n_u) repeats exactly, at least twice; None where it does not."""
-    n, span = len(drive), np.ptp(drive, axis=0).max(initial=0.0)
-    if span == 0 or n < 100:
-        return None
-    near, first = NOISE.same_drive * span, drive[:32]
-    lags = np.flatnonzero(np.all(np.abs(drive[: n - 32] - first[0]) <= near, axis=1))
-    for lag in lags[lags >= 50]:
-        if 2 * lag > n:
-            return None
-        # cheap: tried before the whole record
-        begins = np.all(np.abs(drive[lag : lag + 32] - first) <= near)
-        if begins and np.all(np.abs(drive[lag:] - drive[:-lag]) <= near):
-            return int(lag)
-    return None
-
-
-def period_of(record: Record) -> float | None:
-    """Period [s] with which the drive of a record repeats, as stated or exactly; None where it does not."""
-    if record.period is not None:
-        return record.period
-    samples = drive_period(record.drive)
-    return None if samples is None else samples * record.sample_time
-
-
-def _period_differences(record: Record, i: int) -> list[np.ndarray]:
-    """Differences of neighbouring periods over sqrt(2), so that they have the noise's own size; the first period, which
-    holds a transient, is left out, and no period is used twice."""
-    period = period_of(record)
-    P = round(period / record.sample_time) if period else 0
-    if not P or len(record.time) < 3 * P:
-        return []
-    y = np.where(record.valid[:, i], record.observed[:, i], np.nan)
-    periods = y[P : len(y) // P * P].reshape(-1, P)
-    differences = np.diff(periods[: len(periods) // 2 * 2], axis=0)[::2] / np.sqrt(2.0)
-    return [d[np.isfinite(d)] for d in differences]
-
-
-def _dwells(record: Record, i: int, settling: float) -> list[np.ndarray]:
-    """The valid readings of channel i while the drive is constant, from `settling` [s] after its last change."""
-    moved = np.any(np.diff(record.drive, axis=0) != 0, axis=1)
-    edges = np.flatnonzero(np.concatenate([[True], moved, [True]]))
-    wait = int(np.ceil(settling / record.sample_time))
-    dwells = ((a + wait, b) for a, b in pairwise(edges) if b - a - wait >= NOISE.shortest_stretch)
-    return [record.observed[a:b, i][record.valid[a:b, i]] for a, b in dwells]
 
 
 def autoregression(stretches: list[np.ndarray]) -> tuple[float, np.ndarray]:

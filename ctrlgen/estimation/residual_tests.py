@@ -21,7 +21,8 @@ from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.goes_with_motion import goes_with_motion
 from ctrlgen.estimation.held_out import HeldOutRefit, refit_to_held_out
 from ctrlgen.estimation.misfit import Misfit, misfit
-from ctrlgen.estimation.noise import cross_correlation, ljung_box, without_lines
+from ctrlgen.estimation.noise import cross_correlation, ljung_box
+from ctrlgen.estimation.quiet_stretches import without_lines
 from ctrlgen.estimation.settings import DISCREPANCY, HELD_OUT_REFIT, MOTION, OUTLIERS, RESIDUAL_TESTS, STATISTICS
 from ctrlgen.numerics.quantisation_step import quantisation_step
 from ctrlgen.recordings.recording import Record

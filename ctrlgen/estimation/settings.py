@@ -53,6 +53,11 @@ class NoiseSettings:
     loudest_stretch: float = 1.5
     """Variance of a stretch over the median variance of all, above which it is left out: something happened in it.
     200 samples know a variance to 10 %."""
+    far_louder: float = 4.0
+    """Median variance over that of the quietest tenth, above which most stretches hold more than noise. Judgement: noise of a long memory
+    differs less."""
+    moves_in_dwells: float = 3.0
+    """Noise in dwells over the stated one, above which the device moves in them. Judgement: a stated noise is right to a factor of two."""
     slow_ratio: float = 3.0
     """Standard deviation of coloured noise over that of its innovations, above which a note says that the slow part may
     be motion of the device. Reached by a first-order model with coefficient 0.94. Judgement."""

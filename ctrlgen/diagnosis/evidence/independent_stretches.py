@@ -16,7 +16,7 @@ from scipy.linalg import block_diag
 from ctrlgen.diagnosis.settings import LUCK
 from ctrlgen.diagnosis.shares.blocks import correlation_time
 from ctrlgen.estimation.fit import Fit, Fitter
-from ctrlgen.estimation.noise import period_of
+from ctrlgen.estimation.quiet_stretches import period_of
 from ctrlgen.recordings.recording import Record
 
 GAP = -1

@@ -14,7 +14,7 @@ from scipy import stats
 
 from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.settings import SPECTRAL_LINES
-from ctrlgen.estimation.noise import drive_period
+from ctrlgen.estimation.quiet_stretches import drive_period
 from ctrlgen.recordings.recording import Record
 from ctrlgen.reporting.result_file import FiniteOrNull, Keys, Number
 

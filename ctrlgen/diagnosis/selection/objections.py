@@ -18,7 +18,7 @@ from ctrlgen.effects import Param
 from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.free_parameters import SHAPE_AT_BOUND
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
-from ctrlgen.estimation.noise import period_of
+from ctrlgen.estimation.quiet_stretches import period_of
 from ctrlgen.estimation.raw_readings import detect_directly
 from ctrlgen.estimation.settings import STATISTICS
 from ctrlgen.numerics.quantisation_step import quantisation_step

@@ -34,9 +34,6 @@ COUNT_NAME = re.compile(
 """Names of columns that number the rows."""
 JUMP = 0.25  # of its range: a reading does not go so far to its end in one row, a command does
 NOISE_REST = 200  # rows: the shortest record at rest from which a diagnosis takes the noise
-SETTLED = 2.0  # standard deviations of a rest's end, from which a tenth of the rest that scatters by more about it still settles
-NORMAL_MEDIAN = 0.6745  # standard deviations: the median size of normal noise
-TREND = 0.5  # of the variance of a rest's end, from which its slope is a motion and no noise
 SLOW_CLOCK = 0.6  # share of rows in which a drive stands still from which it steps by a slower clock
 SMOOTH = 0.1  # median of second differences over that of first ones, of a drive that is a curve and no steps
 
@@ -243,27 +240,6 @@ def rests(drives: np.ndarray) -> list[tuple[int, int]]:
     still = (np.abs(np.diff(drives, axis=0)) <= STILL * spans).all(axis=1)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(int), [0]])))
     return [(int(a), int(b) + 1) for a, b in edges.reshape(-1, 2) if b + 1 - a >= REST]
-
-
-def settled(readings: np.ndarray, first: int, last: int) -> int | None:
-    """The row from which no reading (n, readings) moves any more, of a rest of the drives from row `first` to one before `last`.
-
-    None where at its end they still do, or where fewer than `NOISE_REST` rows are left. A drive that stands still says nothing of a tank
-    that fills, or of a mass that swings after its last step.
-    """
-    tenth, begin = max((last - first) // 10, 1), first
-    for y in readings[first:last].T:
-        y = np.where(np.isfinite(y), y, np.nanmedian(y)) if np.isfinite(y).any() else np.zeros_like(y)
-        end = y[len(y) // 2 :]
-        t = np.linspace(-1.0, 1.0, len(end))
-        slope = float(t @ end / (t @ t))
-        if slope**2 * np.mean(t**2) > TREND * np.var(end):
-            return None
-        away = np.abs(y - np.median(end)) / NORMAL_MEDIAN
-        parts = np.array([np.median(away[k : k + tenth]) for k in range(0, len(y), tenth)])
-        off = np.flatnonzero(parts > SETTLED * np.std(end))
-        begin = max(begin, first + (int(off[-1]) + 1) * tenth if len(off) else first)
-    return begin if last - begin >= NOISE_REST else None
 
 
 def between_samples(drive: np.ndarray) -> str:

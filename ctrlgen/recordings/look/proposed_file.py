@@ -9,8 +9,9 @@ import numpy as np
 
 from ctrlgen.core.escaping import toml
 from ctrlgen.core.file_format import FORMAT
-from ctrlgen.recordings.look.column_facts import TableFacts, rests, settled
+from ctrlgen.recordings.look.column_facts import NOISE_REST, TableFacts, rests
 from ctrlgen.recordings.look.proposal import Proposal
+from ctrlgen.recordings.settled_readings import settled
 
 
 def recording_toml(proposal: Proposal, folder: Path, title: str) -> str:
@@ -65,7 +66,9 @@ def _record(proposal: Proposal, facts: TableFacts, folder: Path, role: str) -> l
     head.append(f"between_samples = {proposal.between_samples}")
     n = len(known[0])
     readings = np.column_stack(proposal.readings_of(facts) or [np.zeros(n)])
-    ends = [(settled(readings, a, b), a, b) for a, b in rests(np.column_stack(known)) if (a == 0) != (b == n)]
+    ends = [
+        (settled(readings, a, b, NOISE_REST), a, b) for a, b in rests(np.column_stack(known)) if (a == 0) != (b == n)
+    ]
     still = [(a, b, start) for start, a, b in ends if start is not None]
     begin, end = max((b for a, b, _ in still if a == 0), default=0), min((s for _, b, s in still if b == n), default=n)
     lines = [
