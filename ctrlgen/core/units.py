@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import re
 import reprlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -157,6 +157,12 @@ def base_unit(unit: str) -> str:
         if same_dimension(unit, name):
             return name
     return f"{_registry().Quantity(1.0, _unit(unit)).to_base_units().units:~}"
+
+
+def common_base_unit(units: Sequence[str]) -> str:
+    """The SI unit of a vector given in `units`, such as "m"; "SI" where its components differ."""
+    found = set(map(base_unit, units))
+    return found.pop() if len(found) == 1 else "SI"
 
 
 def exponents(unit: str) -> dict[str, int] | None:

@@ -11,6 +11,7 @@ import numpy as np
 from ctrlgen.controller.null_motion import why_no_null_motion
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import write_text
+from ctrlgen.core.units import common_base_unit
 from ctrlgen.firmware.c.templates import write
 from ctrlgen.firmware.package import LICENCE, MANIFEST, input_files
 from ctrlgen.firmware.player.compression import compress
@@ -64,7 +65,7 @@ def generate_player(solution: Solution, out: Path) -> list[Path]:
         context = player_context(solution, compression, name) | {
             "real": real,
             "drive": drive,
-            "drive_unit": drive.units[0],
+            "drive_unit": common_base_unit(drive.units),
             "nu": len(drive.channels),
             "motion": model.inertial,
             "program": program(),

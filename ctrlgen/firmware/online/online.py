@@ -16,7 +16,7 @@ from ctrlgen.controller.lost_state import FAR
 from ctrlgen.controller.nearest_displacement import SWEEPS
 from ctrlgen.controller.ringing import STILL, TOLD
 from ctrlgen.controller.run_time_check import check_run_time
-from ctrlgen.core.units import show, show_difference
+from ctrlgen.core.units import common_base_unit, show, show_difference
 from ctrlgen.devices import Limit
 from ctrlgen.firmware.c.elementary import elementary_text
 from ctrlgen.firmware.c.real import Real
@@ -157,7 +157,7 @@ def header_context(scenario: Scenario, controller: Controller) -> dict[str, Any]
         "axes": model.axes,
         "follow": follow,
         "drive": drive,
-        "drive_unit": drive.units[0],
+        "drive_unit": common_base_unit(drive.units),
         "state": model.signals.get("state"),
         "rate": _number(1 / kernels.sample_time) if kernels.sample_time else None,
         "si": si_text,
