@@ -167,17 +167,19 @@ def _name(path: Path) -> str:
 
 
 def run_batch(
-    tasks: Sequence[Task],
+    tasks: Path | str | Sequence[Task],
     out: Path | str,
     scheduler: str | None = None,
     jobs: int | None = None,
     progress: Progress | None = None,
 ) -> tuple[BatchRow, ...]:
-    """Runs every diagnosis into its folder in `out`; results.csv and batch.json follow, at the end Parquet files and batch.html.
+    """Runs every diagnosis of `tasks`, which may be the list's file, into its folder in `out`; results.csv and batch.json follow, at the
+    end Parquet files and batch.html.
 
     `ctrlgen.core.parallel` decides where they run; only this process writes. A diagnosis that fails gives a row that says
     why. Raises InputError where `out` cannot be written or the scheduler does not answer.
     """
+    tasks = load_batch(tasks) if isinstance(tasks, Path | str) else tasks
     out, rows = Path(out), {}
     to_do: list[tuple[Task, dict[str, Any]]] = []
     for task in tasks:

@@ -169,9 +169,8 @@ def calibrate(
         what = 'is missing: it names what differs between specimens; write [run_time] and under it constants = ["actuator.ambient"]'
         raise InputError(device, [Fault("run_time", what)])
     progress("reading")
-    paths = [recordings] if isinstance(recordings, (str, Path)) else list(recordings)
     model = build_model(described)
-    recording = with_plausibility(load_recordings(paths, model), model)
+    recording = with_plausibility(load_recordings(recordings, model), model)
     inputs = device_inputs(Path(device))
     # A trial value may lead nowhere, and is then rejected.
     with threadpool_limits(1), np.errstate(over="ignore", invalid="ignore", divide="ignore"):

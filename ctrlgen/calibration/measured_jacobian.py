@@ -93,7 +93,7 @@ class MeasuredJacobian:
 
 
 def calibrate_poses(
-    device: Path | str, recordings: Sequence[Path | str], numbers: JacobianNumbers = JacobianNumbers.ALL
+    device: Path | str, recordings: Path | str | Sequence[Path | str], numbers: JacobianNumbers = JacobianNumbers.ALL
 ) -> MeasuredJacobian:
     """The Jacobian of the specimen whose settled poses `recordings` hold; `device` is the file that describes it.
 
@@ -105,7 +105,7 @@ def calibrate_poses(
     if (drives := len(model.signals["drive"].channels)) > len(CHANNELS):
         what = f"has {drives} drives, more than a pose has components: a Jacobian is calibrated for {len(CHANNELS)} or fewer"
         raise InputError(device, [Fault("drive", what)])
-    recording = with_plausibility(load_recordings(list(recordings), model), model)
+    recording = with_plausibility(load_recordings(recordings, model), model)
     if recording.kind != "poses" or set(recording.channels) != set(READINGS):
         what = f'must be settled poses (kind = "poses") of {", ".join(CHANNELS)}; a Jacobian is calibrated from these'
         raise InputError(recording.title, [Fault("recording", what)])

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ctrlgen.core.counts import number_of
 from ctrlgen.core.files import whole_folder, write_text
+from ctrlgen.core.one_or_several import several
 from ctrlgen.core.steps import noted
 from ctrlgen.devices import Device, files_of, load_device
 from ctrlgen.diagnosis.diagnose import diagnose_recording
@@ -56,33 +57,33 @@ def diagnose(
     seed: int = 0,
     progress: Progress | None = None,
     checkpoint: Checkpoint | None = None,
-    laws: Sequence[str] | None = None,
+    laws: str | Sequence[str] | None = None,
     jobs: int | None = None,
 ) -> Diagnosis:
     """The physics that `recording` shows and `device` leaves out; each may be an object or its file, a recording also several.
 
     Deterministic for a given `seed`, whatever the number of processes, `jobs`: one per core unless given, 0 for this one alone.
-    `progress` is called with a sentence before each step. `laws` restricts the hypotheses to the effects of these names and the
-    device's own parameters. Raises InputError.
+    `progress` is called with a sentence before each step. `laws` restricts the hypotheses to the effects of these names (or of one)
+    and the device's own parameters. Raises InputError.
     """
     device = device if isinstance(device, Device) else load_device(device)
     if not isinstance(recording, Recording):
         if progress:
             progress("reading")
-        paths = [recording] if isinstance(recording, (str, Path)) else list(recording)
         model = build_model(device)
-        recording = with_plausibility(load_recordings(paths, model), model)
-    return diagnose_recording(device, recording, seed, progress, checkpoint, laws, jobs)
+        recording = with_plausibility(load_recordings(recording, model), model)
+    chosen = None if laws is None else several(laws)
+    return diagnose_recording(device, recording, seed, progress, checkpoint, chosen, jobs)
 
 
 def diagnose_into(
     device: Path | str,
-    recordings: Sequence[Path | str],
+    recordings: Paths,
     out: Path | str,
     seed: int = 0,
     progress: Progress | None = None,
     replicates: Replicates | None = None,
-    laws: Sequence[str] | None = None,
+    laws: str | Sequence[str] | None = None,
     jobs: int | None = None,
 ) -> Diagnosis:
     """`diagnose`, reported into the folder `out`, which is replaced as a whole or left unchanged. Raises InputError.
@@ -90,11 +91,13 @@ def diagnose_into(
     An interrupted diagnosis leaves its fits in a file beside `out`; the same call continues from them. With `replicates`
     bootstrap.json is written too, and the diagnosis holds it as `bootstrap`.
     """
+    recordings = several(recordings)
     with whole_folder(Path(out)) as draft:
         step = noted(draft, progress)
         model = build_model(load_device(device))
         step("reading")
-        recording = with_plausibility(load_recordings(list(recordings), model), model)
+        recording = with_plausibility(load_recordings(recordings, model), model)
+        laws = None if laws is None else several(laws)
         checkpoint = _checkpoint(Path(out), device, recordings, seed, laws)
         if checkpoint.reused:
             step(f"continuing after {checkpoint.reused} fits")

@@ -20,6 +20,7 @@ from ctrlgen.budget.sensor_statement import SensorStatement, stated_sensor
 from ctrlgen.budget.uncertainty import FILE, UncertaintyFile
 from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.core.files import read_toml, validate
+from ctrlgen.core.one_or_several import several
 from ctrlgen.core.tabular import Column, Reported, Tabular
 from ctrlgen.learning.implied_pose import ImpliedPose
 from ctrlgen.learning.learning_options import LearningOptions
@@ -105,7 +106,7 @@ def learn(
     Mechatronics 54 (2018) 62; T. T. Cai, Ann. Statist. 27 (1999) 898.
     """
     scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
-    paths = [recordings] if isinstance(recordings, Path | str) else list(recordings)
+    paths = several(recordings)
     progress("symbolic model")
     model = model_of(scenario)
     solution = solve(scenario, model, progress)

@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.one_or_several import several
 from ctrlgen.core.units import show
 from ctrlgen.devices import Device, DevicePhysics, ImposedPhysics, InertialPhysics, Limit, Signal
 from ctrlgen.devices.quantities import shared_path
@@ -28,13 +29,13 @@ NO_RISE = ca.SX(0)  # the surroundings as they are described
 
 def build_model(
     device: Device,
-    free: Sequence[str] = (),
+    free: str | Sequence[str] = (),
     ambient: ca.SX | None = None,
     sample_time: float | None = None,
     per_record: bool = False,
     apart: Collection[int] = (),
 ) -> Model:
-    """The symbolic model of `device`; the parameters named in `free` stay symbols, the others are numbers.
+    """The symbolic model of `device`; the parameters named in `free`, one or several, stay symbols, the others are numbers.
 
     `free` are dotted paths as in `device.quantities()` or, of how far single copies are off, as in `device.copies(path)`; `ambient` is
     a symbol for the rise of the surroundings [K], where that is not zero; without a `sample_time` [s] effects that look back by
@@ -44,6 +45,7 @@ def build_model(
     path that is no parameter or acts on nothing, an effect that does not fit the device, and a restoring force that
     does not rise over the stroke.
     """
+    free = several(free)
     _check_free(device, free)
     model = _assemble(device, free, NO_RISE if ambient is None else ambient, sample_time, per_record, apart)
     told_apart = (k for k, e in enumerate(device.effect) if e.shifts_drive or e.asks or k in apart)

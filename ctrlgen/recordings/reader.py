@@ -17,6 +17,7 @@ from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.file_format import in_this_format
 from ctrlgen.core.files import read_toml, validate
+from ctrlgen.core.one_or_several import several
 from ctrlgen.model.model import Model
 from ctrlgen.recordings import preprocessing, thinning, validation
 from ctrlgen.recordings.begun_elsewhere import begun_elsewhere
@@ -31,13 +32,14 @@ from ctrlgen.recordings.units_of_columns import channel_names
 ONE_CLOCK = "the files go on from each other by their columns of time, which are taken as one clock: {}; `start` says otherwise."
 
 
-def load_recordings(paths: Sequence[Path | str], model: Model, *, hold_out: bool = True) -> Recording:
-    """The recordings in `paths` (each a recording.toml or the folder that holds one) joined and validated.
+def load_recordings(paths: Path | str | Sequence[Path | str], model: Model, *, hold_out: bool = True) -> Recording:
+    """The recordings in `paths` (each a recording.toml or the folder that holds one; one alone, or several) joined and validated.
 
     At least one record must be fitted and one held out; where none has role "hold_out", part of the longest is held out. Without
     `hold_out` every record stays as it is.
     Raises InputError with every fault of every file.
     """
+    paths = several(paths)
     files = [_File(Path(path), model, several=len(paths) > 1) for path in paths]
     if not files:
         raise InputError("recordings", [Fault("paths", "are none; name a recording.toml")])

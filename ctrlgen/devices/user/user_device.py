@@ -20,6 +20,7 @@ from pydantic import create_model
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import validate
+from ctrlgen.core.one_or_several import several
 from ctrlgen.core.units import In, Quantity, same_dimension, written_unit
 from ctrlgen.devices.base import Device
 from ctrlgen.devices.device_physics import BalancedPhysics, DevicePhysics, ImposedPhysics, InertialPhysics
@@ -160,8 +161,8 @@ class UserArguments(TypedDict, total=False):
     """Where the model comes from."""
     machine: Mapping[str, Any]
     """What it is made of, as the `[machine]` table states it."""
-    effect: Sequence[Mapping[str, Any]]
-    """Effects as `[[effect]]` tables state them."""
+    effect: Mapping[str, Any] | Sequence[Mapping[str, Any]]
+    """One effect or several, as `[[effect]]` tables state them."""
 
 
 def user_device(name: str, **given: Unpack[UserArguments]) -> Device:
@@ -232,7 +233,9 @@ def user_device(name: str, **given: Unpack[UserArguments]) -> Device:
         "source": given.get("source", "a user's model"),
         "machine": given.get("machine"),
     }
-    return _validated(description, tables, {"name": name, **plain, "effect": tuple(given.get("effect", ()))}, read)
+    return _validated(
+        description, tables, {"name": name, **plain, "effect": tuple(several(given.get("effect", ())))}, read
+    )
 
 
 @dataclass(frozen=True)
