@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from ctrlgen.core.percent import percent
 from ctrlgen.core.units import show
 from ctrlgen.devices import Device
 from ctrlgen.model.assembly import build_model
@@ -34,7 +35,7 @@ class UnstatedStretching:
 
     def sentence(self) -> str:
         """What is left out, by how much, and what to do."""
-        share = f" ({100 * (self.force / self.linear - 1):+.3g} %)" if self.linear else ""
+        share = f" ({percent(self.force / self.linear - 1, 3, sign=True)})" if self.linear else ""
         stress = ""
         if self.stress is not None:
             label, linear, whole, bound = self.stress

@@ -27,6 +27,7 @@ from ctrlgen.app.viewer.followed_jobs import followed_jobs
 from ctrlgen.app.viewer.found_results import found_results, result_at
 from ctrlgen.app.viewer.viewed_folders import Absent, Place, ViewedFolders
 from ctrlgen.core.counts import number_of
+from ctrlgen.core.percent import percent
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.numbers import number
 from ctrlgen.version import program
@@ -273,7 +274,7 @@ def _cells(row: ComparedRow) -> list[dict[str, Any]]:
     change = ""
     if row.is_number and row.difference:
         a, b = float(row.a or 0), float(row.b or 0)
-        change = f"{100 * (b - a) / abs(a):+.3g} %" if a else f"{b - a:+.3g}"
+        change = percent((b - a) / abs(a), 3, sign=True) if a else f"{b - a:+.3g}"
     elif row.difference:
         change = "only one" if None in (row.a, row.b) else "other"
     return [{"text": text, "short": len(text) < 30} for text in (*texts, change)]

@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 
 from ctrlgen.core.errors import Fault
+from ctrlgen.core.percent import percent
 from ctrlgen.core.units import show
 from ctrlgen.devices.mechanism.condensed import KEPT, Condensed, nominal
 from ctrlgen.devices.mechanism.drawing import Drawing
@@ -158,10 +159,10 @@ class CondensedMode:
     def __str__(self) -> str:
         if self.whole is None:
             return f"{show(self.frequency, 'Hz')} (no single mode of the whole)"
-        off = 100 * (self.frequency / self.whole - 1)
-        if abs(off) < 100 * ROUNDING:
+        off = self.frequency / self.whole - 1
+        if abs(off) < ROUNDING:
             return f"{show(self.frequency, 'Hz')} (that of the bodies)"
-        return f"{show(self.frequency, 'Hz')} ({off:+.2g} % of {show(self.whole, 'Hz')})"
+        return f"{show(self.frequency, 'Hz')} ({percent(off, sign=True)} of {show(self.whole, 'Hz')})"
 
 
 def condensed_modes(device: Drawing, whole: Modes | None = None) -> tuple[tuple[CondensedMode, ...], float | None]:
