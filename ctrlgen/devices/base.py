@@ -145,6 +145,10 @@ class Device(Shown, Section):
         """The same device with flexures that stretch where its model leaves that out; None where there are none."""
         return None
 
+    def load_remarks(self) -> list[str]:
+        """Where its model does not hold what constant loads do to its stiffness, and by how much that is off."""
+        return []
+
     def remarks(self) -> list[str]:
         """Remarks on the description for the reader, such as an equation that is used outside its range."""
         return []

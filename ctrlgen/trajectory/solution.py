@@ -85,11 +85,11 @@ class Solution(Tabular, Reported):
         """What flexures do along the path whose stretching the model leaves out; None where that is nothing."""
         return unstated_stretching(self.model, self.trace, self.drive)
 
-    @property
+    @cached_property
     def left_out(self) -> tuple[str, ...]:
-        """In sentences what the device's file states and the model leaves out, where the path notices."""
+        """In sentences what the device's file states and the model leaves out, where the path notices; or loads, where stiffness does."""
         told = (self.unstated_inertia, self.unstated_modes, self.unstated_stretching)
-        return tuple(each.sentence() for each in told if each is not None)
+        return (*(each.sentence() for each in told if each is not None), *self.model.device.load_remarks())
 
     def columns(self) -> tuple[Column, ...]:
         """Those of its trace, and the commanded signal as command.channel."""

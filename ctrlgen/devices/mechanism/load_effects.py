@@ -6,14 +6,18 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import Fault
+from ctrlgen.core.percent import percent
 from ctrlgen.core.units import show
 from ctrlgen.devices.mechanism.condensed import Condensed, nominal
 from ctrlgen.devices.mechanism.drawing import Drawing
+from ctrlgen.devices.mechanism.loaded_tangent import PressedFlexure, loaded_tangent
 from ctrlgen.devices.mechanism.loads import Loads
 from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.physics.screw import TWIST, inverse_adjoint
 
 STILL = 1e-6  # of the largest component of a motion, below which it is rounding of a symmetric drawing
+SLIGHT = 0.1  # |p| of a flexure that is hardly pressed: its stiffness changes by a hundredth
+HOLDS = 0.01  # of the stiffness of an axis: what it may be off by under the loads without a word
 
 
 def load_faults(device: Drawing) -> list[Fault]:
@@ -33,11 +37,45 @@ def load_faults(device: Drawing) -> list[Fault]:
         return [Fault("load", what)]
     if c.cubics:
         return [Fault("load", "constant loads beside cubic springs are not held by the model; leave out one of them")]
-    loads = Loads(c, SecondOrder(c))
-    K = ca.DM(ca.evalf(ca.SX(c.held_stiffness))).full()
-    if np.linalg.eigvalsh(K + ca.DM(loads.stiffness).full()).min() <= 0:
-        return [Fault("load", "the loads buckle the mechanism: make it stiffer, or load it less")]
-    return []
+    tangent = loaded_tangent(c)
+    faults = [Fault("load", _buckled(e)) for e in tangent.flexures if e.buckles]
+    K = ca.DM(ca.evalf(ca.SX(c.held_stiffness))).full() + ca.DM(tangent.loads.stiffness).full()
+    if not faults and (np.linalg.eigvalsh((K + K.T) / 2).min() <= 0 or tangent.buckles):
+        faults.append(Fault("load", "the loads buckle the mechanism: make it stiffer, or load it less"))
+    return faults
+
+
+def _buckled(e: PressedFlexure) -> str:
+    """Of a flexure that no bodies could hold."""
+    return (
+        f"{e.name} is pressed by {show(-e.tension, 'N')} and buckles at {show(e.buckling_load, 'N')} even between ends that do not "
+        "turn (4 pi^2 EI/l^2 where it is uniform): make it thicker or shorter, or load it less"
+    )
+
+
+def load_remarks(device: Drawing) -> list[str]:
+    """Axes whose stiffness under the constant loads the model has to worse than `HOLDS`, by how much, and up to which loads it holds."""
+    if not (device.load or device.gravity):
+        return []
+    c = nominal(device)
+    tangent = loaded_tangent(c)
+    if not c.pushes or np.abs(off := tangent.off()).max() <= HOLDS or not tangent.flexures:
+        return []
+    most, pressed = max(tangent.flexures, key=lambda e: abs(e.p)), ""
+    if abs(most.p) > SLIGHT:
+        word = "pressed" if most.tension < 0 else "pulled"
+        pressed = (
+            f"{most.name} is {word} by {show(abs(most.tension), 'N')}, p = N l^2/EI = {float(f'{most.p:.2g}'):g}: "
+        )
+    axes = ", ".join(
+        f"{a.name} by {percent(x, sign=True)}"
+        for a, x in zip(device.placed_actuators, off, strict=True)
+        if abs(x) > HOLDS
+    )
+    return [
+        f"under the constant loads {pressed}the stiffness that they leave, which the model has to first order in them, is off ({axes} of "
+        f"what beam-columns have); it is right to {percent(HOLDS)} up to {percent(tangent.holds_to(HOLDS))} of these loads"
+    ]
 
 
 def load_lines(device: Drawing) -> list[str]:
@@ -55,10 +93,8 @@ def load_lines(device: Drawing) -> list[str]:
     lines[0] += f"; the axes held: {_motion(ca.DM(at).full() @ ca.DM(loads.held[body]).full())}"
     K, K_F = (ca.DM(ca.evalf(ca.SX(x))).full() for x in (c.held_stiffness, loads.stiffness))
     for i, a in enumerate(device.placed_actuators):
-        share = 100 * K_F[i, i] / K[i, i]
-        lines.append(
-            f"loads push {a.name} by {show(float(loads.force[i]), 'N')} and change its stiffness by {share:+.2g} %"
-        )
+        share = percent(K_F[i, i] / K[i, i], sign=True)
+        lines.append(f"loads push {a.name} by {show(float(loads.force[i]), 'N')} and change its stiffness by {share}")
     return lines
 
 

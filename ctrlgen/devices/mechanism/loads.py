@@ -8,7 +8,7 @@ With the axes held in place the loads F move the bodies by T_h and put W_h into 
 
 f = T_1' F their force on the axes, s_2 the second order of the actuators' travels. A moment M that keeps half of its axis has the
 work M . theta, no more. K_F of a blade pressed by P between guided ends is -6 P/(5 l). Higher powers of the loads, as near buckling,
-are left out.
+are left out; `loaded_tangent` tells what they are.
 
 Source: geometric stiffness, J. S. Przemieniecki, Theory of Matrix Structural Analysis (1968), chapter 15.
 """

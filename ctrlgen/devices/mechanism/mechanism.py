@@ -31,7 +31,7 @@ from ctrlgen.devices.mechanism.force_readings import reach as load_reach
 from ctrlgen.devices.mechanism.force_readings import unloaded
 from ctrlgen.devices.mechanism.internal_modes import structural_model
 from ctrlgen.devices.mechanism.linear_range import second_order_faults, stiffened
-from ctrlgen.devices.mechanism.load_effects import load_faults
+from ctrlgen.devices.mechanism.load_effects import load_faults, load_remarks
 from ctrlgen.devices.mechanism.mechanism_physics import mechanism_physics
 from ctrlgen.devices.mechanism.mode_shapes import mode_shapes
 from ctrlgen.devices.mechanism.modes import guyan_modes, inertia_faults, inertia_remarks
@@ -371,7 +371,7 @@ class Mechanism(CopiedParts):
         return None if elements is None else self.model_copy(update={"element": elements})
 
     def remarks(self) -> list[str]:
-        """Remarks on flexures outside of the range of their equations, and on inertia that the condensed model does not show."""
+        """Remarks on flexures and loads outside of the range of their equations, and on inertia that the condensed model does not show."""
         dense = {m.name for m in self.material if m.density is not None}
         light = [
             f"{e.name}: a hinge has no mass of its own; count it to the bodies that it joins"
@@ -379,7 +379,16 @@ class Mechanism(CopiedParts):
             if isinstance(e, CircularHinge) and e.material in dense
         ]
         parts = (*self.element, *self.super_element)
-        return [f"{e.name}: {note}" for e in parts for note in e.notes()] + light + inertia_remarks(self)
+        return (
+            [f"{e.name}: {note}" for e in parts for note in e.notes()]
+            + light
+            + inertia_remarks(self)
+            + self.load_remarks()
+        )
+
+    def load_remarks(self) -> list[str]:
+        """Where the stiffness under constant loads is off."""
+        return load_remarks(self)
 
     def physics(self, p: SimpleNamespace) -> DevicePhysics:
         """The condensed mechanism with the values `p`."""
