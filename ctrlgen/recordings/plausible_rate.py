@@ -17,6 +17,8 @@ from ctrlgen.recordings.schema import RecordTable
 SLOWEST = 5.0  # periods of the lowest natural frequency between two samples: nothing of its motion is seen
 SHORTEST = 0.1  # of that period, of a whole record: nothing of it happens
 UNITS = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "hour": 3600.0, "day": 86400.0}
+LONG = ("min", "hour")
+LEAST = 1e-4  # of these from one row to the next: nobody writes fewer
 USUAL = (1e-4, 0.25)  # of a period between two samples: as recorders of a device with inertia are set
 WRONG_RATES = {
     1e-3: "the time is in ms where s is written, or a rate in kHz where Hz is",
@@ -72,14 +74,16 @@ def rate_notes(records: Sequence[Record], model: Model, table: RecordTable) -> l
         return []
     beside = f"a period of the device's lowest natural frequency takes {1e3 / frequency:.4g} ms"
     apart = f"{record.name}: samples are {step:.4g} s apart and the record is {length:.4g} s long, where {beside}"
-    return [f"{apart}; {_mend(step, frequency, table)}."]
+    return [f"{apart}; {_mend(step, frequency, table)}"]
 
 
 def _mend(step: float, frequency: float, table: RecordTable) -> str:
-    """The unit of time with which the rate would be usual."""
+    """The unit of time, another than the written one, with which the rate would be usual, as the end of a sentence."""
     if table.time is None:
         return "is sample_rate right?"
     own = UNITS.get(table.time.unit)
-    fitting = [unit for unit, size in UNITS.items() if own and USUAL[0] < step / own * size * frequency < USUAL[1]]
+    others = {unit: size for unit, size in UNITS.items() if unit != table.time.unit}  # the written one is what is odd
+    fitting = [unit for unit, size in others.items() if own and USUAL[0] < step / own * size * frequency < USUAL[1]]
+    fitting = [unit for unit in fitting if unit not in LONG or (own and step / own > LEAST)]
     near = min(fitting, key=lambda unit: abs(np.log(UNITS[unit] / own)), default=None) if own else None
-    return f'if the time is in {near}, write unit = "{near}"' if near else "is the unit of its time right?"
+    return f'if the time is in {near}, write unit = "{near}".' if near else "is the unit of its time right?"

@@ -13,7 +13,7 @@ CAN = (
 )
 ROS = "is what ROS prints of each message; print a table instead: rostopic echo -p /topic > log.csv, or ros2 topic echo --csv /topic"
 SHORTENED = "is a print with rows left out (...); save the whole table, as to_csv does"
-WRAPPED = "is a print of MATLAB whose columns are broken into blocks; save it with writematrix"
+WRAPPED = "is a print of a matrix whose columns are broken into blocks; save it with writematrix, or as CSV"
 BYTE = r"[0-9A-Fa-f]{2}"
 CELL = r"(?:^|[,;\t|])\s*\"?(?:{})\"?\s*(?:[,;\t|]|$)".format
 """A whole cell: such words occur in comments and in names of readings too."""
@@ -40,7 +40,7 @@ HEADS = (
         "is VCD, changes of digital signals; export its signals as CSV",
     ),
     (re.compile(r"\s*<(!doctype html|html|table)\b.*", re.I), "is a page of HTML; save its table as CSV"),
-    (re.compile(r"\s*Columns \d+ (through|and) \d+\s*"), WRAPPED),
+    (re.compile(r"\s*columns? \d+ (through|thru|and|to) \d+:?\s*", re.I), WRAPPED),
     (re.compile(r"\s*(\d*\s+)?(\.\.\.?\s+){2,}\.\.\.?\s*"), SHORTENED),
     (re.compile(r"[\s|\u2502]*(\u2026[\s|\u2502\u2506]*){2,}"), SHORTENED),
 )

@@ -19,6 +19,7 @@ from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import InputError
 from ctrlgen.recordings.formats import number_cells, text_file
 from ctrlgen.recordings.formats.checked_files import LARGEST
+from ctrlgen.recordings.formats.common_factor import factor_lines
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
 from ctrlgen.recordings.formats.named_lines import are_named
 from ctrlgen.recordings.formats.text_blocks import Block
@@ -120,6 +121,8 @@ def _plan(path: Path, file: BinaryIO, layout: Layout) -> _Plan:
         raise _Otherwise from None
     lines = text.split("\n")
     table = tables[0]
+    if factor_lines(lines):  # it would have to multiply every piece
+        raise _Otherwise
     if len(tables) > 1 or not len(table.lines) or table.aliases or len(table.columns) < 2:
         raise _Otherwise
     first, last = table.lines[0], table.lines[-1]

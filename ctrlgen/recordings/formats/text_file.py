@@ -14,6 +14,7 @@ import numpy as np
 from ctrlgen.core.counts import number_of
 from ctrlgen.recordings.formats import number_cells
 from ctrlgen.recordings.formats.checked_files import fault
+from ctrlgen.recordings.formats.common_factor import factor_lines, factor_of, multiplied
 from ctrlgen.recordings.formats.foreign_text import foreign
 from ctrlgen.recordings.formats.header_rows import LONGEST_SHOWN
 from ctrlgen.recordings.formats.layout_question import Ambiguous, AmbiguousFile
@@ -57,6 +58,8 @@ def tables_of_text(path: Path, text: str, layout: Layout, notes: Sequence[str] =
     if (of_names := named_table(path, lines, notes, layout)) is not None:
         return [of_names]
     lines = whole_lines(lines)
+    factors = factor_lines(lines)
+    lines = ["" if k in factors else line for k, line in enumerate(lines)]
     if stray := stray_quotes(lines):
         listed = ", ".join(f"line {k}" for k in stray[:MOST_LISTED]) + (", ..." if len(stray) > MOST_LISTED else "")
         raise fault(
@@ -77,7 +80,10 @@ def tables_of_text(path: Path, text: str, layout: Layout, notes: Sequence[str] =
                 raise fault(path, f"{what}; write the names once, above the columns, and rows of numbers alone")
             what = f"holds no rows of numbers (cells separated by {NAMES.get(separator, repr(separator))})"
             raise Ambiguous(what, {'separator = ";"': "(for one) with its separator, or export the numbers as text"})
-        return [_table(path, lines, block, separator, layout, notes) for block in blocks]
+        scaled = [factor_of(lines, factors, block, separator) for block in blocks]
+        return [
+            _table(path, lines, block, separator, layout, notes, *by) for block, by in zip(blocks, scaled, strict=True)
+        ]
     except Ambiguous as error:
         raise AmbiguousFile(path, error) from None
 
@@ -91,7 +97,14 @@ def _blocks(lines: list[str], separator: str, layout: Layout) -> list[Block]:
 
 
 def _table(
-    path: Path, lines: list[str], block: Block, separator: str, layout: Layout, said: Sequence[str]
+    path: Path,
+    lines: list[str],
+    block: Block,
+    separator: str,
+    layout: Layout,
+    said: Sequence[str],
+    factor_line: int,
+    factor: float,
 ) -> MeasurementTable:
     header = header_of(lines, block, separator, layout)
     rows = [*header.more_rows, *block.rows][header.in_first_row :]
@@ -100,6 +113,8 @@ def _table(
     style, notes = number_cells.style_of(cells, layout, separator)
     dated = " " in cells[0][0] and not lines[rows[0]].lstrip().startswith('"')
     columns = columns_of("\n".join(lines[k] for k in rows), block, separator, style, dated)
+    columns, multiplication = multiplied(columns, factor_line, factor)
+    notes += multiplication
     if not any(header.names) and lies_on_its_side(columns):
         return on_its_side(path, columns, (*said, *header.notes, *notes), layout, style)
     names, units = list(header.names), dict(header.units)

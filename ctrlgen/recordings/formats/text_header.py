@@ -60,9 +60,10 @@ def header_of(lines: Sequence[str], block: Block, separator: str, layout: Layout
 
 
 def _is_entry(cells: Sequence[str]) -> bool:
-    """Whether two cells are a key and what it says, as `Date:, 05 MAR 2024`, and no names of two columns."""
+    """Whether two cells are a key and what it says, as `Date:, 05 MAR 2024`, or what a program prints before a matrix, `data =`, and no
+    names of two columns."""
     label = cells[0].removesuffix(":").strip().lower()
-    return (
+    return (len(cells) == 2 and cells[1] == "=") or (
         len(cells) == 2
         and cells[0].endswith(":")
         and not cells[1].endswith(":")
