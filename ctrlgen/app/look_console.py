@@ -115,7 +115,8 @@ def print_table(facts: TableFacts) -> None:
     for column in facts.columns:
         shown.add_row(escape(column.name), escape(column.unit or "not stated"), *_numbers(facts, column))
     show_table(shown)
-    for note in dict.fromkeys((*facts.table.notes, *(note for c in facts.columns for note in c.notes))):
+    of_time = () if facts.time is None else facts.time.notes
+    for note in dict.fromkeys((*facts.table.notes, *of_time, *(note for c in facts.columns for note in c.notes))):
         out.print(f"  read: {note}", markup=False, soft_wrap=True)
     for question in (c.question for c in facts.columns if c.question is not None):
         out.print(f"  to be answered: {question.asked(layout_option)}", markup=False, soft_wrap=True)

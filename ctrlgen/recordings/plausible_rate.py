@@ -60,8 +60,11 @@ def _left(seen: Moved, factor: float, lag: float = 0.0) -> float:
     return 1 - float(coefficients(seen.stepped(factor), lag).explained.mean())
 
 
-def rate_notes(records: Sequence[Record], model: Model, table: RecordTable) -> list[str]:
-    """A note where samples are so far apart, or a record so short, that nothing of the device's own motion can be in it."""
+def rate_notes(records: Sequence[Record], model: Model, table: RecordTable, dated: bool = False) -> list[str]:
+    """A note where samples are so far apart, or a record so short, that nothing of the device's own motion can be in it.
+
+    `dated`: the time is dates or a clock, which are in seconds whatever is written.
+    """
     if not records or not model.inertial or table.role == "rest":
         return []
     record = records[0]
@@ -74,7 +77,7 @@ def rate_notes(records: Sequence[Record], model: Model, table: RecordTable) -> l
         return []
     beside = f"a period of the device's lowest natural frequency takes {1e3 / frequency:.4g} ms"
     apart = f"{record.name}: samples are {step:.4g} s apart and the record is {length:.4g} s long, where {beside}"
-    return [f"{apart}; {_mend(step, frequency, table)}"]
+    return [f"{apart}; {'are all digits of its time in the file?' if dated else _mend(step, frequency, table)}"]
 
 
 def _mend(step: float, frequency: float, table: RecordTable) -> str:

@@ -260,7 +260,8 @@ class _File:
             records += result.records
             places += [where] * len(result.records)
             notes += [note for note in reader.notes if note not in notes] + list(result.notes)
-            notes += rate_notes(result.records, self.model, table) if self.written.kind == "series" else []
+            dated = reader.read_from.dated
+            notes += rate_notes(result.records, self.model, table, dated) if self.written.kind == "series" else []
             faults += result.faults
             if result.records:
                 spans.append((k, table, result.records[0].time[0], result.records[-1].time[-1]))

@@ -27,6 +27,8 @@ class RecordedColumns:
         self.notes: list[str] = []
         # [s] when the record's first row was, by its column of time
         self.begin = 0.0
+        # whether that time is dates or a clock: its unit is no question then
+        self.dated = False
         self.files: dict[str, MeasurementTable | None] = {}
         self.clocks: dict[str, Clock] = {}
         self.used: dict[str, list[str]] = {}
@@ -55,7 +57,7 @@ class RecordedColumns:
             self.faults += [Fault(where, f"{file} {fault.what}") for fault in error.faults]
             return None
         if is_time:
-            self.begin = given.begin
+            self.begin, self.dated = given.begin, given.dated
         self.used.setdefault(file, []).append(name)
         if not self.differing and (differing := table.differing_times(self.used[file])):
             self.differing = True

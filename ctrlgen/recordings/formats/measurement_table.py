@@ -15,7 +15,7 @@ import numpy as np
 from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import to_si
-from ctrlgen.recordings.formats import number_cells, over_range, time_stamps, wrapped_counters
+from ctrlgen.recordings.formats import clock_numbers, number_cells, over_range, time_stamps, wrapped_counters
 from ctrlgen.recordings.formats.layout_question import Ambiguous, AmbiguousFile
 from ctrlgen.recordings.formats.number_cells import NumberStyle
 from ctrlgen.recordings.formats.unit_texts import bare_name, split_name
@@ -33,11 +33,12 @@ class Clock(NamedTuple):
 
 class Numbers(NamedTuple):
     """A column as float64 (n,), NaN where there is no reading, and what was interpreted on the way, one line each; of a time when the
-    first was, `begin` [s] on the column's own clock."""
+    first was, `begin` [s] on the column's own clock, and whether it is `dated`: dates or a clock, whose unit is no question."""
 
     values: np.ndarray
     notes: tuple[str, ...] = ()
     begin: float = 0.0
+    dated: bool = False
 
 
 @dataclass(frozen=True)
@@ -158,9 +159,15 @@ class MeasurementTable:
                 raise self.fault(
                     f'column {name!r} holds time stamps, which are read as seconds: write unit = "s", not "{unit}"'
                 )
-            return Numbers(stamps.values, stamps.notes, stamps.begin)
+            return Numbers(stamps.values, stamps.notes, stamps.begin, dated=True)
         if column.dtype.kind == "O":
             column = self._exact(name, column)
+        if (clock := clock_numbers.clock_of(np.asarray(column, dtype=float))) is not None:
+            if unit != "s" or scale != 1:
+                what = f"holds a clock written as numbers (115559 is 11:55:59), which is read as seconds, not as {scale:g} {unit}"
+                raise self.fault(f'column {name!r} {what}: write unit = "s" without a scale')
+            begin = float(clock[np.isfinite(clock)][0])
+            return Numbers(np.round(clock - begin, 6), (f"{name} {clock_numbers.AS_SECONDS}",), begin, dated=True)
         try:
             values, notes = time_stamps.from_first(column, unit, scale)
         except ValueError as error:

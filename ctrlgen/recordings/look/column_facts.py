@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import same_dimension, to_si
+from ctrlgen.recordings.formats.clock_numbers import clock_of
 from ctrlgen.recordings.formats.layout_question import Ambiguous, AmbiguousFile
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
 from ctrlgen.recordings.formats.time_stamps import TIME_NAME, epoch_unit
@@ -96,7 +97,7 @@ class ColumnFacts:
 @dataclass(frozen=True)
 class TimeFacts:
     """The time of a table's rows: `column`, its `unit`, `stamps` whether they are dates, median `step` [s], rms `jitter` [s], `gaps`: (row
-    before, missing rows), `backward`: rows that are earlier than the one before."""
+    before, missing rows), `backward`: rows that are earlier than the one before, `notes`: what was interpreted to read it."""
 
     column: str
     unit: str
@@ -105,6 +106,7 @@ class TimeFacts:
     jitter: float
     gaps: tuple[tuple[int, int], ...]
     backward: int
+    notes: tuple[str, ...] = field(default=(), compare=False)
 
 
 @dataclass(frozen=True)
@@ -194,11 +196,12 @@ def _time_in(table: MeasurementTable, facts: ColumnFacts, chosen: bool) -> TimeF
         return None
     try:
         size = 1.0 if stamps else to_si(1.0, unit) * facts.scale
-        seconds = table.time(facts.name, "s" if stamps else unit, facts.scale).values * size
+        read = table.time(facts.name, "s" if stamps else unit, facts.scale)
     except AmbiguousFile:
         raise
     except InputError:
         return None
+    seconds = read.values * size
     steps = np.diff(seconds[np.isfinite(seconds)])
     if len(steps) < 2 or not np.median(steps) > 0:
         return None
@@ -206,7 +209,8 @@ def _time_in(table: MeasurementTable, facts: ColumnFacts, chosen: bool) -> TimeF
     even = steps[np.abs(steps / step - 1) < GAP - 1]
     gaps = tuple((int(k), round(float(steps[k] / step)) - 1) for k in np.flatnonzero(steps > GAP * step))
     jitter = float(np.sqrt(np.mean((even - step) ** 2))) if len(even) else 0.0
-    return TimeFacts(facts.name, "s" if stamps else unit, stamps, step, jitter, gaps, int(np.sum(steps <= 0)))
+    backward = int(np.sum(steps <= 0))
+    return TimeFacts(facts.name, "s" if stamps else unit, stamps, step, jitter, gaps, backward, read.notes)
 
 
 def is_a_time(column: ColumnFacts) -> bool:
@@ -222,7 +226,8 @@ def counted_step(facts: TableFacts) -> float:
         return 0.0
     column = facts.column(facts.time.column)
     counts = bool(np.all(column.finite == np.round(column.finite)))
-    return facts.time.step if column.unit is None and counts and epoch_unit(column.finite) is None else 0.0
+    known = column.unit is not None or epoch_unit(column.finite) is not None or clock_of(column.finite) is not None
+    return facts.time.step if counts and not known else 0.0
 
 
 def is_a_count(column: ColumnFacts) -> bool:
