@@ -14,6 +14,7 @@ from ctrlgen.recordings.alike_units import alike, size_of
 from ctrlgen.recordings.moved import Moved, moved
 from ctrlgen.recordings.plausible_order import column_notes, row_notes, speed_notes
 from ctrlgen.recordings.plausible_rate import dynamics_notes
+from ctrlgen.recordings.plausible_reach import reach_notes
 from ctrlgen.recordings.plausible_scale import size_notes, zero_notes
 from ctrlgen.recordings.plausible_units import WRONG, unit_notes
 from ctrlgen.recordings.recording import Recording
@@ -35,9 +36,10 @@ class Implausible(str):
 def with_plausibility(recording: Recording, model: Model) -> Recording:
     """The recording with a note for each thing of it that cannot be of the device as it is stated."""
     seen = moved(recording, model)
-    if seen is None:
-        return recording
-    return replace(recording, notes=(*recording.notes, *map(Implausible, implausible(seen))))
+    said = [] if seen is None else implausible(seen)
+    # a unit that is wrong takes every sample as far
+    said += [note for name, note in reach_notes(recording, model).items() if not any(s.startswith(name) for s in said)]
+    return replace(recording, notes=(*recording.notes, *map(Implausible, said))) if said else recording
 
 
 def suspected(notes: Sequence[str]) -> list[Fault]:

@@ -135,11 +135,9 @@ class MeasurementTable:
             for m in marks
         ]
         if (again := wrapped_counters.wrapped(values)) is not None:
-            times = number_of(len(again.rows), "time")
-            notes.append(
-                f"{name}: jumps from one end of {again.words} to the other {times} ({self._first(int(again.rows[0]))}), as numbers do that "
-                f"begin again: write it unwrapped (numpy.unwrap with period={again.size:g}), or these rows are jumps of the reading"
-            )
+            times = f"{number_of(len(again.rows), 'time')} ({self._first(int(again.rows[0]))})"
+            what = f"{name}: jumps from one end of {again.words} to the other {times}, {again.told}"
+            notes.append(f"{what}, or these rows are jumps of the reading")
         return Numbers(values, tuple(notes))
 
     def time(self, name: str, unit: str, scale: float = 1.0) -> Numbers:

@@ -1,4 +1,5 @@
-"""Numbers that begin again from the other end of their range: counters of so many bits, angles after a whole turn."""
+"""Numbers that begin again from the other end of their range: counters of so many bits, signed counts that were written without their sign,
+angles after a whole turn."""
 
 from __future__ import annotations
 
@@ -11,21 +12,34 @@ TURN = 360.0  # degrees
 JUMP = 0.75  # of the range: what falls so far from one row to the next began again
 STEADY = 0.25  # of the range: what moves less between all other rows does not jump otherwise
 EVEN = 0.25  # of a step: how exactly a clock that began again goes on
+DIFFERENT = 16  # counts, with their sign, from which they are a motion about zero: two ends with noise hold fewer
+SLOW = 10.0  # usual steps that such a motion spans at least
 
 
 class Wrapped(NamedTuple):
-    """A range after which numbers begin again, in words, and the rows before which they do."""
+    """A range after which numbers begin again, in words, and the rows before which they do; whether they are `signed` counts that were
+    written without their sign."""
 
     size: float
     words: str
     rows: np.ndarray
+    signed: bool = False
+
+    @property
+    def told(self) -> str:
+        """What is to be told of them, behind their column and the times that they jump."""
+        if not self.signed:
+            return f"as numbers do that begin again: write it unwrapped (numpy.unwrap with period={self.size:.15g})"
+        mend = f"write {self.size:.15g} less for those from {self.size / 2:.15g} on (numpy.unwrap with period={self.size:.15g})"
+        return f"as signed counts do that are written without their sign: {mend}"
 
 
 def wrapped(values: np.ndarray) -> Wrapped | None:
     """How the numbers (n,) of a column begin again; None where they do not.
 
     They jump by nearly their whole range, whole numbers that of a counter or others a turn, and move little before, after and elsewhere.
-    Numbers that stand still at the ends of their range are full steps of a drive.
+    Numbers that stand still at the ends of their range are full steps of a drive, unless they are a smooth motion about zero as signed
+    counts: noise of a few counts about zero jumps in every other row and repeats its numbers.
     """
     known = np.flatnonzero(np.isfinite(values))
     y = values[known]
@@ -37,6 +51,8 @@ def wrapped(values: np.ndarray) -> Wrapped | None:
         return None
     steps = np.diff(y)
     jumps = np.abs(steps) > JUMP * size
+    if size != TURN and low >= 0 and jumps.any() and _are_signed(y, size):
+        return Wrapped(size, words, known[np.flatnonzero(jumps) + 1], signed=True)
     others = np.abs(steps[~jumps])
     if not 0 < jumps.sum() < len(steps) / 4 or others.max() > STEADY * size:
         return None
@@ -46,6 +62,17 @@ def wrapped(values: np.ndarray) -> Wrapped | None:
     if np.abs(through).max() > 2 * max(others.max(), 1.0 if size != TURN else 0.0) or not moving.all():
         return None
     return Wrapped(size, words, known[beside + 1])
+
+
+def _are_signed(y: np.ndarray, size: float) -> bool:
+    """Whether whole numbers (n,) are a slow motion about zero once those of the upper half of their range are taken as negative."""
+    signed = np.where(y >= size / 2, y - size, y)
+    steps = np.abs(np.diff(signed))
+    if len(np.unique(signed)) < DIFFERENT or steps.max() > STEADY * size:
+        return False
+    crossing = np.diff(signed < 0)
+    elsewhere = steps[~crossing].max(initial=1.0)
+    return bool(np.ptp(signed) > SLOW * np.median(steps) and steps[crossing].max(initial=0.0) <= 2 * elsewhere)
 
 
 def _range(y: np.ndarray, low: float, high: float) -> tuple[float, str]:
