@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -57,7 +58,9 @@ def look(
         write_text(to, schema_line("recording", to) + text)
         print_proposal(proposal)
         out.print(str(to), soft_wrap=True, markup=False)
-        out.print(f"next:  ctrlgen check {to} --device {device}", soft_wrap=True, markup=False)
+        out.print(
+            f"next:  {shlex.join(['ctrlgen', 'check', str(to), '--device', str(device)])}", soft_wrap=True, markup=False
+        )
 
 
 def described(paths: Sequence[Path], device: Path) -> list[Path]:
@@ -69,7 +72,7 @@ def described(paths: Sequence[Path], device: Path) -> list[Path]:
     if not files:
         return list(paths)
     written = files[0].with_name(f"{files[0].stem}.recording.toml")
-    look_at = f"ctrlgen look {' '.join(map(str, files))} --device {device} --to {written}"
+    look_at = shlex.join(["ctrlgen", "look", *map(str, files), "--device", str(device), "--to", str(written)])
     tables = [_read(file, NOTHING, look_at) for file in files]
     proposal = propose(tables, build_model(load_device(device)))
     if not proposal.certain:

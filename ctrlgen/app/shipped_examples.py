@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,10 +47,8 @@ class Example:
     def command(self, folder: Path) -> str:
         """What to type to try its copy in `folder`."""
         copy, device = folder / self.name, folder / self.device.relative_to(self.file.parent.parent)
-        result = f"--out {Path('out') / self.name}"
-        if not self.recorded:
-            return f"ctrlgen run {copy} {result}"
-        return f"ctrlgen diagnose {device} {copy / self.file.name} {result}"
+        tried = ["diagnose", device, copy / self.file.name] if self.recorded else ["run", copy]
+        return shlex.join(map(str, ["ctrlgen", *tried, "--out", Path("out") / self.name]))
 
 
 def examples() -> list[Example]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -71,8 +72,8 @@ def device(
     write_device(file, kind, name, given)
     name_schema("device", file)
     out.print(str(file), soft_wrap=True, markup=False)
-    out.print(f"next:  ctrlgen check {file}", soft_wrap=True, markup=False)
-    out.print(f"then:  ctrlgen new scenario circle --device {file}", soft_wrap=True, markup=False)
+    out.print(f"next:  ctrlgen check {shlex.quote(str(file))}", soft_wrap=True, markup=False)
+    out.print(f"then:  ctrlgen new scenario circle --device {shlex.quote(str(file))}", soft_wrap=True, markup=False)
 
 
 @new.command()
@@ -93,7 +94,8 @@ def scenario(
     write_scenario(folder, device_path, path or None)
     name_schema("scenario", folder / "scenario.toml")
     out.print(str(folder / "scenario.toml"), soft_wrap=True, markup=False)
-    out.print(f"next:  ctrlgen run {folder} --out out/{folder.name}", soft_wrap=True, markup=False)
+    command = ["ctrlgen", "run", str(folder), "--out", f"out/{folder.name}"]
+    out.print(f"next:  {shlex.join(command)}", soft_wrap=True, markup=False)
 
 
 @new.command()

@@ -74,8 +74,8 @@ class Match:
     @property
     def option(self) -> str:
         """What says on the command line that it is so."""
-        column = shlex.quote(f"{self.signal}={self.column}")
-        return f"--column {column}" + ("" if self.stated else f" --unit {self.signal}={self.unit}")
+        unit = [] if self.stated else ["--unit", f"{self.signal}={self.unit}"]
+        return shlex.join(["--column", f"{self.signal}={self.column}", *unit])
 
 
 @dataclass(frozen=True)
@@ -155,13 +155,13 @@ def propose(tables: Sequence[TableFacts], model: Model, answers: Answers = NOTHI
     found = {match.signal for match in matches}
     left = [c.name for c in columns if c.name not in {m.column for m in matches}]
     asked = [
-        f"{name}: which column? Free are {', '.join(left) or 'none'} (--column {name}=COLUMN)"
+        f"{name}: which column? Free are {', '.join(left) or 'none'} ({shlex.join(['--column', f'{name}=COLUMN'])})"
         for name in signals
         if name.startswith("drive.") and name not in found
     ]
     if not any(name.startswith("reading.") for name in found):
         known = next(name for name in signals if name.startswith("reading."))
-        asked.append(f"no column was recognised as a reading (--column {known}=COLUMN)")
+        asked.append(f"no column was recognised as a reading ({shlex.join(['--column', f'{known}=COLUMN'])})")
     if first.time is None and answers.rate is None and not answers.poses:
         stated, says = (
             first.table.stated_rate,
@@ -173,7 +173,8 @@ def propose(tables: Sequence[TableFacts], model: Model, answers: Answers = NOTHI
     elif first.time is not None and answers.rate is None and (step := counted_step(first)):
         name = first.time.column
         asked.append(
-            f"time is column {name!r}: the file states no unit, s is assumed, {step:g} s from row to row (--unit {name}=s)"
+            f"time is column {name!r}: the file states no unit, s is assumed, {step:g} s from row to row "
+            f"({shlex.join(['--unit', f'{name}=s'])})"
         )
     if any(name not in found for name in signals):  # which an unread column may be
         asked += [c.question.asked(layout_option) for c in first.columns if c.question is not None]
