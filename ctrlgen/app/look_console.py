@@ -129,7 +129,8 @@ def print_table(facts: TableFacts) -> None:
 
 def _length(facts: TableFacts) -> str:
     if facts.time is None:
-        return f"{number_of(facts.rows, 'row')}, no column is a time"
+        why = f"the time {facts.falls} falls: newest row first" if facts.falls else "no column is a time"
+        return f"{number_of(facts.rows, 'row')}, {why}"
     step, gaps = facts.time.step, facts.time.gaps
     said = f"{number_of(facts.rows, 'row')}, {number(1 / step)} Hz, {number(facts.rows * step)} s"
     if gaps:

@@ -35,6 +35,9 @@ COUNT_NAME = re.compile(
 """Names of columns that number the rows."""
 JUMP = 0.25  # of its range: a reading does not go so far to its end in one row, a command does
 NOISE_REST = 200  # rows: the shortest record at rest from which a diagnosis takes the noise
+NEWEST_FIRST = (
+    "falls from row to row, newest row first: reverse the rows below the header, so that the oldest is the first"
+)
 SLOW_CLOCK = 0.6  # share of rows in which a drive stands still from which it steps by a slower clock
 SMOOTH = 0.1  # median of second differences over that of first ones, of a drive that is a curve and no steps
 
@@ -111,11 +114,12 @@ class TimeFacts:
 
 @dataclass(frozen=True)
 class TableFacts:
-    """The columns of one table, and its time where it has one."""
+    """The columns of one table, and its time where it has one; without one, `falls`: the column of a time whose newest row stands first."""
 
     table: MeasurementTable
     columns: tuple[ColumnFacts, ...]
     time: TimeFacts | None
+    falls: str = ""
 
     @property
     def rows(self) -> int:
@@ -132,12 +136,41 @@ def table_facts(table: MeasurementTable, answers: Answers = NOTHING) -> TableFac
     columns = tuple(_facts(table, name) for name in table.columns)
     columns = tuple(replace(c, unit=answers.unit(c.name, c.bare) or c.unit) for c in columns)
     if answers.time is None:
-        return TableFacts(table, columns, None if answers.rate or answers.poses else _time(table, columns))
+        time = None if answers.rate or answers.poses else _time(table, columns)
+        known = time is not None or answers.poses
+        # of a stated rate only what is surely a time speaks against the order of the rows
+        falls = "" if known else falling_time(table, columns, by_name_too=answers.rate is None)
+        return TableFacts(table, columns, time, falls)
     name = named(table, answers.time)
     time = _time(table, tuple(c for c in columns if c.name == name), name)
+    if time is None and falling_time(table, tuple(c for c in columns if c.name == name), name):
+        raise InputError("--time", [Fault(name, f"does not rise: it {NEWEST_FIRST}")])
     if time is None:
         raise InputError("--time", [Fault(name, "does not rise, or its unit is none of a time")])
     return TableFacts(table, columns, time)
+
+
+def falling_time(
+    table: MeasurementTable, columns: tuple[ColumnFacts, ...], chosen: str = "", by_name_too: bool = True
+) -> str:
+    """The column that is `chosen`, has the unit of a time, holds dates or, `by_name_too`, is named as a time, and falls from row to row;
+    empty where none does."""
+    for column in columns:
+        timed = column.values is None or (column.unit is not None and same_dimension(column.unit, "s"))
+        by_name = by_name_too and (TIME_NAME.match(column.bare) or TIME_NAME.match(column.last))
+        if not (chosen or timed or by_name):
+            continue
+        unit = column.unit or epoch_unit(column.finite) or "s"
+        if column.question is not None or not same_dimension(unit, "s"):
+            continue
+        try:
+            values = table.time(column.name, "s" if column.values is None else unit, column.scale).values
+        except InputError:  # text that is no time
+            continue
+        steps = np.diff(values[np.isfinite(values)])
+        if len(steps) > 1 and np.all(steps <= 0) and np.median(steps) < 0:
+            return column.name
+    return ""
 
 
 def named(table: MeasurementTable, column: str) -> str:

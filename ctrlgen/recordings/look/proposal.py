@@ -18,6 +18,7 @@ from ctrlgen.model.model import Model
 from ctrlgen.recordings.alike_units import size_of
 from ctrlgen.recordings.look.answers import NOTHING, Answers, layout_option
 from ctrlgen.recordings.look.column_facts import (
+    NEWEST_FIRST,
     ColumnFacts,
     TableFacts,
     between_samples,
@@ -136,7 +137,7 @@ class Proposal:
 
 def kind_of(facts: TableFacts, answers: Answers = NOTHING) -> str:
     """The kind of a recording: few rows without a time or a rate are poses."""
-    few = facts.time is None and answers.rate is None and facts.rows <= MOST_POSES
+    few = facts.time is None and not facts.falls and answers.rate is None and facts.rows <= MOST_POSES
     return "poses" if answers.poses or few else "series"
 
 
@@ -145,6 +146,7 @@ def propose(tables: Sequence[TableFacts], model: Model, answers: Answers = NOTHI
     not; they name what `tables` were read with. Raises InputError for an answer that names no signal or column."""
     first = tables[0]
     taken = {c.name for c in first.columns if first.time is not None and (c.name == first.time.column or is_a_time(c))}
+    taken |= {first.falls} if first.falls else set()
     taken |= first.table.time_parts | {c.name for c in first.columns if is_a_count(c)}
     columns = [c for c in first.columns if c.moves and c.name not in taken]
     signals = [name for name in signal_units(model) if name.partition(".")[0] in ("drive", "reading")]
@@ -162,7 +164,9 @@ def propose(tables: Sequence[TableFacts], model: Model, answers: Answers = NOTHI
     if not any(name.startswith("reading.") for name in found):
         known = next(name for name in signals if name.startswith("reading."))
         asked.append(f"no column was recognised as a reading ({shlex.join(['--column', f'{known}=COLUMN'])})")
-    if first.time is None and answers.rate is None and not answers.poses:
+    if first.falls:
+        asked.append(f"time is column {first.falls!r}, which {NEWEST_FIRST}")
+    elif first.time is None and answers.rate is None and not answers.poses:
         stated, says = (
             first.table.stated_rate,
             'state sample_rate, or kind = "poses" (--time COLUMN, --rate 1kHz or --poses)',

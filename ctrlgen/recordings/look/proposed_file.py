@@ -21,7 +21,8 @@ def recording_toml(proposal: Proposal, folder: Path, title: str) -> str:
         f"format = {FORMAT}",
         f"title  = {toml(title)}",
         f"device = {toml(proposal.model.device.name)}",
-        f'kind   = "{proposal.kind}"' + ("" if proposal.timed else " # assumed: no column is a time"),
+        f'kind   = "{proposal.kind}"'
+        + ("" if proposal.timed or proposal.tables[0].falls else " # assumed: no column is a time"),
         *([f"layout = {{ {proposal.answers.layout_text} }}"] if proposal.answers.layout_text else []),
         "",
     ]
@@ -56,6 +57,9 @@ def _record(proposal: Proposal, facts: TableFacts, folder: Path, role: str) -> l
         return ["[[record]]", *head, f'role = "{role}"', ""]
     if answers.rate is not None:
         head.append(f"sample_rate = {toml(answers.rate)}")
+    elif facts.falls:
+        column = facts.column(facts.falls)
+        head.append(f"time = {_column(facts, column.name, column.unit or 's')} # falls: reverse the rows of the file")
     elif facts.time is None:
         head.append('sample_rate = "1 kHz" # assumed: no column is a time')
     else:
