@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import datetime
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
@@ -30,8 +31,11 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
     tables: dict[str, MeasurementTable] = {}
     faults: list[InputError] = []
     typed = layout.model_copy(update={"separator": "tab", "encoding": None})
+    written = openpyxl.load_workbook(path, read_only=True, keep_links=False) if _has_formulas(path) else None
     for sheet in book.worksheets:
         rows = list(sheet.iter_rows(values_only=True))
+        if written is not None:
+            rows = _with_formulas(rows, written[sheet.title].iter_rows(values_only=True))
         if not any(cell is not None for row in rows for cell in row):
             continue
         comma = _has_decimal_comma(path, rows, layout)
@@ -44,9 +48,29 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
             continue
         tables |= {sheet.title if len(found) == 1 else f"{sheet.title}, {k}": table for k, table in enumerate(found, 1)}
     book.close()
+    if written is not None:
+        written.close()
     if not tables:
         raise faults[0] if faults else fault(path, "holds no rows; write a header and one row per sample")
     return tables
+
+
+def _has_formulas(path: Path) -> bool:
+    """Whether a sheet of a workbook holds formulas: only then it is read a second time, for what they are."""
+    with ZipFile(path) as archive:
+        names = [name for name in archive.namelist() if name.startswith("xl/worksheets/") and name.endswith(".xml")]
+        return any(re.search(rb"<f[ >/]", archive.read(name)) for name in names)
+
+
+def _with_formulas(rows: Sequence[tuple[Any, ...]], written: Iterable[tuple[Any, ...]]) -> list[tuple[Any, ...]]:
+    """The rows of a sheet with the text of each formula that no program has calculated, of which the file holds no value."""
+    return [
+        tuple(
+            text if value is None and isinstance(text, str) and text.startswith("=") else value
+            for value, text in zip_longest(row, texts)
+        )
+        for row, texts in zip_longest(rows, written, fillvalue=())
+    ]
 
 
 def _check_parts(path: Path) -> None:

@@ -207,10 +207,14 @@ class MeasurementTable:
         more = f" and {len(bad) - number_cells.MOST_LISTED} more" if len(bad) > number_cells.MOST_LISTED else ""
         key = ", ".join(f'"{word}"' for word in words[: number_cells.MOST_LISTED]).replace("\\", "\\\\")
         what = f"column {name!r} holds text that is no number in {len(bad)} of {number_of(len(self.columns[name]), 'row')} ({listed}{more})"
+        if why := number_cells.written_otherwise([text for _, text in bad]):
+            return self.fault(f"{what}: {why}")
         if any(number_cells.has_unit(text) for _, text in bad):
             if all(re.fullmatch(r"[^a-z]*m", text) for text in words):
                 mend = "metres, or thousandths? Write the unit of its numbers into its name: 'x (m)', 'x (V)' for thousandths of it"
                 return self.fault(f"{what}: {mend}")
+            units = list(dict.fromkeys(re.sub(r"^[-+.,\d]+([eE][-+]?\d+)?\s*", "", text) for text in words))
+            what += f", in several units ({', '.join(units[: number_cells.MOST_LISTED])})" if len(units) > 1 else ""
             return self.fault(f"{what}; numbers stand alone: write the unit into the name, such as 'x (um)'")
         if len(bad) == len(self.columns[name]):
             return self.fault(f"{what}; name another column")

@@ -98,6 +98,8 @@ ZONES = "(?:UTC|GMT|WES?T|BST|CES?T|MEZ|MESZ|EES?T|[ECMP][SD]T|[JK]ST)"
 TIME = re.compile(
     rf"{DATE}|({DATE}[T ,;]\s*)?{CLOCK}\s*(Z|{ZONES}|[+-]\d{{2}}:?\d{{2}})?|\d{{8}}T\d{{6}}([.,]\d+)?Z?", re.ASCII
 )
+HEXADECIMAL = re.compile(r"0[xX][0-9A-Fa-f]+|[0-9A-Fa-f]+h", re.ASCII)
+FORMULA = re.compile(r"=.+")
 EXPONENT = r"([eEdD][+-]?\d{1,3})?"
 GROUPS = "[.,'\u2019 \u00a0\u202f\u2009]"
 ANY = re.compile(rf"(?=[+\u2212-]?[.,]?\d)[+\u2212-]?(\d+|\d{{1,3}}({GROUPS}\d{{3}})+)?([.,]\d*)?{EXPONENT}", re.ASCII)
@@ -153,6 +155,13 @@ def is_number(cell: str) -> bool:
 def has_unit(cell: str) -> bool:
     """Whether a cell is a number and a word of letters, as 0.5 mV."""
     return bool(re.fullmatch(r"[+-]?[\d.,]+([eE][+-]?\d+)?\s*[^\W\d_]{1,4}", cell))
+
+
+def written_otherwise(cells: Sequence[str]) -> str:
+    """What cells are that hold no plain numbers, and what to do, where all are of one kind; empty for others."""
+    kinds = ((HEXADECIMAL, "hexadecimal numbers; write them as decimal ones, signed where they are"),
+             (FORMULA, "a formula that was never calculated; open the file in a spreadsheet, let it calculate and save it"))  # fmt: skip
+    return next((told for pattern, told in kinds if all(pattern.fullmatch(cell) for cell in cells)), "")
 
 
 def is_reading(cell: str) -> bool:

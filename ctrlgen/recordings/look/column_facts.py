@@ -46,7 +46,7 @@ SMOOTH = 0.1  # median of second differences over that of first ones, of a drive
 class ColumnFacts:
     """One column: `unit` as the file states it or its name ends, None where neither does; `values` (n,) in it, NaN where there is no
     number, None where the column is text or cannot be read before its `question` is answered; `notes`: what was interpreted; `scale`: of
-    the file's numbers to `unit`, where it states a multiple of a unit."""
+    the file's numbers to `unit`, where it states a multiple of a unit; `unread`: why the cells of a column of text are no numbers."""
 
     name: str
     unit: str | None
@@ -54,6 +54,7 @@ class ColumnFacts:
     notes: tuple[str, ...] = ()
     question: Ambiguous | None = None
     scale: float = 1.0
+    unread: str = ""
 
     @property
     def bare(self) -> str:
@@ -186,8 +187,8 @@ def _facts(table: MeasurementTable, name: str) -> ColumnFacts:
         read = table.reading(name)
     except AmbiguousFile as error:
         return ColumnFacts(name, unit, None, question=error.question, scale=scale)
-    except InputError:  # it holds text
-        return ColumnFacts(name, unit, None, scale=scale)
+    except InputError as error:  # it holds text
+        return ColumnFacts(name, unit, None, scale=scale, unread="; ".join(fault.what for fault in error.faults))
     return ColumnFacts(name, unit, read.values if scale == 1 else scale * read.values, read.notes, scale=scale)
 
 

@@ -211,13 +211,22 @@ def _chosen(model: Model, facts: TableFacts, signals: Sequence[str], answers: An
         if column.question is not None:
             raise InputError("--column", [Fault(name, column.question.asked(layout_option))])
         if not column.moves:
-            raise InputError("--column", [Fault(name, "holds no numbers that differ")])
+            raise InputError("--column", [Fault(name, _why_unmoved(column))])
         unit = answers.unit(signal) or column.unit
         if unit is not None and not same_dimension(unit, units[signal]):
             what = f"{name} is in {unit}, and {signal} in {units[signal]} or a multiple of it"
             raise InputError("--column", [Fault(signal, what)])
         matches.append(_match(model, signal, column, unit, []))
     return matches
+
+
+def _why_unmoved(column: ColumnFacts) -> str:
+    """Why a column can be no signal: its cells are no numbers, or the same in every row."""
+    if column.values is None:
+        return column.unread
+    if not len(column.finite):
+        return "holds no number in any row"
+    return f"holds no numbers that differ: {column.finite[0]:g} in every row"
 
 
 def _match(model: Model, signal: str, column: ColumnFacts, unit: str | None, why: list[str]) -> Match:
