@@ -53,3 +53,24 @@ def test_a_formula_of_a_workbook_without_its_value_is_named_and_calculated_ones_
     np.testing.assert_allclose(table.numbers("u (V)"), U)
     told = refused(tmp_path / "log.xlsx")
     assert "line 2 '=40*B2'" in told and "a formula that was never calculated" in told
+
+
+@pytest.mark.parametrize(
+    ("form", "said"), [("{}-", "their minus behind them"), ("({})", "in brackets, as accountants")]
+)
+def test_negative_numbers_in_other_forms_are_named_and_not_offered_as_missing(tmp_path, form, said):
+    cells = [f"{k / 8}" if k % 3 else form.format((k + 1) / 8) for k in range(1, 61)]
+    text = "".join(f"{t},{u},{x}\n" for t, u, x in zip(T, U, cells, strict=True))
+    (tmp_path / "log.csv").write_text("t (s),u (V),x\n" + text)
+    told = refused(tmp_path / "log.csv")
+    assert said in told and "missing = [" not in told
+
+
+def test_every_text_is_offered_as_missing_or_the_others_are_counted(tmp_path):
+    for count, more in ((12, ""), (25, "with 5 more texts of the column ")):
+        cells = [f"FAULT {k}" if 0 < k <= count else f"{k}" for k in range(60)]
+        text = "".join(f"{t},{u},{x}\n" for t, u, x in zip(T, U, cells, strict=True))
+        (tmp_path / "log.csv").write_text("t (s),u (V),x\n" + text)
+        told = refused(tmp_path / "log.csv")
+        assert told.count("FAULT") == 5 + min(count, 20), told
+        assert f"]' {more}if that means a missing reading" in told

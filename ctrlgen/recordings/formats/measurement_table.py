@@ -205,7 +205,7 @@ class MeasurementTable:
         words = list(dict.fromkeys(text for _, text in bad))
         listed = ", ".join(f"{self._place(k)} {text!r}" for k, text in bad[: number_cells.MOST_LISTED])
         more = f" and {len(bad) - number_cells.MOST_LISTED} more" if len(bad) > number_cells.MOST_LISTED else ""
-        key = ", ".join(f'"{word}"' for word in words[: number_cells.MOST_LISTED]).replace("\\", "\\\\")
+        key = ", ".join(f'"{word}"' for word in words[: number_cells.MOST_WORDS]).replace("\\", "\\\\")
         what = f"column {name!r} holds text that is no number in {len(bad)} of {number_of(len(self.columns[name]), 'row')} ({listed}{more})"
         if why := number_cells.written_otherwise([text for _, text in bad]):
             return self.fault(f"{what}: {why}")
@@ -218,7 +218,9 @@ class MeasurementTable:
             return self.fault(f"{what}; numbers stand alone: write the unit into the name, such as 'x (um)'")
         if len(bad) == len(self.columns[name]):
             return self.fault(f"{what}; name another column")
-        answers = {f"missing = [{key}]": "if that means a missing reading, or numbers in their place"}
+        left = len(words) - number_cells.MOST_WORDS
+        all_of_them = f"with {number_of(left, 'more text')} of the column " if left > 0 else ""
+        answers = {f"missing = [{key}]": f"{all_of_them}if that means a missing reading, or numbers in their place"}
         return AmbiguousFile(self.path, Ambiguous(what, answers))
 
     def _first(self, row: int) -> str:

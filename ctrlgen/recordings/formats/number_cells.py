@@ -13,6 +13,7 @@ from ctrlgen.recordings.formats.layout_question import Ambiguous
 from ctrlgen.recordings.formats.written_layout import Layout
 
 MOST_LISTED = 5  # bad cells of a column that a message lists; the others are counted
+MOST_WORDS = 20  # different texts of a column that a proposed `missing` names
 MISSING = frozenset(
     [
         "",
@@ -100,6 +101,8 @@ TIME = re.compile(
 )
 HEXADECIMAL = re.compile(r"0[xX][0-9A-Fa-f]+|[0-9A-Fa-f]+h", re.ASCII)
 FORMULA = re.compile(r"=.+")
+MINUS_BEHIND = re.compile(r"[\d.,]*\d[\d.,]*[-\u2212]", re.ASCII)
+IN_BRACKETS = re.compile(r"\([\d.,]*\d[\d.,]*\)", re.ASCII)
 EXPONENT = r"([eEdD][+-]?\d{1,3})?"
 GROUPS = "[.,'\u2019 \u00a0\u202f\u2009]"
 ANY = re.compile(rf"(?=[+\u2212-]?[.,]?\d)[+\u2212-]?(\d+|\d{{1,3}}({GROUPS}\d{{3}})+)?([.,]\d*)?{EXPONENT}", re.ASCII)
@@ -159,8 +162,15 @@ def has_unit(cell: str) -> bool:
 
 def written_otherwise(cells: Sequence[str]) -> str:
     """What cells are that hold no plain numbers, and what to do, where all are of one kind; empty for others."""
-    kinds = ((HEXADECIMAL, "hexadecimal numbers; write them as decimal ones, signed where they are"),
-             (FORMULA, "a formula that was never calculated; open the file in a spreadsheet, let it calculate and save it"))  # fmt: skip
+    kinds = (
+        (HEXADECIMAL, "hexadecimal numbers; write them as decimal ones, signed where they are"),
+        (FORMULA, "a formula that was never calculated; open the file in a spreadsheet, let it calculate and save it"),
+        (MINUS_BEHIND, "numbers with their minus behind them; write it before them"),
+        (
+            IN_BRACKETS,
+            "numbers in brackets, as accountants write negative ones; write a minus before them where they are",
+        ),
+    )
     return next((told for pattern, told in kinds if all(pattern.fullmatch(cell) for cell in cells)), "")
 
 
