@@ -64,6 +64,8 @@ def test_negative_numbers_in_other_forms_are_named_and_not_offered_as_missing(tm
     (tmp_path / "log.csv").write_text("t (s),u (V),x\n" + text)
     told = refused(tmp_path / "log.csv")
     assert said in told and "missing = [" not in told
+    asked = [c.question for c in table_facts(read_table(tmp_path / "log.csv")).columns if c.question is not None]
+    assert len(asked) == 1 and said in str(asked[0])  # look says so unasked
 
 
 def test_every_text_is_offered_as_missing_or_the_others_are_counted(tmp_path):

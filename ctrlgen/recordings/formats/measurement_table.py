@@ -208,7 +208,7 @@ class MeasurementTable:
         key = ", ".join(f'"{word}"' for word in words[: number_cells.MOST_WORDS]).replace("\\", "\\\\")
         what = f"column {name!r} holds text that is no number in {len(bad)} of {number_of(len(self.columns[name]), 'row')} ({listed}{more})"
         if why := number_cells.written_otherwise([text for _, text in bad]):
-            return self.fault(f"{what}: {why}")
+            return AmbiguousFile(self.path, Ambiguous(f"{what}: {why}"))
         if any(number_cells.has_unit(text) for _, text in bad):
             if all(re.fullmatch(r"[^a-z]*m", text) for text in words):
                 mend = "metres, or thousandths? Write the unit of its numbers into its name: 'x (m)', 'x (V)' for thousandths of it"
