@@ -14,9 +14,9 @@ from ctrlgen.estimation.noise import (
     autoregression,
     cross_correlation,
     ljung_box,
-    without_lines,
 )
 from ctrlgen.estimation.pose_noise import stated_pose_noise
+from ctrlgen.estimation.quiet_stretches import without_lines
 from ctrlgen.estimation.residual_noise import louder_than_readings, noise_from_residual
 from ctrlgen.estimation.settings import DISCREPANCY, NOISE, NOISE_UPDATE, STATISTICS
 from ctrlgen.recordings.recording import Record
