@@ -17,13 +17,15 @@ from ctrlgen.app.look_console import described, look
 from ctrlgen.core.errors import InputError
 from ctrlgen.recordings.formats import read_table
 from ctrlgen.recordings.formats.unit_texts import split_name, unit_of
-from ctrlgen.recordings.look.column_facts import between_samples, rests, settled, table_facts
+from ctrlgen.recordings.look.column_facts import between_samples, rests, table_facts
 from ctrlgen.recordings.look.oddities import table_oddities
 from ctrlgen.recordings.look.proposal import propose
 from ctrlgen.recordings.look.proposed_file import recording_toml
 from ctrlgen.recordings.plausibility import early
 from ctrlgen.recordings.reader import load_recordings
+from ctrlgen.recordings.settled_readings import settled
 
+REST = 200  # rows that a rest must have to tell the noise
 RATE = 1000.0
 N = 1500
 GAIN = 50.0  # um/V of the flexure axis
@@ -191,11 +193,11 @@ def test_rests_are_where_no_drive_moves():
 def test_a_drive_that_stands_still_is_no_rest_while_a_reading_moves():
     """What settles is left out of the rest; what still moves at its end, or has too few rows left, is no rest: a tank that fills."""
     t, noise = np.arange(600.0), np.random.default_rng(0).normal(0, 1, 600)
-    assert settled(noise[:, None], 0, 600) == 0
+    assert settled(noise[:, None], 0, 600, REST) == 0
     swing = 300 * np.exp(-t / 30) * np.cos(t / 9) + noise
-    assert 100 <= settled(np.column_stack([noise, swing]), 0, 600) <= 250
-    assert settled((100 * np.exp(-t / 300) + noise)[:, None], 0, 600) is None
-    assert settled(noise[:, None], 450, 600) is None
+    assert 100 <= settled(np.column_stack([noise, swing]), 0, 600, REST) <= 250
+    assert settled((100 * np.exp(-t / 300) + noise)[:, None], 0, 600, REST) is None
+    assert settled(noise[:, None], 450, 600, REST) is None
 
 
 def test_a_rest_of_the_drive_in_which_the_reading_settles_is_fitted(axis, tmp_path):
