@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import errno
 import os
+import re
 import reprlib
 import secrets
 import shutil
@@ -102,7 +103,7 @@ def validate(model: type[Model], table: dict[str, Any], path: Path | str) -> Mod
     try:
         return model.model_validate(table)
     except ValidationError as error:
-        errors = error.errors()
+        errors = _of_nearest_branches(model, error.errors())
         wrong = [details["loc"] for details in errors]
         raise InputError(
             path,
@@ -129,13 +130,28 @@ def _faults(model: type[BaseModel], details: Any) -> list[Fault]:
     return [Fault(f"{place}.{fault.where}" if place else fault.where, fault.what) for fault in found.faults]
 
 
-READERS = ("function-before[", "function-after[")  # how pydantic names branches of a union that read their value
+BRANCHES = ("function-before[", "function-after[", "literal[", "tuple[")  # how pydantic names branches of a union
+
+
+def _of_nearest_branches(model: type[BaseModel], errors: Sequence[Any]) -> list[Any]:
+    """The faults without those of branches of a union that a value was never meant for: it is of another type than they are, and another
+    branch says more of it, or of a part of it."""
+    places = [tuple(_location(model, details["loc"])) for details in errors]
+    kept = []
+    for k, (details, place) in enumerate(zip(errors, places, strict=True)):
+        branch = any(str(part).startswith(BRANCHES) for part in details["loc"])
+        others = [(other, at) for j, (other, at) in enumerate(zip(errors, places, strict=True)) if j != k]
+        said = [other for other, at in others if at == place and not other["type"].endswith("_type")]
+        if branch and (any(_inside(at, place) for _, at in others) or (details["type"].endswith("_type") and said)):
+            continue
+        kept.append(details)
+    return kept
 
 
 def _location(model: type[BaseModel], loc: Sequence[Any]) -> list[Any]:
     """Keys and numbers of entries on the way to a place, without the names of the branches of unions."""
     tags = {"one number", "two numbers", *_tags(model)}
-    return [part for k, part in enumerate(loc) if not (k > 0 and part in tags) and not str(part).startswith(READERS)]
+    return [part for k, part in enumerate(loc) if not (k > 0 and part in tags) and not str(part).startswith(BRANCHES)]
 
 
 def _place(model: type[BaseModel], loc: Sequence[Any]) -> str:
@@ -165,7 +181,9 @@ def _fault(model: type[BaseModel], details: Any) -> Fault:
             f"has {many} entries; give {least} or more" if most is None else f"has {many} entries; give {most} or fewer"
         )
     elif details["type"] == "literal_error":
-        message = f"{reprlib.repr(details['input'])} must be {details['ctx']['expected']}"
+        known = str(details["ctx"]["expected"])
+        near = difflib.get_close_matches(str(details["input"]), re.findall("'([^']*)'", known), n=1)
+        message = f"{reprlib.repr(details['input'])} must be {known}" + (f"; did you mean {near[0]!r}?" if near else "")
     elif details["type"] == "union_tag_invalid":
         where = f"{where}.kind" if where else "kind"
         message = f"{reprlib.repr(details['input']['kind'])} is not one I know; write {details['ctx']['expected_tags']}"

@@ -44,6 +44,13 @@ class Param:
         return "travel" in split_unit(self.unit, MOTION)[0] and "s" in split_unit(self.unit, MOTION)[0]
 
     @property
+    def example(self) -> float:
+        """A number within the bounds, in their unit, far from both: their geometric mean where both are positive, else a tenth of the way
+        from the lower one, or from zero, to the upper one."""
+        low, high = self.bounds
+        return math.sqrt(low * high) if low > 0 else 0.1 * high + 0.9 * (low if high <= 0 else 0.0)
+
+    @property
     def powers_of_time(self) -> float:
         """With which power of a time it goes: -1 of a rate or a frequency."""
         powers = split_unit(self.unit, TIME)[0]

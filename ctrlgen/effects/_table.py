@@ -72,7 +72,7 @@ def _read_parameter(param: Param, given: dict[str, Any]) -> Quantity:
         unit = param.unit
         for word in PLACEHOLDERS:
             unit = unit.replace(word, "um")
-        example = f"{param.bounds[1]:g} {unit}".removesuffix(" 1")
+        example = f"{param.example:.2g} {unit}".removesuffix(" 1")
         raise ValueError(f'{param.name} is missing ({param.doc}); write for example {param.name} = "{example}"')
     try:
         number = read_quantity(None if param.relative else param.unit, given[param.name])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 import os
 import re
@@ -37,7 +38,9 @@ def write_device(file: Path, kind: str, name: str | None = None, given: Mapping[
     for numbers that make no such device.
     """
     if kind not in KINDS:
-        raise InputError("--kind", [Fault(kind, f"is not a kind; known are {', '.join(KINDS)}")])
+        near = difflib.get_close_matches(kind, list(KINDS), n=1)
+        meant = f"; did you mean {near[0]!r}?" if near else ""
+        raise InputError("--kind", [Fault(kind, f"is not a kind; known are {', '.join(KINDS)}{meant}")])
     _absent(file)
     if file.suffix != ".toml":
         raise InputError("new device", [Fault(str(file), "must end in .toml")])
