@@ -28,14 +28,13 @@ def dwells(record: Record, i: int, settling: float) -> list[np.ndarray]:
     moved = np.any(np.diff(record.drive, axis=0) != 0, axis=1)
     edges = np.flatnonzero(np.concatenate([[True], moved, [True]]))
     wait = int(np.ceil(settling / record.sample_time))
-    still = []
-    for a, b in pairwise(edges.tolist()):
-        readings = np.where(record.valid[:b, [i]], record.observed[:b, [i]], np.nan)
-        begin = settled(readings, a, b, NOISE.shortest_stretch) if a == 0 and b >= NOISE.shortest_stretch else None
-        begin = a + wait if begin is None else begin
-        if b - begin >= NOISE.shortest_stretch:
-            still.append(record.observed[begin:b, i][record.valid[begin:b, i]])
-    return still
+    begun = [(a + wait, b) for a, b in pairwise(edges.tolist())]
+    if (first := int(edges[1])) >= NOISE.shortest_stretch:
+        readings = np.where(record.valid[:first, [i]], record.observed[:first, [i]], np.nan)
+        still = settled(readings, 0, first, NOISE.shortest_stretch)
+        begun[0] = begun[0] if still is None else (still, first)
+    long = ((a, b) for a, b in begun if b - a >= NOISE.shortest_stretch)
+    return [record.observed[a:b, i][record.valid[a:b, i]] for a, b in long]
 
 
 def period_differences(record: Record, i: int) -> list[np.ndarray]:
