@@ -96,3 +96,14 @@ def test_a_clock_said_to_be_in_another_unit_is_refused(tmp_path):
         with pytest.raises(InputError, match=r'clock written as numbers .* write unit = "s" without a scale'):
             table.time("Time", unit, scale)
     assert table.time("Time", "s").begin == NOON
+
+
+@pytest.mark.parametrize(
+    "step", [1, 2, 5, 10, 20, 25, 40, 50, 60, 100, 125, 200, 250, 500, 1000, 1250, 2500, 5000, 0.1, 0.25]
+)
+@pytest.mark.parametrize("lost", [False, True])
+def test_numbers_that_are_even_by_themselves_are_no_clock(step, lost):
+    """Of few rows none has 60 seconds by chance: milliseconds, say; also where a row is lost."""
+    for rows in (5, 12, 26, 200):
+        even = step * np.arange(rows, dtype=float)
+        assert clock_of(np.delete(even, rows // 2) if lost else even) is None, rows

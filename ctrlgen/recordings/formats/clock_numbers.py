@@ -60,10 +60,18 @@ def _days(numbers: np.ndarray) -> np.ndarray | None:
 def _goes_on(numbers: np.ndarray, clock: np.ndarray) -> bool:
     """Whether the clock [s] goes on evenly where the numbers jump."""
     steps, beyond = np.diff(clock), np.round(np.diff(numbers) - np.diff(clock))
-    if not np.any(steps > 0) or np.any(steps < 0) or np.ptp(beyond) == 0:  # the numbers are as even: seconds
+    if (
+        not np.any(steps > 0) or np.any(steps < 0) or _evenness(steps) <= _evenness(np.diff(numbers))
+    ):  # as even: no clock
         return False
     usual, passages = float(np.median(steps[steps > 0])), steps[beyond != 0]
     rounding = float(np.all(numbers == np.round(numbers)))
     on = passages <= max(NEAR * usual, usual + rounding)
     on &= passages >= min(usual / NEAR, usual - rounding)
     return bool(np.mean(on) >= MOST and on.sum() >= (1 if numbers.max() >= SURE else 2))
+
+
+def _evenness(steps: np.ndarray) -> float:
+    """The share of steps that are near the usual one."""
+    usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+    return float(np.mean((steps <= NEAR * usual) & (steps >= usual / NEAR)))
