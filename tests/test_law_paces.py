@@ -34,7 +34,10 @@ def suspected(pace: float) -> dict[tuple[str, str], Hypothesis]:
 
 
 def hints(pace: float) -> DataHints:
-    return DataHints({"channel": 1.0, "travel": 1e-4, "travel/s": 5e-3 / pace, "channel/s": 50 / pace, "s": 0.5 * pace})
+    return DataHints(
+        {"channel": 1.0, "travel": 1e-4, "travel/s": 5e-3 / pace, "channel/s": 50 / pace, "s": 0.5 * pace},
+        duration=6.0 * pace,
+    )
 
 
 @pytest.mark.parametrize("pace", PACES)
@@ -81,6 +84,26 @@ def creeping(y: np.ndarray, u: np.ndarray) -> np.ndarray:
         out.append(value + 0.03 * late)
         late += (value - late) / 300
     return np.array(out)
+
+
+def test_a_sample_a_millisecond_is_the_usual_pace_and_so_are_half_and_twice_of_it():
+    for times in (0.5, 1.0, 2.0):
+        late = suspected(times)["low_pass", "sensor:axis"]
+        tau = next(p for p in late.law.params if p.name == "tau")
+        assert late.pace == 1.0 and late.bounds(tau, late.channel_on(AXIS)) == tau.bounds
+
+
+@pytest.mark.parametrize("sample_time, longest", [(1e-5, 0.05), (1e-3, 0.05), (1.0, 50.0)])
+def test_clocks_may_disagree_by_a_twentieth_of_a_second_and_slow_ones_by_fifty_samples(sample_time, longest):
+    clock = suspected(sample_time / H)["clock_offset", "recording:all"]
+    assert clock.bounds(clock.law.amplitude(), clock.channel_on(AXIS)) == pytest.approx((0.0, longest))
+
+
+@pytest.mark.parametrize("duration, slowest", [(0.025, 50.0), (0.09, 16.7), (10.0, 10.0)])
+def test_what_takes_longer_than_the_records_for_a_period_is_no_vibration(duration, slowest):
+    hum = suspected(1.0)["vibration", "disturbance:axis"]
+    starts = hum.shapes(hum.channel_on(AXIS), replace(hints(1.0), duration=duration))
+    assert min(start["frequency"] for start in starts) == slowest
 
 
 CAUSES = {

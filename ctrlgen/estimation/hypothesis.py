@@ -34,8 +34,6 @@ DOMAIN = {
 }
 USUAL_SAMPLE_TIME = 1e-3
 """Sample time [s] of the records for which bounds and starts of times are stated (`Param.paced`)."""
-TWELFTHS = 12
-"""Parts of the records' duration, of which `DataHints.peaks` holds the length."""
 SECONDS_LATE, SAMPLES_LATE = 0.5, 100.0
 """Up to which a reading is taken to be late: a camera, a bus; samples where these are slow, the dead time of a process. Judgement."""
 SECONDS_APART, SAMPLES_APART = 0.05, 50.0
@@ -53,10 +51,12 @@ class DataHints:
     peaks: the largest value of the signal ("channel"), of the displacement ("travel") and of its rate ("travel/s"), and a
         twelfth of the duration ("s"). A limit beyond the peak leaves no trace in the recording.
     suggested: start values by the names of `ParameterPrior.start_from_data`, and the "lines" [Hz] of the residual's spectrum.
+    duration: time [s] that the records take; infinite where it is not known.
     """
 
     peaks: dict[str, float] = field(default_factory=dict)
     suggested: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    duration: float = float("inf")
 
 
 @dataclass(frozen=True)
@@ -176,9 +176,9 @@ class Hypothesis:
             return [value for value in suggested if low <= value <= high]
         starts = prior.start_values or (() if suggested else (sum(p.bounds) / 2,))
         tried = [*(channel.si(value, p) for value in starts), *(value for value in suggested if value >= low)]
-        if p.unit == "Hz" and "s" in hints.peaks:
+        if p.unit == "Hz":
             # what takes longer than the records for a period is a drift
-            return [value for value in tried if 1 / (TWELFTHS * hints.peaks["s"]) <= value <= high]
+            return [value for value in tried if value * hints.duration >= 1 and value <= high]
         return [value for value in tried if value <= high] or [(low + high) / 2]
 
     def bounds(self, p: Param, channel: Channel) -> tuple[float, float]:

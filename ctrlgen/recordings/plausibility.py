@@ -36,9 +36,8 @@ class Implausible(str):
 def with_plausibility(recording: Recording, model: Model) -> Recording:
     """The recording with a note for each thing of it that cannot be of the device as it is stated."""
     seen = moved(recording, model)
-    said = [] if seen is None else implausible(seen)
-    # a unit that is wrong takes every sample as far
-    said += [note for name, note in reach_notes(recording, model).items() if not any(s.startswith(name) for s in said)]
+    # a unit, a sign or an order that is wrong takes samples as far
+    said = ([] if seen is None else implausible(seen)) or reach_notes(recording, model)
     return replace(recording, notes=(*recording.notes, *map(Implausible, said))) if said else recording
 
 

@@ -14,12 +14,12 @@ BEYOND = 1000.0
 """Times the device's own size from the median of a record: no motion of it, and no unit that is taken for another, in single rows."""
 
 
-def reach_notes(recording: Recording, model: Model) -> dict[str, str]:
-    """A sentence for each reading, by its name, of which single samples lie more than `BEYOND` times its typical size from the others.
+def reach_notes(recording: Recording, model: Model) -> list[str]:
+    """A sentence for each reading of which single samples lie more than `BEYOND` times its typical size from the others.
 
     Samples that were marked as outliers count: they are not used, and still say that something is wrong with all of them.
     """
-    said = {}
+    said = []
     for i, (name, unit) in enumerate(zip(recording.channels, recording.units, strict=True)):
         role, _, channel = name.partition(".")
         if role not in ("reading", "pose"):
@@ -32,7 +32,7 @@ def reach_notes(recording: Recording, model: Model) -> dict[str, str]:
         reached, own = (number(abs(float(from_si(v, unit) - from_si(0.0, unit))), 3) for v in (far, size))
         where = f"{number_of(len(rows), 'sample')} of {record.name}, first at {record.time[rows[0]]:.6g} s"
         what = f"{name} lies {reached} {unit} from its other samples, {far / size:.3g} times the device's own size"
-        said[name] = f"{what} of {own} {unit}, in {where}: was a sign lost, or did a counter begin again?"
+        said.append(f"{what} of {own} {unit}, in {where}: was a sign lost, or did a counter begin again?")
     return said
 
 

@@ -205,6 +205,7 @@ class Screen:
             return DataHints(
                 most.get((place, i), {}) | {"s": part},
                 common | along.get((place, i), {}) | suggested(regions, place, i),
+                SCREEN.event_times * part,
             )
 
         return at

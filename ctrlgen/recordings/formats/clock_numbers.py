@@ -60,9 +60,9 @@ def _days(numbers: np.ndarray) -> np.ndarray | None:
 def _goes_on(numbers: np.ndarray, clock: np.ndarray) -> bool:
     """Whether the clock [s] goes on evenly where the numbers jump."""
     steps, beyond = np.diff(clock), np.round(np.diff(numbers) - np.diff(clock))
-    if (
-        not np.any(steps > 0) or np.any(steps < 0) or _evenness(steps) <= _evenness(np.diff(numbers))
-    ):  # as even: no clock
+    if not np.any(steps > 0) or np.any(steps < 0):
+        return False
+    if _evenness(steps) <= _evenness(np.diff(numbers)):  # it explains nothing that the numbers leave open
         return False
     usual, passages = float(np.median(steps[steps > 0])), steps[beyond != 0]
     rounding = float(np.all(numbers == np.round(numbers)))
