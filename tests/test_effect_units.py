@@ -94,7 +94,7 @@ def test_a_table_that_is_no_effect_is_refused_with_what_is_wrong(change, says):
 
 
 def test_a_missing_parameter_is_named_with_an_example():
-    with pytest.raises(ValueError, match=r'gain is missing .*write for example gain = "0.5"'):
+    with pytest.raises(ValueError, match=r'gain is missing .*write for example gain = "0.05"'):
         read_effect({"kind": "drive_gain", "at": "1X"})
 
 
