@@ -23,6 +23,7 @@ ACCEPTED: dict[str, tuple[str, ...]] = {
     "frame_turn": ("frame_turn", "frame_rotation_z"),
     "low_pass": ("low_pass", "thermal_lag"),
     "cogging": ("cogging", "cogging_of_slots"),
+    "cyclic": ("cyclic", "cyclic_from_home"),
     "coulomb": ("coulomb",),
     "stribeck": ("stribeck",),
     "drive_gain": ("drive_gain", "sensor_gain", FORCE_CONSTANT),

@@ -93,6 +93,12 @@ def cubic_sensor(u, t):
     return y + 2e6 * y**3
 
 
+def cyclic_from_home(u, t):
+    """A phasor of 0.3 um that turns once in 22 um, read from where it is at home."""
+    y, home = move(u), 3e-7 * np.exp(1.2j)
+    return y + np.imag(home * (np.exp(2j * np.pi * y / 2.2e-5) - 1))
+
+
 def high_pass(u, t):
     """A leak of 0.2 s by its answer to a step, exp(-t/tau), in place of a state: reading = sum of what each step leaves."""
     y = move(u)
@@ -242,6 +248,7 @@ ON_AXIS = {
     coil_heating: Planted("actuator:axis", {"rise": 3.9e-3 * 10 / 4, "tau": 0.5}, within={"rise": 0.05, "tau": 0.05}),
     cubic_sensor: Planted("sensor:axis", {"curvature": 2e6}),
     warm_up: Planted("sensor:axis", {"size": 3e-7, "tau": 0.7}, within={"size": 0.05, "tau": 0.05}),
+    cyclic_from_home: Planted("sensor:axis", {"amplitude": 3e-7, "period": 2.2e-5, "phase": 1.2}),
     high_pass: Planted("sensor:axis", {"share": 1.0, "tau": 0.2}),
     stitching_error: Planted("sensor:axis", {"offset": 4e-7, "position": 2e-5, "width": 2e-6}, within={"width": 0.1}),
     sensor_step: Planted("disturbance:axis", {"offset": 2e-7, "moment": 1.1, "rise": 0.02}, within={"rise": 0.1}),

@@ -92,3 +92,20 @@ def test_the_command_prints_and_writes(tmp_path):
     done = ctrlgen("simulate", AXIS_FILE, "--step", "1V", "--duration", "0.5", "--out", out)
     assert done.returncode == 0, done.stderr
     assert "displacement.axis" in done.stdout and {"signals.csv", "signals.svg"} <= {p.name for p in out.iterdir()}
+
+
+@pytest.mark.parametrize(
+    "step, beyond", [("1V", ()), ("3V", ("stage displacement",)), ("5V", ("commanded drive", "stage displacement"))]
+)
+def test_a_motion_beyond_the_stated_limits_is_told(step, beyond):
+    """1 V settles at 50 um of 100, 3 V at 150 um; 5 V is more than the amplifier's 4 V."""
+    run = ctrlgen("simulate", str(AXIS_FILE), "--step", step, "--duration", "0.3")
+    told = [line for line in run.stdout.splitlines() if line.startswith("beyond ")]
+    assert len(told) == len(beyond) and all(any(limit in line for line in told) for limit in beyond), run.stdout
+
+
+@pytest.mark.parametrize("file", sorted(DEVICES.glob("*.toml")), ids=lambda file: file.stem)
+def test_a_device_at_rest_is_within_its_limits(file):
+    drive = build_model(load_device(file)).signals["drive"]
+    step = f"{drive.channels[0]}=0 {drive.units[0]}"
+    assert not simulate_device(file, None, step, 0.02, 1000.0).broken

@@ -146,6 +146,10 @@ LAWS = {
     ),
     "cubic_drive": ({}, lambda s, p: p.curvature * s.value**3),
     "cubic_sensor": ({}, lambda s, p: p.curvature * s.value**3),
+    "cyclic_from_home": (
+        {"period": 0.4, "phase": 0.9},
+        lambda s, p: p.amplitude * (sin(TWO_PI * s.value / 0.4 + 0.9) - sin(0.9)),
+    ),
     "cyclic": ({"period": 0.4, "phase": 0.9}, lambda s, p: p.amplitude * sin(TWO_PI * s.value / 0.4 + 0.9)),
     "coil_heating": (
         {"tau": 0.4},

@@ -194,3 +194,8 @@ def print_simulated(result: Simulated) -> None:
         unit = result.model.signals[role].units[result.model.signals[role].channels.index(channel)]
         error = difference(result.error(reading), unit)
         out.print(f"{reading}: measured less simulated {number(error)} {unit} rms", markup=False, soft_wrap=True)
+    for v in result.broken:
+        reached = f"{v.limit.channels[v.channel]} reaches {show(v.value[v.worst], v.limit.unit)} at {result.trace.time[v.worst]:.4g} s"
+        out.print(
+            f"beyond {v.limit.text}: {reached}; there the device file need not hold", markup=False, soft_wrap=True
+        )

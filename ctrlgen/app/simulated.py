@@ -21,6 +21,7 @@ from ctrlgen.model.simulation import Trace, simulate
 from ctrlgen.recordings.look.drive_file import DriveFile, read_drives
 from ctrlgen.reporting.line_patterns import dashes, mark
 from ctrlgen.reporting.plots import COLOURS, STYLE, image, legend_above
+from ctrlgen.trajectory.inverse.violations import Violation, violations
 from ctrlgen.trajectory.unstated_modes import with_internal_modes
 
 MOST_SAMPLES = 2_000_000  # with a dozen signals these fill 200 MB
@@ -36,6 +37,12 @@ class Simulated:
     model: Model
     trace: Trace
     measured: Mapping[str, np.ndarray]
+
+    @property
+    def broken(self) -> list[Violation]:
+        """The limits of the device that the motion breaks, where its laws need not hold, those that miss most first."""
+        n = len(self.trace.time)
+        return violations(self.model, self.trace.x, self.trace.z, self.trace.signals["drive"][:n])
 
     def error(self, reading: str) -> float:
         """Rms of measured less simulated [SI]."""

@@ -37,3 +37,15 @@ class Cyclic(Effect):
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.amplitude * ca.sin(2 * ca.pi * s.value / p.period + p.phase)
+
+
+class CyclicFromHome(Cyclic):
+    """Delta y = A (sin(2 pi y/Lambda + phi) - sin(phi)): home is read as zero, as by incremental scales and interferometers.
+
+    Holds as the other does, and where the reading was set to zero at home.
+    """
+
+    title = "An error that repeats along the path, of a sensor that is set to zero at home"
+
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return super().term(s, p) - p.amplitude * ca.sin(p.phase)

@@ -50,6 +50,7 @@ class LawNeeds:
         return ""
 
 
+_CYCLIC = ("cyclic", "cyclic_from_home")
 _HEATER = LawNeeds("it needs a heater", families=frozenset({"thermal"}))
 
 NEEDS: Mapping[str, LawNeeds] = MappingProxyType(
@@ -95,11 +96,14 @@ NEEDS: Mapping[str, LawNeeds] = MappingProxyType(
             "it needs a sensor of charge or one coupled for alternating signals",
             sensors=frozenset({"capacitive", "strain gauge", "load cell", "accelerometer"}),
         ),
-        "cyclic": LawNeeds(
-            "it needs a sensor or a part that repeats",
-            actuators=_PERIODIC_ACTUATORS,
-            transmissions=_PERIODIC_PARTS,
-            sensors=_PERIODIC_SENSORS,
+        **dict.fromkeys(
+            _CYCLIC,
+            LawNeeds(
+                "it needs a sensor or a part that repeats",
+                actuators=_PERIODIC_ACTUATORS,
+                transmissions=_PERIODIC_PARTS,
+                sensors=_PERIODIC_SENSORS,
+            ),
         ),
     }
 )
@@ -153,12 +157,12 @@ USUAL: Sequence[Usual] = (
     ),
     Usual(
         "harmonic drive",
-        frozenset({"cyclic"}),
+        frozenset(_CYCLIC),
         "a harmonic drive errs twice a turn of its wave generator (T. D. Tuttle, MIT AI Laboratory, TR 1365, 1992)",
     ),
     Usual(
         "resolver",
-        frozenset({"cyclic"}),
+        frozenset(_CYCLIC),
         "a resolver errs once and twice an electrical turn (D. C. Hanselman, IEEE Trans. Ind. Electron. 37 (1990) 556)",
     ),
     Usual(
@@ -168,7 +172,7 @@ USUAL: Sequence[Usual] = (
     ),
     Usual(
         "interferometer",
-        frozenset({"cyclic"}),
+        frozenset(_CYCLIC),
         "an interferometer errs once and twice a fringe (P. L. M. Heydemann, Appl. Opt. 20 (1981) 3382)",
     ),
 )

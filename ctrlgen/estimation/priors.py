@@ -46,6 +46,18 @@ _COGGING = LawPrior(
         "phase": _starts((0.0, 90.0)),
     },
 )
+_CYCLIC = LawPrior(
+    "Harmonics: several at one place. Periods from a twentieth of the typical size to twice it, and those seen in the residual.",
+    form_of="cyclic error",
+    repeatable=True,
+    parameters={
+        "period": ParameterPrior(
+            (2.0, 4 / 3, 1.0, 2 / 3, 0.5, 1 / 3, 0.25, 1 / 6, 0.125, 0.1, 0.05),
+            start_from_data="spatial_periods",
+        ),
+        "phase": _starts((0.0, 90.0)),
+    },
+)
 _PLAY = LawPrior(
     "Reversals between two samples are placed to 1 %: measured on simulated play.",
     model_form_error=0.01,
@@ -56,16 +68,12 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
     {
         # Sensor ---------------------------------------------------------------------------------------------------------------
         "bow": LawPrior("No sensor is bent by its first even term alone; 5 %: judgement.", model_form_error=0.05),
-        "cyclic": LawPrior(
-            "Harmonics: several at one place. Periods from a twentieth of the typical size to twice it, and those seen in the residual.",
-            repeatable=True,
-            parameters={
-                "period": ParameterPrior(
-                    (2.0, 4 / 3, 1.0, 2 / 3, 0.5, 1 / 3, 0.25, 1 / 6, 0.125, 0.1, 0.05),
-                    start_from_data="spatial_periods",
-                ),
-                "phase": _starts((0.0, 90.0)),
-            },
+        "cyclic": _CYCLIC,
+        "cyclic_from_home": replace(
+            _CYCLIC,
+            reason="Where the readings do not tell which of the two it is, the plain one is named: judgement. "
+            + _CYCLIC.reason,
+            log_prior_odds=-1.0,
         ),
         "clock_offset": LawPrior(
             "One pair of recorders for all readings; rarer than a late reading, which is named first: judgement.",

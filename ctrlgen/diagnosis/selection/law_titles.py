@@ -194,10 +194,11 @@ CLEARANCE: Mapping[str, str] = MappingProxyType(
 def title(law: type[Effect], parts: MachineParts) -> str:
     """The title of a law on a machine of these parts."""
     words = parts.words | {""}
-    if law.kind == "cyclic" and (those := _any_of(REPEATS, words)):
+    if law.kind in ("cyclic", "cyclic_from_home") and (those := _any_of(REPEATS, words)):
         # where a sensor alone is stated, what stands behind it is not known
         more = "" if words & REPEATS.keys() - {parts.sensor} or parts.transmission else ", or a pitch behind it"
-        return f"An error that repeats along the path: {those}{more}"
+        home = ", read as zero at home" if law.kind == "cyclic_from_home" else ""
+        return f"An error that repeats along the path: {those}{more}{home}"
     if law.kind == "backlash" and (those := _any_of(CLEARANCE, words)):
         return f"{'Slack' if those == CLEARANCE['cable'] else 'Play'} in {those}"
     if law.kind == "backlash" and parts.transmission:
