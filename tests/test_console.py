@@ -8,6 +8,10 @@ import time
 import pytest
 
 from ctrlgen.app import console
+from ctrlgen.app.diagnosis_console import findings_table
+from ctrlgen.diagnosis.selection.attribution import ShareEntry
+from ctrlgen.diagnosis.selection.findings import Estimate, Finding
+from ctrlgen.estimation.hypothesis import Hypothesis
 
 COLUMNS = (("what was found", "left"), ("place", "left"), ("value", "right"), ("bound", "right"))
 ROWS = (
@@ -37,6 +41,31 @@ def test_a_table_loses_no_text_and_breaks_no_number_at_any_width(monkeypatch, ca
             assert word in printed, word
     if width == 300:
         assert len(printed.splitlines()) == 1 + len(ROWS)
+
+
+def test_an_estimate_and_its_interval_stand_on_one_line(monkeypatch, capsys):
+    monkeypatch.setattr(console.out, "width", 110)
+    periodic, late = Hypothesis("cyclic_from_home", "sensor:axis", "axis"), Hypothesis("delay", "sensor:axis", "axis")
+    share = ShareEntry(value=0.992, ci95=(0.98, 0.996))
+    estimates = {
+        "amplitude": Estimate(8.19, (7.95, 8.43), "deg"),
+        "period": Estimate(90.8, (90.0, 91.6), "deg"),
+    }
+    lag = Hypothesis("low_pass", "sensor:axis", "axis")
+    console.show_table(
+        findings_table(
+            [
+                Finding("cyclic_from_home", "sensor:axis", estimates, (), share, {}, "", periodic),
+                Finding("delay", "sensor:axis", {"delay": Estimate(34, (27, 41), "ms")}, (lag,), None, {}, "", late),
+            ]
+        )
+    )
+    printed = capsys.readouterr().out
+    assert re.findall(r"(\w+) +(\S+) (\w+) \((\S+) \.\.\. (\S+) \w+\)", printed) == [
+        ("amplitude", "8.19", "deg", "7.95", "8.43"),
+        ("period", "90.8", "deg", "90", "91.6"),
+        ("delay", "34", "ms", "27", "41"),
+    ]
 
 
 def test_a_table_in_a_log_wraps_at_its_width(capsys):

@@ -10,9 +10,12 @@ from rich.markup import escape
 from ctrlgen.app.console import Column, out, show_table, table_of
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from ctrlgen.app.batch_row import BatchRow
     from ctrlgen.diagnosis.evidence.bootstrap import Bootstrap
     from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
+    from ctrlgen.diagnosis.selection.findings import Finding
     from ctrlgen.recordings.recording import Recording
 
 
@@ -31,10 +34,8 @@ def print_recording(recording: Recording) -> None:
 def print_diagnosis(diagnosis: Diagnosis) -> None:
     """The verdict, the findings and the held-out errors of a diagnosis."""
     from ctrlgen.diagnosis.report.answer import answer
-    from ctrlgen.diagnosis.report.luck_sentences import chance_text
-    from ctrlgen.diagnosis.report.narrative import gathered, interval, next_steps, share_text
+    from ctrlgen.diagnosis.report.narrative import gathered, next_steps
     from ctrlgen.diagnosis.report.shares_sentences import shares_sentences
-    from ctrlgen.diagnosis.selection.cause_entry import cause_name
     from ctrlgen.reporting.numbers import number
 
     for line in answer(diagnosis):
@@ -42,23 +43,7 @@ def print_diagnosis(diagnosis: Diagnosis) -> None:
     for line in shares_sentences(diagnosis):
         out.print(line, markup=False, soft_wrap=True)
     if diagnosis.findings:
-        table = table_of(
-            ("found", "left"),
-            ("at", "left"),
-            ("share", "right"),
-            ("by luck", "right"),
-            ("parameter", "left"),
-            ("estimate, 95 % interval", "left"),
-        )
-        for finding in diagnosis.findings:
-            sets = (finding.parameters, *finding.terms)
-            rows = [(name, interval(e, name)) for numbers in sets for name, e in numbers.items()]
-            alike = ", ".join(map(cause_name, finding.alternatives))
-            told = (finding.effect, finding.location, share_text(finding), chance_text(finding))
-            for k, (name, text) in enumerate(rows):
-                first = told if k == 0 else ("",) * len(told)
-                table.add_row(*first, name, text, escape(f"or {alike}") if alike and k == 0 else "")
-        show_table(table)
+        show_table(findings_table(diagnosis.findings))
     table = table_of(
         ("held out", "left"), ("before", "right"), ("after", "right"), ("noise", "right"), ("parameters", "right")
     )
@@ -70,6 +55,33 @@ def print_diagnosis(diagnosis: Diagnosis) -> None:
         out.print(f"note: {note}", markup=False, soft_wrap=True)
     for step in next_steps(diagnosis):
         out.print(f"next: {step}", markup=False, soft_wrap=True)
+
+
+def findings_table(findings: Sequence[Finding]) -> Table:
+    """A row a parameter of each finding, its estimate and interval on one line."""
+    from ctrlgen.diagnosis.report.luck_sentences import chance_text
+    from ctrlgen.diagnosis.report.narrative import interval, share_text
+    from ctrlgen.diagnosis.selection.cause_entry import cause_name
+
+    estimate = "estimate, 95 % interval"
+    table = table_of(
+        ("found", "left"),
+        ("at", "left"),
+        ("share", "left"),
+        ("by luck", "right"),
+        ("parameter", "left"),
+        (estimate, "left"),
+    )
+    table.columns[5].no_wrap = True
+    for finding in findings:
+        sets = (finding.parameters, *finding.terms)
+        rows = [(name, interval(e, name)) for numbers in sets for name, e in numbers.items()]
+        alike = ", ".join(map(cause_name, finding.alternatives))
+        told = (finding.effect, finding.location, share_text(finding), chance_text(finding))
+        for k, (name, text) in enumerate(rows):
+            first = told if k == 0 else ("",) * len(told)
+            table.add_row(*first, name, text, escape(f"or {alike}") if alike and k == 0 else "")
+    return table
 
 
 def print_explanation(diagnosis: Diagnosis, law: str) -> None:
