@@ -213,6 +213,7 @@ class Law:
             tangent_compliance=lambda: every,
             displacements=every,
             velocities=every,
+            drives=every,
             accelerations=every,
             displacement=held["displacement"],
             velocity=held["velocity"],

@@ -288,6 +288,7 @@ def test_no_law_is_left_out():
         *IN_ORDER,
         "clock_offset",
         "eccentricity",  # tests/test_rotary_servo.py
+        "feedthrough",  # tests/test_feedthrough.py
         "payload",
         "second_pole",
         "temperature_sensitivity_above",

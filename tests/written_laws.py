@@ -75,6 +75,7 @@ LAWS = {
     ),
     "eccentricity": ({"phase": 0.9}, lambda s, p: p.amplitude * (sin(s.value + 0.9) - sin(0.9))),
     "drive_crosstalk": ({}, lambda s, p: p.share * s.all[s.partner]),
+    "feedthrough": ({"before": 0.3}, lambda s, p: p.gain * (0.7 * s.drives[s.partner] + 0.3 * s.before)),
     "force_factor": ({"centre": 0.2}, lambda s, p: -p.fall * (s.displacement - 0.2) ** 2 * s.value),
     "gravity": ({"phase": 0.9}, lambda s, p: -p.torque * sin(s.displacement + 0.9)),
     "coulomb": ({"reach": 0.02, "smoothing": 0.3}, lambda s, p: -p.force * s.z, lambda s, p: {"z": dahl_rate(s, p)}),

@@ -47,6 +47,8 @@ class LawInputs:
     """() -> what finite rotations add to the pose, a vector; see `DevicePhysics`."""
     tangent_compliance: Callable[[], Expression]
     """() -> by how much less the stages yield than at home, a vector; see `BalancedPhysics`."""
+    drives: Expression = None
+    """What the amplifiers deliver at this instant, a vector over the channels of `Place.DRIVE`; at the sensor's place."""
     rate: Expression | None = None
     """The derivative of `value` [1/s]; where the motion gives it, at places of the platform."""
     second_rate: Expression | None = None

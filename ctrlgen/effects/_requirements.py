@@ -12,6 +12,7 @@ REQUIREMENTS: Mapping[str, str] = MappingProxyType(
         "ambient": "the temperature of the surroundings",
         "balanced": "a stage in balance, without inertia",
         "bipolar": "a drive of both signs",
+        "delivered": "a drive that no feedback of the readings decides on, and no imposed motion",
         "displacement_command": "an actuator that is told how far to go",
         "force": "forces in N or N*m",
         "heat": "heaters",

@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import Quantity
-from ctrlgen.devices import Device, DevicePhysics, InertialPhysics
+from ctrlgen.devices import Device, DevicePhysics
 from ctrlgen.devices.quantities import walk
 from ctrlgen.devices.section import Section
 from ctrlgen.effects import Channel, Effect, Param, Place, group, laws, means
@@ -22,7 +22,7 @@ from ctrlgen.estimation.disturbance_inputs import unread_axes
 from ctrlgen.estimation.law_prior import LawPrior
 from ctrlgen.estimation.priors import DEFAULT, prior_of
 from ctrlgen.estimation.settings import CANDIDATE_TERMS
-from ctrlgen.model.effect_terms import available, channels, partner_channels
+from ctrlgen.model.effect_terms import available, channels, in_loop, partner_channels
 
 DOMAIN = {
     Place.DRIVE: "actuator",
@@ -304,12 +304,6 @@ def why_not_offered(
     if law.place is Place.HEAT and "heat" not in there:
         return "no actuator of the device is heated"
     return "no channel that was recorded is one on which it can act"
-
-
-def in_loop(physics: DevicePhysics) -> bool:
-    """Whether a feedback loop acts on the readings."""
-    loop = physics.feedback if isinstance(physics, InertialPhysics) else None
-    return loop is not None and loop.measures == "reading"
 
 
 def _numbers(device: Device) -> Iterator[tuple[str, str]]:

@@ -19,11 +19,10 @@ import numpy as np
 
 from ctrlgen.devices import Device, DevicePhysics
 from ctrlgen.effects import Place, is_group, means
-from ctrlgen.estimation.hypothesis import in_loop
 from ctrlgen.estimation.settings import SIMULATION
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.discretisation import settling_time
-from ctrlgen.model.effect_terms import channels
+from ctrlgen.model.effect_terms import channels, in_loop
 from ctrlgen.model.model import Model
 
 

@@ -91,6 +91,13 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             once_a_turn=True,
             parameters={"phase": _starts((0.0, 30.0, 60.0, 90.0, 120.0, 150.0))},
         ),
+        "feedthrough": LawPrior(
+            "Shields and grounds are made against it: rarer than a wrong gain, which it is where the stage follows its drive at once. "
+            "Judgement.",
+            log_prior_odds=ONE_IN_TEN,
+            unless=frozenset({"balanced"}),
+            parameters={"before": _starts((0.5,))},
+        ),
         "high_pass": LawPrior(
             "A leak acts on the whole reading: one that is fitted to a part of it stands for something else. From a coupling to a "
             "charge amplifier.",

@@ -146,6 +146,7 @@ class EffectTerms:
         before = next(signal for level, signal in self.signals_before[place] if level >= order)
         channel = channels(self.physics, place)[i]
         at_platform = place in (Place.POSE, Place.SENSOR)
+        delivered = {"drives": self.delivered} if place is Place.SENSOR else {}
         return LawInputs(
             value=before[i],
             all=before,
@@ -160,6 +161,7 @@ class EffectTerms:
             velocities=self.velocity,
             second_order_kinematics=lambda: self.second_order_kinematics,
             tangent_compliance=lambda: self.tangent_compliance,
+            **delivered,
             **(self._of_platform(before[i]) if at_platform else self._of_axis(min(i, len(self.physics.axes) - 1))),
         )
 
@@ -183,6 +185,12 @@ class EffectTerms:
             "temperature_at_rest": None if heater is None else self.physics.rest[i],
             "holding_heat": None if heater is None else self.holding_heat[i],
         }
+
+    @cached_property
+    def delivered(self) -> ca.SX:
+        """What the amplifiers deliver (channels,), with the effects of the drive; a symbol where no drive is known."""
+        levels = self.signals_before.get(Place.DRIVE)
+        return levels[-1][1] if levels else ca.SX.sym("drive", len(channels(self.physics, Place.DRIVE)))
 
     @cached_property
     def holding_heat(self) -> ca.SX:
@@ -284,6 +292,7 @@ def available(physics: DevicePhysics, sample_time: float | None = None) -> froze
         "acceleration": isinstance(physics, ImposedPhysics),
         "ambient": True,
         LOOKS_BACK: sample_time is not None,
+        "delivered": not isinstance(physics, ImposedPhysics) and not in_loop(physics),
         "displacement_command": balanced and same_dimension(physics.force_unit, physics.travel_unit),
         "force": any(same_dimension(physics.force_unit, unit) for unit in ("N", "N*m")),
         "spatial": len(physics.components) == 6,
@@ -292,6 +301,12 @@ def available(physics: DevicePhysics, sample_time: float | None = None) -> froze
         "tangent_compliance": isinstance(physics, BalancedPhysics) and physics.tangent_compliance is not None,
     }
     return frozenset(name for name, given in present.items() if given)
+
+
+def in_loop(physics: DevicePhysics) -> bool:
+    """Whether a feedback loop acts on the readings."""
+    loop = physics.feedback if isinstance(physics, InertialPhysics) else None
+    return loop is not None and loop.measures == "reading"
 
 
 def _has_heaters(physics: DevicePhysics) -> TypeGuard[BalancedPhysics]:

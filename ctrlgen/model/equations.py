@@ -53,9 +53,9 @@ def equations_of(physics: DevicePhysics, terms: EffectTerms, z: ca.SX, v: ca.SX)
 
 def _balanced(physics: BalancedPhysics, terms: EffectTerms, z: ca.SX) -> Equations:
     """Forces in balance: 0 = force - restoring force."""
-    displacement, pose, reading = _carried(physics, terms, z)
     u, x = physics.drive.expr, NONE if physics.state is None else physics.state.expr
     drive = terms.added(Place.DRIVE, u)
+    displacement, pose, reading = _carried(physics, terms, z)
     produced = physics.heating_power(drive)
     heat = ca.SX.sym("heat", produced.numel())  # an unknown of its own, so that the inverse need not solve for squares
     arriving = terms.added(Place.HEAT, heat)
@@ -72,15 +72,14 @@ def _balanced(physics: BalancedPhysics, terms: EffectTerms, z: ca.SX) -> Equatio
 
 def _inertial(physics: InertialPhysics, terms: EffectTerms, z: ca.SX, v: ca.SX) -> Equations:
     """Newton's second law, with the feedback loop if there is one: mass a = force - restoring force - damping force."""
-    displacement, pose, reading = _carried(physics, terms, z)
     u, x, n = physics.drive.expr, NONE if physics.state is None else physics.state.expr, len(physics.axes)
-    loop, signals, held, command = physics.feedback, {"drive": physics.drive}, NONE, NONE
-    if loop is None:
-        drive = produced = terms.added(Place.DRIVE, u)
-    else:
+    loop, signals, command = physics.feedback, {"drive": physics.drive}, NONE
+    held = NONE if loop is None else ca.SX.sym("held", n)
+    drive = produced = terms.added(Place.DRIVE, u if loop is None else held)
+    displacement, pose, reading = _carried(physics, terms, z)
+    if loop is not None:
         measured = reading if loop.measures == "reading" else z
-        command, held = loop.control_law(u, measured, v, x), ca.SX.sym("held", n)
-        drive, produced = terms.added(Place.DRIVE, held), u - measured
+        command, produced = loop.control_law(u, measured, v, x), u - measured
         signals["command"] = loop.command.signal("command", physics.axes, command)
     heat = ca.SX.sym("heat", produced.numel())
     arriving = terms.added(Place.HEAT, heat)
