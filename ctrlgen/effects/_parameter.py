@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from ctrlgen.core.units import split_unit, to_si
 
-PLACEHOLDERS = ("channel", "travel", "partner")
+PLACEHOLDERS = ("channel", "travel", "partner", "force")
 MOTION = (*PLACEHOLDERS, "s")
 TIME = (*PLACEHOLDERS, "s", "Hz")
 PACES = (1e-6, 1e6)
@@ -20,10 +20,10 @@ class Param:
     """One number of a law: `bounds` in its `unit`; at `off` the whole effect vanishes (of one parameter, the amplitude).
 
     In `unit` the word `channel` stands for the unit of the signal that the effect acts on, `travel` for that of the stage
-    displacement, and `partner` for that of the other channel of a pair. Bounds then count in typical sizes of these signals,
-    so that one law serves micrometres and degrees; beside `travel` the `s` counts in typical times (`Channel.time`), so that it serves
-    a fan and a resonator. Of one that is `paced` bounds are those of records with a sample a millisecond and go with the sample time
-    (`Channel.pace`): a scanner's filter and an oven's.
+    displacement, `partner` for that of the other channel of a pair and `force` for that of the stage's force. Bounds then count in
+    typical sizes of these signals, so that one law serves micrometres and degrees, nanonewtons and kilonewtons; beside `travel` the `s`
+    counts in typical times (`Channel.time`), so that it serves a fan and a resonator. Of one that is `paced` bounds are those of records
+    with a sample a millisecond and go with the sample time (`Channel.pace`): a scanner's filter and an oven's.
     """
 
     name: str
@@ -94,6 +94,7 @@ class Channel:
 
     `time` [s]: typical displacement over the speed that occurs, so that what counts in both is a speed, whatever stroke a file states;
     1 s where no record says how fast the stage moves. `pace`: the sample time of the records over a millisecond, to the nearest decade.
+    `force_unit` and `force_scale` are those of the balance, as of `DevicePhysics`.
     """
 
     name: str
@@ -106,6 +107,8 @@ class Channel:
     partner_scale: float = 1.0
     time: float = 1.0
     pace: float = 1.0
+    force_unit: str = "N"
+    force_scale: float = 1.0
 
     def paired_with(self, other: Channel) -> Channel:
         """The same channel as the first one of a pair."""
@@ -115,7 +118,8 @@ class Channel:
         """The unit of a law's number at this channel, such as 'N/um^3' for 'channel/travel^3'; '1' for what is per channel of its kind."""
         if number.unit == "channel/partner" and self.unit == self.partner_unit:
             return "1"
-        units = dict(zip(PLACEHOLDERS, (self.unit, self.travel_unit, self.partner_unit), strict=True))
+        here = (self.unit, self.travel_unit, self.partner_unit, self.force_unit)
+        units = dict(zip(PLACEHOLDERS, here, strict=True))
 
         def in_place(word: re.Match[str]) -> str:
             unit = units[word[0]]
@@ -130,9 +134,9 @@ class Channel:
         if not _is_relative(number.unit):
             return to_si(value, number.unit)
         powers, rest = split_unit(number.unit, MOTION if "travel" in number.unit else PLACEHOLDERS)
-        sizes = zip(MOTION, (self.scale, self.travel_scale, self.partner_scale, self.time), strict=True)
+        here = (self.scale, self.travel_scale, self.partner_scale, self.force_scale, self.time)
         size = 1.0
-        for word, scale in sizes:
+        for word, scale in zip(MOTION, here, strict=True):
             size *= scale ** powers.get(word, 0.0)
         return float(to_si(value, rest) * size)
 

@@ -71,7 +71,7 @@ def _read_parameter(param: Param, given: dict[str, Any]) -> Quantity:
     if param.name not in given:
         unit = param.unit
         for word in PLACEHOLDERS:
-            unit = unit.replace(word, "um")
+            unit = unit.replace(word, "N" if word == "force" else "um")
         example = f"{param.example:.2g} {unit}".removesuffix(" 1")
         raise ValueError(f'{param.name} is missing ({param.doc}); write for example {param.name} = "{example}"')
     try:

@@ -14,7 +14,7 @@ class LostMotion(Effect):
     family = Family.ELASTIC
     requires = frozenset({"force"})
     source = "S. T. Smith, Flexures: Elements of Elastic Mechanisms (2000): levers"
-    params = (Param("compliance", "um/N", (-100.0, 100.0), "lost travel per force", off=0.0),)
+    params = (Param("compliance", "travel/force", (-5.0, 5.0), "lost travel per force", off=0.0),)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.compliance * s.force

@@ -270,7 +270,8 @@ def channels(physics: DevicePhysics, place: Place) -> list[Channel]:
             Place.DISPLACEMENT: (physics.travel_unit, physics.displacement_scale),
         }[place]
         rows = ((axis, unit, scale) for axis in physics.axes)
-    return [Channel(*row, physics.travel_unit, physics.displacement_scale) for row in rows]
+    travel, force = (physics.travel_unit, physics.displacement_scale), (physics.force_unit, physics.force_scale)
+    return [Channel(*row, *travel, force_unit=force[0], force_scale=force[1]) for row in rows]
 
 
 def partner_channels(physics: DevicePhysics, law: Effect | type[Effect]) -> list[Channel]:

@@ -301,8 +301,8 @@ def effects_page() -> str:
         "Each is one file in `ctrlgen/effects/`, written into a device file as an `[[effect]]` table with `kind`, `at` (the "
         'channel it acts on, or `"all"`, or those that measure one thing, such as `"all in rad"`), `of` for effects that couple two '
         "channels, and its parameters. In a unit, "
-        "`channel` stands for the unit of the signal the effect acts on, `travel` for that of the stage displacement and "
-        "`partner` for that of the other channel.",
+        "`channel` stands for the unit of the signal the effect acts on, `travel` for that of the stage displacement, "
+        "`partner` for that of the other channel and `force` for that of the stage's force.",
         "",
     ]
     for kind, law in sorted(Effect.library.items()):
