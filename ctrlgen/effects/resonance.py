@@ -2,7 +2,7 @@
 
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, State, itself
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, ShapeBounds, State, itself
 
 
 class Resonance(Effect):
@@ -20,7 +20,8 @@ class Resonance(Effect):
         Param("frequency", "Hz", (0.5, 2e3), "resonance with the stage held", paced=True),
         Param("damping", "1", (1e-3, 1.0), "damping ratio"),
     )
-    at_bounds = itself("frequency", "damping")
+    # a mass that stands still is a part of the ground
+    at_bounds = {"frequency": ShapeBounds(low="a stiffness or a damping"), **itself("damping")}
     states = (State("q", "travel", 1.0), State("p", "travel", 1.0))
 
     @classmethod

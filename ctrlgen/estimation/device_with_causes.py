@@ -9,6 +9,7 @@ from ctrlgen.devices.changed_numbers import changed, written
 from ctrlgen.effects import Channel, Effect, Param
 from ctrlgen.estimation.free_parameters import suspected_range
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, numbers
+from ctrlgen.estimation.number_sizes import sizes_of_numbers
 
 
 def device_with_causes(device: Device, causes: Sequence[Hypothesis], values: Sequence[dict[str, float]]) -> Device:
@@ -17,7 +18,7 @@ def device_with_causes(device: Device, causes: Sequence[Hypothesis], values: Seq
     effects, changes = [], {}
     for cause, value in zip(causes, values, strict=True):
         if cause.effect == PARAMETER:
-            low, high = suspected_range(described[cause.path])
+            low, high = suspected_range(described[cause.path], sizes_of_numbers(device)[cause.path])
             # a stage of negative size cannot be built
             changes[cause.path] = min(max(value["value"], low), high)
         else:

@@ -10,6 +10,7 @@ from ctrlgen.core.units import Quantity, written_unit
 from ctrlgen.devices import Device
 from ctrlgen.effects import Channel, Param
 from ctrlgen.estimation.hypothesis import DEVICES_KEPT, PARAMETER, Hypothesis, numbers
+from ctrlgen.estimation.number_sizes import sizes_of_numbers
 from ctrlgen.estimation.settings import FIT
 from ctrlgen.model.assembly import movable
 
@@ -59,7 +60,7 @@ def free_parameters(
     place = len(device.effect)
     for index, (cause, start) in enumerate(zip(causes, starts, strict=True)):
         if cause.effect == PARAMETER:
-            yield _suspected_number(cause.path, described[cause.path], index)
+            yield _suspected_number(device, cause.path, described[cause.path], index)
             continue
         channel = cause.channel_on(device)
         for p in cause.law.params:
@@ -69,10 +70,11 @@ def free_parameters(
         place += 1
 
 
-def _suspected_number(path: str, number: Quantity, index: int) -> FreeParameter:
+def _suspected_number(device: Device, path: str, number: Quantity, index: int) -> FreeParameter:
     """A number of the device that the cause `index` says is wrong."""
-    unit, size = written_unit(number.text), (abs(number.si) or 1e-3) * 1e-3
-    return FreeParameter(path, unit, number.si, *suspected_range(number), size, cause=index, amplitude=True)
+    unit, size = written_unit(number.text), FIT.suspected_step * sizes_of_numbers(device)[path]
+    low, high = suspected_range(number, sizes_of_numbers(device)[path])
+    return FreeParameter(path, unit, number.si, low, high, size, cause=index, amplitude=True)
 
 
 def _law_parameter(path: str, p: Param, cause: Hypothesis, channel: Channel, start: float, index: int) -> FreeParameter:
@@ -89,9 +91,9 @@ def _law_parameter(path: str, p: Param, cause: Hypothesis, channel: Channel, sta
     return FreeParameter(path, channel.unit_of(p), off, low, high, size, cause=index, amplitude=amplitude)
 
 
-def suspected_range(number: Quantity) -> tuple[float, float]:
-    """How far a suspected number is looked for [SI]: a tenth to ten times of it, half a radian for an angle."""
-    span = (abs(number.si) or 1e-3) * FIT.suspected_reach
+def suspected_range(number: Quantity, size: float) -> tuple[float, float]:
+    """How far a suspected number of typical `size` [SI] is looked for: a tenth to ten times of it, half a radian for an angle."""
+    span = size * FIT.suspected_reach
     if written_unit(number.text) in ("deg", "rad"):
         span = FIT.suspected_angle
     return number.si - span, number.si + 10 * span

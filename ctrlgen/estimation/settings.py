@@ -258,6 +258,8 @@ class FitSettings:
     suspected_reach: float = 0.9
     """Share of a suspected number of the device by which it may be smaller; ten times as much by which it may be larger:
     from a tenth to ten times."""
+    suspected_step: float = 1e-3
+    """Share of a number's typical size that counts as one while it is fitted or screened. Judgement."""
     suspected_angle: float = 0.5
     """The same for an angle [rad], whose nominal value may be zero."""
 

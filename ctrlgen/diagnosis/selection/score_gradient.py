@@ -20,7 +20,8 @@ from ctrlgen.estimation.disturbance_inputs import with_disturbance_inputs
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis, nominal_physics
 from ctrlgen.estimation.late_readings import LateSlopes
-from ctrlgen.estimation.settings import CANDIDATE_TERMS, SIMULATION
+from ctrlgen.estimation.number_sizes import sizes_of_numbers
+from ctrlgen.estimation.settings import CANDIDATE_TERMS, FIT, SIMULATION
 from ctrlgen.estimation.simulator import Simulator, compiled_simulator
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Record, Timing
@@ -93,7 +94,8 @@ class ScoreGradient:
         self.laws = CandidateTerms(laws, self.simulator, fit.structure, others, entered, seen)
         places = [free.index(h.path) for h in numbers]
         # the constant terms of numbers
-        self.sizes = np.array([max(abs(self.p[i]), 1e-3) * 1e-3 for i in places])
+        typical = sizes_of_numbers(fit.structure.device)
+        self.sizes = np.array([FIT.suspected_step * typical[h.path] for h in numbers])
         self.columns = list(self.laws.columns)
         for k, (h, i) in enumerate(zip(numbers, places, strict=True)):
             term, size = len(self.laws.terms) + k, float(self.sizes[k])
