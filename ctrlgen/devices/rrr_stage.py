@@ -133,6 +133,8 @@ class RrrStage(LoadedPlatform):
         limit, stroke = self.piezo.voltage_limit.si, self.piezo.stroke.si
         # The lowest displacement under any voltages: an input moves back a little when the others push.
         lowest = float(np.minimum(input_per_voltage(self), 0).sum(axis=1).min()) * limit + min(pushed_back(self), 0.0)
+        own = stage(self)
+        reach = np.abs(ca.DM(own.complete_J if self.inputs == "whole" else own.J).full()).sum(axis=1) * stroke
         W = self.wrench(p)[[0, 1, 5]] if self.load else ca.DM.zeros(3)
         given = ca.mtimes(k.C_inFo, W)  # displacement of the inputs by the load, no voltages and no stacks
         carried = {"load": -ca.mtimes(K_in, given)} if self.load else {}
@@ -151,7 +153,7 @@ class RrrStage(LoadedPlatform):
             axes=self.axes,
             components=("delta_x", "delta_y", "theta_z"),
             pose_units=("um", "um", "urad"),
-            pose_scale=(1e-5, 1e-5, 1e-3),
+            pose_scale=tuple(map(float, reach)),  # what all inputs at their stroke make of it
             drive=drive,
             state=state,
             rest=(0.0,) * 3,
