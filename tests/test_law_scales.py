@@ -6,26 +6,20 @@ its reason.
 
 from __future__ import annotations
 
-import re
-import tomllib
-from functools import cache
-from pathlib import Path
-
 import numpy as np
 import pytest
 from axis_records import AXIS, KF, M
 from conftest import AXIS_FILE, DEVICES, MESO_FILE, SCENARIOS
+from scaled_machines import USUAL, Scale, device_of, factor
 
 from ctrlgen import load_device
-from ctrlgen.core.files import validate
-from ctrlgen.core.units import exponents, read_quantity, same_dimension, split_unit, written_unit
+from ctrlgen.core.units import split_unit, written_unit
 from ctrlgen.devices import Device
 from ctrlgen.devices.changed_numbers import with_numbers
 from ctrlgen.effects import laws
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis, hypotheses, nominal_physics, numbers
 from ctrlgen.estimation.number_sizes import sizes_of_numbers
 
-Scale = tuple[float, float, float]  # of length, force and drive
 AXES: tuple[Scale, ...] = ((1e-3, 1, 1), (1e3, 1e-3, 1e3), (0.1, 1e3, 1e-3))
 OF_MATTER: tuple[Scale, ...] = ((1e-3, 1e-6, 1e-3), (100, 1e4, 100))  # with the stress, which matter bears at any size
 PLACEHOLDERS = ("channel", "travel", "partner", "force")
@@ -43,42 +37,6 @@ ABSOLUTE = {
     "um/urad": ARM, "mm": ARM, "mrad": TURN, "deg": TURN, "1/K": MATERIAL, "channel/K": ROOM, "K": ROOM,
 }  # fmt: skip
 """Why bounds may count in these units at a machine of any size; of times see test_law_paces.py."""
-
-
-@cache
-def factor(unit: str, scale: Scale) -> float:
-    """How many times a number in `unit` is as large; a volt is W/A, and an ampere goes with what is left of it."""
-    length, force, drive = scale
-    powers = exponents(unit)
-    assert powers is not None, unit
-    mass = force / length
-    each = {"kg": mass, "m": length, "A": mass * length**2 / drive}
-    return float(np.prod([each.get(name, 1.0) ** power for name, power in powers.items()]))
-
-
-def scaled(table, scale: Scale):
-    """A table of a device file with every number that has a unit as many times as large."""
-    if isinstance(table, dict):
-        return {key: scaled(value, scale) for key, value in table.items()}
-    if isinstance(table, list):
-        return [scaled(value, scale) for value in table]
-    if not isinstance(table, str) or not re.match(r"[+-]?[\d.]", table):
-        return table
-    try:
-        number = read_quantity(None, table)
-    except ValueError:
-        return table
-    unit = written_unit(number.text)
-    if same_dimension(unit, "K") or exponents(unit) is None:
-        return table
-    value = float(table.split()[0]) * factor(unit, scale)
-    return f"{value!r} {unit}" if unit != "1" else table
-
-
-@cache
-def device_of(file: Path, scale: Scale = (1, 1, 1)) -> Device:
-    table = scaled(tomllib.loads(file.read_text()), scale)
-    return validate(Device.library[table["kind"]], table, "device")
 
 
 def suspected(device: Device) -> dict[tuple[str, str, str | None], Hypothesis]:
@@ -119,7 +77,7 @@ def test_every_law_is_sought_in_the_sizes_of_its_machine(file, scale):
             continue
         one, two = h.channel_on(usual), there[key].channel_on(other)
         assert two.scale == pytest.approx(one.scale * factor(one.unit, scale), rel=1e-9), key
-        shapes = h.shapes(one, hints((1, 1, 1), usual, h)), there[key].shapes(two, hints(scale, usual, h))
+        shapes = h.shapes(one, hints(USUAL, usual, h)), there[key].shapes(two, hints(scale, usual, h))
         assert len(shapes[0]) == len(shapes[1]), key
         for p in h.law.params:
             if p.unit in ABSOLUTE:

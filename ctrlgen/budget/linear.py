@@ -91,7 +91,7 @@ def propagate(path: UncertainPath) -> Propagated:
 def player_deviation(path: UncertainPath) -> np.ndarray:
     """(n_y,) [SI] standard deviation a/sqrt(3) of the followed signal under drives from tables of the tolerance a (GUM 4.3.7): a bound,
     for the tables are judged by their largest error."""
-    return playback_tolerance(path.signal.units) / np.sqrt(3)
+    return playback_tolerance(path.signal) / np.sqrt(3)
 
 
 def scattering(path: UncertainPath) -> list[str]:

@@ -31,12 +31,11 @@ from ctrlgen.devices.quantities import shared_path
 from ctrlgen.devices.section import Section
 from ctrlgen.model.model import Model
 from ctrlgen.model.read_poses import ReadPoses, sensor_numbers
-from ctrlgen.trajectory.playback import ANGLE_TOLERANCE, LENGTH_TOLERANCE, playback_tolerance
+from ctrlgen.trajectory.playback import ANGLE_TOLERANCE, length_tolerance, playback_tolerance
 from ctrlgen.trajectory.scenario import Input, Scenario
 
 FILE = "uncertainty.toml"
 AMBIENT = ".ambient"  # how the path of a temperature to which heaters cool ends
-PLAYER = f"{1e9 * LENGTH_TOLERANCE / 3**0.5:.3g} nm, {1e9 * ANGLE_TOLERANCE / 3**0.5:.3g} nrad"
 FROM_DEVICE = "sd in the device file"
 EXAMPLE = """[numbers]
 "actuator.thermal_resistance" = { sd = "5 %", source = "spread of five specimens" }"""
@@ -74,8 +73,8 @@ class DriveChain(Section):
     arithmetic: Literal["double", "float"] = "double"
     """In which the drives are computed; `float` rounds each of them to 24 bits."""
     player: bool = False
-    """Whether the drives are replayed from the player's tables, which may move the followed signal by 0.1 nm and 1e-8 rad; left out:
-    they are as solved."""
+    """Whether the drives are replayed from the player's tables, which may move the followed signal by 0.1 nm, or a ten-thousandth of
+    its typical size where that is less, and 1e-8 rad; left out: they are as solved."""
 
 
 class Correlation(Section):
@@ -178,7 +177,9 @@ def load_uncertainties(scenario: Scenario, model: Model, path: Path | str | None
         what = f"is not stated of anything: no number of {scenario.device.name} has an sd; write {beside} with, for example,\n{EXAMPLE}"
         raise InputError(file_path or scenario.path, [Fault("uncertainty", what)])
     correlation = read.correlation(file_path or scenario.path)
-    texts = {"arithmetic": "float", "player": PLAYER}
+    tolerance = length_tolerance(model.signals[scenario.file.follow])
+    player = f"{1e9 * tolerance / 3**0.5:.3g} nm, {1e9 * ANGLE_TOLERANCE / 3**0.5:.3g} nrad"
+    texts = {"arithmetic": "float", "player": player}
     sources = {
         "arithmetic": "IEEE 754, round to nearest",
         "player": "tolerance of the player's tables, uniform within it",
@@ -350,7 +351,7 @@ class _Reader:
         if self.drive.jitter is not None and scenario.sample_time is None:
             what = "is for motion in time, but the scenario is a row of equilibria; leave it out"
             self.faults.append(Fault("drive.jitter", what))
-        if self.drive.player and not playback_tolerance(model.signals[scenario.file.follow].units).any():
+        if self.drive.player and not playback_tolerance(model.signals[scenario.file.follow]).any():
             what = "has no effect: its tolerance is one of lengths and angles, and the followed signal has neither; leave it out"
             self.faults.append(Fault("drive.player", what))
         heated = model.n_states > 0 and any(path.endswith(AMBIENT) for path in self.numbers)

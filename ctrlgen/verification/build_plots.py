@@ -14,13 +14,10 @@ from ctrlgen.trajectory import playback
 from ctrlgen.trajectory.inverse.clock import Settled
 from ctrlgen.verification.build_record import BUDGET_CORE, BUDGETS, Build
 from ctrlgen.verification.emulated_target import Target
-from ctrlgen.verification.tolerances import ANGLE_LIMIT, LENGTH_LIMIT, rounded
+from ctrlgen.verification.tolerances import ANGLE_LIMIT, length_limit, rounded
 from ctrlgen.verification.tracking import Piece
 
-SHOWN = {
-    "um": ("nm", LENGTH_LIMIT, playback.LENGTH_TOLERANCE),
-    "rad": ("nrad", ANGLE_LIMIT, playback.ANGLE_TOLERANCE),
-}
+SHOWN = {"um": "nm", "rad": "nrad"}
 SCALES = {"nm": 1e9, "nrad": 1e9}
 DECADES = 18  # that the logarithmic axis shows at most: down to the roundings of a double
 KINDS = {"scenario": "along the scenario", "worst": "worst case", "player": "player"}
@@ -37,8 +34,10 @@ def draw_build(build: Build) -> dict[str, str]:
 
 def draw_errors(build: Build, unit: str) -> Figure:
     """|error| of every channel of the dimension of `unit` along the trajectory, one panel per piece of C and arithmetic."""
-    shown, online, player = SHOWN[unit]
     channels, signal = _channels(build, unit), build.solution.model.signals[build.solution.scenario.file.follow]
+    shown, typical = SHOWN[unit], playback.typical_length(signal)
+    lengths = unit == "um"
+    player = playback.length_tolerance(signal) if lengths else playback.ANGLE_TOLERANCE
     panels = [(what, real) for what, by_real in build.errors.items() for real in by_real]
     clock = build.solution.scenario.clock
     static = isinstance(clock, Settled)
@@ -47,7 +46,8 @@ def draw_errors(build: Build, unit: str) -> Figure:
     )
     for panel, (what, real) in zip(axes[0], panels, strict=True):
         largest = build.solution.trace.signals[build.solution.scenario.file.follow][:, channels]
-        limit = max(online[real] if what is Piece.ONLINE else player, rounded(real, largest)) * SCALES[shown]
+        online = length_limit(real, typical) if lengths else ANGLE_LIMIT[real]
+        limit = max(online if what is Piece.ONLINE else player, rounded(real, largest)) * SCALES[shown]
         error = np.abs(build.errors[what][real]) * SCALES[shown]
         time = np.arange(len(error)) if isinstance(clock, Settled) else clock.times(len(error))
         for k, i in enumerate(channels):

@@ -12,6 +12,7 @@ from ctrlgen.firmware.online.limit_tables import FLOAT_SLACK
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import simulate, trace
 from ctrlgen.numerics.newton import newton_solver
+from ctrlgen.trajectory.playback import typical_length
 from ctrlgen.verification.compared_program import ComparedProgram
 from ctrlgen.verification.comparison_entry import ComparisonEntry, ComparisonKind, entry_of
 from ctrlgen.verification.correction_comparison import correction_rows
@@ -20,9 +21,9 @@ from ctrlgen.verification.tolerances import (
     ANGLE_LIMIT,
     EXCESS_LIMIT,
     EXCESS_LIMIT_WITH_MEMORY,
-    LENGTH_LIMIT,
     controller_limit,
     float_limit,
+    length_limit,
     rounded,
 )
 from ctrlgen.verification.tracking import reached
@@ -32,6 +33,7 @@ def online_rows(program: ComparedProgram) -> list[ComparisonEntry]:
     """All comparisons of the online controller of one build."""
     ref = program.reference
     moving = ref.scenario.sample_time is not None
+    typical = typical_length(ref.model.signals[ref.scenario.file.follow])
     start = ref.start if moving else ()
     followed = program.run("follow" if moving else "settle", ref.command, ref.width, start)
     settled = program.run("settle", ref.random, ref.width)
@@ -50,7 +52,7 @@ def online_rows(program: ComparedProgram) -> list[ComparisonEntry]:
             ComparisonKind.ONLINE_PATH,
             ref.once("reached", followed, lambda answers: reached(ref, answers)) - ref.path,
             max(ANGLE_LIMIT[program.real], ref.held_error),
-            max(LENGTH_LIMIT[program.real], ref.held_error),
+            max(length_limit(program.real, typical), ref.held_error),
         ),
     ]
 
@@ -121,8 +123,10 @@ def _equilibrium_rows(program: ComparedProgram, settled: np.ndarray) -> list[Com
         return rows
     wanted = ref.positions[plain]
     off = ref.once("equilibria", settled[plain], lambda answers: _equilibria(ref, answers)) - wanted
+    typical = typical_length(ref.model.signals[ref.scenario.file.follow])
     for unit, span in program.followed_channels():
-        limit = max((ANGLE_LIMIT if unit == "rad" else LENGTH_LIMIT)[real], rounded(real, wanted[:, span]))
+        least = ANGLE_LIMIT[real] if unit == "rad" else length_limit(real, typical)
+        limit = max(least, rounded(real, wanted[:, span]))
         rows.append(program.row(ComparisonKind.EQUILIBRIA, ref.scenario.file.follow, off, limit, span))
     return rows
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ctrlgen.firmware.player.compression import Compression
-from ctrlgen.trajectory.playback import ANGLE_TOLERANCE, LENGTH_TOLERANCE
+from ctrlgen.trajectory.playback import ANGLE_TOLERANCE, length_tolerance
 from ctrlgen.verification.compared_program import ComparedProgram
 from ctrlgen.verification.comparison_entry import ComparisonEntry, ComparisonKind
 from ctrlgen.verification.tolerances import ROUNDINGS
@@ -26,8 +26,9 @@ def player_rows(program: ComparedProgram, compression: Compression) -> list[Comp
     steep = 4 * epsilon * 2 * len(k) * np.abs(np.diff(solved, axis=0)).max()
     solver = ComparisonKind.PLAYED_ROOT if ref.model.inertial else ComparisonKind.PLAYED_OPTIMUM
     off = ref.once("played", played, lambda drives: reached_under(ref, drives)) - ref.played_path
+    allowed = length_tolerance(ref.model.signals[ref.scenario.file.follow])
     return [
-        *program.off_command(ComparisonKind.PLAYER_PATH, off, ANGLE_TOLERANCE, LENGTH_TOLERANCE),
+        *program.off_command(ComparisonKind.PLAYER_PATH, off, ANGLE_TOLERANCE, allowed),
         program.row(ComparisonKind.CURVE, "drive", played - compression.drives(k), near),
         program.row(solver, "drive", played - solved, (compression.chosen.drive or 0.0) + near),
         program.row(ComparisonKind.BETWEEN, "drive", quarter, near + steep),

@@ -5,7 +5,7 @@ for 60 to 110 instructions more a sample; ten seconds of six drives at 1 kHz wou
 and paths of less than about twenty samples and drives that are noise have no shorter form.
 
 The tolerance is on the followed signal, not on the drive: the model is driven by what the C computes (a closed path for
-two laps), and may differ from the command by `LENGTH_TOLERANCE` and `ANGLE_TOLERANCE`.
+two laps), and may differ from the command by `length_tolerance` and `ANGLE_TOLERANCE`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from ctrlgen.firmware.player.spline import Spline, fit
 from ctrlgen.model.model import Model
 from ctrlgen.reporting.result_file import Keys, Number
 from ctrlgen.trajectory.inverse.clock import in_time
-from ctrlgen.trajectory.playback import ANGLE_TOLERANCE, LENGTH_TOLERANCE
+from ctrlgen.trajectory.playback import ANGLE_TOLERANCE, length_tolerance
 from ctrlgen.trajectory.solution import Solution
 from ctrlgen.trajectory.unstated_modes import followed_under
 
@@ -141,7 +141,10 @@ def _compress(
     solution: Solution, real: Real, spline: Callable[[int], Spline | None], begin: int
 ) -> tuple[Compression, int]:
     """The form in one arithmetic, and the step of the drive tolerance at which the search for it ended, begun at another."""
-    bounds = _inward(solution.model, real)
+    bounds, allowed = (
+        _inward(solution.model, real),
+        length_tolerance(solution.model.signals[solution.scenario.file.follow]),
+    )
     n, closed = len(solution.drive), solution.scenario.closed
 
     def measured(curve: Curve) -> PlayerCandidate:
@@ -168,14 +171,14 @@ def _compress(
     table = SampleTable(np.clip(solution.drive, *bounds))
     weighed: list[tuple[Curve | None, PlayerCandidate]] = [(table, measured(table))]
 
-    found = _coarsest(spline, measured, lambda c: c.bytes(real) < table.bytes(real), begin)
+    found = _coarsest(spline, measured, lambda c: c.bytes(real) < table.bytes(real), begin, allowed)
     weighed.append(found[1:] if found else (None, _no_curve("cubic", "no shorter than the table within the tolerance")))
-    usable = [(curve, c) for curve, c in weighed if curve is not None and _within(c) and _affordable(c)]
+    usable = [(curve, c) for curve, c in weighed if curve is not None and _within(c, allowed) and _affordable(c)]
     curve, best = min(usable, key=lambda pair: pair[1].bytes or 0) if usable else weighed[0]
     assert curve is not None
     candidates = []
     for _, c in weighed:
-        told = {"chosen": c is best, "remark": c.remark or _remark(c, best, bool(usable))}
+        told = {"chosen": c is best, "remark": c.remark or _remark(c, best, bool(usable), allowed)}
         candidates.append(c.model_copy(update=told))
     return Compression(real, curve, closed, *_kept(curve, bounds, real), tuple(candidates)), found[
         0
@@ -187,9 +190,10 @@ def _coarsest(
     measured: Callable[[Curve], PlayerCandidate],
     short: Callable[[Spline], bool],
     begin: int,
+    allowed: float,
 ) -> tuple[int, Spline, PlayerCandidate] | None:
-    """The `short` spline of the coarsest drive tolerance that keeps the tolerance of what is followed, after its step; None where there is
-    none.
+    """The `short` spline of the coarsest drive tolerance that keeps the tolerance of what is followed, `allowed` [m] of its lengths, after
+    its step; None where there is none.
 
     Errors are nearly proportional to the drive tolerance: from the step `begin` on each that was measured tells where the next is tried,
     until one serves and that a step coarser does not.
@@ -199,8 +203,8 @@ def _coarsest(
         curve, change = spline(step), 0.0
         if curve is not None and short(curve):
             candidate = measured(curve)
-            change = _steps_to_go(candidate)
-            if _within(candidate):
+            change = _steps_to_go(candidate, allowed)
+            if _within(candidate, allowed):
                 good, too_fine = (step, curve, candidate), step
             else:
                 too_coarse = step
@@ -215,10 +219,10 @@ def _coarsest(
     return good
 
 
-def _steps_to_go(candidate: PlayerCandidate) -> float:
+def _steps_to_go(candidate: PlayerCandidate, allowed: float) -> float:
     """Steps by which the drive tolerance is to be finer, coarser below zero, for an error that just keeps the tolerance; a decade where
     the error tells nothing."""
-    shares = (candidate.length or 0.0) / LENGTH_TOLERANCE, (candidate.angle or 0.0) / ANGLE_TOLERANCE
+    shares = (candidate.length or 0.0) / allowed, (candidate.angle or 0.0) / ANGLE_TOLERANCE
     share = max(shares) / TOLERANCE_SHARE
     return STEPS_A_DECADE * log10(share) if 0 < share < inf else STEPS_A_DECADE
 
@@ -272,11 +276,11 @@ def _keeps_rates(solution: Solution, compression: Compression) -> bool:
     return bool(np.all(change >= low - rounded) and np.all(change <= high + rounded))
 
 
-def _within(c: PlayerCandidate) -> bool:
+def _within(c: PlayerCandidate, allowed: float) -> bool:
     return (
         c.length is not None
         and c.angle is not None
-        and c.length <= TOLERANCE_SHARE * LENGTH_TOLERANCE
+        and c.length <= TOLERANCE_SHARE * allowed
         and c.angle <= TOLERANCE_SHARE * ANGLE_TOLERANCE
     )
 
@@ -285,11 +289,11 @@ def _affordable(c: PlayerCandidate) -> bool:
     return c.instructions is not None and c.instructions <= INSTRUCTION_BUDGET
 
 
-def _remark(c: PlayerCandidate, best: PlayerCandidate, usable: bool) -> str:
+def _remark(c: PlayerCandidate, best: PlayerCandidate, usable: bool, allowed: float) -> str:
     """Why this candidate was chosen, or why not."""
     if c is best:
         return "fewest bytes" if usable else "as solved; nothing is within the tolerance"
-    if not _within(c):
+    if not _within(c, allowed):
         return "not within the tolerance"
     return f"more bytes than the {best.kind}" if _affordable(c) else f"more than {INSTRUCTION_BUDGET} instructions"
 
