@@ -24,6 +24,7 @@ ACCEPTED: dict[str, tuple[str, ...]] = {
     "low_pass": ("low_pass", "thermal_lag"),
     "cogging": ("cogging", "cogging_of_slots"),
     "cyclic": ("cyclic", "cyclic_from_home"),
+    "vibration": ("vibration", "vibration_per_record"),
     "coulomb": ("coulomb",),
     "stribeck": ("stribeck",),
     "drive_gain": ("drive_gain", "sensor_gain", FORCE_CONSTANT),

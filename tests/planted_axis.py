@@ -131,6 +131,12 @@ def sensor_step(u, t):
     return move(u) + 2e-7 * np.clip((t - 1.1) / 0.02 + 0.5, 0, 1)
 
 
+def vibration_per_record(u, t):
+    """The mains, by a turning phasor of 0.1 um that stands at 0.4 rad when the first record begins and at 2.9 rad with the other."""
+    turned = np.cumprod(np.full(len(t), np.exp(2j * np.pi * 50 * H)))
+    return move(u) + np.imag(1e-7 * np.exp((2.9 if t[0] else 0.4) * 1j) * turned)
+
+
 def drive_hysteresis(u, t):
     """Two hundred plays, all alike in weight, where the law has eight: its numbers count in eighths."""
     radii = 0.4 * (np.arange(200) + 0.5) / 200
@@ -251,6 +257,7 @@ ON_AXIS = {
     cyclic_from_home: Planted("sensor:axis", {"amplitude": 3e-7, "period": 2.2e-5, "phase": 1.2}),
     high_pass: Planted("sensor:axis", {"share": 1.0, "tau": 0.2}),
     stitching_error: Planted("sensor:axis", {"offset": 4e-7, "position": 2e-5, "width": 2e-6}, within={"width": 0.1}),
+    vibration_per_record: Planted("disturbance:axis", {"amplitude": 1e-7, "frequency": 50.0}),
     sensor_step: Planted("disturbance:axis", {"offset": 2e-7, "moment": 1.1, "rise": 0.02}, within={"rise": 0.1}),
     butterfly: Planted(
         "actuator:axis", {"share": 1.0, "linear": 0.1, "reach": 0.4}, within={"share": 0.1, "linear": 0.2, "reach": 0.1}

@@ -119,6 +119,7 @@ def test_the_laws_of_two_channels_and_those_with_a_clock_are_these():
         "stiffness_drift",
         "stribeck_after",
         "vibration",
+        "vibration_per_record",
         "warm_up",
     }
     assert {k for k, law in library if any(s.clock for s in law.states)} == clocked

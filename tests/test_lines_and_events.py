@@ -148,6 +148,16 @@ def test_a_line_at_a_harmonic_of_the_drive_is_the_drives(apart, own):
     assert objections(recording, line([HUM], 6.0), exact=True) == {}
 
 
+@pytest.mark.parametrize("held_out, own", [(0.5, False), (0.2, False), (0.71, True), (None, True)])
+def test_a_line_that_a_drive_of_another_period_meets_too_is_its_own(held_out, own):
+    """50 Hz is a harmonic of every drive of a round period: 25 of half a second, of 0.71 s none."""
+    recording = timed(np.linspace(0.0, 10.0, 1001))
+    other = timed(np.linspace(0.0, 10.0, 1001)).records[0]
+    recording.records[0].period, other.period, other.role = 0.5, held_out, "hold_out"
+    recording.records.append(other)
+    assert bool(objections(recording, line([HUM], 50.0))) != own
+
+
 def test_an_event_where_the_motion_ends_is_none_either_and_a_reversal_is_no_end():
     time = 1e-3 * np.arange(400)
     drive = np.where(time < 0.2005, np.sin(2 * np.pi * 5 * time), 0.0)[:, None]

@@ -295,6 +295,10 @@ LAWS = {
     "worn_backlash": ({"wear": 0.4, "spread": 0.5}, lambda s, p: 0.999 * (s.w + s.start * p.gap / 2 - s.displacement)),
     "warm_up": ({"tau": 0.4}, lambda s, p: p.size * (1 - exp(-s.t / 0.4))),
     "zero_per_record": ({}, lambda s, p: p.share * s.zero),
+    "vibration_per_record": (
+        {"frequency": 3.0, "phase": 0.9},
+        lambda s, p: p.amplitude * sin(TWO_PI * 3 * s.t + 0.9 + s.theta),
+    ),
     "vibration": ({"frequency": 3.0, "phase": 0.9}, lambda s, p: p.amplitude * sin(TWO_PI * 3 * s.t + 0.9)),
 }
 AMPLITUDES = {"heater_resistance": 0.01, "heat_loss": 0.01, "expansion": 0.01}  # of a share, an angle, a gain: 0.3

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ctrlgen.estimation.least_squares import initial_state_sd
-from ctrlgen.estimation.settings import INITIAL_MEMORY
+from ctrlgen.estimation.settings import FIT, INITIAL_MEMORY
 from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.recordings.gaps import rows_of
 from ctrlgen.recordings.recording import Record
@@ -22,6 +22,18 @@ White = Callable[[Record, np.ndarray], np.ndarray]  # (record, readings) -> whit
 def begins_elsewhere(simulator: Simulator, record: Record, white: np.ndarray) -> bool:
     """Whether a device with a memory that is looked for here begins worse than it goes on."""
     return bool(simulator.plays or simulator.gaps or simulator.slews) and begins_worse(record, white)
+
+
+def anywhere(simulator: Simulator, theta: np.ndarray, record: Record, expected: np.ndarray, white: White) -> np.ndarray:
+    """The free initial states `expected`, in their prior deviations, and each of which nothing is foretold at the quarter of its typical
+    size, such as a turn, with which the record is foretold best: from a phase half a turn off no step leads to the right one."""
+    sd, states = initial_state_sd(simulator), expected.copy()
+    for k in simulator.unforetold:
+        tried = [states.copy() for _ in INITIAL_MEMORY.quarters]
+        for start, quarter in zip(tried, INITIAL_MEMORY.quarters, strict=True):
+            start[k] = quarter / FIT.start_size
+        states = min(tried, key=lambda s: float(np.sum(white(record, simulator.simulate(record, theta, sd * s)) ** 2)))
+    return states
 
 
 def begins_worse(record: Record, white: np.ndarray) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from ctrlgen.estimation.law_prior import ONE_IN_A_HUNDRED, ONE_IN_TEN, LawPrior, ParameterPrior, peaks
 
@@ -10,6 +11,20 @@ EVENT = {"moment": ParameterPrior(start_from_data="moments"), "rise": peaks(1.0)
 EVENTS_ARE_RARE = (
     "An event at any time. Laws that act always come first among equals: most of a hundred records have no event, and a step fits "
     "something of any structured residual. Judgement."
+)
+
+_VIBRATION = LawPrior(
+    "From outside. Frequencies of mains and rotating machines, and the lines of the residual's spectrum. Rarer than a pitch, "
+    "which is the same at one speed: judgement.",
+    log_prior_odds=ONE_IN_TEN,
+    form_of="vibration",
+    repeatable=True,
+    of_time=True,
+    domain="disturbance",
+    parameters={
+        "frequency": ParameterPrior((10.0, 16.7, 25.0, 33.0, 50.0, 60.0, 100.0, 120.0)),
+        "phase": ParameterPrior((0.0, 90.0)),
+    },
 )
 
 OF_TIME: Mapping[str, LawPrior] = {
@@ -37,16 +52,12 @@ OF_TIME: Mapping[str, LawPrior] = {
         unless=frozenset({"balanced"}),
         parameters={"levels_off": ParameterPrior((3.0, 30.0, 1e4))},
     ),
-    "vibration": LawPrior(
-        "From outside. Frequencies of mains and rotating machines, and the lines of the residual's spectrum. Rarer than a pitch, "
-        "which is the same at one speed: judgement.",
-        log_prior_odds=ONE_IN_TEN,
-        of_time=True,
-        domain="disturbance",
-        parameters={
-            "frequency": ParameterPrior((10.0, 16.7, 25.0, 33.0, 50.0, 60.0, 100.0, 120.0)),
-            "phase": ParameterPrior((0.0, 90.0)),
-        },
+    "vibration": _VIBRATION,
+    "vibration_per_record": replace(
+        _VIBRATION,
+        reason="Where the records do not tell whether their phases differ, they do not: judgement. "
+        + _VIBRATION.reason,
+        log_prior_odds=ONE_IN_TEN - 1.0,
     ),
     "warm_up": LawPrior(
         "A drift that levels off, as rare as one and as far from its form. From within a twelfth of the recording to far beyond it.",

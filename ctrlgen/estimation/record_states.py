@@ -94,7 +94,8 @@ def begun_near(
         step = step / 4
     least = HELD_OUT_REFIT.unsettled * best.objective
     settled = best.objective - promised <= least or was - best.objective <= least
-    if settled and not simulator.slews:  # where it catches up with its drive, a step promises too little
+    # what catches up with its drive, and a phase, promise too little in one step
+    if settled and not simulator.slews and not simulator.unforetold:
         return best
     found = levenberg_marquardt(problem, best.states, HELD_OUT_REFIT.max_steps_to_begin)
     r = problem.residual(found)

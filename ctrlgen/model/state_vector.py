@@ -54,6 +54,7 @@ class MemoryPlaces:
     clocks: tuple[int, ...]
     bristles: tuple[int, ...]
     free: tuple[int, ...]
+    unforetold: tuple[int, ...]
 
 
 def memory_places(memories: Sequence[Memory], first: int, closed: Callable[[ca.SX], ca.SX]) -> MemoryPlaces:
@@ -66,6 +67,7 @@ def memory_places(memories: Sequence[Memory], first: int, closed: Callable[[ca.S
         tuple(k for k, _, s in placed if s.clock),
         bristles,
         tuple(k for k, _, s in placed if s.free or k in bristles),
+        tuple(k for k, _, s in placed if s.unforetold),
     )
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ctrlgen.diagnosis.evidence.independent_stretches import GAP, Memory, Whitened, matched_innovations, stretches
+from ctrlgen.diagnosis.settings import LUCK
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.free_parameters import FreeParameter
 from ctrlgen.estimation.hypothesis import Hypothesis
@@ -24,6 +25,10 @@ class WithoutCauses:
     structure: Structure
     theta: np.ndarray
     root: np.ndarray
+
+    def of(self, full: Fit) -> Fit:
+        """The same as a fit, with what does not depend on numbers of the `full` one."""
+        return replace(full, structure=self.structure, theta=self.theta)
 
 
 def without_causes(full: Fit, causes: Collection[Hypothesis]) -> WithoutCauses:
@@ -54,11 +59,12 @@ def matched_parts(fitter: Fitter, full: Fit, causes: Collection[Hypothesis], mem
 
 
 def _of_record(fitter: Fitter, bare: WithoutCauses, full: Fit, record: Record, memory: Memory) -> Whitened:
-    """What `bare` leaves of a held-out record, from rest, and what `full` changes."""
+    """What `bare` leaves of a held-out record, from rest, and what `full` changes. What the beginning of the record alone can tell, such
+    as the phase of the mains there, it tells, and is then no evidence."""
     simulator = fitter.simulator(bare.structure, record)
     changed = change_by(fitter, bare, full, record)
     sd = initial_state_sd(simulator)
-    predicted, Y = simulator.sensitivities(record, bare.theta, np.zeros(len(sd)))
+    predicted, Y = simulator.sensitivities(record, bare.theta, _told_by_beginning(fitter, bare.of(full), record))
     if not all(np.isfinite(v).all() for v in (predicted, changed, Y)):
         raise ArithmeticError("the prediction diverges")
     k = len(bare.theta)
@@ -66,6 +72,8 @@ def _of_record(fitter: Fitter, bare: WithoutCauses, full: Fit, record: Record, m
     values = [left[..., None], changed[..., None], Y[..., :k] @ bare.root, Y[..., k:] * sd]
     white = fitter.error.whiten(np.concatenate(values, axis=2), record.valid)
     labels = stretches(record, np.sum(white[..., 1] ** 2, axis=1), memory)
+    if fitter.simulator(full.structure, record).unforetold:
+        labels[: _beginning(record)] = GAP
     inside = labels != GAP
     rows = white[inside].reshape(-1, white.shape[2])
     stretch = np.repeat(labels[inside], white.shape[1])
@@ -74,9 +82,27 @@ def _of_record(fitter: Fitter, bare: WithoutCauses, full: Fit, record: Record, m
 
 def change_by(fitter: Fitter, bare: WithoutCauses, full: Fit, record: Record) -> np.ndarray:
     """What `full` changes of the prediction (n, n_y) [SI], both from rest: the held-out readings tell neither initial states, nor what a
-    reading that is late shows of the time before."""
+    reading that is late shows of the time before; their beginning tells what nothing else can."""
     unread = replace(record, valid=np.zeros_like(record.valid))
-    return np.subtract(*(fitter.simulator(f.structure, record).simulate(unread, f.theta) for f in (full, bare)))
+    with_, without = (
+        fitter.simulator(f.structure, record).simulate(unread, f.theta, _told_by_beginning(fitter, f, record))
+        for f in (full, bare.of(full))
+    )
+    return with_ - without
+
+
+def _beginning(record: Record) -> int:
+    return round(LUCK.foretelling * len(record.time))
+
+
+def _told_by_beginning(fitter: Fitter, fit: Fit, record: Record) -> np.ndarray:
+    """The free initial states [SI] of a model at rest, but those that no other record foretells as the beginning of this one tells them."""
+    simulator = fitter.simulator(fit.structure, record)
+    states = np.zeros(len(simulator.free_initial_states))
+    if chosen := list(simulator.unforetold):
+        read = record.valid & (np.arange(len(record.time)) < _beginning(record))[:, None]
+        states[chosen] = fitter.begun(fit, replace(record, valid=read))[0][chosen]
+    return states
 
 
 def _key(structure: Structure, p: FreeParameter) -> tuple[Hypothesis | None, str]:

@@ -170,13 +170,19 @@ def _no_line(recording: Recording, fit: Fit, k: int) -> str | None:
     if line * covered < OBJECTIONS.fewest_periods:
         fewest = f"{OBJECTIONS.fewest_periods:.0f} are needed to tell a line"
         return f"the records hold {line * covered:.1f} periods of it, and {fewest}"
-    for record in (r for r in recording.records if r.role == "fit"):
-        period = period_of(record) or _nearly_period(record)
-        order = line * period if period else 0.5
-        near = max(OBJECTIONS.harmonic / covered, _line_interval(fit, k))
-        if period and order > 0.5 and abs(order - round(order)) / period < near:
-            return f"it is harmonic {round(order)} of the drive's period, as everything is that the drive causes"
-    return None
+    near = max(OBJECTIONS.harmonic / covered, _line_interval(fit, k))
+    orders = [_harmonic(record, line, near) for record in recording.records if record.role in ("fit", "hold_out")]
+    # a line that drives of other periods meet too is none of theirs: where they do not meet it, held-out errors speak against it
+    if not orders or 0 in orders:
+        return None
+    return f"it is harmonic {orders[0]} of the drive's period, as everything is that the drive causes"
+
+
+def _harmonic(record: Record, line: float, near: float) -> int:
+    """The harmonic of a record's drive that a line [Hz] is, within `near` [Hz]; 0 where it is none or the drive does not repeat."""
+    period = period_of(record) or _nearly_period(record)
+    order = round(line * period) if period else 0
+    return order if period and order and abs(line - order / period) < near else 0
 
 
 def _line_interval(fit: Fit, k: int) -> float:

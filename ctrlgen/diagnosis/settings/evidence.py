@@ -154,6 +154,9 @@ class LuckSettings:
     """Length of a stretch in correlation times of the noise: with the gap, sums of neighbours correlate by half a per cent."""
     gap: float = 3.0
     """Gap before each, in the same: exp(-3) = 5 % of what was before it remains."""
+    foretelling: float = 0.25
+    """Share of a held-out record, its beginning, that tells a phase which no other record does; what it is told by is no evidence.
+    Judgement."""
     white: float = 4.0
     """Standard deviations 1/sqrt(n) of the correlation from sample to sample up to which they count as independent."""
     most_causes: int = 4
