@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from axis_records import AXIS, NOISE, H, drive, fitter_of, move, record
+from axis_records import AXIS, NOISE, SETTLING, H, drive, fitter_of, move, record
 from conftest import AXIS_FILE
 from scaled_machines import USUAL, device_of, factor
 
 from ctrlgen.core.units import to_si
 from ctrlgen.devices.changed_numbers import with_numbers
 from ctrlgen.diagnosis.diagnose import diagnose_recording
-from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.diagnosis.selection.score_gradient import ScoreGradient, law_terms
+from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis, hypotheses, nominal_physics
+from ctrlgen.estimation.noise import estimate_noise
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Recording
 
@@ -82,3 +85,20 @@ def test_a_damping_that_is_stated_as_zero_is_found():
     (number,) = [x for x, p in zip(fit.theta, fit.structure.free_parameters, strict=True) if p.path == cause.path]
     assert number == pytest.approx(30.0, rel=0.02)  # beside a mass and a stiffness that are free by their deviations
     assert fit.chi2 < 1.2 * fit.n
+
+
+@pytest.mark.parametrize("scale", SCALES)
+def test_a_number_is_screened_in_its_own_size(scale):
+    """By up to half of itself, however small it is in SI: a force constant of 0.1 mN/V and a mass of 0.5 mg."""
+    device, recording = machine("saturation", scale)
+    fitter = Fitter(recording, estimate_noise(recording, SETTLING))
+    offered = hypotheses(device, nominal_physics(device), recording.channels, H, False)
+    limits = ("mechanics.stroke", "actuator.drive_limit")
+    numbers = [h for h in offered if h.effect == PARAMETER and h.path not in limits]
+    fit, part = fitter.fit(Structure(device), steps=0), fitter.fit_records[0]
+    terms = law_terms(device, numbers, recording.channels, part.timing, len(part.time))
+    slopes = ScoreGradient(fitter, fit, part, numbers, lambda *_: DataHints(), terms)
+    assert len(slopes.columns) == len(numbers) > 3
+    for column in slopes.columns:
+        most = column.range[1] * column.size
+        assert most == pytest.approx(0.5 * abs(column.shape["value"]), rel=1e-6), column.hypothesis.path
