@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from axis_records import AXIS, KF, M
-from conftest import AXIS_FILE, DEVICES, MESO_FILE, SCENARIOS
+from conftest import AXIS_FILE, DEVICES, SCENARIOS
 from scaled_machines import USUAL, Scale, device_of, factor
 
 from ctrlgen import load_device
@@ -23,8 +23,9 @@ from ctrlgen.estimation.number_sizes import sizes_of_numbers
 AXES: tuple[Scale, ...] = ((1e-3, 1, 1), (1e3, 1e-3, 1e3), (0.1, 1e3, 1e-3))
 OF_MATTER: tuple[Scale, ...] = ((1e-3, 1e-6, 1e-3), (100, 1e4, 100))  # with the stress, which matter bears at any size
 PLACEHOLDERS = ("channel", "travel", "partner", "force")
+# Not the two hexapods: their typical pose is a micrometre, which suits their interferometers, and not the travel that their files state
 MACHINES = [
-    *((file, scale) for file in (AXIS_FILE, SCENARIOS / "rack_pinion" / "device.toml", MESO_FILE) for scale in AXES),
+    *((file, scale) for file in (AXIS_FILE, SCENARIOS / "rack_pinion" / "device.toml") for scale in AXES),
     *((DEVICES / f"{name}.toml", scale) for name in ("rrr_case1", "tripod", "parallelogram") for scale in OF_MATTER),
 ]
 EACH = pytest.mark.parametrize("file, scale", MACHINES, ids=[f"{f.parent.name}_{f.stem}-{s}" for f, s in MACHINES])

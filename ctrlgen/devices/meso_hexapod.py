@@ -109,11 +109,12 @@ class MesoHexapod(Device):
                 Limit("stroke", "stage displacement", self.axes, "um", signal.displacement, *ends),
             ]
 
+        arm = 1e-6 / self.hexapod.platform_radius.si  # moves the platform's rim by 1 um
         return BalancedPhysics(
             axes=self.axes,
             components=("theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z"),
             pose_units=("urad",) * 3 + ("um",) * 3,
-            pose_scale=(self.workspace.rotation.si,) * 3 + (self.workspace.translation.si,) * 3,
+            pose_scale=(arm,) * 3 + (1e-6,) * 3,
             drive=drive,
             displacement_scale=travel,  # far below it the balance could not be met to its last digit
             force_scale=travel,
