@@ -212,6 +212,17 @@ def directional_friction(u, t):
     return move(u, force)
 
 
+def eddy_current_brake(u, t):
+    """Of 0.021 N at most, at 0.7 mm/s, by the field: that of the currents stands across that of the poles and turns it."""
+
+    def force(time, q, v, before):
+        middle = v + (v - before) / 2  # of a step
+        away = np.arctan2(abs(middle), 7e-4)  # by which it is turned
+        return -0.042 * np.sin(away) * np.cos(away) * np.sign(middle), v
+
+    return move(u, force)
+
+
 def bouc_wen(u, t):
     """F = -k z, dz = dd (1 - (beta sgn(dd z) + gamma)|z|), beta = 8e4/m, gamma = 2e4/m, in steps of a tenth of a sample."""
 
@@ -275,6 +286,9 @@ ON_AXIS = {
         "actuator:axis",
         {"share": 0.1, "reach": 0.4, "lower": 0.3},
         within={"share": 0.15, "reach": 0.15, "lower": 0.15},
+    ),
+    eddy_current_brake: Planted(
+        "stage:axis", {"damping": 0.042 / 7e-4, "speed": 7e-4}, within={"damping": 0.02, "speed": 0.02}
     ),
     rectified: Planted("sensor:axis", {"share": 0.5}),
     cogging: Planted("stage:axis", {"force": 0.1, "period": 2.5e-5}, within={"force": 0.02}),

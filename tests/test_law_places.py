@@ -56,6 +56,20 @@ def test_a_friction_in_proportion_to_the_speed_is_damping():
     assert not against(0.3, 1e-3)
 
 
+def test_a_brake_whose_critical_speed_is_far_beyond_those_recorded_is_damping():
+    """A plain damper has none; a brake that passes its largest force is one."""
+    fitter, _ = axis_fitter(n=800).described(AXIS)
+    brake = Hypothesis("eddy_current_brake", "stage:axis", "axis", time=0.1)
+
+    def against(speed: float, damping: float = 50.0) -> str:
+        fit = fitter.fit(Structure(AXIS).with_cause(brake, {"damping": damping, "speed": speed}), steps=0)
+        return objections(fitter.recording, fit).get(0, "")
+
+    assert "where it is viscous damping" in against(0.1)
+    assert "it is viscous damping" in against(0.09, damping=1.0)
+    assert not against(2e-3)
+
+
 def test_a_displacement_that_no_force_depends_on_has_no_law():
     """The disturbance that would tell it from others has no place to enter."""
     device = gantry()

@@ -73,6 +73,10 @@ LAWS = {
             -p.force * (sin(s_ := TWO_PI * s.displacement / 0.4 + 0.9) + 0.2 * sin(2 * s_) - 0.1 * cos(2 * s_))
         ),
     ),
+    "eddy_current_brake": (
+        {"speed": 0.4},
+        lambda s, p: -2 * (p.damping * 0.4 / 2) * sign(s.velocity) / (abs(s.velocity) / 0.4 + 0.4 / abs(s.velocity)),
+    ),
     "eccentricity": ({"phase": 0.9}, lambda s, p: p.amplitude * (sin(s.value + 0.9) - sin(0.9))),
     "drive_crosstalk": ({}, lambda s, p: p.share * s.all[s.partner]),
     "feedthrough": ({"before": 0.3}, lambda s, p: p.gain * (0.7 * s.drives[s.partner] + 0.3 * s.before)),

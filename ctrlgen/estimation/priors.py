@@ -206,6 +206,13 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             form_of="dry friction",
             parameters={"skew": _starts((-0.3, 0.3)), "reach": peaks(3e-4, 3e-3, 0.03)},
         ),
+        "eddy_current_brake": LawPrior(
+            "Grease and dry friction are commoner. Conductors are no thin sheets and poles have edges, grease follows other powers: 2 %. "
+            "Judgement.",
+            log_prior_odds=ONE_IN_TEN,
+            model_form_error=0.02,
+            parameters={"speed": peaks(0.05, 0.2, 0.7)},
+        ),
         "end_stop": LawPrior(
             "A contact is neither a spring nor Hertz's ball; 5 %: judgement. A spring is plainest. A stop beyond the peak is "
             "untouched; a soft one is a second spring, from where most of the residual is.",
