@@ -160,3 +160,41 @@ def test_of_a_heater_that_radiates_no_other_law_is_certain(tmp_path):
     (first,) = found.findings
     assert found.verdict == Verdict.AMBIGUOUS
     assert {first.effect, *(c.effect for c in first.alternatives)} >= {"bow", "expansion"}
+
+
+def driven_by_volts(folder, turns, seed=7, n=800, h=4e-3):
+    """A heater of 150 Ohm and 1.5e-3 1/K, whose resistance is largest `turns` above the cold one: dR/dT falls in a straight line, to zero
+    there. In steps of a 64th of a sample."""
+    rng, cold = np.random.default_rng(seed), 293.15
+    for role in ("fit", "hold_out"):
+        volts, T, rows = np.sqrt(150 * np.repeat(rng.uniform(0.02, 0.9, n // 40 + 1), 40)[:n]), cold, []
+        for k, U in enumerate(volts):
+            F = 20 * (2.6e-6 + 5e-9 * (T - 273.15)) * (T - cold) * 160e9 * 12e-6 * 30e-6 * np.sin(np.radians(4))
+            rows.append((k * h, U, F / STIFFNESS * 1e6 + 0.01 * rng.standard_normal()))
+            for _ in range(64):
+                slopes = 1.5e-3, 1.5e-3 * (1 - (T - cold) / turns)  # at the cold end and here
+                R = 150 * (1 + (T - cold) * np.mean(slopes))
+                T += h / 64 * (500 * U**2 / R - (T - cold)) / 20e-3
+        np.savetxt(folder / f"{role}.csv", rows, delimiter=",", header="t,P,x", comments="")
+    volt = 'heater_resistance = "150 ohm"\npower_limit'
+    (folder / "device.toml").write_text(CHEVRON.replace("power_limit", volt))
+    (folder / "recording.toml").write_text(RECORDING + COLUMNS.replace('"W"', '"V"'))
+
+
+LAWS_OF_HEAT = ("end_stop", "heat_loss", "heater_resistance", "heater_resistance_of_second_order")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("turns", [300.0, np.inf])
+def test_a_resistance_that_rises_and_falls_is_told_and_a_straight_one_stays_straight(tmp_path, turns):
+    """It was an end stop."""
+    driven_by_volts(tmp_path, turns)
+    found = diagnose(tmp_path / "device.toml", tmp_path / "recording.toml", laws=LAWS_OF_HEAT, jobs=0)
+    (only,) = found.findings
+    assert found.verdict is Verdict.EXPLAINED
+    straight = np.isinf(turns)
+    assert only.effect == "heater_resistance" + ("" if straight else "_of_second_order")
+    truth = {"slope": 1.5e-3} | ({} if straight else {"curvature": -0.5 / turns})
+    for name, number in truth.items():
+        low, high = only.parameters[name].ci95
+        assert low - 2e-3 * abs(number) <= number <= high + 2e-3 * abs(number)  # of the steps, of either side

@@ -20,6 +20,7 @@ ONE_WAY = {
     "low_pass": (-0.5, 1.5),
     "coil_heating": (-0.1, 1.0),
     "heater_resistance": (-1e-3, 1e-2),
+    "heater_resistance_of_second_order": (-1e-3, 1e-2),
     "heat_loss": (-1e-3, 1e-2),
 }
 
@@ -63,6 +64,7 @@ def test_times_frequencies_and_ways_are_not_negative_and_moments_places_and_lean
             "level",
             "linear",
             "exponent",
+            "curvature",
             "taper",
             "reversible",
             "skew",

@@ -115,7 +115,14 @@ def test_a_motor_is_no_ferroelectric_and_a_stack_has_no_heater():
     for actuator in ("voice coil", "servo motor", "stepper", "pump", "thermal"):
         assert "butterfly" in not_offered(["butterfly"], parts(actuator=actuator))
     assert not not_offered(["butterfly", "drive_hysteresis"], parts(actuator="piezo stack"))
-    heaters = ["heater_resistance", "heat_loss", "heat_crosstalk", "second_pole", "expansion"]
+    heaters = [
+        "heater_resistance",
+        "heater_resistance_of_second_order",
+        "heat_loss",
+        "heat_crosstalk",
+        "second_pole",
+        "expansion",
+    ]
     assert list(not_offered(heaters, parts(actuator="piezo stack"))) == heaters
     assert not not_offered(heaters, parts(actuator="thermal"))
 

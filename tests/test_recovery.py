@@ -289,6 +289,7 @@ def test_no_law_is_left_out():
         "clock_offset",
         "eccentricity",  # tests/test_rotary_servo.py
         "feedthrough",  # tests/test_feedthrough.py
+        "heater_resistance_of_second_order",  # tests/test_heat_loss.py
         "payload",
         "second_pole",
         "temperature_sensitivity_above",

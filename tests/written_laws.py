@@ -198,6 +198,12 @@ LAWS = {
     "frame_rotation_z": ({}, turned(0, 1)),
     "heat_crosstalk": ({}, lambda s, p: p.share * (s.all.sum() - s.value)),
     "heat_loss": ({"power": 1.6}, lost),
+    "heater_resistance_of_second_order": (
+        {"curvature": -0.2},
+        lambda s, p: (
+            s.value / np.polyval([-0.2 * p.slope, p.slope, 1], s.temperature - s.temperature_at_rest) - s.value
+        ),
+    ),
     "heater_resistance": ({}, lambda s, p: s.value / (1 + p.slope * (s.temperature - s.temperature_at_rest)) - s.value),
     "high_pass": ({"tau": 0.3}, lambda s, p: -p.share * s.w, lambda s, p: {"w": (s.value - s.w) / 0.3}),
     "home_offset": ({}, lambda s, p: p.offset),
@@ -305,7 +311,12 @@ LAWS = {
     ),
     "vibration": ({"frequency": 3.0, "phase": 0.9}, lambda s, p: p.amplitude * sin(TWO_PI * 3 * s.t + 0.9)),
 }
-AMPLITUDES = {"heater_resistance": 0.01, "heat_loss": 0.01, "expansion": 0.01}  # of a share, an angle, a gain: 0.3
+AMPLITUDES = {
+    "heater_resistance": 0.01,
+    "heater_resistance_of_second_order": 0.01,
+    "heat_loss": 0.01,
+    "expansion": 0.01,
+}  # of a share, an angle, a gain: 0.3
 
 
 def parameters(kind: str, amplitude: float | None = None) -> SimpleNamespace:

@@ -78,6 +78,7 @@ NEEDS: Mapping[str, LawNeeds] = MappingProxyType(
         # A stack takes no power to speak of, and a heater has laws of its own
         "coil_heating": LawNeeds("it needs a coil", families=frozenset({"electromagnetic"})),
         "heater_resistance": _HEATER,
+        "heater_resistance_of_second_order": _HEATER,
         "heat_loss": _HEATER,
         "heat_crosstalk": _HEATER,
         "second_pole": _HEATER,

@@ -340,7 +340,6 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
                 "drive_gain",
                 "expansion",
                 "heat_crosstalk",
-                "heater_resistance",
                 "link_compliance",
                 "quadratic_damping",
                 "raised_point",

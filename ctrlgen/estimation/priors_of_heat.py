@@ -18,6 +18,15 @@ OF_HEAT: Mapping[str, LawPrior] = {
         model_form_error=0.01,
         parameters={"power": ParameterPrior((0.6, 1.0, 1.6), usual=1.0)},
     ),
+    "heater_resistance": LawPrior(form_of="heater resistance"),
+    "heater_resistance_of_second_order": LawPrior(
+        "A resistance that is straight enough is commoner: judgement. No resistance is a parabola; 1 %: judgement. Starts: silicon that "
+        "turns at 300 K, platinum.",
+        log_prior_odds=ONE_IN_TEN,
+        model_form_error=0.01,
+        form_of="heater resistance",
+        parameters={"curvature": ParameterPrior((-1.7e-3, -1.5e-4))},
+    ),
     "second_pole": LawPrior(
         "Time constants from a chip's to a room's.",
         parameters={"tau": ParameterPrior((2e-3, 0.01, 0.05, 0.3, 2.0, 20.0))},
