@@ -138,6 +138,11 @@ class Effect:
         return ""
 
     @classmethod
+    def inertia(cls, numbers: dict[str, float]) -> float | None:
+        """What it adds with these `numbers` [SI] to the mass that moves when the stage moves slowly; None where it carries none."""
+        return None
+
+    @classmethod
     def meant(cls, numbers: dict[str, float]) -> tuple[str, dict[str, float]] | None:
         """The kind and the numbers [SI] of the law that these `numbers` are, where they contradict this one's name; None where no other
         law of the library is the same."""

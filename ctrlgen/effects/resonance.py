@@ -30,6 +30,10 @@ class Resonance(Effect):
             f"a damping ratio of {p['damping']:.2g} leaves no resonance, only a lag" if p["damping"] > 0.5**0.5 else ""
         )
 
+    @classmethod
+    def inertia(cls, numbers: dict[str, float]) -> float | None:
+        return float(numbers["stiffness"] / (2 * ca.pi * numbers["frequency"]) ** 2)
+
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         w = 2 * ca.pi * p.frequency
         return p.stiffness * (s.states.q - s.displacement + 2 * p.damping * (s.states.p - s.velocity / w))

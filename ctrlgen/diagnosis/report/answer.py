@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from ctrlgen.core.units import from_si
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.luck_sentences import doubt_of_luck, short_doubt
 from ctrlgen.diagnosis.report.narrative import (
@@ -26,6 +27,7 @@ from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.cause_entry import cause_name, cause_noun
 from ctrlgen.diagnosis.selection.finding_region import EndEntry, places_of
 from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding, Role
+from ctrlgen.diagnosis.selection.ringing_mass import ringing_masses
 from ctrlgen.diagnosis.selection.verdict import (
     Verdict,
     contradicts_datasheet,
@@ -249,7 +251,12 @@ def _moved(diagnosis: Diagnosis) -> str:
     moved = moved_numbers(diagnosis.search.chosen.fit)
     if not moved:
         return ""
-    return f"The fit moves {_numbers(diagnosis, moved)}."
+    rings = (
+        f" The stated {path} includes the {number(float(from_si(part, unit)), 2)} {unit} that ring."
+        for path, part in ringing_masses(diagnosis.search.chosen.fit).items()
+        for unit in [diagnosis.values[path].unit]
+    )
+    return f"The fit moves {_numbers(diagnosis, moved)}.{''.join(rings)}"
 
 
 def _numbers(diagnosis: Diagnosis, deviations: dict[str, float]) -> str:

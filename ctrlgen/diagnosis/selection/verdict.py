@@ -10,6 +10,7 @@ from scipy import stats
 from ctrlgen.diagnosis.selection.attribution import Attribution, one_finding
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection
+from ctrlgen.diagnosis.selection.ringing_mass import ringing_masses
 from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, VERDICT
 from ctrlgen.estimation.error_model import ErrorModel
@@ -176,9 +177,10 @@ def contradicts_datasheet(fit: Fit) -> dict[str, float]:
     """Deviations of the device's uncertain parameters from their stated values, in stated standard deviations, by path.
 
     Empty where a chi-square test does not reject the stated uncertainty; else the parameters that deviate by more than
-    `VERDICT.named_deviation`, or the one that deviates most.
+    `VERDICT.named_deviation`, or the one that deviates most. A mass that includes what rings (`ringing_masses`) contradicts nothing.
     """
-    off = _deviations(fit)
+    whole = ringing_masses(fit)
+    off = {path: z for path, z in _deviations(fit).items() if path not in whole}
     if not off or stats.chi2.sf(sum(z * z for z in off.values()), len(off)) > VERDICT.impossible_p:
         return {}
     least = min(VERDICT.named_deviation, max(map(abs, off.values())))
