@@ -208,9 +208,10 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
         ),
         "eddy_current_brake": LawPrior(
             "Grease and dry friction are commoner. Conductors are no thin sheets and poles have edges, grease follows other powers: 2 %. "
-            "Judgement.",
+            "Judgement. Beside dry friction a force that falls with the speed is Stribeck's.",
             log_prior_odds=ONE_IN_TEN,
             model_form_error=0.02,
+            form_of="dry friction",
             parameters={"speed": peaks(0.05, 0.2, 0.7)},
         ),
         "end_stop": LawPrior(
