@@ -229,6 +229,7 @@ def interface_of(text: str) -> str:
     """What of a header another program is compiled against: structures, functions, statuses and sizes, without comments, versions, hashes,
     the names of one build, and how long a device takes to settle."""
     text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+    text = re.sub(r"#else\s+#if \(\w+_BUILD != .*?#endif", "", text, flags=re.DOTALL)  # another header of the name
     text = re.sub(r"#define \w+_(ABI|VERSION|DEVICE_HASH|SCENARIO_HASH|BUILD) .*", "", text)
     text = re.sub(r"(#define \w+_SETTLING) .*", r"\1", text)
     text = re.sub(r"_init_(with_)?[0-9_]+hz_[0-9a-f]{8}", "_init_build", text)

@@ -15,7 +15,7 @@ import three_stacks
 from conftest import SCENARIOS, effect_device
 from one_kernel import print_function
 
-from ctrlgen import build_model, load_scenario
+from ctrlgen import build_model, load_scenario, solve
 from ctrlgen.controller.controller_step import ControllerStatus
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.firmware.c.deviations import DEVIATIONS, permits
@@ -123,6 +123,15 @@ def test_more_drives_than_axes_with_inertia_and_rates_break_no_rule_either(tmp_p
     )
     for check in check_rules(generate(scenario, model, tmp_path / "c")):
         assert check.state != "failed", [str(f) for f in check.findings if not f.permitted]
+
+
+def test_the_player_of_a_path_that_ends_breaks_no_rule(tmp_path):
+    scenario = load_scenario(SCENARIOS / "flexure_axis_line")
+    model = build_model(scenario.device)
+    folder = generate(scenario, model, tmp_path, solve(scenario, model))
+    check = ran(by_tool(check_rules(folder))[STATIC[0]])
+    assert check.passed, [str(f) for f in check.findings if not f.permitted]
+    assert listed(folder) == reported(check)
 
 
 @pytest.mark.exhaustive

@@ -10,7 +10,7 @@ import pytest
 from conftest import SCENARIOS
 from package_programs import run
 
-from ctrlgen import build_model, generate, load_scenario
+from ctrlgen import build_model, generate, load_scenario, solve
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.folder import CFolder
 
@@ -34,16 +34,17 @@ int main(void) { return (int)(slow() | fast()); }
 """
 
 
-def folder(scratch: Path, name: str, rate: str, controller: str = "") -> CFolder:
-    """The C of the flexure axis at a rate, its controller with a name of its own where one is given."""
+def folder(scratch: Path, name: str, rate: str, controller: str = "", played: bool = False) -> CFolder:
+    """The C of the flexure axis at a rate: its controller with a name of its own where one is given, its player where that is asked."""
     text = (SCENARIOS / "flexure_axis_line" / "scenario.toml").read_text()
     text = text.replace('"20 kHz"', f'"{rate}"').replace("../devices", str(SCENARIOS / "devices"))
     home = scratch / name
-    home.mkdir()
+    home.mkdir(parents=True)
     own = f'controller = "{controller}"\n' if controller else ""
     (home / "scenario.toml").write_text(own + text)
     scenario = load_scenario(home / "scenario.toml")
-    return generate(scenario, build_model(scenario.device), scratch / f"{name}_c")
+    model = build_model(scenario.device)
+    return generate(scenario, model, scratch / f"{name}_c", solve(scenario, model) if played else None)
 
 
 def archive(compiler: str, scratch: Path, name: str, c: CFolder) -> Path:
@@ -128,3 +129,26 @@ def test_cmake_takes_two_names_and_refuses_two_controllers_of_one(built, tmp_pat
 
     refused = configured("slow", "fast")
     assert refused.returncode != 0 and "two controllers of one name" in refused.stderr
+
+
+@pytest.fixture(scope="module")
+def namesakes(tmp_path_factory) -> list[CFolder]:
+    """The C, with players, of two scenarios of one name that differ."""
+    return [folder(tmp_path_factory.mktemp(rate[:2]), "line", rate, played=True) for rate in ("10 kHz", "20 kHz")]
+
+
+@pytest.mark.parametrize("piece", ["online_f32", "online_f64", "player_f32", "player_f64"])
+def test_one_source_that_reads_two_different_headers_of_one_name_is_told(namesakes, compiler, tmp_path, piece):
+    """The guard of the first would hide the second, and its sizes and constants with it."""
+    first, second = (next(c.path.glob(f"*_{piece}.h")) for c in namesakes)
+    assert first.name == second.name
+
+    def compiled(*headers: Path) -> subprocess.CompletedProcess[str]:
+        source = tmp_path / "both.c"
+        source.write_text("".join(f'#include "{header}"\n' for header in headers))
+        return subprocess.run([compiler, "-std=c99", "-fsyntax-only", source], capture_output=True, text=True)
+
+    assert compiled(first, first).returncode == 0
+    for headers in ((first, second), (second, first)):
+        told = compiled(*headers)
+        assert told.returncode != 0 and f"two different headers are named {first.name}" in told.stderr

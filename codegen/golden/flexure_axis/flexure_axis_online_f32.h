@@ -98,4 +98,8 @@ uint32_t flexure_axis_online_f32_step_at(flexure_axis_online_f32_state *state, u
 }
 #endif
 
+#else
+#if (FLEXURE_AXIS_ONLINE_F32_BUILD != 0x11318565U) /* the header that was read first is another one */
+#error "two different headers are named flexure_axis_online_f32.h: give one of the controllers a name of its own, by controller = in its scenario.toml"
+#endif
 #endif

@@ -111,4 +111,8 @@ uint32_t limiter_step_at(limiter_state *state, uint32_t tick, const float target
 }
 #endif
 
+#else
+#if (LIMITER_BUILD != 0x5F705B14U) /* the header that was read first is another one */
+#error "two different headers are named limiter.h: give one of the controllers a name of its own, by controller = in its scenario.toml"
+#endif
 #endif

@@ -111,4 +111,8 @@ uint32_t mems_hexapod_online_f32_step_at(mems_hexapod_online_f32_state *state, u
 }
 #endif
 
+#else
+#if (MEMS_HEXAPOD_ONLINE_F32_BUILD != 0x5F705B14U) /* the header that was read first is another one */
+#error "two different headers are named mems_hexapod_online_f32.h: give one of the controllers a name of its own, by controller = in its scenario.toml"
+#endif
 #endif

@@ -77,4 +77,8 @@ uint32_t three_stacks_online_f32_step(three_stacks_online_f32_state *state, cons
 }
 #endif
 
+#else
+#if (THREE_STACKS_ONLINE_F32_BUILD != 0xBF0ABF19U) /* the header that was read first is another one */
+#error "two different headers are named three_stacks_online_f32.h: give one of the controllers a name of its own, by controller = in its scenario.toml"
+#endif
 #endif
