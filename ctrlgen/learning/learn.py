@@ -30,7 +30,7 @@ from ctrlgen.learning.path_check import check_belongs
 from ctrlgen.learning.repeatability import Spectrum
 from ctrlgen.learning.response import Response
 from ctrlgen.learning.run_errors import RunErrors, RunResult
-from ctrlgen.learning.run_gate import belonging
+from ctrlgen.learning.run_gate import belonging, granted
 from ctrlgen.learning.runs import Runs, load_runs, merged
 from ctrlgen.learning.sensor_budget import SensorBudget, sensor_budget
 from ctrlgen.model.simulation import trace
@@ -130,6 +130,7 @@ def learn_recorded(
     runs = load_runs(paths, lifted, implied)
     source = str(paths[0]) if len(paths) == 1 else "recordings"
     check_belongs(runs, lifted, source)
+    runs = replace(runs, notes=(*runs.notes, *granted(runs, lifted, stated)))
     runs = merged(belonging(runs, lifted, source), lifted)
     sensor = sensor_budget(lifted, implied, stated, runs.observed, options)
     return learn_from(lifted, runs, source, {}, options, progress, sensor)

@@ -21,6 +21,11 @@ STILL = 0.1
 """Of the command's motion (rms), below which readings are not of a stage that moves. Judgement: a stage so soft has another description."""
 COMMANDED = 0.2
 """Of the path's extent, by which a channel must be commanded to move for that to be looked at: less may be the coupling of the others."""
+AS_ANOTHER = 0.9
+"""Correlation of a reading with what the drives make of another channel, or against its own, from which it is taken for that. Judgement:
+what a stage couples, or lags by, leaves less."""
+AS_ITSELF = 0.5
+"""Correlation with its own below which it may be another one. Judgement: of a stage that lags behind by 60 degrees it is more."""
 FAR_READING = 3.0
 """Times the size of the path, by which the readings may be off it (rms). Judgement: a wrong unit is a factor of a thousand, a sign two."""
 
@@ -64,8 +69,39 @@ def check_belongs(runs: Runs, lifted: Lifted, source: str) -> None:
             elif read and root_mean_square(moved) > COMMANDED * extent and moves < STILL:
                 what = f"its {channel} moves by {moves:.2g} of what is commanded; check the column, its unit, and that the stage is driven"
                 faults.append(Fault(run.name, what))
+    faults = faults or _misplaced(runs, lifted, extent)
     if faults:
         raise InputError(source, [*faults, *suspected(runs.notes)])
+
+
+def _misplaced(runs: Runs, lifted: Lifted, extent: float) -> list[Fault]:
+    """A fault for each channel of the first run that moves against what its drives make of it, or of channels that move as the drives make
+    one another move: drives that were learnt from it would lead away from the path."""
+    run, names, scale = runs.runs[0], lifted.signal.channels, np.array(lifted.signal.scale)
+    command = lifted.solution.command
+    about, made = ((of - of.mean(axis=0)) / scale for of in (command, lifted.run(run.drive)))
+    read = (errors(run, lifted)[0].mean(axis=0) + command) / scale
+    moved = [i for i in np.flatnonzero(runs.observed).tolist() if root_mean_square(about[:, i]) > COMMANDED * extent]
+    alike = {i: {j: _correlation(read[:, i], made[:, j]) for j in moved} for i in moved}
+    as_what = {i: max((abs(r), j) for j, r in of.items())[1] for i, of in alike.items()}
+    taken = {i: j for i, j in as_what.items() if abs(alike[i][j]) > AS_ANOTHER and alike[i][i] < AS_ITSELF}
+    if set(taken) != set(taken.values()):  # an actuator that acts otherwise, which the next run tells
+        taken = {i: j for i, j in taken.items() if i == j}
+    faults = list[Fault]()
+    for i, j in taken.items():
+        against = f"against what the drives make of {'it' if i == j else names[j]}"
+        how = against if alike[i][j] < 0 else f"as the drives make {names[j]} move"
+        what = (
+            f"its {names[i]} moves {how} (correlation {alike[i][j]:.2f}): check order and sign of the columns, the polarity and the "
+            "order of the drives, and that drives and readings begin at one moment"
+        )
+        faults.append(Fault(run.name, what))
+    return faults
+
+
+def _correlation(a: np.ndarray, b: np.ndarray) -> float:
+    """Of two motions (n,); zero where one stands still."""
+    return float(np.corrcoef(a, b)[0, 1]) if np.std(a) > 0 and np.std(b) > 0 else 0.0
 
 
 def _shift(model: np.ndarray, command: np.ndarray, off: float, closed: bool) -> int | None:

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ctrlgen.budget.sensor_statement import SensorStatement
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import show
 from ctrlgen.learning.hidden_parts import hidden_by
@@ -30,6 +31,10 @@ LEAST_LATE = 0.1
 ANSWER = 0.1
 """Share of a change of drives by which the device may answer otherwise: no more of it is taken for a zero or a delay. As
 `LearningOptions.mismatch`."""
+OUT_OF_TIME = 1.0
+"""Samples from which on it is told that the first run comes late: two of the standard deviations that are assumed of a clock."""
+MOSTLY = 0.7
+"""Of what a run shows beyond the model, rms, that one constant makes for it to be told: half of its square."""
 FOREIGN = 0.05
 """Of the path's extent, that two runs of it may differ by beyond zero, clock, drives and noise. Judgement: friction leaves less."""
 OF_CHANGE = 2.5
@@ -95,6 +100,39 @@ def belonging(runs: Runs, lifted: Lifted, source: str) -> Runs:
         rate = np.zeros(seen[j].model.shape) if lifted.static else rate_of(lifted, seen[j].model)
         kept[j] = replace(kept[j], hidden=hidden_by(zero, delays[j], rate * runs.observed))
     return replace(runs, runs=tuple(kept), notes=tuple(notes))
+
+
+def granted(runs: Runs, lifted: Lifted, stated: SensorStatement) -> list[str]:
+    """What of the first run is believed to be the stage's though a sensor of which nothing is `stated` makes the like: one constant along
+    the whole path, and readings that come later, or sooner, than the device as described makes of its drives."""
+    if stated.scale or stated.zero or stated.clock:
+        return []
+    run, signal = runs.runs[0], lifted.signal
+    first, size = _seen(run, runs, lifted), np.array(signal.scale)
+    constant, whole, words = first.off.mean(axis=0), np.sqrt(np.mean(first.off**2, axis=0)), list[str]()
+    if of := [
+        f"{c} by {show(d, u)}"
+        for c, u, d, share, noise in zip(
+            signal.channels,
+            signal.units,
+            constant * size,
+            abs(constant) / np.maximum(whole, 1e-300),
+            first.noise * size,
+            strict=True,
+        )
+        if share > MOSTLY and abs(d) > SURE * noise
+    ]:
+        words.append(
+            f"{run.name}: its readings are off the device as described by one constant along the path, {', '.join(of)}: taken for the "
+            "stage's. A sensor that tells changes alone has no zero of the path: state [sensor.zero] in uncertainty.toml."
+        )
+    if abs(samples := first.late / lifted.sample_time) > OUT_OF_TIME:
+        words.append(
+            f"{run.name}: its readings come {abs(samples):.1f} samples {'later' if samples > 0 else 'sooner'} than the device as described "
+            "makes of its drives, as of a recording that was started so; taken for the stage's. Look at what starts the recording, or "
+            "state [sensor] clock in uncertainty.toml."
+        )
+    return words
 
 
 def _at_odds(seen: list[_Seen], known: np.ndarray, runs: Runs, lifted: Lifted) -> np.ndarray:

@@ -35,13 +35,15 @@ SETTLED = 4.0  # times the variance between periods, by which the first may diff
 @dataclass(frozen=True, eq=False)
 class Run:
     """The same drives (n, n_u) [SI], as often as they were repeated: readings `y` (m, n, n_y) of the followed signal, NaN where there is
-    none; `names` of the records, how many first `unsettled` periods were left out, and the deviations (n, n_y), in typical sizes, of
+    none; `names` of the records, how many first `unsettled` periods were left out, how many `unread`
+    ones, and the deviations (n, n_y), in typical sizes, of
     which it can say nothing because its zero or clock was taken out (`hidden_parts`)."""
 
     names: tuple[str, ...]
     drive: np.ndarray
     y: np.ndarray
     unsettled: int = 0
+    unread: int = 0
     hidden: tuple[np.ndarray, ...] = ()
 
     @property
@@ -81,6 +83,7 @@ def load_runs(paths: Sequence[Path | str], lifted: Lifted, implied: ImpliedPose)
         what = f"has no reading of the followed {name}; add {name}.{lifted.signal.channels[0]} or reading.{lifted.signal.channels[0]}"
         raise InputError(source, [Fault("columns", what)])
     runs = list[Run]()
+    faults += _copies(records)
     for record in records:
         try:
             run, drift = _run(record, places, lifted, noise)
@@ -101,6 +104,11 @@ def load_runs(paths: Sequence[Path | str], lifted: Lifted, implied: ImpliedPose)
         f"{run.name}: the first period differs from the others by more than they from each other; it had not settled and is left out."
         for run in runs
         if run.unsettled
+    ]
+    notes += [
+        f"{run.name}: {run.unread} of {run.unread + run.unsettled + len(run.y)} repetitions left out, not read for too long to be bridged."
+        for run in runs
+        if run.unread
     ]
     notes += drifting
     return Runs(tuple(runs), noise, observed, tuple(notes))
@@ -123,8 +131,8 @@ def merged(runs: Runs, lifted: Lifted) -> Runs:
         if joined and _alike(joined[-1].drive, run.drive, lifted):
             last = joined[-1]
             y = np.concatenate([last.y, run.y])
-            unsettled, hidden = last.unsettled + run.unsettled, (*last.hidden, *run.hidden)
-            joined[-1] = Run((*last.names, *run.names), last.drive, y, unsettled, hidden)
+            unsettled, unread = last.unsettled + run.unsettled, last.unread + run.unread
+            joined[-1] = Run((*last.names, *run.names), last.drive, y, unsettled, unread, (*last.hidden, *run.hidden))
         else:
             joined.append(run)
     return replace(runs, runs=tuple(joined))
@@ -189,8 +197,32 @@ def _run(record: Record, places: Sequence[int | None], lifted: Lifted, noise: np
     if lifted.closed:
         drift = drift_of(y, noise)
         y = without_drift(y, drift)
-        unsettled = first_differs(y)
-    return Run((record.name,), drive, y[unsettled:], unsettled), drift
+    whole = np.array([_is_whole(of, places, lifted) for of in y])
+    if not whole.any():  # read here and there in each, and everywhere in all
+        whole[:] = True
+    if lifted.closed and whole[0]:
+        unsettled = first_differs(y[whole])
+    return Run((record.name,), drive, y[whole][unsettled:], unsettled, int(np.sum(~whole))), drift
+
+
+def _is_whole(y: np.ndarray, places: Sequence[int | None], lifted: Lifted) -> bool:
+    """Whether a repetition (n, n_y) was read so that what lies between its readings can be bridged. A straight line over half a period,
+    or zero over a whole one, would count as what repeats."""
+    return not any(p is not None and _too_few(np.isfinite(of), lifted) for p, of in zip(places, y.T, strict=True))
+
+
+def _copies(records: Sequence[Record]) -> list[Fault]:
+    """A fault for each record whose readings are another's to the last bit: it is no repetition, and would halve the noise."""
+    faults = list[Fault]()
+    for j, record in enumerate(records):
+        for other in records[:j]:
+            if record.observed.shape == other.observed.shape and np.array_equal(
+                record.observed, other.observed, equal_nan=True
+            ):
+                what = f"holds the readings of {other.name} to the last bit: it is a copy, and no further run; name each run once"
+                faults.append(Fault(record.name, what))
+                break
+    return faults
 
 
 def _every(record: Record, lifted: Lifted) -> int:
