@@ -14,7 +14,7 @@ from ctrlgen import InputError, SolverError
     [
         ("unreachable", {"sample_rate": "1 kHz"}, "state the path as a formula"),
         ("xy_stage_force", {}, "sample_rate: is missing"),
-        ("parallelogram_line", {}, "without delay"),
+        ("parallelogram_line", {}, "state time_constant or rate of an actuator"),
         ("circle20", {"sample_rate": "fast"}, "does not start with a number"),
         ("circle20", {"sample_rate": "0 Hz"}, "is not above zero"),
         ("circle20", {"frequency": "nan Hz"}, 'is not a finite number; write for example "50 Hz"'),

@@ -72,7 +72,7 @@ class BalancedLaw:
         self.model, self.follow, self.inverse = model, follow, inverse
         if not model.n_states and not model.rate_limits:
             what = (
-                "follows its drives without delay, so that nothing bounds its speed: state time_constant or rate_limit of an actuator, or "
+                "follows its drives without delay, so that nothing bounds its speed: state time_constant or rate of an actuator, or "
                 "give the stage inertia"
             )
             raise InputError(model.name, [Fault("actuator", what)])
