@@ -34,14 +34,14 @@ def stretched(y: float) -> float:
     return EI / L**3 * guided(p) * y
 
 
-def frame_of(c, *places):
-    """The stage and its blades as beams, and of the `places` (x, y) [m] on it the numbers of their displacement along x."""
+def frame_of(c, *places, parts=PARTS):
+    """The stage and its blades as beams, `parts` each, and of the `places` (x, y) [m] on it the numbers of their displacement along x."""
     nodes, beams, fixed, ends = [], [], [], []
     for k in range(len(c.ends)):
         end, axis = dm(c.ends[k]).ravel()[:2], dm(c.frames[k])[:2, 0]
         start = len(nodes)
-        nodes += line(end - L * axis, end, PARTS)
-        beams += [(start + j, start + j + 1, EA, EI) for j in range(PARTS)]
+        nodes += line(end - L * axis, end, parts)
+        beams += [(start + j, start + j + 1, EA, EI) for j in range(parts)]
         fixed += [3 * start + x for x in range(3)]
         ends.append(len(nodes) - 1)
     of_places = [len(nodes) + j for j in range(len(places))]

@@ -74,7 +74,7 @@ def test_the_tangent_of_a_loaded_pivot_is_that_of_corotational_beams(tmp_path, p
     assert tangent.stiffness()[0, 0] == pytest.approx(wanted, rel=5e-3)
     told, first = tangent.off()[0], dm(c.held_stiffness)[0, 0] + dm(tangent.loads.stiffness)[0, 0]
     assert told == pytest.approx(first / wanted - 1, abs=0.006 + 0.01 * told)
-    notes = device.load_remarks()
+    notes = device.range_remarks()
     assert bool(notes) == (abs(told) > 0.01) and all(note in device.remarks() for note in notes)
     for note in notes:
         assert re.search(rf"(left|right) is (pressed|pulled) by .*, p = N l\^2/EI = {p:g}: ", note)
@@ -111,8 +111,8 @@ def test_a_body_between_that_buckles_is_refused_and_before_that_told(tmp_path):
     """The inner blades are pressed and the outer ones pulled, as both stand: what the axis yields to is in the tangent alone."""
     tangent = loaded_tangent(nominal(loaded(tmp_path, serial(-8.0))))
     assert {np.sign(e.tension) for e in tangent.flexures} == {-1.0, 1.0}
-    assert abs(tangent.off()[0]) > 0.01 and loaded(tmp_path, serial(-8.0)).load_remarks()
-    assert not loaded(tmp_path, serial(-0.5)).load_remarks()
+    assert abs(tangent.off()[0]) > 0.01 and loaded(tmp_path, serial(-8.0)).range_remarks()
+    assert not loaded(tmp_path, serial(-0.5)).range_remarks()
 
 
 @pytest.mark.parametrize(

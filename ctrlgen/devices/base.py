@@ -145,8 +145,8 @@ class Device(Shown, Section):
         """The same device with flexures that stretch where its model leaves that out; None where there are none."""
         return None
 
-    def load_remarks(self) -> list[str]:
-        """Where its model does not hold what constant loads do to its stiffness, and by how much that is off."""
+    def range_remarks(self) -> list[str]:
+        """Where its model leaves the range in which it holds, under constant loads or within its travels, and by how much it is off."""
         return []
 
     def remarks(self) -> list[str]:

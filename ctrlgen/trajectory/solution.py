@@ -87,9 +87,9 @@ class Solution(Tabular, Reported):
 
     @cached_property
     def left_out(self) -> tuple[str, ...]:
-        """In sentences what the device's file states and the model leaves out, where the path notices; or loads, where stiffness does."""
+        """In sentences what the device's file states and the model leaves out, where the path notices; and where its range ends."""
         told = (self.unstated_inertia, self.unstated_modes, self.unstated_stretching)
-        return (*(each.sentence() for each in told if each is not None), *self.model.device.load_remarks())
+        return (*(each.sentence() for each in told if each is not None), *self.model.device.range_remarks())
 
     def columns(self) -> tuple[Column, ...]:
         """Those of its trace, and the commanded signal as command.channel."""

@@ -1,6 +1,7 @@
 """How far the force of a mechanism is linear: flexures that are held stretch as they bend, and turn with the bodies that they join.
 
-What a travel takes beside K d is told by the energy to fourth order and beyond (`second_order`, `stretching`).
+What a travel takes beside K d is told by the energy to fourth order and beyond (`second_order`, `stretching`), and by what that leaves
+out of the fourth (`third_order`): (36/35) (y/l)^2 of a guided blade, (2/3) (d/r)^2 of an arm r on a pivot.
 """
 
 from __future__ import annotations
@@ -12,13 +13,16 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.core.errors import Fault
+from ctrlgen.core.percent import percent
 from ctrlgen.core.units import show
 from ctrlgen.devices.mechanism.condensed import Condensed, nominal
 from ctrlgen.devices.mechanism.drawing import Drawing
 from ctrlgen.devices.mechanism.flexures import Beam
+from ctrlgen.devices.mechanism.reach import reaches
 from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.devices.mechanism.springs import Spring
 from ctrlgen.devices.mechanism.stretching import Stretching
+from ctrlgen.devices.mechanism.third_order import left_out_energy
 from ctrlgen.devices.travel import farthest
 
 LEVELS = (0.01, 0.05, 0.2)  # of the linear force
@@ -63,9 +67,16 @@ def second_order_faults(device: Drawing) -> list[Fault]:
     return faults
 
 
+def left_out_shares(c: Condensed) -> list[float]:
+    """Of each axis moved alone, what deformations of third order take of its linear force, per square of its displacement [1/m^2]."""
+    second, K = SecondOrder(c), ca.DM(ca.evalf(ca.SX(c.held_stiffness))).full()
+    return [4 * left_out_energy(second, unit) / K[i, i] for i, unit in enumerate(np.eye(second.n))]
+
+
 def linear_ranges(c: Condensed) -> list[tuple[float | None, ...]]:
     """Of each axis moved alone, to the side where that is sooner, the travel [m] from which on the linear force is off by each of
     `LEVELS`; None where that is not within `FARTHEST` of the largest travel."""
+    left_out = left_out_shares(c)
     second, ranges = SecondOrder(c), []
     d = ca.SX.sym("d", second.n)
     extra = ca.Function("extra", [d], [second.restoring_force(d, Stretching(second).energy)])
@@ -75,8 +86,8 @@ def linear_ranges(c: Condensed) -> list[tuple[float | None, ...]]:
         grid = travel * np.geomspace(1e-3, FARTHEST, STEPS)
 
         def off(x: float, i: int = i) -> float:
-            sides = [extra(sign * x * np.eye(second.n)[i]).full()[i, 0] for sign in (1, -1)]
-            return max(map(abs, sides)) / (K[i, i] * x)
+            sides = [sign * extra(sign * x * np.eye(second.n)[i]).full()[i, 0] / (K[i, i] * x) for sign in (1, -1)]
+            return max(abs(side + left_out[i] * x**2) for side in sides)
 
         shares = np.array([off(x) for x in grid])
         found: list[float | None] = []
@@ -96,16 +107,40 @@ def linear_ranges(c: Condensed) -> list[tuple[float | None, ...]]:
 def range_lines(device: Drawing) -> list[str]:
     """What `ctrlgen check` prints of it: of each actuator that does not stay linear to 1 % within its travel ten times over."""
     c = nominal(device)
-    if not c.pushes or c.cubics or c.ported or not any(isinstance(e.section, Beam) for e in device.placed_elements):
+    if not _told(c):
         return []
-    held = "" if device.geometric_stiffening else "; geometric_stiffening = true holds that"
-    levels = ", ".join(f"{100 * level:g}" for level in LEVELS)
-    return [
-        f"linear force of {a.name} off by {levels} % from a travel of "
-        + ", ".join(
+    levels, lines = ", ".join(f"{100 * level:g}" for level in LEVELS), []
+    for a, found, share in zip(device.placed_actuators, linear_ranges(c), left_out_shares(c), strict=True):
+        if found[0] is None:
+            continue
+        places = (
             f"over {show(FARTHEST * farthest(a.section.travel), 'um')}" if x is None else show(x, "um") for x in found
         )
-        + held
-        for a, found in zip(device.placed_actuators, linear_ranges(c), strict=True)
-        if found[0] is not None
-    ]
+        held = "; geometric_stiffening = true holds that"
+        if abs(share) * found[0] ** 2 > LEVELS[0] / 2:
+            held = "; most of that is of third order, which the model does not have"
+        elif device.geometric_stiffening or not any(isinstance(e, Beam) for e in device.element):
+            held = ""
+        lines.append(f"linear force of {a.name} off by {levels} % from a travel of {', '.join(places)}{held}")
+    return lines
+
+
+def third_order_remarks(device: Drawing) -> list[str]:
+    """Axes whose force within their reach is off by more than the first level because deformations of third order are left out."""
+    c = nominal(device)
+    if not _told(c):
+        return []
+    remarks = []
+    for r, share in zip(reaches(c), left_out_shares(c), strict=True):
+        most = max(map(abs, r.ends))
+        if (off := share * most**2) and abs(off) > LEVELS[0]:
+            where = show(float(np.sqrt(LEVELS[0] / abs(share))), "um")
+            remarks.append(
+                f"the force of {r.name} is off by {percent(-off / (1 + off), sign=True)} at {show(most, 'um')} of it alone, because "
+                f"deformations and rotations of third order are left out; it is right to {percent(LEVELS[0])} up to {where}"
+            )
+    return remarks
+
+
+def _told(c: Condensed) -> bool:
+    return c.pushes and not c.cubics and not c.ported

@@ -14,7 +14,7 @@ Against corotational beams the stiffness of a crossed pivot that is pressed is r
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import casadi as ca
@@ -125,10 +125,24 @@ class LoadedTangent:
     @property
     def buckles(self) -> bool:
         """Whether some motion of the bodies, the actuators without drives, takes no force."""
-        K, rows = self._bodies(1.0), self._travels
+        return self._takes_no_force(self._bodies(1.0))
+
+    def _takes_no_force(self, K: np.ndarray) -> bool:
+        """Whether of K_b some motion does, with the stiffness of the actuators beside their force."""
         stacks = np.diag(_numbers(self.c.held_stiffness) - _numbers(self.c.stiffness))
-        beside = rows.T @ (stacks[:, None] * rows) if self.c.pushes else 0.0
+        beside = self._travels.T @ (stacks[:, None] * self._travels) if self.c.pushes else 0.0
         return bool(scipy.linalg.eigvalsh(K + beside, self._linear + beside).min() <= 0)
+
+    def buckles_between(self, other: LoadedTangent, share: float) -> bool:
+        """The same at a `share` of the way from these loads to those of the `other` tangent."""
+        K = self._linear + (1 - share) * self._geometric + share * other._geometric
+        for flexure, far in zip(self.flexures, other.flexures, strict=True):
+            tension = (1 - share) * flexure.tension + share * far.tension
+            if any(column.buckles(tension) for column in flexure.columns):
+                return True
+            for column, moved in zip(flexure.columns, flexure.moved, strict=True):
+                self._put(K, flexure.first, flexure.second, moved.T @ column.rest(tension) @ moved)
+        return self._takes_no_force(K)
 
     def _bodies(self, share: float) -> np.ndarray:
         """K_b (6 bodies, 6 bodies) per twist, turns counted as displacements."""
@@ -164,8 +178,16 @@ class LoadedTangent:
         found = []
         for k, e in enumerate(self.c.elements):
             held = [ca.DM(6, 1) if b == GROUND else self.loads.held[b] for b in (e.first, e.second)]
-            found.append(self.s.motions(k, between=[ca.horzcat(u, h) for u, h in zip(BOTH, held, strict=True)]))
+            moved = self.s.motions(k, between=[ca.horzcat(u, h) for u, h in zip(BOTH, held, strict=True)])
+            found.append(self._moved_by_stroke(k, moved))
         return found
+
+    def _moved_by_stroke(self, k: int, e: Motions) -> Motions:
+        """With the last motion of element k less what prescribes it."""
+        if not (stroke := ca.DM(self.loads.prescribed(k))).nnz():
+            return e
+        own = ca.horzcat(ca.DM(6, e.relative.shape[1] - 1), self.s.local(k, stroke))
+        return replace(e, relative=e.relative - own, load=e.load - ca.mtimes(self.s.local_stiffness(k), own))
 
     @cached_property
     def _geometric(self) -> np.ndarray:

@@ -89,6 +89,8 @@ class Loads:
     def free(self) -> list[Matrix]:
         """(6, 1) twist of every body under the loads, the axes free and without drives (prescribed ones where they are)."""
         device = self.c.device
+        if not self.wrenches:
+            return [ca.DM(6, 1) for _ in device.bodies]
         return [plain(T) for T in rigid_bodies.twists(len(device.bodies), self.c.elements, self.wrenches, device.size)]
 
     @cached_property
@@ -128,6 +130,10 @@ class Loads:
             rows.append(ends[0] - ends[1])
         return ca.vertcat(*rows)
 
+    def prescribed(self, k: int) -> Matrix:
+        """(6, 1) what prescribes the motion of element k while the axes are held, at the global origin: nothing."""
+        return ca.DM(6, 1)
+
     def wrench(self, k: int) -> Matrix:
         """W_h (6, 1) of element k on its free end, at the global origin."""
         return ca.mtimes(self.c.elements[k].stiffness, self.relative(k))
@@ -162,3 +168,27 @@ class Loads:
     def restoring_force(self, d: Matrix) -> Any:
         """(n,) what the loads add to the force that pulls the axes home from `d` (n,)."""
         return ca.mtimes(self.stiffness, d) - self.force
+
+
+class DrivenLoads(Loads):
+    """The same loads with the axes held at `d` (n,) [m], where their actuators push beside them or move the elements."""
+
+    def __init__(self, loads: Loads, d: Any) -> None:
+        super().__init__(loads.c, loads.s)
+        self.without, self.d = loads, ca.DM(d)
+
+    @cached_property
+    def held(self) -> list[Matrix]:
+        """(6, 1) of every body."""
+        return [plain(T + ca.mtimes(T_1, self.d)) for T, T_1 in zip(self.without.held, self.s.first_order, strict=True)]
+
+    @cached_property
+    def force(self) -> Matrix:
+        """(n,) that of the loads on the axes, less what the actuators push."""
+        pushed = ca.mtimes(self.c.stiffness, self.d) if self.c.pushes else ca.DM(self.n, 1)
+        return plain(self.without.force - pushed)
+
+    def prescribed(self, k: int) -> Matrix:
+        """(6, 1) the stroke of element k at `d`."""
+        m = self.c.prescribed[k]
+        return ca.DM(6, 1) if m is None else plain(ca.mtimes(m[:, : self.n], self.d))

@@ -27,16 +27,18 @@ from ctrlgen.devices.mechanism.condensed import MOST_STEPS, SPARE_STEPS, Condens
 from ctrlgen.devices.mechanism.constraints import free_between_springs
 from ctrlgen.devices.mechanism.copies import Copied, CopiedParts, Placed
 from ctrlgen.devices.mechanism.flexures import Blade, CircularHinge, Strut, Wire, flexures_in_one_place
+from ctrlgen.devices.mechanism.flexures_alone import alone_remarks
 from ctrlgen.devices.mechanism.force_readings import reach as load_reach
 from ctrlgen.devices.mechanism.force_readings import unloaded
 from ctrlgen.devices.mechanism.internal_modes import structural_model
-from ctrlgen.devices.mechanism.linear_range import second_order_faults, stiffened
+from ctrlgen.devices.mechanism.linear_range import second_order_faults, stiffened, third_order_remarks
 from ctrlgen.devices.mechanism.load_effects import load_faults, load_remarks
 from ctrlgen.devices.mechanism.mechanism_physics import mechanism_physics
 from ctrlgen.devices.mechanism.mode_shapes import mode_shapes
 from ctrlgen.devices.mechanism.modes import guyan_modes, inertia_faults, inertia_remarks
 from ctrlgen.devices.mechanism.name_faults import name_faults
 from ctrlgen.devices.mechanism.ported_parts import Ported
+from ctrlgen.devices.mechanism.reach import buckling_remarks, reach_remarks
 from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.devices.mechanism.springs import Spring
 from ctrlgen.devices.mechanism.stated_compliances import Compliance, ComplianceMatrix
@@ -383,12 +385,14 @@ class Mechanism(CopiedParts):
             [f"{e.name}: {note}" for e in parts for note in e.notes()]
             + light
             + inertia_remarks(self)
-            + self.load_remarks()
+            + alone_remarks(self)
+            + reach_remarks(self)
+            + self.range_remarks()
         )
 
-    def load_remarks(self) -> list[str]:
-        """Where the stiffness under constant loads is off."""
-        return load_remarks(self)
+    def range_remarks(self) -> list[str]:
+        """Where the stiffness under constant loads is off, the drives buckle a flexure, or what is of third order counts."""
+        return load_remarks(self) + buckling_remarks(self) + third_order_remarks(self)
 
     def physics(self, p: SimpleNamespace) -> DevicePhysics:
         """The condensed mechanism with the values `p`."""

@@ -10,11 +10,13 @@ from ctrlgen.core.units import show
 from ctrlgen.devices.mechanism.condensed import Condensed, nominal
 from ctrlgen.devices.mechanism.constraints import freedoms, redundant_constraints
 from ctrlgen.devices.mechanism.drawing import Drawing
+from ctrlgen.devices.mechanism.flexures_alone import alone_lines
 from ctrlgen.devices.mechanism.linear_range import range_lines
 from ctrlgen.devices.mechanism.load_effects import load_lines
 from ctrlgen.devices.mechanism.modes import condensed_modes, free_modes, guyan_modes
 from ctrlgen.devices.mechanism.point_compliance import point_compliance
 from ctrlgen.devices.mechanism.ported_parts import part_line
+from ctrlgen.devices.mechanism.reach import reach_lines
 from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.devices.travel import farthest
 from ctrlgen.physics.screw import told_in
@@ -49,6 +51,7 @@ def summary(device: Drawing) -> list[str]:
     if len((whole := free_modes(device)).frequencies):
         shown = ", ".join(show(f, "Hz") for f in whole.frequencies[:6])
         lines.append(f"natural frequencies with the drives held: {shown}")
+        lines += alone_lines(device)
     condensed, left_out = condensed_modes(device, whole)
     if condensed:
         used = "solved with it" if device.dynamics is not None else "a table [dynamics] solves with it"
@@ -66,7 +69,13 @@ def summary(device: Drawing) -> list[str]:
             f"{show(v, unit)} per {a.name}" for a, v in zip(device.placed_actuators, row, strict=True) if abs(v) > STILL
         )
         lines.append(f"{channel}: {parts or 'not moved to first order'}")
-    return lines + (_second_order_lines(c) if device.second_order else []) + load_lines(device) + range_lines(device)
+    return (
+        lines
+        + (_second_order_lines(c) if device.second_order else [])
+        + load_lines(device)
+        + reach_lines(device)
+        + range_lines(device)
+    )
 
 
 def _second_order_lines(c: Condensed) -> list[str]:

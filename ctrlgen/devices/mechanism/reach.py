@@ -1,0 +1,195 @@
+"""How far each drive takes its axis alone, what stops it before the end of its travel, and where it buckles a flexure.
+
+An axis alone: the other drives at zero, their axes free. Along it the displacements are d_0 + v x, d_0 those under the constant loads.
+What a drive presses may buckle as what a load does (`loaded_tangent`): a push rod at 4 pi^2 EI/l^2 at the latest, between ends that do not
+turn. The axes are then at a point that the linear equations still have and no mechanism.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import casadi as ca
+import numpy as np
+
+from ctrlgen.core.percent import percent
+from ctrlgen.core.units import show
+from ctrlgen.devices.mechanism.condensed import KEPT, Condensed, nominal
+from ctrlgen.devices.mechanism.drawing import Drawing
+from ctrlgen.devices.mechanism.loaded_tangent import LoadedTangent, loaded_tangent
+from ctrlgen.devices.mechanism.loads import DrivenLoads
+from ctrlgen.devices.mechanism.stretching import Stretching
+from ctrlgen.devices.travel import ends_of
+
+HARDLY, FAR = 0.1, 1e3  # of its travel: a drive that takes its axis less far, or farther, was not meant so
+PRESSED = 1.0  # -p of a flexure: less bends no column by more than a tenth
+STEPS = 30  # halvings of an interval
+FLOOR = 1e-9  # of a stress limit, as in the limit itself
+
+
+@dataclass(frozen=True)
+class Stressed:
+    """Along an axis alone the largest stress of a material [Pa], its limit, and the displacement [m] nearest home from which on it is
+    above that; None where it is not, or everywhere."""
+
+    material: str
+    most: float
+    limit: float
+    met: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """Of an axis alone, each from the lower to the upper side [m]: its `travel`, and where its drive takes it; None of a heater."""
+
+    name: str
+    travel: tuple[float, float]
+    drive: tuple[float, float] | None
+    home: np.ndarray
+    way: np.ndarray
+    own: int
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """As far as both travel and drive allow."""
+        low, high = self.travel if self.drive is None else self.drive
+        start = float(self.home[self.own])
+        return min(max(low, self.travel[0]), start), max(min(high, self.travel[1]), start)
+
+    def at(self, x: float) -> np.ndarray:
+        """(n,) the displacements of all axes with its own at x."""
+        return self.home + self.way * (x - self.home[self.own])
+
+
+@lru_cache(maxsize=KEPT)
+def reaches(c: Condensed) -> tuple[Reach, ...]:
+    """Of each axis of a mechanism of numbers without cubic springs."""
+    placed, loads = c.device.placed_actuators, loaded_tangent(c).loads
+    n = len(placed)
+    stiffness = _numbers(c.held_stiffness) + _numbers(loads.stiffness) if c.pushes else np.eye(n)
+    yields = np.linalg.inv(stiffness)
+    home = (yields @ _numbers(loads.force)).ravel() if c.pushes else np.zeros(n)
+    found = []
+    for i, a in enumerate(placed):
+        drive = None
+        if a.section.kind != "thermal":
+            low, high = sorted(a.section.gain.si * q.si for q in (a.section.low, a.section.high))
+            drive = (float(home[i] + yields[i, i] * low), float(home[i] + yields[i, i] * high))
+        found.append(Reach(a.name, ends_of(a.section.travel), drive, home, yields[:, i] / yields[i, i], i))
+    return tuple(found)
+
+
+def _told(device: Drawing) -> tuple[Reach, ...]:
+    c = nominal(device)
+    return () if c.cubics or c.ported else reaches(c)
+
+
+def reach_lines(device: Drawing) -> list[str]:
+    """What `ctrlgen check` prints: where each drive takes its axis alone, and the largest stress on that way."""
+    lines = []
+    for r in _told(device):
+        parts = [] if r.drive is None else [f"its drive reaches {_span(r.drive)}"]
+        parts.append(f"its travel is {_span(r.travel)}")
+        for s in stresses(nominal(device), r):
+            beyond = "" if s.met is None else f", its limit from {show(s.met, 'um')} on"
+            parts.append(f"stress of {s.material} on it up to {show(s.most, 'MPa')} of {show(s.limit, 'MPa')}{beyond}")
+        lines.append(f"{r.name} alone: {'; '.join(parts)}")
+    return lines
+
+
+def reach_remarks(device: Drawing) -> list[str]:
+    """Axes that hardly begin their travels, because of their drive or of a stress."""
+    remarks = []
+    for r in _told(device):
+        most = max(map(abs, r.travel))
+        if r.drive is not None and not HARDLY * most <= max(map(abs, r.drive)) <= FAR * most:
+            remarks.append(
+                f"the drive of {r.name} alone reaches {_span(r.drive)} of a travel of {_span(r.travel)}: check its gain and its range, "
+                "which way the flexures are thin, their sizes and the units"
+            )
+        remarks += [
+            f"the stress limit of {s.material} is met at {show(s.met, 'um')} of {r.name} alone, of a travel of {_span(r.travel)}: check "
+            "the sizes of the flexures and the units, or move less"
+            for s in stresses(nominal(device), r)
+            if s.met is not None and abs(s.met) < HARDLY * most
+        ]
+    return remarks
+
+
+def buckling_remarks(device: Drawing) -> list[str]:
+    """Axes that buckle the mechanism on their way, each side by itself."""
+    found = (_buckled(nominal(device), r, end) for r in _told(device) for end in r.ends)
+    return [sentence for sentence in found if sentence]
+
+
+def _span(ends: tuple[float, float]) -> str:
+    return f"{show(ends[0], 'um')} to {show(ends[1], 'um')}"
+
+
+@lru_cache(maxsize=KEPT)
+def _stress(c: Condensed) -> dict[str, ca.Function]:
+    """Of each material with a limit its largest stress [Pa] with the axes at d (n,)."""
+    loads, d, found = loaded_tangent(c).loads, ca.SX.sym("d", len(c.directions)), {}
+    stretched = Stretching(loads.s).extra_load if c.device.geometric_stiffening else None
+    for m in c.device.material:
+        if m.stress_limit is not None:
+            floor, constant = FLOOR * m.stress_limit.si, loads.wrench if loads.there else None
+            names, stress = c.stress(m.name, d, floor, stretched, constant)
+            if names:
+                found[m.name] = ca.Function("stress", [d], [ca.mmax(stress)])
+    return found
+
+
+def stresses(c: Condensed, r: Reach) -> list[Stressed]:
+    """Of each material with a stress limit, along an axis alone."""
+    found = []
+    for m in c.device.material:
+        if (law := _stress(c).get(m.name)) is None:
+            continue
+        limit, start = m.stress_limit.si, float(r.home[r.own])
+        at_ends = {end: float(law(r.at(end))) for end in r.ends}
+        met = None
+        if float(law(r.home)) <= limit:
+            places = [_beyond(law, limit, r, start, end) for end, most in at_ends.items() if most > limit]
+            met = min(places, key=abs, default=None)
+        found.append(Stressed(m.name, max(at_ends.values()), limit, met))
+    return found
+
+
+def _buckled(c: Condensed, r: Reach, end: float) -> str:
+    """Where the mechanism buckles on the way to an end, and the flexure that is pressed most; nothing where it does not."""
+    constant, start = loaded_tangent(c).loads, float(r.home[r.own])
+    far = LoadedTangent(c, DrivenLoads(constant, r.at(end)))
+    if end == start or all(e.tension > 0 or abs(e.p) < PRESSED for e in far.flexures):
+        return ""
+    near = LoadedTangent(c, DrivenLoads(constant, r.home))
+    if not near.buckles_between(far, 1.0):
+        return ""
+    share = _first(0.0, 1.0, lambda x: near.buckles_between(far, x))
+    k = min(range(len(far.flexures)), key=lambda k: far.flexures[k].tension / far.flexures[k].buckling_load)
+    one, other = near.flexures[k], far.flexures[k]
+    press = -(one.tension + share * (other.tension - one.tension))
+    place, borne = show(start + share * (end - start), "um"), percent(press / other.buckling_load)
+    return (
+        f"{r.name} alone buckles the mechanism from {place} on, within its reach of {show(end, 'um')}, and the model does not know "
+        f"it: {other.name} is then pressed by {show(press, 'N')}, {borne} of what it bears between ends that do not turn. Move less, or "
+        "make it thicker or shorter"
+    )
+
+
+def _beyond(law: ca.Function, limit: float, r: Reach, start: float, end: float) -> float:
+    return _first(start, end, lambda x: float(law(r.at(x))) > limit)
+
+
+def _first(low: float, high: float, there: Callable[[float], bool]) -> float:
+    """The place between one where it is not and one where it is."""
+    for _ in range(STEPS):
+        middle = (low + high) / 2
+        low, high = (low, middle) if there(middle) else (middle, high)
+    return high
+
+
+def _numbers(matrix: ca.SX | ca.DM) -> np.ndarray:
+    return np.asarray(ca.DM(ca.evalf(ca.SX(matrix))).full())
