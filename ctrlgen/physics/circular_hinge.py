@@ -279,3 +279,14 @@ def out_of_plane(R: Scalar, t: Scalar, b: Scalar, E: Scalar, G: Scalar) -> tuple
 def locked(R: Scalar, t: Scalar, b: Scalar, E: Scalar, G: Scalar) -> Scalar:
     """delta_y/F_y with the rotation of the end locked: C.2 - R^2 C.1, and the shear of C.4 with the factor 6/5."""
     return c2(R, t, b, E) - R**2 * c1(R, t, b, E) + 6 / 5 * c4(R, t, b, G)
+
+
+def plane_strain_share(R: float, t: float, b: float) -> float:
+    """f(x) = 0.243 x^2/(1 + 0.04 x + 0.243 x^2), x = b/sqrt(t R): how far a notch of depth b cannot curve across, from 0 to 1.
+
+    Its bending in the plane is that of plane stress, of which C.1, C.2 and the others are, less nu^2 f of it: 1 - nu^2 in the end. Least
+    squares to solids of finite elements, t/R of 0.05 and 0.15, x from 0.5 to 10, within 0.05 of f, which is half a per cent of the
+    stiffness (`tests/test_deep_notch.py`).
+    """
+    x = b / (t * R) ** 0.5
+    return 0.243 * x**2 / (1 + 0.04 * x + 0.243 * x**2)

@@ -2,8 +2,10 @@
 
 A uniform beam of length l bends at 4.730^2/(2 pi l^2) sqrt(E I/(rho A)) and twists at 1/(2 l) sqrt(G J/(rho I_p)); each half of a blade
 that twists is one whose two ends do not warp, as its middle does not (`held_flexure.warping_share`). Pieces in line bend as Hermitian
-elements do, `PARTS` a piece. Plates of finite elements have the same to 1.6 %, and 3 % where they twist, up to twice as wide as long, 6 % at
-four times (`tests/test_flexures_alone.py`). Source: R. D. Blevins, Formulas for Natural Frequency and Mode Shape (1979), tables 8-1 and 8-16.
+elements do, `PARTS` a piece. Plates of finite elements have the same to 1.6 %, and to 3 % where they twist, up to twice as wide as
+long, to 6 % at four times (`tests/test_flexures_alone.py`).
+
+Source: R. D. Blevins, Formulas for Natural Frequency and Mode Shape (1979), tables 8-1 and 8-16.
 """
 
 from __future__ import annotations

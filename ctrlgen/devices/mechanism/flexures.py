@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Annotated, Any, Literal
 
-import casadi as ca
 import numpy as np
 from pydantic import StrictBool, model_validator
 
-from ctrlgen.core.errors import Fault
+from ctrlgen.core.percent import percent
 from ctrlgen.core.units import In, Quantity
 from ctrlgen.devices.hinge import Hinge
-from ctrlgen.devices.mechanism.copies import Placed
 from ctrlgen.devices.mechanism.joining import Joining, Length
 from ctrlgen.devices.mechanism.stated_compliances import compliance_of_entries
 from ctrlgen.physics import circular_hinge, flexure, held_flexure
@@ -22,8 +20,9 @@ from ctrlgen.physics.flexure import Segment
 from ctrlgen.physics.held_flexure import THICKEST, WIDEST
 from ctrlgen.physics.screw import Matrix
 
-SAME = 1e-6  # of the size of a mechanism: two places are one
 SLENDEST = 0.1  # of the width over the length: beyond it a slender blade is off by more than 2 % in bending and shear
+USUAL = 0.3  # Poisson's ratio, where a note has none
+DEEP = 0.03  # of a notch's stiffness: what its equations are right to
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +51,10 @@ class Flexible(Joining):
     def sections(self, p: SimpleNamespace) -> tuple[FlexureSection, ...]:
         """The sections at which it may be stressed most."""
         raise NotImplementedError
+
+    def room(self) -> tuple[float, float, float]:
+        """Its length and its section along y and z [m], no larger than they are; zero where it says none."""
+        return 0.0, 0.0, 0.0
 
     @staticmethod
     def largest_stress(about_y: Matrix, about_z: Matrix, tension: Matrix, shear: Matrix, floor: float) -> Matrix:
@@ -122,6 +125,10 @@ class Blade(Beam):
                 )
         return notes
 
+    def room(self) -> tuple[float, float, float]:
+        """Length, thickness and width."""
+        return self.length.si, self.thickness.si, self.width.si
+
     def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
         """One piece of rectangular section. Source: `held_flexure`; slender, S1 eq. (21)-(23)."""
         segment = flexure.blade_segment if self.slender else held_flexure.held_blade
@@ -142,6 +149,14 @@ class Wire(Beam):
     """A wire or rod of round section."""
     diameter: Length
     """Of the section."""
+
+    def room(self) -> tuple[float, float, float]:
+        """Its length, and the square in its section."""
+        return self.length.si, *[self.diameter.si / np.sqrt(2)] * 2
+
+    def notes(self) -> list[str]:
+        """Its diameter against its length, and what that changes."""
+        return _thick(self.diameter.si / self.length.si, self.slender, "it is")
 
     def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
         """One piece of round section. Source: S1 eq. (24), with shear where it is not slender."""
@@ -174,6 +189,14 @@ class Strut(Beam):
         if 2 * self.wire_length.si >= self.length.si:
             raise ValueError("wire_length: two wires must fit in the length of the strut")
         return self
+
+    def room(self) -> tuple[float, float, float]:
+        """Its length, and the square in the section of its thinner part."""
+        return self.length.si, *[min(self.wire_diameter.si, self.rod_diameter.si) / np.sqrt(2)] * 2
+
+    def notes(self) -> list[str]:
+        """The diameter of its wires against their length, and what that changes."""
+        return _thick(self.wire_diameter.si / self.wire_length.si, self.slender, "its wires are")
 
     def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
         """Three pieces, wire, rod, wire. Source: S1 section 5.2, with shear where it is not slender."""
@@ -226,9 +249,22 @@ class CircularHinge(Flexible):
             (twist, turn, plane[2, 2]), (plane[0, 0], plane[1, 1], across), plane[2, 1], coupled
         )
 
+    def room(self) -> tuple[float, float, float]:
+        """Its length 2 R, its neck and its depth."""
+        return 2 * self.hinge.R.si, self.hinge.t.si, 0.0 if self.hinge.b is None else self.hinge.b.si
+
     def notes(self) -> list[str]:
-        """Where its equations leave their range of t/R."""
-        return self.hinge.notes()
+        """Where its equations leave their range of t/R, and where they leave out that it is deep."""
+        R, t, b = (0.0 if q is None else q.si for q in (self.hinge.R, self.hinge.t, self.hinge.b))
+        nu = USUAL if self.hinge.poisson is None else self.hinge.poisson.si
+        stiffer = 1 / (1 - nu**2 * circular_hinge.plane_strain_share(R, t, b)) - 1
+        if stiffer < DEEP:
+            return self.hinge.notes()
+        return [
+            *self.hinge.notes(),
+            f"it is {b / t:.3g} times as deep as its neck: its equations are of plane stress, and a notch that cannot curve across is "
+            f"{percent(stiffer)} stiffer in bending at a Poisson's ratio of {nu:g}",
+        ]
 
     def reach(self, p: SimpleNamespace) -> Any:
         """The length 2 R [m]."""
@@ -248,21 +284,22 @@ class CircularHinge(Flexible):
         return (FlexureSection("neck", R, area, about_y, about_z / (1 + t / (2 * R)) ** 0.45, torsion),)
 
 
-def flexures_in_one_place(placed: Sequence[Placed], size: float) -> list[Fault]:
-    """Flexures of a material, or copies of one, of which two join the same bodies with their ends in one place of a mechanism of a
-    `size` [m] and go the same way: two pieces of material cannot be there."""
-    faults, seen = [], list[tuple[str, frozenset[int], np.ndarray]]()
-    for e in placed:
-        if not isinstance(e.section, Flexible):
-            continue
-        at, along = (ca.DM(e.turn) @ ca.DM(v) for v in ([x.si for x in e.section.at], e.section.along))
-        where = np.concatenate(
-            [ca.DM(at).full().ravel() / size, ca.DM(along).full().ravel() / np.linalg.norm(e.section.along)]
-        )
-        for name, bodies, other in seen:
-            if bodies == {e.first, e.second} and np.abs(where - other).max() < SAME:
-                faults.append(
-                    Fault("element", f"{e.name} lies where {name} lies; move one, or give its width to the other")
-                )
-        seen.append((e.name, frozenset({e.first, e.second}), where))
-    return faults
+def _thick(ratio: float, slender: bool, what: str) -> list[str]:
+    """What a round piece with so many times its length as its diameter lacks: shear where it is `slender`, and what its held ends make
+    of it, as of a square bar of its area."""
+    if ratio <= SLENDEST:
+        return []
+    told = f"{what} {ratio:.2g} times as thick as long"
+    if ratio > THICKEST:
+        return [f"{told}, which is no flexure: nothing was compared beyond {THICKEST:g}"]
+    side = ratio * np.sqrt(np.pi) / 2
+    bar, beam = held_flexure.held_blade(1.0, side, side, 1.0, USUAL), flexure.blade_segment(1.0, side, side, 1.0, USUAL)
+    free = 0.0 if slender else held_flexure.shear_share(side, USUAL)
+    held = 1 / bar.EI_z + 12 * bar.shear_y
+    yields = beam.EA / bar.EA, beam.EI_z * held / (1 + free)
+    left_out = "shear and held ends are left out (slender = true)" if slender else "what its ends hold is left out"
+    along, across = (percent(1 / share - 1, sign=True) for share in yields)
+    return [
+        f"{told}: {left_out}, which changes its stiffness between ends that do not turn by about {along} along and {across} across, at a "
+        f"Poisson's ratio of {USUAL:g}"
+    ]

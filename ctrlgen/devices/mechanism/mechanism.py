@@ -26,7 +26,7 @@ from ctrlgen.devices.mechanism.bent_beams import BentBeam, ThermalActuator
 from ctrlgen.devices.mechanism.condensed import MOST_STEPS, SPARE_STEPS, Condensed, nominal
 from ctrlgen.devices.mechanism.constraints import free_between_springs
 from ctrlgen.devices.mechanism.copies import Copied, CopiedParts, Placed
-from ctrlgen.devices.mechanism.flexures import Blade, CircularHinge, Strut, Wire, flexures_in_one_place
+from ctrlgen.devices.mechanism.flexures import Blade, CircularHinge, Strut, Wire
 from ctrlgen.devices.mechanism.flexures_alone import alone_remarks
 from ctrlgen.devices.mechanism.force_readings import reach as load_reach
 from ctrlgen.devices.mechanism.force_readings import unloaded
@@ -37,6 +37,7 @@ from ctrlgen.devices.mechanism.mechanism_physics import mechanism_physics
 from ctrlgen.devices.mechanism.mode_shapes import mode_shapes
 from ctrlgen.devices.mechanism.modes import guyan_modes, inertia_faults, inertia_remarks
 from ctrlgen.devices.mechanism.name_faults import name_faults
+from ctrlgen.devices.mechanism.overlaps import flexures_in_one_place, overlap_remarks
 from ctrlgen.devices.mechanism.ported_parts import Ported
 from ctrlgen.devices.mechanism.reach import buckling_remarks, reach_remarks
 from ctrlgen.devices.mechanism.second_order import SecondOrder
@@ -380,10 +381,10 @@ class Mechanism(CopiedParts):
             for e in self.element
             if isinstance(e, CircularHinge) and e.material in dense
         ]
-        parts = (*self.element, *self.super_element)
         return (
-            [f"{e.name}: {note}" for e in parts for note in e.notes()]
+            [f"{e.name}: {note}" for e in (*self.material, *self.element, *self.super_element) for note in e.notes()]
             + light
+            + overlap_remarks(self.placed_elements)
             + inertia_remarks(self)
             + alone_remarks(self)
             + reach_remarks(self)

@@ -18,6 +18,8 @@ from ctrlgen.devices.travel import Travel
 from ctrlgen.physics.screw import Matrix, TwistComponent, WrenchComponent, rotation_z
 
 Inertia = Annotated[Quantity, In("kg*mm^2", positive=True)]
+STIFFEST, SOFTEST = 1300e9, 1e6  # Pa: beyond diamond and below rubber
+DENSEST, LIGHTEST = 23e3, 10.0  # kg/m^3: beyond osmium and below foams
 FLAT = 0.01  # a flat plate has the sum; its numbers are rounded
 
 
@@ -46,6 +48,18 @@ class Material(Section):
                 'expansion and expansion_slope belong together; write expansion_slope = "0 1/K^2" where it is constant'
             )
         return self
+
+    def notes(self) -> list[str]:
+        """Numbers that no material has, as a wrong unit makes them."""
+        young, notes = self.young.si, []
+        if not SOFTEST <= young <= STIFFEST:
+            notes.append(
+                f"young = {self.young.text!r} is {'above diamond' if young > STIFFEST else 'below rubber'}: check the unit"
+            )
+        if self.density is not None and not LIGHTEST <= self.density.si <= DENSEST:
+            word = "above osmium" if self.density.si > DENSEST else "below foams"
+            notes.append(f"density = {self.density.text!r} is {word}: check the unit")
+        return notes
 
 
 class Pattern(Section):
