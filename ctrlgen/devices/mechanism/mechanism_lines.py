@@ -7,6 +7,7 @@ import numpy as np
 
 from ctrlgen.core.counts import number_of
 from ctrlgen.core.units import show
+from ctrlgen.devices.mechanism.bent_tangent import displaced_lines
 from ctrlgen.devices.mechanism.condensed import Condensed, nominal
 from ctrlgen.devices.mechanism.constraints import freedoms, redundant_constraints
 from ctrlgen.devices.mechanism.drawing import Drawing
@@ -74,6 +75,7 @@ def summary(device: Drawing) -> list[str]:
         + (_second_order_lines(c) if device.second_order else [])
         + load_lines(device)
         + reach_lines(device)
+        + displaced_lines(device)
         + range_lines(device)
     )
 

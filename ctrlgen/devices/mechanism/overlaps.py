@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -52,11 +51,22 @@ def boxes(placed: Sequence[Placed]) -> list[Box]:
     return found
 
 
+def _near(found: list[Box]) -> list[tuple[Box, Box]]:
+    """The pairs that are parallel and not farther apart than their lengths and sections reach."""
+    if not found:
+        return []
+    axes, middles = (np.array(x) for x in zip(*((e.frame[:, 0], (e.free + e.fixed) / 2) for e in found), strict=True))
+    reach = np.array([e.length / 2 + sum(e.section) for e in found])
+    parallel = np.abs(axes @ axes.T) > 1 - SKEW**2
+    near = np.linalg.norm(middles[:, None] - middles, axis=2) <= reach[:, None] + reach
+    return [(found[i], found[j]) for i, j in np.argwhere(np.triu(parallel & near, 1))]
+
+
 def flexures_in_one_place(placed: Sequence[Placed], size: float) -> list[Fault]:
     """Those of which two join the same bodies and have both ends in one place of a mechanism of a `size` [m], drawn from whichever end."""
     return [
         Fault("element", f"{b.name} lies where {a.name} lies; move one, or give its width to the other")
-        for a, b in itertools.combinations(boxes(placed), 2)
+        for a, b in _near(boxes(placed))
         if a.bodies == b.bodies and _coincide(a, b, size)
     ]
 
@@ -72,7 +82,7 @@ def _coincide(a: Box, b: Box, size: float) -> bool:
 def overlap_remarks(placed: Sequence[Placed]) -> list[str]:
     """Parallel flexures that run in one another over some length."""
     remarks = []
-    for a, b in itertools.combinations(boxes(placed), 2):
+    for a, b in _near(boxes(placed)):
         if (shared := _shared(a, b)) > SLIGHT * max(min(a.length, b.length), 1e-12):
             remarks.append(
                 f"{b.name} runs inside {a.name} over {show(shared, 'mm')} of their length: two pieces of material cannot be in one place; "
