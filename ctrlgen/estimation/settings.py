@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ctrlgen.estimation.settings_of_parts import LeadingPartSettings, MotionSettings, ProfileSettings
+from ctrlgen.estimation.settings_of_parts import (
+    InitialMemorySettings,
+    LeadingPartSettings,
+    MotionSettings,
+    ProfileSettings,
+)
 
 
 @dataclass(frozen=True)
@@ -284,27 +289,6 @@ class HeldOutRefitSettings:
 
 
 @dataclass(frozen=True)
-class InitialMemorySettings:
-    """Where the plays of a hysteresis stood when a record began."""
-
-    rows: int = 300
-    """Samples at the beginning of a record, a quarter of it at most, that tell where plays stood before. Judgement."""
-    worse: float = 1.5
-    """Mean square there over that of the rest, from which on the beginning is wrong. Judgement."""
-    ways_back: tuple[float, ...] = (0.05, 0.15, 0.4, 1.0, 2.0)
-    """How far the motion came back since it last turned, in prior deviations of a place, where the search for that begins. Judgement."""
-    far: float = 30.0
-    """From where every play is dragged along, in the same."""
-    sides: tuple[float, ...] = (-0.875, -0.625, -0.375, -0.125, 0.125, 0.375, 0.625, 0.875)
-    """Places of a driven side in its gap, in halves of it, from which a search begins, so near that a step reaches the next. Judgement."""
-    quarters: tuple[float, ...] = (0.0, 0.25, 0.5, -0.25)
-    """Values of a state of which nothing is foretold, such as a phase, in its typical size, from one of which steps lead to the right
-    one."""
-    behind: tuple[float, ...] = (-0.5, -0.25, -0.1, -0.03, 0.03, 0.1, 0.25, 0.5)
-    """How far what a rate limits is behind its drive when a record begins, in prior deviations, from which a search begins. Judgement."""
-
-
-@dataclass(frozen=True)
 class ResidualTestsSettings:
     """Model validation on the held-out records, the fitted ones and rest."""
 
@@ -388,9 +372,9 @@ NOISE_UPDATE = NoiseUpdateSettings()
 OUTLIERS = OutlierSettings()
 POSE_OUTLIERS = PoseOutlierSettings()
 HELD = HeldSettings()
-INITIAL_MEMORY = InitialMemorySettings()
 SIMULATION = SimulationSettings()
 FIT = FitSettings()
+INITIAL_MEMORY = InitialMemorySettings()
 LEADING_PART = LeadingPartSettings()
 MOTION = MotionSettings()
 HELD_OUT_REFIT = HeldOutRefitSettings()

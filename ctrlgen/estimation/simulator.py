@@ -134,11 +134,6 @@ class Simulator:
         return tuple(i for i, name in free if name.startswith(kinds))
 
     @cached_property
-    def unforetold(self) -> tuple[int, ...]:
-        """Places among the free initial states of those of which other records tell nothing."""
-        return tuple(i for i, k in enumerate(self.free_initial_states) if k in self.model.unforetold)
-
-    @cached_property
     def _observed(self) -> ca.SX:
         signals = self.model.signals
         rows = []
