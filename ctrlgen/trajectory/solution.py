@@ -16,6 +16,7 @@ from ctrlgen.model.simulation import Trace
 from ctrlgen.physics.euler_angles import angles_of
 from ctrlgen.trajectory.frame import ROTATIONS
 from ctrlgen.trajectory.inverse.violations import Before, limited_values
+from ctrlgen.trajectory.late_memory import LateMemory, late_memory
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.trajectory.unstated_inertia import UnstatedInertia, unstated_inertia
 from ctrlgen.trajectory.unstated_modes import UnstatedModes, unstated_modes
@@ -86,9 +87,15 @@ class Solution(Tabular, Reported):
         return unstated_stretching(self.model, self.trace, self.drive)
 
     @cached_property
+    def late_memory(self) -> LateMemory | None:
+        """What creep, which learns of the displacement a sample late, does along the path; None where that is nothing."""
+        file = self.scenario.file
+        return late_memory(self.model, file.follow, self.trace, self.drive, self.scenario.sample_time)
+
+    @cached_property
     def left_out(self) -> tuple[str, ...]:
         """In sentences what the device's file states and the model leaves out, where the path notices; and where its range ends."""
-        told = (self.unstated_inertia, self.unstated_modes, self.unstated_stretching)
+        told = (self.unstated_inertia, self.unstated_modes, self.unstated_stretching, self.late_memory)
         return (*(each.sentence() for each in told if each is not None), *self.model.device.range_remarks())
 
     def columns(self) -> tuple[Column, ...]:
