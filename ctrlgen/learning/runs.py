@@ -82,9 +82,8 @@ def load_runs(paths: Sequence[Path | str], lifted: Lifted, implied: ImpliedPose)
         name = lifted.solution.scenario.file.follow
         what = f"has no reading of the followed {name}; add {name}.{lifted.signal.channels[0]} or reading.{lifted.signal.channels[0]}"
         raise InputError(source, [Fault("columns", what)])
-    runs = list[Run]()
-    faults += _copies(records)
-    for record in records:
+    runs, copies = list[Run](), _copies(records)
+    for record in (record for record in records if record.name not in copies):
         try:
             run, drift = _run(record, places, lifted, noise)
         except ValueError as error:
@@ -109,6 +108,10 @@ def load_runs(paths: Sequence[Path | str], lifted: Lifted, implied: ImpliedPose)
         f"{run.name}: {run.unread} of {run.unread + run.unsettled + len(run.y)} repetitions left out, not read for too long to be bridged."
         for run in runs
         if run.unread
+    ]
+    notes += [
+        f"{name}: holds the readings of {of} to the last bit and is left out: a copy says nothing more of the noise."
+        for name, of in copies.items()
     ]
     notes += drifting
     return Runs(tuple(runs), noise, observed, tuple(notes))
@@ -211,18 +214,17 @@ def _is_whole(y: np.ndarray, places: Sequence[int | None], lifted: Lifted) -> bo
     return not any(p is not None and _too_few(np.isfinite(of), lifted) for p, of in zip(places, y.T, strict=True))
 
 
-def _copies(records: Sequence[Record]) -> list[Fault]:
-    """A fault for each record whose readings are another's to the last bit: it is no repetition, and would halve the noise."""
-    faults = list[Fault]()
+def _copies(records: Sequence[Record]) -> dict[str, str]:
+    """The records whose readings, under the same drives, are those of an earlier one to the last bit, with its name: no repetitions, which
+    would halve the noise."""
+    found: dict[str, str] = {}
     for j, record in enumerate(records):
         for other in records[:j]:
-            if record.observed.shape == other.observed.shape and np.array_equal(
-                record.observed, other.observed, equal_nan=True
-            ):
-                what = f"holds the readings of {other.name} to the last bit: it is a copy, and no further run; name each run once"
-                faults.append(Fault(record.name, what))
+            same = record.drive.shape == other.drive.shape and np.array_equal(record.drive, other.drive)
+            if same and np.array_equal(record.observed, other.observed, equal_nan=True):
+                found[record.name] = other.name
                 break
-    return faults
+    return found
 
 
 def _every(record: Record, lifted: Lifted) -> int:
