@@ -52,6 +52,14 @@ def test_a_solved_path_says_how_far_off_creep_leaves_it(tmp_path):
     assert show(told.off, "um") in sentence and "half the sample time" in sentence
 
 
+@pytest.mark.parametrize("delay", ["2 ms", "30 ms"])
+def test_a_late_reading_beside_it_changes_nothing(tmp_path, delay):
+    """A delay keeps as many readings as it is samples long, which are more where these are shorter."""
+    late = f'\n[[effect]]\nkind = "delay"\nat = "delta_x"\ndelay = "{delay}"\n'
+    plain, delayed = (circled(tmp_path / str(k), CREEP.format(GAIN) + more) for k, more in enumerate(("", late)))
+    assert delayed.late_memory.off == pytest.approx(plain.late_memory.off, rel=1e-9)
+
+
 def test_half_the_sample_time_leaves_half_and_no_creep_nothing(tmp_path):
     whole, half = (
         circled(tmp_path / rate[:3], CREEP.format(GAIN), rate).late_memory.off for rate in ("100 Hz", "200 Hz")

@@ -50,11 +50,14 @@ def late_memory(
     if sample_time is None or model.inertial or not ca.depends_on(model.rates, model.z):
         return None
     u = drive[:MOST_SAMPLES]
-    finer = build_model(model.device, sample_time=sample_time / PARTS)
-    found = simulate(finer, np.repeat(u, PARTS, axis=0), sample_time / PARTS, trace.x[0], trace.z[0])
-    wanted = trace.signals[follow][: len(u)]
+    plain = build_model(model.device)  # what looks back by samples keeps others where these are shorter
+    start = trace.x[0][[model.x_names.index(name) for name in plain.x_names]]
+    wanted, found = (
+        simulate(plain, np.repeat(u, k, axis=0), sample_time / k, start, trace.z[0]).signals[follow][: len(u) * k : k]
+        for k in (1, PARTS)
+    )
     # steps of a share 1/PARTS leave that share of it
-    off = np.abs(found.signals[follow][: len(u) * PARTS : PARTS] - wanted) * PARTS / (PARTS - 1)
+    off = np.abs(found - wanted) * PARTS / (PARTS - 1)
     way = np.maximum(np.ptp(wanted, axis=0), model.signals[follow].scale)
     sample, channel = np.unravel_index(int(np.argmax(off / way)), off.shape)
     if off[sample, channel] <= NOTICED * way[channel]:
