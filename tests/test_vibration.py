@@ -23,9 +23,9 @@ HUM = Hypothesis("vibration_per_record", "disturbance:axis", "axis")
 N = 1500
 
 
-def hummed(phases, lines=((50.0, 20 * NOISE),), own_clock=True) -> Recording:
+def hummed(phases, lines=((50.0, 20 * NOISE),), own_clock=True, seed=4) -> Recording:
     """A record to fit for each phase [rad] but the last, and one to hold out; each on a clock of its own, or all on one."""
-    rng, parts = np.random.default_rng(4), []
+    rng, parts = np.random.default_rng(seed), []
     for k, phase in enumerate(phases):
         role = "fit" if k < len(phases) - 1 else "hold_out"
         first = 0.0 if own_clock else k * N * H
@@ -60,11 +60,14 @@ def test_what_tells_the_phase_of_a_held_out_record_is_no_evidence_for_the_line(l
     assert 50 < np.count_nonzero(parts) < 80  # of a hundred stretches, without the first quarter of the record
 
 
-def test_a_line_that_is_not_there_is_found_by_luck_alone():
-    """A fit to the noise of one record tells nothing of another, whatever phase it takes there."""
-    fitter, fit = fitted(hummed((0.0, 0.0), lines=()), 0.3)
-    parts = matched_parts(fitter, fit, [HUM], Memory(0.0, False))
-    assert sign_flip_p(parts) > 1e-3
+def test_a_line_that_is_not_there_is_found_by_luck_as_often_as_is_said():
+    """A fit to the noise of one record tells nothing of another, whatever phase it takes there. Were the phase told by the whole of the
+    other, the line would fit there always: chances are then below 0.3. Of 40 even ones the median is below that once in 200 times."""
+    found = []
+    for seed in range(40):
+        fitter, fit = fitted(hummed((0.0, 0.0), lines=(), seed=seed), 0.3)
+        found.append(sign_flip_p(matched_parts(fitter, fit, [HUM], Memory(0.0, False))))
+    assert np.median(found) > 0.3
 
 
 @pytest.mark.long

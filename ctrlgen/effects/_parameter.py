@@ -70,7 +70,7 @@ class State:
     `clock` is the time since the record's common zero. With what a
     `free` one begins is unknown and differs by record: a diagnosis fits it there; elsewhere it begins at zero. One
     `per_record` is free and keeps its value through the record: outside a diagnosis it is the number zero, and no state. One
-    `unforetold` may have any value: what it is in one record tells nothing of another.
+    `arbitrary` may have any value: what it is in one record tells nothing of another.
     """
 
     name: str
@@ -81,7 +81,7 @@ class State:
     clock: bool = False
     free: bool = False
     per_record: bool = False
-    unforetold: bool = False
+    arbitrary: bool = False
 
     def __post_init__(self) -> None:
         if self.per_record:  # it changes by no law of its own

@@ -36,7 +36,7 @@ class VibrationPerRecord(Vibration):
     """
 
     title = "A vibration of one frequency in the reading, of another phase in each record"
-    states = (*Vibration.states, State("theta", "1", 2 * math.pi, per_record=True, unforetold=True))
+    states = (*Vibration.states, State("theta", "1", 2 * math.pi, per_record=True, arbitrary=True))
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.amplitude * ca.sin(2 * ca.pi * p.frequency * s.states.t + p.phase + s.states.theta)

@@ -15,7 +15,7 @@ import numpy as np
 from ctrlgen.devices import Device
 from ctrlgen.estimation.checkpoint import Checkpoint, key_of
 from ctrlgen.estimation.error_model import ErrorModel, error_model
-from ctrlgen.estimation.initial_memory import anywhere, begins_elsewhere, memory_before
+from ctrlgen.estimation.initial_memory import at_the_best_quarter, begins_elsewhere, memory_before
 from ctrlgen.estimation.leading_part import leading_part
 from ctrlgen.estimation.least_squares import LeastSquaresProblem, initial_state_sd, limited, whiten_residual
 from ctrlgen.estimation.moved_drive import with_drive_at
@@ -309,7 +309,7 @@ class Fitter:
         if len(sd) == 0:
             return sd, simulator.simulate(record, fit.theta)
         expected = start_of(simulator, self.error, fit.theta, record) / sd
-        first = anywhere(simulator, fit.theta, record, expected, self._white)
+        first = at_the_best_quarter(simulator, fit.theta, record, expected, self._white)
         found = begun_near(simulator, self.error, fit.theta, record, first, expected)
         if begins_elsewhere(simulator, record, self._white(record, found.y)):
             other = memory_before(simulator, fit.theta, record, found.states, expected, self._white)

@@ -24,16 +24,18 @@ def begins_elsewhere(simulator: Simulator, record: Record, white: np.ndarray) ->
     return bool(simulator.plays or simulator.gaps or simulator.slews) and begins_worse(record, white)
 
 
-def unforetold(simulator: Simulator) -> list[int]:
+def arbitrary_states(simulator: Simulator) -> list[int]:
     """Places among the free initial states of those of which other records tell nothing."""
-    return [i for i, k in enumerate(simulator.free_initial_states) if k in simulator.model.unforetold]
+    return [i for i, k in enumerate(simulator.free_initial_states) if k in simulator.model.arbitrary_memories]
 
 
-def anywhere(simulator: Simulator, theta: np.ndarray, record: Record, expected: np.ndarray, white: White) -> np.ndarray:
-    """The free initial states `expected`, in their prior deviations, and each of which nothing is foretold at the quarter of its typical
-    size, such as a turn, with which the record is foretold best: from a phase half a turn off no step leads to the right one."""
+def at_the_best_quarter(
+    simulator: Simulator, theta: np.ndarray, record: Record, expected: np.ndarray, white: White
+) -> np.ndarray:
+    """The free initial states `expected`, in their prior deviations, and each arbitrary one at the quarter of its typical size, such as a
+    turn, with which the record is foretold best: from a phase half a turn off no step leads to the right one."""
     sd, states = initial_state_sd(simulator), expected.copy()
-    for k in unforetold(simulator):
+    for k in arbitrary_states(simulator):
         tried = [states.copy() for _ in INITIAL_MEMORY.quarters]
         for start, quarter in zip(tried, INITIAL_MEMORY.quarters, strict=True):
             start[k] = quarter / FIT.start_size

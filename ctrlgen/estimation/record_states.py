@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ctrlgen.estimation.error_model import ErrorModel
-from ctrlgen.estimation.initial_memory import unforetold
+from ctrlgen.estimation.initial_memory import arbitrary_states
 from ctrlgen.estimation.least_squares import initial_state_sd, whiten_residual
 from ctrlgen.estimation.settings import FIT, HELD_OUT_REFIT
 from ctrlgen.estimation.simulator import Simulator
@@ -96,7 +96,7 @@ def begun_near(
     least = HELD_OUT_REFIT.unsettled * best.objective
     settled = best.objective - promised <= least or was - best.objective <= least
     # what catches up with its drive, and a phase, promise too little in one step
-    if settled and not simulator.slews and not unforetold(simulator):
+    if settled and not simulator.slews and not arbitrary_states(simulator):
         return best
     found = levenberg_marquardt(problem, best.states, HELD_OUT_REFIT.max_steps_to_begin)
     r = problem.residual(found)

@@ -20,8 +20,7 @@ class InitialMemorySettings:
     sides: tuple[float, ...] = (-0.875, -0.625, -0.375, -0.125, 0.125, 0.375, 0.625, 0.875)
     """Places of a driven side in its gap, in halves of it, from which a search begins, so near that a step reaches the next. Judgement."""
     quarters: tuple[float, ...] = (0.0, 0.25, 0.5, -0.25)
-    """Values of a state of which nothing is foretold, such as a phase, in its typical size, from one of which steps lead to the right
-    one."""
+    """Values of an arbitrary state, such as a phase, in its typical size, from one of which steps lead to the right one."""
     behind: tuple[float, ...] = (-0.5, -0.25, -0.1, -0.03, 0.03, 0.1, 0.25, 0.5)
     """How far what a rate limits is behind its drive when a record begins, in prior deviations, from which a search begins. Judgement."""
 

@@ -171,7 +171,7 @@ def _assemble(
         set_valued_axes=_set_valued_axes(terms, v, equations.own_force),
         bristles=places.bristles,
         free_memories=places.free,
-        unforetold=places.unforetold,
+        arbitrary_memories=places.arbitrary,
         signals=signals,
         force_parts=physics.restoring_force_parts(z),
         limits=tuple(_with_numbers(limit, p, p_nominal) for limit in limits),

@@ -69,7 +69,7 @@ class Model(Shown):
     set_valued_axes: tuple[int, ...]  # axes with inertia on which dry friction may hold the stage at rest
     bristles: tuple[int, ...]  # the states of that friction
     free_memories: tuple[int, ...]  # states of effects that begin differently in each record
-    unforetold: tuple[int, ...]  # of these, where those of one record tell nothing of another
+    arbitrary_memories: tuple[int, ...]  # of these, where those of one record tell nothing of another
 
     # What is read from the equations
     # Drive, power, state where there are some, force, displacement, pose, reading; in this order

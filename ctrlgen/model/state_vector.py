@@ -54,7 +54,7 @@ class MemoryPlaces:
     clocks: tuple[int, ...]
     bristles: tuple[int, ...]
     free: tuple[int, ...]
-    unforetold: tuple[int, ...]
+    arbitrary: tuple[int, ...]
 
 
 def memory_places(memories: Sequence[Memory], first: int, closed: Callable[[ca.SX], ca.SX]) -> MemoryPlaces:
@@ -67,7 +67,7 @@ def memory_places(memories: Sequence[Memory], first: int, closed: Callable[[ca.S
         tuple(k for k, _, s in placed if s.clock),
         bristles,
         tuple(k for k, _, s in placed if s.free or k in bristles),
-        tuple(k for k, _, s in placed if s.unforetold),
+        tuple(k for k, _, s in placed if s.arbitrary),
     )
 
 

@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ctrlgen.physics.flexure import Segment, segment_compliance
+from ctrlgen.physics.flexure import Segment, bent, segment_compliance
 
 ALONG = np.array([1.0, 0.0, 0.0])
 PARTS = 12  # pieces of a segment: the growth of a guided blade's compliance is right to 1 %
@@ -50,9 +50,9 @@ def _curved(segments: Sequence[Segment], load: np.ndarray) -> np.ndarray:
             x**2 / 2 * moment + (left * x**2 / 2 - x**3 / 6) * across
         )  # integral of the rotation
         owns += [own] * PARTS
-        turns.append(turned + yields * (half * moment + half * (left - half / 2) * across))
+        turns.append(turned + np.array([np.array(bent(s, float(h), left, load), float) for h in half[:, 0]]))
         places.append(reached + x * (ALONG + strain) + np.cross(turn, ALONG))
-        turned = turned + yields * (length * moment + length * (left - length / 2) * across)
+        turned = turned + np.array(bent(s, length, left, load), float)
         reached, left = places[-1][-1], left - length
     R, arms = Rotation.from_rotvec(np.vstack(turns)).as_matrix(), reached - np.vstack(places)
     wrench = np.zeros((len(owns), 6, 6))  # on a piece, in its frame, per wrench on the tip

@@ -31,6 +31,14 @@ class Segment:
     shear_z: Any = 0.0
 
 
+def bent(s: Segment, x: Any, left: Any, load: Any) -> tuple[Any, Any, Any]:
+    """Rotation [rad] about x, y and z that the first x [m] of a segment add, where a `load` of six, force and moment, acts `left` [m] from
+    where the segment begins: the integral of (M + (left - x) e_x x F) over G J and E I."""
+    lever = x * (left - x / 2)
+    _, F_y, F_z, M_x, M_y, M_z = load
+    return x * M_x / s.GJ, (x * M_y - lever * F_z) / s.EI_y, (x * M_z + lever * F_y) / s.EI_z
+
+
 def shear_ratio(poisson: Scalar) -> Scalar:
     """chi = G/E = 1 / (2 (1 + nu)). Source: S1 eq. (22)."""
     return 1 / (2 * (1 + poisson))

@@ -14,6 +14,7 @@ from collections.abc import Iterable, Sequence
 from typing import Literal, TypeAlias, get_args
 
 import casadi as ca
+import numpy as np
 
 TwistComponent = Literal["theta_x", "theta_y", "theta_z", "delta_x", "delta_y", "delta_z"]
 WrenchComponent = Literal["F_x", "F_y", "F_z", "M_x", "M_y", "M_z"]
@@ -26,6 +27,11 @@ Scalar: TypeAlias = float | ca.SX
 def told_in(component: str) -> str:
     """The unit in which a component of a twist is told: 'urad' of a turn, 'um' of a displacement."""
     return "urad" if component.startswith("theta") else "um"
+
+
+def numbers(matrix: Matrix) -> np.ndarray:
+    """A matrix without symbols as an array (rows, columns)."""
+    return np.array(ca.evalf(ca.SX(matrix)).full())
 
 
 def rotation_z(angle: Scalar) -> Matrix:

@@ -18,7 +18,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from ctrlgen.physics.flexure import Segment
+from ctrlgen.physics.flexure import Segment, bent
 from ctrlgen.physics.screw import Matrix
 
 NEXT, LAST = [1, 2, 0], [2, 0, 1]  # rows in a cross product: three at once, as a mechanism has thousands of them
@@ -82,28 +82,23 @@ def beam(segments: Sequence[Segment], load: Matrix, a: Sequence[int], b: Sequenc
 
 def _beam(segments: Sequence[Segment], load: Matrix, a: Sequence[int], b: Sequence[int]) -> Matrix:
     left = sum((s.length for s in segments[1:]), segments[0].length)  # from the section to the free end
-    psi = ca.DM.zeros(3, load.shape[1])
+    psi, rows = ca.DM.zeros(3, load.shape[1]), ca.vertsplit(load)
     along, across = ca.repmat(AXIS, 1, len(a)), cross(ca.repmat(AXIS, 1, load.shape[1]), load[:3, :])
     turn, shift = ca.DM.zeros(3, len(a)), ca.DM.zeros(3, len(a))
     for s in segments:
         flexibility = ca.vertcat(1 / s.GJ, 1 / s.EI_y, 1 / s.EI_z)
-
-        def bent(x: Any, left: Any = left, by: Matrix = flexibility) -> Matrix:
-            """Rotation (3, k) that a piece of length x adds."""
-            lever = x * (left - x / 2)
-            return ca.mtimes(ca.diag(by), x * load[3:, :] + lever * across)
 
         strain = ca.vertcat(load[0, :] / s.EA, load[1, :] * s.shear_y, load[2, :] * s.shear_z)
         for node, weight in zip(NODES, WEIGHTS, strict=True):
             x = s.length * (1 + node) / 2
             rest = left - x
             kappa = ca.mtimes(ca.diag(flexibility), load[3:, :] + rest * across)
-            R = psi + bent(x)
+            R = psi + ca.vertcat(*bent(s, x, left, rows))
             slope = cross(R[:, b], along)
             Gamma = -cross(R[:, a], slope) / 2 - cross(R[:, a], strain[:, b])
             K = -cross(R[:, a], kappa[:, b]) / 2
             turn += weight * s.length / 2 * K
             shift += weight * s.length / 2 * (Gamma + rest * cross(K, along))
-        psi = psi + bent(s.length)
+        psi = psi + ca.vertcat(*bent(s, s.length, left, rows))
         left = left - s.length
     return ca.vertcat(turn, shift)

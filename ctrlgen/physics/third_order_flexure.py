@@ -19,7 +19,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ctrlgen.physics.flexure import Segment
+from ctrlgen.physics.flexure import Segment, bent
 
 # Exact to the seventh degree; the cube of a rotation along a segment is of the sixth.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
@@ -40,14 +40,13 @@ def third_order_motion(point: np.ndarray, first: np.ndarray, second: np.ndarray)
 def third_order_work(segments: Sequence[Segment], load: np.ndarray) -> float:
     """[N m] of the `load` (6,) on the free end, force and moment in the frame of the beam, on Gamma_3 of segments in line."""
     left = sum(float(s.length) for s in segments)
-    force, moment, psi, work = load[:3], load[3:], np.zeros(3), 0.0
-    across = np.cross(ALONG, force)
+    force, psi, work = load[:3], np.zeros(3), 0.0
     for s in segments:
-        yields, length = np.array([1 / float(s.GJ), 1 / float(s.EI_y), 1 / float(s.EI_z)]), float(s.length)
+        length = float(s.length)
         sheared = np.array([0.0, -float(s.shear_z) * force[2], float(s.shear_y) * force[1]])
         for x, weight in zip(length * (1 + NODES) / 2, length * WEIGHTS / 2, strict=True):
-            turned = psi + sheared + yields * (x * moment + x * (left - x / 2) * across)
+            turned = psi + sheared + np.array(bent(s, x, left, load), float)
             work -= weight * force @ np.cross(turned, np.cross(turned, np.cross(turned, ALONG))) / 6
-        psi = psi + yields * (length * moment + length * (left - length / 2) * across)
+        psi = psi + np.array(bent(s, length, left, load), float)
         left -= length
     return float(work)

@@ -15,7 +15,7 @@ from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.physics import rigid_bodies
 from ctrlgen.physics.bent_flexure import bent_compliance
 from ctrlgen.physics.rigid_bodies import GROUND, Element
-from ctrlgen.physics.screw import adjoint, inverse, inverse_adjoint, move
+from ctrlgen.physics.screw import adjoint, inverse, inverse_adjoint, move, numbers
 
 NOTICED = 0.05  # of a stiffness: less is what thicknesses are known to
 ALONG = 10.0  # times as stiff with the axes held as with their drives: a direction in which they move it
@@ -28,8 +28,7 @@ def displaced_compliance(c: Condensed, d: np.ndarray) -> np.ndarray:
     the load in a flexure does to its stiffness across (`stretching`, `loaded_tangent`) is not in it."""
     second, device = SecondOrder(c), c.device
     twists = [
-        np.zeros(6) if b == GROUND else _numbers(second.first_order[b]) @ d
-        for b in (*range(len(device.bodies)), GROUND)
+        np.zeros(6) if b == GROUND else numbers(second.first_order[b]) @ d for b in (*range(len(device.bodies)), GROUND)
     ]
     elements = []
     for k, e in enumerate(c.elements):
@@ -37,21 +36,21 @@ def displaced_compliance(c: Condensed, d: np.ndarray) -> np.ndarray:
         if not segments:
             elements.append(e)
             continue
-        motions, base, end = second.motions(k), twists[e.first], _numbers(c.ends[k]).ravel()
-        C = bent_compliance(segments, _numbers(motions.load)[:, : len(d)] @ d)
-        R = Rotation.from_rotvec(base[:3]).as_matrix() @ _numbers(c.frames[k])
+        motions, base, end = second.motions(k), twists[e.first], numbers(c.ends[k]).ravel()
+        C = bent_compliance(segments, numbers(motions.load)[:, : len(d)] @ d)
+        R = Rotation.from_rotvec(base[:3]).as_matrix() @ numbers(c.frames[k])
         there = end + twists[e.second][3:] + np.cross(twists[e.second][:3], end)
         elements.append(Element(e.first, e.second, move(inverse(ca.DM(C)), ca.DM(R), ca.DM(there))))
     for i, (a, n) in enumerate(zip(device.placed_actuators if c.pushes else (), c.directions, strict=False)):
-        held = HELD * _numbers(c.held_stiffness)[i, i]
-        point = _numbers(c.point(a)).ravel()
+        held = HELD * numbers(c.held_stiffness)[i, i]
+        point = numbers(c.point(a)).ravel()
         push = [rigid_bodies.point_force(ca.DM(point), n), rigid_bodies.point_motion(ca.DM(point), n)]
         elements.append(Element(a.first, a.second, held * ca.mtimes(*push)))
     output = device.bodies.index(device.output.body)
-    at = _numbers(c.output_point).ravel()
+    at = numbers(c.output_point).ravel()
     at = ca.DM(at + twists[output][3:] + np.cross(twists[output][:3], at))
     T = rigid_bodies.twists(len(device.bodies), elements, {output: adjoint(None, at)}, device.size)
-    return _numbers(ca.mtimes(inverse_adjoint(None, at), T[output]))
+    return numbers(ca.mtimes(inverse_adjoint(None, at), T[output]))
 
 
 def displaced_lines(device: Drawing) -> list[str]:
@@ -60,7 +59,7 @@ def displaced_lines(device: Drawing) -> list[str]:
     c = nominal(device)
     if c.cubics or c.ported:
         return []
-    home, free, lines = displaced_compliance(c, np.zeros(len(c.directions))), np.abs(_numbers(c.output_compliance)), []
+    home, free, lines = displaced_compliance(c, np.zeros(len(c.directions))), np.abs(numbers(c.output_compliance)), []
     for r in reaches(c):
         end = max(r.ends, key=abs)
         bent = displaced_compliance(c, r.at(end))
@@ -82,7 +81,3 @@ def _changed(home: float, bent: float, free: float) -> float:
 
 def _changes(shares: list[float]) -> list[str]:
     return [f"{name} {percent(x, sign=True)}" for name, x in zip("xyz", shares, strict=True) if abs(x) > NOTICED]
-
-
-def _numbers(matrix: ca.SX | ca.DM) -> np.ndarray:
-    return np.asarray(ca.DM(ca.evalf(ca.SX(matrix))).full())

@@ -23,7 +23,7 @@ from ctrlgen.devices.mechanism.modes import guyan_modes
 from ctrlgen.devices.travel import farthest
 from ctrlgen.physics import rigid_bodies
 from ctrlgen.physics.rigid_bodies import GROUND
-from ctrlgen.physics.screw import Matrix
+from ctrlgen.physics.screw import Matrix, numbers
 
 FAINT = 1e-9  # of the largest travel: a stretch of an element that is rounding
 
@@ -52,10 +52,10 @@ def reach(device: Drawing) -> np.ndarray:
     readings of a motion."""
     c, travel = nominal(device), max(farthest(a.section.travel) for a in device.placed_actuators)
     n, fastest = len(c.directions), guyan_modes(device).frequencies[-1:] if device.dynamics is not None else np.zeros(0)
-    found = _numbers(c.reading_motion)[:, :n]
+    found = numbers(c.reading_motion)[:, :n]
     size = np.abs(found).sum(axis=1)
     if len(fastest):
-        size += np.abs(_numbers(inertial(c))).sum(axis=1) * (2 * np.pi * fastest[0]) ** 2
+        size += np.abs(numbers(inertial(c))).sum(axis=1) * (2 * np.pi * fastest[0]) ** 2
     return np.asarray(size * travel * [r.section.of is not None for r in device.placed_readings])
 
 
@@ -66,13 +66,9 @@ def unloaded(device: Drawing) -> list[str]:
     for r, load in zip(device.placed_readings, loads, strict=True):
         if r.section.of is not None:
             # counted as the force that would stretch the element as far as a share of the largest travel
-            K = np.abs(_numbers(c.elements[c.load_row(r)[0]].stiffness)[:3, 3:]).max()
+            K = np.abs(numbers(c.elements[c.load_row(r)[0]].stiffness)[:3, 3:]).max()
             faint += [r.name] * bool(load <= least * K * (device.size if r.section.unit == "N*m" else 1.0))
     return faint
-
-
-def _numbers(matrix: Matrix) -> np.ndarray:
-    return np.asarray(ca.DM(ca.evalf(ca.SX(matrix))).full())
 
 
 def _held(c: Condensed) -> list[Matrix]:

@@ -12,7 +12,7 @@ from ctrlgen.devices.mechanism.force_readings import inertial
 from ctrlgen.devices.mechanism.modes import as_displacements, body_matrices, guyan_modes
 from ctrlgen.devices.structural_model import StructuralModel
 from ctrlgen.physics.rigid_bodies import GROUND
-from ctrlgen.physics.screw import inverse_adjoint
+from ctrlgen.physics.screw import inverse_adjoint, numbers
 
 REACH = 5.0  # times the fastest condensed mode: how far up the response is told where a file states no `modes_below`
 MOVES = 1e-9  # of the softest mode with mass: below it a motion of bodies has no mass
@@ -35,18 +35,18 @@ def structural_model(device: Drawing) -> StructuralModel | None:
     c, n = nominal(device), len(device.placed_actuators)
     K, M, _ = body_matrices(c)
     size = as_displacements(device)
-    at_rest = np.vstack([_numbers(T[:, :n]) for T in c.twists]) / size[:, None]
+    at_rest = np.vstack([numbers(T[:, :n]) for T in c.twists]) / size[:, None]
     bodies = [np.eye(6 * len(device.bodies))[6 * i : 6 * i + 6] * size for i in range(len(device.bodies))]
-    travel = np.vstack([_numbers(c.travel(i, [ca.DM(b) for b in bodies])) for i in range(n)])
+    travel = np.vstack([numbers(c.travel(i, [ca.DM(b) for b in bodies])) for i in range(n)])
     free = scipy.linalg.null_space(travel)  # the axes held
     slow, shapes = scipy.linalg.eigh(free.T @ M @ free, free.T @ K @ free)  # 1/w^2: bodies without a mass have none
     shapes, slow = (x[..., ::-1] for x in (shapes, slow))  # the slowest first
     moving = slow > MOVES * slow.max(initial=0.0)
     shapes = free @ shapes[:, moving] / np.sqrt(slow[moving])
-    seen = _numbers(inverse_adjoint(None, c.output_point)) @ bodies[device.bodies.index(device.output.body)]
+    seen = numbers(inverse_adjoint(None, c.output_point)) @ bodies[device.bodies.index(device.output.body)]
     ratio = device.dynamics.damping_ratio.si
 
-    rows, per_acceleration, kept = _readings(c, bodies), _numbers(inertial(c)), slow[moving]
+    rows, per_acceleration, kept = _readings(c, bodies), numbers(inertial(c)), slow[moving]
 
     def with_modes(count: int) -> StructuralModel:
         basis = np.hstack([at_rest, shapes[:, :count]])
@@ -71,16 +71,12 @@ def _readings(c: Condensed, bodies: list[np.ndarray]) -> np.ndarray:
     """(readings, 6 bodies) what is read beside the output of the twists of all bodies, turns counted as displacements."""
     rows = np.zeros((len(c.device.placed_readings), bodies[0].shape[1]))
     for i, (r, row) in enumerate(zip(c.device.placed_readings, c.reading_rows, strict=True)):
-        first, second, seen = r.first, r.second, _numbers(row)
+        first, second, seen = r.first, r.second, numbers(row)
         if r.section.of is not None:
             k, of_wrench = c.load_row(r)
             first, second = c.elements[k].first, c.elements[k].second
-            seen = _numbers(ca.mtimes(of_wrench, c.elements[k].stiffness))
+            seen = numbers(ca.mtimes(of_wrench, c.elements[k].stiffness))
         for body, sign in ((second, 1), (first, -1)):
             if body != GROUND:
                 rows[i] += sign * (seen @ bodies[body]).ravel()
     return rows
-
-
-def _numbers(matrix: ca.SX | ca.DM) -> np.ndarray:
-    return np.asarray(ca.DM(ca.evalf(ca.SX(matrix))).full())

@@ -27,6 +27,7 @@ from ctrlgen.devices.mechanism.modes import as_displacements
 from ctrlgen.devices.mechanism.second_order import Motions, SecondOrder
 from ctrlgen.physics.beam_column import Column, Piece
 from ctrlgen.physics.rigid_bodies import GROUND, point_motion
+from ctrlgen.physics.screw import numbers
 from ctrlgen.physics.second_order_flexure import dot, relative_motion
 
 # Unit twists of both bodies of an element, one after the other, and all pairs of them
@@ -96,20 +97,20 @@ class LoadedTangent:
             )
             for k, e in enumerate(self._motions)
             if self.s.parts[k][1]
-            for relative in [_numbers(e.relative)[:, self.s.n : self.s.n + 12]]
+            for relative in [numbers(e.relative)[:, self.s.n : self.s.n + 12]]
         ]
 
     def stiffness(self, share: float = 1.0) -> np.ndarray:
         """(n, n) of the axes [N/m] under a `share` of the loads, with that of the actuators beside their force."""
         B, T = self._travels, self._moved
         column = np.linalg.inv(B @ np.linalg.solve(self._bodies(share), B.T))
-        higher = column - _numbers(self.c.stiffness) - share * T.T @ self._geometric @ T
-        return _numbers(self.c.held_stiffness) + share * _numbers(self.loads.stiffness) + higher
+        higher = column - numbers(self.c.stiffness) - share * T.T @ self._geometric @ T
+        return numbers(self.c.held_stiffness) + share * numbers(self.loads.stiffness) + higher
 
     def off(self, share: float = 1.0) -> np.ndarray:
         """(n,) of the stiffness of each axis, by how much of it that to first order, K + K_F, is too large."""
         exact = np.diag(self.stiffness(share))
-        first = np.diag(_numbers(self.c.held_stiffness) + share * _numbers(self.loads.stiffness))
+        first = np.diag(numbers(self.c.held_stiffness) + share * numbers(self.loads.stiffness))
         return first / exact - 1
 
     def holds_to(self, most: float) -> float:
@@ -129,7 +130,7 @@ class LoadedTangent:
 
     def _takes_no_force(self, K: np.ndarray) -> bool:
         """Whether of K_b some motion does, with the stiffness of the actuators beside their force."""
-        stacks = np.diag(_numbers(self.c.held_stiffness) - _numbers(self.c.stiffness))
+        stacks = np.diag(numbers(self.c.held_stiffness) - numbers(self.c.stiffness))
         beside = self._travels.T @ (stacks[:, None] * self._travels) if self.c.pushes else 0.0
         return bool(scipy.linalg.eigvalsh(K + beside, self._linear + beside).min() <= 0)
 
@@ -169,7 +170,7 @@ class LoadedTangent:
         K, swap = np.zeros((len(self._scale),) * 2), np.r_[3:6, 0:3]
         between = np.hstack([-np.eye(6), np.eye(6)])
         for e in self.c.elements:
-            self._put(K, e.first, e.second, between.T @ _numbers(e.stiffness)[swap] @ between)
+            self._put(K, e.first, e.second, between.T @ numbers(e.stiffness)[swap] @ between)
         return (K + K.T) / 2
 
     @cached_property
@@ -195,7 +196,7 @@ class LoadedTangent:
         K, n = np.zeros((len(self._scale),) * 2), self.s.n
         a, b = ([n + u for u in by] for by in PAIRS)
         for placed, e in zip(self.c.elements, self._motions, strict=True):
-            own = _numbers(dot(e.load[:, [n + 12] * 144], e.deformation(a, b)))
+            own = numbers(dot(e.load[:, [n + 12] * 144], e.deformation(a, b)))
             self._put(K, placed.first, placed.second, 2 * own.reshape(12, 12))
         for body, at, force in self.loads.points():
             if body != GROUND:
@@ -209,14 +210,14 @@ class LoadedTangent:
     @cached_property
     def _moved(self) -> np.ndarray:
         """T_1 (6 bodies, n)."""
-        return np.vstack([_numbers(T) for T in self.s.first_order]) / self._scale[:, None]
+        return np.vstack([numbers(T) for T in self.s.first_order]) / self._scale[:, None]
 
     @cached_property
     def _travels(self) -> np.ndarray:
         """B (n, 6 bodies)."""
         B = np.zeros((len(self.c.directions), len(self._scale)))
         for i, (placed, direction) in enumerate(zip(self.c.device.placed_actuators, self.c.directions, strict=True)):
-            row = _numbers(point_motion(self.c.point(placed), direction)).ravel() if self.c.pushes else np.zeros(6)
+            row = numbers(point_motion(self.c.point(placed), direction)).ravel() if self.c.pushes else np.zeros(6)
             for body, sign in ((placed.first, -1), (placed.second, 1)):
                 if body != GROUND:
                     B[i, 6 * body : 6 * body + 6] += sign * row * self._scale[:6]
@@ -226,9 +227,5 @@ class LoadedTangent:
 def _turned(point: ca.DM, force: ca.DM) -> np.ndarray:
     """(12, 12) the work of a `force` on what the rotations of two bodies add to the motion of a `point` of the second, seen from the
     first."""
-    moved = _numbers(relative_motion(ca.DM(ca.evalf(ca.SX(point))), BOTH[0], BOTH[1], PAIRS[0], PAIRS[1]))[3:]
-    return (_numbers(force).ravel() @ moved).reshape(12, 12)
-
-
-def _numbers(matrix: ca.SX | ca.DM) -> np.ndarray:
-    return np.array(ca.DM(ca.evalf(ca.SX(matrix))).full())
+    moved = numbers(relative_motion(ca.DM(ca.evalf(ca.SX(point))), BOTH[0], BOTH[1], PAIRS[0], PAIRS[1]))[3:]
+    return (numbers(force).ravel() @ moved).reshape(12, 12)

@@ -3,7 +3,6 @@ ends as a beam without a load between them is, by the cubic of its end's places 
 
 from __future__ import annotations
 
-import casadi as ca
 import numpy as np
 
 from ctrlgen.core.mode_lines import Line, ModeShape
@@ -13,6 +12,7 @@ from ctrlgen.devices.mechanism.element_ends import element_ends
 from ctrlgen.devices.mechanism.internal_modes import highest_told
 from ctrlgen.devices.mechanism.modes import as_displacements, free_modes
 from ctrlgen.physics.rigid_bodies import GROUND
+from ctrlgen.physics.screw import numbers
 
 MOST = 12
 """Modes of a page; as many as a reader compares."""
@@ -39,7 +39,7 @@ def mode_shapes(device: Drawing) -> tuple[ModeShape, ...]:
     for s in device.placed_super_elements:
         for body, place in zip(s.bodies, s.places, strict=True):
             held[body].append(place)
-    held[device.bodies.index(device.output.body)].append(_numbers(nominal(device).output_point).ravel())
+    held[device.bodies.index(device.output.body)].append(numbers(nominal(device).output_point).ravel())
     grounds = np.array(held.pop(GROUND)).reshape(-1, 3)
 
     def shape(k: int) -> ModeShape:
@@ -79,7 +79,3 @@ def bent(start: np.ndarray, end: np.ndarray, first: np.ndarray, second: np.ndarr
     moved = (1 - 3 * s**2 + 2 * s**3) * u + (3 * s**2 - 2 * s**3) * v
     moved = moved + (s - 2 * s**2 + s**3) * slopes[0] + (s**3 - s**2) * slopes[1]
     return Line(start + s * span, moved, "flexure")
-
-
-def _numbers(matrix: ca.SX | ca.DM) -> np.ndarray:
-    return np.asarray(ca.DM(ca.evalf(ca.SX(matrix))).full())

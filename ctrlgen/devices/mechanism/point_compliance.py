@@ -10,7 +10,7 @@ import numpy as np
 from ctrlgen.core.units import show
 from ctrlgen.devices.mechanism.condensed import nominal
 from ctrlgen.devices.mechanism.drawing import Drawing
-from ctrlgen.physics.screw import TWIST, WRENCH, move
+from ctrlgen.physics.screw import TWIST, WRENCH, move, numbers
 
 UNITS = {("theta", "F"): "urad/N", ("theta", "M"): "urad/(N*m)", ("delta", "F"): "um/N", ("delta", "M"): "um/(N*m)"}
 STIFF_UNITS = {("F", "theta"): "N/rad", ("F", "delta"): "N/m", ("M", "theta"): "N*m/rad", ("M", "delta"): "N*m/m"}
@@ -44,9 +44,9 @@ class PointCompliance:
 def point_compliance(device: Drawing, point: np.ndarray | None = None) -> PointCompliance:
     """The output body's at `point` (3,) [m] in the global frame; left out: the output point. Of the drawing, without loads."""
     c = nominal(device)
-    home = _numbers(c.output_point).ravel()
+    home = numbers(c.output_point).ravel()
     at = home if point is None else np.asarray(point, float)
-    C = _numbers(move(ca.DM(_numbers(c.output_compliance)), None, tuple(home - at)))
+    C = numbers(move(ca.DM(numbers(c.output_compliance)), None, tuple(home - at)))
     K = np.linalg.inv(C)
     centres = [
         at + _symmetric(X[3:, 3:], X[:3, 3:]) for X in (C, K)
@@ -66,10 +66,6 @@ def _symmetric(coupling: np.ndarray, moved: np.ndarray) -> np.ndarray:
         / 2
     )
     return np.asarray(2 * np.linalg.solve(np.trace(moved) * np.eye(3) - moved, axis))
-
-
-def _numbers(matrix: ca.SX | ca.DM) -> np.ndarray:
-    return np.asarray(ca.DM(ca.evalf(ca.SX(matrix))).full())
 
 
 def _rows(

@@ -22,6 +22,7 @@ from ctrlgen.devices.mechanism.loaded_tangent import LoadedTangent, loaded_tange
 from ctrlgen.devices.mechanism.loads import DrivenLoads
 from ctrlgen.devices.mechanism.stretching import Stretching
 from ctrlgen.devices.travel import ends_of
+from ctrlgen.physics.screw import numbers
 
 HARDLY, FAR = 0.1, 1e3  # of its travel: a drive that takes its axis less far, or farther, was not meant so
 PRESSED = 1.0  # -p of a flexure: less bends no column by more than a tenth
@@ -68,9 +69,9 @@ def reaches(c: Condensed) -> tuple[Reach, ...]:
     """Of each axis of a mechanism of numbers without cubic springs."""
     placed, loads = c.device.placed_actuators, loaded_tangent(c).loads
     n = len(placed)
-    stiffness = _numbers(c.held_stiffness) + _numbers(loads.stiffness) if c.pushes else np.eye(n)
+    stiffness = numbers(c.held_stiffness) + numbers(loads.stiffness) if c.pushes else np.eye(n)
     yields = np.linalg.inv(stiffness)
-    home = (yields @ _numbers(loads.force)).ravel() if c.pushes else np.zeros(n)
+    home = (yields @ numbers(loads.force)).ravel() if c.pushes else np.zeros(n)
     found = []
     for i, a in enumerate(placed):
         drive = None
@@ -189,7 +190,3 @@ def _first(low: float, high: float, there: Callable[[float], bool]) -> float:
         middle = (low + high) / 2
         low, high = (low, middle) if there(middle) else (middle, high)
     return high
-
-
-def _numbers(matrix: ca.SX | ca.DM) -> np.ndarray:
-    return np.asarray(ca.DM(ca.evalf(ca.SX(matrix))).full())

@@ -13,7 +13,7 @@ from ctrlgen.diagnosis.settings import LUCK
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.free_parameters import FreeParameter
 from ctrlgen.estimation.hypothesis import Hypothesis
-from ctrlgen.estimation.initial_memory import unforetold
+from ctrlgen.estimation.initial_memory import arbitrary_states
 from ctrlgen.estimation.least_squares import initial_state_sd
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Record
@@ -73,7 +73,7 @@ def _of_record(fitter: Fitter, bare: WithoutCauses, full: Fit, record: Record, m
     values = [left[..., None], changed[..., None], Y[..., :k] @ bare.root, Y[..., k:] * sd]
     white = fitter.error.whiten(np.concatenate(values, axis=2), record.valid)
     labels = stretches(record, np.sum(white[..., 1] ** 2, axis=1), memory)
-    if unforetold(fitter.simulator(full.structure, record)):
+    if arbitrary_states(fitter.simulator(full.structure, record)):
         labels[: _beginning(record)] = GAP
     inside = labels != GAP
     rows = white[inside].reshape(-1, white.shape[2])
@@ -100,7 +100,7 @@ def _told_by_beginning(fitter: Fitter, fit: Fit, record: Record) -> np.ndarray:
     """The free initial states [SI] of a model at rest, but those that no other record foretells as the beginning of this one tells them."""
     simulator = fitter.simulator(fit.structure, record)
     states = np.zeros(len(simulator.free_initial_states))
-    if chosen := unforetold(simulator):
+    if chosen := arbitrary_states(simulator):
         read = record.valid & (np.arange(len(record.time)) < _beginning(record))[:, None]
         states[chosen] = fitter.begun(fit, replace(record, valid=read))[0][chosen]
     return states
