@@ -42,7 +42,7 @@ class Cyclic(Effect):
 class CyclicFromHome(Cyclic):
     """Delta y = A (sin(2 pi y/Lambda + phi) - sin(phi)): home is read as zero, as by incremental scales and interferometers.
 
-    Holds as the other does, and where the reading was set to zero at home.
+    Holds as `cyclic`, and where the reading was set to zero at home.
     """
 
     title = "An error that repeats along the path, of a sensor that is set to zero at home"

@@ -32,7 +32,7 @@ class Vibration(Effect):
 class VibrationPerRecord(Vibration):
     """Delta y = A sin(2 pi f t + phi + theta), d theta/dt = 0: theta is constant within a record, another in each, and fitted there.
 
-    Nothing starts a recorder on the phase of the mains. Holds as the other does; outside a diagnosis theta = 0.
+    Nothing starts a recorder on the phase of the mains. Holds as `vibration`; outside a diagnosis theta = 0.
     """
 
     title = "A vibration of one frequency in the reading, of another phase in each record"
