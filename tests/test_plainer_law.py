@@ -24,6 +24,8 @@ from ctrlgen.recordings.recording import Record
 
 GENERAL = {kind: law for kind, law in Effect.library.items() if law.plainer}
 every_general_law = pytest.mark.parametrize("law", GENERAL.values(), ids=GENERAL)
+# the axis of these tests has no heater: of one that is straight, after all, test_heat_loss.py tells
+on_an_axis = pytest.mark.parametrize("law", [law for law in GENERAL.values() if "heat" not in law.requires], ids=lambda law: law.kind)
 
 
 def at_neutral(law: type[Effect], where, amplitude: float) -> dict[str, float]:
@@ -166,7 +168,7 @@ def test_what_generalises_nothing_is_what_it_is():
 
 
 @pytest.mark.long
-@every_general_law
+@on_an_axis
 def test_what_rubs_or_lags_alike_both_ways_is_named_by_the_plainer_law(law, monkeypatch):
     """Readings of the plainer law, fitted by the one that generalises it."""
     cause = Hypothesis(law.kind, "actuator:axis" if law.kind.endswith("drive_hysteresis") else "stage:axis", "axis")
