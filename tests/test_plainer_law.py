@@ -25,7 +25,9 @@ from ctrlgen.recordings.recording import Record
 GENERAL = {kind: law for kind, law in Effect.library.items() if law.plainer}
 every_general_law = pytest.mark.parametrize("law", GENERAL.values(), ids=GENERAL)
 # the axis of these tests has no heater: of one that is straight, after all, test_heat_loss.py tells
-on_an_axis = pytest.mark.parametrize("law", [law for law in GENERAL.values() if "heat" not in law.requires], ids=lambda law: law.kind)
+on_an_axis = pytest.mark.parametrize(
+    "law", [law for law in GENERAL.values() if "heat" not in law.requires], ids=lambda law: law.kind
+)
 
 
 def at_neutral(law: type[Effect], where, amplitude: float) -> dict[str, float]:

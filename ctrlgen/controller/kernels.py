@@ -28,6 +28,7 @@ from ctrlgen.model.allocation import inverse_of
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.inverse import NEWTON_STEPS, Inverse, invert
 from ctrlgen.model.model import Model
+from ctrlgen.numerics.newton import steps_needed
 
 # The memory of an effect does not scale with the displacement, so its share of the excess is removed over several rounds.
 COMPOSITE_ROUNDS = 8
@@ -147,7 +148,7 @@ class ControllerKernels:
     @cached_property
     def _own_newton_steps(self) -> int:
         m = self.nominal
-        return NEWTON_STEPS if ca.depends_on(ca.jacobian(m.balance, m.z), m.z) else 1
+        return steps_needed(m.balance, m.z, NEWTON_STEPS)
 
     @cached_property
     def nominal(self) -> Model:

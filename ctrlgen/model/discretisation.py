@@ -19,7 +19,7 @@ import scipy
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.model.integrators import NEAR_HOME, integrator_of
 from ctrlgen.model.model import Model
-from ctrlgen.numerics.newton import newton_root
+from ctrlgen.numerics.newton import newton_root, steps_needed
 from ctrlgen.numerics.phi_functions import held_gain, increment, lag_increment, varied_gain
 
 NEWTON_STEPS = 4  # from the displacement one sample before, each step doubles the digits
@@ -100,6 +100,27 @@ def held_step(model: Model, sample_time: float, rates: ca.SX | None = None) -> c
     return _with_sampled_states(model, x)
 
 
+def jumps(model: Model, x_then: ca.SX) -> bool:
+    """Whether states that have come to `x_then` remember the displacement of a stage in balance that its drives put elsewhere at once, and
+    do not act on it."""
+    if model.inertial or not ca.depends_on(model.balance, model.u):
+        return False
+    remember = [i for i in range(model.x.numel()) if i not in model.stepped and ca.depends_on(x_then[i], model.z)]
+    return bool(remember) and not ca.depends_on(model.balance, model.x[remember])
+
+
+def at_displacement(model: Model, x_then: ca.SX, displaced: ca.SX) -> ca.SX:
+    """`x_then`, after a sample, with what has rates (creep, lags of readings) at the displacement `displaced` [SI] that the drive gives the
+    stage in the whole sample, for that of the sample before, model.z, which states that change once a sample keep."""
+    return _with_sampled_states(model, ca.substitute(x_then, model.z, displaced))
+
+
+def driven_step(model: Model, sample_time: float) -> ca.SX:
+    """`held_step` where model.z is the displacement before the drive acts, and what remembers it is given that under the drive."""
+    x = held_step(model, sample_time)
+    return at_displacement(model, x, balanced(model, x, model.u)) if jumps(model, x) else x
+
+
 def varied_step(model: Model, sample_time: ca.SX, longest: float, rates: ca.SX) -> ca.SX:
     """`held_step` of states that do not act on one another (`acts_alone`), over a `sample_time` [s] that is a symbol: at most `longest`."""
     A = ca.jacobian(rates, model.x)
@@ -176,8 +197,7 @@ def balanced(model: Model, x: ca.SX, u: ca.SX, newton_steps: int = NEWTON_STEPS,
     """
     # Both at once: x may hold the drive of the sample before
     balance = ca.substitute(model.balance, ca.vertcat(model.x, model.u), ca.vertcat(x, u))
-    linear = not ca.depends_on(ca.jacobian(balance, model.z), model.z)
-    return root(balance, model.z, model.z, 1 if linear else newton_steps)
+    return root(balance, model.z, model.z, steps_needed(balance, model.z, newton_steps))
 
 
 def _settle(model: Model, u: ca.SX, newton_steps: int, root: Root) -> tuple[ca.SX, ca.SX]:

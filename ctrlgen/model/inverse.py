@@ -4,6 +4,8 @@ It is derived from the equations of any `Model` at the end of a sample,
 
     followed(x+, z+, u) = target,  g(x+, z+, u) = 0,  x+ = held_step(x, z, u)  (static: rates = 0).
 
+Where the drive puts a stage elsewhere at once, what remembers its displacement is given z+ for z (`at_displacement`).
+
 They are sorted into blocks by block triangular form (I. S. Duff, J. K. Reid, ACM TOMS 4 (1978) 137), and each block is
 solved in the cheapest exact way: a linear one in closed form, one quadratic equation by its root, anything else by a fixed
 number of Newton steps. The operation count is therefore fixed.
@@ -19,9 +21,9 @@ import numpy as np
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.effects import Effect
-from ctrlgen.model.discretisation import held_step, varied_step
+from ctrlgen.model.discretisation import at_displacement, held_step, jumps, varied_step
 from ctrlgen.model.model import Model
-from ctrlgen.numerics.newton import newton_root
+from ctrlgen.numerics.newton import newton_root, steps_needed
 
 # Operations at which an expression is not differentiable:
 CORNERS = frozenset((ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_SIGN, ca.OP_FLOOR, ca.OP_CEIL, ca.OP_IF_ELSE_ZERO))
@@ -85,6 +87,8 @@ def invert(
             if longest is None
             else varied_step(model, h, longest, model.rates_of_heat)
         )
+        if jumps(model, stepped):
+            stepped = at_displacement(model, stepped, z_1)
         reached, motion, produced = _held(model, end, stepped)
     heating = heat - produced
     followed = ca.substitute(followed, model.p, ca.DM(model.p_nominal))
@@ -100,6 +104,9 @@ def invert(
     )
     settled = ca.substitute(model.balance, model.p, end.p)
     advance = ca.substitute(reached, heat, ca.substitute(produced, x_1, reached) if sample_time is None else produced)
+    if ca.depends_on(advance, z_1):
+        then = ca.substitute(balance, x_1, advance)
+        advance = ca.substitute(advance, z_1, newton_root(then, z_1, z, steps_needed(then, z_1, NEWTON_STEPS)))
     states = x_1[:n_s]
     results: dict[str, tuple[dict[str, ca.SX], ca.SX]] = {
         "displacement": ({"x": x, "z": z, "target": target}, wanted_z),

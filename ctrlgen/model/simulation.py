@@ -14,7 +14,7 @@ from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.core.tabular import Column, Drawn, Tabular
 from ctrlgen.core.units import from_si
 from ctrlgen.devices import Signal
-from ctrlgen.model.discretisation import held_step, one_step_map
+from ctrlgen.model.discretisation import at_displacement, held_step, jumps, one_step_map
 from ctrlgen.model.model import Model
 from ctrlgen.numerics.batched_evaluation import evaluate, in_blocks
 from ctrlgen.numerics.newton import newton_solver
@@ -113,9 +113,12 @@ def _balanced_step(model: Model, sample_time: float) -> tuple[ca.Function, ca.Fu
     """`balance_solver`, and (x and z, u) -> x and z one sample later, in balance."""
     x, z, u = (ca.MX.sym(n, s.numel()) for n, s in (("x", model.x), ("z", model.z), ("u", model.u)))
     p, balance = ca.DM(model.p_nominal), balance_solver(model)
-    step = ca.Function("step", [model.x, model.z, model.u, model.p], [held_step(model, sample_time)])
-    x_next = step(x, z, u, p)
+    given, held = [model.x, model.z, model.u, model.p], held_step(model, sample_time)
+    x_next = ca.Function("step", given, [held])(x, z, u, p)
     z_next = balance(z, x_next, u, p)
+    if jumps(model, held):
+        there = ca.SX.sym("there", model.z.numel())
+        x_next = ca.Function("there", [*given, there], [at_displacement(model, held, there)])(x, z, u, p, z_next)
     return balance, ca.Function("one", [ca.vertcat(x, z), u], [ca.vertcat(x_next, z_next)])
 
 

@@ -50,6 +50,11 @@ def newton_root(residual: ca.SX, unknown: ca.SX, start: ca.SX, steps: int) -> ca
     return root
 
 
+def steps_needed(residual: ca.SX, unknown: ca.SX, most: int) -> int:
+    """One step where the `residual` is linear in the `unknown`, else `most`."""
+    return most if ca.depends_on(ca.jacobian(residual, unknown), unknown) else 1
+
+
 class ImplicitRoots:
     """Roots of equations r(z, q) = 0 as symbols, so that what follows from them is differentiated by the implicit function theorem,
 

@@ -1,9 +1,8 @@
-"""How far off the path what remembers the displacement leaves a stage in balance, because it learns of it a sample late.
+"""How far off the path what remembers the displacement leaves a stage in balance, because it learns of it half a sample late.
 
-`held_step` gives creep the displacement at the beginning of a sample, before the drive of that sample acts. A stage that follows its drive
-at once is by then where the drive of the sample before has put it: creep comes a sample late, by about its gain times the way of a
-sample. Inverse, simulation and C have that in common and call it nothing. Here the drives of a solved path are put into the same model with
-`PARTS` steps a sample.
+`held_step` gives creep the displacement at the beginning of a sample. A stage behind heaters, which change little by little, has by
+half the way of the sample gone on from there. Inverse, simulation and C have that in common and call it nothing. Here the drives of a
+solved path are put into the same model with `PARTS` steps a sample.
 """
 
 from __future__ import annotations
@@ -37,7 +36,8 @@ class LateMemory:
         """How far off, where and when, and what to do."""
         unit = self.signal.units[self.signal.channels.index(self.channel)]
         return (
-            f"creep learns of the displacement a sample late: {self.channel} is {show(self.off, unit)} off the path at {self.time:.4g} s, "
+            f"creep learns of the displacement half a sample late: {self.channel} is {show(self.off, unit)} off the path "
+            f"at {self.time:.4g} s, "
             "which no other number here counts; half the sample time leaves half of it"
         )
 

@@ -23,7 +23,7 @@ import numpy as np
 
 from ctrlgen.core.errors import SolverError
 from ctrlgen.devices import Limit
-from ctrlgen.model.discretisation import held_step
+from ctrlgen.model.discretisation import driven_step
 from ctrlgen.model.model import Model
 from ctrlgen.model.simulation import Trace, trace
 from ctrlgen.numerics.ipopt import IpoptOptions, NonlinearProgramme, solve_nlp
@@ -100,7 +100,7 @@ class TrajectoryProgramme:
             return ca.substitute(expression, ca.vertcat(m.x, m.z, m.u, m.p), values)
 
         if isinstance(clock, Sampled):
-            motion = x_1 - (at(held_step(m, clock.sample_time), u) - m.rest) / m.x_scale
+            motion = x_1 - (at(driven_step(m, clock.sample_time), u) - m.rest) / m.x_scale
         else:
             motion = at(m.settling, u) / m.x_scale
         equal = [at(self.signal.expr, v) / self.signal.scale - commanded - s, at(m.balance, v) / m.force_scale, motion]

@@ -88,7 +88,7 @@ class Solution(Tabular, Reported):
 
     @cached_property
     def late_memory(self) -> LateMemory | None:
-        """What creep, which learns of the displacement a sample late, does along the path; None where that is nothing."""
+        """What creep, which learns of the displacement half a sample late, does along the path; None where that is nothing."""
         file = self.scenario.file
         return late_memory(self.model, file.follow, self.trace, self.drive, self.scenario.sample_time)
 

@@ -25,7 +25,7 @@ from ctrlgen.firmware.c.elementary import elementary_text
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.firmware.c.templates import write
 from ctrlgen.model.assembly import build_model
-from ctrlgen.model.discretisation import balanced, held_step, one_step_map
+from ctrlgen.model.discretisation import balanced, driven_step, one_step_map
 from ctrlgen.model.model import Model
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.version import __version__, program
@@ -59,7 +59,7 @@ class Plant:
         if self.inertial:
             after = one_step_map(m, self.sample_time)
             return self._kernel("advance", ca.vertcat(after.x, after.z))
-        return self._kernel("advance", held_step(m, self.sample_time))
+        return self._kernel("advance", driven_step(m, self.sample_time))
 
     @cached_property
     def balance(self) -> ca.Function:
