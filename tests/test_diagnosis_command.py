@@ -58,7 +58,7 @@ def test_the_command_explains_one_law(creeping, tmp_path, capsys):
 
 def test_an_unknown_law_to_explain_is_refused_before_the_diagnosis(creeping, tmp_path, capsys):
     assert command("diagnose", AXIS_FILE, creeping, "--out", tmp_path / "out", "--explain", "crep") == 2
-    assert "known are: " in capsys.readouterr().err and not (tmp_path / "out").exists()
+    assert "did you mean 'creep'" in capsys.readouterr().err and not (tmp_path / "out").exists()
 
 
 def test_a_place_for_replicates_that_nobody_asked_for_is_refused(creeping, tmp_path, capsys):

@@ -165,6 +165,7 @@ def test_only_the_effects_asked_for_are_considered_and_the_answer_says_so(tmp_pa
     assert "creep" not in {f.effect for f in found.findings}
 
 
-def test_an_effect_that_does_not_exist_is_refused_with_those_that_do(clean):
-    with pytest.raises(InputError, match=r"creeep: is not a known effect; known are: .*creep"):
-        ctrlgen.diagnose(AXIS_FILE, clean, laws=("creeep",))
+@pytest.mark.parametrize("name, said", [("creeep", "did you mean 'creep'"), ("qqq", "known are: .*creep")])
+def test_an_effect_that_does_not_exist_is_refused_with_the_one_that_was_meant_or_all(name, said, clean):
+    with pytest.raises(InputError, match=rf"{name}: is not a known effect; {said}"):
+        ctrlgen.diagnose(AXIS_FILE, clean, laws=(name,))

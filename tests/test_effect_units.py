@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+
 import pytest
+from effect_cases import every_effect, place_of
 from pydantic import BaseModel
 
 from ctrlgen.core.errors import InputError
 from ctrlgen.core.files import validate
-from ctrlgen.core.units import split_unit
+from ctrlgen.core.units import same_dimension, split_unit, written_unit
 from ctrlgen.devices.tested_axis import Mass
 from ctrlgen.devices.travel import TravelOrTurn
-from ctrlgen.effects import Channel, Param, State, faults_at, read_effect
+from ctrlgen.effects import Channel, Param, Place, State, faults_at, read_effect
 
 # A drive of typically 50 V beside a heater of 0.2 W, on a stage that travels 20 um: no power of one is another's.
 DRIVE = Channel("1X", "V", 50.0, "um", 2e-5, "1Y", "mW", 0.2)
@@ -112,3 +116,18 @@ def test_a_number_of_one_of_two_units_is_told_by_its_key_alone():
         with pytest.raises(InputError) as error:
             validate(File, {"mass": "3 V", "travel": travel}, "file.toml")
         assert {"mass", place} <= {fault.where for fault in error.value.faults} <= {"mass", place, "travel[1]"}
+
+
+@every_effect
+def test_an_example_of_a_missing_number_has_a_unit_that_its_place_takes(effect):
+    """Of a drive in watts, as in volts."""
+    _, places = place_of(effect)
+    table = {"kind": effect.kind, "at": places[0].name} | ({"of": places[0].partner} if effect.pairs else {})
+    with pytest.raises(ValueError) as error:
+        read_effect(table)
+    examples = dict(re.findall(r'write for example (\w+) = "([^"]*)"', str(error.value)))
+    assert set(examples) == {p.name for p in effect.params}
+    for p in effect.params:
+        where = replace(places[0], unit="V") if effect.place is Place.DRIVE else places[0]
+        if not p.relative and where.unit_of(p) != "1":
+            assert same_dimension(written_unit(examples[p.name]), where.unit_of(p)), (p.name, examples[p.name])

@@ -60,7 +60,7 @@ def test_a_coil_may_be_driven_by_current(tmp_path):
         ("piezo", {"voltage": "-3 V"}, "above zero"),
         ("piezo", {"volts": "3 V"}, "is not asked of piezo; asked are voltage"),
         ("piezo", {"voltage": '3 V" }\n[evil'}, "does not start with a number"),
-        ("lathe", {}, "known are piezo"),
+        ("lathe", {}, "known are: piezo"),
     ],
 )
 def test_wrong_answers_are_refused_and_nothing_is_written(kind, given, says, tmp_path):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from pathlib import Path
 
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_toml, write_bytes
+from ctrlgen.core.names import meant
 from ctrlgen.core.shipped_files import shipped
 
 SCENARIO = "scenario.toml"
@@ -98,6 +98,4 @@ def copy_examples(names: Sequence[str], to: Path) -> list[Path]:
 
 
 def _unknown(name: str, known: Iterable[str]) -> str:
-    near = difflib.get_close_matches(name, list(known), n=1)
-    remedy = f"did you mean {near[0]!r}?" if near else "ctrlgen example lists them"
-    return f"is not an example; {remedy}"
+    return f"is not an example; {meant(name, known, 'ctrlgen example lists them')}"

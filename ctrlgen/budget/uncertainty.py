@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections.abc import Callable
@@ -18,6 +17,7 @@ from ctrlgen.budget.deviation import Deviation, parse_share
 from ctrlgen.budget.sensor_statement import SensorSection, stated_sensor
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import read_text, read_toml, validate
+from ctrlgen.core.names import meant
 from ctrlgen.core.units import (
     is_share,
     parse_difference,
@@ -267,8 +267,7 @@ class _Reader:
         pattern = re.escape(name).replace(re.escape("[*]"), r"\[\d+\]")
         paths = tuple(path for path in self.numbers if re.fullmatch(pattern, path))
         if not paths:
-            near = difflib.get_close_matches(name, self.numbers, n=1)
-            hint = f"did you mean {near[0]!r}?" if near else "ctrlgen check DEVICE lists them"
+            hint = meant(name, self.numbers, "ctrlgen check DEVICE lists them")
             self.faults.append(Fault(where, f"is not a number of the device; {hint}"))
             return
         sds = []

@@ -6,9 +6,10 @@ and underscores alone. Texts for readers (titles, sources) are checked by `ctrlg
 
 from __future__ import annotations
 
+import difflib
 import re
 import reprlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field
@@ -31,6 +32,14 @@ def checked(text: str, pattern: str = NAME) -> str:
     if len(text) > LONGEST_NAME:
         raise ValueError(f"{reprlib.repr(text)} has {len(text)} letters; a name has at most {LONGEST_NAME}: shorten it")
     return text
+
+
+def meant(name: str, known: Iterable[str], otherwise: str | None = None) -> str:
+    """Which of the `known` names an unknown one was to be, or, where none is near, what `otherwise` says: all of them, if nothing else."""
+    every = list(known)
+    if near := difflib.get_close_matches(name, every, n=1):
+        return f"did you mean {near[0]!r}?"
+    return f"known are: {', '.join(every)}" if otherwise is None else otherwise
 
 
 def is_name(text: object) -> bool:

@@ -10,10 +10,17 @@ from typing import Annotated, Any
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import PydanticCustomError, core_schema
 
+from ctrlgen.core.names import meant
 from ctrlgen.core.units import Quantity, read_quantity, same_dimension, show, to_si, written_unit
-from ctrlgen.effects._effect import Effect
+from ctrlgen.effects._effect import Effect, Place
 from ctrlgen.effects._installed import installed, law_of
 from ctrlgen.effects._parameter import PLACEHOLDERS, Channel, Param
+
+USUAL = {
+    Place.DRIVE: "V",
+    Place.HEAT: "W",
+    Place.FORCE: "N",
+}  # units of an example, where no device tells them; of others, um
 
 
 def read_effect(given: Any) -> Effect:
@@ -38,7 +45,7 @@ def read_effect(given: Any) -> Effect:
     values = {}
     for param in law.params:
         try:
-            values[param.name] = _read_parameter(param, given)
+            values[param.name] = _read_parameter(law, param, given)
         except ValueError as error:
             faults.append(str(error))
     if faults:
@@ -61,17 +68,23 @@ def _law(given: dict[str, Any]) -> type[Effect]:
         raise ValueError(
             f"{kind} is a law of the package {package}, which is not installed here or does not bring it; pip install {package}"
         )
-    raise ValueError(
-        f"kind = {kind!r} is not a known effect; known are: {', '.join(sorted(Effect.library))}. A law of another package "
-        "is known once that package is installed"
-    )
+    others = f"known are: {', '.join(sorted(Effect.library))}. A law of another package is known once that package is installed"
+    raise ValueError(f"kind = {kind!r} is not a known effect; {meant(str(kind), Effect.library, others)}")
 
 
-def _read_parameter(param: Param, given: dict[str, Any]) -> Quantity:
+def _usual_units(law: type[Effect]) -> tuple[str, str, str, str]:
+    """What stands for `PLACEHOLDERS` in an example, where no device tells it."""
+    own = law.channel_unit if isinstance(law.channel_unit, str) else (law.channel_unit or ("",))[0]
+    channel = {"m": "um", "rad": "urad"}.get(own, own) or USUAL.get(law.place, "um")
+    partner = law.partner_unit if law.partner_unit not in (None, "channel") else channel
+    return channel, "um", partner, "N"
+
+
+def _read_parameter(law: type[Effect], param: Param, given: dict[str, Any]) -> Quantity:
     if param.name not in given:
         unit = param.unit
-        for word in PLACEHOLDERS:
-            unit = unit.replace(word, "N" if word == "force" else "um")
+        for word, usual in zip(PLACEHOLDERS, _usual_units(law), strict=True):
+            unit = unit.replace(word, usual)
         example = f"{param.example:.2g} {unit}".removesuffix(" 1")
         raise ValueError(f'{param.name} is missing ({param.doc}); write for example {param.name} = "{example}"')
     try:

@@ -13,6 +13,7 @@ from math import log10
 from types import MappingProxyType
 
 from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.names import meant
 from ctrlgen.core.units import Quantity
 from ctrlgen.devices import Device, DevicePhysics
 from ctrlgen.devices.quantities import walk
@@ -198,8 +199,8 @@ def selected_laws(names: Sequence[str] | None = None) -> tuple[type[Effect], ...
     """The effects of these names, all for None, in alphabetical order. Raises InputError for a name that is no effect's."""
     unknown = sorted(set(names or ()) - set(laws()))
     if unknown:
-        known = ", ".join(sorted(laws()))
-        raise InputError("laws", [Fault(name, f"is not a known effect; known are: {known}") for name in unknown])
+        faults = [Fault(name, f"is not a known effect; {meant(name, sorted(laws()))}") for name in unknown]
+        raise InputError("laws", faults)
     return tuple(law for name, law in sorted(laws().items()) if names is None or name in names)
 
 

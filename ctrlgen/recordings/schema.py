@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from ctrlgen.core.errors import Fault
+from ctrlgen.core.names import meant
 from ctrlgen.core.units import In, Quantity, parse, parse_difference, same_dimension
 from ctrlgen.devices.section import Section
 from ctrlgen.model.model import Model
@@ -265,8 +265,7 @@ class _Check:
         for name, column in columns.items():
             place = "columns" if column is self.written.columns.get(name) else f"{where}.columns"
             if name not in units:
-                near = difflib.get_close_matches(name, units, n=1)
-                hint = f"did you mean {near[0]!r}?" if near else f"its signals are {', '.join(self.model.signals)}"
+                hint = meant(name, units, f"its signals are {', '.join(self.model.signals)}")
                 self._fault(f"{place}.{name!r}", f"is no signal of {self.model.device.name}; {hint}")
             else:
                 self._check_unit(f"{place}.{name!r}", column, units[name])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import os
 import re
@@ -17,7 +16,7 @@ from ctrlgen.app.new_files.questions import KINDS, Answer, answers
 from ctrlgen.core.compiled_templates import environment
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.files import write_text
-from ctrlgen.core.names import C_NAME, checked
+from ctrlgen.core.names import C_NAME, checked, meant
 from ctrlgen.core.units import from_si, same_dimension
 from ctrlgen.devices import load_device
 from ctrlgen.model.assembly import build_model
@@ -38,9 +37,7 @@ def write_device(file: Path, kind: str, name: str | None = None, given: Mapping[
     for numbers that make no such device.
     """
     if kind not in KINDS:
-        near = difflib.get_close_matches(kind, list(KINDS), n=1)
-        meant = f"; did you mean {near[0]!r}?" if near else ""
-        raise InputError("--kind", [Fault(kind, f"is not a kind; known are {', '.join(KINDS)}{meant}")])
+        raise InputError("--kind", [Fault(kind, f"is not a kind; {meant(kind, KINDS)}")])
     _absent(file)
     if file.suffix != ".toml":
         raise InputError("new device", [Fault(str(file), "must end in .toml")])
@@ -117,7 +114,7 @@ def write_scenario(folder: Path, device: Path, path: str | None = None) -> None:
     Raises InputError for a device whose range cannot be told, an unknown path, a path of two directions for one, an existing folder.
     """
     if path is not None and path not in PATHS:
-        raise InputError("--path", [Fault(path, f"is not a path; known are {', '.join(PATHS)}")])
+        raise InputError("--path", [Fault(path, f"is not a path; {meant(path, PATHS)}")])
     file = folder / "scenario.toml"
     _absent(file)
     model = build_model(load_device(device))

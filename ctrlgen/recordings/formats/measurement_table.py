@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,6 +13,7 @@ import numpy as np
 
 from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.names import meant
 from ctrlgen.core.units import to_si
 from ctrlgen.recordings.formats import clock_numbers, number_cells, over_range, time_stamps, wrapped_counters
 from ctrlgen.recordings.formats.layout_question import Ambiguous, AmbiguousFile
@@ -98,9 +98,8 @@ class MeasurementTable:
         if wanted.isdecimal() and int(wanted) < len(names):
             k = int(wanted)
             return f"write column = {k}, without quotes, for the one with {k} before it: {names[k]!r}"
-        near = difflib.get_close_matches(wanted, [*names, *map(bare_name, names)], n=1)
         listed = ", ".join(names[:MOST_LISTED]) + (", ..." if len(names) > MOST_LISTED else "")
-        return f"did you mean {near[0]!r}?" if near else f"its columns are: {listed or 'none'}"
+        return meant(wanted, [*names, *map(bare_name, names)], f"its columns are: {listed or 'none'}")
 
     def unit(self, name: str) -> str | None:
         """The unit that the file states of a column, beside it or behind its name; None where it states none."""
