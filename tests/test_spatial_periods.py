@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from axis_records import H, record
+from conftest import SCENARIOS
 from recovery import fitter_of
 
+from ctrlgen import load_device
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.selection.screen import Screen
@@ -97,3 +101,16 @@ def test_a_slow_pitch_is_sought_on_paths_that_are_short_beside_the_travel_alone(
     left = np.sin(2 * np.pi * path / 4e-4) + 300 * path
     assert slowest_periods(path, left, 25e-3) == pytest.approx((4e-4,), rel=0.01)
     assert slowest_periods(path, left, 2e-3) == () and slowest_periods(path[:1], left[:1], 25e-3) == ()
+
+
+@pytest.mark.parametrize("kind", ["cyclic", "cyclic_from_home"])
+def test_of_a_reading_whose_typical_size_is_small_a_pitch_as_long_as_the_way_shows_is_looked_for(kind):
+    """A platform that is typically moved by 1 um, over 500 um."""
+    platform = load_device(SCENARIOS / "devices" / "meso_hexapod.toml")
+    fringe = Hypothesis(kind, "sensor:delta_x", "delta_x")
+    channel, (amplitude, period, _) = fringe.channel_on(platform), fringe.law.params
+    usual = 2 * channel.scale
+    for seen, longest in ((np.inf, usual), (usual / 8, usual), (1.5e-4, 1.5e-4)):
+        told = replace(fringe, longest_period=seen)
+        assert told.bounds(period, channel) == pytest.approx((1e-4 * channel.scale, longest))
+        assert told.bounds(amplitude, channel) == pytest.approx((-longest / 4, longest / 4))

@@ -19,11 +19,11 @@ class Cyclic(Effect):
     channel_unit = ("m", "rad")
     source = "N. Bobroff, Appl. Opt. 26 (1987) 2676: residual errors in laser interferometry"
     params = (
-        Param("amplitude", "channel", (-0.5, 0.5), "largest error", off=0.0),
+        Param("amplitude", "channel", (-2.5e3, 2.5e3), "largest error", off=0.0),
         Param(
             "period",
             "channel",
-            (1e-4, 2.0),
+            (1e-4, 1e4),
             "path of one period",
         ),
         Param("phase", "deg", (-360.0, 360.0), "phase at home"),

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import product
-from math import log10
+from math import isfinite, log10
 from types import MappingProxyType
 
 from ctrlgen.core.errors import Fault, InputError
@@ -187,6 +187,11 @@ class Hypothesis:
         low, high = (channel.si(b, p) for b in p.bounds)
         if p.unit == "Hz":
             return low, max(low, min(high, self.highest))
+        if self.prior.period_up_to is not None and p.unit == "channel":
+            seen = self.longest_period if isfinite(self.longest_period) else 0.0
+            longest = max(channel.si(self.prior.period_up_to, p), seen)
+            high = min(high, longest / 4 if p is self.law.amplitude() else longest)
+            return max(low, -high), high
         if self.law.moves_in_time and p is self.law.amplitude():
             return low, max(low, min(high, self.longest))
         if p.unit == "s" and self.prior.of(p).scales_with_peak and self.law.place is not Place.SENSOR:

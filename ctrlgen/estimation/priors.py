@@ -50,6 +50,7 @@ _CYCLIC = LawPrior(
     "Harmonics: several at one place. Periods from a twentieth of the typical size to twice it, and those seen in the residual.",
     form_of="cyclic error",
     repeatable=True,
+    period_up_to=2.0,
     parameters={
         "period": ParameterPrior(
             (2.0, 4 / 3, 1.0, 2 / 3, 0.5, 1 / 3, 0.25, 1 / 6, 0.125, 0.1, 0.05),
