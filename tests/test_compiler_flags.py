@@ -38,7 +38,7 @@ OPTIONS = {
     "gcc": (
         *BOTH,
         "-fsignaling-nans",
-        "-fsingle-precision-constant",
+        "-fsingle-precision-constant",  # which takes double's constants for float's
         "-fexcess-precision=fast",
         "-fexcess-precision=standard",
         "-ffloat-store",
@@ -51,6 +51,7 @@ OPTIONS = {
     ),
     "clang": (
         *BOTH,
+        "-cl-single-precision-constant",
         "-fno-honor-nans",
         "-fno-honor-infinities",
         "-fno-honor-nans -fno-honor-infinities",
@@ -87,7 +88,9 @@ def escapes(folder: CFolder, real: Real, compiler: str, option: str, scratch: Pa
     words = [compiler, "-std=c99", "-O2", *option.split(), f"-I{folder.path}", *map(str, sources), "-o", str(program)]
     built = subprocess.run(words, capture_output=True, text=True)
     if built.returncode != 0:
-        refused = "they remove the checks for NaN" in built.stderr or UNKNOWN.search(built.stderr)
+        refused = re.search("they remove the checks for NaN|constants_in_double", built.stderr) or UNKNOWN.search(
+            built.stderr
+        )
         return "" if refused else built.stderr
     ran = subprocess.run([str(program)], capture_output=True, text=True)
     return "" if ran.returncode == 0 else ran.stdout or f"status {ran.returncode}"
@@ -105,8 +108,20 @@ def test_a_compiler_that_is_told_that_no_number_is_nan_lets_none_pass(circle_c, 
 def test_no_option_for_floating_point_numbers_lets_a_nan_pass(circle_c, compiler, real, tmp_path):
     if not shutil.which(compiler):
         pytest.skip(f"{compiler} is missing: its options were not tried")
-    # which takes double's constants for float's: the test tells that, and it is no matter of NaN
-    left_out = {"-fsingle-precision-constant"} if real is Real.DOUBLE else set()
-    tried = [option for option in OPTIONS[compiler] if option not in left_out]
-    found = {option: escapes(circle_c, real, compiler, option, tmp_path) for option in tried}
+    found = {option: escapes(circle_c, real, compiler, option, tmp_path) for option in OPTIONS[compiler]}
     assert {option: words for option, words in found.items() if words} == {}
+
+
+@pytest.mark.parametrize(
+    "compiler, option", [("gcc", "-fsingle-precision-constant"), ("clang", "-cl-single-precision-constant")]
+)
+def test_no_source_in_double_is_compiled_with_constants_in_float(circle_c, compiler, option, tmp_path):
+    """Each one by itself: a player alone has no self test that would tell."""
+    if not shutil.which(compiler):
+        pytest.skip(f"{compiler} is missing: its option was not tried")
+    for source in circle_c.sources(Real.DOUBLE):
+        words = [compiler, "-std=c99", option, "-fsyntax-only", source]
+        told = subprocess.run(words, capture_output=True, text=True)
+        assert told.returncode != 0 and f"{source.stem}_constants_in_double" in told.stderr, source.name
+    for source in circle_c.sources(Real.FLOAT):
+        subprocess.run([compiler, "-std=c99", option, "-fsyntax-only", source], check=True)

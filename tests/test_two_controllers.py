@@ -41,7 +41,8 @@ def folder(scratch: Path, name: str, rate: str, controller: str = "", played: bo
     home = scratch / name
     home.mkdir(parents=True)
     own = f'controller = "{controller}"\n' if controller else ""
-    (home / "scenario.toml").write_text(own + text)
+    checksum = "checksum = true\n" if played else ""
+    (home / "scenario.toml").write_text(own + checksum + text)
     scenario = load_scenario(home / "scenario.toml")
     model = build_model(scenario.device)
     return generate(scenario, model, scratch / f"{name}_c", solve(scenario, model) if played else None)
@@ -133,7 +134,7 @@ def test_cmake_takes_two_names_and_refuses_two_controllers_of_one(built, tmp_pat
 
 @pytest.fixture(scope="module")
 def namesakes(tmp_path_factory) -> list[CFolder]:
-    """The C, with players, of two scenarios of one name that differ."""
+    """The C, with players and checksums, of two scenarios of one name that differ."""
     return [folder(tmp_path_factory.mktemp(rate[:2]), "line", rate, played=True) for rate in ("10 kHz", "20 kHz")]
 
 
@@ -152,3 +153,34 @@ def test_one_source_that_reads_two_different_headers_of_one_name_is_told(namesak
     for headers in ((first, second), (second, first)):
         told = compiled(*headers)
         assert told.returncode != 0 and f"two different headers are named {first.name}" in told.stderr
+
+
+CALLS = {
+    "_player_f32.c": "float drive[1]; return (int){name}_sample(3U, drive);",
+    "_player_f64.c": "double drive[1]; return (int){name}_at(0.001, drive);",
+    "_checked_f32.c": "static {name}_state state; {name}_init(&state); return 0;",
+}
+
+
+@pytest.mark.parametrize("ending", list(CALLS))
+def test_a_program_that_is_linked_with_another_of_the_name_is_told(namesakes, compiler, tmp_path, ending):
+    """Of two libraries that define one symbol a linker takes the first without a word: the drives were those of the other path."""
+    libraries = []
+    for k, c in enumerate(namesakes):
+        objects = []
+        for source in sorted(c.path.glob(f"*{ending.split('_')[-1]}")):
+            objects.append(tmp_path / f"{source.stem}_{k}.o")
+            run(compiler, "-std=c99", "-c", source, "-o", objects[-1])
+        run("ar", "rcs", tmp_path / f"lib{k}.a", *objects)
+        libraries.append(tmp_path / f"lib{k}.a")
+    header = next(namesakes[0].path.glob(f"*{ending}")).with_suffix(".h")
+    body = CALLS[ending].format(name=header.stem)
+    (tmp_path / "main.c").write_text(f'#include "{header.name}"\nint main(void)\n{{\n    {body}\n}}\n')
+
+    def made(*of: Path) -> subprocess.CompletedProcess[str]:
+        words = [compiler, "-std=c99", f"-I{namesakes[0].path}", tmp_path / "main.c", *of, "-o", tmp_path / "firmware"]
+        return subprocess.run(list(map(str, words)), capture_output=True, text=True)
+
+    assert made(libraries[0]).returncode == 0
+    alone = made(libraries[1])
+    assert alone.returncode != 0 and f"undefined reference to `{header.stem}_" in alone.stderr

@@ -54,6 +54,8 @@ class CFolder(Shown):
     # The symbol that the header's `..._init` calls
     init: dict[Arithmetic, str]
     compression: dict[Real, Compression]
+    # The symbol that the player's `..._sample` calls
+    sample: dict[Real, str]
     operations: int
     worst_operations: int
     # In the controller's state, behind its own: constants of the start and what follows from them.
@@ -168,6 +170,7 @@ def generate(
         names["vectors"] | {real: c["vectors"] for real, c in integers.items()},
         init | {real: f"{c['prefix']}_init_{c['build']}" for real, c in integers.items()},
         compression,
+        {real: f"{names['player'][real]}_sample_{contexts[real]['played_build']:08x}" for real in compression},
         operations=cost["step"],
         worst_operations=cost["worst"],
         given_numbers=contexts[Real.FLOAT]["given_numbers"],

@@ -78,7 +78,7 @@ def _run(
     for piece, names in pieces:
         if real in names:
             program = scratch / f"{piece}_{core.name}_{compiler}_{real.suffix}.elf"
-            entry = folder.init[real] if piece == "online" else f"{names[real]}_sample"
+            entry = folder.init[real] if piece == "online" else folder.sample[Real(real)]
             cross_compile(compiler, core, [folder.path / f"{names[real]}.c"], folder.path, entry, program)
             machines[piece] = Machine(core, program)
     costs, compared = [], _Compared(real)
@@ -152,7 +152,7 @@ def _sequences(
 
         def played() -> Answers:
             for k in samples:
-                status, count = player.call(f"{folder.player[real]}_sample", int(k), drive)
+                status, count = player.call(folder.sample[Real(real)], int(k), drive)
                 yield player.read(drive, nu, real), status, count
 
         yield CallKind.PLAYER, played(), host.played(samples)

@@ -35,6 +35,15 @@ DEVIATIONS = (
         "The caller uses them: number of the interface, version, device, rate, sizes, number of samples, status values, tolerances.",
     ),
     Deviation(
+        "2.3",
+        tuple(
+            f"*_{piece}_f64.c" for piece in ("online", "checked", "corrected", "player", "plant", "selftest", "vectors")
+        ),
+        "the type ..._constants_in_double, which nothing uses",
+        "It has no size, and the source does not compile, where a compiler's option rounds every constant to float; C99 has no "
+        "_Static_assert.",
+    ),
+    Deviation(
         "19.2",
         ("*_online_f??.c", "*_corrected_f??.c", "*_plant_f??.c"),
         "the unions in square_root(), exponential() and logarithm(), by which the exponent of a number is halved, set or read",

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 from typing import Any
 
 import numpy as np
 
+from ctrlgen.firmware.c.templates import ABI
 from ctrlgen.firmware.player.compression import INSTRUCTION_BUDGET, Compression, PlayerCandidate, SampleTable
 from ctrlgen.firmware.player.spline import Spline
 from ctrlgen.trajectory.inverse.clock import in_time
@@ -28,6 +30,7 @@ def player_context(solution: Solution, compression: Compression, prefix: str) ->
         "loads": solution.model.device.load_texts,
         "device_sha256": solution.scenario.device_sha256,
         "digest": solution.scenario.digest,
+        "played_build": build_of(solution, compression),
         "samples": len(solution.drive),
         "closed": solution.scenario.closed,
         "whole": 2**32
@@ -43,6 +46,14 @@ def player_context(solution: Solution, compression: Compression, prefix: str) ->
         "budget": INSTRUCTION_BUDGET,
         "rate": 1 / in_time(solution.scenario.clock).sample_time,
     }
+
+
+def build_of(solution: Solution, compression: Compression) -> int:
+    """What tells this player from others of the same name: a word of interface, inputs, rate and drives as the C has them."""
+    scenario = solution.scenario
+    about = ABI, scenario.device_sha256, sorted(scenario.digest.items()), scenario.sample_time, scenario.closed
+    drives = compression.curve.values(compression.real)
+    return int(hashlib.sha256(repr(about).encode() + drives.tobytes()).hexdigest()[:8], 16)
 
 
 def _line(c: PlayerCandidate) -> str:
