@@ -6,6 +6,7 @@ import ctypes
 import subprocess
 import zlib
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -64,6 +65,7 @@ def built(folder: CFolder, real: Real, into: Path, compiler: str) -> Checked:
     probe.write_text(
         f'#include "{checked}.h"\nunsigned size(int whole);\n'
         f"unsigned size(int whole) {{ return whole ? sizeof({checked}_state) : sizeof({online}_state); }}\n"
+        f"void {checked}_begin({checked}_state *state);\nvoid {checked}_begin({checked}_state *state) {{ {checked}_init(state); }}\n"
     )
     library = into / f"{checked}.so"
     sources = [folder.path / f"{online}.c", folder.path / f"{checked}.c", probe]
@@ -103,9 +105,29 @@ def test_a_bit_that_flips_anywhere_in_the_state_is_told_and_the_drive_is_safe(fo
     checked, target = built(folder, real, tmp_path, compiler), np.zeros(3, KIND[real])
     assert checked.to("step", target) == LOST | CHECKSUM  # never initialised
     assert getattr(checked.c, f"{checked.name}_step")(None, None, None) == INPUT
-    checked("init")
+    checked("begin")
     assert checked.to("step", None) & (INPUT | LOST | CHECKSUM) == INPUT
     every_flip_is_told(checked, 3, target)
+
+
+def test_a_state_that_is_half_of_one_call_and_half_of_the_next_is_told(compiler, tmp_path):
+    """As a reset in the middle of a call leaves it, or of a copy to memory that no reset clears: without the checksum nothing tells."""
+    real, jump = Real.FLOAT, np.array([0, 0, 0, 2e-6, 0, 3e-5], np.float32)
+    checked = built(folder_of("circle20", tmp_path / "c"), real, tmp_path, compiler)
+    checked("begin")
+    checked.to("settle", jump / 10)
+    states = [checked.state.copy()]
+    for _ in range(2):
+        assert checked.to("step", jump) & (LOST | CHECKSUM) == 0
+        states.append(checked.state.copy())
+    torn = 0
+    for old, new in pairwise(states):
+        for k in range(0, checked.size + 4, 4):
+            checked.state[:] = np.concatenate([new[:k], old[k:]])
+            if not any(np.array_equal(checked.state, whole) for whole in (old, new)):
+                assert checked.to("step", jump) == LOST | CHECKSUM, k
+                torn += 1
+    assert torn > 20
 
 
 @pytest.mark.long
@@ -117,7 +139,7 @@ def test_the_checksum_changes_no_answer_and_nothing_where_it_is_off(folder, comp
             assert (plain.path / f"{name}.{kind}").read_bytes() == (folder.path / f"{name}.{kind}").read_bytes()
         checked = built(folder, real, tmp_path, compiler)
         without = replace(checked, name=name, state=checked.state.copy(), out=checked.out.copy())
-        checked("init")
+        checked("begin")
         getattr(without.c, folder.init[real])(ctypes.c_void_p(without.state.ctypes.data))
         for target in rng.normal(size=(200, 3)).astype(KIND[real]) * 1e-5:
             assert checked.to("step", target) == without.to("step", target)
@@ -134,7 +156,7 @@ def test_constants_of_a_specimen_are_covered_too(compiler, tmp_path):
     assert folder.given_numbers > 0
     for real in Real:
         checked = built(folder, real, tmp_path, compiler)
-        checked("init")
+        checked("begin")
         assert checked.size >= folder.given_numbers * real.bytes
         every_flip_is_told(checked, 6, np.array([0, 0, 0, 0, 0, 1e-5], KIND[real]))
         set_ambient = getattr(checked.c, f"{checked.name}_set_ambient")
@@ -161,7 +183,7 @@ def test_the_readme_says_what_the_checksum_costs(tmp_path):
     online, name = folder.online[real], folder.checked[real]
     sources = [folder.path / f"{online}.c", folder.path / f"{name}.c"]
     counts = {}
-    for used, entry in ((online, folder.init[real]), (name, f"{name}_init")):
+    for used, entry in ((online, folder.init[real]), (name, folder.init[real].replace(online, name))):
         cross_compile(compiler, M4F, sources, folder.path, entry, tmp_path / "m.elf")
         machine = Machine(M4F, tmp_path / "m.elf")
         state, target, out = (machine.reserve(count, real) for count in (20, 6, 18))

@@ -66,19 +66,32 @@ uint32_t limiter_elapsed(limiter_state *state, uint32_t ticks, const real drive[
         for (k = 0; k < EXACT_TICKS; k++) {
             if (left > 0U) {
                 STEP_ADVANCE(state, state->z, drive, state->x);
+#if REMEMBERING
                 BALANCE(state, state->x, state->z, drive, state->z);
+#endif
                 left -= 1U;
             }
         }
         if (left > 0U) { /* in the time that is left the device comes to rest, from wherever it was */
             for (k = 0; k < SETTLING_SWEEPS; k++) {
                 SETTLE_ADVANCE(state, state->z, drive, state->x);
+#if REMEMBERING
                 BALANCE(state, state->x, state->z, drive, state->z);
+#endif
             }
             if (state->unsure < LIMITER_SETTLING) {
                 state->unsure = LIMITER_SETTLING;
             }
         }
+#if !REMEMBERING
+        left = ticks;
+        for (k = 0; k < SETTLING_SWEEPS; k++) { /* no state remembers where the stage was in between */
+            if (left > 0U) {
+                BALANCE(state, state->x, state->z, drive, state->z);
+                left -= 1U;
+            }
+        }
+#endif
         if (state->unsure == LIMITER_FOREVER) {
             /* no time makes it known */
         } else if (state->unsure > ticks) {

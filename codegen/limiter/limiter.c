@@ -11,8 +11,8 @@
  * limit), DIRECT (every displacement is a matrix times the target, and a target that leads into the range is a command), BOUND_FIRST (the
  * cheap bound is known of the target), REDUNDANT (more drives than axes, of which GROUPS can be moved without a push), COUPLED (a displacement moves several
  * channels), MOVING (kernels for the next sample), MOTION (targets with derivatives), GIVEN (constants that are given at the
- * start), PIVOTED (targets of a pivot), ESTIMATED (states that are stepped from sample to sample, which can be believed wrongly), RINGING (a
- * stage with inertia, which may be off its motion; NY numbers tell of that), OBSERVED (these can be measured), VARIED (the
+ * start), PIVOTED (targets of a pivot), ESTIMATED (states that are stepped from sample to sample, which can be believed wrongly), REMEMBERING
+ * (how they go on depends on where the stage is), RINGING (a stage with inertia, which may be off its motion; NY numbers tell of that), OBSERVED (these can be measured), VARIED (the
  * time of a sample, state->h, may vary). SETTLE_DRIVE_LIMITED and STEP_DRIVE_LIMITED: drives beyond their limits can be needed. SETTLE_EXAMINED_FIRST and
  * STEP_EXAMINED_FIRST: whether a state is lost is asked before it is used. STATE_BY_MODE and DRIVE_BY_MODE: the line search calls one
  * kernel to settle and another to step, as ADVANCE_BY_MODE says of drives within reach. OWN_DRIVES: each drive leads one displacement of its

@@ -125,7 +125,7 @@ static uint32_t LIMIT_DRIVES(const limiter_state *state, limiter_output *out, in
 
 #endif
 #if DRIVE_LIMITED
-/* The state becomes that of the next sample; so does out->displacement, which the device does not come to where limited is 1. */
+/* The state becomes that of the next sample; so do displacement and state of out, to which the device does not come where limited is 1. */
 static void PROCEED(limiter_state *state, limiter_output *out, int limited)
 #else
 /* The state becomes that of the next sample. */
@@ -146,6 +146,9 @@ static void PROCEED(limiter_state *state, const limiter_output *out)
 #if DRIVE_LIMITED
     if (limited != 0) {
         BALANCE(state, state->x, out->displacement, out->drive, out->displacement);
+#if NS
+        EACH_STATE(TELL_STATE)
+#endif
     }
 #endif
     EACH_AXIS(KEEP_DISPLACEMENT)
@@ -280,14 +283,9 @@ static uint32_t WITHIN(limiter_state *state, limiter_output *out)
 #endif
     }
 #endif
-#if RATED && (NS || PASSING)
+#if RATED && PASSING
     if (held > 1) {
-#if NS
-        EACH_STATE(TELL_STATE)
-#endif
-#if PASSING
         status |= passed(state);
-#endif
     }
 #endif
     return status;

@@ -31,9 +31,10 @@ def device_hash(calibration: Calibration) -> int:
 
 
 def c_header(calibration: Calibration) -> str:
-    """constants.h: an initialiser of the constants in each arithmetic, refused beside the C of another device."""
+    """constants.h: an initialiser of the constants in each arithmetic, refused beside the C of another device, whichever is read first, and
+    beside the constants of another specimen, whose macros have the same names."""
     name, number = calibration.device.name, device_hash(calibration)
-    upper = name.upper()
+    upper, specimen = name.upper(), int.from_bytes(binary(calibration)[-4:], "little")
     lines = [
         f"/* Constants of one specimen of {c_comment(calibration.device.title)},",
         f" * from the recording {c_comment(calibration.recording.title)}.",
@@ -42,6 +43,9 @@ def c_header(calibration: Calibration) -> str:
         f" *   status = {name}_online_f32_init_with(&state, &specimen); */",
         f"#ifndef {upper}_CONSTANTS_H",
         f"#define {upper}_CONSTANTS_H",
+        "",
+        f"#define {upper}_CONSTANTS_DEVICE_HASH (0x{number:08x}U) /* compared by a controller's header that is read behind this */",
+        f"#define {upper}_CONSTANTS_SPECIMEN (0x{specimen:08x}U) /* of these numbers */",
         "",
     ]
     for real in Real:
@@ -59,7 +63,14 @@ def c_header(calibration: Calibration) -> str:
             told = f"{c.base_unit}, sd {row.sd:.3g}" if row.determined else f"{c.base_unit}, default: {row.remark}"
             lines.append(f"    {literal}{end} /* {c.name}: {c_comment(told)} */ \\")
         lines.append("}")
-    return "\n".join([*lines, "", "#endif", ""])
+    other = [
+        "#else",
+        f"#if ({upper}_CONSTANTS_SPECIMEN != 0x{specimen:08x}U) /* the header that was read first is another one */",
+        f'#error "constants of two specimens of {name} in one source: give each a source of its own, or load constants.bin"',
+        "#endif",
+        "#endif",
+    ]
+    return "\n".join([*lines, "", *other, ""])
 
 
 def binary(calibration: Calibration) -> bytes:

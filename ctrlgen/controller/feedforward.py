@@ -204,10 +204,9 @@ class Controller:
             return ControllerStep(status, wanted, state_wanted, u, (state_wanted, wanted, *last))
         x_next = answer(k.advance, x, wanted if static else z, u)
         z_next = answer(k.settle, x_next, wanted, u) if limited else wanted
-        if held:
-            status |= self._passed(x_next, z_next) if kernels.limits_can_be_passed else status
-            state_wanted = x_next[:n]
-        return ControllerStep(status, z_next, state_wanted, u, (x_next, z_next, *last))
+        if held and kernels.limits_can_be_passed:
+            status |= self._passed(x_next, z_next)
+        return ControllerStep(status, z_next, x_next[:n] if limited else state_wanted, u, (x_next, z_next, *last))
 
     def _passed(self, x: np.ndarray, z: np.ndarray) -> ControllerStatus:
         """The limits beyond which a device is that has come to (x, z) with its drives as fast as they may change."""

@@ -12,7 +12,8 @@
  *   -4 V <= commanded drive <= 4 V
  *   -100 um <= stage displacement <= 100 um
  *
- * Arithmetic operations of the physics per call: 13 while all limits hold, 21 at most
+ * Arithmetic operations of the physics per call: 13 while all limits hold, 21 at most,
+ * and 21 more where flexure_axis_online_f32_step_at makes up for calls that were missed
  * (comparisons and the limiter's own arithmetic not counted). Arithmetic: float.
  * Physics: an example: round numbers, no particular instrument
  * Made by ctrlgen 0.1.0 from device 5f641b21af2d9766 (sha256), whatever the trajectory. Do not edit.
@@ -47,6 +48,8 @@ extern "C" {
 
 #define FLEXURE_AXIS_ONLINE_F32_SETTLING (13945U) /* samples under a held drive, after which whatever drives within their limits made the device ring is told no more, with the damping that it has at least: 0.697 s */
 
+/* One a device, written by the functions here alone. They must not be called on it while another call on it is going on, by an interrupt or
+ * another thread: neither forget, observe, elapsed or settle beside step. Calls on different states may run at the same time. */
 typedef struct {
     float x[1]; /* velocity_axis [m / s] */
     float z[FLEXURE_AXIS_ONLINE_F32_DISPLACEMENT_SIZE]; /* displacement_axis [m] */

@@ -42,6 +42,7 @@ typedef float real;
 #define CHANGING 0
 #define DOUBLE 0
 #define ESTIMATED 1
+#define REMEMBERING 0
 #define RINGING 0
 #define OBSERVED 0
 #define VARIED 0

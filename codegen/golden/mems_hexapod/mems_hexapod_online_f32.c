@@ -895,7 +895,7 @@ static uint32_t mems_hexapod_online_f32_step_limit_drives(const mems_hexapod_onl
     return status;
 }
 
-/* The state becomes that of the next sample; so does out->displacement, which the device does not come to where limited is 1. */
+/* The state becomes that of the next sample; so do displacement and state of out, to which the device does not come where limited is 1. */
 static void mems_hexapod_online_f32_step_proceed(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out, int limited)
 {
     if (limited != 0) {
@@ -910,6 +910,12 @@ static void mems_hexapod_online_f32_step_proceed(mems_hexapod_online_f32_state *
     }
     if (limited != 0) {
         mems_hexapod_online_f32_balance_displacement(state->x, out->displacement, out->displacement);
+        out->state[0] = state->x[0];
+        out->state[1] = state->x[1];
+        out->state[2] = state->x[2];
+        out->state[3] = state->x[3];
+        out->state[4] = state->x[4];
+        out->state[5] = state->x[5];
     }
     state->z[0] = out->displacement[0];
     state->z[1] = out->displacement[1];
@@ -1081,17 +1087,22 @@ uint32_t mems_hexapod_online_f32_elapsed(mems_hexapod_online_f32_state *state, u
         for (k = 0; k < 64; k++) {
             if (left > 0U) {
                 mems_hexapod_online_f32_step_advance(state->x, drive, state->x);
-                mems_hexapod_online_f32_balance_displacement(state->x, state->z, state->z);
                 left -= 1U;
             }
         }
         if (left > 0U) { /* in the time that is left the device comes to rest, from wherever it was */
             for (k = 0; k < 3; k++) {
                 mems_hexapod_online_f32_wanted_advance(drive, state->x);
-                mems_hexapod_online_f32_balance_displacement(state->x, state->z, state->z);
             }
             if (state->unsure < MEMS_HEXAPOD_ONLINE_F32_SETTLING) {
                 state->unsure = MEMS_HEXAPOD_ONLINE_F32_SETTLING;
+            }
+        }
+        left = ticks;
+        for (k = 0; k < 3; k++) { /* no state remembers where the stage was in between */
+            if (left > 0U) {
+                mems_hexapod_online_f32_balance_displacement(state->x, state->z, state->z);
+                left -= 1U;
             }
         }
         if (state->unsure == MEMS_HEXAPOD_ONLINE_F32_FOREVER) {

@@ -16,7 +16,8 @@
  *   notch rotation <= 5 deg
  *   wire flexure stress <= 550 MPa
  *
- * Arithmetic operations of the physics per call: 198 while all limits hold, 2819 at most
+ * Arithmetic operations of the physics per call: 198 while all limits hold, 2819 at most,
+ * and 6276 more where mems_hexapod_online_f32_step_at makes up for calls that were missed
  * (comparisons and the limiter's own arithmetic not counted). Arithmetic: float.
  * Physics: S1: Mech. Mach. Theory 80 (2014) 246-264, doi 10.1016/j.mechmachtheory.2014.05.004
  * Made by ctrlgen 0.1.0 from device 39f6d7972ef7d6f4 (sha256), whatever the trajectory. Do not edit.
@@ -53,6 +54,8 @@ extern "C" {
 #define MEMS_HEXAPOD_ONLINE_F32_SETTLING (71U) /* samples after which the states are those of the equilibrium under a held drive, to 1 millionth of their range: 0.071 s */
 #define MEMS_HEXAPOD_ONLINE_F32_FOREVER (0xFFFFFFFFU) /* of state.unsure: not by waiting */
 
+/* One a device, written by the functions here alone. They must not be called on it while another call on it is going on, by an interrupt or
+ * another thread: neither forget, observe, elapsed or settle beside step. Calls on different states may run at the same time. */
 typedef struct {
     float x[6]; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
     float z[MEMS_HEXAPOD_ONLINE_F32_DISPLACEMENT_SIZE]; /* displacement_1X, displacement_1Y, displacement_2X, displacement_2Y, displacement_3X, displacement_3Y [m] */

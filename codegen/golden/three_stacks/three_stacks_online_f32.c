@@ -406,7 +406,7 @@ static uint32_t three_stacks_online_f32_settle_limit_drives(const three_stacks_o
     return status;
 }
 
-/* The state becomes that of the next sample; so does out->displacement, which the device does not come to where limited is 1. */
+/* The state becomes that of the next sample; so do displacement and state of out, to which the device does not come where limited is 1. */
 static void three_stacks_online_f32_settle_proceed(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out, int limited)
 {
     if (limited != 0) {
@@ -542,7 +542,7 @@ static uint32_t three_stacks_online_f32_step_limit_drives(const three_stacks_onl
     return status;
 }
 
-/* The state becomes that of the next sample; so does out->displacement, which the device does not come to where limited is 1. */
+/* The state becomes that of the next sample; so do displacement and state of out, to which the device does not come where limited is 1. */
 static void three_stacks_online_f32_step_proceed(three_stacks_online_f32_state *state, three_stacks_online_f32_output *out, int limited)
 {
     if (limited != 0) {

@@ -98,6 +98,7 @@ def _features(context: Mapping[str, Any]) -> dict[str, int]:
         "CHANGING": context["changing"] is not None,
         "DOUBLE": context["real"] is Real.DOUBLE,
         "ESTIMATED": context["estimated"] is not None,
+        "REMEMBERING": context["estimated"] is not None and "z" in modes["step"]["advance"].arguments,
         "RINGING": context["ringing"] is not None,
         "OBSERVED": context["observed"],
         "VARIED": context["times"] is not None,

@@ -26,6 +26,7 @@ from ctrlgen.firmware.online.limiter import bounds_once, limited_modes, limiter_
 from ctrlgen.firmware.online.printed_kernels import PrintedKernels, kernel_printer, printed_kernels, si_text
 from ctrlgen.firmware.online.start_constants import start_calls, start_context
 from ctrlgen.firmware.online.stated_pivot import pivot_context
+from ctrlgen.model.discretisation import SETTLING_SWEEPS
 from ctrlgen.trajectory.scenario import Scenario
 from ctrlgen.version import __version__, program
 
@@ -149,6 +150,7 @@ def header_context(scenario: Scenario, controller: Controller) -> dict[str, Any]
         "source": model.device.source,
         "loads": model.device.load_texts,
         "device_sha256": scenario.device_sha256,
+        "specimen_macro": f"{model.device.name.upper()}_CONSTANTS_DEVICE_HASH",
         "n": len(model.axes),
         "nu": len(drive.channels),
         "m": len(follow.channels),
@@ -197,7 +199,8 @@ def _tables(context: Mapping[str, Any]) -> list[tuple[str, np.ndarray, str]]:
 
 
 def _cost(controller: Controller, printed: PrintedKernels) -> dict[str, int]:
-    """Operations of the physics: of a "step" that no limit touches, and of the "worst"."""
+    """Operations of the physics: of a "step" that no limit touches, of the "worst", and of what is made up for where calls came "late" or
+    a state was "measured" or forgotten, at most."""
     mode, bound, balance = printed.modes[-1], printed.bound, printed.balance
     shares = sum(kernel.operations for kernel in (printed.shares, printed.few) if kernel)
     kernels = controller.kernels
@@ -220,7 +223,15 @@ def _cost(controller: Controller, printed: PrintedKernels) -> dict[str, int]:
     if kernels.limits_can_be_passed:
         worst += kernels.composite_rounds * (shares + 1) if shares else 0
         worst += bound.operations if bound else 0
-    return {"step": step, "worst": worst}
+    measured = late = 0
+    if kernels.contraction or kernels.ringing:
+        measured = SETTLING_SWEEPS * balance.operations
+        late = measured
+        late += SETTLING_SWEEPS * sum(m["advance"].operations for m in printed.modes[:1] if "advance" in m)
+    if kernels.contraction:
+        remembering = "z" in mode["advance"].arguments
+        late += EXACT * (mode["advance"].operations + (balance.operations if remembering else 0))
+    return {"step": step, "worst": worst, "late": late, "measured": measured}
 
 
 def _number(value: float) -> float | int:

@@ -27,6 +27,7 @@ def player_context(solution: Solution, compression: Compression, prefix: str) ->
         "prefix": prefix,
         "title": solution.scenario.file.title,
         "version": __version__,
+        "given_at_start": bool(solution.model.device.given_at_start),
         "loads": solution.model.device.load_texts,
         "device_sha256": solution.scenario.device_sha256,
         "digest": solution.scenario.digest,
