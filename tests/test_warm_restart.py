@@ -42,8 +42,8 @@ class Copies:
 
 
 def after_resets(c: Compiled, rng: np.random.Generator, resets: int, *, copied: bool) -> tuple[np.ndarray, int]:
-    """(errors [K] of the temperatures that calls without UNSURE believed, resets after which the copy was taken). Resets come in the middle of
-    a call, before its drive is put out, before that is copied, and behind; the hardware holds its drive and counts samples meanwhile."""
+    """(errors [K] of the temperatures that calls without UNSURE believed, resets after which the copy was taken). Resets come in the middle
+    of a call, before its drive is put out, before that is copied, and behind; the hardware holds its drive and counts samples meanwhile."""
     off, taken = [], 0
     for _ in range(resets):
         heaters, copies, held, tick = Heaters(), Copies(), np.zeros(N), 0
