@@ -34,7 +34,7 @@ GOLDEN = [
     "golden/limiter/limiter.h",
     "golden/limiter/limiter_config.h",
 ]
-NUMBER = re.compile(r"-?\d+\.\d+(?:e[+-]?\d+)?|-?\d+e[+-]?\d+")
+NUMBER = re.compile(r"(?<![\w.])(?:-?\d+\.\d+(?:e[+-]?\d+)?|-?\d+e[+-]?\d+)")
 
 
 @pytest.fixture(scope="module")

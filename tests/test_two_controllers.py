@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
 from conftest import SCENARIOS
+from mechanism_files import loaded
 from package_programs import run
+from two_masses import two_masses
 
 from ctrlgen import build_model, generate, load_scenario, solve
 from ctrlgen.firmware.c.real import Real
@@ -184,3 +187,35 @@ def test_a_program_that_is_linked_with_another_of_the_name_is_told(namesakes, co
     assert made(libraries[0]).returncode == 0
     alone = made(libraries[1])
     assert alone.returncode != 0 and f"undefined reference to `{header.stem}_" in alone.stderr
+
+
+LINE = '[path]\nkind = "line"\nstart = { delta_x = "0 um" }\nend = { delta_x = "100 um" }\n'
+# Of scenarios of one device: what changes its controller, and what does not.
+KEYS = {
+    "": "",
+    "led": 'feedforward = "modes"\n',
+    "slower": "",
+    "falling": 'gravity = ["-0.5 m/s^2", "0 m/s^2", "0 m/s^2"]\n',
+    "checked": "checksum = true\n",
+}
+
+
+def test_controllers_of_one_device_that_differ_are_different_builds(tmp_path):
+    """And so are not linked one for the other: of a device whose modes were led the target has two numbers more, which a program that
+    was compiled for the other controller did not give."""
+    loaded(tmp_path, two_masses('modes_below = "200 Hz"\n'))
+    builds: dict[str, set[str]] = {}
+    for key, words in KEYS.items():
+        rate = "1 kHz" if key == "slower" else "2 kHz"
+        head = f'title = "t"\ndevice = "device.toml"\nsample_rate = "{rate}"\nduration = "0.05 s"\n'
+        (tmp_path / "scenario.toml").write_text(head + words + LINE)
+        scenario = load_scenario(tmp_path / "scenario.toml")
+        made = generate(scenario, build_model(scenario.device), tmp_path / f"c_{key}")
+        name = made.online[Real.FLOAT]
+        text = (made.path / f"{name}.c").read_text() + (made.path / f"{name}.h").read_text()
+        (build,) = set(re.findall(r"_BUILD \((\w+)\)", text))
+        code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+        code = re.sub(rf"{build}|{build[2:].lower()}", "BUILD", code, flags=re.IGNORECASE)
+        builds.setdefault(build, set()).add(code)
+    assert all(len(codes) == 1 for codes in builds.values())
+    assert len(builds) == 4

@@ -243,7 +243,7 @@ static uint32_t flexure_axis_online_f32_stay(flexure_axis_online_f32_state *stat
     return flexure_axis_online_f32_follow_on(state, still, still, 0.0f);
 }
 
-void flexure_axis_online_f32_init_20000hz_11318565(flexure_axis_online_f32_state *state)
+void flexure_axis_online_f32_init_20000hz_d41c3760(flexure_axis_online_f32_state *state)
 {
     static const float X_REST[1] = { 0.0f }; /* SI */
     if (state != NULL) {

@@ -32,7 +32,7 @@ extern "C" {
 #define FLEXURE_AXIS_ONLINE_F32_VERSION "0.1.0" /* of ctrlgen */
 #define FLEXURE_AXIS_ONLINE_F32_DEVICE_HASH (0x5f641b21U) /* the first 32 bits of the SHA-256 of the device's description */
 #define FLEXURE_AXIS_ONLINE_F32_RATE_HZ (20000U) /* samples a second */
-#define FLEXURE_AXIS_ONLINE_F32_BUILD (0x11318565U) /* of device, followed signal, rate, limits and arithmetic; the mark of an initialised state */
+#define FLEXURE_AXIS_ONLINE_F32_BUILD (0xD41C3760U) /* of device, followed signal, rate, limits and arithmetic; the mark of an initialised state */
 #define FLEXURE_AXIS_ONLINE_F32_TARGET_SIZE (3U)
 #define FLEXURE_AXIS_ONLINE_F32_DRIVE_SIZE (1U)
 #define FLEXURE_AXIS_ONLINE_F32_DISPLACEMENT_SIZE (1U)
@@ -67,13 +67,13 @@ typedef struct {
 
 /* What flexure_axis_online_f32_init calls. It is linked by a name of this build, rate and hash of device, signal and limits: a program that was
  * compiled with this header and is linked with another build of the same prefix is told so by the linker. */
-void flexure_axis_online_f32_init_20000hz_11318565(flexure_axis_online_f32_state *state);
+void flexure_axis_online_f32_init_20000hz_d41c3760(flexure_axis_online_f32_state *state);
 
 /* A cold device at rest. Also the way out of status LOST: hold the safe drive until the device has settled, then call it.
  * Behind a reset, a brown-out or a watchdog nobody knows whether it is: call flexure_axis_online_f32_forget then. */
 static inline void flexure_axis_online_f32_init(flexure_axis_online_f32_state *state)
 {
-    flexure_axis_online_f32_init_20000hz_11318565(state);
+    flexure_axis_online_f32_init_20000hz_d41c3760(state);
 }
 
 /* Drive of the equilibrium at the position of target; the state becomes that equilibrium. Hold the drive until the device has settled: FLEXURE_AXIS_ONLINE_F32_SETTLING samples,
@@ -102,7 +102,7 @@ uint32_t flexure_axis_online_f32_step_at(flexure_axis_online_f32_state *state, u
 #endif
 
 #else
-#if (FLEXURE_AXIS_ONLINE_F32_BUILD != 0x11318565U) /* the header that was read first is another one */
+#if (FLEXURE_AXIS_ONLINE_F32_BUILD != 0xD41C3760U) /* the header that was read first is another one */
 #error "two different headers are named flexure_axis_online_f32.h: give one of the controllers a name of its own, by controller = in its scenario.toml"
 #endif
 #endif

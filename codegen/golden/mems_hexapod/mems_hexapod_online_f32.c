@@ -662,7 +662,7 @@ static uint32_t mems_hexapod_online_f32_into_reach(const mems_hexapod_online_f32
     return status;
 }
 
-void mems_hexapod_online_f32_init_1000hz_5f705b14(mems_hexapod_online_f32_state *state)
+void mems_hexapod_online_f32_init_1000hz_e58d3e00(mems_hexapod_online_f32_state *state)
 {
     if (state != NULL) {
         int i;

@@ -36,7 +36,7 @@ extern "C" {
 #define MEMS_HEXAPOD_ONLINE_F32_VERSION "0.1.0" /* of ctrlgen */
 #define MEMS_HEXAPOD_ONLINE_F32_DEVICE_HASH (0x39f6d797U) /* the first 32 bits of the SHA-256 of the device's description */
 #define MEMS_HEXAPOD_ONLINE_F32_RATE_HZ (1000U) /* samples a second */
-#define MEMS_HEXAPOD_ONLINE_F32_BUILD (0x5F705B14U) /* of device, followed signal, rate, limits and arithmetic; the mark of an initialised state */
+#define MEMS_HEXAPOD_ONLINE_F32_BUILD (0xE58D3E00U) /* of device, followed signal, rate, limits and arithmetic; the mark of an initialised state */
 #define MEMS_HEXAPOD_ONLINE_F32_TARGET_SIZE (6U)
 #define MEMS_HEXAPOD_ONLINE_F32_DRIVE_SIZE (6U)
 #define MEMS_HEXAPOD_ONLINE_F32_DISPLACEMENT_SIZE (6U)
@@ -73,13 +73,13 @@ typedef struct {
 
 /* What mems_hexapod_online_f32_init calls. It is linked by a name of this build, rate and hash of device, signal and limits: a program that was
  * compiled with this header and is linked with another build of the same prefix is told so by the linker. */
-void mems_hexapod_online_f32_init_1000hz_5f705b14(mems_hexapod_online_f32_state *state);
+void mems_hexapod_online_f32_init_1000hz_e58d3e00(mems_hexapod_online_f32_state *state);
 
 /* A cold device at rest. Also the way out of status LOST: hold the safe drive until the device has settled, then call it.
  * Behind a reset, a brown-out or a watchdog nobody knows whether it is: call mems_hexapod_online_f32_forget then. */
 static inline void mems_hexapod_online_f32_init(mems_hexapod_online_f32_state *state)
 {
-    mems_hexapod_online_f32_init_1000hz_5f705b14(state);
+    mems_hexapod_online_f32_init_1000hz_e58d3e00(state);
 }
 
 /* Drive of the equilibrium at target; the state becomes that equilibrium. Hold the drive until the device has settled: MEMS_HEXAPOD_ONLINE_F32_SETTLING samples,
@@ -115,7 +115,7 @@ uint32_t mems_hexapod_online_f32_step_at(mems_hexapod_online_f32_state *state, u
 #endif
 
 #else
-#if (MEMS_HEXAPOD_ONLINE_F32_BUILD != 0x5F705B14U) /* the header that was read first is another one */
+#if (MEMS_HEXAPOD_ONLINE_F32_BUILD != 0xE58D3E00U) /* the header that was read first is another one */
 #error "two different headers are named mems_hexapod_online_f32.h: give one of the controllers a name of its own, by controller = in its scenario.toml"
 #endif
 #endif

@@ -119,6 +119,7 @@ def build_of(scenario: Scenario, controller: Controller, arithmetic: str) -> dic
         scenario.device_sha256,
         *scenario.device.load_texts,
         kernels.follow,
+        kernels.target.channels,  # with derivatives, and more of them where modes are led
         rate,
         [limit.text for limit in kernels.nominal.limits],
         arithmetic,

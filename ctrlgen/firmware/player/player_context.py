@@ -31,7 +31,7 @@ def player_context(solution: Solution, compression: Compression, prefix: str) ->
         "loads": solution.model.device.load_texts,
         "device_sha256": solution.scenario.device_sha256,
         "digest": solution.scenario.digest,
-        "played_build": build_of(solution, compression),
+        "played_build": player_build(solution, compression),
         "samples": len(solution.drive),
         "closed": solution.scenario.closed,
         "whole": 2**32
@@ -49,7 +49,7 @@ def player_context(solution: Solution, compression: Compression, prefix: str) ->
     }
 
 
-def build_of(solution: Solution, compression: Compression) -> int:
+def player_build(solution: Solution, compression: Compression) -> int:
     """What tells this player from others of the same name: a word of interface, inputs, rate and drives as the C has them."""
     scenario = solution.scenario
     about = ABI, scenario.device_sha256, sorted(scenario.digest.items()), scenario.sample_time, scenario.closed
