@@ -106,3 +106,5 @@ def test_to_make_up_for_missed_calls_costs_less_than_they_would_have(circle, tmp
     machine.call(f"{name}_step_at", state, 1, target, out)
     status, late = machine.call(f"{name}_step_at", state, 1 + 2 * EXACT, target, out)
     assert status & CLOCK and late < EXACT * each / 2
+    told = int((folder.path / "README.md").read_text().split("missed with ")[1].split()[0])  # operations
+    assert told + folder.operations < late < 2 * (told + folder.operations)
