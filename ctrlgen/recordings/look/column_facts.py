@@ -12,13 +12,16 @@ from ctrlgen.core.units import same_dimension, to_si
 from ctrlgen.recordings.formats.clock_numbers import clock_of
 from ctrlgen.recordings.formats.layout_question import Ambiguous, AmbiguousFile
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
-from ctrlgen.recordings.formats.time_stamps import TIME_NAME, epoch_unit
+from ctrlgen.recordings.formats.time_stamps import EPOCHS, TIME_NAME, epoch_unit
 from ctrlgen.recordings.formats.unit_texts import BASES, NAMES, bare_name, scaled_unit, unit_of
 from ctrlgen.recordings.look.answers import NOTHING, Answers
 
 SUFFIX = re.compile(r"^(?P<name>.*[A-Za-z0-9)])[_.](?P<unit>[A-Za-z%]{1,4})$")  # of a name: drive_V, time.ms
-CLOCKS = {"millis": "ms", "micros": "us", "ms": "ms", "us": "us", "msec": "ms", "usec": "us"}
-"""Names of columns that are units of time, of microcontrollers among others; those of two letters as they stand: Us is a voltage."""
+CLOCKS = {
+    "millis": "ms", "micros": "us", "ms": "ms", "us": "us", "msec": "ms", "usec": "us", "milliseconds": "ms", "microseconds": "us",
+    "s": "s", "sec": "s", "secs": "s", "second": "s", "seconds": "s", "sekunden": "s", "x_value": "s",
+}  # fmt: skip
+"""Names of columns that are units of time, of microcontrollers and LabVIEW among others; those of two letters as they stand: Us is a voltage."""
 RATE_SUFFIX = re.compile(
     r"^.*[A-Za-z0-9)][_.](?P<of>[mun]?m|[mu]?rad|deg)_(?:per_)?s(?P<square>2?)$"
 )  # of a name: v_mm_s, qdd_rad_s2
@@ -39,6 +42,8 @@ NEWEST_FIRST = (
     "falls from row to row, newest row first: reverse the rows below the header, so that the oldest is the first"
 )
 SLOW_CLOCK = 0.6  # share of rows in which a drive stands still from which it steps by a slower clock
+LONG_STEP = 0.05  # s: a time without a unit that goes on by more is rather one in ms, of a rate below 20 kHz. Judgement
+SAME_RATE = 0.01  # of a rate: a time and a header that differ by less say the same
 SMOOTH = 0.1  # median of second differences over that of first ones, of a drive that is a curve and no steps
 
 
@@ -180,8 +185,8 @@ def named(table: MeasurementTable, column: str) -> str:
 
 
 def _facts(table: MeasurementTable, name: str) -> ColumnFacts:
-    stated = table.units.get(name)
-    several = scaled_unit(table.unit(name) or "")
+    stated = table.unit(name)
+    several = scaled_unit(stated or "")
     scale, unit = several or (1.0, _suffix(name) if stated is None else unit_of(stated))
     try:
         read = table.reading(name)
@@ -225,7 +230,7 @@ def _time(table: MeasurementTable, columns: tuple[ColumnFacts, ...], chosen: str
 
 def _time_in(table: MeasurementTable, facts: ColumnFacts, chosen: bool) -> TimeFacts | None:
     """The time in one column; None where it holds none. Raises `AmbiguousFile`."""
-    unit, stamps = facts.unit or epoch_unit(facts.finite) or "s", facts.values is None
+    unit, stamps = facts.unit or epoch_unit(facts.finite) or _unit_by_rate(table, facts) or "s", facts.values is None
     if not same_dimension(unit, "s") or (facts.question is not None and not chosen):
         return None
     try:
@@ -254,14 +259,26 @@ def is_a_time(column: ColumnFacts) -> bool:
     return bool(named) and timed and column.moves and bool(np.all(np.diff(column.finite) > 0))
 
 
-def counted_step(facts: TableFacts) -> float:
-    """The step [s] of a time without a stated unit that counts in whole numbers: it may be ticks, or rows. 0 for any other."""
+def assumed_step(facts: TableFacts) -> float:
+    """The step [s] of a time of which nothing tells the unit, where it counts whole numbers or goes on in long steps: it may be in ms,
+    ticks, or rows. 0 for any other."""
     if facts.time is None or facts.time.stamps:
         return 0.0
     column = facts.column(facts.time.column)
+    known = column.unit or epoch_unit(column.finite) or _unit_by_rate(facts.table, column)
+    if known is not None or clock_of(column.finite) is not None:
+        return 0.0
     counts = bool(np.all(column.finite == np.round(column.finite)))
-    known = column.unit is not None or epoch_unit(column.finite) is not None or clock_of(column.finite) is not None
-    return facts.time.step if counts and not known else 0.0
+    return facts.time.step if counts or facts.time.step >= LONG_STEP else 0.0
+
+
+def _unit_by_rate(table: MeasurementTable, column: ColumnFacts) -> str | None:
+    """The unit with which a time goes on from row to row as often as the file states beside it; None where none does."""
+    steps = np.diff(column.finite)
+    if table.stated_rate is None or len(steps) < 2:
+        return None
+    rows = float(np.median(steps)) * table.stated_rate[1]
+    return next((unit for unit, many in EPOCHS.items() if abs(rows / many - 1) < SAME_RATE), None)
 
 
 def is_a_count(column: ColumnFacts) -> bool:
