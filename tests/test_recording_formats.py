@@ -100,8 +100,8 @@ def test_a_csv_may_lack_a_header_or_use_the_decimal_comma(tmp_path):
 
 
 def test_bad_cells_are_listed_by_line(tmp_path):
-    (tmp_path / "a.csv").write_text("t,u\n0,1\n1,OVER\n2,x\n")
-    with pytest.raises(InputError, match=r"line 3 'OVER', line 4 'x'"):
+    (tmp_path / "a.csv").write_text("t,u\n0,1\n1,FAULT\n2,x\n")
+    with pytest.raises(InputError, match=r"line 3 'FAULT', line 4 'x'"):
         read_table(tmp_path / "a.csv").numbers("u")
 
 

@@ -125,6 +125,8 @@ class MeasurementTable:
                 for word, k in cells.words.items()
             ]
             notes += [f"{name}: true is read as 1, false as 0"] if cells.truths else []
+            plain = self.style.plain(number_cells.usual(cells.otherwise))
+            notes += [f"{name}: numbers such as {cells.otherwise!r} are read as {plain}"] if cells.otherwise else []
         try:
             values, marks = over_range.without_marks(np.asarray(column, dtype=float), self.missing)
         except Ambiguous as error:
@@ -217,6 +219,9 @@ class MeasurementTable:
             return self.fault(f"{what}; numbers stand alone: write the unit into the name, such as 'x (um)'")
         if len(bad) == len(self.columns[name]):
             return self.fault(f"{what}; name another column")
+        if number_cells.are_digits(words):
+            mend = "numbers with marks that are not known; write plain ones, such as -1234.5"
+            return AmbiguousFile(self.path, Ambiguous(f"{what}: {mend}"))
         left = len(words) - number_cells.MOST_WORDS
         all_of_them = f"with {number_of(left, 'more text')} of the column " if left > 0 else ""
         answers = {f"missing = [{key}]": f"{all_of_them}if that means a missing reading, or numbers in their place"}

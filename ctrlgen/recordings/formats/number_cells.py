@@ -13,6 +13,7 @@ from ctrlgen.recordings.formats.layout_question import Ambiguous
 from ctrlgen.recordings.formats.written_layout import Layout
 
 MOST_LISTED = 5  # bad cells of a column that a message lists; the others are counted
+FEW = 3  # different texts of digits in a column: as few may be codes of a fault
 MOST_WORDS = 20  # different texts of a column that a proposed `missing` names
 MISSING = frozenset(
     [
@@ -92,6 +93,11 @@ OVER = frozenset(
     ]
 )
 """Words of instruments for a reading beyond their range, or lost."""
+NO_READING = re.compile(
+    r"[-\u2013*#?_.<>~+=/ ]+|[-+]?(over|under|ovr|ofl|ovf|ol)[-+]?|no (signal|data|reading)|not ?a ?number|n\.a\.|\(null\)",
+    re.IGNORECASE,
+)
+"""The same within a column of numbers: nothing but signs, as in a display without a reading, and words that are names elsewhere."""
 WHOLE = re.compile(r"[+-]?\d{1,18}", re.ASCII)
 DATE = r"(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}|\d{1,2}[-./ ][A-Z][a-z]{2,8}[-./, ]+\d{4})"
 CLOCK = r"(?:\d+ days? )?\d{1,3}:\d{2}(:\d{2})?([.,:;]\d+)?(\s*[AaPp]\.?[Mm]\.?)?"
@@ -101,7 +107,7 @@ TIME = re.compile(
 )
 HEXADECIMAL = re.compile(r"0[xX][0-9A-Fa-f]+|[0-9A-Fa-f]+h", re.ASCII)
 FORMULA = re.compile(r"=.+")
-MINUS_BEHIND = re.compile(r"[\d.,]*\d[\d.,]*[-\u2212]", re.ASCII)
+DIGITS = re.compile(r"[^A-Za-z]*\d[^A-Za-z]*")
 IN_BRACKETS = re.compile(r"\([\d.,]*\d[\d.,]*\)", re.ASCII)
 EXPONENT = r"([eEdD][+-]?\d{1,3})?"
 GROUPS = "[.,'\u2019 \u00a0\u202f\u2009]"
@@ -109,8 +115,17 @@ ANY = re.compile(rf"(?=[+\u2212-]?[.,]?\d)[+\u2212-]?(\d+|\d{{1,3}}({GROUPS}\d{{
 """A number in some style."""
 OPEN = re.compile("[,'\u2019\u00a0\u202f\u2009]|\\d \\d|[.]\\d*[.]")
 """What in cells may be a decimal comma or stand between thousands."""
-AFTER_SIGN = re.compile(r"(?<=^[+\u2212-])[ ]+(?=[\d.,])")
-"""Blanks between a sign and its number, which some loggers write to fill a column."""
+POINT = re.compile(r"(?<![\d.])(?:0|\d{4,})\.\d|\.(?:\d{1,2}|\d{4,})(?![\d.])", re.ASCII)
+"""A point that stands between no thousands."""
+OTHERWISE = (
+    (re.compile(r"(?<=^[+\u2212-])[ ]+(?=[\d.,])"), ""),
+    (re.compile(r"^([\d.,]*\d[\d.,]*)[-\u2212]$", re.ASCII), r"-\1"),
+    (re.compile(r"^[\u2010-\u2015\ufe63\uff0d](?=[\d.,])"), "-"),
+    (re.compile(r"(?<=[\d.,])\s*[*x\u00b7\u00d7]\s*10\s*\^\s*(?=[+-]?\d)"), "e"),
+    (re.compile(r"(?<=[\d.,])[ ]+(?=[eE][+-]?\d)"), ""),
+)
+"""What programs write otherwise, and what stands in its place: blanks behind a sign, which fill a column; a minus behind its number; a dash
+for a minus; 10 to a power; a blank before an exponent."""
 BLANKS = ("\u00a0", "\u202f", "\u2009", " ")
 
 
@@ -142,17 +157,18 @@ class NumberStyle:
 @dataclass(frozen=True)
 class Cells:
     """Cells as numbers (n,), NaN where there is none; rows of each word of an instrument; `bad` cells that are neither; whether some are
-    truths."""
+    truths; the first that is written `otherwise` than most programs do, empty where none is."""
 
     values: np.ndarray
     words: dict[str, list[int]] = field(default_factory=dict)
     bad: tuple[tuple[int, str], ...] = ()
     truths: bool = False
+    otherwise: str = ""
 
 
 def is_number(cell: str) -> bool:
     """Whether a cell is a number in some style."""
-    return ANY.fullmatch(without_gap(cell)) is not None
+    return (ANY.fullmatch(cell) or ANY.fullmatch(usual(cell))) is not None
 
 
 def has_unit(cell: str) -> bool:
@@ -165,13 +181,17 @@ def written_otherwise(cells: Sequence[str]) -> str:
     kinds = (
         (HEXADECIMAL, "hexadecimal numbers; write them as decimal ones, signed where they are"),
         (FORMULA, "a formula that was never calculated; open the file in a spreadsheet, let it calculate and save it"),
-        (MINUS_BEHIND, "numbers with their minus behind them; write it before them"),
         (
             IN_BRACKETS,
             "numbers in brackets, as accountants write negative ones; write a minus before them where they are",
         ),
     )
     return next((told for pattern, told in kinds if all(pattern.fullmatch(cell) for cell in cells)), "")
+
+
+def are_digits(words: Sequence[str]) -> bool:
+    """Whether different texts are numbers with marks that are not known: digits in all of them, letters in none."""
+    return len(words) > FEW and all(DIGITS.fullmatch(word) for word in words)
 
 
 def is_reading(cell: str) -> bool:
@@ -185,9 +205,11 @@ def _word(cell: str) -> str:
     return re.sub(r"(#[a-z]+)0+$", r"\1", low) if "#" in low else low
 
 
-def without_gap(cell: str) -> str:
-    """A cell without the blanks between its sign and its number."""
-    return AFTER_SIGN.sub("", cell) if cell[1:2] == " " else cell
+def usual(cell: str) -> str:
+    """A cell with its number as most programs write it: `OTHERWISE`."""
+    for pattern, instead in OTHERWISE:
+        cell = pattern.sub(instead, cell)
+    return cell
 
 
 def are_whole(cells: np.ndarray) -> bool:
@@ -198,7 +220,7 @@ def are_whole(cells: np.ndarray) -> bool:
 def to_numbers(cells: np.ndarray, style: NumberStyle, missing: Sequence[str | int | float] = ()) -> Cells:
     """Cells of a text file (n,) as numbers; `missing` are the reader's own words for none."""
     values, words, bad = np.full(len(cells), np.nan), dict[str, list[int]](), list[tuple[int, str]]()
-    pattern, truths, own = style.pattern, False, {str(word).strip() for word in missing}
+    pattern, truths, otherwise, own = style.pattern, False, "", {str(word).strip() for word in missing}
     for k, given in enumerate(cells):
         if not isinstance(given, str):
             values[k] = np.nan if given is None else float(given)
@@ -206,16 +228,17 @@ def to_numbers(cells: np.ndarray, style: NumberStyle, missing: Sequence[str | in
         cell = given.strip()
         if cell in own or _word(cell) in MISSING:
             continue
-        cell = without_gap(cell)
+        if not pattern.fullmatch(cell) and pattern.fullmatch(usual(cell)):
+            cell, otherwise = usual(cell), otherwise or cell
         if pattern.fullmatch(cell):
             values[k] = float(style.plain(cell))
-        elif _word(cell) in OVER:
+        elif _word(cell) in OVER or NO_READING.fullmatch(cell):
             words.setdefault(cell, []).append(k)
         elif cell.lower() in ("true", "false"):
             values[k], truths = cell.lower() == "true", True
         else:
             bad.append((k, cell))
-    return Cells(values, words, tuple(bad), truths)
+    return Cells(values, words, tuple(bad), truths, otherwise)
 
 
 def style_of(columns: Iterable[Sequence[str]], layout: Layout, separator: str) -> tuple[NumberStyle, list[str]]:
@@ -226,11 +249,12 @@ def style_of(columns: Iterable[Sequence[str]], layout: Layout, separator: str) -
     """
     columns = list(columns)
     plain = layout.decimal is None and layout.thousands is None and separator != ";"
-    if plain and not any(OPEN.search("\n".join(column)) for column in columns):
+    texts = ["\n".join(column) for column in columns] if plain else []
+    if plain and not any(map(OPEN.search, texts)) and any(map(POINT.search, texts)):
         return NumberStyle(dates=layout.dates), []
     votes = _Votes()
     for column in columns:
-        votes.count([without_gap(cell.strip()) for cell in column])
+        votes.count([usual(cell.strip()) for cell in column])
     decimal = layout.decimal or votes.decimal(separator)
     other = "." if decimal == "," else ","
     grouped = other if votes.seen[other] else ("'" if votes.seen["'"] else "blank" if votes.seen["blank"] else "")
@@ -248,9 +272,11 @@ class _Votes:
         self.sure = {".": "", ",": ""}  # cells in which the mark can only be the decimal one
         self.open = {".": "", ",": ""}  # cells in which it is that or stands between thousands
         self.seen = {".": False, ",": False, "'": False, "blank": False}
+        self.mixed = False  # whether 1.682 stands in one column with 682, as whole numbers with thousands do
 
     def count(self, column: Sequence[str]) -> None:
         numbers = [c for c in column if is_number(c)]
+        short = any(re.fullmatch(r"[+\u2212-]?[1-9]\d{0,2}", c) for c in numbers)
         long = any(re.match(r"[+\u2212-]?\d{4}", c) for c in numbers)  # a column that writes 1234 has no mark in 1,234
         for cell in numbers:
             body = re.sub(r"[eEdD].*", "", cell.lstrip("+\u2212-"))
@@ -271,6 +297,7 @@ class _Votes:
                 self.sure[last] = cell
             else:
                 self.open[last] = cell
+                self.mixed |= short
 
     def decimal(self, separator: str) -> Literal[".", ","]:
         marks = {'decimal = ","': "", 'decimal = "."': ""}
@@ -283,8 +310,9 @@ class _Votes:
         if self.open[","]:
             what = f"writes {self.open[',']!r}, and no cell tells whether that is {_read_two_ways(self.open[','])}"
             raise Ambiguous(what, marks)
-        if self.open["."] and separator == ";":  # as programs of countries with the decimal comma separate
-            what = f"separates cells by semicolons and writes {self.open['.']!r}; no cell tells whether that is"
+        semicolons = separator == ";"  # as programs of countries with the decimal comma separate
+        if self.open["."] and (semicolons or self.mixed):
+            what = f"{'separates cells by semicolons and ' * semicolons}writes {self.open['.']!r}; no cell tells whether that is"
             raise Ambiguous(f"{what} {_read_two_ways(self.open['.'])}", marks)
         return "."
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 import numpy as np
 
 from ctrlgen.core.counts import number_of
@@ -12,7 +10,7 @@ from ctrlgen.model.model import Model
 from ctrlgen.recordings.alike_units import alike
 from ctrlgen.recordings.formats.time_stamps import TIME_NAME
 from ctrlgen.recordings.look.column_facts import TableFacts
-from ctrlgen.recordings.look.signal_words import COMMAND_WORDS
+from ctrlgen.recordings.look.signal_words import COMMAND_WORDS, words_of
 
 WIDE = 5.0  # times the device's own size: no reading of it is as large
 NARROW = 1e-4  # of it: nothing moved, or the unit is another
@@ -35,7 +33,7 @@ def table_oddities(facts: TableFacts) -> list[str]:
     for column in facts.columns:
         if column.values is None:
             continue
-        if set(re.findall(r"[a-z]+", column.bare.lower())) & COMMAND_WORDS:
+        if words_of(column.bare) & COMMAND_WORDS:
             continue
         said += [f"{column.name}: stands at its end {end:g} again and again: clipped?" for end in column.clipped()]
     constant = [c.name for c in facts.columns if c.values is not None and not c.moves]

@@ -28,7 +28,7 @@ from ctrlgen.recordings.look.column_facts import (
     named,
 )
 from ctrlgen.recordings.look.oddities import fitting_units, implausible_range
-from ctrlgen.recordings.look.signal_words import DRIVE_WORDS, READING_WORDS
+from ctrlgen.recordings.look.signal_words import DRIVE_WORDS, READING_WORDS, words_of
 from ctrlgen.recordings.moved import Stretch, moved_of
 from ctrlgen.recordings.plausibility import implausible
 from ctrlgen.recordings.schema import signal_units
@@ -321,7 +321,7 @@ def _likeness(model: Model, signal: str, column: ColumnFacts) -> float:
     unit = signal_units(model)[signal]
     if column.unit is not None and not same_dimension(column.unit, unit):
         return 0.0
-    words = set(re.findall(r"[a-z]+|\d+[a-z]*", column.bare.lower()))
+    words = words_of(column.bare)
     if any(words & meaning and not _may_be(of, unit) for of, meaning in MEANINGS.items()):
         return 0.0
     score = UNIT if column.unit is not None else POSSIBLE

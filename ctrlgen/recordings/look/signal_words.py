@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 COMMAND_WORDS = frozenset((
     "command", "commanded", "cmd", "ref", "reference", "set", "setpoint", "sp", "target", "demand", "desired", "soll",
 ))  # fmt: skip
@@ -15,3 +17,12 @@ READING_WORDS = frozenset((
     "measurement", "enc", "encoder", "cap", "capacitive", "adc", "ai", "ad", "displacement", "disp", "distance", "dist", "weg",
     "y", "response", "interferometer", "lvdt", "laser", "probe", "gauge",
 ))  # fmt: skip
+PLACES = frozenset(("position", "pos", "displacement", "distance", "angle"))
+"""Words beside which `current` is the present one: Current Position."""
+
+
+def words_of(name: str) -> set[str]:
+    """The words of a column's name in small letters, those of camelCase too."""
+    apart = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
+    words = set(re.findall(r"[a-z]+|\d+[a-z]*", apart.lower()))
+    return words - {"current"} if words & PLACES else words
