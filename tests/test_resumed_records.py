@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from axis_records import AXIS, NOISE, H, move, record
 
+from ctrlgen import build_model
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.noise import estimate_noise
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings import gaps
+from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recording import Recording
 
 N, TAU, GAIN = 3000, 0.4, 0.1
@@ -76,3 +78,23 @@ def test_a_record_from_rest_remembers_nothing_before_it(moved):
         len(structure.simulator(("reading.axis",), p.timing).free_initial_states) for p in (before, after)
     )
     assert going_on > at_rest
+
+
+@pytest.mark.parametrize("lead_in, going_on", [(0, True), (200, False)])
+def test_rows_within_a_log_go_on_unless_a_lead_in_tells_what_came_before(moved, tmp_path, lead_in, going_on):
+    """Where the drive is off at the cut no reading tells it."""
+    u, _ = moved
+    u = np.where(np.arange(N) // 20 == 1500 // 20, 0.0, u)
+    np.savetxt(tmp_path / "log.csv", np.c_[H * np.arange(N), u, move(u)], delimiter=",", header="t,u,y", comments="")
+    rows = {"fit": [0, 1500], "hold_out": [1500, N]}
+    (tmp_path / "recording.toml").write_text(
+        f'title = "a log"\ndevice = "{AXIS.name}"\nkind = "series"\n[columns]\n"drive.axis" = {{ column = "u", unit = "V" }}\n'
+        '"reading.axis" = { column = "y", unit = "m" }\n'
+        + "".join(
+            f'[[record]]\nfile = "log.csv"\nrole = "{role}"\nrows = {ends}\ntime = {{ column = "t", unit = "s" }}\n'
+            for role, ends in rows.items()
+        )
+        + f"lead_in = {lead_in}\n"
+    )
+    recording = load_recordings([tmp_path / "recording.toml"], build_model(AXIS))
+    assert [r.resumed for r in recording.records] == [False, going_on]

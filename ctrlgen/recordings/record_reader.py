@@ -192,6 +192,7 @@ class RecordReader:
             valid=(after_lead_in & recorded)[kept],
             period=None if table.period is None else table.period.si,
             band=None if self.written.low_pass is None else self.written.low_pass.si,
+            resumed=self.written.kind == "series" and table.begins_within,
         )
 
     def _ambient(self, given: str | Column | None) -> np.ndarray | float | None:

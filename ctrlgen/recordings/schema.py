@@ -107,6 +107,11 @@ class RecordTable(Section):
     """Columns of this record alone, by signal; they replace those of the whole file."""
 
     @property
+    def begins_within(self) -> bool:
+        """Whether rows of the file come before it, of which no lead-in tells what the device remembers."""
+        return self.rows is not None and self.rows[0] > 0 and not self.lead_in
+
+    @property
     def used_rows(self) -> tuple[int, int]:
         """The half-open range of rows whose readings are used; ends at `LAST_ROW` where `rows` is not given."""
         a, b = self.rows or (0, LAST_ROW)

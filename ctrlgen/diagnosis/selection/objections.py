@@ -12,12 +12,13 @@ from itertools import combinations
 import numpy as np
 
 from ctrlgen.core.units import from_si
+from ctrlgen.devices.device_physics import BalancedPhysics, ImposedPhysics
 from ctrlgen.diagnosis.selection.way_covered import way_covered
 from ctrlgen.diagnosis.settings import OBJECTIONS
-from ctrlgen.effects import Param
+from ctrlgen.effects import Family, Param
 from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.free_parameters import SHAPE_AT_BOUND
-from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, nominal_physics
 from ctrlgen.estimation.quiet_stretches import period_of
 from ctrlgen.estimation.raw_readings import detect_directly
 from ctrlgen.estimation.settings import STATISTICS
@@ -43,6 +44,7 @@ def objections(
             continue
         reason = (
             another_law(fit, k)
+            or _no_turn(recording, fit, k)
             or _on_the_lattice(recording, fit, k)
             or (None if exact else _of_another_kind(recording, fit, k))
         )
@@ -143,6 +145,31 @@ def _same_line(recording: Recording, fit: Fit, j: int, k: int) -> bool:
     if a.effect == PARAMETER or not a.prior.repeatable or (a.effect, a.location) != (b.effect, b.location):
         return False
     return abs(_line(fit, j) - _line(fit, k)) * _covered(recording, a, fit) < OBJECTIONS.apart
+
+
+def _no_turn(recording: Recording, fit: Fit, k: int) -> str | None:
+    """Why a loop, or a number that changes by the clock, is none: in no record to fit does a drive turn back, and up to the first turn
+    either is a curve of the position; None where it may be one. What has inertia turns back by itself."""
+    cause = fit.structure.causes[k]
+    if cause.effect == PARAMETER:
+        return None
+    loop = cause.law.family is Family.HYSTERESIS
+    if not loop and (cause.prior.of_time or not any(s.clock for s in cause.law.states)):
+        return None
+    physics = nominal_physics(fit.structure.device)
+    by_itself = recording.kind == "series" and not isinstance(physics, BalancedPhysics | ImposedPhysics)
+    if by_itself or _both_ways([r.drive for r in recording.records if r.role == "fit"]):
+        return None
+    what = "a loop" if loop else "what changes with time"
+    return f"no drive turns back in the records to fit; before a turn {what} cannot be told from a curve"
+
+
+def _both_ways(drives: Sequence[np.ndarray]) -> bool:
+    """Whether any column of the drives (n, n_u) rises and falls, in one record or in two, by more than one that stands still changes."""
+    span = np.ptp(np.concatenate(drives), axis=0)
+    falls = np.max([np.max(np.maximum.accumulate(u) - u, axis=0) for u in drives], axis=0)
+    rises = np.max([np.max(u - np.minimum.accumulate(u), axis=0) for u in drives], axis=0)
+    return bool(np.any(np.minimum(falls, rises) > OBJECTIONS.standing * span))
 
 
 def _no_pitch(recording: Recording, fit: Fit, k: int) -> str | None:
