@@ -20,6 +20,10 @@ def test_what_is_begun_passes_check(kind, tmp_path):
     write_device(device, kind)
     assert load_device(device).name == "stage"
     assert "assumed: replace it by yours" in device.read_text()
+    if kind == "tested-axis":
+        with pytest.raises(InputError, match="has no actuator: another machine moves it"):
+            write_scenario(tmp_path / "first", device)
+        return
     write_scenario(tmp_path / "first", device)
     check(tmp_path / "first")  # raises where the path cannot be followed
 
@@ -50,6 +54,38 @@ def test_a_coil_may_be_driven_by_current(tmp_path):
     with pytest.raises(InputError, match="both in volt or in ampere"):
         write_device(tmp_path / "b.toml", "voice-coil", given={"force_constant": "20 N/A"})  # and volts
     assert not (tmp_path / "b.toml").exists()
+
+
+def test_an_axis_may_turn_and_what_is_read_behind_it_may_weigh_nothing(tmp_path):
+    write_device(tmp_path / "table.toml", "servo", given={"travel": "90 deg"})
+    assert load_device(tmp_path / "table.toml").travel.text == "90 deg"
+    turning = {"mass": "0 kg*m^2", "damping": "0 N*m*s/rad", "stiffness": "2 N*m/rad"}
+    sizes = {"stroke": "1 rad", "speed": "3 rad/s", "force": "5 mN*m"}
+    write_device(tmp_path / "motor.toml", "tested-axis", given=turning | sizes)
+    assert load_device(tmp_path / "motor.toml").mechanics.rotary
+    with pytest.raises(InputError, match="the axis is rotary"):
+        write_device(tmp_path / "both.toml", "tested-axis", given=sizes)
+    with pytest.raises(InputError, match="must be above zero"):
+        write_device(tmp_path / "none.toml", "servo", given={"travel": "0 mm"})
+
+
+@pytest.mark.parametrize(
+    ("travel", "says"),
+    [
+        ('"60 K"', "travel: '60 K' has the wrong unit: um is needed, for example \"60 um\", or rad is needed"),
+        ("60", 'travel: 60 has no unit; write for example "60 um", or write for example "60 rad"'),
+    ],
+)
+def test_a_number_that_may_be_a_length_or_an_angle_is_one_fault(travel, says, tmp_path):
+    write_device(tmp_path / "stage.toml", "servo")
+    lines = (tmp_path / "stage.toml").read_text().splitlines()
+    (tmp_path / "stage.toml").write_text(
+        "\n".join(f"travel = {travel}" if line.startswith("travel") else line for line in lines)
+    )
+    with pytest.raises(InputError) as caught:
+        load_device(tmp_path / "stage.toml")
+    (fault,) = caught.value.faults
+    assert f"{fault.where}: {fault.what}".startswith(says)
 
 
 @pytest.mark.parametrize(

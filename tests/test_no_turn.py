@@ -16,7 +16,10 @@ from ctrlgen.recordings.recording import Recording
 
 SERVO = 'kind = "servo"\nname = "cell"\ntitle = "a load cell"\nsource = "an example"\ntravel = "3 mm"\n'
 UP = np.linspace(0.0, 2e-3, 21)
-LOOP = Hypothesis("displacement_hysteresis", "stage:axis", "axis"), {"share": 0.05, "reach": 2e-3, "taper": 0.0, "reversible": 0.5}
+LOOP = (
+    Hypothesis("displacement_hysteresis", "stage:axis", "axis"),
+    {"share": 0.05, "reach": 2e-3, "taper": 0.0, "reversible": 0.5},
+)
 TIRED = Hypothesis("degradation", "actuator:axis", "axis"), {"rate": 1e-3, "levels_off": 60.0}
 BENT = Hypothesis("bow", "sensor:axis", "axis"), {"curvature": -6.0}
 DRIFTS = Hypothesis("drift", "sensor:axis", "axis"), {"rate": 1e-7}

@@ -105,15 +105,26 @@ def validate(model: type[Model], table: dict[str, Any], path: Path | str) -> Mod
     except ValidationError as error:
         errors = _of_nearest_branches(model, error.errors())
         wrong = [details["loc"] for details in errors]
-        raise InputError(
-            path,
-            [
-                fault
-                for details in errors
-                if details["type"] != "too_short" or not any(_inside(other, details["loc"]) for other in wrong)
-                for fault in _faults(model, details)
-            ],
-        ) from None
+        faults = [
+            fault
+            for details in errors
+            if details["type"] != "too_short" or not any(_inside(other, details["loc"]) for other in wrong)
+            for fault in _faults(model, details)
+        ]
+        raise InputError(path, _with_all_units(faults)) from None
+
+
+UNIT = re.compile(r"(.*) (?:has the wrong unit: |has no unit; )(.*)", re.DOTALL)
+
+
+def _with_all_units(faults: Sequence[Fault]) -> list[Fault]:
+    """The faults, those of one number that may be of several dimensions as one that names a unit of each."""
+    told: dict[tuple[str, str], Fault] = {}
+    for k, fault in enumerate(faults):
+        unit = UNIT.fullmatch(fault.what)
+        key = (fault.where, unit[1] if unit else str(k))
+        told[key] = Fault(fault.where, f"{told[key].what}, or {unit[2]}") if unit and key in told else fault
+    return list(told.values())
 
 
 def _inside(place: Sequence[Any], outer: Sequence[Any]) -> bool:

@@ -25,7 +25,8 @@ def device(
     kind: Annotated[
         str,
         typer.Option(
-            help="What it is: piezo, voice-coil, xy, tip-tilt, hexapod, mechanism, matrix.", show_default=False
+            help="What it is: piezo, voice-coil, xy, tip-tilt, hexapod, servo, tested-axis, mechanism, matrix.",
+            show_default=False,
         ),
     ],
     name: Annotated[
@@ -48,8 +49,9 @@ def device(
     """Begin a device file: its numbers are asked for in a terminal, or given by --set; those that nobody gave are marked as assumed.
 
     Kinds: piezo (one axis, a stack and two blades), voice-coil (one axis with mass), xy (two stacks), tip-tilt (a mirror on
-    three stacks), hexapod (six struts on three planar stages), mechanism (your own, from its drawing),
-    matrix (a stage by its compliance at a point).
+    three stacks), hexapod (six struts on three planar stages), servo (one axis that goes where it is told), tested-axis (one
+    that a machine moves while its force is read), mechanism (your own, from its drawing), matrix (a stage by its compliance at
+    a point).
 
     Example:  ctrlgen new device stage.toml --kind piezo --set voltage=150V --set free_stroke=30um
     """
@@ -73,7 +75,8 @@ def device(
     name_schema("device", file)
     out.print(str(file), soft_wrap=True, markup=False)
     out.print(f"next:  ctrlgen check {shlex.quote(str(file))}", soft_wrap=True, markup=False)
-    out.print(f"then:  ctrlgen new scenario circle --device {shlex.quote(str(file))}", soft_wrap=True, markup=False)
+    then = "recording log.csv" if kind == "tested-axis" else "scenario circle"
+    out.print(f"then:  ctrlgen new {then} --device {shlex.quote(str(file))}", soft_wrap=True, markup=False)
 
 
 @new.command()

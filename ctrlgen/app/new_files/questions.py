@@ -11,11 +11,14 @@ from ctrlgen.core.units import parse, to_si, written_unit
 
 @dataclass(frozen=True)
 class Question:
-    """One number of a device: its `key`, the question in words, and an `answer` to begin with, whose dimension any other must have."""
+    """One number of a device: its `key`, the question in words, and an `answer` to begin with; another has its dimension, or that of one of
+    the units `or_in`, and is above zero, unless it `may_be_zero`."""
 
     key: str
     text: str
     answer: str
+    or_in: tuple[str, ...] = ()
+    may_be_zero: bool = False
 
 
 @dataclass(frozen=True)
@@ -48,8 +51,8 @@ KINDS: Mapping[str, Kind] = {
             Question("stiffness", "stiffness of the flexures", "0.2 N/um"),
             Question("damping", "viscous damping, from a ring-down", "30 N*s/m"),
             Question("stroke", "largest displacement to either side", "100 um"),
-            Question("force_constant", "force of the coil per volt or ampere", "10 N/V"),
-            Question("drive_limit", "largest drive of either sign, in the same volt or ampere", "4 V"),
+            Question("force_constant", "force of the coil per volt or ampere", "10 N/V", ("N/A",)),
+            Question("drive_limit", "largest drive of either sign, in the same volt or ampere", "4 V", ("A",)),
         ),
     ),
     "xy": Kind(
@@ -70,6 +73,21 @@ KINDS: Mapping[str, Kind] = {
             Question("height", "height of the platform's centre above the lower strut ends", "200 mm"),
             Question("platform_thickness", "thickness of the platform", "12 mm"),
             Question("travel", "largest displacement of an actuator to either side", "1 mm"),
+        ),
+    ),
+    "servo": Kind(
+        "one axis that goes where it is told, or nearly",
+        (Question("travel", "largest excursion to either side, a length or an angle", "10 mm", ("deg",)),),
+    ),
+    "tested-axis": Kind(
+        "one axis that a machine moves while its force is read",
+        (
+            Question("mass", "what is accelerated with the motion, a mass or an inertia", "1 kg", ("kg*m^2",), True),
+            Question("damping", "viscous damping", "10 N*s/m", ("N*m*s/rad",), True),
+            Question("stiffness", "stiffness", "1 N/mm", ("N*m/rad",), True),
+            Question("stroke", "largest displacement to either side, a length or an angle", "10 mm", ("rad",)),
+            Question("speed", "largest speed, to a digit", "100 mm/s", ("rad/s",)),
+            Question("force", "largest force or torque, to a digit", "100 N", ("N*m",)),
         ),
     ),
     "mechanism": Kind(
@@ -129,16 +147,14 @@ def answers(kind: str, given: Mapping[str, str]) -> dict[str, Answer]:
 
 def read(question: Question, text: str) -> float:
     """The SI number of an answer. Raises ValueError that says what to write instead."""
-    unit = written_unit(question.answer)
-    units = {unit, unit.replace("V", "A")} if question.key in ("force_constant", "drive_limit") else {unit}
     faults = []
-    for wanted in sorted(units, key=lambda u: u != unit):
+    for wanted in (written_unit(question.answer), *question.or_in):
         try:
             si = parse(text, wanted)
         except ValueError as error:
             faults.append(error)
             continue
-        if not si > to_si(0.0, wanted):
+        if not (si > to_si(0.0, wanted) or (question.may_be_zero and si == to_si(0.0, wanted))):
             raise ValueError(f"{text!r} must be above zero")
         return si
     raise faults[0]

@@ -20,6 +20,7 @@ from ctrlgen.core.names import C_NAME, checked, meant
 from ctrlgen.core.units import from_si, same_dimension
 from ctrlgen.devices import load_device
 from ctrlgen.model.assembly import build_model
+from ctrlgen.model.effect_terms import available
 from ctrlgen.model.model import Model
 from ctrlgen.trajectory.workspace import Workspace, middle_pose
 
@@ -111,13 +112,19 @@ def _identifier(text: str) -> str:
 def write_scenario(folder: Path, device: Path, path: str | None = None) -> None:
     """`folder`/scenario.toml: a path of one of `PATHS` in the middle of what the device can reach, half as large as would fit.
 
-    Raises InputError for a device whose range cannot be told, an unknown path, a path of two directions for one, an existing folder.
+    Raises InputError for a device without an actuator or whose range cannot be told, an unknown path, a path of two directions for one, an
+    existing folder.
     """
     if path is not None and path not in PATHS:
         raise InputError("--path", [Fault(path, f"is not a path; {meant(path, PATHS)}")])
     file = folder / "scenario.toml"
     _absent(file)
-    model = build_model(load_device(device))
+    described = load_device(device)
+    model = build_model(described)
+    if "actuator" not in available(described.physics(described.values())):
+        raise InputError(
+            "--device", [Fault(model.name, "has no actuator: another machine moves it, along no path of its own")]
+        )
     reach = reachable(model)
     plane = reach.plane()
     path = path or ("circle" if len(plane) > 1 else "line")
