@@ -47,6 +47,17 @@ def test_a_cause_whose_family_is_far_behind_a_clear_one_does_not_stand_first(fri
     assert {f.effect: f.contradicted for f in (first, second)}["creep"] == (not stands)
 
 
+def test_what_is_seen_in_the_readings_stands_first_for_no_cause_in_doubt():
+    """The rounding of a reading takes no share, and nothing speaks against it."""
+    step, told = finding("quantisation"), Evidence(*2 * [shares(0.9, 0.0)])
+    found = in_standing([finding("creep"), step], told, [step])
+    assert [f.effect for f in found] == ["creep", "quantisation"] and found[0].contradicted
+    assert answer_of(Verdict.EXPLAINED, found, exact=False) is Verdict.AMBIGUOUS
+    assert in_standing([step], told, [step])[0].effect == "quantisation"
+    ahead = in_standing([step, finding("coulomb")], told, [step])
+    assert [f.effect for f in ahead] == ["coulomb", "quantisation"]
+
+
 @pytest.mark.parametrize(("by_itself", "stands"), [(0.95, True), (0.86, True), (0.8, False)])
 def test_a_family_that_predicts_as_much_alone_is_not_contradicted(by_itself, stands):
     """As the history of travel and the speed in a sine, of which only the first one selected adds anything."""

@@ -156,7 +156,7 @@ def _diagnose(
     analyses = run_supporting_analyses(search, tests.passed, seed)
     found = (*findings(search, attribution, likelihoods), *detected)
     if evidence is not None:
-        found = in_standing(found, evidence)
+        found = in_standing(found, evidence, detected)
         answer = answer_of(answer, found, search.chosen.errors.is_noise)
     found = with_chances(found, search)
     answer = doubted(answer, found)

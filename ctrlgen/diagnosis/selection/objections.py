@@ -33,7 +33,7 @@ def objections(
     """The reason by cause, by its place in the structure, of each that is not yet `accepted` and meets an objection; and of an accepted
     one that has grown so long, while others came and went, that the records do not show that it repeats.
 
-    `exact`: the model leaves noise alone, so that an event or a short line is what it looks like.
+    `exact`: the model leaves noise alone, so that an event, a short line or a pitch of one period is what it looks like.
     """
     causes = fit.structure.causes
     reasons: dict[int, str] = {}
@@ -46,7 +46,7 @@ def objections(
             another_law(fit, k)
             or _no_turn(recording, fit, k)
             or _on_the_lattice(recording, fit, k)
-            or (None if exact else _of_another_kind(recording, fit, k))
+            or (_no_pitch(recording, fit, k, exact) if exact else _of_another_kind(recording, fit, k))
         )
         if reason:
             reasons[k] = reason
@@ -172,13 +172,15 @@ def _both_ways(drives: Sequence[np.ndarray]) -> bool:
     return bool(np.any(np.minimum(falls, rises) > OBJECTIONS.standing * span))
 
 
-def _no_pitch(recording: Recording, fit: Fit, k: int) -> str | None:
-    """Why an error that repeats along a reading does not: the reading goes no farther than about its period; None where it may."""
+def _no_pitch(recording: Recording, fit: Fit, k: int, exact: bool = False) -> str | None:
+    """Why an error that repeats along a reading does not: the reading goes no farther than about its period; None where it may. A part
+    of a period is a curve too where the model is `exact`."""
     cause = fit.structure.causes[k]
     if cause.effect == PARAMETER or not any(_is_spatial_period(cause, p) for p in cause.law.params):
         return None
     periods = _line(fit, k) * _covered(recording, cause, fit)
-    if periods > OBJECTIONS.fewest_pitches * (1 + SHAPE_AT_BOUND):  # at its bound it would go on growing
+    fewest = 1.0 if exact else OBJECTIONS.fewest_pitches
+    if periods > fewest * (1 + SHAPE_AT_BOUND):  # at its bound it would go on growing
         return None
     return (
         f"the reading covers {periods:.1f} periods of it, and {OBJECTIONS.fewest_pitches:g} are needed to see it repeat"

@@ -78,10 +78,11 @@ def borne_out_instead(search: SearchResult, evidence: Evidence) -> CandidateMode
     return None
 
 
-def in_standing(findings: Sequence[Finding], evidence: Evidence) -> tuple[Finding, ...]:
-    """The findings with what the shares say of each cause; those that they contradict after the others."""
-    told = [replace(f, support=evidence.of(f.effect) if f.role is Role.CAUSE else None) for f in findings]
-    return tuple(sorted(told, key=lambda f: (f.role is not Role.CAUSE, f.contradicted)))
+def in_standing(findings: Sequence[Finding], evidence: Evidence, seen: Sequence[Finding] = ()) -> tuple[Finding, ...]:
+    """The findings with what the shares say of each cause; those that they contradict after the others, and so is what is `seen` in the
+    readings themselves, which takes no share: alone it does not stand for what the rest leaves in doubt."""
+    told = [(f in seen, replace(f, support=evidence.of(f.effect) if f.role is Role.CAUSE else None)) for f in findings]
+    return tuple(f for _, f in sorted(told, key=lambda t: (t[1].role is not Role.CAUSE, t[0] or t[1].contradicted)))
 
 
 def possible(shares: Sequence[tuple[Family, float]], offered: Sequence[Hypothesis]) -> list[tuple[Family, float]]:
