@@ -56,6 +56,31 @@ def slew_rate(u, t):
     return move(u, behind)
 
 
+def asymmetric_slew_rate(u, t):
+    """12 V/s up and 20 V/s down, as steps to the middle of each tenth of a sample."""
+
+    def behind(now, q, v, out):
+        wanted = u[int(now / H + 1e-6)]
+        middle = out + np.clip(wanted - out, -20 * H / 20, 12 * H / 20)
+        return KF * (middle - wanted), middle + np.clip(wanted - middle, -20 * H / 20, 12 * H / 20)
+
+    return move(u, behind)
+
+
+def back_emf(u, t):
+    """A coil of 4 Ohm and 12 mH that gives 40 N/A, and so takes 40 V*s/m, in exact steps of a twentieth of a sample."""
+    ohm, henry, per_ampere = 4.0, 12e-3, 40.0
+    kept = np.exp(-ohm / henry * H / 20)
+
+    def behind(now, q, v, ampere):
+        volts = u[min(int(now / H + 1e-6), len(u) - 1)]
+        end = (volts - per_ampere * v) / ohm
+        middle = end + (ampere - end) * kept
+        return per_ampere * middle - KF * volts, end + (middle - end) * kept
+
+    return move(u, behind)
+
+
 def amplifier_lag(u, t):
     """An amplifier of 30 Hz that rings, D = 0.5, in exact steps of a twentieth of a sample."""
     tau = 1 / (2 * np.pi * 30)
@@ -262,6 +287,8 @@ ON_AXIS = {
     amplifier_lag: Planted("actuator:axis", {"share": 1.0, "tau": 1 / (2 * np.pi * 30), "damping": 0.5}),
     one_sided_saturation: Planted("actuator:axis", {"level": -1.1}),
     slew_rate: Planted("actuator:axis", {"rate": 12.0}),
+    asymmetric_slew_rate: Planted("actuator:axis", {"rate": 12.0, "excess": -2 / 3}),
+    back_emf: Planted("actuator:axis", {"emf": 40.0, "tau": 3e-3}, within={"emf": 0.03, "tau": 0.03}),
     coil_heating: Planted("actuator:axis", {"rise": 3.9e-3 * 10 / 4, "tau": 0.5}, within={"rise": 0.05, "tau": 0.05}),
     cubic_sensor: Planted("sensor:axis", {"curvature": 2e6}),
     warm_up: Planted("sensor:axis", {"size": 3e-7, "tau": 0.7}, within={"size": 0.05, "tau": 0.05}),

@@ -68,6 +68,7 @@ def test_times_frequencies_and_ways_are_not_negative_and_moments_places_and_lean
             "taper",
             "reversible",
             "skew",
+            "excess",
             "wear",
             "sine",
             "cosine",

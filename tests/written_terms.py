@@ -110,6 +110,10 @@ def remembered(s, p):
     return p.size * float(np.array([WEIGHTS[f"c{k}"] for k in j]) @ (lag / (0.3 * j / 8)))
 
 
+def slewed(s, p):
+    return p.share * (s.mean - s.rise / 2 + s.w - s.value)
+
+
 def stop(s, p):
     side, e = sign(p.gap), 1e-3 * s.travel
     x = max(side * (s.displacement - p.gap), 0.0)

@@ -1,8 +1,10 @@
 """An amplifier whose output changes at most so fast."""
 
+from typing import ClassVar
+
 import casadi as ca
 
-from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, State, itself
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, Plainer, State, itself
 
 
 class SlewRate(Effect):
@@ -18,7 +20,7 @@ class SlewRate(Effect):
     order = -1  # of what is not clipped, and before the gains, which act on what is delivered
     requires = frozenset({"actuator", "sample_time"})
     source = "J. E. Solomon, IEEE J. Solid-State Circuits 9 (1974) 314: slew rate of a monolithic operational amplifier"
-    params = (
+    params: ClassVar[tuple[Param, ...]] = (
         Param("share", "1", (0.0, 1.5), "1: nothing of the drive changes faster", off=0.0),
         Param("rate", "channel/s", (1e-3, 1e6), "R: fastest change of what is delivered", paced=True),
     )
@@ -41,11 +43,31 @@ class SlewRate(Effect):
         return {"v": s.value, "mean": s.value, "rise": 0.0}
 
     def update(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
-        most = p.rate * s.sample_time
-        c = ca.fmax(ca.fmin(s.value - s.states.v, most), -most)
-        k = ca.fabs(c) / most
+        up, down = self.most(s, p)
+        c = ca.fmax(ca.fmin(s.value - s.states.v, up), -down)
+        k = ca.fmax(c / up, -c / down)
         return {
             "v": s.states.v + c,
             "mean": s.states.v + c * (1 - k / 2),
             "rise": c * k * (3 - 2 * k),
         }
+
+    def most(self, s: LawInputs, p: LawNumbers) -> tuple[Expression, Expression]:
+        """The largest change over a sample, up and down."""
+        return p.rate * s.sample_time, p.rate * s.sample_time
+
+
+class AsymmetricSlewRate(SlewRate):
+    """As `slew_rate`, with rates of its own both ways: R (1 + a) rising and R falling for a > 0, R rising and R (1 - a) falling for a < 0.
+
+    R is the slower one, which holds for a path in either direction. Holds as `slew_rate`.
+    """
+
+    title = "An amplifier whose output changes at most so fast, up faster than down or down faster than up"
+    params = (*SlewRate.params, Param("excess", "1", (-9.0, 9.0), "a: by how much the quicker way is quicker"))
+    at_bounds = itself("rate", "excess")
+    plainer = Plainer("slew_rate", {"excess": 0.0})
+
+    def most(self, s: LawInputs, p: LawNumbers) -> tuple[Expression, Expression]:
+        up, down = super().most(s, p)
+        return up * (1 + ca.fmax(p.excess, 0.0)), down * (1 + ca.fmax(-p.excess, 0.0))

@@ -76,7 +76,9 @@ NEEDS: Mapping[str, LawNeeds] = MappingProxyType(
         # The field of a gap that a coil or an armature leaves; a ceramic has none
         "force_factor": LawNeeds("it needs a coil or an armature", families=frozenset({"electromagnetic"})),
         # A stack takes no power to speak of, and a heater has laws of its own
-        "coil_heating": LawNeeds("it needs a coil", families=frozenset({"electromagnetic"})),
+        **dict.fromkeys(
+            ("back_emf", "coil_heating"), LawNeeds("it needs a coil", families=frozenset({"electromagnetic"}))
+        ),
         "heater_resistance": _HEATER,
         "heater_resistance_of_second_order": _HEATER,
         "heat_loss": _HEATER,
@@ -92,9 +94,10 @@ NEEDS: Mapping[str, LawNeeds] = MappingProxyType(
             ("backlash_above", "backlash_below", "worn_backlash"),
             LawNeeds("it needs a part with clearance", transmissions=_CLEARANCE),
         ),
-        # What counts, or measures by a reference that lasts, keeps a constant
+        # What counts, or measures by a reference that lasts, keeps a constant; a stack that is driven by charge moves as it leaks
         "high_pass": LawNeeds(
-            "it needs a sensor of charge or one coupled for alternating signals",
+            "it needs a sensor of charge, one coupled for alternating signals, or a ceramic that charge drives",
+            actuators=frozenset({"piezo stack", "piezo ceramic"}),
             sensors=frozenset({"capacitive", "strain gauge", "load cell", "accelerometer"}),
         ),
         **dict.fromkeys(

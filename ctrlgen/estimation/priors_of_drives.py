@@ -18,6 +18,24 @@ OF_DRIVES: Mapping[str, LawPrior] = {
     "asymmetric_gain": LawPrior(
         "Rarer than a gain that is wrong in both directions: judgement.", log_prior_odds=ONE_IN_TEN
     ),
+    "asymmetric_slew_rate": LawPrior(
+        "As a rate that is the same both ways, of which it is a finer form.",
+        refines=frozenset({"slew_rate"}),
+        parameters={
+            "share": ParameterPrior(fixed_range=(0.5, 1.5)),
+            "rate": peaks(0.03, 0.2, 0.8),
+            "excess": ParameterPrior((-1.0, 1.0)),
+        },
+    ),
+    "back_emf": LawPrior(
+        "Most amplifiers of a motor control its current: judgement. A coil is at a voltage or it is not.",
+        log_prior_odds=ONE_IN_TEN,
+        parameters={
+            "share": ParameterPrior(fixed_range=(0.5, 1.5)),
+            "emf": ParameterPrior((0.03, 0.3)),
+            "tau": ParameterPrior((5e-4, 2e-3, 1e-2)),
+        },
+    ),
     "butterfly": LawPrior(
         "Actuators without bias are rare: judgement. " + HYSTERESIS,
         log_prior_odds=ONE_IN_TEN,
