@@ -26,7 +26,7 @@ from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Recording
 
 NAMES = {*get_args(ActuatorName), *get_args(TransmissionName), *get_args(SensorName)}
-WORDS = {*NAMES, *FAMILIES.values(), "position", "flexible"}
+WORDS = {*NAMES, *FAMILIES.values(), "position", "flexible", "imposed"}
 # What may only be said of a machine that has it
 OWN_WORDS = {
     "piezo": "piezo|ferroelectric|polarisation",
@@ -82,6 +82,7 @@ def test_a_machine_of_unknown_parts_is_told_in_neutral_words():
         "amplifier_lag",
         "one_sided_saturation",
         "slew_rate",
+        "asymmetric_slew_rate",
         "saturation",
         "stiffening",
         "creep",
@@ -93,6 +94,20 @@ def test_a_machine_of_unknown_parts_is_told_in_neutral_words():
     assert "fringe" in title(Effect.library["cyclic"], parts(sensor="interferometer"))
     assert "told nothing" in title(Effect.library["drive_offset"], parts(actuator="pump"))
     assert "command" in title(Effect.library["drive_offset"], MachineParts(position=True))
+
+
+def test_a_constant_of_a_force_that_is_read_may_be_a_weight():
+    device = load_device(SCENARIOS / "emps" / "device.toml")
+    assert "such as a weight" in title(Effect.library["home_offset"], device.parts(nominal_physics(device)))
+    assert "weight" not in title(Effect.library["home_offset"], MachineParts(transmission=("none",)))
+
+
+def test_a_piezo_may_be_driven_by_a_charge_that_leaks():
+    leak, interferometer = Effect.library["high_pass"], {"sensor": "interferometer"}
+    assert "of the piezo that it drives" in title(leak, parts(actuator="piezo stack"))
+    assert "piezo" not in title(leak, parts(actuator="voice coil"))
+    assert not not_offered(["high_pass"], parts(actuator="piezo stack", **interferometer))
+    assert "high_pass" in not_offered(["high_pass"], parts(actuator="voice coil", **interferometer))
 
 
 def test_what_repeats_or_has_clearance_is_named_by_every_part_that_may():

@@ -82,7 +82,8 @@ class MachineParts:
 
     actuator, transmission, sensor: as stated, None where not. family: by what the actuator works, a value of `FAMILIES`, "none"
     where the motion is imposed, None where it is not known. excluded: families that it cannot be, with the reason. flexible:
-    whether its stage stands on flexures, None where not known. position: whether its drive is the position that it shall have.
+    whether its stage stands on flexures, None where not known. position: whether its drive is the position that it shall have. imposed:
+    whether its motion is imposed and its force read.
     """
 
     actuator: str | None = None
@@ -92,6 +93,7 @@ class MachineParts:
     excluded: tuple[tuple[str, str], ...] = ()
     flexible: bool | None = None
     position: bool = False
+    imposed: bool = False
 
     def cannot_be(self, families: frozenset[str]) -> str:
         """Why its actuator is none of the `families`; empty where it may be one."""
@@ -111,10 +113,10 @@ class MachineParts:
     @property
     def words(self) -> frozenset[str]:
         """Every word that is known of it: names of parts, the family of its actuator, "position" for a drive that is one, "flexible"
-        for a stage on flexures."""
+        for a stage on flexures, "imposed" for a motion that is."""
         known = (self.family, self.actuator, self.sensor, *(self.transmission or ()))
-        marks = ("position" if self.position else None, "flexible" if self.flexible else None)
-        return frozenset(word for word in (*known, *marks) if word)
+        marks = {"position": self.position, "flexible": self.flexible, "imposed": self.imposed}
+        return frozenset(word for word in (*known, *(mark for mark, holds in marks.items() if holds)) if word)
 
     @property
     def text(self) -> str:
@@ -166,6 +168,7 @@ def machine_parts(
         reasons.setdefault("piezo", f"its travel is beyond {farthest[way][1]}")
     if between is not None:
         flexible = "flexure" in between
+    imposed = isinstance(physics, ImposedPhysics)
     position = way is not None and all(same_dimension(unit, physics.travel_unit) for unit in units)
     return MachineParts(
         actuator=given.actuator,
@@ -174,5 +177,6 @@ def machine_parts(
         family=FAMILIES[given.actuator] if given.actuator else family,
         excluded=tuple(reasons.items()),
         flexible=flexible,
-        position=position and not isinstance(physics, ImposedPhysics),
+        position=position and not imposed,
+        imposed=imposed,
     )

@@ -28,6 +28,7 @@ from ctrlgen.diagnosis.selection.cause_entry import cause_name, cause_noun
 from ctrlgen.diagnosis.selection.finding_region import EndEntry, places_of
 from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding, Role
 from ctrlgen.diagnosis.selection.ringing_mass import ringing_masses
+from ctrlgen.diagnosis.selection.untold_scale import moved_together
 from ctrlgen.diagnosis.selection.verdict import (
     Verdict,
     contradicts_datasheet,
@@ -102,7 +103,7 @@ def _cause(diagnosis: Diagnosis) -> str:
     if not findings:
         known = "effect that could be tried" if diagnosis.untried.sentences() else "known effect"
         return f"{head}: the recording differs from {title}, and no {known} explains it."
-    return f"{head}: {_too_much_left(diagnosis)}{_main(findings)}{_rivals(diagnosis)}{unlikely_rival(diagnosis)}."
+    return f"{head}: {_too_much_left(diagnosis)}{_main(findings)}{_rivals(diagnosis)}{unlikely_rival(diagnosis)}{_by_file(diagnosis)}."
 
 
 def _too_much_left(diagnosis: Diagnosis) -> str:
@@ -210,6 +211,17 @@ def unlikely_rival(diagnosis: Diagnosis) -> str:
         f"would be off by {number(there[0], 2)} of its {kind} deviations" if there[1].sd else "is set and not measured"
     )
     return f"; the readings alone do not tell it from {cause_noun(rival.cause)}, which {off}{own}"
+
+
+def _by_file(diagnosis: Diagnosis) -> str:
+    """'; the readings alone do not tell it from mechanics.stiffness and actuator.force_constant that are off together: that it is this one
+    rests on what the file states of those', for a number of the device."""
+    fit, main = diagnosis.search.chosen.fit, diagnosis.findings[0].cause
+    others = moved_together(fit, fit.structure.causes.index(main)) if main in fit.structure.causes else ()
+    if not others:
+        return ""
+    names = " and ".join([", ".join(others[:-1]), others[-1]] if len(others) > 1 else others)
+    return f"; the readings alone do not tell it from {names} off together: that it is this one rests on what the file states of those"
 
 
 def _any(causes: Sequence[Hypothesis]) -> str:

@@ -12,7 +12,7 @@ from ctrlgen.devices.machine import MachineParts
 from ctrlgen.effects import Effect
 
 # By law: (word of the machine, title) in the order in which they are looked for; "" is for any other machine. A word is a family of
-# actuators, the name of a part, "position" for a drive that is a position, or "flexible" for a stage on flexures.
+# actuators, the name of a part, "position" for a drive that is a position, "flexible" for a stage on flexures, or "imposed" for a motion.
 TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
     {
         "amplifier_lag": (
@@ -32,6 +32,13 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
             ("piezo", "Asymmetric hysteresis of the piezo: the displacement lags behind the voltage"),
             ("electromagnetic", "Asymmetric hysteresis of the motor's iron: the force lags behind the current"),
             ("", "Asymmetric hysteresis of the actuator: its force lags behind the drive"),
+        ),
+        "asymmetric_slew_rate": (
+            (
+                "position",
+                "An axis that follows its command faster in one direction, and no faster than at a speed of each",
+            ),
+            ("", "A drive that follows its command at most so fast, up faster than down or down faster than up"),
         ),
         "butterfly": (
             ("piezo", "Strain of a ferroelectric: it grows with the square of a polarisation that remembers"),
@@ -95,6 +102,18 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
         "eccentricity": (
             ("gear", "An error once a turn: a gear, or the sensor's graduation, whose centre is beside the axis"),
             ("", "An error once a turn: the sensor's graduation is centred beside the axis"),
+        ),
+        "high_pass": (
+            (
+                "piezo",
+                "What stands still is forgotten: a charge amplifier that leaks, of the sensor or of the piezo that it drives",
+            ),
+        ),
+        "home_offset": (
+            (
+                "imposed",
+                "A constant in the force or torque that is read: the zero of its sensor, or a load such as a weight",
+            ),
         ),
         "lever_ratio": (
             ("lever", "A lever whose arms are not as drawn"),

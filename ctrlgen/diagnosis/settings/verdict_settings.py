@@ -40,6 +40,9 @@ class VerdictSettings:
     """Standard deviations of a mass and a damping about those that wrong times would make, within which that may be it."""
     clock_off: float = 1.1
     """Times too long, or too short, from which the time is doubted: numbers of a device are known no better. Judgement."""
+    undone: float = 0.1
+    """Change of a number of the device that others must undo in the readings, for it to be told only beside them; and how much of the
+    largest such other one moves to be named. Judgement."""
     as_read: float = 0.3
     """Share of what is read, root mean square, from which on so much noise would have been told. Judgement."""
 
