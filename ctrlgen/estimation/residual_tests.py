@@ -6,7 +6,8 @@ to fit, by its size. That at rest, where the noise was estimated: its size tells
 memory nor heavy tails after whitening, and a stage that moves by itself has, whatever its parameters within their posterior.
 
 Where nothing but the readings tells the noise of a channel, neither its size nor its memory speaks against a structure: both are those of
-the noise as well. There only what goes with the motion is no noise (`goes_with_motion`).
+the noise as well. There only what goes with the motion is no noise (`goes_with_motion`), and what is left of one record and not of another
+(`uneven`).
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ class ResidualTests:
     "fitted" size of that of the records to fit, of the channels whose noise is told; "motion": that what is left goes with the
     motion, of the others. `restless`: channels that do at rest what no stationary noise does. `passed`: whether the structure is
     valid by all of them. `refitted`: the fit with its numbers moved to the held-out records under their posterior. `by_motion`: p
-    of "motion" of each channel whose noise is not told.
+    of "motion" of each channel whose noise is not told. `uneven`: of such channels the records of which most and least is left, where
+    no noise differs so much, and how many times as much.
     """
 
     ratio: tuple[float, ...]
@@ -48,6 +50,7 @@ class ResidualTests:
     refitted: Fit
     restless: tuple[str, ...] = ()
     by_motion: dict[str, float] = field(default_factory=dict)
+    uneven: dict[str, tuple[str, str, float]] = field(default_factory=dict)
 
     @property
     def worst(self) -> float:
@@ -75,9 +78,9 @@ def run_residual_tests(fitter: Fitter, fit: Fit) -> ResidualTests:
         smallest["motion"] = min(1.0, min(by_motion.values()) * len(by_motion))
         rejected |= smallest["motion"] < MOTION.p
     too_large = bool(told.any()) and _too_large(fitter, fit, told, (squares, count), fitted, smallest)
-    restless = _restless(fitter, fit)
-    passed = bool(np.isfinite(ratio).all()) and not (too_large or rejected or restless)
-    return ResidualTests(ratio, smallest, passed, refit.fit, restless, by_motion)
+    restless, uneven = _restless(fitter, fit), _uneven(fitter, fit, refit.fit)
+    passed = bool(np.isfinite(ratio).all()) and not (too_large or rejected or restless or uneven)
+    return ResidualTests(ratio, smallest, passed, refit.fit, restless, by_motion, uneven)
 
 
 def _too_large(
@@ -109,6 +112,22 @@ def _by_motion(fitter: Fitter, fit: Fit, refitted: Fit, channels: list[int]) -> 
     """p of what is left of some `channels` to go with the motion by chance, over all records that move."""
     left = [*((fit, r) for r in fitter.fit_records), *((refitted, r) for r in fitter.held_out_records)]
     return {fitter.recording.channels[i]: goes_with_motion(fitter, left, i) for i in channels}
+
+
+def _uneven(fitter: Fitter, fit: Fit, refitted: Fit) -> dict[str, tuple[str, str, float]]:
+    """Of channels whose noise is guessed: the names of the records of which most and least is left, root mean square, and the ratio, where
+    it is more than a noise that is the same in all of them makes it."""
+    found = {}
+    for i in np.flatnonzero(fitter.noise.guessed).tolist() if fitter.recording.kind == "series" else ():
+        left = {}
+        for each, r in [*((fit, r) for r in fitter.fit_records), *((refitted, r) for r in fitter.held_out_records)]:
+            e = (r.observed - fitter.predict(each, r))[r.valid[:, i], i]
+            if len(e) > SHORTEST:
+                left[r.name] = float(np.sqrt(np.mean(e**2)))
+        most, least = (choose(left, key=left.__getitem__, default="") for choose in (max, min))
+        if left and left[most] > RESIDUAL_TESTS.uneven * left[least] > 0:
+            found[fitter.recording.channels[i]] = most, least, left[most] / left[least]
+    return found
 
 
 def _held_out_residual(

@@ -299,6 +299,9 @@ class ResidualTestsSettings:
     noticed_ratio: float = 1.02
     """A rejected test of whiteness counts only where the error ratio exceeds this: long records reject residuals that
     are white for every practical purpose."""
+    uneven: float = 5.0
+    """Times as much that one record leaves as another, from which on it is no noise of both: a slow one differs by two
+    or three. Judgement."""
     rest_p: float = 1e-6
     """p below which the residual at rest is not noise. Smaller than `whiteness_p`, for the noise was estimated there."""
     spike: float = 3.9

@@ -237,7 +237,18 @@ def _left(diagnosis: Diagnosis) -> list[str]:
     fit = diagnosis.search.chosen.fit
     moved = "" if contradicts_datasheet(fit) and diagnosis.residual_tests.passed else _moved(diagnosis)
     text = _rest(diagnosis) if diagnosis.findings else ""
-    return [" ".join(part for part in (text, moved) if part)] if text or moved else []
+    told = [part for part in (text, moved, *_uneven(diagnosis)) if part]
+    return [" ".join(told)] if told else []
+
+
+def _uneven(diagnosis: Diagnosis) -> list[str]:
+    """'What is left of axis in fit.csv is 23 times what is left in hold_out.csv: noise does not differ so, and something acts in the one
+    that does not in the other, such as a jump.'"""
+    return [
+        f"What is left of {short(channel)} in {most} is {number(ratio, 2)} times what is left in {least}: noise does not differ so, and "
+        "something acts in the one that does not in the other, such as a jump."
+        for channel, (most, least, ratio) in diagnosis.residual_tests.uneven.items()
+    ]
 
 
 def _rest(diagnosis: Diagnosis) -> str:
