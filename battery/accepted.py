@@ -22,7 +22,7 @@ ACCEPTED: dict[str, tuple[str, ...]] = {
     "step": ("step", "force_step"),
     "frame_turn": ("frame_turn", "frame_rotation_z"),
     "low_pass": ("low_pass", "thermal_lag"),
-    "cogging": ("cogging", "cogging_of_slots"),
+    "cogging": ("cogging", "cogging_from_home", "cogging_of_slots"),
     "cyclic": ("cyclic", "cyclic_from_home"),
     "vibration": ("vibration", "vibration_per_record"),
     "coulomb": ("coulomb",),

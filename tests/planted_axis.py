@@ -98,6 +98,20 @@ def amplifier_lag(u, t):
     return move(u, behind)
 
 
+def notch(u, t):
+    """A notch of 60 Hz, D = 0.4, that takes out nine tenths: (s^2 + 0.1 2 D w s + w^2)/(s^2 + 2 D w s + w^2), in exact steps of a
+    twentieth of a sample."""
+    w, D = 2 * np.pi * 60, 0.4
+    kept = expm(np.array([[0, 1, 0], [-(w**2), -2 * D * w, 1], [0, 0, 0]]) * H / 20)
+
+    def behind(now, q, v, state):
+        x = np.array([*(np.zeros(2) if isinstance(state, float) else state), u[min(int(now / H + 1e-6), len(u) - 1)]])
+        middle = kept @ x
+        return -KF * 0.9 * 2 * D * w * middle[1], (kept @ middle)[:2]
+
+    return move(u, behind)
+
+
 def one_sided_saturation(u, t):
     return move(np.maximum(u, -1.1))
 
@@ -201,6 +215,15 @@ def cogging(u, t):
     return move(u, lambda time, q, v, memory: (-0.1 * np.sin(2 * np.pi * (q + v * H / 20) / 2.5e-5 + 0.7), memory))
 
 
+def cogging_from_home(u, t):
+    """0.1 N every 25 um, in the middle of a step, of a stage that rests at the zero of its reading."""
+
+    def force(time, q, v, memory):
+        return -0.1 * (np.sin(2 * np.pi * (q + v * H / 20) / 2.5e-5 + 0.7) - np.sin(0.7)), memory
+
+    return move(u, force)
+
+
 def force_factor(u, t):
     """10 % less of the force at 50 um from 1e-5 m, in the middle of a step."""
 
@@ -285,6 +308,7 @@ ON_AXIS = {
     cubic_drive: Planted("actuator:axis", {"curvature": -0.012}),
     stiffness_drift: Planted("stage:axis", {"rate": 0.04}, within={"rate": 0.02}),
     amplifier_lag: Planted("actuator:axis", {"share": 1.0, "tau": 1 / (2 * np.pi * 30), "damping": 0.5}),
+    notch: Planted("actuator:axis", {"share": 0.9, "tau": 1 / (2 * np.pi * 60), "damping": 0.4}),
     one_sided_saturation: Planted("actuator:axis", {"level": -1.1}),
     slew_rate: Planted("actuator:axis", {"rate": 12.0}),
     asymmetric_slew_rate: Planted("actuator:axis", {"rate": 12.0, "excess": -2 / 3}),
@@ -318,6 +342,7 @@ ON_AXIS = {
         "stage:axis", {"damping": 0.042 / 7e-4, "speed": 7e-4}, within={"damping": 0.02, "speed": 0.02}
     ),
     rectified: Planted("sensor:axis", {"share": 0.5}),
+    cogging_from_home: Planted("stage:axis", {"force": 0.1, "period": 2.5e-5, "phase": 0.7}, within={"force": 0.02}),
     cogging: Planted("stage:axis", {"force": 0.1, "period": 2.5e-5}, within={"force": 0.02}),
     bouc_wen: Planted(
         "stage:axis",

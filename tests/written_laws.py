@@ -68,6 +68,10 @@ LAWS = {
         {"period": 0.4, "phase": 0.9},
         lambda s, p: -p.force * sin(TWO_PI * s.displacement / 0.4 + 0.9),
     ),
+    "cogging_from_home": (
+        {"period": 0.4, "phase": 0.9},
+        lambda s, p: -p.force * (sin(TWO_PI * s.displacement / 0.4 + 0.9) - sin(0.9)),
+    ),
     "cogging_of_slots": (
         {"period": 0.4, "phase": 0.9, "sine": 0.2, "cosine": -0.1},
         lambda s, p: (
@@ -237,6 +241,11 @@ LAWS = {
     "one_sided_saturation": (
         {"level": -0.4},
         lambda s, p: p.share * (-0.4 - s.value) ** 2 / (-0.4 - s.value + 4e-5) if s.value < -0.4 else 0.0,
+    ),
+    "notch": (
+        {"tau": 0.06, "damping": 0.7},
+        lambda s, p: -1.4 * p.share * s.v,
+        lambda s, p: {"w": s.v / 0.06, "v": (s.value - s.w - 1.4 * s.v) / 0.06},
     ),
     "back_emf": (
         {"emf": 0.3, "tau": 0.06},

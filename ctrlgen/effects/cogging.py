@@ -28,3 +28,16 @@ class Cogging(Effect):
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.force * ca.sin(2 * math.pi * s.displacement / p.period + p.phase)
+
+
+class CoggingFromHome(Cogging):
+    """F = -A (sin(2 pi d/Lambda + phi) - sin(phi)): home, where the displacement is zero, is where the stage rests with its drive off.
+
+    A spring holds a stage that is pulled into a slot off its own middle. Holds as `cogging`, and where the reading was set to zero there.
+    """
+
+    title = "A force that repeats along the way, of a stage whose reading is zero where it rests"
+    requires = Cogging.requires | {"actuator"}
+
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return super().term(s, p) + p.force * ca.sin(p.phase)

@@ -66,7 +66,7 @@ NEEDS: Mapping[str, LawNeeds] = MappingProxyType(
         ),
         # Slots, magnets and threads; a coil in an even gap and a stack on flexures have none
         **dict.fromkeys(
-            ("cogging", "cogging_of_slots"),
+            ("cogging", "cogging_from_home", "cogging_of_slots"),
             LawNeeds(
                 "it needs a motor with poles or a part with a pitch",
                 actuators=_PERIODIC_ACTUATORS,

@@ -184,6 +184,12 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             parameters={"reach": _LOOP, "loop": _starts((0.55, 0.9)), "power": _starts((1.5,))},
         ),
         "cogging": _COGGING,
+        "cogging_from_home": replace(
+            _COGGING,
+            reason="Where the readings do not tell which of the two it is, the plain one is named: judgement. "
+            + _COGGING.reason,
+            log_prior_odds=-1.0,
+        ),
         "cogging_of_slots": replace(
             _COGGING,
             suspected=False,

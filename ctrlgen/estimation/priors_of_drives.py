@@ -67,6 +67,16 @@ OF_DRIVES: Mapping[str, LawPrior] = {
         unless=frozenset({"displacement_command"}),
     ),
     "drive_offset": LawPrior("As common as a wrong gain.", constant=True),
+    "notch": LawPrior(
+        "Who puts a notch into a controller knows it; one that is forgotten is rarer than a lag: judgement.",
+        log_prior_odds=ONE_IN_TEN,
+        model_form_error=0.005,
+        parameters={
+            "share": ParameterPrior(plausible_range=(0.5, 1.5)),
+            "tau": ParameterPrior((1e-3, 3e-3, 1e-2, 5e-2)),
+            "damping": ParameterPrior((0.5, 2.0)),
+        },
+    ),
     "one_sided_saturation": LawPrior(
         "As a limit both ways, and rarer: judgement.",
         log_prior_odds=ONE_IN_TEN,

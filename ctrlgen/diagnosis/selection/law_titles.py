@@ -49,6 +49,13 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
             ("electromagnetic", "A force that repeats along the way: cogging of the motor"),
             ("", "A force that repeats along the way"),
         ),
+        "cogging_from_home": (
+            (
+                "electromagnetic",
+                "A force that repeats along the way, read from where the stage rests: cogging of the motor",
+            ),
+            ("", "A force that repeats along the way, of a stage whose reading is zero where it rests"),
+        ),
         "cogging_of_slots": (
             (
                 "screw",
@@ -146,6 +153,10 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
             ("harmonic drive", "A weight, or an unbalanced mass, whose moment twists the harmonic drive"),
             ("flexible", "A weight on the platform, whose moment bends the flexures"),
             ("", "A weight, or an unbalanced mass, whose moment bends what carries it"),
+        ),
+        "notch": (
+            ("piezo", "A notch in the drive: a filter of the controller or of the amplifier"),
+            ("", "A notch in the drive: a filter of the controller"),
         ),
         "reversed": (("position", "An axis that counts the other way round"),),
         "saturation": (
