@@ -20,7 +20,9 @@ def finding(cause, share: float | None, *alternatives, chance: ChanceEntry | Non
     return Finding(cause.effect, cause.location, {}, alternatives, taken, {}, "", cause, chance=chance)
 
 
-def told(verdict: Verdict, *findings: Finding, passed=False, after=2.0, untried=(), taken=0.6, notes=()) -> list[str]:
+def told(
+    verdict: Verdict, *findings: Finding, passed=False, after=2.0, untried=(), taken=0.6, notes=(), held_out=True
+) -> list[str]:
     errors = ChannelErrorEntry(
         rms_before=50.0,
         rms_after=after,
@@ -40,14 +42,20 @@ def told(verdict: Verdict, *findings: Finding, passed=False, after=2.0, untried=
             held_out={"reading.axis": errors},
             device=SimpleNamespace(title="an axis"),
             search=SimpleNamespace(chosen=chosen, fitter=fitter, unlikely=()),
-            residual_tests=SimpleNamespace(passed=passed),
+            residual_tests=SimpleNamespace(passed=passed, uneven={}),
             untried=SimpleNamespace(sentences=lambda: list(untried)),
             shares=None,
             unconfirmed=(),
-            attribution=SimpleNamespace(explained=taken),
+            attribution=SimpleNamespace(explained=taken, held_out=held_out),
             notes=notes,
         )
     )
+
+
+def test_shares_of_the_records_to_fit_are_told_as_that():
+    """Where no held-out record shows a mismatch, the table beside the sentence says little of them."""
+    assert "of the records to fit" in told(Verdict.PARTLY, finding(GAIN, 1.0), held_out=False)[0]
+    assert "of the records to fit" not in told(Verdict.PARTLY, finding(GAIN, 1.0))[0]
 
 
 @pytest.mark.parametrize("share, says", [(0.16, True), (0.14, False), (None, False)])

@@ -98,12 +98,12 @@ def _cause(diagnosis: Diagnosis) -> str:
         lacks = f"{head}: the device file ({title}) lacks nothing that this recording can show"
         return f"{lacks}{_blind(diagnosis) or _within(diagnosis) or untold(diagnosis)}."
     if far and (diagnosis.residual_tests.passed or not findings):
-        also = f"; the model also needs {_main(findings)}" if findings else ""
+        also = f"; the model also needs {_main(diagnosis)}" if findings else ""
         return f"{head}: {_beyond(diagnosis, far)}{also}."
     if not findings:
         known = "effect that could be tried" if diagnosis.untried.sentences() else "known effect"
         return f"{head}: the recording differs from {title}, and no {known} explains it."
-    return f"{head}: {_too_much_left(diagnosis)}{_main(findings)}{_rivals(diagnosis)}{unlikely_rival(diagnosis)}{_by_file(diagnosis)}."
+    return f"{head}: {_too_much_left(diagnosis)}{_main(diagnosis)}{_rivals(diagnosis)}{unlikely_rival(diagnosis)}{_by_file(diagnosis)}."
 
 
 def _too_much_left(diagnosis: Diagnosis) -> str:
@@ -114,11 +114,14 @@ def _too_much_left(diagnosis: Diagnosis) -> str:
     return f"what was found leaves {'all' if left >= 1 else per_cent(left)} of the error; the best of it is "
 
 
-def _main(findings: Sequence[Finding]) -> str:
+def _main(diagnosis: Diagnosis) -> str:
     """The main cause with its first numbers and its share; the names of the others with theirs."""
-    main, *others = findings
+    main, *others = diagnosis.findings
     numbers = ", ".join([*(f"{name} = {interval(e, name)}" for name, e in _first_numbers(main).items()), *where(main)])
-    share = f"; it takes away {_share(main.share)}" if main.share else ""
+    fitted = (
+        "" if diagnosis.attribution.held_out else " of the records to fit, as no held-out record shows more than noise"
+    )
+    share = f"; it takes away {_share(main.share)}{fitted}" if main.share else ""
     causes = [f for f in others if f.role is Role.CAUSE]
     names = [f"{cause_name(f.cause)}{_in_brackets(f)}" for f in causes[:BESIDE]]
     more = len(others) - len(names)
