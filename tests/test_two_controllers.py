@@ -15,6 +15,7 @@ from two_masses import two_masses
 
 from ctrlgen import build_model, generate, load_scenario, solve
 from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.fmi.plant import plant_of, write_plant
 from ctrlgen.firmware.folder import CFolder
 
 USE = """
@@ -219,3 +220,23 @@ def test_controllers_of_one_device_that_differ_are_different_builds(tmp_path):
         builds.setdefault(build, set()).add(code)
     assert all(len(codes) == 1 for codes in builds.values())
     assert len(builds) == 4
+
+
+def test_a_plant_at_another_rate_is_not_linked_for_the_one_that_was_asked_for(compiler, tmp_path):
+    text = (
+        (SCENARIOS / "flexure_axis_line" / "scenario.toml")
+        .read_text()
+        .replace("../devices", str(SCENARIOS / "devices"))
+    )
+    for rate in ("10 kHz", "20 kHz"):
+        (tmp_path / "scenario.toml").write_text(text.replace('"20 kHz"', f'"{rate}"'))
+        scenario = load_scenario(tmp_path / "scenario.toml")
+        (folder := tmp_path / rate[:2]).mkdir()
+        name = write_plant(scenario, plant_of(scenario), Real.FLOAT, folder)
+        run(compiler, "-std=c99", "-c", folder / f"{name}.c", "-o", folder / "plant.o")
+    body = f"{name}_state state; const float drive[1] = {{ 0.0f }}; return (int){name}_init(&state, drive);"
+    (tmp_path / "main.c").write_text(f'#include "{name}.h"\nint main(void)\n{{\n    {body}\n}}\n')
+    words = [compiler, "-std=c99", f"-I{tmp_path / '10'}", tmp_path / "main.c", "-o", tmp_path / "main"]
+    run(*words, tmp_path / "10" / "plant.o")
+    other = subprocess.run([*map(str, words), tmp_path / "20" / "plant.o"], capture_output=True, text=True)
+    assert other.returncode != 0 and f"undefined reference to `{name}_init_" in other.stderr

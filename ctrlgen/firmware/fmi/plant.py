@@ -9,6 +9,7 @@ the measuring chain: its noise and its converter (`ctrlgen.model.virtual_sensors
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -23,7 +24,7 @@ from ctrlgen.devices import Signal
 from ctrlgen.firmware.c.cprint import Kernel, Printer
 from ctrlgen.firmware.c.elementary import elementary_text
 from ctrlgen.firmware.c.real import Real
-from ctrlgen.firmware.c.templates import write
+from ctrlgen.firmware.c.templates import ABI, write
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.discretisation import balanced, driven_step, one_step_map
 from ctrlgen.model.model import Model
@@ -116,6 +117,7 @@ def plant_context(scenario: Scenario, plant: Plant, real: Real, prefix: str) -> 
     kernels["signals"] = printer.kernel(plant.output, "signals", about)
     called = frozenset().union(*(kernel.calls for kernel in kernels.values()))
     starts = np.cumsum([0, *(len(signal.channels) for signal in plant.signals)])
+    build = ABI, scenario.device_sha256, m.device.load_texts, plant.sample_time, real.value
     return {
         "prefix": prefix,
         "real": real,
@@ -125,6 +127,7 @@ def plant_context(scenario: Scenario, plant: Plant, real: Real, prefix: str) -> 
         "source": m.device.source,
         "loads": m.device.load_texts,
         "device_sha256": scenario.device_sha256,
+        "build": int(hashlib.sha256(repr(build).encode()).hexdigest()[:8], 16),
         "si": si_text,
         "drive": m.signals["drive"],
         "rate": 1 / plant.sample_time,
