@@ -80,6 +80,7 @@ def test_what_is_asked_word_for_word(tmp_path, axis):
     drive, reading = "drive.axis", "reading.axis"
     spoilt = ["FAULT" if k == 7 else x for k, x in enumerate(X)]
     which = "(--column drive.axis=COLUMN)"
+    none = "no column was recognised as a reading: which is it? Free are none (--column reading.axis=COLUMN)"
     asks = (
         ("t [s],u [V],x [um]", (T, U, X), NOTHING, (), (drive, reading), ()),
         ("x [um],t [s],u [V]", (X, T, U), NOTHING, (), (drive, reading), ()),
@@ -87,7 +88,7 @@ def test_what_is_asked_word_for_word(tmp_path, axis):
         ("u [V],x [um]", (U, X), NOTHING, (NO_TIME,), (drive, reading), ()),
         ("u [V],x [um]", (U, X), Answers(rate="1 kHz"), (), (drive, reading), ()),
         ("u [V],x [um]", (U, X), Answers(poses=True), (), (drive, reading), ()),
-        ("t [s],u [V]", (T, U), NOTHING, ("no column was recognised as a reading: which is it? Free are none (--column reading.axis=COLUMN)",), (drive,), ()),
+        ("t [s],u [V]", (T, U), NOTHING, (none,), (drive,), ()),
         ("t [s],x [um]", (T, X), NOTHING, (f"drive.axis: which column? Free are none {which}",), (reading,), ()),
         ("t [s],x [um],i [A]", (T, X, U), NOTHING, (f"drive.axis: which column? Free are i [A] {which}",), (reading,), ("i [A]",)),
         ("t [s],u [V],x [um],i [A]", (T, U, X, X + 1), NOTHING, (), (drive, reading), ("i [A]",)),

@@ -26,6 +26,7 @@ from ctrlgen.recordings.look.proposed_file import recording_toml
 from ctrlgen.reporting.numbers import number
 
 MOST_GAPS = 3  # that are listed
+MOST_COLUMNS = 40  # of a table that are listed
 
 
 def look(
@@ -115,11 +116,15 @@ def print_table(facts: TableFacts) -> None:
     """One table: its rows and rate, its columns, what was interpreted, what is odd."""
     out.print(f"[bold]{escape(str(facts.table.path))}[/bold]: {_length(facts)}", soft_wrap=True)
     shown = table_of(("column", "left"), ("unit", "left"), ("smallest", "right"), ("largest", "right"), ("", "left"))
-    for column in facts.columns:
+    for column in facts.columns[:MOST_COLUMNS]:
         shown.add_row(escape(column.name), escape(column.unit or "not stated"), *_numbers(facts, column))
     show_table(shown)
-    of_time = () if facts.time is None else facts.time.notes
-    for note in dict.fromkeys((*facts.table.notes, *of_time, *(note for c in facts.columns for note in c.notes))):
+    if more := facts.columns[MOST_COLUMNS:]:
+        told = f"  and {number_of(len(more), 'more column')}, {more[0].name} to {more[-1].name}"
+        out.print(told, markup=False, soft_wrap=True)
+    of_time, time = ((), "") if facts.time is None else (facts.time.notes, facts.time.column)
+    of_columns = (note for c in facts.columns if c.name != time for note in c.notes)
+    for note in dict.fromkeys((*facts.table.notes, *of_time, *of_columns)):
         out.print(f"  read: {note}", markup=False, soft_wrap=True)
     for question in (c.question for c in facts.columns if c.question is not None):
         out.print(f"  to be answered: {question.asked(layout_option)}", markup=False, soft_wrap=True)

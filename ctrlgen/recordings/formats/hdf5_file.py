@@ -11,6 +11,7 @@ from ctrlgen.core.counts import number_of
 from ctrlgen.recordings.formats.checked_files import check_size, fault, package
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
 from ctrlgen.recordings.formats.nested_columns import columns_of
+from ctrlgen.recordings.formats.stated_rate import rate_of
 from ctrlgen.recordings.formats.unapplied import unapplied
 from ctrlgen.recordings.formats.written_layout import Layout
 
@@ -28,7 +29,12 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
     units: dict[str, str] = {}
     notes: list[str] = []
 
+    beside: list[tuple[str, Any]] = []
+
     def visit(name: str, node: Any) -> None:
+        beside.extend((key, _attribute(node, key)) for key in node.attrs)
+        if isinstance(node, h5py.Dataset) and node.shape == () and node.dtype.kind in "iuf":
+            beside.append((name.rpartition("/")[2], node[()]))
         if not isinstance(node, h5py.Dataset) or name.startswith("#") or not _may_be_columns(h5py, node.dtype):
             return
         if node.external or node.is_virtual:
@@ -48,8 +54,12 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
                 units[column.name] = str(unit)
 
     with h5py.File(path, "r") as file:
+        beside.extend((key, _attribute(file, key)) for key in file.attrs)
         file.visititems(visit)
-    return {"data": MeasurementTable(path, columns, units, notes=tuple(dict.fromkeys(notes)), missing=layout.missing)}
+    said = tuple(dict.fromkeys(notes))
+    return {
+        "data": MeasurementTable(path, columns, units, notes=said, missing=layout.missing, stated_rate=rate_of(beside))
+    }
 
 
 def _may_be_columns(h5py: Any, dtype: Any) -> bool:

@@ -6,7 +6,8 @@ import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
-from ctrlgen.recordings.formats.number_cells import is_number
+from ctrlgen.recordings.formats.number_cells import is_number, is_reading
+from ctrlgen.recordings.formats.time_stamps import TIME_NAME
 from ctrlgen.recordings.formats.unit_texts import is_unit_cell, is_unit_row, split_name, unit_of
 
 NAME_LABELS = {"name", "names", "trace name", "channel name", "signal name"}
@@ -22,8 +23,9 @@ FACTOR_LABELS = {
     "skalierung",
     "verst\u00e4rkung",
 }
-UNIT_LABELS = {"unit", "units", "einheit", "einheiten", "vunit"}
+UNIT_LABELS = {"unit", "units", "einheit", "einheiten", "vunit", "vertical units", "y_unit_label"}
 DATES = re.compile("time|date|zeit|datum", re.IGNORECASE)
+MOST_PASSED = 3  # lines that hold neither names nor units and are shown
 LONGEST_SHOWN = 60  # characters of a line that a note shows
 
 
@@ -57,8 +59,17 @@ def names_and_units(candidates: Sequence[tuple[int, list[str]]], numeric: Collec
     if not candidates:
         return Header(())
     labels = {cells[0].rstrip(":").lower(): n for n, (_, cells) in reversed(list(enumerate(candidates)))}
-    at = next((labels[word] for word in UNIT_LABELS if word in labels), None)
+    stating = (labels[word] for word in UNIT_LABELS if word in labels)
+    at = next((n for n in stating if any(map(unit_of, candidates[n][1][1:]))), None)
     names_at = next((labels[word] for word in NAME_LABELS if word in labels and at is not None), None)
+    nearest = candidates[0][1]
+    if (
+        at
+        and names_at is None
+        and TIME_NAME.match(nearest[0])
+        and not any(cell and is_reading(cell) for cell in nearest)
+    ):
+        names_at = 0  # of an oscilloscope: its settings stand above the names, units among them
     if at is None:
         at = next(
             (
@@ -93,10 +104,14 @@ def names_and_units(candidates: Sequence[tuple[int, list[str]]], numeric: Collec
     passed = [(k + 1, c) for n, (k, c) in enumerate(candidates[: max(names_at, at or 0)]) if n not in (names_at, at)]
     notes += [
         f"line {k} ({_shown(cells)}) is not applied: write its factors as `scale` of the columns"
-        if of_factors(cells)
-        else f"line {k} ({_shown(cells)}) holds neither names nor units"
         for k, cells in passed
+        if of_factors(cells)
     ]
+    others = [(k, cells) for k, cells in passed if not of_factors(cells)]
+    if len(others) > MOST_PASSED:
+        notes.append(f"lines {', '.join(str(k) for k, _ in reversed(others))} hold neither names nor units")
+    else:
+        notes += [f"line {k} ({_shown(cells)}) holds neither names nor units" for k, cells in others]
     found = _grouped(names, above)
     if found == names and at is not None and _is_text(above):
         notes.append(f"above them stands {', '.join(filter(None, above))}")

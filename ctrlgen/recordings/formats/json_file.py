@@ -8,7 +8,8 @@ from typing import Any
 
 from ctrlgen.recordings.formats.checked_files import fault
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
-from ctrlgen.recordings.formats.nested_columns import collected, columns_of
+from ctrlgen.recordings.formats.nested_columns import collected, columns_of, numbers_beside
+from ctrlgen.recordings.formats.stated_rate import rate_of
 from ctrlgen.recordings.formats.text_encoding import decoded
 from ctrlgen.recordings.formats.written_layout import Layout
 
@@ -42,7 +43,15 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
     content = _as_columns(content)
     columns, units, aliases, said = collected(columns_of(content))
     return {
-        "data": MeasurementTable(path, columns, units, notes=(*notes, *said), aliases=aliases, missing=layout.missing)
+        "data": MeasurementTable(
+            path,
+            columns,
+            units,
+            notes=(*notes, *said),
+            aliases=aliases,
+            missing=layout.missing,
+            stated_rate=rate_of(numbers_beside(content)),
+        )
     }
 
 

@@ -36,10 +36,12 @@ def columns_of(value: Any, name: str = "", joint: str = ".") -> Iterator[Nested]
         key = next((k for k in VALUES if k in value and _is_numeric(value[k])), None)
         for member, content in value.items():
             path = f"{name}{joint}{member}" if name else str(member)
+            unit = next((value[u] for u in UNITS if isinstance(value.get(u), str)), None)
             if label is not None and member == key:
                 group = name.rpartition(joint)[0] if name.endswith("]") else name
-                unit = next((value[u] for u in UNITS if isinstance(value.get(u), str)), None)
                 yield from _labelled(content, path, f"{group}{joint}{label}" if group else label, unit)
+            elif unit is not None and member == key:  # named by what it stands in
+                yield from _labelled(content, path, name, unit)
             else:
                 yield from columns_of(content, path, joint)
         return
@@ -48,6 +50,19 @@ def columns_of(value: Any, name: str = "", joint: str = ".") -> Iterator[Nested]
             yield from columns_of(member, f"{name}[{k}]", joint)
         return
     yield from _vectors(value, name, joint)
+
+
+def numbers_beside(value: Any) -> Iterator[tuple[str, float]]:
+    """Every single number in nested structures, by its own name: `dt` and `Fs` stand beside columns."""
+    for name, content in value.items() if isinstance(value, Mapping) else ():
+        if isinstance(content, Mapping):
+            yield from numbers_beside(content)
+        elif (
+            isinstance(content, (int, float, np.ndarray))
+            and np.size(content) == 1
+            and np.asarray(content).dtype.kind in "iuf"
+        ):
+            yield str(name), float(np.asarray(content).ravel()[0])
 
 
 def _labelled(content: Any, path: str, label: str, unit: str | None) -> Iterator[Nested]:

@@ -12,7 +12,7 @@ from ctrlgen.recordings.formats.layout_question import Ambiguous
 
 HUGE = 9e29  # no reading in any unit: SCPI says 9.9e37 and 9.91e37, others 1e30, 1e31, 1e38, the largest float and infinity
 COUNTS = (-9999, 9999, -99999, 99999, -999, -9999.99, 99999.9, 999999, -999999, 9999999, -32768, 32767, 65535, -2147483648, 2147483647,
-          4294967295, 8388607, -8388608, 16777215, -999.25, -1e20, 1e20)  # fmt: skip
+          4294967295, 8388607, -8388608, 16777215, -999.25, -1e10, 1e10, -1e20, 1e20)  # fmt: skip
 """Numbers that loggers and converters write for none; some are readings, so they count only where they are far from all else."""
 NINES = re.compile(r"-?9+\.?9*")
 FEWEST_NINES = 4  # of a number that fills the display of a sensor: 99.99

@@ -13,6 +13,7 @@ from ctrlgen.recordings.formats.measurement_table import MeasurementTable
 from ctrlgen.recordings.formats.unit_texts import bare_name
 
 FRACTIONS = (
+    (re.compile(r"fraction(al)?([ _]?(secs?|seconds?))?|frac[ _]?secs?", re.IGNORECASE), 1.0),
     (re.compile(r"(ms|msecs?|millis?|milli(tm|secs?|seconds?))", re.IGNORECASE), 1e3),
     (re.compile(r"(us|usecs?|micros?|micro(secs?|seconds?))", re.IGNORECASE), 1e6),
     (re.compile(r"(ns|nsecs?|nanos?|nano(secs?|seconds?))", re.IGNORECASE), 1e9),
@@ -45,6 +46,7 @@ def _joined(table: MeasurementTable, before: str, name: str, size: float) -> np.
         return None
     parts = np.all(whole == np.round(whole)) and over.min() >= 0 and over.max() < size
     falls = np.diff(over) < 0
-    if not parts or not falls.any() or not np.all(np.diff(whole)[falls] > 0):
+    within = not falls.any() and np.ptp(whole) == 0 and np.all(np.diff(over) > 0)  # one second
+    if not parts or not (falls.any() or within) or not np.all(np.diff(whole)[falls] > 0):
         return None
     return np.asarray(np.round(whole + (over - over[0]) / size, 9))

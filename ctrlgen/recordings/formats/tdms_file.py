@@ -9,6 +9,7 @@ import numpy as np
 from ctrlgen.recordings.formats.checked_files import check_size, package
 from ctrlgen.recordings.formats.measurement_table import Clock, MeasurementTable
 from ctrlgen.recordings.formats.nested_columns import columns_of
+from ctrlgen.recordings.formats.stated_rate import rate_of
 from ctrlgen.recordings.formats.unapplied import unapplied
 from ctrlgen.recordings.formats.written_layout import Layout
 
@@ -44,9 +45,17 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
                         float(given.get("wf_start_offset", 0.0)),
                         float(given["wf_increment"]),
                     )
+    steps = {step for _, _, step in starts.values()}
+    rate = rate_of(("wf_increment", step) for step in steps) if len(steps) == 1 else None
     return {
         "data": MeasurementTable(
-            path, columns, units, clocks=_clocks(starts), notes=tuple(notes), missing=layout.missing
+            path,
+            columns,
+            units,
+            clocks=_clocks(starts),
+            notes=tuple(notes),
+            missing=layout.missing,
+            stated_rate=rate,
         )
     }
 

@@ -27,6 +27,8 @@ TRIED = [
 """Encodings that programs of loggers write beside those of Unicode; digits are the same in all of them."""
 WESTERN = frozenset("µ°²³±äöüßéèà·ÄÖÜ".encode("cp1252"))
 """Bytes of signs that units and German names are written with in cp1252, the encoding of Windows in Europe and America."""
+MSDOS = frozenset("µ°²±äöüßéèàÄÖÜ".encode("cp437"))
+"""The same in the encoding of MS-DOS, which some instruments keep: one byte of µ before a letter would be a Chinese sign."""
 SAMPLE = 200_000  # bytes at the head of a file, by which an encoding is known
 
 
@@ -84,6 +86,8 @@ def _eight_bits(content: bytes, first: int) -> str:
     sample = content[max(0, first - SAMPLE // 2) : first + SAMPLE // 2]
     if all(byte < 128 or byte in WESTERN for byte in set(sample)):
         return "cp1252"
+    if all(byte < 128 or byte in MSDOS for byte in set(sample)):
+        return "cp437"
     from charset_normalizer import from_bytes  # takes a moment to import
 
     best = from_bytes(sample, cp_isolation=TRIED).best()

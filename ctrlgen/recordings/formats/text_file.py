@@ -149,8 +149,20 @@ def _table(
         own_times={unique[k]: unique[time] for k, time in own.items()},
         style=style,
         missing=layout.missing,
-        stated_rate=stated_rate([lines[k] for k in block.above]),
+        stated_rate=stated_rate([*(lines[k] for k in block.above), *_entries(lines, block, separator)]),
     )
+
+
+def _entries(lines: Sequence[str], block: Block, separator: str) -> list[str]:
+    """What two lines above a table say one below the other, as `Increment = 1e-3`."""
+    rows = [cells_of(lines[k], separator) for k in block.above]
+    return [
+        f"{name} = {number}"
+        for names, numbers in pairwise(rows)
+        if len(names) == len(numbers)
+        for name, number in zip(names, numbers, strict=True)
+        if number_cells.is_number(number) and not number_cells.is_number(name)
+    ]
 
 
 def _between(lines: Sequence[str], rows: Sequence[int]) -> list[str]:

@@ -26,6 +26,9 @@ from ctrlgen.recordings.formats.written_layout import Layout
 
 HEAD = 20  # rows of a table by which its columns of numbers are known
 REMARKS = {"comment", "comments", "remark", "remarks", "note", "notes", ""}
+ENTRY = re.compile(r"\w+\s*=\s*\S+")
+"""A setting behind names: tInc = 1e-3."""
+QUOTED = re.compile(r"^'([^']*)'$")
 WORD_WITH_UNIT = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?")
 
 
@@ -85,8 +88,11 @@ def _ends_empty(lines: Sequence[str], block: Block, separator: str) -> bool:
 def _fitting(line: str, width: int, separator: str) -> list[str] | None:
     """The cells of a line above a table, as many as the table has columns; None for another line."""
     text = without_mark(line) if is_comment(line) else line
-    cells = cells_of(text, separator)
-    if len(cells) > width and (all(c.lower() in REMARKS for c in cells[width:]) or all(map(is_reading, cells[:width]))):
+    cells = [QUOTED.sub(r"\1", cell) for cell in cells_of(text, separator)]
+    beyond = cells[width:]
+    if beyond and (
+        all(c.lower() in REMARKS or ENTRY.fullmatch(c) for c in beyond) or all(map(is_reading, cells[:width]))
+    ):
         cells = cells[:width]
     if separator == " " and len(cells) == width + 1 and cells[0].lower() == "date":
         cells = [f"{cells[0]} {cells[1]}", *cells[2:]]

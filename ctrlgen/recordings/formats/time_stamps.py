@@ -40,7 +40,7 @@ EAST = {
 """Hours east of Greenwich of zones by their letters. Of those that two countries use only the difference to summer time matters here."""
 # of a column; _time as InfluxDB writes it
 TIME_NAME = re.compile(
-    r"^_*(t|ts|x_value|millis|micros|time|zeit|tijd|temps|tempo|timestamp|time.?stamp|clock|datetime|date|elapsed.*|sekunden|seconds?|secs?)(?![a-z])",
+    r"^_*(t|ts|x_value|millis|micros|time|zeit|tijd|temps|tempo|tiempo|\u0432\u0440\u0435\u043c\u044f|\u65f6\u95f4|\u6642\u9593|timestamp|time.?stamp|clock|datetime|date|elapsed.*|sekunden|seconds?|secs?)(?![a-z])",
     re.IGNORECASE,
 )
 PARTS = re.compile(r"(\d{1,4})[-./](\d{1,2})[-./](\d{1,4})", re.ASCII)

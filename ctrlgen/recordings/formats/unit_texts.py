@@ -13,10 +13,11 @@ RATE = re.compile(
 )
 """A unit with a stroke of its own, after a blank or the stroke of DIN 1313: speed rad/s, v / mm/s. The second is no unit of its own."""
 SLASH = re.compile(r"^(?P<name>.*?\S)\s*/\s*(?P<unit>[^\s/]{1,8})$")  # of DIN 1313: U / mV
-PLAIN = re.compile(
-    r"^(?P<name>.*[^\W_])(?:[_\s]+|\s+in\s+)(?P<unit>[mun\u00b5\u03bc]s|[mun\u00b5\u03bcp]m|[mkun\u00b5\u03bc][VA]|[mun\u00b5\u03bc]rad|rad|deg[CF]?|[kM]?Hz)$"
-)
+SURE = r"[mun\u00b5\u03bc]s|[mun\u00b5\u03bcp]m|[mkun\u00b5\u03bc][VA]|[mun\u00b5\u03bc]rad|rad|deg[CF]?|[kM]?Hz"
+PLAIN = re.compile(rf"^(?P<name>.*[^\W_])(?:[_\s]+|\s+in\s+)(?P<unit>{SURE})$")
 """A unit after a blank or an underscore, of those that are no usual end of a name: time_ms, but not x_m or phase A."""
+AFTER_MARK = re.compile(r"^(?P<name>.*[^\W_][)\]]?)(?:\s*[,:|]\s*|\s+[-\u2013\u2014]\s+)(?P<unit>[^\W\d_]{1,4})$")
+"""The same after a comma, as GOST 2.105 writes it, a colon, a bar, or a dash between blanks: `voltage, V`."""
 BESIDE = re.compile(
     r"(?P<unit>[^\W\d]\w*)\s*[*x\u00d7]\s*(?=\d)[\d.eE^+-]+|[*x\u00d7]\s*(?=\d)[\d.eE^+-]+\s*(?P<behind>[^\W\d]\w*)"
 )
@@ -32,11 +33,14 @@ WORDS = {
     "rpm": "rpm", "r/min": "rpm", "rev/min": "rpm", "u/min": "rpm", "rev": "turn", "revs": "turn", "rev/s": "turn/s", "rps": "turn/s",
     "dps": "deg/s", "%fs": "percent", "% fs": "percent", "%f.s.": "percent", "pct": "percent", "\u00e5": "angstrom",
     "n.m": "N*m", "torr": "torr", "ohms": "ohm", "radian": "rad", "radians": "rad", "hz": "Hz", "khz": "kHz", "%": "percent",
+    "millisekunden": "ms", "mikrometer": "um", "nanometre": "nm", "millivolts": "mV",
+    "\u0441": "s", "\u043c\u0441": "ms", "\u043c\u043a\u0441": "us", "\u0432": "V", "\u043c\u0432": "mV", "\u043c\u043a\u043c": "um",
+    "\u043d\u043c": "nm", "\u043c\u043c": "mm", "\u0433\u0446": "Hz",
 }  # fmt: skip
 LETTERS = {
     "C": "degC", "g": "g_0", "mil": "thou", "mils": "thou",  # of a log: neither coulombs nor grams nor a mil of angle
     "Gs": "gauss", "as": "arcsecond", "px": "pixel", "ue": "microstrain", "\u00b5": "um", "\u03bc": "um", "Ohm": "ohm",
-    "S": "s", "MS": "ms", "US": "us", "MM": "mm", "UM": "um", "MV": "mV", "MA": "mA",  # in capitals: no log is in siemens or megavolts
+    "S": "s", "MS": "ms", "US": "us", "MM": "mm", "Mm": "mm", "UM": "um", "MV": "mV", "MA": "mA",  # no log is in siemens, MV or Mm
     "Nm": "N*m", "mNm": "mN*m", "Ncm": "N*cm", "Nmm": "N*mm", "kNm": "kN*m",
 }  # fmt: skip
 SCALED = re.compile(r"(?P<number>\d*\.?\d+(?:[eE][+-]?\d{1,2})?|10\^[+-]?\d{1,2})\s*[*\u00b7]?\s*(?P<unit>[^\W\d].*)")
@@ -152,9 +156,18 @@ def split_name(name: str) -> tuple[str, str | None]:
         return match["name"].removesuffix(" in").strip(), match["unit"]
     if match := RATE.match(name):
         return match["name"].removesuffix(" in").strip(), match["unit"]
+    if (match := AFTER_MARK.match(name)) and _is_sure(match["unit"]):
+        return match["name"].strip(), match["unit"]
     if (match := SLASH.match(name)) and match["unit"] not in LETTERS_OF_NAMES and is_unit_cell(match["unit"]):
         return match["name"].strip(), match["unit"]
     return name, None
+
+
+def _is_sure(unit: str) -> bool:
+    """Whether letters behind a mark are a unit and no usual end of a name, such as the A of a phase."""
+    return (
+        bool(re.fullmatch(SURE, unit)) or unit in ("s", "V", "N") or (not unit.isascii() and unit_of(unit) is not None)
+    )
 
 
 def _is_of_a_node(name: str, unit: str) -> bool:

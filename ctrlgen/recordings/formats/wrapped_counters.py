@@ -16,6 +16,12 @@ DIFFERENT = 16  # counts, with their sign, from which they are a motion about ze
 SLOW = 10.0  # usual steps that such a motion spans at least
 
 
+AGAIN = {2.0**bits: f"its counter of {bits} bits" for bits in (16, 24, 32)} | {
+    size: f"it counts to {size:g} and" for size in (60.0, 1e3, 3600.0, 6e4, 86400.0, 1e6, 3.6e6, 8.64e7)
+}
+"""After how much a clock begins again: a counter, or what is over whole seconds, minutes, hours and days, in s and parts of it."""
+
+
 class Wrapped(NamedTuple):
     """A range after which numbers begin again, in words, and the rows before which they do; whether they are `signed` counts that were
     written without their sign."""
@@ -89,21 +95,21 @@ def _range(y: np.ndarray, low: float, high: float) -> tuple[float, str]:
 
 
 def unwrapped_clock(values: np.ndarray, first: float) -> tuple[np.ndarray, str]:
-    """The whole numbers (n,) of a clock since its `first`, without the falls where its counter of 16 or 32 bits began again, and a note; as
-    they are where it did not.
+    """The numbers (n,) of a clock since its `first`, without the falls where it began again (`AGAIN`), and a note; as they are where it
+    did not.
 
     Only where it goes on by its usual step. A clock that begins at zero may be a second record instead, and is left.
     """
     steps = np.diff(values)
     falls = np.flatnonzero(steps < 0)
-    if not len(falls) or not np.all(np.isfinite(values)) or np.any(values != np.round(values)):
+    if not len(falls) or not np.all(np.isfinite(values)):
         return values, ""
     usual = float(np.median(steps))
-    bits = next((b for b in (16, 32) if np.all(np.abs(steps[falls] + 2.0**b - usual) <= EVEN * usual)), 0)
-    if not bits or not usual > 0 or first <= usual:
+    size = next((size for size in AGAIN if np.all(np.abs(steps[falls] + size - usual) <= EVEN * usual)), 0.0)
+    if not size or not usual > 0 or first <= usual:
         return values, ""
     turns = np.zeros(len(values))
-    turns[falls + 1] = 2.0**bits
-    note = f"its counter of {bits} bits begins again before row {falls[0] + 1}"
+    turns[falls + 1] = size
+    note = f"{AGAIN[size]} begins again before row {falls[0] + 1}"
     note += f" and {len(falls) - 1} more times" if len(falls) > 1 else ""
     return values + np.cumsum(turns), f"{note}: time goes on evenly"

@@ -21,7 +21,8 @@ CLOCKS = {
     "millis": "ms", "micros": "us", "ms": "ms", "us": "us", "msec": "ms", "usec": "us", "milliseconds": "ms", "microseconds": "us",
     "s": "s", "sec": "s", "secs": "s", "second": "s", "seconds": "s", "sekunden": "s", "x_value": "s",
 }  # fmt: skip
-"""Names of columns that are units of time, of microcontrollers and LabVIEW among others; those of two letters as they stand: Us is a voltage."""
+"""Names of columns that are units of time, of microcontrollers and LabVIEW among others, or their last words; those of two letters as they
+stand: Us is a voltage."""
 RATE_SUFFIX = re.compile(
     r"^.*[A-Za-z0-9)][_.](?P<of>[mun]?m|[mu]?rad|deg)_(?:per_)?s(?P<square>2?)$"
 )  # of a name: v_mm_s, qdd_rad_s2
@@ -43,6 +44,7 @@ NEWEST_FIRST = (
 )
 SLOW_CLOCK = 0.6  # share of rows in which a drive stands still from which it steps by a slower clock
 LONG_STEP = 0.05  # s: a time without a unit that goes on by more is rather one in ms, of a rate below 20 kHz. Judgement
+EVEN = 0.01  # of a step: rounding of a time that rises evenly
 SAME_RATE = 0.01  # of a rate: a time and a header that differ by less say the same
 SMOOTH = 0.1  # median of second differences over that of first ones, of a drive that is a curve and no steps
 
@@ -202,6 +204,9 @@ def _suffix(name: str) -> str | None:
     none is taken."""
     if (clock := CLOCKS.get(name if len(name) == len("ms") else name.lower())) is not None:
         return clock
+    tail = re.split(r"[_.]|(?<=[a-z])(?=[A-Z])", name)[-1].lower()
+    if tail != name.lower() and len(tail) > 1 and tail in CLOCKS:  # t_millis, timeMs
+        return CLOCKS[tail]
     if rate := RATE_SUFFIX.match(name):
         return f"{rate['of']}/s" + ("^2" if rate["square"] else "")
     match = SUFFIX.match(name)
@@ -257,6 +262,12 @@ def is_a_time(column: ColumnFacts) -> bool:
     named = TIME_NAME.match(column.bare) or TIME_NAME.match(column.last)
     timed = column.unit is None or same_dimension(column.unit, "s")
     return bool(named) and timed and column.moves and bool(np.all(np.diff(column.finite) > 0))
+
+
+def rises_evenly(column: ColumnFacts) -> bool:
+    """Whether numbers rise by one and the same step from row to row, as a time or a number of the row does."""
+    steps = np.diff(column.finite)
+    return column.moves and bool(np.all(steps >= 0) and np.ptp(steps) <= EVEN * np.median(steps))
 
 
 def assumed_step(facts: TableFacts) -> float:

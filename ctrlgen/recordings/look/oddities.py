@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from ctrlgen.core.counts import number_of
+from ctrlgen.core.errors import InputError
 from ctrlgen.core.units import from_si, to_si
 from ctrlgen.model.model import Model
 from ctrlgen.recordings.alike_units import alike
 from ctrlgen.recordings.formats.time_stamps import TIME_NAME
-from ctrlgen.recordings.look.column_facts import TableFacts
+from ctrlgen.recordings.look.column_facts import ColumnFacts, TableFacts, rises_evenly
 from ctrlgen.recordings.look.signal_words import COMMAND_WORDS, words_of
 
 WIDE = 5.0  # times the device's own size: no reading of it is as large
 NARROW = 1e-4  # of it: nothing moved, or the unit is another
 FITTING = (0.02, 2.5)  # of the device's size: a reading of it usually spans so much
-EVEN = 0.01  # of a step: rounding of a time that rises evenly
 
 
 def table_oddities(facts: TableFacts) -> list[str]:
@@ -44,23 +44,34 @@ def table_oddities(facts: TableFacts) -> list[str]:
 
 def _perhaps_times(facts: TableFacts) -> list[str]:
     """Of a table without a time: columns that are named as one and stand still between rows, else those that rise evenly."""
-    rising = [c for c in facts.columns if c.moves and c.values is not None and bool(np.all(np.diff(c.finite) >= 0))]
     said = []
-    for column in (c for c in rising if TIME_NAME.match(c.bare)):
-        steps = np.diff(column.finite)
-        said.append(
-            f"{column.name}: stands still in {np.sum(steps == 0)} of {len(steps)} rows: rounded too coarsely to be a time; where rows "
-            f"are even, leave it out and write their rate (1 row in {np.mean(steps):.6g} {column.unit or 'of its unit'})"
-        )
-    for column in () if said else rising:
-        steps = np.diff(column.finite)
-        if np.ptp(steps) <= EVEN * np.median(steps):
-            said.append(f"{column.name}: rises by {np.median(steps):.6g} from row to row: name it as the time if it is")
-    return said
+    for column in facts.columns:
+        named = TIME_NAME.match(column.bare) is not None
+        seconds = column.finite if column.values is not None else _dates(facts, column) if named else np.empty(0)
+        steps = np.diff(seconds)
+        if named and len(steps) and np.all(steps >= 0) and np.any(steps > 0):
+            unit = column.unit or ("of its unit" if column.values is not None else "s")
+            said.append(
+                f"{column.name}: stands still in {np.sum(steps == 0)} of {len(steps)} rows: rounded too coarsely to be a time; where rows "
+                f"are even, leave it out and write their rate (1 row in {np.mean(steps):.6g} {unit})"
+            )
+    return said or [
+        f"{c.name}: rises by {np.median(np.diff(c.finite)):.6g} from row to row: name it as the time if it is"
+        for c in facts.columns
+        if rises_evenly(c)
+    ]
+
+
+def _dates(facts: TableFacts, column: ColumnFacts) -> np.ndarray:
+    """The seconds of a column of dates; empty where it holds none."""
+    try:
+        return facts.table.time(column.name, "s").values
+    except InputError:
+        return np.empty(0)
 
 
 def _alike(facts: TableFacts) -> list[tuple[str, str]]:
-    moving = [c for c in facts.columns if c.moves]
+    moving = [c for c in facts.columns if c.moves and c.name not in facts.table.time_parts]
     return [
         (a.name, b.name)
         for k, b in enumerate(moving)

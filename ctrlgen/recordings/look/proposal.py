@@ -18,15 +18,14 @@ from ctrlgen.model.model import Model
 from ctrlgen.recordings.alike_units import size_of
 from ctrlgen.recordings.look.answers import NOTHING, Answers, layout_option
 from ctrlgen.recordings.look.column_facts import (
-    NEWEST_FIRST,
     ColumnFacts,
     TableFacts,
     between_samples,
-    assumed_step,
     is_a_count,
     is_a_time,
     named,
 )
+from ctrlgen.recordings.look.file_questions import free_columns, perhaps_times, time_questions, with_own_rate
 from ctrlgen.recordings.look.oddities import fitting_units, implausible_range
 from ctrlgen.recordings.look.signal_words import DRIVE_WORDS, READING_WORDS, words_of
 from ctrlgen.recordings.moved import Stretch, moved_of
@@ -58,8 +57,6 @@ NAMED = 1.0
 """Likeness from which more than the want of another column speaks for one."""
 CLEAR = 1.0
 """How much more alike the chosen column must be than the next best that is free, to be certain."""
-MOST_LISTED, MOST_UNREAD = 12, 3
-"""Columns that a question lists: of numbers, and of text."""
 MOST_POSES = 500
 """Rows without a time that are taken for poses."""
 
@@ -147,9 +144,11 @@ def propose(tables: Sequence[TableFacts], model: Model, answers: Answers = NOTHI
     """The recording that files with the same columns are of a device. Its first file decides which column is what, where `answers` do
     not; they name what `tables` were read with. Raises InputError for an answer that names no signal or column."""
     first = tables[0]
+    answers = with_own_rate(first, answers)
     taken = {c.name for c in first.columns if first.time is not None and (c.name == first.time.column or is_a_time(c))}
     taken |= {first.falls} if first.falls else set()
     taken |= first.table.time_parts | {c.name for c in first.columns if is_a_count(c)}
+    taken |= perhaps_times(model, first, taken) if first.time is None else set()
     columns = [c for c in first.columns if c.moves and c.name not in taken]
     signals = [name for name in signal_units(model) if name.partition(".")[0] in ("drive", "reading")]
     chosen = _chosen(model, first, signals, answers)
@@ -159,47 +158,21 @@ def propose(tables: Sequence[TableFacts], model: Model, answers: Answers = NOTHI
     found = {match.signal for match in matches}
     left = [c.name for c in columns if c.name not in {m.column for m in matches}]
     asked = [
-        f"{name}: which column? Free are {_free(first, left)} ({shlex.join(['--column', f'{name}=COLUMN'])})"
+        f"{name}: which column? Free are {free_columns(first, left)} ({shlex.join(['--column', f'{name}=COLUMN'])})"
         for name in signals
         if name.startswith("drive.") and name not in found
     ]
     if not any(name.startswith("reading.") for name in found):
         known = next(name for name in signals if name.startswith("reading."))
-        which = f"Free are {_free(first, left)} ({shlex.join(['--column', f'{known}=COLUMN'])})"
+        which = f"Free are {free_columns(first, left)} ({shlex.join(['--column', f'{known}=COLUMN'])})"
         asked.append(f"no column was recognised as a reading: which is it? {which}")
-    asked += _of_time(first, answers)
+    asked += time_questions(first, answers)
     if any(name not in found for name in signals):  # which an unread column may be
         asked += [c.question.asked(layout_option) for c in first.columns if c.question is not None]
     _check_lengths(first, matches)
     remarks = _remarks(model, first, matches, answers)
     left = [c.name for c in first.columns if c.moves and c.name not in {*taken, *(m.column for m in matches)}]
     return Proposal(model, tuple(tables), tuple(matches), tuple(left), tuple(asked), tuple(remarks), answers)
-
-
-def _free(facts: TableFacts, left: Sequence[str]) -> str:
-    """The columns of numbers that no signal is, with their units, and what keeps those of text from being read."""
-    columns = [facts.column(name) for name in left[:MOST_LISTED]]
-    free = [f"{c.name} [{c.unit}]" if c.unit and c.bare == c.name else c.name for c in columns]
-    free += [f"{len(left) - MOST_LISTED} more"] if len(left) > MOST_LISTED else []
-    time = "" if facts.time is None else facts.time.column
-    unread = [c for c in facts.columns if c.unread and c.name != time]
-    return "; ".join([", ".join(free) or "none", *(c.unread for c in unread[:MOST_UNREAD])])
-
-
-def _of_time(facts: TableFacts, answers: Answers) -> list[str]:
-    """What is asked of when the rows were taken."""
-    stated, known = facts.table.stated_rate, answers.rate is not None or answers.poses
-    says = "" if stated is None else f"the file says {stated[0]!r} (--rate {stated[1]:.9g}Hz"
-    if facts.falls:
-        return [f"time is column {facts.falls!r}, which {NEWEST_FIRST}"]
-    if facts.time is None and not known:
-        otherwise = 'state sample_rate, or kind = "poses" (--time COLUMN, --rate 1kHz or --poses)'
-        return [f"no column is a time: {f'{says}, else --time COLUMN or --poses)' if says else otherwise}"]
-    if facts.time is not None and not known and (step := assumed_step(facts)):
-        name = facts.time.column
-        assumed = f"the file states no unit, s is assumed, {step:g} s from row to row ({shlex.join(['--unit', f'{name}=s'])})"
-        return [f"time is column {name!r}: {assumed}" + (f"; but {says})" if says else "")]
-    return []
 
 
 def _check_lengths(facts: TableFacts, matches: Sequence[Match]) -> None:

@@ -13,6 +13,9 @@ from ctrlgen.recordings.look.column_facts import NOISE_REST, TableFacts, rests
 from ctrlgen.recordings.look.proposal import Proposal
 from ctrlgen.recordings.settled_readings import settled
 
+MOST_LEFT = 20
+"""Columns that are not used and are listed."""
+
 
 def recording_toml(proposal: Proposal, folder: Path, title: str) -> str:
     """The text of a recording.toml in `folder`, with comments where something is assumed."""
@@ -34,7 +37,9 @@ def recording_toml(proposal: Proposal, folder: Path, title: str) -> str:
     for match in proposal.matches:
         why = f" # {'; '.join(match.why)}" if match.why else ""
         lines.append(f'"{match.signal}" = {_column(proposal.tables[0], match.column, match.unit)}{why}')
-    lines += [f"# not used: {', '.join(proposal.left)}"] if proposal.left else []
+    more = len(proposal.left) - MOST_LEFT
+    unused = [*proposal.left[:MOST_LEFT], *([f"{more} more"] if more > 0 else [])]
+    lines += [f"# not used: {', '.join(unused)}"] if unused else []
     lines += [f"# to be answered: {question}" for question in proposal.missing]
     lines += [f"# odd: {remark}" for remark in proposal.remarks]
     # names of columns stand in comments, too, where nothing escapes what is not shown

@@ -1,0 +1,69 @@
+"""What is asked of measurement files beside a device: which free column a signal is, and when the rows were taken."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ctrlgen.model.model import Model
+from ctrlgen.recordings.formats.number_cells import TIME
+from ctrlgen.recordings.look.answers import Answers
+from ctrlgen.recordings.look.column_facts import NEWEST_FIRST, ColumnFacts, TableFacts, assumed_step, rises_evenly
+from ctrlgen.recordings.look.signal_words import DRIVE_WORDS, READING_WORDS, words_of
+
+MOST_LISTED, MOST_UNREAD = 12, 3
+"""Columns that a question lists: of numbers, and of text."""
+
+
+def with_own_rate(facts: TableFacts, answers: Answers) -> Answers:
+    """The answers with the rate of a table without a time whose format states one clock of all its channels, as waveforms of LabVIEW do."""
+    steps = {clock.step for clock in facts.table.clocks.values()}
+    known = facts.time is not None or facts.falls or answers.rate is not None or answers.poses
+    whole = facts.table.clocks.keys() >= {c.name for c in facts.columns if c.moves}
+    return replace(answers, rate=f"{1 / steps.pop():.9g} Hz") if not known and whole and len(steps) == 1 else answers
+
+
+def perhaps_times(model: Model, facts: TableFacts, taken: set[str]) -> set[str]:
+    """The first column that rises evenly without a unit or a word of a signal, where enough others are left: the time or a number of the
+    row of a table that names none, and rather no drive."""
+    moving = [c for c in facts.columns if c.moves and c.name not in taken]
+    words = DRIVE_WORDS | READING_WORDS
+    rising = [c.name for c in moving if c.unit is None and not words_of(c.bare) & words and rises_evenly(c)]
+    return set(rising[:1]) if len(moving) > 1 + len(model.signals["drive"].channels) else set()
+
+
+def free_columns(facts: TableFacts, left: Sequence[str]) -> str:
+    """The columns of numbers that no signal is, with their units, and what keeps those of text from being read."""
+    columns = [facts.column(name) for name in left[:MOST_LISTED]]
+    free = [f"{c.name} [{c.unit}]" if c.unit and c.bare == c.name else c.name for c in columns]
+    free += [f"{len(left) - MOST_LISTED} more"] if len(left) > MOST_LISTED else []
+    time = "" if facts.time is None else facts.time.column
+    unread = [c for c in facts.columns if c.unread and c.name != time and _of_digits(facts, c)]
+    return "; ".join([", ".join(free) or "none", *(c.unread for c in unread[:MOST_UNREAD])])
+
+
+def _of_digits(facts: TableFacts, column: ColumnFacts) -> bool:
+    """Whether every cell of a column of text holds digits and none is a date: numbers written otherwise, and no remarks."""
+    cells = [str(cell) for cell in facts.table.columns[column.name]]
+    return all(any(c.isdigit() for c in cell) and not TIME.fullmatch(cell) for cell in cells)
+
+
+def time_questions(facts: TableFacts, answers: Answers) -> list[str]:
+    """What is asked of when the rows were taken."""
+    stated, known = facts.table.stated_rate, answers.rate is not None or answers.poses
+    says = "" if stated is None else f"the file says {stated[0]!r} (--rate {stated[1]:.9g}Hz"
+    if facts.falls:
+        return [f"time is column {facts.falls!r}, which {NEWEST_FIRST}"]
+    if facts.time is None and not known:
+        rising = next((c for c in facts.columns if c.unit is None and rises_evenly(c)), None)
+        perhaps = shlex.join(["--time", "COLUMN" if rising is None else rising.name])
+        otherwise = f'state sample_rate, or kind = "poses" ({perhaps}, --rate 1kHz or --poses)'
+        return [f"no column is a time: {f'{says}, else {perhaps} or --poses)' if says else otherwise}"]
+    if facts.time is not None and not known and (step := assumed_step(facts)):
+        name = facts.time.column
+        assumed = (
+            f"the file states no unit, s is assumed, {step:g} s from row to row ({shlex.join(['--unit', f'{name}=s'])})"
+        )
+        return [f"time is column {name!r}: {assumed}" + (f"; but {says})" if says else "")]
+    return []
