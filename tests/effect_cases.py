@@ -179,7 +179,7 @@ class Law:
             a = f(memory)
             slope = h * ca.diag(ca.jacobian(a, memory))
             after = after + h * a * ca.if_else(slope < -1e-6, (ca.exp(slope) - 1) / slope, 1.0)
-        elif "rates" in vars(effect):
+        elif effect.rates is not Effect.rates:
             part = h / self.STEPS
             moving = memory
             for _ in range(self.STEPS):

@@ -17,6 +17,7 @@ from ctrlgen.trajectory.scenario import model_of
 
 NUMBERS = {
     "clock_offset": 'at = "all"\noffset = "2 ms"',
+    "asymmetric_slew_rate": 'at = "axis"\nshare = "1"\nrate = "250 V/s"\nexcess = "0.5"',
     "delay": 'at = "axis"\ndelay = "2 ms"',
     "slew_rate": 'at = "axis"\nshare = "1"\nrate = "250 V/s"',
     "warm_up": 'at = "axis"\nsize = "1 um"\ntau = "2 s"',
@@ -90,7 +91,7 @@ def test_the_rate_of_an_amplifier_is_a_limit_along_a_path(tmp_path):
 @every_law
 def test_a_path_is_followed(kind, tmp_path):
     """The pose is on the path; what of its reading grows with time is followed too."""
-    with_law(tmp_path, kind, 'at = "axis"\nshare = "1"\nrate = "4 V/ms"' if kind == "slew_rate" else None)
+    with_law(tmp_path, kind, NUMBERS[kind].replace("250 V/s", "4 V/ms"))
     solution = line(tmp_path)
     pose = solution.trace.signals["pose"][: len(solution.command), 0]
     assert pose == pytest.approx(solution.command[:, 0], abs=1e-13)

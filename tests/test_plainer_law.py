@@ -40,7 +40,7 @@ def test_laws_say_what_they_generalise():
     assert set(GENERAL) == {
         *("directional_friction", "stribeck", "asymmetric_hysteresis", "slack_friction"),
         *("asymmetric_displacement_hysteresis", "asymmetric_drive_hysteresis"),
-        "heater_resistance_of_second_order",
+        *("heater_resistance_of_second_order", "asymmetric_slew_rate"),
     }
 
 
