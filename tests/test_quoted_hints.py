@@ -32,7 +32,7 @@ def answered(questions) -> list[list[str]]:
 
 
 def test_names_with_blanks_commas_and_brackets_are_quoted_in_every_question(tmp_path):
-    (tmp_path / "log.csv").write_text('"t, ms";"u (drive) in, it\'s";"x, all"\n' + rows(";", K, U, X))
+    (tmp_path / "log.csv").write_text('"t, all";"u (drive) in, it\'s";"x, all"\n' + rows(";", K, U, X))
     proposal = propose([table_facts(read_table(tmp_path / "log.csv"))], build_model(load_device(STAGE)))
     words = [word for options in answered(proposal.asked) for word in options]
     name = proposal.tables[0].time.column

@@ -8,7 +8,7 @@ from typing import Any
 
 from ctrlgen.recordings.formats.checked_files import fault
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
-from ctrlgen.recordings.formats.nested_columns import collected, columns_of, numbers_beside
+from ctrlgen.recordings.formats.nested_columns import collected, columns_of, entries_beside
 from ctrlgen.recordings.formats.stated_rate import rate_of
 from ctrlgen.recordings.formats.text_encoding import decoded
 from ctrlgen.recordings.formats.written_layout import Layout
@@ -50,7 +50,7 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
             notes=(*notes, *said),
             aliases=aliases,
             missing=layout.missing,
-            stated_rate=rate_of(numbers_beside(content)),
+            stated_rate=rate_of(entries_beside(content)),
         )
     }
 

@@ -10,7 +10,7 @@ import scipy
 
 from ctrlgen.recordings.formats.checked_files import check_size, fault, package
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
-from ctrlgen.recordings.formats.nested_columns import collected, columns_of, numbers_beside
+from ctrlgen.recordings.formats.nested_columns import collected, columns_of, entries_beside
 from ctrlgen.recordings.formats.stated_rate import rate_of
 from ctrlgen.recordings.formats.written_layout import Layout
 
@@ -32,7 +32,7 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
     columns, units, aliases, notes = collected(columns_of(variables))
     if not columns and content:
         raise fault(path, f"holds no columns of numbers ({OBJECTS}); {REMEDY}")
-    rate = rate_of(numbers_beside(variables))
+    rate = rate_of(entries_beside(variables))
     table = MeasurementTable(
         path, columns, units, notes=notes, aliases=aliases, missing=layout.missing, stated_rate=rate
     )

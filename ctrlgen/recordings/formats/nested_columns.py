@@ -52,11 +52,13 @@ def columns_of(value: Any, name: str = "", joint: str = ".") -> Iterator[Nested]
     yield from _vectors(value, name, joint)
 
 
-def numbers_beside(value: Any) -> Iterator[tuple[str, float]]:
-    """Every single number in nested structures, by its own name: `dt` and `Fs` stand beside columns."""
+def entries_beside(value: Any) -> Iterator[tuple[str, Any]]:
+    """Every single number and text in nested structures, by its own name: `dt` and `Fs` stand beside columns."""
     for name, content in value.items() if isinstance(value, Mapping) else ():
         if isinstance(content, Mapping):
-            yield from numbers_beside(content)
+            yield from entries_beside(content)
+        elif isinstance(content, str):
+            yield str(name), content
         elif (
             isinstance(content, (int, float, np.ndarray))
             and np.size(content) == 1

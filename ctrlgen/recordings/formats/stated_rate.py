@@ -24,6 +24,7 @@ PERIOD, RATE = (
 )
 OWN_UNIT = re.compile(r"_(hz|khz|s|ms|us|ns)$")
 """A unit at the end of a key: sample_rate_hz."""
+REMARK = "#%/!; \t"
 RATES = ("fs", "f_s")
 """Names of variables that are a rate by convention, in Hz."""
 
@@ -37,7 +38,8 @@ def stated_rate(lines: Sequence[str]) -> tuple[str, float] | None:
             own = OWN_UNIT.search(what)
             unit = (match["unit"] or match["before"] or match["square"] or (own[1] if own else "")).lower()
             rate = RATE_UNIT.fullmatch(unit)
-            if number <= 0 or match["word"] or (unit and unit not in SECONDS and rate is None):
+            above = what == "rate" and line[: match.start()].strip(REMARK)  # another rate, such as that of a display
+            if number <= 0 or above or match["word"] or (unit and unit not in SECONDS and rate is None):
                 continue
             if rate is not None or (not unit and what != "rate" and what.endswith(RATE)):
                 return match[0].strip(), number * (MANY[rate[1]] if rate else 1.0)
@@ -46,13 +48,13 @@ def stated_rate(lines: Sequence[str]) -> tuple[str, float] | None:
     return None
 
 
-def rate_of(numbers: Iterable[tuple[str, Any]]) -> tuple[str, float] | None:
-    """The same of names and numbers that stand beside the columns of a structure: `dt`, `Fs`, `sample_rate`."""
-    for name, value in numbers:
+def rate_of(entries: Iterable[tuple[str, Any]]) -> tuple[str, float] | None:
+    """The same of names and numbers or texts that stand beside the columns of a structure: `dt`, `Fs`, `sample_rate`."""
+    for name, value in entries:
         try:
             line = f"{name} = {float(value):.12g}" + (" Hz" if name.lower() in RATES else "")
         except (TypeError, ValueError):
-            continue
+            line = f"{name} = {value}" if isinstance(value, str) else ""
         if (stated := stated_rate([line])) is not None:
             return line, stated[1]
     return None

@@ -271,16 +271,16 @@ def rises_evenly(column: ColumnFacts) -> bool:
 
 
 def assumed_step(facts: TableFacts) -> float:
-    """The step [s] of a time of which nothing tells the unit, where it counts whole numbers or goes on in long steps: it may be in ms,
-    ticks, or rows. 0 for any other."""
+    """The step [s] of a time without a stated unit that counts whole numbers or goes on in long steps: it may be in ms, ticks, or rows. 0
+    for any other, and for one in seconds that goes on as often as the file states."""
     if facts.time is None or facts.time.stamps:
         return 0.0
     column = facts.column(facts.time.column)
-    known = column.unit or epoch_unit(column.finite) or _unit_by_rate(facts.table, column)
-    if known is not None or clock_of(column.finite) is not None:
+    known = column.unit is not None or epoch_unit(column.finite) is not None or clock_of(column.finite) is not None
+    if known or _unit_by_rate(facts.table, column) == "s":
         return 0.0
     counts = bool(np.all(column.finite == np.round(column.finite)))
-    return facts.time.step if counts or facts.time.step >= LONG_STEP else 0.0
+    return facts.time.step if counts or facts.time.unit != "s" or facts.time.step >= LONG_STEP else 0.0
 
 
 def _unit_by_rate(table: MeasurementTable, column: ColumnFacts) -> str | None:

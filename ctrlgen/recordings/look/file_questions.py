@@ -9,7 +9,14 @@ from dataclasses import replace
 from ctrlgen.model.model import Model
 from ctrlgen.recordings.formats.number_cells import TIME
 from ctrlgen.recordings.look.answers import Answers
-from ctrlgen.recordings.look.column_facts import NEWEST_FIRST, ColumnFacts, TableFacts, assumed_step, rises_evenly
+from ctrlgen.recordings.look.column_facts import (
+    NEWEST_FIRST,
+    SAME_RATE,
+    ColumnFacts,
+    TableFacts,
+    assumed_step,
+    rises_evenly,
+)
 from ctrlgen.recordings.look.signal_words import DRIVE_WORDS, READING_WORDS, words_of
 
 MOST_LISTED, MOST_UNREAD = 12, 3
@@ -61,9 +68,10 @@ def time_questions(facts: TableFacts, answers: Answers) -> list[str]:
         otherwise = f'state sample_rate, or kind = "poses" ({perhaps}, --rate 1kHz or --poses)'
         return [f"no column is a time: {f'{says}, else {perhaps} or --poses)' if says else otherwise}"]
     if facts.time is not None and not known and (step := assumed_step(facts)):
-        name = facts.time.column
-        assumed = (
-            f"the file states no unit, s is assumed, {step:g} s from row to row ({shlex.join(['--unit', f'{name}=s'])})"
-        )
-        return [f"time is column {name!r}: {assumed}" + (f"; but {says})" if says else "")]
+        name, unit = facts.time.column, facts.time.unit
+        fits = stated is not None and abs(step * stated[1] - 1) < SAME_RATE
+        why = f", as {stated[0]!r} says" if stated is not None and fits else ""
+        answer = shlex.join(["--unit", f"{name}={unit}"])
+        assumed = f"the file states no unit, {unit} is assumed{why}, {step:g} s from row to row ({answer})"
+        return [f"time is column {name!r}: {assumed}" + (f"; but {says})" if says and not fits else "")]
     return []
