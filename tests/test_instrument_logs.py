@@ -159,7 +159,7 @@ def test_a_stated_rate_is_that_of_its_unit_and_none_where_the_unit_is_not_known(
         assert rate_of([("title", "a"), (name, value)])[1] == pytest.approx(1e3), name
 
 
-def test_rates_beside_columns_of_structures_are_offered_and_clocks_of_waveforms_are_no_question(tmp_path, facts, axis):
+def test_rates_beside_columns_are_offered_and_clocks_of_waveforms_are_no_question(tmp_path, facts, axis, capsys):
     seen = facts(json.dumps({"dt": 1e-3, "u": U.tolist(), "x": X.tolist()}), "log.json")
     assert any("the file says 'dt = 0.001' (--rate 1000Hz" in question for question in propose([seen], axis).asked)
     channels = {"time": ("ms", 1e3 * T + 0.25), "drive": ("V", U), "position": ("um", X)}
@@ -175,7 +175,10 @@ def test_rates_beside_columns_of_structures_are_offered_and_clocks_of_waveforms_
                 for n, v, u in (("u", U, "V"), ("x", X, "um"))
             ]
         )
-    proposal = propose([table_facts(read_table(tmp_path / "log.tdms"))], axis)
+    seen = table_facts(read_table(tmp_path / "log.tdms"))
+    print_table(seen)
+    assert "60 rows, 1000 Hz, 0.06 s, as the file states of its channels" in capsys.readouterr().out
+    proposal = propose([seen], axis)
     assert proposal.certain and 'sample_rate = "1000 Hz"\n' in recording_toml(proposal, tmp_path, "t")
 
 

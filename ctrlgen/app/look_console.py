@@ -133,6 +133,8 @@ def print_table(facts: TableFacts) -> None:
 
 
 def _length(facts: TableFacts) -> str:
+    if facts.time is None and (step := facts.clock_step):
+        return f"{number_of(facts.rows, 'row')}, {number(1 / step)} Hz, {number(facts.rows * step)} s, as the file states of its channels"
     if facts.time is None:
         why = f"the time {facts.falls} falls: newest row first" if facts.falls else "no column is a time"
         return f"{number_of(facts.rows, 'row')}, {why}"

@@ -134,6 +134,13 @@ class TableFacts:
         """Its length."""
         return max((len(c.values) for c in self.columns if c.values is not None), default=0)
 
+    @property
+    def clock_step(self) -> float:
+        """The step [s] of the one clock that the format states of all channels, as waveforms of LabVIEW do; 0 without one."""
+        clocks = self.table.clocks
+        steps = {clock.step for clock in clocks.values()}
+        return steps.pop() if len(steps) == 1 and clocks.keys() >= {c.name for c in self.columns if c.moves} else 0.0
+
     def column(self, name: str) -> ColumnFacts:
         """The column of a name."""
         return next(c for c in self.columns if c.name == name)

@@ -24,11 +24,9 @@ MOST_LISTED, MOST_UNREAD = 12, 3
 
 
 def with_own_rate(facts: TableFacts, answers: Answers) -> Answers:
-    """The answers with the rate of a table without a time whose format states one clock of all its channels, as waveforms of LabVIEW do."""
-    steps = {clock.step for clock in facts.table.clocks.values()}
+    """The answers with the rate of a table without a time whose channels have one clock."""
     known = facts.time is not None or facts.falls or answers.rate is not None or answers.poses
-    whole = facts.table.clocks.keys() >= {c.name for c in facts.columns if c.moves}
-    return replace(answers, rate=f"{1 / steps.pop():.9g} Hz") if not known and whole and len(steps) == 1 else answers
+    return replace(answers, rate=f"{1 / facts.clock_step:.9g} Hz") if facts.clock_step and not known else answers
 
 
 def perhaps_times(model: Model, facts: TableFacts, taken: set[str]) -> set[str]:
