@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 from axis_records import AXIS
 
-from ctrlgen.diagnosis.report.on_the_clock import runs_on_the_clock, used_for_another_run
+from ctrlgen.diagnosis.report.on_the_clock import a_pose_a_second, runs_on_the_clock, used_for_another_run
 from ctrlgen.estimation.hypothesis import Hypothesis, hypotheses, nominal_physics
 
 USE = "Use it."
@@ -64,3 +64,23 @@ def test_every_law_that_is_a_function_of_time_alone_runs_on_the_clock():
     assert not any(
         map(runs_on_the_clock, (h for h in offered if h.effect in {"creep", "drive_gain", "delay", "coulomb"}))
     )
+
+
+@pytest.mark.parametrize(
+    "kind, step, causes, told",
+    [
+        (
+            "poses",
+            float("inf"),
+            (CREEP, DRIFT, STEP),
+            "drift at sensor:axis and sensor_step at disturbance:axis is one pose",
+        ),
+        ("poses", float("inf"), (CREEP,), None),
+        ("poses", 2.0, (DRIFT,), None),
+        ("series", 1e-3, (DRIFT,), None),
+    ],
+)
+def test_a_second_of_poses_that_have_settled_is_a_pose(kind, step, causes, told):
+    recording = SimpleNamespace(kind=kind, records=(SimpleNamespace(sample_time=step),))
+    notes = a_pose_a_second(recording, [SimpleNamespace(cause=c) for c in causes])
+    assert notes == ([] if told is None else [f"settled poses have no clock: 1 s of {told}"])

@@ -31,6 +31,7 @@ from ctrlgen.diagnosis.evidence.supporting_analyses import run_supporting_analys
 from ctrlgen.diagnosis.needed_memory import refuse_what_memory_cannot_hold
 from ctrlgen.diagnosis.report.half_a_sample import half_a_sample
 from ctrlgen.diagnosis.report.nearly_as_large import nearly_as_large
+from ctrlgen.diagnosis.report.on_the_clock import a_pose_a_second
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.dead_channels import without_dead_channels
 from ctrlgen.diagnosis.selection.direct_detection import directly_detected_findings
@@ -166,6 +167,7 @@ def _diagnose(
     spikes = find_spikes(search.fitter, search.chosen.fit, known)
     told = (*marking_notes(live.recording, search.fitter.recording), *(s.sentence for s in spikes))
     told = (*told, *half_a_sample(search.fitter.recording, found), *nearly_as_large(found))
+    told = (*told, *a_pose_a_second(search.fitter.recording, found))
     told_of_machine = [NOT_OFFERED.format("; ".join(refusals(refused)))] if refused else []
     if rare := offered_as_faults(list(dict.fromkeys(h.effect for h in suspected)), parts):
         told_of_machine.append(OFFERED_AS_FAULTS.format("; ".join(refusals(rare))))

@@ -8,9 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.findings import Finding
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.recordings.recording import Recording
 
 DEAD = "stuck"  # the law of a channel that reports one number, whatever the motion
 
@@ -18,6 +21,14 @@ DEAD = "stuck"  # the law of a channel that reports one number, whatever the mot
 def runs_on_the_clock(cause: Hypothesis) -> bool:
     """Whether what a cause does depends on when it is."""
     return cause.effect != PARAMETER and cause.law.runs_on_the_clock()
+
+
+def a_pose_a_second(recording: Recording, findings: Sequence[Finding]) -> list[str]:
+    """What is told of the seconds of causes that run on the clock, where the poses have settled and have none."""
+    clocked = [cause_name(f.cause) for f in findings if runs_on_the_clock(f.cause)]
+    if not clocked or recording.kind != "poses" or any(np.isfinite(r.sample_time) for r in recording.records):
+        return []
+    return [f"settled poses have no clock: 1 s of {' and '.join(clocked)} is one pose"]
 
 
 def used_for_another_run(findings: Sequence[Finding], use: str) -> str:
