@@ -81,8 +81,12 @@ def borne_out_instead(search: SearchResult, evidence: Evidence) -> CandidateMode
 def in_standing(findings: Sequence[Finding], evidence: Evidence, seen: Sequence[Finding] = ()) -> tuple[Finding, ...]:
     """The findings with what the shares say of each cause; those that they contradict after the others, and so is what is `seen` in the
     readings themselves, which takes no share: alone it does not stand for what the rest leaves in doubt."""
-    told = [(f in seen, replace(f, support=evidence.of(f.effect) if f.role is Role.CAUSE else None)) for f in findings]
-    return tuple(f for _, f in sorted(told, key=lambda t: (t[1].role is not Role.CAUSE, t[0] or t[1].contradicted)))
+    told = [replace(f, support=evidence.of(f.effect) if f.role is Role.CAUSE else None) for f in findings]
+    after = [
+        (f.role is not Role.CAUSE, f.contradicted or any(given is s for s in seen))
+        for f, given in zip(told, findings, strict=True)
+    ]
+    return tuple(told[k] for k in sorted(range(len(told)), key=lambda k: after[k]))
 
 
 def possible(shares: Sequence[tuple[Family, float]], offered: Sequence[Hypothesis]) -> list[tuple[Family, float]]:
