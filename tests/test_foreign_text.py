@@ -257,7 +257,7 @@ RUNS = "lever_runs/run_a.toml lever_runs/run_b.toml"
         "calibrate devices/mems_hexapod_run_time.toml hexapod_specimen",
         f"learn lever_circle {RUNS}",
         f"diagnose devices/xy_lever_stage.toml {RUNS} --laws creep,backlash",
-        "batch lever_runs/jobs.toml",
+        pytest.param("batch lever_runs/jobs.toml", marks=pytest.mark.exhaustive),
     ],
     ids=lambda words: words.split()[0],
 )

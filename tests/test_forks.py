@@ -132,7 +132,7 @@ def bent_mirror():
 
 @pytest.mark.long
 @forked
-@pytest.mark.parametrize("recorded", [cubic_axis, bent_mirror])
+@pytest.mark.parametrize("recorded", [pytest.param(cubic_axis, marks=pytest.mark.exhaustive), bent_mirror])
 def test_a_diagnosis_is_the_same_in_any_number_of_processes_and_can_be_continued(tmp_path, recorded):
     device, recording = recorded()
     answers, files = [], []

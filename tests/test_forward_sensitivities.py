@@ -93,8 +93,8 @@ def agree(found: np.ndarray, wanted: np.ndarray) -> None:
 
 @pytest.mark.long
 @pytest.mark.parametrize("worth", [SIMULATION.parametric_operations, -1], ids=["parameters", "constants"])
-@pytest.mark.parametrize("linear", [False, pytest.param(True, marks=pytest.mark.long)], ids=["held", "linear"])
-@pytest.mark.parametrize("steps", [pytest.param(1, marks=pytest.mark.long), 3])
+@pytest.mark.parametrize("linear", [False, True], ids=["held", "linear"])
+@pytest.mark.parametrize("steps", [pytest.param(1, marks=pytest.mark.exhaustive), 3])
 @pytest.mark.parametrize("text, size", [(AXIS, 1.0), (AXIS + LOOP, 4e-5)], ids=["open", "loop"])
 @pytest.mark.parametrize(
     "effects",

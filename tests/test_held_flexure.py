@@ -170,7 +170,7 @@ def test_a_thin_blade_is_a_plate(q, nu):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("nu", [0.25, 0.33])
+@pytest.mark.parametrize("nu", [pytest.param(0.25, marks=pytest.mark.exhaustive), 0.33])
 @pytest.mark.parametrize(
     "q, r", [(0.1, 1.0), (0.15, 0.4), (0.3, 0.1), (0.3, 0.8), (0.7, 0.2), (0.7, 0.6), (1.5, 0.1), (3.0, 0.1)]
 )
