@@ -41,14 +41,19 @@ class Frame:
         """Force that moves the number `driven` by `by` [m] in `steps`, with `load` (3 n,) on all, the displacements, the beams' loads."""
         q, rest = np.zeros(3 * len(self.X)), np.setdiff1d(self.free, [driven])
         load = np.zeros(len(q)) if load is None else load
-        for k in range(1, steps + 1):
-            q[driven] = by * k / steps
+        for _ in range(steps):
+            # The others go along first: beams that one node stretches alone lead Newton's method anywhere
+            _, K, _ = self.forces(q)
+            q[rest] -= np.linalg.solve(K[np.ix_(rest, rest)], K[rest, driven]) * by / steps
+            q[driven] += by / steps
             for _ in range(40):
                 f, K, _ = self.forces(q)
                 change = np.linalg.solve(K[np.ix_(rest, rest)], (load - f)[rest])
                 q[rest] += change
                 if np.abs(change).max() < 1e-13:
                     break
+            else:
+                raise AssertionError("Newton's method does not converge: more steps are needed")
         f, _, loads = self.forces(q)
         return f[driven] - load[driven], q, loads
 

@@ -13,7 +13,7 @@ from ctrlgen.diagnosis.selection.far_off import is_far_off, nearer_when_simulate
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.speeds import counted_in_speeds, speeds_that_occur
 from ctrlgen.diagnosis.selection.trials import Trials
-from ctrlgen.effects import Effect
+from ctrlgen.effects import Effect, Place
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, hypotheses, nominal_physics
 from ctrlgen.estimation.noise import estimate_noise
@@ -68,8 +68,9 @@ def bounds_of_similar(folder, length=1.0, time=1.0, force=1.0, stroke=1.0):
             if not p.of_motion:
                 continue
             powers, _ = split_unit(p.unit, ("channel", "travel", "s"))
+            channel = 1.0 if h.law.place is Place.DRIVE else force  # the volt stays what it is
             unit = np.prod(
-                [size ** powers.get(w, 0) for w, size in (("channel", force), ("travel", length), ("s", time))]
+                [size ** powers.get(w, 0) for w, size in (("channel", channel), ("travel", length), ("s", time))]
             )
             found[h.effect, p.name] = np.array(h.bounds(p, h.channel_on(device))) / unit
     return found

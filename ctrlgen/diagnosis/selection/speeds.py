@@ -34,7 +34,7 @@ def counted_in_speeds(suspected: Sequence[Hypothesis], fitter: Fitter, device: D
 
     def counted(h: Hypothesis) -> Hypothesis:
         axes = [*h.acts_on(device), *(i for i, axis in enumerate(physics.axes) if axis == h.of)]
-        moving = [speeds[i] for i in axes if speeds[i] > 0] if h.law.place is Place.FORCE else []
+        moving = [speeds[i] for i in axes if speeds[i] > 0] if h.law.place in (Place.FORCE, Place.DRIVE) else []
         return replace(h, time=physics.displacement_scale / min(moving)) if moving else h
 
     return [counted(h) if h in acting else h for h in suspected]
