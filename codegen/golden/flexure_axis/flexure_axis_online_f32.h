@@ -49,7 +49,7 @@ extern "C" {
 #define FLEXURE_AXIS_ONLINE_F32_SETTLING (13945U) /* samples under a held drive, after which whatever drives within their limits made the device ring is told no more, with the damping that it has at least: 0.697 s */
 
 /* One a device, written by the functions here alone. They must not be called on it while another call on it is going on, by an interrupt or
- * another thread: neither forget, observe, elapsed or settle beside step. Calls on different states may run at the same time. */
+ * another thread: neither settle, elapsed, forget nor observe beside step. Calls on different states may run at the same time. */
 typedef struct {
     float x[1]; /* velocity_axis [m / s] */
     float z[FLEXURE_AXIS_ONLINE_F32_DISPLACEMENT_SIZE]; /* displacement_axis [m] */

@@ -55,7 +55,7 @@ extern "C" {
 #define LIMITER_FOREVER (0xFFFFFFFFU) /* of state.unsure: not by waiting */
 
 /* One a device, written by the functions here alone. They must not be called on it while another call on it is going on, by an interrupt or
- * another thread: neither forget, observe, elapsed or settle beside step. Calls on different states may run at the same time. */
+ * another thread: neither settle, elapsed, forget nor observe beside step. Calls on different states may run at the same time. */
 typedef struct {
     float x[6]; /* temperature_1X [K], temperature_1Y [K], temperature_2X [K], temperature_2Y [K], temperature_3X [K], temperature_3Y [K] */
     float z[LIMITER_DISPLACEMENT_SIZE]; /* displacement_1X, displacement_1Y, displacement_2X, displacement_2Y, displacement_3X, displacement_3Y [m] */

@@ -48,7 +48,7 @@ extern "C" {
 #define THREE_STACKS_ONLINE_F32_RATE (128U)       /* drive changes as fast as it may: the target is reached later. Bits of limits beside it: also those that the device passes, because no drive can turn back faster */
 
 /* One a device, written by the functions here alone. They must not be called on it while another call on it is going on, by an interrupt or
- * another thread: neither forget, observe, elapsed or settle beside step. Calls on different states may run at the same time. */
+ * another thread: not even settle beside step. Calls on different states may run at the same time. */
 typedef struct {
     float z[THREE_STACKS_ONLINE_F32_DISPLACEMENT_SIZE]; /* displacement_x, displacement_y [m] */
     float u[THREE_STACKS_ONLINE_F32_DRIVE_SIZE]; /* last drive: a [V], b [V], c [V] */
