@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,8 +11,9 @@ from fitted_causes import CREEP, DRIFT, GAIN, fitted
 
 from ctrlgen.diagnosis.report.answer import answer
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
-from ctrlgen.diagnosis.selection.findings import ChanceEntry, ChannelErrorEntry, Finding
+from ctrlgen.diagnosis.selection.findings import ChanceEntry, ChannelErrorEntry, Estimate, Finding
 from ctrlgen.diagnosis.selection.verdict import Verdict
+from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.recordings.plausibility import Implausible
 
 
@@ -56,6 +58,15 @@ def test_shares_of_the_records_to_fit_are_told_as_that():
     """Where no held-out record shows a mismatch, the table beside the sentence says little of them."""
     assert "of the records to fit" in told(Verdict.PARTLY, finding(GAIN, 1.0), held_out=False)[0]
     assert "of the records to fit" not in told(Verdict.PARTLY, finding(GAIN, 1.0))[0]
+
+
+def test_of_a_law_that_is_there_or_is_not_the_numbers_that_are_measured_stand_first():
+    for kind, name, unit in (("amplifier_lag", "tau", "ms"), ("slew_rate", "rate", "V/s")):
+        cause = Hypothesis(kind, "actuator:axis", "axis")
+        numbers = {"share": Estimate(1.0, (1.0, 1.0), "1"), name: Estimate(2.0, (1.9, 2.1), unit)}
+        first = told(Verdict.EXPLAINED, replace(finding(cause, 1.0), parameters=numbers), passed=True)[0]
+        there = cause.prior.of(cause.law.amplitude()).fixed_range is not None
+        assert (first.index(f"{name} = 2") < first.index("share = 1")) == there == (kind == "slew_rate")
 
 
 @pytest.mark.parametrize("share, says", [(0.16, True), (0.14, False), (None, False)])

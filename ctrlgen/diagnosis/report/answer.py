@@ -143,7 +143,7 @@ def _share(share: ShareEntry) -> str:
 
 
 def _first_numbers(finding: Finding) -> dict[str, Estimate]:
-    """The amplitude of a finding and the numbers after it, as many as the sentence holds."""
+    """The amplitude of a finding and the numbers after it, as many as the sentence holds; that of a law that is there or is not, last."""
     if finding.effect == PARAMETER:
         return finding.parameters
     law = finding.cause.law
@@ -151,7 +151,10 @@ def _first_numbers(finding: Finding) -> dict[str, Estimate]:
     # where it is comes before how it is
     told = places_of(law)
     places = [p.name for p in law.params if finding.cause.prior.of(p).start_from_data]
-    first = sorted(finding.parameters, key=lambda name: (name != amplitude, name not in places))
+    there = finding.cause.prior.of(law.amplitude()).fixed_range is not None
+    first = sorted(
+        finding.parameters, key=lambda name: (there and name == amplitude, name != amplitude, name not in places)
+    )
     most = NUMBERS - bool(told)
     return {name: finding.parameters[name] for name in [name for name in first if name not in told][:most]}
 
