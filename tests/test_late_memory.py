@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from ctrlgen import build_model, load_device, load_scenario, simulate, solve
 from ctrlgen.core.units import show
-from ctrlgen.model.discretisation import balanced
+from ctrlgen.model.discretisation import balanced, driven_step
 from ctrlgen.model.inverse import invert
 
 GAIN, TAU = 0.1, 0.05
@@ -87,6 +87,18 @@ def test_kernels_see_the_displacement_that_the_drive_gives(device, more, tmp_pat
     assert moved.x[1] == pytest.approx(then, rel=1e-9) and moved.z[1] == pytest.approx(there, rel=1e-9)
     led = inverse.displacement(x, z, moved.signals["pose"][1]).full().ravel()
     assert led == pytest.approx(there, rel=1e-9)
+
+
+def test_a_drive_that_goes_from_end_to_end_is_met_where_it_leads(tmp_path):
+    """The step of IPOPT and of the plant's C, of always as many of Newton's steps, beside the simulation, which takes what it needs."""
+    text = (SCENARIOS / "devices" / "parallelogram.toml").read_text() + CREEP.format(GAIN) + STIFFENING
+    (tmp_path / "device.toml").write_text(text)
+    model, (low, high) = build_model(load_device(tmp_path / "device.toml")), (-1.5, 1.5)
+    begun = simulate(model, np.array([[low]] * 2), 0.01)
+    wanted = simulate(model, np.array([[high]]), 0.01, begun.x[-1], begun.z[-1]).x[1]
+    step = ca.Function("x", [model.x, model.z, model.u, model.p], [driven_step(model, 0.01)])
+    found = step(begun.x[-1], begun.z[-1], high, model.p_nominal).full().ravel()
+    assert found == pytest.approx(wanted, rel=1e-5)
 
 
 def late(solution) -> np.ndarray:

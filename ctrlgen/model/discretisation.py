@@ -23,6 +23,7 @@ from ctrlgen.numerics.newton import newton_root, steps_needed
 from ctrlgen.numerics.phi_functions import held_gain, increment, lag_increment, varied_gain
 
 NEWTON_STEPS = 4  # from the displacement one sample before, each step doubles the digits
+JUMP_NEWTON_STEPS = 8  # from one end of the drive to the other: 4 pm at most, of a coil's stage that stiffens
 SETTLING_SWEEPS = 3  # memories that follow memories that follow heaters whose power depends on their temperature
 SETTLING_TIME_CONSTANTS = 14.0  # e^-14 is a millionth
 # Sample time times the fastest rate of coupled states, beyond which the sample time is refused; 20 doublings of the phi functions
@@ -118,7 +119,7 @@ def at_displacement(model: Model, x_then: ca.SX, displaced: ca.SX) -> ca.SX:
 def driven_step(model: Model, sample_time: float) -> ca.SX:
     """`held_step` where model.z is the displacement before the drive acts, and what remembers it is given that under the drive."""
     x = held_step(model, sample_time)
-    return at_displacement(model, x, balanced(model, x, model.u)) if jumps(model, x) else x
+    return at_displacement(model, x, balanced(model, x, model.u, JUMP_NEWTON_STEPS)) if jumps(model, x) else x
 
 
 def varied_step(model: Model, sample_time: ca.SX, longest: float, rates: ca.SX) -> ca.SX:
