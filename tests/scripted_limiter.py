@@ -179,7 +179,9 @@ def scripted(device: Device) -> Controller:
         x_units=("K",) * device.n_x,
         signals={"drive": signal, "displacement": signal, "state": signal if device.states else None},
         redundant=False,
-        device=SimpleNamespace(title="scripted", source="none", given_at_start=(), run_time=None, load_texts=()),
+        device=SimpleNamespace(
+            name="scripted", title="scripted", source="none", given_at_start=(), run_time=None, load_texts=()
+        ),
     )
     guarded, moving = device.composite != "none", inverse(0.25) if device.moving else None
     kernels = Scripted(

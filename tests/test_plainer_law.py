@@ -14,7 +14,7 @@ from ctrlgen.diagnosis.selection.model_selection import ModelSelection
 from ctrlgen.diagnosis.selection.rivals import as_plainer, rivals, simplified
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.trials import Trials
-from ctrlgen.effects import Effect
+from ctrlgen.effects import Effect, Place
 from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.plainer_law import left_beside, may_be_plainer, plainer_start
@@ -173,7 +173,7 @@ def test_what_generalises_nothing_is_what_it_is():
 @on_an_axis
 def test_what_rubs_or_lags_alike_both_ways_is_named_by_the_plainer_law(law, monkeypatch):
     """Readings of the plainer law, fitted by the one that generalises it."""
-    cause = Hypothesis(law.kind, "actuator:axis" if law.kind.endswith("drive_hysteresis") else "stage:axis", "axis")
+    cause = Hypothesis(law.kind, "actuator:axis" if law.place is Place.DRIVE else "stage:axis", "axis")
     model, channel = fitter_of(n=400), cause.channel_on(AXIS)
     size = channel.si(0.05 if law.amplitude().unit == "channel" else 0.3, law.amplitude())
     values = at_neutral(law, channel, size)
@@ -204,7 +204,11 @@ def test_what_rubs_or_lags_alike_both_ways_is_named_by_the_plainer_law(law, monk
         stopped = replace(general, fit=replace(general.fit, theta=theta, J=J))
         assert may_be_plainer(stopped.fit, 0) is None and simplified(trials, stopped).causes == (plain,)
     monkeypatch.setattr("ctrlgen.diagnosis.selection.rivals.replacements", lambda *_: [])
-    assert [t.cause for t in rivals(trials, general, 0)[0]] == [plain]
+    alike = [t.cause for t in rivals(trials, general, 0)[0]]
+    if plain.effect in cause.prior.refines:  # one law, of which the finer form is tried where the plain one was found
+        assert alike == []
+        return
+    assert alike == [plain]
     # nothing that the machine cannot have
     without = Trials(fitter, Screen(fitter, [cause]), lambda _: None)
     assert simplified(without, without.fit(begun, cause, steps=12)).causes == (cause,)
