@@ -99,3 +99,15 @@ class SolverError(CtrlgenError):
 
 class ToolError(CtrlgenError):
     """A program outside ctrlgen (a C compiler) is missing or failed."""
+
+
+class ExampleGiven(ValueError):
+    """A text is no quantity of the wanted kind; the message says what to write instead."""
+
+
+class WrongUnit(ExampleGiven):
+    """A number without a unit, or with one of another dimension: what is `said` of it, and what to write `instead`."""
+
+    def __init__(self, said: str, instead: str, joint: str) -> None:
+        super().__init__(f"{said}{joint} {instead}")
+        self.said, self.instead = said, instead

@@ -18,8 +18,9 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from ctrlgen.core.errors import Fault, InputError, TableFaults
+from ctrlgen.core.errors import Fault, InputError, TableFaults, WrongUnit
 from ctrlgen.core.file_limits import LARGEST_TEXT, TOO_DEEP, foreign_parts, unreadable_toml
+from ctrlgen.core.names import meant
 from ctrlgen.core.steps import STEPS
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -105,26 +106,27 @@ def validate(model: type[Model], table: dict[str, Any], path: Path | str) -> Mod
     except ValidationError as error:
         errors = _of_nearest_branches(model, error.errors())
         wrong = [details["loc"] for details in errors]
-        faults = [
-            fault
+        told = [
+            details
             for details in errors
             if details["type"] != "too_short" or not any(_inside(other, details["loc"]) for other in wrong)
-            for fault in _faults(model, details)
         ]
-        raise InputError(path, _with_all_units(faults)) from None
+        raise InputError(path, _with_all_units(model, told)) from None
 
 
-UNIT = re.compile(r"(.*) (?:has the wrong unit: |has no unit; )(.*)", re.DOTALL)
-
-
-def _with_all_units(faults: Sequence[Fault]) -> list[Fault]:
-    """The faults, those of one number that may be of several dimensions as one that names a unit of each."""
-    told: dict[tuple[str, str], Fault] = {}
-    for k, fault in enumerate(faults):
-        unit = UNIT.fullmatch(fault.what)
-        key = (fault.where, unit[1] if unit else str(k))
-        told[key] = Fault(fault.where, f"{told[key].what}, or {unit[2]}") if unit and key in told else fault
-    return list(told.values())
+def _with_all_units(model: type[BaseModel], errors: Sequence[Any]) -> list[Fault]:
+    """The faults that pydantic tells, those of one number that may be of several dimensions as one that names a unit of each."""
+    faults: list[Fault] = []
+    numbers: dict[tuple[str, str], int] = {}  # where each is, and what is said of it: its place among the faults
+    for details in errors:
+        unit = details.get("ctx", {}).get("error")
+        if isinstance(unit, WrongUnit):
+            k = numbers.setdefault((_place(model, details["loc"]), unit.said), len(faults))
+            if k < len(faults):
+                faults[k] = Fault(faults[k].where, f"{faults[k].what}, or {unit.instead}")
+                continue
+        faults += _faults(model, details)
+    return faults
 
 
 def _inside(place: Sequence[Any], outer: Sequence[Any]) -> bool:
@@ -180,10 +182,7 @@ def _fault(model: type[BaseModel], details: Any) -> Fault:
         message = "is missing; add it"
     elif details["type"] == "extra_forbidden":
         siblings = _keys(model, details["loc"][:-1])
-        near = difflib.get_close_matches(str(location[-1]), siblings, n=1)
-        message = "is not a key I know; " + (
-            f"did you mean {near[0]!r}?" if near else f"known here: {', '.join(siblings)}"
-        )
+        message = f"is not a key I know; {meant(str(location[-1]), siblings, 'known here: ' + ', '.join(siblings))}"
     elif details["type"] in _REMEDY:
         message = f"{reprlib.repr(details['input'])}: {_REMEDY[details['type']]}"
     elif details["type"] in ("too_short", "too_long"):

@@ -16,15 +16,11 @@ from typing import TYPE_CHECKING, Any
 from annotated_types import GroupedMetadata
 from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
+from ctrlgen.core.errors import ExampleGiven, WrongUnit
 from ctrlgen.core.known_units import KNOWN, UNCLEAR, UNKNOWN
 
 if TYPE_CHECKING:
     import pint
-
-
-class ExampleGiven(ValueError):
-    """A text is no quantity of the wanted kind; the message says what to write instead."""
-
 
 _NUMBER = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|[+-]?inf)\s*(.*?)\s*$", re.IGNORECASE)
 
@@ -217,11 +213,10 @@ def parse(text: object, unit: str) -> float:
     absolute = unit in ("degC", "degF", "K")
     if (written == "" and unit != "1") or (absolute and "delta" in written) or not same_dimension(written, unit):
         if written == "":
-            raise ExampleGiven(f'{text!r} has no unit; write for example "{value:g} {unit}"')
-        hint = f'"{value:g} {unit}"' if unit != "1" else f'"{value:g}" without a unit'
-        raise ExampleGiven(
-            f"{text!r} has the wrong unit: {unit if unit != '1' else 'a plain number'} is needed, for example {hint}"
-        )
+            raise WrongUnit(f"{text!r} has no unit", f'write for example "{value:g} {unit}"', ";")
+        plain = ("a plain number", f'"{value:g}" without a unit')
+        needed, example = plain if unit == "1" else (unit, f'"{value:g} {unit}"')
+        raise WrongUnit(f"{text!r} has the wrong unit", f"{needed} is needed, for example {example}", ":")
     si = to_si(value, written)
     if not abs(si) <= largest(unit):
         raise ValueError(f"{text!r} is far too large; {show(largest(unit), unit)} is the most that is read")

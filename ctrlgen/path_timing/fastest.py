@@ -16,9 +16,9 @@ import numpy as np
 
 from ctrlgen.budget.robust import solve
 from ctrlgen.core.counts import number_of
-from ctrlgen.core.errors import Fault, InputError, SolverError
+from ctrlgen.core.errors import ExampleGiven, Fault, InputError, SolverError
 from ctrlgen.core.tabular import Column, Reported, Tabular
-from ctrlgen.core.units import ExampleGiven, Quantity, read_quantity, show
+from ctrlgen.core.units import Quantity, read_quantity, show
 from ctrlgen.model.model import Model
 from ctrlgen.path_timing.binding import Binding, bindings
 from ctrlgen.path_timing.curve import Curve

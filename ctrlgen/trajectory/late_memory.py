@@ -36,7 +36,7 @@ class LateMemory:
         """How far off, where and when, and what to do."""
         unit = self.signal.units[self.signal.channels.index(self.channel)]
         return (
-            f"creep learns of the displacement half a sample late: {self.channel} is {show(self.off, unit)} off the path "
+            f"creep is given the displacement of the beginning of each sample: {self.channel} is {show(self.off, unit)} off the path "
             f"at {self.time:.4g} s, "
             "which no other number here counts; half the sample time leaves half of it"
         )

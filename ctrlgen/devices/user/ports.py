@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, TypeAlias
@@ -11,6 +10,7 @@ import casadi as ca
 
 from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault
+from ctrlgen.core.names import meant
 
 Law: TypeAlias = Callable[..., Any] | ca.Function
 
@@ -40,8 +40,7 @@ class Ports:
 
 def suggestion(name: str, names: Sequence[str]) -> str:
     """'did you mean ...?' for a name that is not one of `names`, or the list of them."""
-    like = difflib.get_close_matches(name, names, n=1)
-    return f"did you mean {like[0]!r}?" if like else f"it has {', '.join(names) or 'nothing'}"
+    return meant(name, names, f"it has {', '.join(names) or 'nothing'}")
 
 
 def evaluate_law(where: str, law: Law, offered: Mapping[str, Ports], names: Sequence[str]) -> tuple[ca.SX, list[Fault]]:
