@@ -119,7 +119,7 @@ def test_a_finding_tells_its_edge_no_more_narrowly_than_that():
 
 @pytest.mark.exhaustive
 def test_intervals_of_ends_hold_those_of_the_independent_plant():
-    """One case of each law that is not of its own form there; docs/evidence.md counts more of them."""
+    """One case of each law that is not of its own form there; docs/evidence/concealed_cases.md counts more of them."""
     for name in ("friction_there", "friction_from", "damping_fast", "knee"):
         assert found(name, 1).covered == (True,), name
 

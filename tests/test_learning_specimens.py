@@ -1,4 +1,4 @@
-"""Learning on specimens of the independent plant whose sensors, clocks, zeros, noise and friction are wrong; see docs/evidence.md."""
+"""Learning on specimens of the independent plant whose sensors, clocks, zeros, noise and friction are wrong; see docs/evidence/learning_and_sensors.md."""
 
 from __future__ import annotations
 
