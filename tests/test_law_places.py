@@ -17,7 +17,8 @@ from ctrlgen.core.errors import InputError
 from ctrlgen.core.files import validate
 from ctrlgen.core.units import to_si
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.diagnose import diagnose_recording, noise_before_fits
+from ctrlgen.diagnosis.diagnose import diagnose_recording
+from ctrlgen.diagnosis.prepared_recording import noise_before_fits
 from ctrlgen.diagnosis.selection.objections import objections
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.verdict import Verdict

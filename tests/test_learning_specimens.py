@@ -1,4 +1,7 @@
-"""Learning on specimens of the independent plant whose sensors, clocks, zeros, noise and friction are wrong; see docs/evidence/learning_and_sensors.md."""
+"""Learning on specimens of the independent plant whose sensors, clocks, zeros, noise and friction are wrong.
+
+Results: docs/evidence/learning_and_sensors.md.
+"""
 
 from __future__ import annotations
 

@@ -11,7 +11,8 @@ from recording_folders import SERVO, servo_poses
 
 import ctrlgen
 from ctrlgen.core.units import to_si
-from ctrlgen.diagnosis.diagnose import diagnose_recording, noise_before_fits
+from ctrlgen.diagnosis.diagnose import diagnose_recording
+from ctrlgen.diagnosis.prepared_recording import noise_before_fits
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.noise import NoiseSource

@@ -1,4 +1,7 @@
-"""What is the sensor's and what the device's: sizes known beforehand, and which other reading decides; see docs/evidence/learning_and_sensors.md."""
+"""What is the sensor's and what the device's: sizes known beforehand, and which other reading decides.
+
+Results: docs/evidence/learning_and_sensors.md.
+"""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ import pytest
 from axis_records import AXIS, NOISE, H, drive, move, record
 
 import ctrlgen
-from ctrlgen.diagnosis.diagnose import noise_before_fits
+from ctrlgen.diagnosis.prepared_recording import noise_before_fits
 from ctrlgen.diagnosis.selection.dead_channels import without_dead_channels
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.estimation.fit import Fitter

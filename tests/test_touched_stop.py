@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from axis_records import AXIS, KF, C, K, M, drive, record
 
-from ctrlgen.diagnosis.diagnose import clock_note
+from ctrlgen.diagnosis.report.told_beside import clock_note
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.candidates import as_meant
 from ctrlgen.diagnosis.selection.model_selection import scored
