@@ -15,25 +15,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from ctrlgen.controller.feedforward import Controller
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.core.shown import Shown
 from ctrlgen.firmware.c.deviations import deviations_context
 from ctrlgen.firmware.c.misra import CPPCHECK
 from ctrlgen.firmware.c.real import Arithmetic, Integers, Real
 from ctrlgen.firmware.c.templates import write
-from ctrlgen.firmware.online.checksum import checked_context
-from ctrlgen.firmware.online.corrected import corrected_context, corrections_of
-from ctrlgen.firmware.online.correction_vectors import correction_vectors
-from ctrlgen.firmware.online.fixed_source import fixed_context
-from ctrlgen.firmware.online.online import online_context
+from ctrlgen.firmware.c_sources import SourcesOfOne, sources_of
+from ctrlgen.firmware.online.corrected import corrections_of
 from ctrlgen.firmware.online.stated_pivot import StatedPivot
-from ctrlgen.firmware.online.vectors import played_vectors, self_test_calls, vectors
-from ctrlgen.firmware.package import PIECES, owners, write_package
-from ctrlgen.firmware.player.compression import Compression, compress
-from ctrlgen.firmware.player.player_context import player_context
+from ctrlgen.firmware.package import write_package
+from ctrlgen.firmware.player.compression import Compression
 from ctrlgen.firmware.player_only import check_online
 from ctrlgen.model.model import Model
 from ctrlgen.trajectory.scenario import Scenario, check_tightened
@@ -109,83 +101,50 @@ def generate(
     out = Path(out)
     check_tightened(scenario, model)
     check_online(scenario, model)
-    controller = controller_of(
-        model, scenario.file.follow, scenario.sample_time, scenario.file.leads_modes, scenario.sample_times
-    )
-    played = solution if scenario.sample_time else None
-    problem = scenario.bind(model)
-    command = problem.samples if solution is None else solution.command
-    targets = problem.targets
-    names = {
-        piece: {real: f"{owner}_{piece}_{real.suffix}" for real in Real} for piece, owner in owners(scenario).items()
-    }
-    checked = {real: f"{scenario.controller_name}_checked_{real.suffix}" for real in Real if scenario.file.checksum}
-    corrections = corrections_of(scenario, controller.kernels)
-    corrected = {real: f"{scenario.controller_name}_corrected_{real.suffix}" for real in Real if corrections}
-    fixed = _fixed(scenario, controller, targets)
-    compression = compress(played) if played else {}
-    left_out = () if solution is None else solution.left_out
-    contexts, written = {}, []
-    for real in Real:
-        of: dict[str, Any] = {piece: names[piece][real] for piece in PIECES} | ({} if played else {"player": None})
-        online = online_context(scenario, controller, real, of["online"])
-        samples = {} if played is None else player_context(played, compression[real], of["player"])
-        reference = vectors(controller, targets, real) | played_vectors(
-            compression.get(real), len(command), scenario.clock
-        )
-        contexts[real] = samples | online | of | reference | {"solved": solution is not None, "left_out": left_out}
-        contexts[real] |= {"checked": checked.get(real), "corrected": corrected.get(real)}
-        added = corrected_context(scenario, corrections, online, corrected[real], real) if corrections else None
-        contexts[real] |= {
-            "correction": correction_vectors(corrections, added, real) if corrections and added else None
-        }
-        contexts[real] |= self_test_calls(contexts[real]) | {"fixed": fixed}
-        by_template = {"online": online, "selftest": contexts[real], "vectors": contexts[real]}
-        if played:
-            by_template["player"] = online | samples
-        if checked:
-            of["checked"] = checked[real]
-            by_template["checked"] = checked_context(online, checked[real])
-        if added:
-            of["corrected"] = corrected[real]
-            by_template["corrected"] = added
-        for template, context in by_template.items():
-            for kind in ("h", "c"):
-                written.append(write(f"{template}.{kind}", context, out / f"{of[template]}.{kind}"))
-        written.append(write("test.c", contexts[real], out / "test" / f"test_{scenario.name}_{real.suffix}.c"))
-    if fixed is not None:
-        written += _write_fixed(fixed, out, scenario.name)
+    sources = sources_of(scenario, model, solution)
+    of = {real: sources.of(real) for real in Real}
+    fixed = sources.fixed
+    written = [path for real in Real for path in _write(of[real], out, f"test_{scenario.name}_{real.suffix}.c")]
+    written += _write_fixed(fixed, out, scenario.name) if fixed else []
     of_c = {path.name: path.read_text(encoding="utf-8") for path in written}
     written.append(write("DEVIATIONS.md", {"cppcheck": CPPCHECK, **deviations_context(of_c)}, out / "DEVIATIONS.md"))
-    write_package(out, scenario, contexts, figures or {}, written)
-    cost = contexts[Real.FLOAT]["cost"]
-    init = {real: f"{names['online'][real]}_init_{contexts[real]['build']}" for real in Real}
-    integers = {} if fixed is None else {Integers.Q31: fixed}
+    write_package(out, scenario, {real: each.whole for real, each in of.items()}, figures or {}, written)
+
+    def names(template: str, prefix: str | None = None) -> dict[Any, str]:
+        """The stems of one piece by arithmetic; with `prefix`, what holds that of the integers in their context."""
+        stems = {real: each.files[template][0] for real, each in of.items() if template in each.files}
+        return stems | ({Integers.Q31: fixed[prefix]} if fixed and prefix else {})
+
+    init = {real: f"{stem}_init_{of[real].whole['build']}" for real, stem in names("online").items()}
+    init |= {Integers.Q31: f"{fixed['prefix']}_init_{fixed['build']}"} if fixed else {}
+    single = of[Real.FLOAT].whole
     return CFolder(
         out,
         scenario.name,
-        names["online"] | {real: c["prefix"] for real, c in integers.items()},
-        names["player"] if played else {},
-        names["selftest"] | {real: c["selftest"] for real, c in integers.items()},
-        names["vectors"] | {real: c["vectors"] for real, c in integers.items()},
-        init | {real: f"{c['prefix']}_init_{c['build']}" for real, c in integers.items()},
-        compression,
-        {real: f"{names['player'][real]}_sample_{contexts[real]['played_build']:08x}" for real in compression},
-        operations=cost["step"],
-        worst_operations=cost["worst"],
-        given_numbers=contexts[Real.FLOAT]["given_numbers"],
-        state_words=len(contexts[Real.FLOAT]["words"]),
-        checked=checked,
-        corrected=corrected,
+        names("online", "prefix"),
+        names("player"),
+        names("selftest", "selftest"),
+        names("vectors", "vectors"),
+        init,
+        sources.compression,
+        {real: f"{stem}_sample_{of[real].whole['played_build']:08x}" for real, stem in names("player").items()},
+        operations=single["cost"]["step"],
+        worst_operations=single["cost"]["worst"],
+        given_numbers=single["given_numbers"],
+        state_words=len(single["words"]),
+        checked=names("checked"),
+        corrected=names("corrected"),
     )
 
 
-def _fixed(scenario: Scenario, controller: Controller, targets: np.ndarray) -> dict[str, Any] | None:
-    """The context of the controller in integers; None where the scenario does not ask for it."""
-    if not scenario.file.fixed_point:
-        return None
-    names = {piece: f"{owner}_{piece}_{Integers.Q31.suffix}" for piece, owner in owners(scenario).items()}
-    return fixed_context(scenario, controller, targets, names)
+def _write(c: SourcesOfOne, out: Path, test: str) -> list[Path]:
+    """The C of one arithmetic, and the `test` of it."""
+    written = [
+        write(f"{template}.{kind}", context, out / f"{stem}.{kind}")
+        for template, (stem, context) in c.files.items()
+        for kind in ("h", "c")
+    ]
+    return [*written, write("test.c", c.whole, out / "test" / test)]
 
 
 def _write_fixed(context: dict[str, Any], out: Path, name: str) -> list[Path]:
