@@ -114,3 +114,15 @@ def test_what_may_be_the_time_is_told_where_none_is_known(tmp_path):
         rows[k] = text + rows[k][1:]
     said = table_oddities(table_facts(read_table(written(tmp_path, "\n".join(rows) + "\n"))))
     assert any("2: rises by 0.001 from row to row: name it as the time" in line for line in said)
+
+
+def test_of_two_lines_that_are_labelled_as_units_the_nearer_one_counts(tmp_path):
+    """A set of labels has no order: which line was taken depended on the run."""
+    rows = "".join(f",{t},{u},{x}\n" for t, u, x in zip(TIME, DRIVE, PLACE, strict=True))
+    labels = ("Einheit", "Einheiten", "Unit", "Units", "Vertical Units", "VUnit", "y_unit_label")
+    for first in labels:
+        for second in labels:
+            if first != second:
+                path = written(tmp_path, f"Name,t,drive,place\n{first},ms,mV,mm\n{second},s,V,um\n{rows}")
+                table = read_table(path)
+                assert [table.units[name] for name in ("t", "drive", "place")] == ["s", "V", "um"], (first, second)

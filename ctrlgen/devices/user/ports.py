@@ -112,7 +112,8 @@ def _rows(where: str, value: Any, names: Sequence[str]) -> tuple[ca.SX, list[Fau
     if isinstance(value, Mapping):
         faults = [
             Fault(where, f"returns {k!r}, which is not one of its components; {suggestion(str(k), names)}")
-            for k in set(value) - set(names)
+            for k in value
+            if k not in names
         ]
         faults += [Fault(where, f"returns no {name!r}") for name in names if name not in value]
         if faults:

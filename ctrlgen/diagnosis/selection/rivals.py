@@ -93,8 +93,8 @@ def _coarser(trials: Trials, current: CandidateModel, k: int) -> CandidateModel:
         if plain.law.amplitude().name not in current.fit.values(k):  # a size of another kind
             continue
         channel = plain.channel_on(current.fit.structure.device)
-        common = {p.name for p in plain.law.params} & current.fit.values(k).keys()
-        numbers = {name: current.fit.values(k)[name] for name in common}
+        values = current.fit.values(k)
+        numbers = {p.name: values[p.name] for p in plain.law.params if p.name in values}
         starts = [others.with_cause(plain, numbers | shape) for shape in plain.shapes(channel, DataHints(), numbers)]
         if not starts:  # a region that no record suggests here
             continue

@@ -58,66 +58,64 @@ def names_and_units(candidates: Sequence[tuple[int, list[str]]], numeric: Collec
     """Names and units of rows above a table, nearest first; `numeric`: its columns of numbers, which alone have a unit."""
     if not candidates:
         return Header(())
-    labels = {cells[0].rstrip(":").lower(): n for n, (_, cells) in reversed(list(enumerate(candidates)))}
-    stating = (labels[word] for word in UNIT_LABELS if word in labels)
-    at = next((n for n in stating if any(map(unit_of, candidates[n][1][1:]))), None)
-    names_at = next((labels[word] for word in NAME_LABELS if word in labels and at is not None), None)
-    nearest = candidates[0][1]
-    if (
-        at
-        and names_at is None
-        and TIME_NAME.match(nearest[0])
-        and not any(cell and is_reading(cell) for cell in nearest)
-    ):
-        names_at = 0  # of an oscilloscope: its settings stand above the names, units among them
-    if at is None:
-        at = next(
-            (
-                n
-                for n in range(min(2, len(candidates) - 1))
-                if _is_units(candidates[n][1], candidates[n + 1][1], numeric)
-            ),
-            None,
-        )
-    if at is None and not any(map(is_number, candidates[0][1])):  # units above the names
-        at = next((n for n in range(1, min(4, len(candidates))) if is_unit_row(candidates[n][1])), None)
-        alike = len(set(candidates[0][1])) == 1 < len(candidates[0][1])  # the rate of every column, which names none
-        names_at = names_at if at is None or alike else 0
-    names_at = names_at if names_at is not None else 0 if at is None else min(at + 1, len(candidates) - 1)
-    above = candidates[names_at + 1][1] if names_at + 1 < len(candidates) and names_at + 1 != at else []
-    if at is not None and _tells_more(above, candidates[names_at][1]):
+    lines, rows = [line + 1 for line, _ in candidates], [cells for _, cells in candidates]
+    names_at, units_at = _roles(rows, numeric)
+    above = rows[names_at + 1] if names_at + 1 < len(rows) and names_at + 1 != units_at else []
+    if units_at is not None and _tells_more(above, rows[names_at]):
         names_at, above = names_at + 1, []
-    line, names = candidates[names_at]
-    notes = [f"names in line {line + 1}"] if line else []
+    names, notes = rows[names_at], [f"names in line {lines[names_at]}"] if lines[names_at] > 1 else []
     if not all(names) and _is_text(above) and all(a or n for a, n in zip(above, names, strict=True)):
-        notes.append(f"columns without a name there are named by line {candidates[names_at + 1][0] + 1}")
-        names = [name or other for name, other in zip(names, above, strict=True)]
-        above = []
+        notes.append(f"columns without a name there are named by line {lines[names_at + 1]}")
+        names, above = [name or other for name, other in zip(names, above, strict=True)], []
     if any(map(is_number, names)):
-        notes = [f"line {line + 1} ({', '.join(names)}) is taken as the columns' names"]
+        notes = [f"line {lines[names_at]} ({', '.join(names)}) is taken as the columns' names"]
     units = units_behind(names)
-    if at is not None and at != names_at:
-        notes.append(f"line {candidates[at][0] + 1} holds units")
-        units |= {
-            k: c.strip("[](){} ") for k, c in enumerate(candidates[at][1]) if c and not is_number(c) and unit_of(c)
-        }
-    passed = [(k + 1, c) for n, (k, c) in enumerate(candidates[: max(names_at, at or 0)]) if n not in (names_at, at)]
-    notes += [
-        f"line {k} ({_shown(cells)}) is not applied: write its factors as `scale` of the columns"
-        for k, cells in passed
+    if units_at is not None and units_at != names_at:
+        notes.append(f"line {lines[units_at]} holds units")
+        stated = {k: cell for k, cell in enumerate(rows[units_at]) if cell and not is_number(cell) and unit_of(cell)}
+        units |= {k: cell.strip("[](){} ") for k, cell in stated.items()}
+    between = range(max(names_at, units_at or 0))
+    notes += _passed([(lines[n], rows[n]) for n in between if n not in (names_at, units_at)])
+    found = _grouped(names, above)
+    if found == names and units_at is not None and _is_text(above):
+        notes.append(f"above them stands {', '.join(filter(None, above))}")
+        joined = [name or other for name, other in zip(names, above, strict=True)]
+        found = joined if len(set(joined)) == len(joined) else names
+    return Header(tuple(found), units, notes=tuple(notes))
+
+
+def _roles(rows: Sequence[list[str]], numeric: Collection[int]) -> tuple[int, int | None]:
+    """Which of the rows above a table, nearest first, holds the names, and which the units; None where none does."""
+    last = len(rows) - 1
+    labels = {cells[0].rstrip(":").lower(): n for n, cells in reversed(list(enumerate(rows)))}
+    labelled = sorted(labels[word] for word in UNIT_LABELS & labels.keys())
+    units = next((n for n in labelled if any(map(unit_of, rows[n][1:]))), None)
+    if units is not None:
+        names = min((labels[word] for word in NAME_LABELS & labels.keys()), default=None)
+        # Settings of an oscilloscope, units among them, stand above the names
+        if names is None and units and TIME_NAME.match(rows[0][0]) and not any(map(is_reading, filter(None, rows[0]))):
+            names = 0
+        return min(units + 1, last) if names is None else names, units
+    units = next((n for n in range(min(2, last)) if _is_units(rows[n], rows[n + 1], numeric)), None)
+    if units is not None:
+        return units + 1, units
+    if not any(map(is_number, rows[0])):
+        units = next((n for n in range(1, min(4, len(rows))) if is_unit_row(rows[n])), None)
+    rate_of_each = len(set(rows[0])) == 1 < len(rows[0])  # one word over every column names none
+    return (min(units + 1, last) if units is not None and rate_of_each else 0), units
+
+
+def _passed(rows: Sequence[tuple[int, list[str]]]) -> list[str]:
+    """What is told of lines between the table and its names and units: (number, cells), nearest first."""
+    told = [
+        f"line {line} ({_shown(cells)}) is not applied: write its factors as `scale` of the columns"
+        for line, cells in rows
         if of_factors(cells)
     ]
-    others = [(k, cells) for k, cells in passed if not of_factors(cells)]
+    others = [(line, cells) for line, cells in rows if not of_factors(cells)]
     if len(others) > MOST_PASSED:
-        notes.append(f"lines {', '.join(str(k) for k, _ in reversed(others))} hold neither names nor units")
-    else:
-        notes += [f"line {k} ({_shown(cells)}) holds neither names nor units" for k, cells in others]
-    found = _grouped(names, above)
-    if found == names and at is not None and _is_text(above):
-        notes.append(f"above them stands {', '.join(filter(None, above))}")
-        found = [name or other for name, other in zip(names, above, strict=True)]
-        found = found if len(set(found)) == len(found) else names
-    return Header(tuple(found), units, notes=tuple(notes))
+        return [*told, f"lines {', '.join(str(k) for k, _ in reversed(others))} hold neither names nor units"]
+    return [*told, *(f"line {line} ({_shown(cells)}) holds neither names nor units" for line, cells in others)]
 
 
 def _shown(cells: Sequence[str]) -> str:

@@ -115,7 +115,7 @@ def _parsed(place: int, line: str) -> _Line:
 
 def _check_one_source(path: Path, rows: Sequence[_Line]) -> None:
     """Raises InputError where what stands beside the names differs from line to line: other sources, other states."""
-    for names in {frozenset(line.cells) for line in rows}:
+    for names in dict.fromkeys(frozenset(line.cells) for line in rows):
         rests = [line.rest for line in rows if frozenset(line.cells) == names]
         plain = Counter(DIGITS.sub("0", rest) for rest in rests)
         counted = len(set(rests)) == len(rests)  # a number of the line, or its time
