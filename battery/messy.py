@@ -154,9 +154,12 @@ def background(
 
 def shares(bench: Bench, dominant: Sequence[Planted], small: Sequence[Planted], ruler: Ruler) -> dict[str, Any]:
     """What the answer says of shares: with constants counted, without them, and the least error [noise]."""
-    names, takes = refitted(bench.axis), [bench.fit, bench.takes[-1]]
-    if servo_cases.commanded(bench.stated):
-        names = ()
+    numbers, takes = refitted(bench.axis), [bench.fit, bench.takes[-1]]
+    # a stage without springs has no stiffness
+    kept = [
+        k for k, name in enumerate(numbers) if getattr(bench.axis, name) and not servo_cases.commanded(bench.stated)
+    ]
+    names = [numbers[k] for k in kept]
     noise = bench.scene.noise
 
     def reading(planted: Sequence[Planted], x: Array, record: int) -> Array:
@@ -170,12 +173,14 @@ def shares(bench: Bench, dominant: Sequence[Planted], small: Sequence[Planted], 
     zero = np.zeros(len(names))
     observed = tuple(reading([*dominant, *small], zero, record) for record in (0, 1))
     observed = tuple(y + t.noise.mean() / noise for y, t in zip(observed, takes, strict=True))  # with its zero point
-    columns = ruler.columns[:, : len(names)] / noise
+    columns, sd = ruler.columns[:, kept] / noise, _stated_sd(bench.stated)
+    off = [getattr(bench.stated, name) / getattr(bench.axis, name) - 1 for name in names]
+    stated = truth.Stated(np.array(off), np.array([sd[name] for name in names]))
 
     def model(present: frozenset[int], x: Array, record: int) -> Array:
         return reading([dominant[k] for k in sorted(present)], x, record)
 
-    counted, free = (truth.attribute(observed, model, columns, len(dominant), zeros) for zeros in (False, True))
+    counted, free = (truth.attribute(observed, model, columns, stated, len(dominant), zeros) for zeros in (False, True))
     return {
         "shares": counted.shares,
         "shares_varying": free.shares,

@@ -29,13 +29,15 @@ LARGEST = {
     "heat_crosstalk": 0.06,
     "frame_turn": 0.1,
 }
+# In the order in which laws act: what a drive gives warms the neighbours, and sensors read the turned frame
+PLACES = ("drive", "heat", "stage", "frame", "pose")
 KNOWN = ("drive_gain", "sensor_gain", "bow", "coupling", "stiffening")
 FOREIGN = ("product", "wander", "kink", "root", "ripple", "bouc_wen_motion", "worn_play", "preisach")
 
 
 @dataclass(frozen=True)
 class Act:
-    """One law of a pose plant: what it adds, change(x, amplitude, record), at the "drive", the "stage" [um] or the "pose".
+    """One law of a pose plant: what it adds, change(x, amplitude, record), at one of the `PLACES`; the "stage" in um.
 
     `also`: other names of the same law on this machine.
     """
@@ -115,7 +117,9 @@ class Bench:
         """Poses (n, 6) [rad, um] of record 0 (to fit) or 1 (held out), without noise."""
         n = changed(read(self.machine.file), self.poses.shares if shares is None else shares)
         x = self.poses.drives[("fit", "hold_out")[record]]
-        for place, onward in (("drive", self.machine.to_stage), ("stage", self.machine.to_pose), ("pose", None)):
+        onwards = {"heat": self.machine.to_stage, "stage": self.machine.to_pose}
+        for place in PLACES:
+            onward = onwards.get(place)
             x = x + sum((a.change(x, a.amplitude, record) for a in acts if a.at == place), np.zeros_like(x))
             x = onward(n, x) if onward else x
         return x
@@ -192,8 +196,8 @@ def draw_act(name: str, rng: Rng, bench: Bench, gauge: PoseGauge) -> Act:
         "bow": (sensor, "pose", only(c, lambda x: x[:, c] ** 2 / width)),
         "coupling": (stage, "stage", only(k, lambda x: x[:, j])),
         "stiffening": (stage, "stage", only(k, lambda x: -(x[:, k] ** 3) / s**2)),
-        "heat_crosstalk": ("actuator:all", "drive", lambda x, a, r: a * (x.sum(axis=1, keepdims=True) - x)),
-        "frame_turn": ("mechanism:all", "pose", lambda x, a, r: x @ (np.kron(np.eye(2), turn_z(a)) - np.eye(6)).T),
+        "heat_crosstalk": ("actuator:all", "heat", lambda x, a, r: a * (x.sum(axis=1, keepdims=True) - x)),
+        "frame_turn": ("mechanism:all", "frame", lambda x, a, r: x @ (np.kron(np.eye(2), turn_z(a)) - np.eye(6)).T),
         "product": (sensor, "pose", only(c, lambda x: x[:, c] * x[:, other] / across)),
         "kink": (sensor, "pose", only(c, lambda x: np.maximum(x[:, c] - place * width, 0))),
         "root": (stage, "stage", only(k, lambda x: np.sign(x[:, k]) * np.sqrt(np.abs(x[:, k]) * s))),
@@ -248,7 +252,10 @@ def shares(bench: Bench, dominant: Sequence[Act], small: Sequence[Act], gauge: P
         moved = {path: true[path] + share for path, share in zip(true, x, strict=True)}
         return bench.reading([dominant[k] for k in sorted(present)], record, moved) / gauge.sd
 
-    counted, free = (truth.attribute(observed, model, gauge.columns, len(dominant), zeros) for zeros in (False, True))
+    stated = truth.Stated(-np.array(list(true.values())), np.array([bench.machine.deviations[path] for path in true]))
+    counted, free = (
+        truth.attribute(observed, model, gauge.columns, stated, len(dominant), zeros) for zeros in (False, True)
+    )
     return {
         "shares": counted.shares,
         "shares_varying": free.shares,

@@ -1,7 +1,8 @@
 """How much of the mismatch each accepted cause takes away, with intervals: one account, of the error that the tables call "before".
 
 The energy E(S) that the causes S leave on the held-out records: the device with these causes as the accepted model has them, its
-own numbers fitted again, as every model is: held by what its file states of them, under the discrepancy that the set itself leaves.
+own numbers fitted again, as every model is: held by what its file states of them, under the discrepancy that the set itself leaves,
+one for all readings over their noise, as E counts them.
 No causes leave what the tables call "before", all of them what they call "after". What a cause takes away is its Shapley value,
 
     phi_k = mean over orders of E(before k) - E(after k),      sum phi = E(none) - E(all),
@@ -264,10 +265,22 @@ def left_by(fitter: Fitter, fit: Fit, present: frozenset[int], records: list[Rec
     nothing = np.zeros(0)
     reduced = Fit(structure, theta, (), 0.0, fit.n, nothing, nothing, 0.0, fit.shapes)
     for _ in range(ATTRIBUTION.updates):
-        problem = CausesAsFound(structure, fitter.with_errors_of(reduced), reduced.theta)
+        problem = CausesAsFound(structure, _alike(fitter.with_errors_of(reduced)), reduced.theta)
         x = levenberg_marquardt(problem, problem.start, ATTRIBUTION.steps)
         reduced = replace(reduced, theta=problem.to_si(x)[: problem.k])
     return as_fitted(fitter, reduced, records)
+
+
+def _alike(fitter: Fitter) -> Fitter:
+    """The same with one discrepancy of all readings, over their noise, where there is any: E counts their squares over that alike. With
+    one of its own for each, a set would give up a few readings for the others, and leave more of all than without its causes."""
+    errors = fitter.error
+    if errors.is_noise:
+        return fitter
+    floor = fitter.noise.floor
+    left = np.where(errors.rms > 0, errors.rms / floor, 1.0) ** 2
+    tau = np.full(len(floor), left @ errors.tau / left.sum())
+    return replace(fitter, errors=replace(errors, rms=np.sqrt(left.mean()) * floor, tau=tau))
 
 
 def _key(structure: Structure, p: FreeParameter) -> tuple[Hypothesis | None, str]:
