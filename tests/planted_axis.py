@@ -116,6 +116,16 @@ def one_sided_saturation(u, t):
     return move(np.maximum(u, -1.1))
 
 
+def soft_saturation(u, t):
+    """The drive as the angle of a triangle: 2.2 V are never reached."""
+    return move(2.2 * np.sin(np.arctan(u / 2.2)))
+
+
+def sensor_saturation(u, t):
+    y = move(u)
+    return 1.5e-4 * np.sin(np.arctan(y / 1.5e-4))
+
+
 def coil_heating(u, t):
     """Copper of 4 Ohm that 8 W would heat by 80 K in the end, in steps of a sample; cold at first."""
     resistance, warmth, out = 4.0, 0.0, []
@@ -310,6 +320,8 @@ ON_AXIS = {
     amplifier_lag: Planted("actuator:axis", {"share": 1.0, "tau": 1 / (2 * np.pi * 30), "damping": 0.5}),
     notch: Planted("actuator:axis", {"share": 0.9, "tau": 1 / (2 * np.pi * 60), "damping": 0.4}),
     one_sided_saturation: Planted("actuator:axis", {"level": -1.1}),
+    soft_saturation: Planted("actuator:axis", {"level": 2.2, "sharpness": 2.0}),
+    sensor_saturation: Planted("sensor:axis", {"level": 1.5e-4, "sharpness": 2.0}),
     slew_rate: Planted("actuator:axis", {"rate": 12.0}),
     asymmetric_slew_rate: Planted("actuator:axis", {"rate": 12.0, "excess": -2 / 3}),
     back_emf: Planted("actuator:axis", {"emf": 40.0, "tau": 3e-3}, within={"emf": 0.03, "tau": 0.03}),

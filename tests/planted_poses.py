@@ -87,6 +87,10 @@ ON_HEXAPOD = {
     ),
     "lever_ratio": (carried, Planted("stage:2X", {"gain": 0.02})),
     "lost_motion": (losing, Planted("stage:all", {"compliance": 5e-6})),
+    "soft_saturation": (
+        lambda u: Hexapod().settled(0.9 * np.sin(np.arctan(u / 0.9))),
+        Planted("actuator:all", {"level": 0.9, "sharpness": 2.0}),
+    ),
     "heat_loss": (cooled, Planted("actuator:all", {"coefficient": 2e-4, "power": 1.0})),
     "heater_resistance": (
         lambda u: Hexapod(faults=Faults(resistance=5e-5), voltage=True).settled(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
-from numpy import abs, cos, cross, exp, sign, sin, sqrt
+from numpy import abs, arctan, cos, cross, exp, sign, sin, sqrt
 from written_terms import (
     EVENT,
     PARTS,
@@ -265,6 +265,10 @@ LAWS = {
     "resonance": ({"frequency": 8.0, "damping": 0.2}, second_mass, second_mass_rates),
     "reversed": ({}, lambda s, p: -2 * p.share * s.value),
     "saturation": ({"level": 0.4}, clipped),
+    **dict.fromkeys(
+        ("soft_saturation", "sensor_saturation"),
+        ({"level": 0.4, "sharpness": 2.0}, lambda s, p: p.share * (0.4 * sin(arctan(s.value / 0.4)) - s.value)),
+    ),
     "slew_rate": ({"rate": 40.0}, slewed, lambda s, p: {"w": s.rise / H}),
     "asymmetric_slew_rate": ({"rate": 40.0, "excess": 0.5}, slewed, lambda s, p: {"w": s.rise / H}),
     "screw_motion": ({}, lambda s, p: p.share * cross(s.all[:3], s.all[3:])[s.index - 3] / 2),

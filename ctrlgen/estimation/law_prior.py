@@ -68,6 +68,13 @@ SECOND_ORDER_FILTER = {
 """Of a filter of a reading or of a drive: it acts on the whole of it, and one that is fitted to a part stands for something else. In
 firmware, y += (new - y)/2^k, it lets a quarter through at once where k = 2."""
 
+LEVELLING_OFF = {
+    "share": ParameterPrior(fixed_range=(0.5, 1.5)),
+    "level": peaks(0.6, 1.5),
+    "sharpness": ParameterPrior((1.2, 2.5, 6.0)),
+}
+"""Of a curve of a drive or of a reading: between iron and an amplifier that nearly clips."""
+
 
 @dataclass(frozen=True)
 class LawPrior:

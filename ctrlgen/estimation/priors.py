@@ -14,7 +14,15 @@ from types import MappingProxyType
 
 from ctrlgen.devices.usual_deviation import ASSUMED_SCALE
 from ctrlgen.effects import Effect
-from ctrlgen.estimation.law_prior import CREEPING, ONE_IN_TEN, SECOND_ORDER_FILTER, LawPrior, ParameterPrior, peaks
+from ctrlgen.estimation.law_prior import (
+    CREEPING,
+    LEVELLING_OFF,
+    ONE_IN_TEN,
+    SECOND_ORDER_FILTER,
+    LawPrior,
+    ParameterPrior,
+    peaks,
+)
 from ctrlgen.estimation.priors_in_a_region import IN_A_REGION
 from ctrlgen.estimation.priors_of_a_lag import HYSTERESIS, OF_A_LAG
 from ctrlgen.estimation.priors_of_drives import OF_DRIVES
@@ -133,6 +141,12 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             "camera, are off together.",
             of_one_reference=True,
             parameters={"gain": ParameterPrior(deviation=ASSUMED_SCALE)},
+        ),
+        "sensor_saturation": LawPrior(
+            "A sensor's curve is first of all a cubic, and drives level off more often: judgement. Its form: as `soft_saturation`.",
+            log_prior_odds=ONE_IN_TEN,
+            model_form_error=0.01,
+            parameters=LEVELLING_OFF,
         ),
         "stitching_error": LawPrior(
             "Rarer than errors that act along the whole path: judgement. A scale may have several joints.",

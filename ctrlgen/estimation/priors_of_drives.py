@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ctrlgen.estimation.law_prior import ONE_IN_TEN, SECOND_ORDER_FILTER, LawPrior, ParameterPrior, peaks
+from ctrlgen.estimation.law_prior import (
+    LEVELLING_OFF,
+    ONE_IN_TEN,
+    SECOND_ORDER_FILTER,
+    LawPrior,
+    ParameterPrior,
+    peaks,
+)
 from ctrlgen.estimation.priors_of_a_lag import HYSTERESIS
 
 OF_DRIVES: Mapping[str, LawPrior] = {
@@ -93,6 +100,7 @@ OF_DRIVES: Mapping[str, LawPrior] = {
     ),
     "saturation": LawPrior(
         "A limit beyond the peak shows nowhere; one far below it would have been noticed. An amplifier clips or it does not.",
+        form_of="saturation",
         parameters={
             "share": ParameterPrior(fixed_range=(0.5, 1.5)),
             "level": peaks(0.2, 0.4, 0.6, 0.8, 0.9, 0.97),
@@ -104,6 +112,14 @@ OF_DRIVES: Mapping[str, LawPrior] = {
             "share": ParameterPrior(fixed_range=(0.5, 1.5)),
             "rate": peaks(3e-3, 0.01, 0.03, 0.1, 0.2, 0.4, 0.6, 0.8, 0.9, 0.97),
         },
+    ),
+    "soft_saturation": LawPrior(
+        "Rarer than a limit that is run into: judgement. Measured curves differ from any form of theirs: tanh by 0.5 % of what it takes "
+        "away, of which 1 % is twice. A curve is there or it is not; it bends already where its limit is beyond the peak.",
+        log_prior_odds=-1.0,
+        model_form_error=0.01,
+        form_of="saturation",
+        parameters=LEVELLING_OFF,
     ),
     "swapped": LawPrior(
         "A wiring fault is rarer than a wrong gain: judgement. Two leads are exchanged or they are not.",

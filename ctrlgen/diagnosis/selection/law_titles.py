@@ -171,6 +171,10 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
             ),
             ("", "A drive that follows its command no faster than at one rate: slew rate"),
         ),
+        "soft_saturation": (
+            ("position", "An axis that goes less far the farther it is told, toward a limit"),
+            ("electromagnetic", "A drive that levels off toward a limit: an amplifier, or iron, that saturates smoothly"),
+        ),
         "stiffening": (
             ("flexible", "A clamped flexure stretches as it bends"),
             ("", "A stiffness that grows with the square of the displacement"),
