@@ -93,6 +93,9 @@ def test_a_pitch_is_seen_to_repeat(period, told):
     # one that was accepted shorter may have grown since, as where two causes nearly make up for one another
     assert objections(recording, fit, [cause]) == objections(recording, fit)
     assert objections(recording, fit, exact=True) == {}
+    # nor may one that is accepted go on to less than a period where noise alone is left
+    values["period"] = 1e-6 / 0.9
+    assert objections(recording, fit, [cause], exact=True).keys() == {0}
 
 
 def test_a_period_that_is_seen_to_repeat_grows_into_none_that_is_not():

@@ -156,3 +156,26 @@ def test_what_is_refused_although_it_scores_better_stands_in_its_round(monkeypat
     (round_,) = found.rounds
     (refusal,) = round_.refused
     assert refusal.causes == (BACKLASH,) and refusal.reasons == ("so it is",) and round_.candidates == ()
+
+
+def test_what_is_sound_of_a_set_whose_best_fit_is_refused_is_what_goes_on(monkeypatch):
+    """A play in two valleys, of which the one that leaves less is no play: the fits that follow begin in the other one, and end there."""
+    fitter = fitter_of(played)
+    trials = Trials(fitter, Screen(fitter, [BACKLASH]), nothing)
+    nominal = trials.fit(Structure(AXIS))
+    refused = trials.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 6e-8}))
+    sound = trials.scored(
+        refused.fit.structure, fitter.fit(Structure(AXIS).with_cause(BACKLASH, {"gap": 5e-8}), steps=0)
+    )
+    assert sound.fit.objective > refused.fit.objective  # so that it is not what is known of its causes
+    assert trials.fit(sound.fit.restarted).fit is refused.fit
+    monkeypatch.setattr(pruning, "_other_valleys", lambda cause, starts: list(starts[1:]))
+    monkeypatch.setattr(type(fitter), "fit", lambda self, structure, **_: sound.fit)
+    monkeypatch.setattr(
+        "ctrlgen.diagnosis.selection.trials.objections",
+        lambda r, fit, *_: {0: "so it is"} if fit is refused.fit else {},
+    )
+    starts = {BACKLASH: ({"gap": 6e-8}, {"gap": 5e-8})}
+    kept = pruned(trials, refused, (), starts, nominal)
+    assert kept.fit is sound.fit
+    assert trials.converged(kept).fit is sound.fit

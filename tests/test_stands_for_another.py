@@ -58,6 +58,17 @@ def test_nothing_is_searched_again_where_no_cause_stands_for_another(searched, m
     assert searcher.without_other_laws(loop, []) is loop
 
 
+def test_a_pitch_that_grew_while_other_causes_came_and_went_is_not_in_the_end(searched, monkeypatch):
+    """Of its period the records hold less than one; without it nothing is objected to."""
+    searcher, loop = searched
+    pitch = Hypothesis("cyclic", "sensor:axis", "axis")
+    long = {"amplitude": NOISE, "period": 2e-3, "phase": 0.3}
+    grown = searcher.trials.fit(loop.fit.restarted.with_cause(pitch, long), pitch, 0)
+    monkeypatch.setattr(Searcher, "_settled", lambda self, current: current)
+    assert searcher.without_unseen_pitches(grown).causes == (LOOP,)
+    assert searcher.without_unseen_pitches(loop) is loop
+
+
 def test_a_search_that_finds_nothing_sound_leaves_all_as_it_was(searched, monkeypatch):
     """Errors, screen and rounds too; its attempts are kept for whoever asks what was tried."""
     searcher, loop = searched

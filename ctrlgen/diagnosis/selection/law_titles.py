@@ -173,7 +173,10 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
         ),
         "soft_saturation": (
             ("position", "An axis that goes less far the farther it is told, toward a limit"),
-            ("electromagnetic", "A drive that levels off toward a limit: an amplifier, or iron, that saturates smoothly"),
+            (
+                "electromagnetic",
+                "A drive that levels off toward a limit: an amplifier, or iron, that saturates smoothly",
+            ),
         ),
         "stiffening": (
             ("flexible", "A clamped flexure stretches as it bends"),

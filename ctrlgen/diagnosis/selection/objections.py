@@ -39,7 +39,7 @@ def objections(
     reasons: dict[int, str] = {}
     for k, cause in enumerate(causes):
         if cause in accepted:
-            if not exact and (reason := _no_pitch(recording, fit, k)):
+            if reason := _no_pitch(recording, fit, k, exact):
                 reasons[k] = reason
             continue
         reason = (

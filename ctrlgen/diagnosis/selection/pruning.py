@@ -107,6 +107,7 @@ def _begun_elsewhere(
             fit = trials.fitter.fit(begun, steps=SEARCH.candidate_steps, enough=before.fit.objective)
             again = trials.scored(begun, fit, candidate.cause)
             if trials.selection.advantage(again, before) > 0 and not trials.objections(again, accepted):
+                trials.keep(again, SEARCH.candidate_steps)
                 return again
         except FAILURES as error:
             trials.note_failure(cause, error)

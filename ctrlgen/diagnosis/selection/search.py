@@ -77,6 +77,7 @@ class Searcher:
         trials = self.trials
         if found is not current:
             current = self._in_plainest_form(self._finely_timed(found))
+        current = self.without_unseen_pitches(current)
         # its numbers are not bent by the errors of a better model
         nominal = scored(trials.fitter, trials.fitter.described(device)[1])
         current, account = supported(trials, nominal, current, trials.screen.seed)
@@ -143,11 +144,15 @@ class Searcher:
     def without_other_laws(self, current: CandidateModel, rounds: list[Round]) -> CandidateModel:
         """The model without the causes that were accepted for what their names say, and by now stand for something else
         (`other_laws`), where another that is sound explains alike, or nearly; `SEARCH.most_searches_without` of them at most."""
-        doubtful = [c for k, c in enumerate(current.causes) if stands_for_another(current.fit, k)]
+        doubtful = [c for k, c in enumerate(current.causes) if self._is_doubtful(current, k)]
         for cause in doubtful[: SEARCH.most_searches_without]:
-            if cause in current.causes and stands_for_another(current.fit, k := current.causes.index(cause)):
+            if cause in current.causes and self._is_doubtful(current, k := current.causes.index(cause)):
                 current = self._without_other_law(current, k, rounds)
         return current
+
+    def _is_doubtful(self, current: CandidateModel, k: int) -> bool:
+        """Whether cause k stands for something else by now, or is a pitch that the records do not show to repeat any more."""
+        return stands_for_another(current.fit, k) or k in self.trials.objections(current, current.causes)
 
     def _without_other_law(self, current: CandidateModel, k: int, rounds: list[Round]) -> CandidateModel:
         """The model with what is sound and explains alike, or nearly, in the place of cause k; as it is where nothing does. A rival
@@ -165,6 +170,16 @@ class Searcher:
         other.trials.suspecting_again(whole.screen)
         self.trials, self.markings, rounds[:] = other.trials, other.markings, again
         return found
+
+    def without_unseen_pitches(self, current: CandidateModel) -> CandidateModel:
+        """The model without the pitches that its last fits made so long that the records do not show that they repeat: what was objected
+        to while causes came and went holds at the end too."""
+        while against := self.trials.objections(current, current.causes):
+            bare = self._bare(current, max(against))
+            if not bare:
+                return current
+            current = self._settled(bare[0])
+        return current
 
     def _bare(self, current: CandidateModel, k: int) -> list[CandidateModel]:
         """The model without cause k; none where such a device cannot be simulated."""

@@ -189,6 +189,11 @@ class Trials:
         self.note_failure(cause, failure)
         return []
 
+    def keep(self, candidate: CandidateModel, steps: int) -> None:
+        """Keeps a fit of so many `steps` as that of its causes, where another one of them leaves less and is refused: it is gone on from,
+        and the refused one is not handed out in its place."""
+        self.fitted[frozenset(candidate.causes)] = (candidate, steps)
+
     def note_failure(self, cause: Hypothesis | None, error: Exception) -> None:
         """Keeps why a trial of a cause could not be made."""
         self.failed.append(Failure(cause, reason_of(error)))
