@@ -86,6 +86,7 @@ def place_of(effect: type[Effect]) -> tuple[dict, list[Channel]]:
 
 
 SUGGESTED = {
+    "drive_levels": (0.05, 0.2),
     "moments": (0.3, 1.0, 3.0),
     "jump_positions": (-0.3, 0.1, 0.6),
     "edges_above": (-0.3, 0.2),

@@ -116,6 +116,11 @@ def one_sided_saturation(u, t):
     return move(np.maximum(u, -1.1))
 
 
+def drive_quantisation(u, t):
+    """Ten bits for 8 V, the levels a quarter of a step off zero."""
+    return move(8 / 1024 * (np.round(u / 8 * 1024 - 0.25) + 0.25))
+
+
 def soft_saturation(u, t):
     """The drive as the angle of a triangle: 2.2 V are never reached."""
     return move(2.2 * np.sin(np.arctan(u / 2.2)))
@@ -320,6 +325,7 @@ ON_AXIS = {
     amplifier_lag: Planted("actuator:axis", {"share": 1.0, "tau": 1 / (2 * np.pi * 30), "damping": 0.5}),
     notch: Planted("actuator:axis", {"share": 0.9, "tau": 1 / (2 * np.pi * 60), "damping": 0.4}),
     one_sided_saturation: Planted("actuator:axis", {"level": -1.1}),
+    drive_quantisation: Planted("actuator:axis", {"quantum": 8 / 1024, "grid": 0.25}, within={"grid": 0.02}),
     soft_saturation: Planted("actuator:axis", {"level": 2.2, "sharpness": 2.0}),
     sensor_saturation: Planted("sensor:axis", {"level": 1.5e-4, "sharpness": 2.0}),
     slew_rate: Planted("actuator:axis", {"rate": 12.0}),

@@ -109,7 +109,7 @@ def test_c_equals_python(effect, compiled, rng):
 def controlled() -> list[type[Effect]]:
     """Effects on the way to the pose of the device that a controller can be made for; of one that limits the rate of the drive, a
     controller has the limit alone (`test_laws_that_look_back`)."""
-    inverted = [e for e in Effect.library.values() if e.place is not Place.SENSOR and not e.limits_rate]
+    inverted = [e for e in Effect.library.values() if e.place is not Place.SENSOR and e.inverted and not e.limits_rate]
     return [e for e in inverted if place_of(e)[0] is tables()[0]]
 
 

@@ -69,6 +69,7 @@ def test_times_frequencies_and_ways_are_not_negative_and_moments_places_and_lean
             "reversible",
             "skew",
             "excess",
+            "grid",
             "wear",
             "sine",
             "cosine",

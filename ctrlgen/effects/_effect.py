@@ -76,6 +76,8 @@ class Effect:
     shifts_drive: ClassVar[bool] = False
     # Asks what reaches the readings from its place, and may find that nothing does: its amplitude may be free all the same.
     asks: ClassVar[bool] = False
+    # False: no controller can undo it, or need try. One is made of a model without a sample time, which leaves the law out.
+    inverted: ClassVar[bool] = True
     # The parameter that bounds how fast a drive may change, if there is one: along a path it is a limit.
     limits_rate: ClassVar[str] = ""
     # Its amplitude [s] moves a signal in time, so far that no slope at zero tells what it would explain.

@@ -23,12 +23,12 @@ class ParameterPrior:
         from `off`), for laws whose effect is not proportional to a small amplitude.
     scales_with_peak: the start values are multiples of the largest value in the recording of the signal of that unit: the
         channel's, the travel's, their rates, or, for a time, one twelfth of the recording's duration.
-    start_from_data: starts that the recording suggests are tried too: "spatial_periods" (periods along the path that stand
-        out of the residual), "jump_positions" (places along the path at which it jumps), "moments" (times spread over the
-        recording); where most of the residual is, by a test whose level holds: "edges_above", "edges_below", "edges_outward",
-        "edges_beyond" (ways from home), "speeds", "drives", "since" (a time) and "warmer" (a temperature) beyond which it is,
-        "middles" and "lengths" of stretches of the reading. Frequencies in Hz always take the lines of the residual's spectrum as
-        well.
+    start_from_data: starts that the recording suggests are tried too: "spatial_periods" (periods along the path that stand out of
+        the residual), "drive_levels" (of the drive after which it repeats), "jump_positions" (places along the path at which it
+        jumps), "moments" (times spread over the recording); where most of the residual is, by a test whose level holds:
+        "edges_above", "edges_below", "edges_outward", "edges_beyond" (ways from home), "speeds", "drives", "since" (a time) and
+        "warmer" (a temperature) beyond which it is, "middles" and "lengths" of stretches of the reading. Frequencies in Hz always
+        take the lines of the residual's spectrum as well.
     only_from_data: the law is not suspected where the recording suggests no start.
     plausible_range: of an amplitude: a fit that ends outside is another cause under this law's name, and is rejected.
     usual: of a shape: the value of the plain form of the law, which is taken where the fit does not exclude it: what the records to fit

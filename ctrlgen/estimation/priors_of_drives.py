@@ -74,6 +74,18 @@ OF_DRIVES: Mapping[str, LawPrior] = {
         unless=frozenset({"displacement_command"}),
     ),
     "drive_offset": LawPrior("As common as a wrong gain.", constant=True),
+    "drive_quantisation": LawPrior(
+        "Steps that show are rarer than a wrong gain: judgement. A converter has steps or it has none; where what is left does not repeat "
+        "along the drive, they are not suspected.",
+        log_prior_odds=ONE_IN_TEN,
+        model_form_error=0.03,
+        parameters={
+            "share": ParameterPrior(fixed_range=(0.5, 1.5)),
+            "quantum": ParameterPrior(start_from_data="drive_levels", only_from_data=True),
+            "grid": ParameterPrior((-0.25, 0.0, 0.25, 0.5)),
+            "rounding": ParameterPrior((0.1,)),
+        },
+    ),
     "notch": LawPrior(
         "Who puts a notch into a controller knows it; one that is forgotten is rarer than a lag: judgement.",
         log_prior_odds=ONE_IN_TEN,

@@ -168,6 +168,7 @@ def _assemble(
         stepped=places.stepped,
         resting=places.resting,
         clocks=places.clocks,
+        not_inverted=tuple(sorted({m.effect.kind for m in terms.members if not m.effect.inverted})),
         set_valued_axes=_set_valued_axes(terms, v, equations.own_force),
         bristles=places.bristles,
         free_memories=places.free,

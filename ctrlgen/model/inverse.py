@@ -123,8 +123,12 @@ def invert(
 
 def _check_delivered(model: Model) -> None:
     """Refuses a model with memories that rest only after many samples, such as those of a drive whose rate is limited: over one sample what
-    a drive is beyond that rate moves nothing, and there is no root. Raises InputError."""
+    a drive is beyond that rate moves nothing, and there is no root; and one whose drive goes in steps. Raises InputError."""
     what = "looks back by samples and is not inverted: build the model without a sample time"
+    if model.not_inverted:
+        kinds = [(k, e.kind) for k, e in enumerate(model.device.effect) if e.kind in model.not_inverted]
+        why = "gives a drive in steps and is not inverted: build the model without a sample time"
+        raise InputError(model.name, [Fault(f"effect[{k}].kind", f"{kind} {why}") for k, kind in kinds])
     if model.resting:
         kinds = [(k, e.kind) for k, e in enumerate(model.device.effect) if type(e).resting is not Effect.resting]
         raise InputError(model.name, [Fault(f"effect[{k}].kind", f"{kind} {what}") for k, kind in kinds])

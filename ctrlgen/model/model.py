@@ -66,6 +66,7 @@ class Model(Shown):
     stepped: dict[int, ca.SX]  # change once a sample: place -> new value
     resting: dict[int, ca.SX]  # of these, where they come to rest only after many samples: place -> value at rest
     clocks: tuple[int, ...]  # count time
+    not_inverted: tuple[str, ...]  # kinds of its effects that no controller can undo (`Effect.inverted`)
     set_valued_axes: tuple[int, ...]  # axes with inertia on which dry friction may hold the stage at rest
     bristles: tuple[int, ...]  # the states of that friction
     free_memories: tuple[int, ...]  # states of effects that begin differently in each record

@@ -19,6 +19,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from ctrlgen.diagnosis.selection.candidate_terms import CandidateTerm, Peaks, signal_peaks, signals_along
+from ctrlgen.diagnosis.selection.drive_levels import steps_of_drives
 from ctrlgen.diagnosis.selection.law_terms import LawTerms
 from ctrlgen.diagnosis.selection.motion_regions import Along, motion_of, on_either_side, suggested
 from ctrlgen.diagnosis.selection.regions import Leftover, Region, find_regions
@@ -262,7 +263,8 @@ class Screen:
             for i, name in read
             if name in names and np.any(good := record.valid[:, i] & np.isfinite(residual[:, i]))
         }
-        return by_sensor | self._along_axes(fit, record, residual)
+        drives = steps_of_drives(self.fitter, fit, record, foreseen)
+        return by_sensor | self._along_axes(fit, record, residual) | drives
 
     def _along_axes(
         self, fit: Fit, record: Record, residual: np.ndarray

@@ -67,6 +67,8 @@ class SpatialPeriodSettings:
     """Equal cells of the path in which jumps are sought. Judgement."""
     jump_side: int = 16
     """Cells on either side of a place whose means are compared. Judgement."""
+    kick: float = 1e-3
+    """What is added to a drive for one sample, to see what the readings answer, in typical drives: little beside the motion. Judgement."""
 
 
 @dataclass(frozen=True)
