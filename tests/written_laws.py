@@ -266,7 +266,11 @@ LAWS = {
     "reversed": ({}, lambda s, p: -2 * p.share * s.value),
     "saturation": ({"level": 0.4}, clipped),
     "drive_quantisation": (
-        {"quantum": 0.03, "grid": 0.2, "rounding": 0.1},  # the phasor of a wave, and 0.9 of that of each harmonic before it
+        {
+            "quantum": 0.03,
+            "grid": 0.2,
+            "rounding": 0.1,
+        },  # the phasor of a wave, and 0.9 of that of each harmonic before it
         lambda s, p: -p.share * 0.03 / np.pi * np.angle(1 + 0.9 * exp(1j * TWO_PI * (s.value / 0.03 - 0.2))),
     ),
     **dict.fromkeys(
