@@ -39,9 +39,9 @@ def time_of(folder, head: str, *columns, answers: Answers = NOTHING) -> TimeFact
 
 def test_the_time_of_a_table_with_its_step_its_gaps_and_its_falls(tmp_path):
     x = np.arange(9)
-    jitter = pytest.approx(np.sqrt(0.25**2 / 5), rel=1e-12)  # of five steps near 1 s; 1.5 s is neither near nor a gap
-    assert time_of(tmp_path, "time,x", CLOCK, x) == TimeFacts("time", "s", False, 1.0, jitter, ((5, 2),), 1)
-    assert time_of(tmp_path, "time (ms),x", CLOCK, x).step == pytest.approx(1e-3, rel=1e-12)
+    step, jitter = pytest.approx(1.05, rel=1e-12), pytest.approx(0.1, rel=1e-12)  # of five near 1 s; 1.5 s is neither near nor a gap
+    assert time_of(tmp_path, "time,x", CLOCK, x) == TimeFacts("time", "s", False, step, jitter, ((5, 2),), 1)
+    assert time_of(tmp_path, "time (ms),x", CLOCK, x).step == pytest.approx(1.05e-3, rel=1e-12)
     three = time_of(tmp_path, "time,x", [0, 1, 2], [0, 1, 2])
     assert three is not None and (three.step, three.jitter, three.gaps, three.backward) == (1.0, 0.0, (), 0)
     assert time_of(tmp_path, "time,x", [0, 1], [0, 1]) is None

@@ -22,11 +22,11 @@ from ctrlgen.recordings.after_gaps import Gap as AfterGap
 from ctrlgen.recordings.bridges import Bridge, DriveWithGaps
 from ctrlgen.recordings.preprocessing import WHOLE_SAMPLES
 from ctrlgen.recordings.recording import Record
+from ctrlgen.recordings.usual_step import BREAK
 
 Gap = Literal["linear", "held", "split"]
 
 SHORTEST = {"series": 20, "poses": 3}  # rows below which a record says nothing
-BREAK = 1.5  # sample times without a sample: a gap
 LONGEST = 100  # rows of a gap that is bridged unasked
 # of a drive's range: a bridge that may be farther off has lost where the drive turned, and what remembers it is known to no twentieth
 LOST = 0.05

@@ -14,6 +14,7 @@ from ctrlgen.recordings.formats.measurement_table import Clock, MeasurementTable
 from ctrlgen.recordings.formats.unit_texts import scaled_unit, unclear_factor, unit_of
 from ctrlgen.recordings.recorded_files import sha256
 from ctrlgen.recordings.schema import Column, RecordingFile, RecordTable
+from ctrlgen.recordings.usual_step import usual_step
 
 SAME_CLOCK = 1e-3  # of a time between readings: as far as two clocks may differ by the rounding of a file
 
@@ -81,7 +82,7 @@ class RecordedColumns:
             return {}
         first, clock = next(iter(clocks.items()))
         rate = self.table.sample_rate
-        step = 1 / rate.si if rate else None if time is None or len(time) < 2 else float(np.nanmedian(np.diff(time)))
+        step = 1 / rate.si if rate else None if time is None or len(time) < 2 else usual_step(time)
         if step is not None and abs(clock.step / step - 1) > SAME_CLOCK:
             key, stated = (
                 ("sample_rate", f"sample_rate = {rate.text}") if rate else ("time", f"its time steps by {step:.6g} s")

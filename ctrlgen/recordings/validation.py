@@ -23,9 +23,10 @@ from ctrlgen.devices.limit import spans
 from ctrlgen.model.model import Model
 from ctrlgen.recordings.after_gaps import Described
 from ctrlgen.recordings.alike_units import unit_within
-from ctrlgen.recordings.gaps import BREAK, SHORTEST, Gap, rows_between, stretches
+from ctrlgen.recordings.gaps import SHORTEST, Gap, rows_between, stretches
 from ctrlgen.recordings.outliers import outliers, stuck_samples
 from ctrlgen.recordings.recording import Record
+from ctrlgen.recordings.usual_step import BREAK
 
 JITTER = 0.01  # of the sample time, rms
 NOTED_JITTER = 0.001  # of the sample time, rms: from here on it is noted
@@ -187,8 +188,7 @@ def _sample_time(record: Record, where: str) -> tuple[float, list[str], list[Fau
             "all; sort the rows, remove repeated ones, or give sample_rate if the samples are evenly spaced"
         )
         return np.nan, [], [Fault(f"{where}.time", what)]
-    median = float(np.median(step))
-    regular = step[step <= BREAK * median]
+    regular = step[step <= BREAK * np.median(step)]
     sample_time = float(f"{regular.mean():.9g}")  # the same for records that differ by rounding
     jitter = float(np.sqrt(np.mean((regular / sample_time - 1) ** 2)))
     if jitter > JITTER:

@@ -12,7 +12,7 @@ from ctrlgen.recordings.formats.checked_files import check_size, fault, package
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
 from ctrlgen.recordings.formats.nested_columns import columns_of
 from ctrlgen.recordings.formats.stated_rate import rate_of
-from ctrlgen.recordings.formats.unapplied import unapplied
+from ctrlgen.recordings.formats.unapplied import APPLIED, scale_of_counts, unapplied
 from ctrlgen.recordings.formats.written_layout import Layout
 
 UNITS = ("unit", "units", "Unit", "Units", "UNIT")
@@ -28,6 +28,7 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
     columns: dict[str, np.ndarray] = {}
     units: dict[str, str] = {}
     notes: list[str] = []
+    scales: dict[str, float] = {}
 
     beside: list[tuple[str, Any]] = []
 
@@ -46,7 +47,9 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
         attributes = {key: _attribute(node, key) for key in (*UNITS, *FILL, "scale_factor", "add_offset")}
         value, said = _applied(node[()], attributes, name)
         notes.extend([*said, *unapplied(name, ((key, _attribute(node, key)) for key in node.attrs))])
+        scale = scale_of_counts(value, ((key, _attribute(node, key)) for key in node.attrs if key not in APPLIED))
         for column in columns_of(value, name, "/"):
+            scales.update({column.name: scale} if scale is not None else {})
             columns[column.name] = column.values
             notes.extend([column.note] if column.note else [])
             unit = next((attributes[key] for key in UNITS if attributes[key] is not None), None)
@@ -58,7 +61,9 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
         file.visititems(visit)
     said = tuple(dict.fromkeys(notes))
     return {
-        "data": MeasurementTable(path, columns, units, notes=said, missing=layout.missing, stated_rate=rate_of(beside))
+        "data": MeasurementTable(
+            path, columns, units, notes=said, missing=layout.missing, stated_rate=rate_of(beside), scales=scales
+        )
     }
 
 

@@ -52,6 +52,7 @@ class MeasurementTable:
     `time_parts`: columns that are one time together, which is a column of its own.
     `style`: how numbers are written as text. `missing`: numbers and texts that the reader says are no reading,
     None where nothing is said. `stated_rate`: words of the file that state how often rows were read, and the rate [Hz].
+    `scales`: factors that stand beside columns of whole numbers, which lack them.
     """
 
     path: Path
@@ -67,6 +68,7 @@ class MeasurementTable:
     style: NumberStyle = field(default_factory=NumberStyle)
     missing: tuple[str | int | float, ...] | None = None
     stated_rate: tuple[str, float] | None = None
+    scales: Mapping[str, float] = field(default_factory=dict)
 
     def find(self, wanted: str | int) -> str:
         """The full name of a column that is given by name, by number from 0, without its unit, or without its group.
@@ -118,7 +120,7 @@ class MeasurementTable:
         if column.dtype.kind == "O":
             cells = number_cells.to_numbers(column, self.style, self.missing or ())
             if cells.bad:
-                raise self._bad_cells(name, cells.bad)
+                raise self._bad_cells(name, cells)
             column = cells.values
             notes += [
                 f"{name}: {number_of(len(k), 'reading is', 'readings are')} {word!r} ({self._first(k[0])}), taken as missing"
@@ -202,13 +204,15 @@ class MeasurementTable:
                 )
         return ""
 
-    def _bad_cells(self, name: str, bad: Sequence[tuple[int, str]]) -> InputError:
+    def _bad_cells(self, name: str, cells: number_cells.Cells) -> InputError:
+        bad = cells.bad
         words = list(dict.fromkeys(text for _, text in bad))
         listed = ", ".join(f"{self._place(k)} {text!r}" for k, text in bad[: number_cells.MOST_LISTED])
         more = f" and {len(bad) - number_cells.MOST_LISTED} more" if len(bad) > number_cells.MOST_LISTED else ""
         key = ", ".join(f'"{word}"' for word in words[: number_cells.MOST_WORDS]).replace("\\", "\\\\")
         what = f"column {name!r} holds text that is no number in {len(bad)} of {number_of(len(self.columns[name]), 'row')} ({listed}{more})"
-        if why := number_cells.written_otherwise([text for _, text in bad]):
+        remarks = not np.isfinite(cells.values).any()  # and a state INF is no infinity
+        if (len(words) > 1 or not remarks) and (why := number_cells.written_otherwise([text for _, text in bad])):
             return AmbiguousFile(self.path, Ambiguous(f"{what}: {why}"))
         if any(number_cells.has_unit(text) for _, text in bad):
             if all(re.fullmatch(r"[^a-z]*m", text) for text in words):
@@ -222,6 +226,8 @@ class MeasurementTable:
         if number_cells.are_digits(words):
             mend = "numbers with marks that are not known; write plain ones, such as -1234.5"
             return AmbiguousFile(self.path, Ambiguous(f"{what}: {mend}"))
+        if remarks:
+            return self.fault(f"{what}, and numbers in none; name another column")
         left = len(words) - number_cells.MOST_WORDS
         all_of_them = f"with {number_of(left, 'more text')} of the column " if left > 0 else ""
         answers = {f"missing = [{key}]": f"{all_of_them}if that means a missing reading, or numbers in their place"}

@@ -10,7 +10,7 @@ from ctrlgen.recordings.formats.checked_files import check_size, package
 from ctrlgen.recordings.formats.measurement_table import Clock, MeasurementTable
 from ctrlgen.recordings.formats.nested_columns import columns_of
 from ctrlgen.recordings.formats.stated_rate import rate_of
-from ctrlgen.recordings.formats.unapplied import unapplied
+from ctrlgen.recordings.formats.unapplied import NI_SCALE, scale_of_counts, unapplied
 from ctrlgen.recordings.formats.written_layout import Layout
 
 UNSET = 1.0  # s: the time between readings of a waveform whose programmer did not set it
@@ -22,6 +22,7 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
     columns: dict[str, np.ndarray] = {}
     units: dict[str, str] = {}
     notes: list[str] = []
+    scales: dict[str, float] = {}
     starts: dict[str, tuple[np.datetime64 | None, float, float]] = {}
     with nptdms.TdmsFile.open(path) as file:
         channels = [(group, channel) for group in file.groups() for channel in group.channels()]
@@ -31,6 +32,9 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
                 columns[column.name] = column.values
                 given = channel.properties
                 notes += unapplied(column.name, given.items())
+                plain = ((key, value) for key, value in given.items() if not key.startswith(NI_SCALE))
+                if (scale := scale_of_counts(np.asarray(column.values), plain)) is not None:
+                    scales[column.name] = scale
                 if given.get("unit_string"):
                     units[column.name] = str(given["unit_string"])
                 if given.get("wf_increment") == UNSET:
@@ -56,6 +60,7 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
             notes=tuple(notes),
             missing=layout.missing,
             stated_rate=rate,
+            scales=scales,
         )
     }
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ctrlgen.core.counts import number_of
+from ctrlgen.recordings.formats import half_day_clock
 from ctrlgen.recordings.formats.layout_question import Ambiguous
 from ctrlgen.recordings.formats.number_cells import CLOCK, DATE, MISSING, ZONES
 
@@ -29,6 +30,7 @@ HUNDREDS = {
     "1601": (1.2e17, 1.7e17),
     "the year 1": (6.1e17, 6.7e17),
 }  # of nanoseconds: of Windows and of .NET, 1934 and later
+HOURS = re.compile(r"(?<=[T ,;])(\d{1,2}):\d", re.ASCII)
 STAMP = re.compile(rf"({DATE})?[T ,;]*({CLOCK})?\s*(Z|{ZONES}|[+-]\d{{2}}:?\d{{2}})?", re.ASCII)
 BASIC = re.compile(r"^(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)(\d\d)", re.ASCII)  # ISO 8601 without marks
 THOUSANDTHS = re.compile(r"(\d[T ]\d{1,2}:\d{2}:\d{2})[:;](\d{3})(?!\d)", re.ASCII)  # behind a date; of instruments
@@ -91,6 +93,15 @@ def _dates(cells: list[str], first: str, dates: str | None) -> Stamps:
     else:
         instants = _parsed(texts, "mixed")
     stamps = _instants(instants, said, notes)
+    found = [HOURS.search(c) for c in texts]
+    if not any(re.search(r"[AaPp]\.?[Mm]", c) for c in texts) and all(
+        found[k] for k in np.flatnonzero(~np.isnat(instants))
+    ):
+        hours = [0 if match is None else int(match[1]) for match in found]
+        if (days := half_day_clock.of_whole_days(stamps.values, hours)) is not None:
+            first_of = float(days.values[np.isfinite(days.values)][0])
+            notes = (*stamps.notes, half_day_clock.told(days))
+            return Stamps(np.round(days.values - first_of, 12), notes, stamps.begin + first_of)
     return stamps if zoned else _without_summer_time(stamps)
 
 
@@ -176,6 +187,7 @@ def _without_summer_time(stamps: Stamps) -> Stamps:
 def _times_of_day(cells: list[str]) -> Stamps:
     """Hours, minutes and seconds; midnight may pass. Raises ValueError for what is none, or two numbers that may be hours or minutes."""
     values, carried, last, notes = np.full(len(cells), np.nan), 0.0, -np.inf, list[str]()
+    hours = [0] * len(cells)
     for k, cell in enumerate(cells):
         if cell.lower() in MISSING:
             continue
@@ -204,6 +216,9 @@ def _times_of_day(cells: list[str]) -> Stamps:
             carried += DAY
             notes.append(f"midnight passes before row {k}")
         values[k] = last = time + carried
+        hours[k] = high if third is not None and half is None and days is None else 0
+    if not notes and (whole := half_day_clock.of_whole_days(values, hours)) is not None:
+        values, notes = whole.values, [half_day_clock.told(whole)]
     known = values[np.isfinite(values)]
     begin = float(known[0]) if len(known) else 0.0
     return Stamps(np.round(values - begin, 12), ("time is a time of day; seconds since the first", *notes), begin)

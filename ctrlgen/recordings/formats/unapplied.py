@@ -14,6 +14,8 @@ from ctrlgen.recordings.formats.unit_texts import unit_of
 FACTOR = re.compile(
     r"(^|[ _.])(gain|scale|scaling|factor|slope|multiplier|conversion|sensitivity)($|[ _.])", re.IGNORECASE
 )
+MULTIPLIES = re.compile(r"(.*[ _.])?(scale|scaling|factor|slope|multiplier|lsb|resolution)([ _.].*)?", re.IGNORECASE)
+"""Of these the ones by which numbers are multiplied; a gain or a sensitivity rather divides them."""
 APPLIED = ("scale_factor",)  # which the CF conventions define
 MOST_UNITS = 6
 """Units among which an instrument changes."""
@@ -34,9 +36,26 @@ def unapplied(name: str, attributes: Iterable[tuple[str, Any]]) -> list[str]:
             continue
         if number != 1:
             said.append(
-                f"{name}: {key} = {number:g} stands beside it and is not applied; where its numbers lack it, write scale = {number:g}"
+                f"{name}: {key} = {number:.12g} stands beside it and is not applied; where its numbers lack it, write scale = {number:.12g}"
             )
     return said
+
+
+def scale_of_counts(values: np.ndarray, attributes: Iterable[tuple[str, Any]]) -> float | None:
+    """The factor that stands beside whole numbers (n,) that surely lack it: one by which whole numbers multiplied are whole no more, or of
+    which they are no multiples. None where there is none, or more than one."""
+    if values.dtype.kind not in "iu" or not values.size:
+        return None
+    found = set()
+    for key, value in attributes:
+        try:
+            number = float(value)
+        except (TypeError, ValueError):
+            continue
+        lacking = number != round(number) or bool(np.any(values % number)) if number and np.isfinite(number) else False
+        if MULTIPLIES.fullmatch(key) and lacking:
+            found.add(number)
+    return found.pop() if len(found) == 1 else None
 
 
 def unapplied_columns(names: Sequence[str], columns: Sequence[np.ndarray]) -> list[str]:

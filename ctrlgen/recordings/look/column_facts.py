@@ -15,6 +15,7 @@ from ctrlgen.recordings.formats.measurement_table import MeasurementTable
 from ctrlgen.recordings.formats.time_stamps import EPOCHS, TIME_NAME, epoch_unit
 from ctrlgen.recordings.formats.unit_texts import BASES, NAMES, bare_name, scaled_unit, unit_of
 from ctrlgen.recordings.look.answers import NOTHING, Answers
+from ctrlgen.recordings.usual_step import usual_step
 
 SUFFIX = re.compile(r"^(?P<name>.*[A-Za-z0-9)])[_.](?P<unit>[A-Za-z%]{1,4})$")  # of a name: drive_V, time.ms
 CLOCKS = {
@@ -53,7 +54,8 @@ SMOOTH = 0.1  # median of second differences over that of first ones, of a drive
 class ColumnFacts:
     """One column: `unit` as the file states it or its name ends, None where neither does; `values` (n,) in it, NaN where there is no
     number, None where the column is text or cannot be read before its `question` is answered; `notes`: what was interpreted; `scale`: of
-    the file's numbers to `unit`, where it states a multiple of a unit; `unread`: why the cells of a column of text are no numbers."""
+    the file's numbers to `unit`, where it states a multiple of a unit, or `counted`: a factor beside whole numbers, which lack it;
+    `unread`: why the cells of a column of text are no numbers."""
 
     name: str
     unit: str | None
@@ -62,6 +64,7 @@ class ColumnFacts:
     question: Ambiguous | None = None
     scale: float = 1.0
     unread: str = ""
+    counted: bool = False
 
     @property
     def bare(self) -> str:
@@ -107,7 +110,7 @@ class ColumnFacts:
 
 @dataclass(frozen=True)
 class TimeFacts:
-    """The time of a table's rows: `column`, its `unit`, `stamps` whether they are dates, median `step` [s], rms `jitter` [s], `gaps`: (row
+    """The time of a table's rows: `column`, its `unit`, `stamps` whether they are dates, usual `step` [s], rms `jitter` [s], `gaps`: (row
     before, missing rows), `backward`: rows that are earlier than the one before, `notes`: what was interpreted to read it."""
 
     column: str
@@ -149,7 +152,7 @@ class TableFacts:
 def table_facts(table: MeasurementTable, answers: Answers = NOTHING) -> TableFacts:
     """What a table holds, with the units and the time of `answers`. Raises InputError for a time that is none."""
     columns = tuple(_facts(table, name) for name in table.columns)
-    columns = tuple(replace(c, unit=answers.unit(c.name, c.bare) or c.unit) for c in columns)
+    columns = tuple(_answered(c, answers) for c in columns)
     if answers.time is None:
         time = None if answers.rate or answers.poses else _time(table, columns)
         known = time is not None or answers.poses
@@ -163,6 +166,16 @@ def table_facts(table: MeasurementTable, answers: Answers = NOTHING) -> TableFac
     if time is None:
         raise InputError("--time", [Fault(name, "does not rise, or its unit is none of a time")])
     return TableFacts(table, columns, time)
+
+
+def _answered(column: ColumnFacts, answers: Answers) -> ColumnFacts:
+    """The column in the unit, or the multiple of one, that was stated for it."""
+    unit, scale = (of(column.name, column.bare) for of in (answers.unit, answers.scale))
+    if unit is None or scale is None:
+        return column
+    scale = scale if column.name in answers.scales or column.bare in answers.scales or column.counted else column.scale
+    values = None if column.values is None else column.values * (scale / column.scale)
+    return replace(column, unit=unit, values=values, scale=scale, counted=False)
 
 
 def falling_time(
@@ -197,13 +210,16 @@ def _facts(table: MeasurementTable, name: str) -> ColumnFacts:
     stated = table.unit(name)
     several = scaled_unit(stated or "")
     scale, unit = several or (1.0, _suffix(name) if stated is None else unit_of(stated))
+    counted = several is None and name in table.scales
+    scale = table.scales[name] if counted else scale
     try:
         read = table.reading(name)
     except AmbiguousFile as error:
         return ColumnFacts(name, unit, None, question=error.question, scale=scale)
     except InputError as error:  # it holds text
         return ColumnFacts(name, unit, None, scale=scale, unread="; ".join(fault.what for fault in error.faults))
-    return ColumnFacts(name, unit, read.values if scale == 1 else scale * read.values, read.notes, scale=scale)
+    values = read.values if scale == 1 else scale * read.values
+    return ColumnFacts(name, unit, values, read.notes, scale=scale, counted=counted)
 
 
 def _suffix(name: str) -> str | None:
@@ -256,8 +272,8 @@ def _time_in(table: MeasurementTable, facts: ColumnFacts, chosen: bool) -> TimeF
     steps = np.diff(seconds[np.isfinite(seconds)])
     if len(steps) < 2 or not np.median(steps) > 0:
         return None
-    step = float(np.median(steps))
-    even = steps[np.abs(steps / step - 1) < GAP - 1]
+    step = usual_step(seconds[np.isfinite(seconds)])
+    even = steps[np.abs(steps / np.median(steps) - 1) < GAP - 1]
     gaps = tuple((int(k), round(float(steps[k] / step)) - 1) for k in np.flatnonzero(steps > GAP * step))
     jitter = float(np.sqrt(np.mean((even - step) ** 2))) if len(even) else 0.0
     backward = int(np.sum(steps <= 0))
@@ -295,7 +311,7 @@ def _unit_by_rate(table: MeasurementTable, column: ColumnFacts) -> str | None:
     steps = np.diff(column.finite)
     if table.stated_rate is None or len(steps) < 2:
         return None
-    rows = float(np.median(steps)) * table.stated_rate[1]
+    rows = usual_step(column.finite) * table.stated_rate[1]
     return next((unit for unit, many in EPOCHS.items() if abs(rows / many - 1) < SAME_RATE), None)
 
 

@@ -37,7 +37,7 @@ MEANINGS = {
     "A": frozenset(("current", "ampere", "amps", "strom")),
     "N*m": frozenset(("torque", "moment", "drehmoment")),
     "N": frozenset(("force", "kraft", "load")),
-    "W": frozenset(("power", "leistung", "heater")),
+    "W": frozenset(("power", "leistung")),
     "K": frozenset(("temperature", "temp", "temperatur")),
     "1/s": frozenset(("speed", "velocity", "vel", "rpm", "geschwindigkeit")),
     "1/s^2": frozenset(("acceleration", "accel", "acc")),
@@ -63,18 +63,24 @@ MOST_POSES = 500
 
 @dataclass(frozen=True)
 class Match:
-    """`signal` is `column`, in `unit`; `stated` whether the file says the unit. `why`: what is not certain, empty where all is."""
+    """`signal` is `column`, `scale` times its numbers in `unit`; `stated` whether the file says so. `why`: what is not certain, empty where
+    all is."""
 
     signal: str
     column: str
     unit: str
     stated: bool
     why: tuple[str, ...] = ()
+    scale: float = 1.0
 
     @property
     def option(self) -> str:
         """What says on the command line that it is so."""
-        unit = [] if self.stated else ["--unit", f"{self.signal}={self.unit}"]
+        unit = (
+            []
+            if self.stated
+            else ["--unit", f"{self.signal}={'' if self.scale == 1 else f'{self.scale:.12g} '}{self.unit}"]
+        )
         return shlex.join(["--column", f"{self.signal}={self.column}", *unit])
 
 
@@ -203,7 +209,7 @@ def _chosen(model: Model, facts: TableFacts, signals: Sequence[str], answers: An
         if unit is not None and not same_dimension(unit, units[signal]):
             what = f"{name} is in {unit}, and {signal} in {units[signal]} or a multiple of it"
             raise InputError("--column", [Fault(signal, what)])
-        matches.append(_match(model, signal, column, unit, []))
+        matches.append(_match(model, signal, column, unit, [], answers))
     return matches
 
 
@@ -216,13 +222,20 @@ def _why_unmoved(column: ColumnFacts) -> str:
     return f"holds no numbers that differ: {column.finite[0]:g} in every row"
 
 
-def _match(model: Model, signal: str, column: ColumnFacts, unit: str | None, why: list[str]) -> Match:
-    """One match; a `unit` that nobody states is assumed, and asked."""
+def _match(model: Model, signal: str, column: ColumnFacts, unit: str | None, why: list[str], answers: Answers) -> Match:
+    """One match; a `unit` that nobody states is assumed, and asked, and so is a factor that stands beside counts."""
+    scale = column.scale if (stated := answers.scales.get(signal)) is None else stated
+    if unit is not None and column.counted and stated is None:
+        why = [
+            *why,
+            f"its whole numbers lack {scale:.12g}, which stands beside them and is assumed: {_range(column)} {unit}",
+        ]
+        return Match(signal, column.name, unit, False, tuple(why), scale)
     if unit is not None:
-        return Match(signal, column.name, unit, True, tuple(why))
+        return Match(signal, column.name, unit, True, tuple(why), scale)
     assumed = _plausible(model, signal, column, signal_units(model)[signal])
     why = [*why, f"the file states no unit, {assumed} is assumed: {_range(column)}"]
-    return Match(signal, column.name, assumed, False, tuple(why))
+    return Match(signal, column.name, assumed, False, tuple(why), scale)
 
 
 def _remarks(model: Model, facts: TableFacts, matches: Sequence[Match], answers: Answers) -> list[str]:
@@ -237,14 +250,15 @@ def _remarks(model: Model, facts: TableFacts, matches: Sequence[Match], answers:
     seen = moved_of(model, drives, readings, [Stretch(u, y, step, linear)]) if known and readings else None
     if seen is not None:
         return implausible(seen)
-    values = ((m, facts.column(m.column).values) for m in matches)
-    return [odd for m, v in values if v is not None and (odd := implausible_range(m.signal, v, m.unit, model))]
+    columns = ((m, facts.column(m.column)) for m in matches)
+    values = ((m, c.values * (m.scale / c.scale)) for m, c in columns if c.values is not None)
+    return [odd for m, v in values if (odd := implausible_range(m.signal, v, m.unit, model))]
 
 
 def _si(facts: TableFacts, match: Match) -> np.ndarray:
-    values = facts.column(match.column).values
-    assert values is not None  # only columns of numbers are matched
-    return values * size_of(match.unit) + to_si(0.0, match.unit)
+    column = facts.column(match.column)
+    assert column.values is not None  # only columns of numbers are matched
+    return column.values * (match.scale / column.scale) * size_of(match.unit) + to_si(0.0, match.unit)
 
 
 def _matched(model: Model, signals: Sequence[str], columns: Sequence[ColumnFacts], answers: Answers) -> list[Match]:
@@ -268,7 +282,7 @@ def _matched(model: Model, signals: Sequence[str], columns: Sequence[ColumnFacts
         if likeness[i, k] < NAMED:
             why.append("nothing but its place speaks for it")
         unit = answers.unit(signals[i]) or column.unit
-        matches.append(_match(model, signals[i], column, unit, why))
+        matches.append(_match(model, signals[i], column, unit, why, answers))
     return matches
 
 

@@ -36,7 +36,7 @@ def recording_toml(proposal: Proposal, folder: Path, title: str) -> str:
     lines.append("[columns]")
     for match in proposal.matches:
         why = f" # {'; '.join(match.why)}" if match.why else ""
-        lines.append(f'"{match.signal}" = {_column(proposal.tables[0], match.column, match.unit)}{why}')
+        lines.append(f'"{match.signal}" = {_column(match.column, match.unit, match.scale)}{why}')
     more = len(proposal.left) - MOST_LEFT
     unused = [*proposal.left[:MOST_LEFT], *([f"{more} more"] if more > 0 else [])]
     lines += [f"# not used: {', '.join(unused)}"] if unused else []
@@ -46,10 +46,9 @@ def recording_toml(proposal: Proposal, folder: Path, title: str) -> str:
     return "\n".join("".join(c if c.isprintable() else " " for c in line) for line in lines) + "\n"
 
 
-def _column(facts: TableFacts, name: str, unit: str) -> str:
-    """A column as recording.toml names it, with its scale where the file states a multiple of a unit."""
-    scale = facts.column(name).scale
-    return f'{{ column = {toml(name)}, unit = "{unit}"' + (f", scale = {scale:g} }}" if scale != 1 else " }")
+def _column(name: str, unit: str, scale: float) -> str:
+    """A column as recording.toml names it, with the scale of its numbers."""
+    return f'{{ column = {toml(name)}, unit = "{unit}"' + (f", scale = {scale:.12g} }}" if scale != 1 else " }")
 
 
 def _record(proposal: Proposal, facts: TableFacts, folder: Path, role: str) -> list[str]:
@@ -64,11 +63,16 @@ def _record(proposal: Proposal, facts: TableFacts, folder: Path, role: str) -> l
         head.append(f"sample_rate = {toml(answers.rate)}")
     elif facts.falls:
         column = facts.column(facts.falls)
-        head.append(f"time = {_column(facts, column.name, column.unit or 's')} # falls: reverse the rows of the file")
+        head.append(
+            f"time = {_column(column.name, column.unit or 's', column.scale)} # falls: reverse the rows of the file"
+        )
     elif facts.time is None:
-        head.append('sample_rate = "1 kHz" # assumed: no column is a time')
+        stated = facts.table.stated_rate
+        says = f"{stated[1]:.9g} Hz" if stated is not None else "1 kHz"
+        why = f"the file says {stated[0]!r}" if stated is not None else "no column is a time"
+        head.append(f'sample_rate = "{says}" # assumed: {why}')
     else:
-        head.append(f"time = {_column(facts, facts.time.column, facts.time.unit)}")
+        head.append(f"time = {_column(facts.time.column, facts.time.unit, facts.column(facts.time.column).scale)}")
     known = proposal.drives_of(facts)
     if not known:
         return ["[[record]]", *head, f'role = "{role}"', ""]
