@@ -168,3 +168,24 @@ def test_a_column_without_any_number_is_text(tmp_path, axis, cells):
     (tmp_path / "log.csv").write_text("t [s],drive [V],position [um],state\n" + rows)
     seen = seen_of(tmp_path / "log.csv", axis, stated())
     assert seen.certain and not any(c.question for c in seen.tables[0].columns)
+
+
+@pytest.mark.parametrize("every", [2, 5, 20])
+def test_a_drive_that_is_logged_at_a_lower_rate_is_held_and_told(tmp_path, axis, every):
+    u = np.repeat(np.random.default_rng(5).uniform(-2, 2, N // every), every)
+    rows = "".join(
+        f"{t:.3f},{v if k % every == 0 else ''},{x:.6f}\n" for k, (t, v, x) in enumerate(zip(T, u, X, strict=True))
+    )
+    (tmp_path / "log.csv").write_text("t [s],drive [V],position [um]\n" + rows)
+    text = recording_toml(seen_of(tmp_path / "log.csv", axis, stated()), tmp_path, "r")
+    assert f'gap = "held" # assumed: one row in {every} states' in text
+    (tmp_path / "recording.toml").write_text(text)
+    (read,) = (r for r in load_recordings([tmp_path / "recording.toml"], axis).records if r.role == "fit")
+    n = len(read.time)
+    np.testing.assert_allclose(read.drive[:, 0], u[:n], rtol=1e-9)
+    assert n > N // 2 and read.valid.mean() > 0.9
+    plain = text.replace('gap = "held"', "")
+    (tmp_path / "recording.toml").write_text(plain)
+    if every > 2:  # every other row may be as smooth as it looks
+        with pytest.raises(InputError, match='write gap = "held" or "linear"'):
+            load_recordings([tmp_path / "recording.toml"], axis)

@@ -154,6 +154,27 @@ def test_what_the_file_says_of_a_gap_holds(gap, value):
     assert len(gaps.stretches(given, "split")[0]) == 2
 
 
+@pytest.mark.parametrize("gap", ["held", "linear"])
+@pytest.mark.parametrize("every", [2, 5, 50])
+def test_readings_between_the_rows_of_a_slower_drive_are_used_where_the_file_says_how_it_goes(every, gap):
+    u = drive(N)
+    k = np.arange(N)
+    last = k[-1] // every * every
+    slow = np.where(k % every == 0, u, np.nan)
+    given = record(slow, np.arange(N), "fit")
+    assert len(gaps.stretches(given)[0]) == 0 or every == 2  # a drive that moves on in every row tells nothing of five
+    (bridged,), notes = gaps.stretches(given, gap)
+    stated = u[k // every * every] if gap == "held" else np.interp(k, k[::every], u[::every])
+    n = len(bridged.time)
+    assert n == last + 1 and bridged.valid.all()
+    np.testing.assert_allclose(bridged.drive[:, 0], stated[:n], atol=1e-9)
+    np.testing.assert_array_equal(bridged.observed[:, 0], np.arange(n))
+    assert f"readings of {last - last // every} of them are used" in " ".join(notes)
+    there = (k % 7 != 3) | (k % every == 0)
+    (bridged,), _ = gaps.stretches(gaps.rows_of(given, there), gap)
+    np.testing.assert_array_equal(bridged.valid[:, 0], there[:n])
+
+
 def test_the_file_may_say_it_for_a_series_alone(tmp_path, model):
     kept = np.arange(400) != 200
     fit = {k: v[kept] for k, v in samples().items()}

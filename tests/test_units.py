@@ -77,6 +77,14 @@ def test_numbers_are_shown_in_the_readers_unit():
     assert show(0.5, "1") == "0.5"
 
 
+@pytest.mark.parametrize("number", [9999.0, 1e4, 15000.0, 360000.0, 123456.0])
+@pytest.mark.parametrize("unit", ["um", "ms", "N/m", "urad/(N*m)", "1"])
+def test_no_power_of_ten_is_shown_below_a_million(number, unit):
+    text = show(to_si(number, unit), unit)
+    assert "e" not in text.split(" ")[0] and float(text.split(" ")[0]) == pytest.approx(number, rel=5e-4)
+    assert "e+06" in show(to_si(2e6, unit), unit) and "e-05" in show(to_si(2e-5, unit), unit)
+
+
 @pytest.mark.parametrize(
     ("value", "unit", "sd", "si"),
     [

@@ -58,7 +58,7 @@ class _Bridged:
 
 
 def bridged(record: Record, gap: Gap | None, device: Described | None = None) -> tuple[Record, list[str]]:
-    """The record with the rows that it lacks, their readings not valid, and their drive as `gap` says or, unasked, as each drive tells;
+    """The record with the rows that it lacks and their drive as `gap` says or, unasked, as each drive tells, their readings not valid then;
     gaps that cannot be bridged stay as they were. Readings after a gap that the `device` as described says are still wrong are not valid
     either. A note on how many were bridged, the longest, and what that leaves."""
     whole, kept = _on_its_grid(record)
@@ -85,12 +85,14 @@ def bridged(record: Record, gap: Gap | None, device: Described | None = None) ->
     drive = whole.drive.copy()
     for each in told:
         each.into(drive)
-        valid[each.a : each.b] = False
+        valid[each.a : each.b] &= gap is not None  # a drive that is stated there is known there
         kept[each.a : each.b] = True
     after = int((wrong & valid).any(axis=1).sum())
     valid &= ~wrong
     observed = np.where(valid, whole.observed, np.nan)
-    return rows_of(replace(whole, drive=drive, valid=valid, observed=observed), kept), [_note(record.name, told, after)]
+    return rows_of(replace(whole, drive=drive, valid=valid, observed=observed), kept), [
+        _note(record.name, told, after, valid)
+    ]
 
 
 def _followed(record: Record, told: list[_Bridged], device: Described | None) -> tuple[list[_Bridged], np.ndarray]:
@@ -124,7 +126,7 @@ def _without_nan(drive: np.ndarray) -> np.ndarray:
     return np.column_stack([np.interp(rows, np.flatnonzero(ok := np.isfinite(u)), u[ok]) for u in drive.T])
 
 
-def _note(name: str, told: list[_Bridged], after: int) -> str:
+def _note(name: str, told: list[_Bridged], after: int, valid: np.ndarray) -> str:
     """How many gaps were bridged, how, and how many samples after them are not used."""
     sizes = [g.b - g.a for g in told]
     ways = sorted({bridge.way for g in told for bridge in g.bridges})
@@ -135,10 +137,12 @@ def _note(name: str, told: list[_Bridged], after: int) -> str:
         if len(sizes) > 1
         else f"a gap of {number_of(sizes[0], 'sample')} is"
     )
+    used = sum(int(valid[g.a : g.b].any(axis=1).sum()) for g in told)
+    theirs = f"readings of {used} of them are used" if used else "readings of theirs are not used"
     more = f", nor of {number_of(after, 'sample')} after them, which that changes" if after else ""
     return (
         f"{name}: {count} bridged, {number_of(sum(sizes), 'sample')} in all: the drive is taken as {' or '.join(ways)} there{right}; "
-        f"readings of theirs are not used{more}."
+        f"{theirs}{more}."
     )
 
 

@@ -89,7 +89,8 @@ def validate_record(
             )
             notes = clock_notes + gap_notes
             if not parts:
-                faults = [Fault(where, f"{record.name}: {notes[-1]} No usable stretch remains; record without gaps")]
+                mend = 'write gap = "held" or "linear" if the drive is so between the rows that state it, or record without gaps'
+                faults = [Fault(where, f"{record.name}: {notes[-1]} No usable stretch remains; {mend}")]
     faults = faults or _nothing_changes(record, where)
     if faults:
         return Validated(faults=tuple(faults))

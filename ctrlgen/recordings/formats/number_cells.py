@@ -106,6 +106,7 @@ TIME = re.compile(
     rf"{DATE}|({DATE}[T ,;]\s*)?{CLOCK}\s*(Z|{ZONES}|[+-]\d{{2}}:?\d{{2}})?|\d{{8}}T\d{{6}}([.,]\d+)?Z?", re.ASCII
 )
 HEXADECIMAL = re.compile(r"0[xX][0-9A-Fa-f]+|[0-9A-Fa-f]+h", re.ASCII)
+TOGETHER = re.compile(r"[+-]?\d+(?:[+-]\d+)*\+\d+(?:[+-]\d+)*", re.ASCII)
 FORMULA = re.compile(r"=.+")
 DIGITS = re.compile(r"[^A-Za-z]*\d[^A-Za-z]*")
 IN_BRACKETS = re.compile(r"\([\d.,]*\d[\d.,]*\)", re.ASCII)
@@ -179,6 +180,7 @@ def has_unit(cell: str) -> bool:
 def written_otherwise(cells: Sequence[str]) -> str:
     """What cells are that hold no plain numbers, and what to do, where all are of one kind; empty for others."""
     kinds = (
+        (TOGETHER, "numbers that run into one another; write a blank or a comma between columns of fixed width"),
         (HEXADECIMAL, "hexadecimal numbers; write them as decimal ones, signed where they are"),
         (FORMULA, "a formula that was never calculated; open the file in a spreadsheet, let it calculate and save it"),
         (

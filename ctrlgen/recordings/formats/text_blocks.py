@@ -12,6 +12,7 @@ from typing import Literal
 from ctrlgen.core.counts import number_of
 from ctrlgen.recordings.formats.layout_question import Ambiguous
 from ctrlgen.recordings.formats.number_cells import OVER, is_number, is_reading
+from ctrlgen.recordings.formats.run_together import two_in_one
 from ctrlgen.recordings.formats.text_cells import cells_of, is_comment, width_of, without_mark
 
 FEWEST_ROWS = 2  # of a table among other text
@@ -147,6 +148,11 @@ def _block(lines: Sequence[str], run: list[int], above: list[int], separator: st
         listed = ", ".join(f"line {k + 1} has {w}" for k, w in wrong[:MOST_LISTED]) + (
             ", ..." if len(wrong) > MOST_LISTED else ""
         )
+        if merged := next((text for k, _ in wrong if (text := two_in_one(lines[k]))), ""):
+            what = f"two numbers run into one another in {merged!r}, and no sign parts them"
+            raise Ambiguous(
+                f"{listed.partition(' has')[0]}: {what}: write a blank or a comma between columns of fixed width"
+            )
         mend = "(for one) with the line of the names, if these stand above the table, or repair them"
         raise Ambiguous(f"line {usual[0] + 1} has {number_of(width, 'cell')}, but {listed}", {"header = 5": mend})
     return Block(tuple(run), width, max(widths), tuple(above), cut, below)

@@ -22,6 +22,7 @@ from ctrlgen.recordings.formats.measurement_table import Clock, MeasurementTable
 from ctrlgen.recordings.formats.named_lines import named_table
 from ctrlgen.recordings.formats.number_cells import TIME, NumberStyle
 from ctrlgen.recordings.formats.rows_of_signals import lies_on_its_side, on_its_side
+from ctrlgen.recordings.formats.run_together import parted
 from ctrlgen.recordings.formats.stated_rate import stated_rate
 from ctrlgen.recordings.formats.text_blocks import MOST_LISTED, Block, blocks_of, kind_of
 from ctrlgen.recordings.formats.text_cells import cells_of, separator_of, stray_quotes, whole_lines
@@ -69,6 +70,7 @@ def tables_of_text(path: Path, text: str, layout: Layout, notes: Sequence[str] =
     if not any(line.strip() for line in lines):
         raise fault(path, "has no rows; write a header and one row per sample")
     try:
+        lines, run = parted(lines)
         separator = separator_of(lines, layout)
         blocks = _blocks(lines, separator, layout)
         if not blocks:
@@ -82,7 +84,8 @@ def tables_of_text(path: Path, text: str, layout: Layout, notes: Sequence[str] =
             raise Ambiguous(what, {'separator = ";"': "(for one) with its separator, or export the numbers as text"})
         scaled = [factor_of(lines, factors, block, separator) for block in blocks]
         return [
-            _table(path, lines, block, separator, layout, notes, *by) for block, by in zip(blocks, scaled, strict=True)
+            _table(path, lines, block, separator, layout, (*notes, *run), *by)
+            for block, by in zip(blocks, scaled, strict=True)
         ]
     except Ambiguous as error:
         raise AmbiguousFile(path, error) from None

@@ -332,6 +332,12 @@ def rests(drives: np.ndarray) -> list[tuple[int, int]]:
     return [(int(a), int(b) + 1) for a, b in edges.reshape(-1, 2) if b + 1 - a >= REST]
 
 
+def slow_clock(drives: np.ndarray) -> int:
+    """The number of rows of which each drive (n, drives) is written in one alone, as one is that is logged at a lower rate; 1 where not."""
+    apart = {int(k) for u in drives.T for k in np.diff(np.flatnonzero(np.isfinite(u)))}
+    return apart.pop() if len(apart) == 1 else 1
+
+
 def between_samples(drive: np.ndarray) -> str:
     """ "held" for a drive that steps, "linear" for one that is a curve as sampled: second differences far below the first ones."""
     u = drive[np.isfinite(drive)]

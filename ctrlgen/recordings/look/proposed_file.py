@@ -9,7 +9,7 @@ import numpy as np
 
 from ctrlgen.core.escaping import toml
 from ctrlgen.core.file_format import FORMAT
-from ctrlgen.recordings.look.column_facts import NOISE_REST, TableFacts, rests
+from ctrlgen.recordings.look.column_facts import NOISE_REST, TableFacts, rests, slow_clock
 from ctrlgen.recordings.look.proposal import Proposal
 from ctrlgen.recordings.settled_readings import settled
 
@@ -78,6 +78,8 @@ def _record(proposal: Proposal, facts: TableFacts, folder: Path, role: str) -> l
         return ["[[record]]", *head, f'role = "{role}"', ""]
     head.append(f"between_samples = {proposal.between_samples}")
     n = len(known[0])
+    if (every := slow_clock(np.column_stack(known))) > 1:
+        head.append(f'gap = "held" # assumed: one row in {every} states what drives; "linear" if it goes on evenly')
     readings = np.column_stack(proposal.readings_of(facts) or [np.zeros(n)])
     ends = [
         (settled(readings, a, b, NOISE_REST), a, b) for a, b in rests(np.column_stack(known)) if (a == 0) != (b == n)
