@@ -190,6 +190,18 @@ def test_rests_are_where_no_drive_moves():
     assert rests(drive) == [(0, 151), (299, 451)]
 
 
+@pytest.mark.parametrize("noise", [0.05, 0.2, 0.3, 0.5, 0.65, 0.8, 1.0, 1.5, 3.0, 10.0])  # counts
+@pytest.mark.parametrize("size", [1.0, 0.618, 1e-9])
+@pytest.mark.parametrize("zero", [0.0, 0.3, 0.5])
+def test_a_rest_that_is_read_in_counts_is_one(noise, size, zero):
+    rng = np.random.default_rng(8)
+    counts = np.round(zero + noise * rng.standard_normal(1000))
+    assert settled(size * counts[:, None], 0, 1000, REST) == 0
+    swing = np.round(zero + noise * rng.standard_normal(1000) + 60 * max(noise, 1) * np.exp(-np.arange(1000) / 60))
+    begin = settled(size * swing[:, None], 0, 1000, REST)
+    assert begin is not None and 100 <= begin <= 400
+
+
 def test_a_drive_that_stands_still_is_no_rest_while_a_reading_moves():
     """What settles is left out of the rest; what still moves at its end, or has too few rows left, is no rest: a tank that fills."""
     t, noise = np.arange(600.0), np.random.default_rng(0).normal(0, 1, 600)

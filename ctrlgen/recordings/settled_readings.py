@@ -13,7 +13,7 @@ def settled(readings: np.ndarray, first: int, last: int, shortest: int) -> int |
     """The row from which no reading (n, readings) moves any more, of a rest of the drives from row `first` to one before `last`.
 
     None where at its end they still do, or where fewer than the `shortest` rows are left. A drive that stands still says nothing of a tank
-    that fills, or of a mass that swings after its last step.
+    that fills, or of a mass that swings after its last step. A reading in counts may be half a count nearer than it says.
     """
     tenth, begin = max((last - first) // 10, 1), first
     for y in readings[first:last].T:
@@ -23,7 +23,8 @@ def settled(readings: np.ndarray, first: int, last: int, shortest: int) -> int |
         slope = float(t @ end / (t @ t))
         if slope**2 * np.mean(t**2) > TREND * np.var(end):
             return None
-        away = np.abs(y - np.median(end)) / NORMAL_MEDIAN
+        count = float(np.diff(np.unique(end)).min()) if np.ptp(end) > 0 else 0.0
+        away = np.maximum(np.abs(y - np.median(end)) - count / 2, 0.0) / NORMAL_MEDIAN
         parts = np.array([np.median(away[k : k + tenth]) for k in range(0, len(y), tenth)])
         off = np.flatnonzero(parts > SETTLED * np.std(end))
         begin = max(begin, first + (int(off[-1]) + 1) * tenth if len(off) else first)
