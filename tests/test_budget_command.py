@@ -304,3 +304,16 @@ def test_a_finer_model_of_another_device_is_refused(circle, tmp_path):
         load_finer(scenario, model, SCENARIOS / "devices" / "flexure_axis.toml")
     assert [fault.where for fault in caught.value.faults] == ["drive", "pose"]
     assert "describe the same device" in str(caught.value) and "flexure_axis.toml: 2 faults" in str(caught.value)
+
+
+@pytest.mark.parametrize("scenario", ["circle20", "meso_circle", "raster", "rrr_circle"])
+def test_the_example_of_the_refusal_is_of_the_device_and_is_accepted(tmp_path, scenario):
+    device = load_scenario(SCENARIOS / scenario).device
+    (tmp_path / "stated.toml").write_text('title = "t"\n')
+    bound = load_scenario(SCENARIOS / scenario)
+    with pytest.raises(InputError) as caught:
+        load_uncertainties(bound, build_model(device), tmp_path / "stated.toml")
+    example = str(caught.value).partition("for example,\n")[2]
+    (tmp_path / "stated.toml").write_text(f'title = "t"\n{example}\n')
+    read = load_uncertainties(bound, build_model(device), tmp_path / "stated.toml")
+    assert tomllib.loads(example)["numbers"].keys() <= {name for name, _ in device.quantities()} and read

@@ -37,8 +37,6 @@ from ctrlgen.trajectory.scenario import Input, Scenario
 FILE = "uncertainty.toml"
 AMBIENT = ".ambient"  # how the path of a temperature to which heaters cool ends
 FROM_DEVICE = "sd in the device file"
-EXAMPLE = """[numbers]
-"actuator.thermal_resistance" = { sd = "5 %", source = "spread of five specimens" }"""
 SINGULAR = 1e-9  # of an eigenvalue of a matrix of correlations, below zero: rounding
 
 
@@ -174,7 +172,9 @@ def load_uncertainties(scenario: Scenario, model: Model, path: Path | str | None
         raise InputError(file_path or scenario.path, read.faults)
     drive = file.drive or DriveChain()
     if not (read.lines or drive.converter or drive.jitter or drive.arithmetic == "float" or drive.player):
-        what = f"is not stated of anything: no number of {scenario.device.name} has an sd; write {beside} with, for example,\n{EXAMPLE}"
+        of = next((n for n, q in scenario.device.quantities() if q.si and not q.whole), "")
+        lines = f'[numbers]\n"{of}" = {{ sd = "5 %", source = "spread of five specimens" }}'
+        what = f"is not stated of anything: no number of {scenario.device.name} has an sd; write {beside} with, for example,\n{lines}"
         raise InputError(file_path or scenario.path, [Fault("uncertainty", what)])
     correlation = read.correlation(file_path or scenario.path)
     tolerance = length_tolerance(model.signals[scenario.file.follow])
