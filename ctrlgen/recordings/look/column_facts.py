@@ -170,7 +170,7 @@ def table_facts(table: MeasurementTable, answers: Answers = NOTHING) -> TableFac
 
 def _answered(column: ColumnFacts, answers: Answers) -> ColumnFacts:
     """The column in the unit, or the multiple of one, that was stated for it."""
-    unit, scale = (of(column.name, column.bare) for of in (answers.unit, answers.scale))
+    unit, scale = answers.unit(column.name, column.bare), answers.scale(column.name, column.bare)
     if unit is None or scale is None:
         return column
     scale = scale if column.name in answers.scales or column.bare in answers.scales or column.counted else column.scale
