@@ -39,7 +39,10 @@ def time_of(folder, head: str, *columns, answers: Answers = NOTHING) -> TimeFact
 
 def test_the_time_of_a_table_with_its_step_its_gaps_and_its_falls(tmp_path):
     x = np.arange(9)
-    step, jitter = pytest.approx(1.05, rel=1e-12), pytest.approx(0.1, rel=1e-12)  # of five near 1 s; 1.5 s is neither near nor a gap
+    step, jitter = (
+        pytest.approx(1.05, rel=1e-12),
+        pytest.approx(0.1, rel=1e-12),
+    )  # of five near 1 s; 1.5 s is neither near nor a gap
     assert time_of(tmp_path, "time,x", CLOCK, x) == TimeFacts("time", "s", False, step, jitter, ((5, 2),), 1)
     assert time_of(tmp_path, "time (ms),x", CLOCK, x).step == pytest.approx(1.05e-3, rel=1e-12)
     three = time_of(tmp_path, "time,x", [0, 1, 2], [0, 1, 2])

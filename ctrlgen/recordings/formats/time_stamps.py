@@ -217,8 +217,8 @@ def _times_of_day(cells: list[str]) -> Stamps:
             notes.append(f"midnight passes before row {k}")
         values[k] = last = time + carried
         hours[k] = high if third is not None and half is None and days is None else 0
-    if not notes and (whole := half_day_clock.of_whole_days(values, hours)) is not None:
-        values, notes = whole.values, [half_day_clock.told(whole)]
+    if not notes and (half_days := half_day_clock.of_whole_days(values, hours)) is not None:
+        values, notes = half_days.values, [half_day_clock.told(half_days)]
     known = values[np.isfinite(values)]
     begin = float(known[0]) if len(known) else 0.0
     return Stamps(np.round(values - begin, 12), ("time is a time of day; seconds since the first", *notes), begin)
