@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from corotational_frame import Frame, line
 from held_blades import EA, EI, L, T
-from mechanism_files import PARALLELOGRAM, blade, dm, loaded
+from mechanism_files import HEAD, PARALLELOGRAM, SILICON, blade, dm, loaded, pushed
 
 from ctrlgen.devices.mechanism.bent_tangent import displaced_compliance, displaced_lines
 from ctrlgen.devices.mechanism.condensed import nominal
@@ -70,6 +70,77 @@ def test_a_bent_mechanism_yields_along_its_blades_as_corotational_beams_do(tmp_p
     assert bent / home == pytest.approx(along_the_blades(c, share * T) / home / rigid, rel=0.03)
 
 
+def toggle(joint: str, weight: float) -> str:
+    """A stage between two arms that lean against it, like half of a bridge amplifier: the coil pushes the slider, the stage rises. A
+    `weight` presses the arms."""
+    text = HEAD + SILICON + "".join(f'[[body]]\nname = "{b}"\n' for b in ("first", "stage", "second", "slider"))
+    chain = ("ground", "first", "stage", "second", "slider")
+    for k, (x, y) in enumerate(((-16, 0), (-4, 1.2), (6, 1.2), (18, 0))):
+        text += f'[[element]]\nname = "joint_{k}"\nfrom = "{chain[k]}"\nto = "{chain[k + 1]}"\nmaterial = "silicon"\n{joint}'
+        text += f'at = ["{x} mm", "{y} mm", "0 mm"]\nalong = [1, 0, 0]\n'
+    text += "".join(blade(f"guide_{x}", x).replace('"stage"', '"slider"') for x in (22, 26))
+    text += f'[[load]]\nname = "weight"\non = "stage"\nat = ["0 mm", "2 mm", "0 mm"]\nforce = ["0 N", "{-weight} N", "0 N"]\n'
+    push = pushed("slider", "coil", "0 mm", gain="5 N/A", ends=("-1 A", "1 A"), travel="50 um")
+    push = push.replace(
+        '[output]\nbody = "slider"\nat = ["0 mm", "0 mm"', '[output]\nbody = "stage"\nat = ["0 mm", "2 mm"'
+    )
+    return text + push.replace("delta_x", "delta_y")
+
+
+BLADES = 'kind = "blade"\nslender = true\nlength = "2 mm"\nthickness = "0.2 mm"\nwidth = "8 mm"\n'
+NOTCHES = 'kind = "hinge"\nhinge = { kind = "circular", R = "1 mm", t = "0.2 mm", b = "8 mm", outside = "accept" }\n'
+
+
+def corotational_toggle(c, x: float, weight: float) -> np.ndarray:
+    """(2, 2) [m/N] at the output point in the plane, by corotational beams; a notch is a short one in its middle that yields alike."""
+    out, slider = np.array([0.0, 2e-3]), np.array([0.0, 0.0])
+    nodes, beams, fixed, bodies = [out, slider], [], [], {"stage": 0, "slider": 1}
+    for k, e in enumerate(c.device.placed_elements):
+        tip, axis, C = dm(c.ends[k]).ravel()[:2], dm(c.frames[k])[:2, 0], dm(c.compliances[k])
+        length, parts = (L, PARTS) if e.name.startswith("guide") else (2e-3, PARTS)
+        start, stiffness = tip - length * axis, (EA, EI)
+        if e.section.kind == "hinge":
+            start, tip, parts = tip - 1.2e-3 * axis, tip - 0.8e-3 * axis, 1
+            stiffness = (0.4e-3 / C[3, 0], 0.4e-3 / C[2, 5])
+        first = len(nodes)
+        nodes += line(start, tip, parts)
+        beams += [(first + j, first + j + 1, *stiffness) for j in range(parts)]
+        for name, node in ((e.section.from_, first), (e.section.to, first + parts)):
+            if name == "ground":
+                fixed += [3 * node + i for i in range(3)]
+            elif name in bodies:
+                beams.append((bodies[name], node, *RIGID))
+            else:
+                bodies[name] = node
+    frame, load = Frame(nodes, beams, fixed), np.zeros(3 * len(nodes))
+    load[1] = -weight
+    _, q, _ = frame.moved(3, x, load, steps=4)
+    rest = np.setdiff1d(frame.free, [3])
+    at = [int(np.flatnonzero(rest == i)[0]) for i in (0, 1)]
+    return np.linalg.inv(frame.forces(q)[1][np.ix_(rest, rest)])[np.ix_(at, at)]
+
+
+@pytest.mark.parametrize("joint", [BLADES, NOTCHES])
+@pytest.mark.parametrize("weight", [0.0, 3.0])
+def test_a_toggle_turns_and_what_its_drive_presses_counts(tmp_path, joint, weight):
+    """Of both directions in the plane, the change of the stiffness: bodies turn, the drive loads the arms; joints that bend, and that
+    yield at a point."""
+    c = nominal(loaded(tmp_path, toggle(joint, weight)))
+    changes = []
+    for x in (-20e-6, 20e-6):
+        ours, exact = (
+            [f(at) for at in (0.0, x)]
+            for f in (
+                lambda at: displaced_compliance(c, np.array([at]))[np.ix_([3, 4], [0, 1])],
+                lambda at: corotational_toggle(c, at, weight),
+            )
+        )
+        changes.append([np.diag(home) / np.diag(there) - 1 for home, there in (ours, exact)])
+    ours, exact = np.swapaxes(np.array(changes), 0, 1)
+    assert np.abs(exact).max() > 0.1
+    assert ours == pytest.approx(exact, abs=0.015)
+
+
 def test_what_a_displaced_stage_loses_is_told(tmp_path):
     far = PARALLELOGRAM.replace('travel = "300 um"', 'travel = "1 mm"').replace('gain = "2 N/A"', 'gain = "9 N/A"')
     (said,) = displaced_lines(loaded(tmp_path, far))
@@ -87,3 +158,13 @@ def test_a_guided_blade_between_held_ends_yields_along_itself_as_its_stiffness_s
     C = bent_compliance((s,), np.array([0, force, 0, 0, 0, moment]))[np.ix_([3, 4, 2], [0, 1, 5])]
     guided = 1 / (1 / s.EI_z + 12 * s.shear_y / l**2)
     assert 1 / np.linalg.inv(C)[0, 0] == pytest.approx(l / s.EA + y**2 * l / (700 * guided), rel=0.01)
+
+
+def test_both_ends_are_told_where_they_differ_and_one_where_they_are_alike(tmp_path):
+    """Arms of 0.12 rad that a stack pushes to 0.097 and 0.14; a straight blade is as soft to both sides."""
+    stack = toggle(BLADES, 0.0).replace('travel = "50 um"', 'travel = "20 um"\nstiffness = "1 N/um"')
+    both = displaced_lines(loaded(tmp_path, stack.replace('gain = "5 N/A"', 'gain = "50 N/A"')))
+    assert ["at 20 um" in line for line in both] == [False, True]
+    assert "x +15 %" in both[0] and "x -12 %" in both[1]
+    far = PARALLELOGRAM.replace('travel = "300 um"', 'travel = "1 mm"').replace('gain = "2 N/A"', 'gain = "9 N/A"')
+    assert len(displaced_lines(loaded(tmp_path, far))) == 1

@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 
 from ctrlgen import InputError, Unreachable, build_model, load_device, load_scenario, run, solve
 from ctrlgen.devices.mechanism.condensed import Condensed
+from ctrlgen.devices.mechanism.mechanism_lines import summary
 from ctrlgen.physics import thermal_actuator, xy_stage
 
 SPECIAL = load_device(DEVICE).values()
@@ -95,6 +96,20 @@ def test_the_heater_of_a_path_has_the_power_of_the_papers_equations(tmp_path):
 def paper_stiffness() -> float:
     """Along the bar with its other directions free."""
     return 1 / np.linalg.inv(ca.DM(thermal_actuator.stiffness(SPECIAL.actuator)).full())[3, 0]
+
+
+@pytest.mark.parametrize("power", ["200 mW", "2 W"])
+def test_how_far_a_heater_takes_its_axis_is_told(tmp_path, power):
+    """S1's force at the temperature that its power or its limit allows, over the stiffness of beams and load; with nothing of a stiffness
+    at the end, as how hot beams press one another is not known."""
+    a = SPECIAL.actuator
+    stated = number(a.power_limit, "W")
+    said = summary(loaded(tmp_path, BAR.replace(f"power_limit = {stated}", f'power_limit = "{power}"')))
+    T = min(a.temperature_limit, a.ambient + a.thermal_resistance * (0.2 if power == "200 mW" else 2.0))
+    reach = float(thermal_actuator.force(T, a)) / (paper_stiffness() + 0.02e6)
+    (line_,) = [text for text in said if text.startswith("heater alone:")]
+    assert f"its drive reaches 0 um to {reach * 1e6:.4g} um; its travel" in line_
+    assert not any("held at" in text for text in said)
 
 
 def test_a_heater_cannot_pull(tmp_path):

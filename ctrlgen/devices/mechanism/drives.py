@@ -17,6 +17,17 @@ def transduction(c: Condensed) -> Transduction:
     return _heated(c) if c.device.actuator[0].kind == "thermal" else _proportional(c)
 
 
+def held_forces(c: Condensed) -> list[tuple[float, float]]:
+    """Of each axis of a mechanism of numbers the least and the most that its drive does for good: force with the axis held at home [N],
+    or displacement [m]; of a heater as hot as its power and its limit of temperature let it be."""
+    placed = c.device.placed_actuators
+    if placed[0].section.kind == "thermal":
+        hottest = (min(a.temperature_limit, a.ambient + a.thermal_resistance * a.power_limit) for a in _heaters(c, c.p))
+        return [(0.0, float(thermal_actuator.force(T, a))) for T, a in zip(hottest, _heaters(c, c.p), strict=True)]
+    low_high = ([a.section.gain.si * q.si for q in (a.section.low, a.section.high)] for a in placed)
+    return [(min(ends), max(ends)) for ends in low_high]
+
+
 def _proportional(c: Condensed) -> Transduction:
     """Force or displacement are the drive times the gain, at once or with a lag of first order."""
     placed = c.device.placed_actuators

@@ -14,6 +14,7 @@ Against corotational beams the stiffness of a crossed pivot that is pressed is r
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -26,7 +27,7 @@ from ctrlgen.devices.mechanism.loads import Loads
 from ctrlgen.devices.mechanism.modes import as_displacements
 from ctrlgen.devices.mechanism.second_order import Motions, SecondOrder
 from ctrlgen.physics.beam_column import Column, Piece
-from ctrlgen.physics.rigid_bodies import GROUND, point_motion
+from ctrlgen.physics.rigid_bodies import GROUND, Element, point_motion
 from ctrlgen.physics.screw import numbers
 from ctrlgen.physics.second_order_flexure import dot, relative_motion
 
@@ -147,7 +148,11 @@ class LoadedTangent:
 
     def _bodies(self, share: float) -> np.ndarray:
         """K_b (6 bodies, 6 bodies) per twist, turns counted as displacements."""
-        K = self._linear + share * self._geometric
+        return self._linear + self.of_loads(share)
+
+    def of_loads(self, share: float = 1.0) -> np.ndarray:
+        """The part of K_b that a `share` of the loads adds: G, and of every flexure what is beyond its first order."""
+        K = share * self._geometric
         for flexure in self.flexures:
             for column, moved in zip(flexure.columns, flexure.moved, strict=True):
                 self._put(K, flexure.first, flexure.second, moved.T @ column.rest(share * flexure.tension) @ moved)
@@ -165,13 +170,17 @@ class LoadedTangent:
                     here = np.ix_(range(6 * i, 6 * i + 6), range(6 * j, 6 * j + 6))
                     K[here] += form[rows, columns] * np.outer(self._scale[:6], self._scale[:6])
 
-    @cached_property
-    def _linear(self) -> np.ndarray:
+    def assembled(self, elements: Sequence[Element]) -> np.ndarray:
+        """(6 bodies, 6 bodies) the stiffness of `elements` between the bodies, turns counted as displacements."""
         K, swap = np.zeros((len(self._scale),) * 2), np.r_[3:6, 0:3]
         between = np.hstack([-np.eye(6), np.eye(6)])
-        for e in self.c.elements:
+        for e in elements:
             self._put(K, e.first, e.second, between.T @ numbers(e.stiffness)[swap] @ between)
         return (K + K.T) / 2
+
+    @cached_property
+    def _linear(self) -> np.ndarray:
+        return self.assembled(self.c.elements)
 
     @cached_property
     def _motions(self) -> list[Motions]:

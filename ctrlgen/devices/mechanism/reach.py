@@ -18,6 +18,7 @@ from ctrlgen.core.percent import percent
 from ctrlgen.core.units import show
 from ctrlgen.devices.mechanism.condensed import KEPT, Condensed, nominal
 from ctrlgen.devices.mechanism.drawing import Drawing
+from ctrlgen.devices.mechanism.drives import held_forces
 from ctrlgen.devices.mechanism.loaded_tangent import LoadedTangent, loaded_tangent
 from ctrlgen.devices.mechanism.loads import DrivenLoads
 from ctrlgen.devices.mechanism.stretching import Stretching
@@ -43,11 +44,11 @@ class Stressed:
 
 @dataclass(frozen=True, eq=False)
 class Reach:
-    """Of an axis alone, each from the lower to the upper side [m]: its `travel`, and where its drive takes it; None of a heater."""
+    """Of an axis alone, each from the lower to the upper side [m]: its `travel`, and where its drive takes it."""
 
     name: str
     travel: tuple[float, float]
-    drive: tuple[float, float] | None
+    drive: tuple[float, float]
     home: np.ndarray
     way: np.ndarray
     own: int
@@ -55,7 +56,7 @@ class Reach:
     @property
     def ends(self) -> tuple[float, float]:
         """As far as both travel and drive allow."""
-        low, high = self.travel if self.drive is None else self.drive
+        low, high = self.drive
         start = float(self.home[self.own])
         return min(max(low, self.travel[0]), start), max(min(high, self.travel[1]), start)
 
@@ -72,12 +73,10 @@ def reaches(c: Condensed) -> tuple[Reach, ...]:
     stiffness = numbers(c.held_stiffness) + numbers(loads.stiffness) if c.pushes else np.eye(n)
     yields = np.linalg.inv(stiffness)
     home = (yields @ numbers(loads.force)).ravel() if c.pushes else np.zeros(n)
-    found = []
+    found, forces = [], held_forces(c)
     for i, a in enumerate(placed):
-        drive = None
-        if a.section.kind != "thermal":
-            low, high = sorted(a.section.gain.si * q.si for q in (a.section.low, a.section.high))
-            drive = (float(home[i] + yields[i, i] * low), float(home[i] + yields[i, i] * high))
+        low, high = forces[i]
+        drive = (float(home[i] + yields[i, i] * low), float(home[i] + yields[i, i] * high))
         found.append(Reach(a.name, ends_of(a.section.travel), drive, home, yields[:, i] / yields[i, i], i))
     return tuple(found)
 
@@ -91,8 +90,7 @@ def reach_lines(device: Drawing) -> list[str]:
     """What `ctrlgen check` prints: where each drive takes its axis alone, and the largest stress on that way."""
     lines = []
     for r in _told(device):
-        parts = [] if r.drive is None else [f"its drive reaches {_span(r.drive)}"]
-        parts.append(f"its travel is {_span(r.travel)}")
+        parts = [f"its drive reaches {_span(r.drive)}", f"its travel is {_span(r.travel)}"]
         for s in stresses(nominal(device), r):
             beyond = "" if s.met is None else f", its limit from {show(s.met, 'um')} on"
             parts.append(f"stress of {s.material} on it up to {show(s.most, 'MPa')} of {show(s.limit, 'MPa')}{beyond}")
@@ -105,7 +103,7 @@ def reach_remarks(device: Drawing) -> list[str]:
     remarks = []
     for r in _told(device):
         most = max(map(abs, r.travel))
-        if r.drive is not None and not HARDLY * most <= max(map(abs, r.drive)) <= FAR * most:
+        if not HARDLY * most <= max(map(abs, r.drive)) <= FAR * most:
             remarks.append(
                 f"the drive of {r.name} alone reaches {_span(r.drive)} of a travel of {_span(r.travel)}: check its gain and its range, "
                 "which way the flexures are thin, their sizes and the units"
