@@ -12,6 +12,7 @@ from ctrlgen import InputError, build_model, run
 from ctrlgen.core.units import show
 from ctrlgen.devices.mechanism.condensed import Condensed
 from ctrlgen.devices.mechanism.load_effects import load_lines
+from ctrlgen.devices.mechanism.loads import without_rounding
 from ctrlgen.devices.mechanism.mechanism_lines import summary
 from ctrlgen.devices.mechanism.modes import guyan_modes
 
@@ -142,3 +143,12 @@ def test_a_loaded_stage_is_solved_and_its_c_is_the_model(tmp_path):
         held = (K - 6 * 1.72 / (5 * L)) * np.array([-50e-6, 100e-6]) - 0.08 * 3
         assert outcome.passed
         assert outcome.solution.drive[[0, -1], 0] * 2 == pytest.approx(held, rel=2e-3)
+
+
+def test_rounding_of_a_symmetric_drawing_is_left_out_of_what_loads_do():
+    """3e-59 N/m beside a stiffness of 1e4 N/m is zero of a symmetric stage, and no number in single precision; symbols stay."""
+    K = ca.DM([[-258.8, 3e-59], [3e-59, 2e-9]])
+    kept = without_rounding(K, lambda: np.full((2, 2), 1e4))
+    assert dm(kept).tolist() == [[-258.8, 0.0], [0.0, 0.0]] and kept.nnz() == 1
+    x = ca.SX.sym("x", 2)
+    assert without_rounding(x, lambda: np.full(2, 1e4)) is x

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mechanism_files import HEAD, PARALLELOGRAM, SILICON, blade, dm, loaded
 
-from ctrlgen import build_model, load_scenario, solve
+from ctrlgen import InputError, build_model, load_scenario, solve
 from ctrlgen.devices.mechanism.condensed import nominal
 from ctrlgen.devices.mechanism.reach import buckling_remarks, reach_lines, reach_remarks, reaches
 from ctrlgen.physics.beam_column import Column, Piece
@@ -130,3 +130,11 @@ def test_a_solution_tells_of_it(tmp_path):
     device = loaded(tmp_path, pushed_by_a_rod(1)[0])
     left_out = solve(load_scenario(tmp_path), build_model(device)).left_out
     assert any("alone buckles the mechanism from" in sentence for sentence in left_out)
+
+
+@pytest.mark.parametrize("direction", ["[1e200, 0, 0]", "[1e-200, 0, 0]", "[true, 0, 0]"])
+@pytest.mark.parametrize("written", ["along = [0, 1, 0]", "along = [1, 0, 0]"])
+def test_a_direction_whose_numbers_are_none_is_refused_where_it_stands(tmp_path, written, direction):
+    """Of a blade and of an actuator; the squares of such numbers are infinite, or zero."""
+    with pytest.raises(InputError, match=r"along"):
+        loaded(tmp_path, PARALLELOGRAM.replace(written, f"along = {direction}"))

@@ -93,6 +93,8 @@ def load_lines(device: Drawing) -> list[str]:
     lines[0] += f"; the axes held: {_motion(ca.DM(at).full() @ ca.DM(loads.held[body]).full())}"
     K, K_F = (ca.DM(ca.evalf(ca.SX(x))).full() for x in (c.held_stiffness, loads.stiffness))
     for i, a in enumerate(device.placed_actuators):
+        if not (float(loads.force[i]) or K_F[i, i]):
+            continue
         share = percent(K_F[i, i] / K[i, i], sign=True)
         lines.append(f"loads push {a.name} by {show(float(loads.force[i]), 'N')} and change its stiffness by {share}")
     return lines
@@ -114,4 +116,4 @@ def _motion(twist: np.ndarray) -> str:
             for n, v in zip(names, values, strict=True)
             if abs(v) > STILL * np.abs(values).max()
         ]
-    return ", ".join(parts)
+    return ", ".join(parts) or "not at all"

@@ -15,18 +15,30 @@ Source: geometric stiffness, J. S. Przemieniecki, Theory of Matrix Structural An
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cached_property
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from ctrlgen.devices.mechanism.condensed import Condensed
-from ctrlgen.devices.mechanism.second_order import SecondOrder, plain
+from ctrlgen.devices.mechanism.second_order import LOST, SecondOrder, plain
+from ctrlgen.devices.travel import farthest
 from ctrlgen.physics import rigid_bodies
 from ctrlgen.physics.rigid_bodies import GROUND
-from ctrlgen.physics.screw import Matrix, inverse_adjoint
+from ctrlgen.physics.screw import Matrix, inverse_adjoint, numbers
 from ctrlgen.physics.second_order_flexure import dot, relative_motion
+
+
+def without_rounding(values: Matrix, sizes: Callable[[], np.ndarray]) -> Matrix:
+    """`values` (n, m), those left out that are below a share `LOST` of their `sizes` (n,) or (n, m), where they are numbers: of a symmetric
+    drawing they are zero, and in single precision they may be below its least number."""
+    if not isinstance(found := plain(values), ca.DM):
+        return values
+    kept = found.full()
+    typical = np.broadcast_to(sizes().reshape(kept.shape[0], -1), kept.shape)
+    return ca.sparsify(ca.DM(np.where(np.abs(kept) < LOST * typical, 0.0, kept)))
 
 
 class Loads:
@@ -103,7 +115,7 @@ class Loads:
     @cached_property
     def force(self) -> Matrix:
         """f (n,) on the axes [N]; of prescribed displacements none is asked."""
-        return plain(ca.mtimes(self.c.stiffness, self.sag))
+        return without_rounding(ca.mtimes(self.c.stiffness, self.sag), lambda: self._stiffest * self._travel)
 
     @cached_property
     def held(self) -> list[Matrix]:
@@ -115,7 +127,7 @@ class Loads:
         """(channels,) what the loads add to the pose, the axes held."""
         c = self.c
         seen = ca.mtimes(inverse_adjoint(None, c.output_point), self.held[c.device.bodies.index(c.device.output.body)])
-        return seen[c.channel_rows, :]
+        return without_rounding(seen[c.channel_rows, :], lambda: np.array(c.device.channel_scale))
 
     @cached_property
     def sensed(self) -> Matrix:
@@ -163,7 +175,16 @@ class Loads:
                 T = self.s.first_order[body]
                 V -= ca.mtimes(force.T, relative_motion(at, ca.DM(*T.shape), T, I, J)[3:, :])
         form = ca.reshape(V, n, n)
-        return plain(form + form.T)
+        return without_rounding(form + form.T, lambda: np.sqrt(np.outer(self._stiffest, self._stiffest)))
+
+    @property
+    def _stiffest(self) -> np.ndarray:
+        """(n,) stiffness of the axes, of a mechanism of numbers [N/m]."""
+        return np.abs(np.diag(numbers(self.c.stiffness)))
+
+    @property
+    def _travel(self) -> np.ndarray:
+        return np.array([farthest(a.section.travel) for a in self.c.device.placed_actuators])
 
     def restoring_force(self, d: Matrix) -> Any:
         """(n,) what the loads add to the force that pulls the axes home from `d` (n,)."""
