@@ -8,8 +8,6 @@ drives among them, add (`loaded_tangent`). It is complete to first order in d. T
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import casadi as ca
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -115,5 +113,5 @@ def _changed(home: float, there: float, free: float) -> float:
     return -1.0 if there <= 0 else home / there - 1
 
 
-def _changes(shares: Sequence[float]) -> list[str]:
+def _changes(shares: np.ndarray) -> list[str]:
     return [f"{name} {percent(float(x), sign=True)}" for name, x in zip("xyz", shares, strict=True) if abs(x) > NOTICED]
