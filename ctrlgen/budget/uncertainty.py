@@ -173,8 +173,8 @@ def load_uncertainties(scenario: Scenario, model: Model, path: Path | str | None
     drive = file.drive or DriveChain()
     if not (read.lines or drive.converter or drive.jitter or drive.arithmetic == "float" or drive.player):
         of = next((n for n, q in scenario.device.quantities() if q.si and not q.whole), "")
-        lines = f'[numbers]\n"{of}" = {{ sd = "5 %", source = "spread of five specimens" }}'
-        what = f"is not stated of anything: no number of {scenario.device.name} has an sd; write {beside} with, for example,\n{lines}"
+        shown = f'[numbers]\n"{of}" = {{ sd = "5 %", source = "spread of five specimens" }}'
+        what = f"is not stated of anything: no number of {scenario.device.name} has an sd; write {beside} with, for example,\n{shown}"
         raise InputError(file_path or scenario.path, [Fault("uncertainty", what)])
     correlation = read.correlation(file_path or scenario.path)
     tolerance = length_tolerance(model.signals[scenario.file.follow])
