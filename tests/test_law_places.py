@@ -131,6 +131,24 @@ def test_the_cogging_of_a_motor_is_found_with_its_pitch():
     assert second == pytest.approx(0.3 / 1.5, abs=0.0035)  # 4 sd: 0.05 N / 1.5 N * sqrt(2 / 3000)
 
 
+@pytest.mark.parametrize("back", [False, True])
+def test_a_constant_of_an_axis_that_moves_one_way_may_be_its_friction(back):
+    """A rack that made one stroke had, for certain, a sensor that does not read zero, or a weight."""
+    rng, device, parts = np.random.default_rng(3), linear_motor(), []
+    s = np.linspace(0, 1, 600)
+    for role, way in (("fit", 0.15), ("hold_out", 0.12)):
+        ways = [way * (10 * s**3 - 15 * s**4 + 6 * s**5)]
+        ways += [ways[0][::-1]] if back else []
+        place = np.concatenate(ways)
+        v = np.gradient(place, 2e-3)
+        moved = np.column_stack([place, v, np.gradient(v, 2e-3)])
+        force = 4 * moved[:, 2] + 20 * v + 3.0 + 0.05 * rng.standard_normal(len(place))
+        parts.append(record(moved, force, role, h=2e-3))
+    recording = Recording("t", device.name, "series", ("reading.force",), ("N",), (0.05,), tuple(parts), ())
+    (found,) = diagnose_recording(device, recording, jobs=0, laws=["home_offset"]).findings
+    assert found.effect == "home_offset" and ("dry friction" in found.title) == (not back)
+
+
 def servo_fit(readings, effect: str, start: dict[str, float]) -> tuple[Fitter, Fit]:
     """A law fitted to poses of an axis that is told where to go."""
     rng, parts = np.random.default_rng(9), []

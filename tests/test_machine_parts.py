@@ -17,7 +17,7 @@ from ctrlgen.app.check_files import check
 from ctrlgen.core.errors import InputError
 from ctrlgen.devices.machine import FAMILIES, ActuatorName, Machine, MachineParts, SensorName, TransmissionName
 from ctrlgen.diagnosis.report.answer import sentence
-from ctrlgen.diagnosis.selection.law_titles import TITLES, title
+from ctrlgen.diagnosis.selection.law_titles import ONE_WAY, TITLES, title
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.hypothesis import Hypothesis, hypotheses, nominal_physics
 from ctrlgen.estimation.law_needs import NEEDS, USUAL, not_offered, offered_as_faults, refusals, usual, with_odds
@@ -26,7 +26,7 @@ from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Recording
 
 NAMES = {*get_args(ActuatorName), *get_args(TransmissionName), *get_args(SensorName)}
-WORDS = {*NAMES, *FAMILIES.values(), "position", "flexible", "imposed"}
+WORDS = {*NAMES, *FAMILIES.values(), "position", "flexible", "imposed", ONE_WAY}
 # What may only be said of a machine that has it
 OWN_WORDS = {
     "piezo": "piezo|ferroelectric|polarisation",

@@ -16,6 +16,7 @@ from ctrlgen.diagnosis.selection.finding_region import RegionEntry, region_of
 from ctrlgen.diagnosis.selection.law_titles import title
 from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.selection.verdict import terms_of_findings, unconfirmed
+from ctrlgen.diagnosis.selection.way_covered import moves_one_way
 from ctrlgen.diagnosis.settings import ATTRIBUTION, LUCK
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, nominal_physics
@@ -305,7 +306,8 @@ def _title(search: SearchResult, cause: Hypothesis) -> str:
     if cause.effect == PARAMETER:
         return ""
     device = search.chosen.fit.structure.device
-    return title(cause.law, device.parts(nominal_physics(device)))
+    one_way = moves_one_way(search.fitter.recording, device)
+    return title(cause.law, device.parts(nominal_physics(device)), one_way)
 
 
 def _role(share: ShareEntry | None, unseen: bool, nothing_to_share: bool, is_served: bool) -> Role:

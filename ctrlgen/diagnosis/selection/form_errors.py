@@ -64,6 +64,13 @@ def hardly_told(current: CandidateModel, rival: CandidateModel) -> bool:
     return advantage_in_form(current, rival) < CONFUSABLE.unfinished * CONFUSABLE.criterion
 
 
+def follows_the_motion_as_well(current: CandidateModel, k: int, rival: CandidateModel) -> bool:
+    """Whether cause k acts with the motion, and a rival that is a function of time alone in its place is better by no more than errors of
+    form are: at one speed a line follows those of a pitch too, and holds at that speed alone."""
+    of_time = rival.cause is not None and rival.cause.prior.of_time and not current.causes[k].prior.of_time
+    return of_time and not rival.errors.is_noise and advantage_in_form(rival, current) < CONFUSABLE.criterion
+
+
 def advantage_in_form(a: CandidateModel, b: CandidateModel) -> float:
     """By how much T' of `a` is better than that of `b`; negative where it is worse."""
     m = CONFUSABLE.form_samples

@@ -11,8 +11,11 @@ from types import MappingProxyType
 from ctrlgen.devices.machine import MachineParts
 from ctrlgen.effects import Effect
 
+ONE_WAY = "one way"  # axes whose motion is imposed go one way alone in the records
+
 # By law: (word of the machine, title) in the order in which they are looked for; "" is for any other machine. A word is a family of
-# actuators, the name of a part, "position" for a drive that is a position, "flexible" for a stage on flexures, or "imposed" for a motion.
+# actuators, the name of a part, "position" for a drive that is a position, "flexible" for a stage on flexures, "imposed" for a
+# motion, or ONE_WAY.
 TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
     {
         "amplifier_lag": (
@@ -117,6 +120,11 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
             ),
         ),
         "home_offset": (
+            (
+                ONE_WAY,
+                "A constant in the force or torque that is read: the zero of its sensor, a load such as a weight, or the dry friction "
+                "of an axis that moves one way alone",
+            ),
             (
                 "imposed",
                 "A constant in the force or torque that is read: the zero of its sensor, or a load such as a weight",
@@ -228,9 +236,9 @@ CLEARANCE: Mapping[str, str] = MappingProxyType(
 )
 
 
-def title(law: type[Effect], parts: MachineParts) -> str:
-    """The title of a law on a machine of these parts."""
-    words = parts.words | {""}
+def title(law: type[Effect], parts: MachineParts, one_way: bool = False) -> str:
+    """The title of a law on a machine of these parts, in records in which its axes move `one_way` alone or not."""
+    words = parts.words | {""} | ({ONE_WAY} if one_way else frozenset())
     if law.kind in ("cyclic", "cyclic_from_home") and (those := _any_of(REPEATS, words)):
         # where a sensor alone is stated, what stands behind it is not known
         more = "" if words & REPEATS.keys() - {parts.sensor} or parts.transmission else ", or a pitch behind it"

@@ -13,7 +13,7 @@ import numpy as np
 
 from ctrlgen.core.units import from_si
 from ctrlgen.devices.device_physics import BalancedPhysics, ImposedPhysics
-from ctrlgen.diagnosis.selection.way_covered import way_covered
+from ctrlgen.diagnosis.selection.way_covered import both_ways, way_covered
 from ctrlgen.diagnosis.settings import OBJECTIONS
 from ctrlgen.effects import Family, Param
 from ctrlgen.estimation.fit import Fit
@@ -158,18 +158,10 @@ def _no_turn(recording: Recording, fit: Fit, k: int) -> str | None:
         return None
     physics = nominal_physics(fit.structure.device)
     by_itself = recording.kind == "series" and not isinstance(physics, BalancedPhysics | ImposedPhysics)
-    if by_itself or _both_ways([r.drive for r in recording.records if r.role == "fit"]):
+    if by_itself or both_ways([r.drive for r in recording.records if r.role == "fit"]):
         return None
     what = "a loop" if loop else "what changes with time"
     return f"no drive turns back in the records to fit; before a turn {what} cannot be told from a curve"
-
-
-def _both_ways(drives: Sequence[np.ndarray]) -> bool:
-    """Whether any column of the drives (n, n_u) rises and falls, in one record or in two, by more than one that stands still changes."""
-    span = np.ptp(np.concatenate(drives), axis=0)
-    falls = np.max([np.max(np.maximum.accumulate(u) - u, axis=0) for u in drives], axis=0)
-    rises = np.max([np.max(u - np.minimum.accumulate(u), axis=0) for u in drives], axis=0)
-    return bool(np.any(np.minimum(falls, rises) > OBJECTIONS.standing * span))
 
 
 def _no_pitch(recording: Recording, fit: Fit, k: int, exact: bool = False) -> str | None:

@@ -11,7 +11,7 @@ from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, l
 from ctrlgen.diagnosis.selection.candidates import significant, trying
 from ctrlgen.diagnosis.selection.confusable import explains_alike, explains_better, is_commoner
 from ctrlgen.diagnosis.selection.failures import FAILURES
-from ctrlgen.diagnosis.selection.form_errors import hardly_told, hidden_rivals
+from ctrlgen.diagnosis.selection.form_errors import follows_the_motion_as_well, hardly_told, hidden_rivals
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.other_laws import stands_for_another
 from ctrlgen.diagnosis.selection.precedence import counterparts, explains_alike_but_for_odds
@@ -28,11 +28,13 @@ from ctrlgen.estimation.structure import Structure
 
 def swapped(trials: Trials, current: CandidateModel, before: int) -> CandidateModel:
     """Each cause against what would be suspected in its place, now that the others are there; not what came alone to those
-    `before`, which has been compared already. What explains better takes the place, or, at the noise, no worse and is commoner."""
+    `before`, which has been compared already. What explains better takes the place, or, at the noise, no worse and is commoner; a function
+    of time alone not that of a law that acts with the motion and is told from it by errors of form alone."""
     causes, compare = len(current.causes), trials.selection
     for k in range(before if causes == before + 1 else causes):
         for rival in replacements(trials, current, k):
             takes_place = explains_better(compare, rival, current) or is_commoner(compare, rival, current)
+            takes_place &= not follows_the_motion_as_well(current, k, rival)
             if takes_place and not trials.objections(rival, current.causes):
                 current = trials.converged(rival)
                 break

@@ -45,3 +45,20 @@ def with_longest_periods(suspected: Sequence[Hypothesis], recording: Recording, 
         return replace(h, longest_period=way_covered(recording, h, device) / OBJECTIONS.fewest_pitches)
 
     return [told(h) for h in suspected]
+
+
+def both_ways(drives: Sequence[np.ndarray]) -> bool:
+    """Whether any column of the drives (n, n_u) rises and falls, in one record or in two, by more than one that stands still changes."""
+    span = np.ptp(np.concatenate(drives), axis=0)
+    falls = np.max([np.max(np.maximum.accumulate(u) - u, axis=0) for u in drives], axis=0)
+    rises = np.max([np.max(u - np.minimum.accumulate(u), axis=0) for u in drives], axis=0)
+    return bool(np.any(np.minimum(falls, rises) > OBJECTIONS.standing * span))
+
+
+def moves_one_way(recording: Recording, device: Device) -> bool:
+    """Whether every axis whose motion is imposed goes one way alone in all records: its dry friction is a constant then."""
+    physics = nominal_physics(device)
+    if recording.kind != "series" or not isinstance(physics, ImposedPhysics):
+        return False
+    axes = len(physics.axes)
+    return not both_ways([r.drive[:, :axes] for r in recording.records if r.role != "rest"])
