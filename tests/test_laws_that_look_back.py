@@ -18,6 +18,7 @@ from ctrlgen.trajectory.scenario import model_of
 NUMBERS = {
     "clock_offset": 'at = "all"\noffset = "2 ms"',
     "asymmetric_slew_rate": 'at = "axis"\nshare = "1"\nrate = "250 V/s"\nexcess = "0.5"',
+    "drive_quantisation": 'at = "axis"\nshare = "1"\nquantum = "2 mV"\ngrid = "0"\nrounding = "0.01"',
     "delay": 'at = "axis"\ndelay = "2 ms"',
     "slew_rate": 'at = "axis"\nshare = "1"\nrate = "250 V/s"',
     "warm_up": 'at = "axis"\nsize = "1 um"\ntau = "2 s"',

@@ -169,7 +169,7 @@ def test_what_is_sound_of_a_set_whose_best_fit_is_refused_is_what_goes_on(monkey
     )
     assert sound.fit.objective > refused.fit.objective  # so that it is not what is known of its causes
     assert trials.fit(sound.fit.restarted).fit is refused.fit
-    monkeypatch.setattr(pruning, "_other_valleys", lambda cause, starts: list(starts[1:]))
+    monkeypatch.setattr(pruning, "other_valleys", lambda cause, starts: list(starts[1:]))
     monkeypatch.setattr(type(fitter), "fit", lambda self, structure, **_: sound.fit)
     monkeypatch.setattr(
         "ctrlgen.diagnosis.selection.trials.objections",

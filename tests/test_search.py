@@ -375,3 +375,19 @@ def test_held_out_records_contradict_a_cause_beyond_two_standard_deviations(lost
     compare = ModelSelection(fitter, lambda *_: [])
     compare.held_out_loss = lambda t, errors: 100.0 + lost * (t is beside)
     assert compare.contradicted(without, beside) is contradicted
+
+
+def test_two_causes_that_held_out_records_confirm_together_alone_are_found(monkeypatch):
+    """A late reading and the harmonics of its scale: fitted alone, each is bent by the other and foretells worse than neither."""
+    bow = Hypothesis("bow", "sensor:axis", "axis")
+    fitter = fitter_of(lambda u: (y := played(u, 2e-7)) + 120 * y**2, n=700)
+    enough = ModelSelection.improves_enough
+    monkeypatch.setattr(ModelSelection, "improves_enough", lambda self, a, b: len(b.causes) != 1 and enough(self, a, b))
+    monkeypatch.setattr(candidates, "fit_subsets", lambda *_: ())  # that foresees them at once only by slopes
+
+    def found(searcher: Searcher) -> set[Hypothesis]:
+        described = searcher.trials.fit(Structure(AXIS))
+        begun = searcher.trials.with_errors(described)
+        return set(searcher.forward_rounds(begun, []).causes)
+
+    assert found(Searcher(fitter, Screen(fitter, [BACKLASH, bow]), lambda _: None)) == {BACKLASH, bow}

@@ -64,7 +64,7 @@ def test_a_pitch_that_grew_while_other_causes_came_and_went_is_not_in_the_end(se
     pitch = Hypothesis("cyclic", "sensor:axis", "axis")
     long = {"amplitude": NOISE, "period": 2e-3, "phase": 0.3}
     grown = searcher.trials.fit(loop.fit.restarted.with_cause(pitch, long), pitch, 0)
-    monkeypatch.setattr(Searcher, "_settled", lambda self, current: current)
+    monkeypatch.setattr(Searcher, "settled", lambda self, current: current)
     assert searcher.without_unseen_pitches(grown).causes == (LOOP,)
     assert searcher.without_unseen_pitches(loop) is loop
 

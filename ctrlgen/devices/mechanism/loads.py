@@ -27,17 +27,17 @@ from ctrlgen.devices.mechanism.second_order import LOST, SecondOrder, plain
 from ctrlgen.devices.travel import farthest
 from ctrlgen.physics import rigid_bodies
 from ctrlgen.physics.rigid_bodies import GROUND
-from ctrlgen.physics.screw import Matrix, inverse_adjoint, numbers
+from ctrlgen.physics.screw import Matrix, inverse_adjoint
 from ctrlgen.physics.second_order_flexure import dot, relative_motion
 
 
-def without_rounding(values: Matrix, sizes: Callable[[], np.ndarray]) -> Matrix:
-    """`values` (n, m), those left out that are below a share `LOST` of their `sizes` (n,) or (n, m), where they are numbers: of a symmetric
+def without_rounding(values: Matrix, sizes: Callable[[], np.ndarray | None]) -> Matrix:
+    """`values` (n, m), those left out that are below a share `LOST` of their `sizes` (n,) or (n, m), where both are numbers: of a symmetric
     drawing they are zero, and in single precision they may be below its least number."""
-    if not isinstance(found := plain(values), ca.DM):
+    if not isinstance(found := plain(values), ca.DM) or (typical := sizes()) is None:
         return values
     kept = found.full()
-    typical = np.broadcast_to(sizes().reshape(kept.shape[0], -1), kept.shape)
+    typical = np.broadcast_to(typical.reshape(kept.shape[0], -1), kept.shape)
     return ca.sparsify(ca.DM(np.where(np.abs(kept) < LOST * typical, 0.0, kept)))
 
 
@@ -115,7 +115,7 @@ class Loads:
     @cached_property
     def force(self) -> Matrix:
         """f (n,) on the axes [N]; of prescribed displacements none is asked."""
-        return without_rounding(ca.mtimes(self.c.stiffness, self.sag), lambda: self._stiffest * self._travel)
+        return without_rounding(ca.mtimes(self.c.stiffness, self.sag), self._usual_forces)
 
     @cached_property
     def held(self) -> list[Matrix]:
@@ -175,16 +175,20 @@ class Loads:
                 T = self.s.first_order[body]
                 V -= ca.mtimes(force.T, relative_motion(at, ca.DM(*T.shape), T, I, J)[3:, :])
         form = ca.reshape(V, n, n)
-        return without_rounding(form + form.T, lambda: np.sqrt(np.outer(self._stiffest, self._stiffest)))
+        return without_rounding(form + form.T, self._usual_stiffnesses)
 
-    @property
-    def _stiffest(self) -> np.ndarray:
-        """(n,) stiffness of the axes, of a mechanism of numbers [N/m]."""
-        return np.abs(np.diag(numbers(self.c.stiffness)))
+    def _usual_stiffnesses(self) -> np.ndarray | None:
+        """(n, n) the roots of the products of the axes' stiffnesses [N/m]; None of a mechanism of symbols."""
+        if not isinstance(K := plain(self.c.stiffness), ca.DM):
+            return None
+        roots = np.sqrt(np.abs(np.diag(K.full())))
+        return np.outer(roots, roots)
 
-    @property
-    def _travel(self) -> np.ndarray:
-        return np.array([farthest(a.section.travel) for a in self.c.device.placed_actuators])
+    def _usual_forces(self) -> np.ndarray | None:
+        """(n,) what the axes' stiffnesses take at their ends [N]; None of a mechanism of symbols."""
+        K = self._usual_stiffnesses()
+        travel = np.array([farthest(a.section.travel) for a in self.c.device.placed_actuators])
+        return None if K is None else np.diag(K) * travel
 
     def restoring_force(self, d: Matrix) -> Any:
         """(n,) what the loads add to the force that pulls the axes home from `d` (n,)."""

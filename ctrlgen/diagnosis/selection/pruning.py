@@ -96,7 +96,7 @@ def _begun_elsewhere(
     several = len(against) > 1
     for k in against:
         cause = candidate.causes[k]
-        for start in _other_valleys(cause, starts.get(cause, ())):
+        for start in other_valleys(cause, starts.get(cause, ())):
             try:
                 begun = structure.restarted(k, start)
                 begins.append((trials.fitter.rough_objective(begun) if several else 0.0, cause, begun))
@@ -114,7 +114,7 @@ def _begun_elsewhere(
     return None
 
 
-def _other_valleys(cause: Hypothesis, starts: Sequence[dict[str, float]]) -> list[dict[str, float]]:
+def other_valleys(cause: Hypothesis, starts: Sequence[dict[str, float]]) -> list[dict[str, float]]:
     """The starts beside the first, one of each shape: a phase or the amplitude is found from any, another period is not."""
     if cause.effect == PARAMETER:
         return []

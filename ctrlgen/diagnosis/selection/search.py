@@ -20,7 +20,7 @@ from ctrlgen.devices import Device
 from ctrlgen.diagnosis.selection.attribution import Attribution, attribute
 from ctrlgen.diagnosis.selection.begun_again import begun_again
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round
-from ctrlgen.diagnosis.selection.candidates import finer_forms, fit_candidates, restart_elsewhere
+from ctrlgen.diagnosis.selection.candidates import finer_forms, fit_candidates, restart_elsewhere, takes_away_much
 from ctrlgen.diagnosis.selection.confusable import explains_alike
 from ctrlgen.diagnosis.selection.failures import FAILURES
 from ctrlgen.diagnosis.selection.model_selection import scored
@@ -66,11 +66,11 @@ class Searcher:
             if noise is before:
                 break
             trials.use(trials.fitter.with_noise(noise))
-            current = self._settled(current)
+            current = self.settled(current)
             if np.allclose(noise.floor, before.floor, rtol=SEARCH.same_noise, atol=0):
                 break
         # in the steps and on the clock in which it is told: its rivals, which the report lists, are fitted once
-        current = self._finely_timed(self._settled(current))
+        current = self._finely_timed(self.settled(current))
         better = self._compared(current)
         current = self._in_plainest_form(current if better is current else self._finely_timed(better))
         found = self.without_other_laws(current, rounds)
@@ -119,7 +119,7 @@ class Searcher:
             trials.fitter, nominal, current, account, bare, alike, tuple(rounds), screened, withdrawn, *log, unlikely
         )
 
-    def _settled(self, current: CandidateModel) -> CandidateModel:
+    def settled(self, current: CandidateModel) -> CandidateModel:
         """The same model fitted to its end under its own errors, without the causes that it then does not need."""
         return without_needless(self.trials, self._converged(current))
 
@@ -129,13 +129,13 @@ class Searcher:
 
     def best_settled(self, current: CandidateModel) -> CandidateModel:
         """The model `_settled`, and what then explains better in the place of one of its causes: none of them is an alternative of it."""
-        return self._compared(self._settled(current))
+        return self._compared(self.settled(current))
 
     def _compared(self, current: CandidateModel) -> CandidateModel:
         """The settled model, or what explains better in the place of one of its causes, settled too. In the round that added the cause, a
         rival had not been fitted to its end, nor weighed by these errors."""
         better = swapped(self.trials, current, len(current.causes))
-        return current if better is current else self._settled(better)
+        return current if better is current else self.settled(better)
 
     def _in_plainest_form(self, current: CandidateModel) -> CandidateModel:
         """The model with the plainest laws, and those that act with the motion, that explain alike."""
@@ -178,7 +178,7 @@ class Searcher:
             bare = self._bare(current, max(against))
             if not bare:
                 return current
-            current = self._settled(bare[0])
+            current = self.settled(bare[0])
         return current
 
     def _bare(self, current: CandidateModel, k: int) -> list[CandidateModel]:
@@ -189,7 +189,7 @@ class Searcher:
     def searched_on(self, begun: CandidateModel, current: CandidateModel, rounds: list[Round]) -> CandidateModel:
         """What a search finds that begins with a model, where that one is worse than `current`, with one cause more than this at most: what
         a law stands for is two others, beside what the device's numbers take over, as they do a gain."""
-        found = self._settled(begun)
+        found = self.settled(begun)
         if self.trials.selection.advantage(current, found) <= 0:
             return found
         return self.best_settled(self.forward_rounds(found, rounds, len(current.causes) + 1))
@@ -209,7 +209,7 @@ class Searcher:
         trials.step("refit in shorter steps")
         trials.use(trials.fitter)  # what was fitted in longer ones is no fit of it
         fitted = trials.tried(structure, current.cause, steps=FIT.max_steps)
-        return self._settled(fitted[0]) if fitted else current
+        return self.settled(fitted[0]) if fitted else current
 
     def _finely_timed(self, current: CandidateModel) -> CandidateModel:
         """The same model in steps that suffice, and with the drive where its records tell that it was."""
@@ -229,7 +229,7 @@ class Searcher:
         trials.step("refit with the drive off its time stamps")
         trials.use(fitter)
         # a shape that was bent by the clock, and stays so from where it stands, would be refuted by noise alone
-        return self._settled(simplified(trials, scored(fitter, fit, current.cause)))
+        return self.settled(simplified(trials, scored(fitter, fit, current.cause)))
 
     def _learn_mismatch(self, described: CandidateModel) -> None:
         """What the device as described leaves on the held-out records is what causes are measured by."""
@@ -272,7 +272,7 @@ class Searcher:
             best = acting_first(trials, current, one_loop_first(trials, current, best, candidates), candidates)
             rounds.append(self._round(screened, candidates, current, best))
             if not better:
-                return current
+                return self._beside_what_was_refused(current, candidates, rounds, most)
             kept = sum(c in current.causes for c in best.causes)
             # where one cause more leaves noise alone, all are compared at the end (`best_settled`)
             at_end = best.errors.is_noise and len(best.causes) == kept + 1
@@ -284,6 +284,23 @@ class Searcher:
             # what too long steps miss would be read as a further cause
             current = self._finely_stepped(trials.with_noise_update(self._converged(current)), MOST_IN_SEARCH)
             visited.append(current)
+
+    def _beside_what_was_refused(
+        self, current: CandidateModel, candidates: Sequence[CandidateModel], rounds: list[Round], most: float
+    ) -> CandidateModel:
+        """What a search finds that goes on from a candidate that takes much away of the records to fit and that the held-out ones refuse,
+        where nothing is accepted: two causes may foretell them together alone, such as a late reading and what its scale does."""
+        trials = self.trials
+        if current.causes or current.errors.is_noise:
+            return current
+        refused = [t for t in candidates if takes_away_much(t, current) and not trials.objections(t)]
+        for begun in refused[: SEARCH.most_searches_without]:
+            further: list[Round] = []
+            found = self.forward_rounds(trials.with_errors(trials.converged(begun)), further, most)
+            if trials.selection.improves_enough(current, found):
+                rounds += further
+                return found
+        return current
 
     def _in_finer_form(self, current: CandidateModel) -> CandidateModel:
         """The model with a law in a finer form where that leaves enough less: no further cause could be trusted beside an error of the
