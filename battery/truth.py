@@ -24,11 +24,10 @@ import numpy as np
 from battery.plant_axis import Array
 
 Pair = tuple[Array, Array]  # of the record to fit and of the one held out, (n, channels) over the noise
-ROUNDS = (
-    8  # of the Gauss-Newton refit with the sensitivities of the plain plant, for each estimate of what the model leaves
-)
-ESTIMATES = 30  # of that, at the most: until it
-SAME = 0.01  # stays within this
+# Of the Gauss-Newton refit with the sensitivities of the plain plant, for each estimate of what the model leaves
+ROUNDS = 8
+ESTIMATES = 30  # of what the model leaves, at the most
+SAME = 0.01  # relative change of it at which it stays
 NEGLIGIBLE = 1e-6  # decrease of the sum of squares that ends a refit
 HALVINGS = 5  # of a step that leaves more than before
 

@@ -9,9 +9,8 @@ import numpy as np
 
 HALF_DAY = 43200.0
 HOUR = 3600.0
-SOON = (
-    2 * HOUR
-)  # within which rows go on where one half of a day ends: a longer pause is told from a second run by nothing
+# Within which rows go on where one half of a day ends: a longer pause is told from a second run by nothing
+SOON = 2 * HOUR
 
 
 class WholeDays(NamedTuple):
