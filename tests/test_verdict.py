@@ -281,7 +281,12 @@ def test_a_rival_of_a_small_harmonic_is_none_of_the_law(first, monkeypatch):
         found = search(trial(held=15.0 * N), chosen, tuple(left_without), rivals)
         assert main_rivals(found, shares_of(0.9, 0.9)) == (k == first)
         assert terms_of_findings(found) == [[first, 1 - first]]
-        for name, told in (("nominal_physics", None), ("title", ""), ("estimated_values", {})):
+        for name, told in (
+            ("nominal_physics", None),
+            ("moves_one_way", False),
+            ("title", ""),
+            ("estimated_values", {}),
+        ):
             monkeypatch.setattr(f"ctrlgen.diagnosis.selection.findings.{name}", lambda *_, told=told: told)
         (row,) = findings(found, shares_of(0.9, 0.9, rest=0.1))
         assert row.alternatives == ((DRIFT,) if k == first else ())
@@ -303,7 +308,8 @@ def test_a_whole_number_is_said_as_what_it_was_expected_to_be_and_the_weightier_
         "ctrlgen.diagnosis.selection.findings.robust_deviations", lambda fit: np.full(len(fit.theta), 0.01)
     )
     monkeypatch.setattr("ctrlgen.diagnosis.selection.findings.nominal_physics", lambda device: None)
-    monkeypatch.setattr("ctrlgen.diagnosis.selection.findings.title", lambda law, parts: "")
+    monkeypatch.setattr("ctrlgen.diagnosis.selection.findings.title", lambda *_: "")
+    monkeypatch.setattr("ctrlgen.diagnosis.selection.findings.moves_one_way", lambda *_: False)
     chosen = trial(causes=(GAIN, REVERSED), free_parameters=(number("effect[0].gain", cause=0),), theta=(1.1,))
     bare = (trial(held=3.0 * N), trial(held=8.0 * N))
     found = search(trial(held=15.0 * N), chosen, bare, ((trial(cause=CREEP), trial()), ()))
