@@ -128,7 +128,7 @@ class Searcher:
         return self.trials.with_errors(begun_again(self.trials, self.trials.converged(current)))
 
     def best_settled(self, current: CandidateModel) -> CandidateModel:
-        """The model `_settled`, and what then explains better in the place of one of its causes: none of them is an alternative of it."""
+        """The model `settled`, and what then explains better in the place of one of its causes: none of them is an alternative of it."""
         return self._compared(self.settled(current))
 
     def _compared(self, current: CandidateModel) -> CandidateModel:
