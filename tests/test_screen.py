@@ -7,15 +7,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from axis_records import AXIS, axis_fitter
+from conftest import MESO_FILE, SCENARIOS
 
+from ctrlgen import load_device
 from ctrlgen.diagnosis.evidence.detectability import detectability
 from ctrlgen.diagnosis.selection.confusable import explains_alike, explains_better, look_alike
 from ctrlgen.diagnosis.selection.findings import estimated_values
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
 from ctrlgen.diagnosis.selection.subset_search import SubsetSearch, Suspect
-from ctrlgen.effects import Channel
-from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.effects import Channel, laws
+from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, hypotheses, nominal_physics, why_not_offered
+from ctrlgen.estimation.noise import estimate_noise
 from ctrlgen.estimation.structure import Structure
+from ctrlgen.model.assembly import build_model
+from ctrlgen.recordings.reader import load_recordings
 
 DRIVE_GAIN = Hypothesis("drive_gain", "actuator:axis", "axis")
 SENSOR_GAIN = Hypothesis("sensor_gain", "sensor:axis", "axis")
@@ -87,6 +93,26 @@ def test_a_gain_of_a_drive_that_is_never_used_affects_no_reading():
     fit = fitter.fit(Structure(AXIS))
     (hidden,) = detectability(fit, Screen(fitter, [DRIVE_GAIN]).run(fit), fit.n).undetectable
     assert hidden.effect == "drive_gain" and hidden.masked_by.startswith("nothing")
+
+
+def test_in_settled_poses_no_lag_is_suspected_however_much_its_rounding_looks_like_what_is_left():
+    """A slow heat has spread, and the rounding of that is a slope too; what is in time alone, and at rest a gain at most, is not tried."""
+    device = load_device(MESO_FILE)
+    recording = load_recordings([SCENARIOS / "nist_hexapod"], build_model(device))
+    kinds = "thermal_lag", "drive_gain", "high_pass", "low_pass", "notch", "amplifier_lag", "creep", "log_creep"
+    offered = hypotheses(
+        device, nominal_physics(device), recording.channels, None, False, tuple(laws()[kind] for kind in kinds)
+    )
+    offered = [h for h in offered if h.effect != PARAMETER]
+    assert {h.effect for h in offered} == {"thermal_lag", "drive_gain"}
+    fitter = Fitter(recording, estimate_noise(recording, 0.0))
+    fit = fitter.fit(Structure(device), steps=0)
+    found = Screen(fitter, offered).run(fit)
+    lags = {h for h in offered if h.effect == "thermal_lag"}
+    assert set(found.undetectable) >= lags and {s.hypothesis.effect for s in found.suspects} == {"drive_gain"}
+    assert "no clock" in why_not_offered(
+        laws()["high_pass"], device, nominal_physics(device), recording.channels, None, False
+    )
 
 
 def test_a_frequency_ends_where_the_sampling_shows_no_higher_one_and_a_ratio_does_not():

@@ -18,7 +18,7 @@ from ctrlgen.core.units import Quantity
 from ctrlgen.devices import Device, DevicePhysics
 from ctrlgen.devices.quantities import walk
 from ctrlgen.devices.section import Section
-from ctrlgen.effects import Channel, Effect, Param, Place, group, laws, means
+from ctrlgen.effects import Channel, Effect, Family, Param, Place, group, laws, means
 from ctrlgen.estimation.disturbance_inputs import unread_axes
 from ctrlgen.estimation.law_prior import LawPrior
 from ctrlgen.estimation.priors import DEFAULT, prior_of
@@ -239,7 +239,7 @@ def _of_law(
     """The hypotheses of one law; none of a displacement on which, as on that of the axes `unread`, nothing that is read depends."""
     there = available(physics, sample_time) - (frozenset() if ambient else {"ambient"})
     prior = prior_of(law)
-    if not prior.suspected or prior.unless & there:
+    if not prior.suspected or prior.unless & there or _needs_a_clock(law, sample_time):
         return
     if not law.requires <= there or (law.place is Place.HEAT and "heat" not in there):
         return
@@ -271,6 +271,11 @@ def _of_law(
     whole = len(places) == every and (prior.acts_on_all or law.place is not Place.SENSOR)
     for at in _together(law, physics, fitting) if prior.of_one_reference or whole else ():
         yield Hypothesis(law.kind, f"{domain}:{at}", at, highest=highest, longest=longest)
+
+
+def _needs_a_clock(law: type[Effect], sample_time: float | None) -> bool:
+    """Whether all of a law is in time, of which settled poses tell nothing: at rest, what creeps or forgets is a gain."""
+    return sample_time is None and law.family in (Family.TIMING, Family.CREEP)
 
 
 def _together(law: type[Effect], physics: DevicePhysics, fitting: Sequence[Channel]) -> list[str]:
@@ -307,6 +312,8 @@ def why_not_offered(
         return f"the device has {' and '.join(sorted(there_already))}: {prior.reason}"
     if missing := law.requires - there:
         return f"it needs {' and '.join(sorted(missing))}, which the device or the recording does not have"
+    if _needs_a_clock(law, sample_time):
+        return "the poses are settled and have no clock: at rest, what creeps or is late cannot be told from a gain"
     if law.place is Place.HEAT and "heat" not in there:
         return "no actuator of the device is heated"
     return "no channel that was recorded is one on which it can act"

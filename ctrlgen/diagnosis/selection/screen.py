@@ -301,7 +301,9 @@ class Screen:
         threshold: float | None = None,
     ) -> Screened:
         """`gradient` U'r (k,), zero at an optimum inside all bounds; `likeness` |J's|/|J| (free numbers, columns)."""
-        norm = sums.squares
+        # what does nothing at its largest amplitude, such as a lag in settled poses, leaves rounding
+        largest = np.array([max(map(abs, c.range)) for c in columns])
+        norm = np.where(sums.squares > (SCREEN.least_reach / largest) ** 2, sums.squares, 0.0)
         distinct = norm - np.sum(sums.US**2, axis=0)
         score = sums.Sr - gradient @ sums.US
         distinct_share = np.where(norm > 0, distinct / np.where(norm > 0, norm, 1.0), 0.0)

@@ -14,6 +14,9 @@ class ScreenSettings:
     own_share: float = 1e-10
     """Share of a score's squares outside of the span of the free parameters, below which it cannot be told from them:
     rounding leaves that much."""
+    least_reach: float = 1e-3
+    """Standard deviations of all readings together that a law must move them by, at the largest amplitude that it may have, to be
+    suspected: what does less is rounding, such as that of a lag in settled poses, and would need an amplitude without bounds."""
     false_alarm_quantile: float = 0.99
     """Quantile of the largest |z| among simulated records without mismatch that is the screen's threshold: one false
     alarm in a hundred rounds."""
