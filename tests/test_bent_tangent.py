@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from corotational_frame import Frame, line
 from held_blades import EA, EI, L, T
 from mechanism_files import HEAD, PARALLELOGRAM, SILICON, blade, dm, loaded, pushed
 
+from ctrlgen.devices.mechanism import bent_tangent
 from ctrlgen.devices.mechanism.bent_tangent import displaced_compliance, displaced_lines
 from ctrlgen.devices.mechanism.condensed import nominal
 from ctrlgen.physics.bent_flexure import bent_compliance
@@ -168,3 +171,21 @@ def test_both_ends_are_told_where_they_differ_and_one_where_they_are_alike(tmp_p
     assert "x +15 %" in both[0] and "x -12 %" in both[1]
     far = PARALLELOGRAM.replace('travel = "300 um"', 'travel = "1 mm"').replace('gain = "2 N/A"', 'gain = "9 N/A"')
     assert len(displaced_lines(loaded(tmp_path, far))) == 1
+
+
+@pytest.mark.parametrize("ends", [(-500e-6, 400e-6), (-400e-6, 500e-6)])
+def test_an_end_that_is_not_told_silences_no_other(monkeypatch, ends):
+    """4 % softer at one end, which is too little to tell, and 8 % at the other, within 5 % of the first."""
+    soft = {-1: 1.04, 0: 1.0, 1: 1.08}
+
+    def compliance(c, held):
+        return np.ones((6, 6)) / soft[int(np.sign(held[0]))]
+
+    drawing = SimpleNamespace(cubics=(), ported=False, directions=[0], output_compliance=np.ones((6, 6)))
+    reach = SimpleNamespace(name="a", own=0, home=np.zeros(1), ends=ends, at=lambda end: np.array([end]))
+    monkeypatch.setattr(bent_tangent, "nominal", lambda device: drawing)
+    monkeypatch.setattr(bent_tangent, "numbers", lambda matrix: matrix)
+    monkeypatch.setattr(bent_tangent, "reaches", lambda c: [reach])
+    monkeypatch.setattr(bent_tangent, "displaced_compliance", compliance)
+    (told,) = displaced_lines(SimpleNamespace(actuator=[SimpleNamespace(kind="force")]))
+    assert f"held at {max(ends) * 1e6:g} um" in told and "+8 %" in told

@@ -96,10 +96,10 @@ def displaced_lines(device: Drawing) -> list[str]:
             changes = np.array([_changed(home[at], there[at], free[at]) for at in (*SHIFTS, *TURNS)])
             if any(np.abs(changes - other).max() <= NOTICED for other in said):
                 continue
-            said.append(changes)
             parts, turned = _changes(changes[:3]), _changes(changes[3:])
             parts += [f"about {', '.join(turned)}"] if turned else []
             if parts:
+                said.append(changes)
                 lines.append(
                     f"stiffness at the output point with {r.name} held at {show(end, 'um')}, over that held at home: {', '.join(parts)}"
                 )
