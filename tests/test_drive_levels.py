@@ -11,8 +11,10 @@ from recovery import fitter_of
 from ctrlgen import InputError, build_model, load_device
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.effects import Place
+from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.model.inverse import invert
 
+CONVERTER = Hypothesis("drive_quantisation", "actuator:axis", "axis")
 N = 2500
 T = H * np.arange(N)
 DRIVE = 1.5 * np.sin(2 * np.pi * 2.3 * T) + 0.3 * np.sin(2 * np.pi * 13.1 * T + 1) + 0.2 * np.sin(2 * np.pi * 41 * T)
@@ -24,7 +26,8 @@ def levels(read, told=DRIVE) -> tuple[float, ...]:
     y = read(DRIVE) + NOISE * rng.standard_normal(N)
     parts = [record(told, y, role) for role in ("fit", "hold_out")]
     fitter, fit = fitter_of(AXIS, ("reading.axis",), ("um",), (NOISE,), "series", parts).described(AXIS)
-    return Screen(fitter, []).data_hints(fit)(Place.DRIVE, 0).suggested["drive_levels"]
+    assert "drive_levels" not in Screen(fitter, []).data_hints(fit)(Place.DRIVE, 0).suggested  # no law begins there
+    return Screen(fitter, [CONVERTER]).data_hints(fit)(Place.DRIVE, 0).suggested["drive_levels"]
 
 
 def rounded(u, step):

@@ -20,22 +20,23 @@ from ctrlgen.model.effect_terms import channels
 from ctrlgen.recordings.recording import Record
 
 
-def steps_of_drives(
-    fitter: Fitter, fit: Fit, record: Record, foreseen: np.ndarray
-) -> dict[tuple[Place, int], dict[str, tuple[float, ...]]]:
-    """Of each drive the changes [SI] after which what `foreseen` (n, n_y) leaves of a record repeats; none of a loop, whose drives are not
-    recorded, nor of an imposed motion."""
+def steps_of_drives(fitter: Fitter, fit: Fit, record: Record) -> dict[tuple[Place, int], dict[str, tuple[float, ...]]]:
+    """Of each drive the changes [SI] after which what a fit leaves of a record repeats; none of a loop, whose drives are not recorded, nor
+    of an imposed motion."""
     physics = nominal_physics(fit.structure.device)
     many = channels(physics, Place.DRIVE)
     if len(many) != record.drive.shape[1] or (isinstance(physics, InertialPhysics) and physics.feedback is not None):
         return {}
+    simulator = fitter.simulator(fit.structure, record)
+    start, foreseen = fitter.begun(fit, record)
     white = np.where(record.valid, record.observed - foreseen, 0.0) / fitter.noise.sd
     found = {}
     for j, channel in enumerate(many):
         kicked = record.drive.copy()
         first = len(kicked) // 4
         kicked[first, j] += SPATIAL_PERIODS.kick * channel.scale
-        answer = (fitter.predict(fit, replace(record, drive=kicked)) - foreseen)[first:] / fitter.noise.sd
+        answer = simulator.simulate(replace(record, drive=kicked), fit.theta, start) - foreseen
+        answer = answer[first:] / fitter.noise.sd
         if not np.all(np.isfinite(answer)) or not np.any(answer):
             continue
         n = 2 * len(white)

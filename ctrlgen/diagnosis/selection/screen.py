@@ -263,8 +263,17 @@ class Screen:
             for i, name in read
             if name in names and np.any(good := record.valid[:, i] & np.isfinite(residual[:, i]))
         }
-        drives = steps_of_drives(self.fitter, fit, record, foreseen)
+        drives = steps_of_drives(self.fitter, fit, record) if self._begins_at("drive_levels", fit) else {}
         return by_sensor | self._along_axes(fit, record, residual) | drives
+
+    def _begins_at(self, hint: str, fit: Fit) -> bool:
+        """Whether a law that is suspected, and not in the fit, begins at this that the records show."""
+        return any(
+            number.start_from_data == hint
+            for h in self.hypotheses
+            if h not in fit.structure.causes
+            for number in h.prior.parameters.values()
+        )
 
     def _along_axes(
         self, fit: Fit, record: Record, residual: np.ndarray
