@@ -12,9 +12,10 @@ STRAIGHT = ShapeBounds(high="a curve that levels off nowhere", untold="no curve"
 class LevellingOff(Effect, listed=False):
     """Delta x = g (c(x) - x), c(x) = x/(1 + |x/L|^n)^(1/n): x while it is small, and L at most; g = 1 is the curve.
 
-    n = 1 is Froehlich's curve of iron; with n = 2.4 it is tanh, with 1.7 arctan, each within 1 % of L; with n large it has a corner, as
-    `saturation`. Where it takes a few per cent, n = 2 is a cubic. Holds for a curve without memory that is alike to both sides, or of a
-    signal of one sign. Near the limit what went in cannot be recovered.
+    n = 1 is Froehlich's curve of iron. With n = 2.4 and L 3 % above the limit of a tanh it is that within 1 % of L up to three times L, and
+    with n = 1.7 and L 7 % below that of an arctan, that: which limit such a curve has is known to a few per cent. With n large it has a
+    corner, as `saturation`. Where it takes a few per cent, n = 2 is a cubic. Holds for a curve without memory that is alike to both sides,
+    or of a signal of one sign. Near the limit what went in cannot be recovered.
     """
 
     source = (
