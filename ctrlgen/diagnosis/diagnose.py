@@ -1,8 +1,8 @@
 """The steps of a diagnosis in their order, from a validated recording to the answer.
 
-1. Channels that read one constant value are taken out (`selection.dead_channels`), all in `prepared_recording`.
+1. Channels that read one constant value are taken out (`selection.dead_channels`).
 2. The noise of every channel is estimated (`estimation.noise`), and isolated outliers are marked (`isolated_outliers`); the search
-   marks them again against each model that it accepts.
+   marks them again against each model that it accepts. Both are done in `prepared_recording`.
 3. The device as described is refitted within its stated uncertainty (`estimation.fit`).
 4. Hypotheses are listed: every effect at every location, every parameter of the device (`estimation.hypothesis`), of which the
    machine's parts refuse some (`selection.offered_laws`).

@@ -84,7 +84,7 @@ class Round:
 
     screened: its screen. candidates: its candidate models, the best first, with the `criteria` T of each. before: the model
     before, with the criterion `criterion_before`. refused: what was not taken, with the reasons, first what would gain most. failed: trials
-    that could not be simulated, with the reason.
+    that could not be simulated, with the reason. gone_on_beside: the causes that were refused and beside which the search went on.
     """
 
     screened: Screened
@@ -94,6 +94,7 @@ class Round:
     criterion_before: float
     refused: tuple[Refusal, ...] = ()
     failed: tuple[Failure, ...] = ()
+    gone_on_beside: tuple[Hypothesis, ...] = ()
 
 
 def linearised_optimum(fit: Fit) -> float:

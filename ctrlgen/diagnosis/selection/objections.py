@@ -174,9 +174,7 @@ def _no_pitch(recording: Recording, fit: Fit, k: int, exact: bool = False) -> st
     fewest = 1.0 if exact else OBJECTIONS.fewest_pitches
     if periods > fewest * (1 + SHAPE_AT_BOUND):  # at its bound it would go on growing
         return None
-    return (
-        f"the reading covers {periods:.1f} periods of it, and {OBJECTIONS.fewest_pitches:g} are needed to see it repeat"
-    )
+    return f"the reading covers {periods:.1f} periods of it, and {fewest:g} are needed to see it repeat"
 
 
 def _no_line(recording: Recording, fit: Fit, k: int) -> str | None:

@@ -289,17 +289,21 @@ class Searcher:
         self, current: CandidateModel, candidates: Sequence[CandidateModel], rounds: list[Round], most: float
     ) -> CandidateModel:
         """What a search finds that goes on from a candidate that takes much away of the records to fit and that the held-out ones refuse,
-        where nothing is accepted: two causes may foretell them together alone, such as a late reading and what its scale does."""
-        trials = self.trials
+        where nothing is accepted: two causes may foretell them together alone, such as a late reading and what its scale does. A search
+        that finds nothing leaves errors and marked readings as they were."""
+        whole = self.trials
         if current.causes or current.errors.is_noise:
             return current
-        refused = [t for t in candidates if takes_away_much(t, current) and not trials.objections(t)]
-        for begun in refused[: SEARCH.most_searches_without]:
-            further: list[Round] = []
-            found = self.forward_rounds(trials.with_errors(trials.converged(begun)), further, most)
-            if trials.selection.improves_enough(current, found):
-                rounds += further
+        refused = [t for t in candidates if takes_away_much(t, current) and not whole.objections(t)]
+        for begun in refused[: SEARCH.most_searches_beside]:
+            other, again = copy.copy(self), [*rounds[:-1], replace(rounds[-1], gone_on_beside=begun.causes)]
+            other.trials = whole.apart()
+            found = other.forward_rounds(other.trials.with_errors(other.trials.converged(begun)), again, most)
+            if other.trials.selection.improves_enough(current, found):
+                other.trials.log[:0] = whole.log
+                self.trials, self.markings, rounds[:] = other.trials, other.markings, again
                 return found
+            whole.log += other.trials.log
         return current
 
     def _in_finer_form(self, current: CandidateModel) -> CandidateModel:

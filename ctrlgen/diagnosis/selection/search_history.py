@@ -93,7 +93,7 @@ def search_history(search: SearchResult) -> list[RoundEntry]:
             not_taken=[not_taken_entry(search, r) for r in round_.refused if r.gain > 0],
             failed=list(map(str, round_.failed)),
             causes_after=[(c.effect, c.location) for c in then.causes],
-            decision=_decision(round_.before, then, bool(round_.candidates)),
+            decision=_decision(round_, then),
         )
         for k, (round_, then) in enumerate(zip(search.rounds, following, strict=True), 1)
     ]
@@ -163,10 +163,13 @@ def _tried(
     )
 
 
-def _decision(before: CandidateModel, then: CandidateModel, tried: bool) -> str:
+def _decision(round_: Round, then: CandidateModel) -> str:
     """What a round changed, or why it changed nothing."""
-    if not tried:
+    if not round_.candidates:
         return "no hypothesis exceeds the threshold: stopped"
-    added = [f"added {c.effect} at {c.location}" for c in then.causes if c not in before.causes]
-    dropped = [f"dropped {c.effect} at {c.location}" for c in before.causes if c not in then.causes]
+    if beside := [f"{c.effect} at {c.location}" for c in round_.gone_on_beside]:
+        return f"the held-out records refuse each candidate alone: searched on beside {', '.join(beside)}"
+    before = round_.before.causes
+    added = [f"added {c.effect} at {c.location}" for c in then.causes if c not in before]
+    dropped = [f"dropped {c.effect} at {c.location}" for c in before if c not in then.causes]
     return ", ".join([*added, *dropped]) or "no candidate is confirmed by the held-out records: stopped"

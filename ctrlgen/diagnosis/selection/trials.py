@@ -76,9 +76,16 @@ class Trials:
             form = h.form_of is not None and (h.form_of, h.at) == (cause.form_of, cause.at)
             return form or (h.effect, h.location, h.path) == (cause.effect, cause.location, cause.path)
 
-        branch = copy.copy(self)
+        branch = self.apart()
         branch.screen = self.screen.without(is_kin)
-        branch.fitted, branch.screens, branch.bare, branch.latest = dict(self.fitted), {}, {}, None
+        branch.screens, branch.bare, branch.latest = {}, {}, None
+        return branch
+
+    def apart(self) -> Trials:
+        """A copy of these trials, which learns for itself, errors and marked readings included."""
+        branch = copy.copy(self)
+        branch.screen = self.screen.without(lambda _: False)
+        branch.fitted, branch.screens, branch.bare = dict(self.fitted), dict(self.screens), dict(self.bare)
         branch.beaten = dict(self.beaten)
         branch.refused, branch.failed, branch.log = [], [], []
         return branch
@@ -262,7 +269,8 @@ class Trials:
         return self.bare[k][1:]
 
     def objections(self, candidate: CandidateModel, accepted: Sequence[Hypothesis] = ()) -> dict[int, str]:
-        """What speaks against the causes of a candidate that are not yet `accepted`."""
+        """What speaks against the causes of a candidate that are not yet `accepted`; and against those that are, that the records do not
+        show a pitch to repeat any more."""
         noise = self.fitter.noise
         exact = candidate.errors.is_noise and bool(noise.known.all() and not noise.guessed.any())
         against = objections(self.fitter.recording, candidate.fit, accepted, exact)

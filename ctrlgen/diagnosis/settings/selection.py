@@ -151,6 +151,9 @@ class SearchSettings:
     most_searches_without: int = 2
     """Causes that have come to stand for something else, at most, without which is searched again: each search costs about as much
     as the first. Judgement."""
+    most_searches_beside: int = 2
+    """Refused candidates, at most, beside which is searched where nothing is accepted: each search costs about as much as the first.
+    Judgement."""
     nearly_best: float = 0.9
     """Share of what the best candidate explains from which on another is fitted to the end before both are compared."""
     longest_shift: int = 64
