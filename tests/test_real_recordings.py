@@ -122,7 +122,8 @@ def test_a_hash_of_no_file_of_the_recording_is_a_fault(tmp_path):
 
 @pytest.mark.exhaustive
 def test_the_meso_hexapod_is_wired_and_built_otherwise_than_printed():
-    """Held out: better than 36 free numbers fitted alike (1.63 um, 0.00103 deg)."""
+    """Held out: better than 36 free numbers fitted alike (1.63 um, 0.00103 deg), in translation by a quarter. The table is printed to
+    0.5 um and 0.0005 deg, so that rotations are left at rounding."""
     found = diagnosed("nist_hexapod", device="../devices/meso_hexapod.toml")
     causes = {(f.effect, f.location): f for f in found.findings}
     assert {location for effect, location in causes if effect == "reversed"} == {
@@ -134,8 +135,8 @@ def test_the_meso_hexapod_is_wired_and_built_otherwise_than_printed():
     fit, fitter = found.search.chosen.fit, found.fitter
     errors = PoseErrors(np.vstack([r.observed - fitter.predict(fit, r) for r in fitter.held_out_records]))
     assert sum(u.cause is not None for u in fit.structure.free_parameters) <= 24  # two thirds of the peer's
-    assert np.rad2deg(errors.rotation.mean()) < 0.00095
-    assert errors.translation.mean() < 1.4e-6
+    assert np.rad2deg(errors.rotation.mean()) < 0.00103
+    assert errors.translation.mean() < 0.75 * 1.63e-6
 
 
 FRICTION = {"coulomb", "directional_friction", "stribeck"}
@@ -152,7 +153,7 @@ def test_emps_has_dry_friction_and_a_drive_that_counts_later():
     assert 0.0 < offset.value < 2.0 and offset.unit == "ms"  # one cycle of the controller is 1 ms
     assert not {"vibration", "force_step", "sensor_step", "drift"} & {f.effect for f in found.findings}
     assert left(found, "reading.force") < 0.3
-    assert relative(found) < 0.060  # the owner's figure on the same held-out run
+    assert relative(found) < 0.046  # the owner's figure on the same held-out run is 6.0 %
 
 
 @pytest.mark.long
@@ -165,7 +166,7 @@ def test_the_rack_has_friction_or_a_zero_that_is_off_and_two_clocks(name):
     assert named & FRICTION and "home_offset" in named and found.verdict == "ambiguous"
     assert second.effect == "clock_offset"
     assert 6.0 < second.parameters["offset"].value < 9.0  # 8 ms is the best by plain least squares
-    assert left(found, "reading.force") < 0.35
+    assert left(found, "reading.force") < 0.26  # 11.5 N
 
 
 @pytest.mark.exhaustive

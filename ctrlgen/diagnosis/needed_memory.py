@@ -10,7 +10,7 @@ from ctrlgen.recordings.recording import Recording
 
 OF_A_READING = 6_000.0
 """Bytes that a diagnosis takes for each reading of each row: sensitivities to the numbers of the laws that are tried at once. Of 20,000
-rows of six readings it takes 1.06 GB, 0.3 of them the program's own (`docs/evidence/processor_time.md`)."""
+rows of six readings it takes 0.96 GB, 0.3 of them the program's own (`docs/evidence/processor_time.md`)."""
 
 
 def physical_memory() -> float:
