@@ -66,7 +66,7 @@ GROUPS = (
 LOOP = ("coulomb", "stribeck", "viscous", "quadratic_damping", "cyclic", "lost_beams", "step", "backlash")
 # By class, in the order of CLASSES
 COUNTS = {
-    "ci": (2, 4, 1, 1, 1, 1, 1, 1, 1, 1, 2, 0, 0, 0, 0),
+    "ci": (1, 2, 1, 1, 1, 0, 1, 1, 1, 1, 1, 0, 0, 0, 0),
     "small": (10, 30, 8, 8, 7, 4, 2, 11, 10, 10, 12, 13, 12, 8, 9),
     "full": (110, 90, 40, 48, 42, 16, 10, 33, 200, 72, 204, 78, 96, 104, 48),
 }
