@@ -184,6 +184,15 @@ def test_sets_of_causes_begin_and_end_where_the_tables_do():
     assert ((high - low)[: len(fixed)] < 1e-6).tolist() == fixed
 
 
+@pytest.mark.parametrize("causes", [2, 6])
+def test_that_sets_are_weighed_otherwise_than_the_tables_is_taken_away_by_no_cause(monkeypatch, causes):
+    """The first cause takes all away, the others nothing: the fits of sets alone leave 70 where the table says 100, all the same."""
+    assert causes == 2 or causes > ATTRIBUTION.most_causes
+    found = shared(monkeypatch, lambda S: 1e3 if 0 in S else 7e4, causes, described=1e5)
+    assert found.shares[0].value == pytest.approx(0.99) and found.rest.value == pytest.approx(0.01)
+    assert found.shares[1:] == (None,) * (causes - 1)
+
+
 def test_a_set_gives_no_reading_up_for_the_others(tmp_path):
     """A heater 12 % too strong, and heaters that warm each other by 2.2 %, half cancel in some components. Alone the first leaves more of
     all than with the numbers of the model if each component has a discrepancy of its own."""

@@ -2,17 +2,18 @@
 
 The energy E(S) that the causes S leave on the held-out records: the device with these causes as the accepted model has them, its
 own numbers fitted again, as every model is: held by what its file states of them, under the discrepancy that the set itself leaves,
-one for all readings over their noise, as E counts them.
-No causes leave what the tables call "before", all of them what they call "after". What a cause takes away is its Shapley value,
+one for all readings over their noise, as E counts them. What a cause takes away is its Shapley value,
 
     phi_k = mean over orders of E(before k) - E(after k),      sum phi = E(none) - E(all),
 
 the average over all orders in which the causes may be added (R. Lindeman, P. Merenda, R. Gold, Introduction to Bivariate and
 Multivariate Analysis, 1980; L. Shapley, Contributions to the Theory of Games II, 1953, 307). With the numbers of the accepted model
 instead, a set would be told by an error that nobody sees: that of a device whose numbers fit what is not there, often several times
-"before". Freed of what the file states, numbers would bend to take what is missing. In energies beyond noise
+"before". Freed of what the file states, numbers would bend to take what is missing. No set and all causes are fitted as every other set
+is: the tables' own fits weigh each reading by its own discrepancy, and what that changes would be counted as taken away by whichever
+cause comes first, or last. With what the tables call before and after, in energies beyond noise,
 
-    share_k = phi_k/E(none),   left = E(all)/E(none),
+    share_k = phi_k/sum phi (before - after)/before,   left = after/before,
 
 which are one, in every channel and in all. A cause that takes nothing away itself is counted with the one that it serves, so that no
 share is negative; a constant, if alone it takes nothing away, with the law that needs it. Intervals are those of a bootstrap over
@@ -87,13 +88,14 @@ def attribute(
     if not n or before.sum() <= 0:
         return Attribution((None,) * len(causes), None, held)
     after = _by_block(known, as_fitted(fitter, fit, records))
-    subsets = _subsets(n)
+    everyone, subsets = frozenset(range(n)), _subsets(n)
     members = [frozenset(k for k, group in enumerate(of) if group in S) for S in subsets]
     energies = in_forks(lambda present: _left_or_all(known, fitter, fit, present, records, before), members, jobs)
-    left = {frozenset(): before, frozenset(range(n)): after} | dict(zip(subsets, energies, strict=True))
+    left = dict(zip(subsets, energies, strict=True))
     serves = [_needed_by(left, g, n) for g in range(n)]
     parts, told = _counted(np.array([_shapley(left, g, n) for g in range(n)]), before, after, serves, seed)
-    back = [float(np.sum(left[frozenset(range(n)) - {g}] - after) / np.sum(before - after)) for g in range(n)]
+    whole = np.sum(left[frozenset()] - left[everyone])
+    back = [float(np.sum(left[everyone - {g}] - left[everyone]) / max(whole, 1e-300)) for g in range(n)]
     _lead_constants(parts, told, serves, back, [causes[of.index(g)].prior.constant for g in range(n)])
     shares = [ShareEntry(value=v, ci95=(a, b)) for v, a, b in _with_intervals(parts, before, after, seed, told)]
     by_channel = _shares(told, *(v.sum(axis=-2) for v in (parts, before, after)))
@@ -229,8 +231,8 @@ def _left_or_all(
 
 
 def _subsets(n: int) -> list[frozenset[int]]:
-    """The sets of causes but none and all of them: every one, or those of one, and of all but one, where there are too many."""
-    sizes = range(1, n) if n <= ATTRIBUTION.most_causes else (1, n - 1)
+    """The sets of causes: every one, or none, those of one, all but one and all where there are too many."""
+    sizes = range(n + 1) if n <= ATTRIBUTION.most_causes else (0, 1, n - 1, n)
     return [frozenset(chosen) for size in sizes for chosen in combinations(range(n), size)]
 
 
