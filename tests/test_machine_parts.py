@@ -60,6 +60,16 @@ def test_the_tables_name_laws_and_parts_that_exist():
         assert re.search(r"\(.+\)$", row.text), "who says so"
 
 
+@pytest.mark.parametrize("actuator", ["voice coil", "piezo stack", "thermal", "stepper", "servo"])
+def test_the_usual_words_for_an_actuator_are_known(actuator):
+    assert Machine(actuator=actuator).actuator in FAMILIES
+    # a motor by either of its names has the same laws
+    assert (
+        not_offered(list(Effect.library), parts(actuator="servo")).keys()
+        == not_offered(list(Effect.library), parts(actuator="servo motor")).keys()
+    )
+
+
 @pytest.mark.parametrize("actuator", get_args(ActuatorName))
 def test_no_machine_is_told_of_parts_of_another(actuator):
     machine = parts(actuator=actuator)

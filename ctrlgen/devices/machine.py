@@ -17,6 +17,7 @@ ActuatorName = Literal[
     "voice coil",
     "linear motor",
     "servo motor",
+    "servo",
     "stepper",
     "galvanometer",
     "solenoid",
@@ -47,10 +48,10 @@ SensorName = Literal[
     "autocollimator",
     "accelerometer",
 ]
-# By what an actuator works. "position": a controller of its own brings it where it is told.
+# By what an actuator works. A servo, as a servo motor with its own controller is called for short, works as its motor does.
 FAMILIES: Mapping[str, str] = {
     **dict.fromkeys(
-        ("voice coil", "linear motor", "servo motor", "stepper", "galvanometer", "solenoid"), "electromagnetic"
+        ("voice coil", "linear motor", "servo motor", "servo", "stepper", "galvanometer", "solenoid"), "electromagnetic"
     ),
     **dict.fromkeys(("piezo stack", "piezo ceramic"), "piezo"),
     "piezo motor": "stepping piezo",

@@ -17,7 +17,7 @@ from ctrlgen.estimation.law_prior import ONE_IN_A_HUNDRED
 _CLEARANCE = frozenset({"gear", "harmonic drive", "screw", "belt", "rack", "cable", "linkage"})
 _PERIODIC_SENSORS = frozenset({"interferometer", "encoder", "resolver"})
 _PERIODIC_PARTS = frozenset({"gear", "harmonic drive", "screw", "belt", "rack"})
-_PERIODIC_ACTUATORS = frozenset({"stepper", "servo motor", "linear motor", "piezo motor"})
+_PERIODIC_ACTUATORS = frozenset({"stepper", "servo motor", "servo", "linear motor", "piezo motor"})
 
 
 @dataclass(frozen=True)
