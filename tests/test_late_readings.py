@@ -105,8 +105,9 @@ def test_what_acts_behind_a_delay_or_on_it_in_a_loop_keeps_the_samples_in_the_mo
     digits = Hypothesis("quantisation", "sensor:axis", "axis")
     starts = {"delay": 2e-3}, {"quantum": 1e-8, "share": 1.0}
     for causes, places in (((LATE,), (0,)), ((LATE, digits), ())):
-        device = Structure(AXIS, causes, starts[: len(causes)]).expanded_device
-        assert effects_apart(device, nominal_physics(device)) == places
+        structure = Structure(AXIS, causes, starts[: len(causes)])
+        free = [p.path for p in structure.free_parameters]
+        assert effects_apart(structure.expanded_device, nominal_physics(AXIS), free) == places
     looped = validate(Device.library["axis"], tomllib.loads(AXIS_FILE.read_text()) | {"loop": LOOP}, "looped.toml")
     physics = nominal_physics(looped)
     late, *_ = hypotheses(looped, physics, ("reading.axis",), H, False, [Effect.library["delay"]])

@@ -289,9 +289,9 @@ def test_a_fit_takes_away_no_more_than_several_times_what_a_shift_promises(late,
     t = H * np.arange(LONG)
     trials, current = trials_beside(axis_fitter(n=LONG, change=lambda y, u: np.interp(t - late, t, y)), [CLOCK])
     begun, promised = best_shift(trials.fitter, current.fit, CLOCK, H)
-    fitted = trials.fit(current.fit.restarted.with_cause(CLOCK, {"delay": begun}), CLOCK)
+    fitted = trials.fit(current.fit.restarted.with_cause(CLOCK, begun), CLOCK)
     took = current.fit.objective - fitted.fit.objective
-    assert begun == pytest.approx(shift) and took > 0.5 * current.fit.objective
+    assert begun["delay"] == pytest.approx(shift) and took > 0.5 * current.fit.objective
     assert 0.9 * promised < took < SEARCH.generous_promise * promised
 
 
@@ -301,7 +301,7 @@ def test_a_shift_that_cannot_take_away_enough_is_not_fitted(monkeypatch):
     single = replace(rough, fit=replace(rough.fit, chi2=0.5 * current.fit.objective, penalty=0.0))
     fitted, promises = [], {id(current.fit): 0.0, id(single.fit): 0.0}
     monkeypatch.setattr(Trials, "tried", lambda _, structure, *__: fitted.append(structure.causes) or [])
-    monkeypatch.setattr(candidates, "best_shift", lambda _, fit, *__: (H, promises[id(fit)]))
+    monkeypatch.setattr(candidates, "best_shift", lambda _, fit, *__: ({"delay": H}, promises[id(fit)]))
     # what a single takes away; what that leaves
     need = (
         0.5 * current.fit.objective * np.array([SEARCH.smallest_score, SEARCH.subset_share]) / SEARCH.generous_promise

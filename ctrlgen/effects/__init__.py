@@ -22,7 +22,7 @@ with an underscore are no laws: the law's interface, the reader of [[effect]] ta
 from importlib import import_module
 from pkgutil import iter_modules
 
-from ctrlgen.effects._channel_group import group, is_group, means
+from ctrlgen.effects._channel_group import group, is_group, means, overlap
 from ctrlgen.effects._effect import Effect, Place
 from ctrlgen.effects._family import Family
 from ctrlgen.effects._installed import Installed, LeftOut, installed, law_of, laws, load_laws
@@ -68,5 +68,6 @@ __all__ = [
     "laws",
     "load_laws",
     "means",
+    "overlap",
     "read_effect",
 ]

@@ -28,3 +28,8 @@ def means(at: str, channel: str, unit: str) -> bool:
         return same_dimension(unit, at.removeprefix(_IN))
     except ValueError:
         return False
+
+
+def overlap(first: str, second: str) -> bool:
+    """Whether two `at` may mean one channel: both the same, or one of them several."""
+    return first == second or is_group(first) or is_group(second)

@@ -58,6 +58,8 @@ class Effect:
     # Remembers so much that a simulation of a recording applies it to the simulated readings as a whole, where nothing follows it,
     # and leaves it out of the model: `estimation.late_readings`.
     apart: ClassVar[bool] = False
+    # Follows a reading in steps, between which it has no slope: where nothing follows it, a fit leaves it out and takes it as noise.
+    in_steps: ClassVar[bool] = False
     # What the device must have: words of `_requirements`.
     requires: ClassVar[frozenset[str]] = frozenset()
     # Couples a channel to another one, `of`, whose index is `partner`; a symmetric one acts on both.
@@ -192,6 +194,10 @@ class Effect:
         """The states at this sample time [s], of which a law that looks back by samples needs more the shorter it is; `free`: its
         amplitude may be moved from the file's. Raises ValueError, of its amplitude, where they are too many to build."""
         return self.states
+
+    def reaches(self, sample_time: float) -> float:
+        """Up to where its amplitude may be moved [SI] with the states `kept` of one that is free; infinite where they bound it nowhere."""
+        return float("inf")
 
     def after_sample(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
         """`update`, with the states that keep their value through a record, and ramps, which begin anew."""

@@ -35,6 +35,9 @@ class Delay(Effect):
         age = samples_in(self.values["delay"], sample_time)
         return _kept(max(2 * age + FREE_SAMPLES if free else age, 1))
 
+    def reaches(self, sample_time: float) -> float:
+        return 2 * self.values["delay"].si + FREE_SAMPLES * sample_time
+
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         h, total, samples = s.sample_time, 0.0, len(vars(s.states)) // 3 - 1
         D = ca.fmin(p.delay / h, samples)

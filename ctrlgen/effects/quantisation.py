@@ -21,6 +21,7 @@ class Quantisation(Effect):
         Param("quantum", "channel", (1e-7, 1.0), "q: step"),
     )
     at_bounds = itself("quantum")
+    in_steps = True
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return p.share * (p.quantum * ca.floor(s.value / p.quantum + 0.5) - s.value)

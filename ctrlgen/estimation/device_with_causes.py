@@ -18,12 +18,13 @@ def device_with_causes(device: Device, causes: Sequence[Hypothesis], values: Seq
     effects, changes = [], {}
     for cause, value in zip(causes, values, strict=True):
         if cause.effect == PARAMETER:
-            low, high = suspected_range(described[cause.path], sizes_of_numbers(device)[cause.path])
+            low, high = suspected_range(cause, described[cause.path], sizes_of_numbers(device)[cause.path])
             # a stage of negative size cannot be built
             changes[cause.path] = min(max(value["value"], low), high)
         else:
             effects.append(_effect(cause, cause.channel_on(device), value))
-    return changed(device, changes).model_copy(update={"effect": (*device.effect, *effects)})
+    device = changed(device, changes)
+    return device.model_copy(update={"effect": (*device.effect, *effects)})
 
 
 def _effect(cause: Hypothesis, channel: Channel, values: dict[str, float]) -> Effect:

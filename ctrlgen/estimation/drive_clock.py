@@ -18,7 +18,6 @@ import numpy as np
 from ctrlgen.estimation.error_model import huber
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.held_out import refit_to_held_out
-from ctrlgen.estimation.hypothesis import PARAMETER
 from ctrlgen.estimation.integration_error import with_steps_that_suffice
 from ctrlgen.estimation.least_squares import whiten_residual
 from ctrlgen.estimation.moved_drive import with_drive_at
@@ -89,7 +88,7 @@ def drive_clock(fitter: Fitter, fit: Fit) -> DriveClock | None:
     Raises the errors of a simulation.
     """
     records = fitter.fit_records
-    timed = any(c.effect != PARAMETER and c.law.moves_in_time for c in fit.structure.causes)
+    timed = any(c.shifts for c in fit.structure.causes)
     if timed or fitter.recording.kind == "poses" or not all(np.isfinite(r.sample_time) for r in records):
         return None
     stamps = stamp_deviation(fitter.recording)

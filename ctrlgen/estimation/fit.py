@@ -167,7 +167,19 @@ class Fitter:
         A fit that ends above the fit `nested` in it started too far away. It is repeated from `nested`'s initial states with
         its new causes almost off, and once more with the device's own numbers as stated, which `nested` may have bent to
         stand in for the new causes. The best of them is returned. A fit ends before where it cannot reach an objective that is `enough`.
+        One that ends with a delay as long as the samples that are kept for it is begun again with more of them, from that delay and the
+        other numbers as they began, which it may have bent.
         """
+        fit = best = self._fit_from(structure.with_room(), theta, steps, nested, enough)
+        while steps and (longer := fit.structure.with_room(fit.theta)) is not fit.structure:
+            fit = self._fit_from(longer, None, steps, nested, enough)
+            best = min(best, fit, key=lambda fit: fit.objective)
+        return best
+
+    def _fit_from(
+        self, structure: Structure, theta: np.ndarray | None, steps: int, nested: Fit | None, enough: float
+    ) -> Fit:
+        """The best of the fits that `fit` says, with the samples that are kept of delays."""
         problem = self.problem(structure)
         start = np.concatenate([structure.start if theta is None else theta, problem.expected])
         if nested is not None:

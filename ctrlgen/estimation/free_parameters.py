@@ -8,8 +8,8 @@ from functools import lru_cache
 
 from ctrlgen.core.units import Quantity, written_unit
 from ctrlgen.devices import Device
-from ctrlgen.effects import Channel, Param
-from ctrlgen.estimation.hypothesis import DEVICES_KEPT, PARAMETER, Hypothesis, numbers
+from ctrlgen.effects import Channel, Effect, Param
+from ctrlgen.estimation.hypothesis import DEVICES_KEPT, PARAMETER, Hypothesis, is_of_effect, numbers
 from ctrlgen.estimation.number_sizes import sizes_of_numbers
 from ctrlgen.estimation.settings import FIT
 from ctrlgen.model.assembly import movable
@@ -23,7 +23,8 @@ the shape changes fades toward it."""
 class FreeParameter:
     """One free number [SI]: `sd` is its stated deviation from `nominal`, None where nothing is known beforehand.
 
-    `cause` is the place of its hypothesis in the structure, None for the device's own uncertain numbers.
+    `cause` is the place of its hypothesis in the structure, None for the device's own uncertain numbers. `stated`: it is a number of the
+    device file that a cause says is wrong.
     """
 
     path: str
@@ -35,11 +36,12 @@ class FreeParameter:
     sd: float | None = None
     cause: int | None = None
     amplitude: bool = False
+    stated: bool = False
 
     @property
     def name(self) -> str:
         """The parameter's name in its effect; "value" for a number of the device."""
-        return self.path.rpartition(".")[2] if self.path.startswith("effect[") else "value"
+        return self.path.rpartition(".")[2] if is_of_effect(self.path) and not self.stated else "value"
 
     def shape_ends(self, value: float) -> tuple[bool, bool]:
         """Whether a fit that leaves this number of a law, no amplitude, at `value` has ended at its low bound, at its high one."""
@@ -60,7 +62,7 @@ def free_parameters(
     place = len(device.effect)
     for index, (cause, start) in enumerate(zip(causes, starts, strict=True)):
         if cause.effect == PARAMETER:
-            yield _suspected_number(device, cause.path, described[cause.path], index)
+            yield _suspected_number(device, cause, described[cause.path], index)
             continue
         channel = cause.channel_on(device)
         for p in cause.law.params:
@@ -70,11 +72,12 @@ def free_parameters(
         place += 1
 
 
-def _suspected_number(device: Device, path: str, number: Quantity, index: int) -> FreeParameter:
+def _suspected_number(device: Device, cause: Hypothesis, number: Quantity, index: int) -> FreeParameter:
     """A number of the device that the cause `index` says is wrong."""
-    unit, size = written_unit(number.text), FIT.suspected_step * sizes_of_numbers(device)[path]
-    low, high = suspected_range(number, sizes_of_numbers(device)[path])
-    return FreeParameter(path, unit, number.si, low, high, size, cause=index, amplitude=True)
+    unit, typical = written_unit(number.text), sizes_of_numbers(device)[cause.path]
+    low, high = suspected_range(cause, number, typical)
+    size = FIT.suspected_step * typical
+    return FreeParameter(cause.path, unit, number.si, low, high, size, cause=index, amplitude=True, stated=True)
 
 
 def _law_parameter(path: str, p: Param, cause: Hypothesis, channel: Channel, start: float, index: int) -> FreeParameter:
@@ -91,8 +94,11 @@ def _law_parameter(path: str, p: Param, cause: Hypothesis, channel: Channel, sta
     return FreeParameter(path, channel.unit_of(p), off, low, high, size, cause=index, amplitude=amplitude)
 
 
-def suspected_range(number: Quantity, size: float) -> tuple[float, float]:
-    """How far a suspected number of typical `size` [SI] is looked for: a tenth to ten times of it, half a radian for an angle."""
+def suspected_range(cause: Hypothesis, number: Quantity, size: float) -> tuple[float, float]:
+    """How far a suspected number of typical `size` [SI] is looked for: a tenth to ten times of it, half a radian for an angle; of a shift
+    in time from none on."""
+    if cause.shifts:
+        return 0.0, cause.longest
     span = size * FIT.suspected_reach
     if written_unit(number.text) in ("deg", "rad"):
         span = FIT.suspected_angle
@@ -103,6 +109,8 @@ def nuisances(device: Device) -> dict[str, float]:
     """Path and standard deviation [SI] of every number with a stated `sd`, or of a section with a tolerance."""
     sds = {}
     for path, section, number in numbers(device):
+        if isinstance(section, Effect):
+            continue  # suspected, but no nuisance: a simulator keeps every sample of a delay that is free
         sd = number.sd if number.sd is not None else (section.relative_sd or 0.0) * abs(number.si)
         if sd and not number.whole:
             sds[path] = sd

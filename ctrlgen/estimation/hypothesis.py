@@ -18,7 +18,7 @@ from ctrlgen.core.units import Quantity
 from ctrlgen.devices import Device, DevicePhysics
 from ctrlgen.devices.quantities import walk
 from ctrlgen.devices.section import Section
-from ctrlgen.effects import Channel, Effect, Family, Param, Place, group, laws, means
+from ctrlgen.effects import Channel, Effect, Family, Param, Place, group, laws, means, overlap
 from ctrlgen.estimation.disturbance_inputs import unread_axes
 from ctrlgen.estimation.law_prior import LawPrior
 from ctrlgen.estimation.priors import DEFAULT, prior_of
@@ -65,7 +65,8 @@ class Hypothesis:
     """One effect at one place; or, where `effect` is "parameter", one number of the device, at `path`.
 
     location: where a report says it is, such as "actuator:1X".
-    at, of: the channel on which the effect acts, or several of them (`effects.means`); for effects of pairs, the other channel.
+    at, of: the channel on which the effect acts, or several of them (`effects.means`); for effects of pairs, the other channel. Of a
+        number of the device empty, but for that of a law that the file has.
     count: how many of the same effect a structure has there already, where the effect is repeatable.
     highest: frequency [Hz] up to which samples are told from their aliases; infinite for settled poses, which have no clock.
     machine_odds: ln of how many times commoner the law is in a machine of these parts than in any.
@@ -90,13 +91,16 @@ class Hypothesis:
     def beside(self, causes: Sequence[Hypothesis]) -> Hypothesis | None:
         """The hypothesis to add to `causes`: itself, one more where it is there and repeatable, None where it cannot be added.
 
-        A place has at most one form of one physics, and one cause of a law that is not repeatable.
+        A place has at most one form of one physics, and one cause of a law that is not repeatable. A reading has at most one shift in time
+        of one law: another one, of it or of all, is the same number.
         """
         if any(
             (c.form_of, c.location) == (self.form_of, self.location) and c.effect != self.effect
             for c in causes
             if c.form_of
         ):
+            return None
+        if self.shifts and any(c.effect == self.effect and c.shifts and overlap(c.at, self.at) for c in causes):
             return None
         same = [c for c in causes if (c.effect, c.location, c.of) == (self.effect, self.location, self.of)]
         if not same:
@@ -109,6 +113,16 @@ class Hypothesis:
         return self.prior.form_of
 
     @property
+    def shifts(self) -> bool:
+        """Whether it moves a signal in time."""
+        return is_of_effect(self.path) if self.effect == PARAMETER else self.law.moves_in_time
+
+    @property
+    def sample_time(self) -> float:
+        """The shortest sample time [s] of the records; 0 of settled poses, which have no clock."""
+        return CANDIDATE_TERMS.highest_frequency / self.highest
+
+    @property
     def finer(self) -> tuple[Hypothesis, ...]:
         """The finer forms of its law, at the same place."""
         kinds = (kind for kind, law in sorted(laws().items()) if self.effect in prior_of(law).refines)
@@ -118,8 +132,7 @@ class Hypothesis:
     def pace(self) -> float:
         """The sample time of the records over a millisecond, to the nearest decade: starts of times are decades apart, and those of records
         that are thinned out by two should be the same. 1 for settled poses."""
-        sample_time = CANDIDATE_TERMS.highest_frequency / self.highest
-        return 10.0 ** round(log10(sample_time / USUAL_SAMPLE_TIME)) if sample_time > 0 else 1.0
+        return 10.0 ** round(log10(self.sample_time / USUAL_SAMPLE_TIME)) if self.sample_time > 0 else 1.0
 
     @property
     def prior(self) -> LawPrior:
@@ -224,12 +237,13 @@ def hypotheses(
     """
     laws = selected_laws() if laws is None else laws
     unread = unread_axes(device, physics)
-    effects = [h for law in laws for h in _of_law(law, physics, observed, sample_time, ambient, unread)]
-    return effects + [Hypothesis(PARAMETER, location, path=path) for path, location in _numbers(device)]
+    effects = [h for law in laws for h in _of_law(law, device, physics, observed, sample_time, ambient, unread)]
+    return effects + list(_numbers(device, physics, observed, sample_time))
 
 
 def _of_law(
     law: type[Effect],
+    device: Device,
     physics: DevicePhysics,
     observed: tuple[str, ...],
     sample_time: float | None,
@@ -245,13 +259,7 @@ def _of_law(
         return
     domain = prior.domain or DOMAIN[law.place]
     highest = CANDIDATE_TERMS.highest_frequency / sample_time if sample_time else float("inf")
-    longest = float("inf")
-    if law.apart and sample_time:
-        longest = max(SAMPLES_LATE * sample_time, SECONDS_LATE)
-        if in_loop(physics):
-            longest = CANDIDATE_TERMS.samples_in_loop * sample_time
-    if law.shifts_drive and sample_time:
-        longest = max(SAMPLES_APART * sample_time, SECONDS_APART)
+    longest = _longest_shift(law, physics, sample_time)
     places = channels(physics, law.place)
     seen = {channel.removeprefix("reading.") for channel in observed}
     if law.place is Place.SENSOR:
@@ -266,11 +274,30 @@ def _of_law(
                     yield Hypothesis(law.kind, f"{domain}:{channel.name}", channel.name, other.name, highest=highest)
         return
     fitting = [channel for channel in places if law.applies_to(channel)]
+    stated = _stated_once(law, device)
+    fitting = [c for c in fitting if not any(means(e.at, c.name, c.unit) for e in stated)]
     for channel in () if prior.acts_on_all or prior.of_one_body else fitting:
         yield Hypothesis(law.kind, f"{domain}:{channel.name}", channel.name, highest=highest, longest=longest)
     whole = len(places) == every and (prior.acts_on_all or law.place is not Place.SENSOR)
-    for at in _together(law, physics, fitting) if prior.of_one_reference or whole else ():
+    for at in _together(law, physics, fitting) if (prior.of_one_reference or whole) and not stated else ():
         yield Hypothesis(law.kind, f"{domain}:{at}", at, highest=highest, longest=longest)
+
+
+def _stated_once(law: type[Effect], device: Device) -> list[Effect]:
+    """The laws of this kind that the file of `device` has, where a reading has one at most: of a second shift in time the file's number is
+    the sum, and what is rounded stays so."""
+    return [e for e in device.effect if e.kind == law.kind] if law.moves_in_time or law.in_steps else []
+
+
+def _longest_shift(law: type[Effect], physics: DevicePhysics, sample_time: float | None) -> float:
+    """How long a delay, or an offset of clocks, is looked for [s]; infinite of other laws, and without a clock."""
+    if not (law.moves_in_time and sample_time):
+        return float("inf")
+    if law.shifts_drive:
+        return max(SAMPLES_APART * sample_time, SECONDS_APART)
+    if in_loop(physics):
+        return CANDIDATE_TERMS.samples_in_loop * sample_time
+    return max(SAMPLES_LATE * sample_time, SECONDS_LATE)
 
 
 def _needs_a_clock(law: type[Effect], sample_time: float | None) -> bool:
@@ -300,7 +327,8 @@ def why_not_offered(
     ambient: bool,
 ) -> str:
     """Why `hypotheses` has none of this law; empty where it has some. Arguments as there."""
-    if next(_of_law(law, physics, observed, sample_time, ambient, unread_axes(device, physics)), None) is not None:
+    unread = unread_axes(device, physics)
+    if next(_of_law(law, device, physics, observed, sample_time, ambient, unread), None) is not None:
         return ""
     there = available(physics, sample_time) - (frozenset() if ambient else {"ambient"})
     prior = prior_of(law)
@@ -316,21 +344,50 @@ def why_not_offered(
         return "the poses are settled and have no clock: at rest, what creeps or is late cannot be told from a gain"
     if law.place is Place.HEAT and "heat" not in there:
         return "no actuator of the device is heated"
+    if _stated_once(law, device):
+        return "the device file has it wherever it was recorded" + (
+            ": its number is what may be off" if law.moves_in_time else ""
+        )
     return "no channel that was recorded is one on which it can act"
 
 
-def _numbers(device: Device) -> Iterator[tuple[str, str]]:
-    """(path, location) of every number that is not a count."""
+def _numbers(
+    device: Device, physics: DevicePhysics, observed: tuple[str, ...], sample_time: float | None
+) -> Iterator[Hypothesis]:
+    """Every number that is not a count; of a law, where a channel `observed` at a `sample_time` shows it."""
     for path, section, number in numbers(device):
-        if not number.whole:
-            # the name of one of several alike, such as axes
-            owner = "" if isinstance(section, Device) else getattr(section, "name", "")
-            yield path, f"{section.domain}:{f'{owner}.' if owner else ''}{path.rpartition('.')[2]}"
+        if number.whole:
+            continue
+        name = path.rpartition(".")[2]
+        if isinstance(section, Effect):
+            read = [c for c in channels(physics, section.place) if f"reading.{c.name}" in observed]
+            if sample_time and any(means(section.at, c.name, c.unit) for c in read):
+                yield Hypothesis(
+                    PARAMETER,
+                    f"{prior_of(type(section)).domain or DOMAIN[section.place]}:{section.at}.{name}",
+                    at=section.at,
+                    path=path,
+                    highest=CANDIDATE_TERMS.highest_frequency / sample_time,
+                    longest=max(_longest_shift(type(section), physics, sample_time), 2 * number.si),
+                )
+            continue
+        # the name of one of several alike, such as axes
+        owner = "" if isinstance(section, Device) else getattr(section, "name", "")
+        yield Hypothesis(PARAMETER, f"{section.domain}:{f'{owner}.' if owner else ''}{name}", path=path)
 
 
-def numbers(device: Device) -> Iterator[tuple[str, Section, Quantity]]:
-    """Every number outside the effects with the section that holds it."""
-    return (place for place in walk(device) if isinstance(place[1], Section))
+def numbers(device: Device) -> Iterator[tuple[str, Section | Effect, Quantity]]:
+    """Every number that may be off with what holds it: those outside the effects, and how far an effect of the file moves a signal in
+    time, beside which no second one is suspected."""
+    for path, owner, number in walk(device):
+        shift = isinstance(owner, Effect) and owner.moves_in_time and path.endswith(f".{owner.amplitude().name}")
+        if shift or isinstance(owner, Section):
+            yield path, owner, number
+
+
+def is_of_effect(path: str) -> bool:
+    """Whether a number of the device is one of a law's."""
+    return path.startswith("effect[")
 
 
 @lru_cache(maxsize=DEVICES_KEPT)

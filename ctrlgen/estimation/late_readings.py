@@ -6,11 +6,14 @@ afterwards, by the polynomials of `effects.delay`, whose states the C and everyt
 
 What such a reading shows at first happened before the record. No model knows it: there a simulation is taken to be as wrong as it is
 just afterwards, so that nothing is won and nothing lost by not knowing.
+
+Rounding that is the last to act is left out too, and stays out: by the slopes of a staircase, which are zero, no fit could move any
+number, and `estimation.noise` counts it as noise (B. Widrow, I. Kollar, Quantization Noise, 2008).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -18,7 +21,7 @@ import casadi as ca
 import numpy as np
 
 from ctrlgen.devices import Device, DevicePhysics
-from ctrlgen.effects import Place, is_group, means
+from ctrlgen.effects import Place, means, overlap
 from ctrlgen.estimation.settings import SIMULATION
 from ctrlgen.model.assembly import build_model
 from ctrlgen.model.discretisation import settling_time
@@ -26,18 +29,24 @@ from ctrlgen.model.effect_terms import channels, in_loop
 from ctrlgen.model.model import Model
 
 
-def effects_apart(device: Device, physics: DevicePhysics) -> tuple[int, ...]:
-    """The places in the file of the effects that can be left out of the model of a recording."""
+def effects_apart(
+    device: Device, physics: DevicePhysics, free: Collection[str] = (), clock: bool = True
+) -> tuple[int, ...]:
+    """The places in the file of the effects that can be left out of the model of a recording, whose numbers `free` are fitted; of one
+    without a `clock` none that looks back."""
     if in_loop(physics):
         return ()
-    sensors = [e for e in device.effect if e.place is Place.SENSOR]
+    sensors = {k: e for k, e in enumerate(device.effect) if e.place is Place.SENSOR}
 
-    def last(k: int) -> bool:
+    def last(k: int, unless: Collection[int] = ()) -> bool:
         law = device.effect[k]
-        behind = [e for e in sensors if e.order > law.order or (e.order == law.order and e is not law)]
-        return not any(is_group(e.at) or is_group(law.at) or e.at == law.at for e in behind)
+        behind = [e for j, e in sensors.items() if e.order >= law.order and j != k and j not in unless]
+        return not any(overlap(e.at, law.at) for e in behind)
 
-    return tuple(k for k, law in enumerate(device.effect) if law.apart and last(k))
+    fixed = {k for k in sensors if not any(path.startswith(f"effect[{k}].") for path in free)}
+    rounding = {k for k, e in sensors.items() if e.in_steps and k in fixed and last(k)}
+    late = {k for k, e in sensors.items() if e.apart and clock and last(k, rounding)}
+    return tuple(sorted(rounding | late))
 
 
 def settling_time_of(device: Device) -> float:
@@ -77,14 +86,14 @@ def late_readings(
     model: Model, apart: Sequence[int], free: Sequence[str], observed: Sequence[str]
 ) -> tuple[list[LateReading], ca.SX]:
     """The channels `observed` that are late by the effects left out, and the rates (m,) that they need beside the channels."""
-    if not apart:
-        return [], ca.SX(0, 1)
+    late: list[LateReading] = []
+    rates: list[ca.SX] = []
+    if not any(model.device.effect[k].apart for k in apart):
+        return late, ca.SX(0, 1)
     device = model.device
     sensors = channels(device.physics(device.values()), Place.SENSOR)
     names, units = [c.name for c in sensors], {c.name: c.unit for c in sensors}
-    late: list[LateReading] = []
-    rates: list[ca.SX] = []
-    for k in apart:
+    for k in (k for k in apart if device.effect[k].apart):
         law, amplitude = device.effect[k], device.effect[k].amplitude().name
         path = f"effect[{k}].{amplitude}"
         for row, channel in enumerate(observed):
@@ -101,6 +110,7 @@ def late_readings(
     return late, ca.vertcat(ca.SX(0, 1), *rates)
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of a simulation that runs away
 def read_late(s: Signals, age: float, h: float) -> tuple[np.ndarray, np.ndarray]:
     """y(t - age) at every sample of h [s], and its derivative by the age; linear in the signals.
 

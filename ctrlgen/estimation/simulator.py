@@ -58,7 +58,8 @@ class Simulator:
         self.sample_time, self.linear = sample_time, linear
         self.ambient = ca.SX.sym("ambient")
         look_back = sample_time if np.isfinite(sample_time) else None
-        apart = () if poses or look_back is None else effects_apart(device, nominal_physics(device))
+        clock = not poses and look_back is not None
+        apart = effects_apart(device, nominal_physics(device), self.free, clock)
         self.model: Model = build_model(device, free, self.ambient, look_back, per_record=True, apart=apart)
         self.late, self._rates = late_readings(self.model, apart, self.free, self.channels)
         self.poses = not self.model.inertial and (poses or np.isinf(sample_time))

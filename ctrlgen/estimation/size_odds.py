@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from math import inf, log
 
 from ctrlgen.devices import Device
+from ctrlgen.devices.section import Section
 from ctrlgen.devices.usual_deviation import usual_deviation
 from ctrlgen.effects import Place, is_group, means
 from ctrlgen.estimation.fit import Fit
@@ -41,9 +42,9 @@ def known_deviation(cause: Hypothesis, device: Device) -> Deviation | None:
     """By how much what a cause says is wrong is usually off; None where nothing is known of it."""
     if cause.effect == PARAMETER:
         section, number = next((section, number) for path, section, number in numbers(device) if path == cause.path)
-        if number.sd is None and section.relative_sd == 0.0:
+        if number.sd is None and isinstance(section, Section) and section.relative_sd == 0.0:
             return Deviation(0.0, False)
-        sd = nuisances(device).get(cause.path) or usual_deviation(number)
+        sd = nuisances(device).get(cause.path) or number.sd or usual_deviation(number)
         return Deviation(sd, bool(number.sd)) if sd else None
     amplitude = cause.law.amplitude()
     channel = cause.channel_on(device)

@@ -5,7 +5,7 @@ The nominal device is nested in every structure: an effect at its `off`, a numbe
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
@@ -15,13 +15,16 @@ import numpy as np
 from ctrlgen.devices import Device
 from ctrlgen.estimation.device_with_causes import device_with_causes
 from ctrlgen.estimation.free_parameters import FreeParameter, free_parameters
-from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, nominal_physics
+from ctrlgen.estimation.late_readings import effects_apart
 from ctrlgen.estimation.simulator import Simulator, compiled_simulator
 from ctrlgen.recordings.recording import Timing
 
 # Of a number: 5 % off, the steps of an axis that is read twice in a period of its own raise the objective by 0.7, 10 % off by 1.9, 38 % off
 # by 98 (the axis of tests/test_expanded_again.py)
 FAR = 0.05
+FULL = 1e-3
+"""Share of the range of a delay within which it is as long as the samples that are kept for it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,8 +132,44 @@ class Structure:
 
     @cached_property
     def free_parameters(self) -> tuple[FreeParameter, ...]:
-        """The numbers given as `free`; else the device's uncertain ones, then every parameter of every cause."""
-        return tuple(free_parameters(self.device, self.causes, self.starts)) if self.free is None else self.free
+        """The numbers given as `free`; else the device's uncertain ones, then every parameter of every cause. A delay of which a simulator
+        keeps every sample goes as far as these."""
+        if self.free is not None:
+            return self.free
+        found = tuple(free_parameters(self.device, self.causes, self.starts))
+        kept = self._kept_shifts(found)
+        return tuple(replace(p, high=min(p.high, kept[i])) if i in kept else p for i, p in enumerate(found))
+
+    def _kept_shifts(self, found: Sequence[FreeParameter]) -> dict[int, float]:
+        """How far each of the numbers `found`, by its place among them, may shift a reading [s] with the samples that a simulator keeps;
+        those alone of which it keeps samples."""
+        shifts = [i for i, p in enumerate(found) if p.cause is not None and p.amplitude and self.causes[p.cause].shifts]
+        if not shifts:
+            return {}
+        device = self.expanded_device
+        apart = effects_apart(device, nominal_physics(self.device), [p.path for p in found])
+        kept = {}
+        for i in shifts:
+            k = int(found[i].path.removeprefix("effect[").partition("]")[0])
+            if k not in apart:
+                kept[i] = device.effect[k].reaches(self.cause_of(found[i]).sample_time)
+        return kept
+
+    def with_room(self, theta: np.ndarray | None = None) -> Structure:
+        """The same with those delays begun, and expanded, where they start, or end at `theta` (k,), that are as long there as the samples
+        kept for them: as many are kept again and more."""
+        begun = self
+        for i in self._kept_shifts(self.free_parameters):
+            p = self.free_parameters[i]
+            assert p.cause is not None
+            there = self.starts[p.cause][p.name] if theta is None else float(theta[i])
+            full = there >= p.high - FULL * (p.high - p.low)
+            if full and there > self.expanded_at[p.cause][p.name]:
+                begun = begun.restarted(p.cause, begun.starts[p.cause] | {p.name: there})
+                here = begun.expanded_at
+                expansion = (*here[: p.cause], here[p.cause] | {p.name: there}, *here[p.cause + 1 :])
+                begun = replace(begun, expansion=expansion)
+        return begun
 
     @cached_property
     def start(self) -> np.ndarray:

@@ -231,7 +231,7 @@ def fit_other_clocks(
     share of what the best single takes away; as every set, one beside another a share of what that leaves."""
     h = min(r.sample_time for r in trials.fitter.recording.records)
     open_ = (o for o in (h.beside(current.causes) for h in trials.screen.hypotheses) if o is not None)
-    shifts = [o for o in open_ if o.effect != PARAMETER and o.law.moves_in_time]
+    shifts = [o for o in open_ if o.shifts]
     if current.errors.is_noise or trials.fitter.recording.kind == "poses" or not shifts:
         return ()
     alone = len(trials.fitter.recording.channels) == 1
@@ -240,15 +240,15 @@ def fit_other_clocks(
     def one(branch: Trials, beside: CandidateModel) -> list[CandidateModel]:
         begun: list[tuple[float, Hypothesis, Structure]] = []
         # a drive that is early and a single reading that is late are one shift
-        shifted = alone and any(c.effect != PARAMETER and c.law.moves_in_time for c in beside.causes)
+        shifted = alone and any(c.shifts for c in beside.causes)
         need = SEARCH.smallest_score * most if beside is current else SEARCH.subset_share * beside.fit.objective
-        for cause in () if shifted else shifts:
+        open_beside = (s for s in shifts if s.beside(beside.causes) is not None)
+        for cause in () if shifted else open_beside:
             try:
-                p = cause.law.amplitude()
-                shift, promised = best_shift(branch.fitter, beside.fit, cause, h)
+                start, promised = best_shift(branch.fitter, beside.fit, cause, h)
                 if SEARCH.generous_promise * promised < need:
                     continue
-                structure = beside.fit.restarted.with_cause(cause, {p.name: shift})
+                structure = beside.fit.restarted.with_cause(cause, start)
                 begun.append((branch.fitter.rough_objective(structure), cause, structure))
             except FAILURES as error:
                 branch.note_failure(cause, error)
@@ -313,7 +313,7 @@ def fit_subsets(
 
 def _promising_sets(screened: Screened, size: int, enough: float, most: int) -> list[tuple[Suspect, ...]]:
     """The first `most` sets of one size that promise `enough`, no suspect in more than half of them, no two forms of one physics at
-    one place."""
+    one place, no two shifts in time of one reading."""
     chosen: list[tuple[Suspect, ...]] = []
     used: dict[Hypothesis, int] = {}
     for promised, suspects in screened.subsets:
@@ -321,7 +321,8 @@ def _promising_sets(screened: Screened, size: int, enough: float, most: int) -> 
         if len(suspects) != size or promised < enough or len(chosen) >= most:
             continue
         often = max(used.get(h, 0) for h in causes) >= max(2, most // 2)
-        if often or len({(h.form_of, h.location) if h.form_of else h for h in causes}) < size:
+        barred = any(h.beside(causes[:i]) is None for i, h in enumerate(causes))
+        if often or barred or len({(h.form_of, h.location) if h.form_of else h for h in causes}) < size:
             continue
         used.update({h: used.get(h, 0) + 1 for h in causes})
         chosen.append(suspects)

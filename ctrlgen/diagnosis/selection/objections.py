@@ -79,7 +79,8 @@ def outside_its_range(fit: Fit, k: int) -> str | None:
         if plausible and not plausible[0] <= value <= plausible[1]:
             return f"{u.name} = {shown(value)} is outside of {shown(plausible[0])} ... {shown(plausible[1])}"
         span = OBJECTIONS.at_bound * (u.high - u.low)
-        if value >= u.high - span or (value <= u.low + span and u.low != u.nominal):
+        # a reading that is not late is in time
+        if value >= u.high - span or (value <= u.low + span and u.low != u.nominal and not cause.shifts):
             return f"{u.name} is at its bound of {shown(float(value))}"
     return None
 

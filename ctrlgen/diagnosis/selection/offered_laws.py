@@ -74,5 +74,5 @@ def _testable(device: Device, recording: Recording, effects: Sequence[type[Effec
     sample_time = shortest if np.isfinite(shortest) else None
     ambient = any(r.ambient is not None for r in recording.records)
     offered = hypotheses(device, nominal_physics(device), recording.channels, sample_time, ambient, effects)
-    offered = [h for h in offered if h.effect != PARAMETER or h.path in acting]
+    offered = [h for h in offered if h.effect != PARAMETER or h.shifts or h.path in acting]
     return with_longest_periods(where_it_turns(offered, recording, device), recording, device)

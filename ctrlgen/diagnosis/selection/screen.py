@@ -111,11 +111,11 @@ class Screen:
         regions: dict[Along, tuple[Region, ...]] | None = None,
         threshold: float | None = None,
     ) -> Screened:
-        """All hypotheses that the fit does not contain yet, without those `dropped`, any whose law cannot be evaluated, and offsets
-        of the recorders' clocks, which no term of the model shows; laws in a region begun in the `regions`, those of what is left
-        unless given. With the `threshold`, where another screen has told it, each hypothesis is looked at alone: no cosines, no sets."""
+        """All hypotheses that the fit does not contain yet, without those `dropped`, any whose law cannot be evaluated, and what no
+        term of the model shows: offsets of the recorders' clocks, shifts that the file has. Laws in a region are begun in the `regions`,
+        those of what is left unless given. With the `threshold`, where another screen has told it, each is looked at alone: no sets."""
         beside, dropped = (h.beside(fit.structure.causes) for h in self.hypotheses), dropped or {}
-        shown = (h for h in beside if h is not None and (h.effect == PARAMETER or not h.law.shifts_drive))
+        shown = (h for h in beside if h is not None and not (h.shifts if h.effect == PARAMETER else h.law.shifts_drive))
         open_ = [h for h in shown if h not in dropped]
         sums: Sums | None = None
         columns: list[CandidateTerm] = []

@@ -4,28 +4,32 @@ from __future__ import annotations
 
 import numpy as np
 
+from ctrlgen.devices import Device
 from ctrlgen.diagnosis.settings import SEARCH
+from ctrlgen.effects import Effect, Place, means
 from ctrlgen.estimation.error_model import huber
 from ctrlgen.estimation.fit import Fit, Fitter
-from ctrlgen.estimation.hypothesis import Hypothesis, nominal_physics
+from ctrlgen.estimation.free_parameters import suspected_range
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, nominal_physics, numbers
 from ctrlgen.estimation.least_squares import limited
 from ctrlgen.model.effect_terms import channels
 from ctrlgen.recordings.recording import Record
 
 
 def shifts_tried(h: float, low: float, high: float) -> np.ndarray:
-    """Every sample of h [s], farther apart the longer they are, up to `SEARCH.longest_shift`; one at least."""
+    """Every sample of h [s], farther apart the longer they are, up to `SEARCH.longest_shift` either way; one at least."""
     shifts = [1]
     while (further := shifts[-1] + max(1, shifts[-1] // SEARCH.shift_share)) <= SEARCH.longest_shift:
         shifts.append(further)
-    tried = h * np.array(shifts, float)
+    tried = h * np.array([*(-s for s in reversed(shifts)), *shifts], float)
     within = tried[(tried >= low) & (tried <= high)]
     return within if len(within) else np.array([min(max(h, low), high)])
 
 
-def best_shift(fitter: Fitter, fit: Fit, cause: Hypothesis, h: float) -> tuple[float, float]:
-    """The shift [s] of `shifts_tried` that leaves least of the residual of `fit` on the records to fit, and by how much it promises to
-    lower the objective: what it takes away with all numbers as they are or, of a shift too short for that, with them refitted,
+def best_shift(fitter: Fitter, fit: Fit, cause: Hypothesis, h: float) -> tuple[dict[str, float], float]:
+    """Where a fit of `cause` begins, at the shift of `shifts_tried` that leaves least of the residual of `fit` on the records to fit, and
+    by how much it promises to lower the objective: what it takes away with all numbers as they are or, of a shift too short for that,
+    with them refitted,
 
         (s_perp'r)^2/|s_perp|^2,  s_perp = s - J (J'J)^-1 J's,
 
@@ -34,11 +38,13 @@ def best_shift(fitter: Fitter, fit: Fit, cause: Hypothesis, h: float) -> tuple[f
     Exact for what `fit` predicts where nothing but the signal's own time is shifted; a start, not an estimate.
     """
     device = fit.structure.device
-    shifts = shifts_tried(h, *cause.bounds(cause.law.amplitude(), cause.channel_on(device)))
-    there = channels(nominal_physics(device), cause.law.place)
-    moved = {f"reading.{there[i].name}" for i in cause.acts_on(device)}
+    name, (low, now, high), early = _range(cause, device)
+    shifts = shifts_tried(h, low - now, high - now)
+    moved = {
+        f"reading.{c.name}" for c in channels(nominal_physics(device), Place.SENSOR) if means(cause.at, c.name, c.unit)
+    }
     rows = [i for i, channel in enumerate(fitter.recording.channels) if channel in moved]
-    late = np.concatenate([[0.0], -shifts if cause.law.shifts_drive else shifts])
+    late = np.concatenate([[0.0], -shifts if early else shifts])
     left, slopes = np.zeros(len(late)), []
     for k, record in enumerate(fitter.fit_records):
         start = fit.initial_states[k] if fit.initial_states else None
@@ -46,7 +52,21 @@ def best_shift(fitter: Fitter, fit: Fit, cause: Hypothesis, h: float) -> tuple[f
         left += _left(fitter, record, y, list(rows), late)
         slopes.append(_slope(fitter, record, y, list(rows)))
     best = 1 + int(np.argmin(left[1:]))
-    return float(shifts[best - 1]), max(float(left[0] - left[best]), _promised(fit, np.concatenate(slopes)))
+    return {name: now + float(shifts[best - 1])}, max(
+        float(left[0] - left[best]), _promised(fit, np.concatenate(slopes))
+    )
+
+
+def _range(cause: Hypothesis, device: Device) -> tuple[str, tuple[float, float, float], bool]:
+    """The name of the number of a cause that shifts in time, its lowest value, that before and the highest [s], and whether it is by how
+    much readings come early."""
+    if cause.effect != PARAMETER:
+        p = cause.law.amplitude()
+        low, high = cause.bounds(p, cause.channel_on(device))
+        return p.name, (low, 0.0, high), cause.law.shifts_drive
+    law, number = next((owner, number) for path, owner, number in numbers(device) if path == cause.path)
+    low, high = suspected_range(cause, number, abs(number.si))
+    return "value", (low, number.si, high), isinstance(law, Effect) and law.shifts_drive
 
 
 def _slope(fitter: Fitter, record: Record, y: np.ndarray, rows: list[int]) -> np.ndarray:
