@@ -22,12 +22,12 @@ GAP = slice(1300, 1600)
 CREEP, LAG = Hypothesis("creep", "stage:axis", "axis"), Hypothesis("thermal_lag", "actuator:axis", "axis")
 
 
-def lagging(x: np.ndarray) -> np.ndarray:
+def lagging(x: np.ndarray, tau: float = TAU) -> np.ndarray:
     """x behind one time constant, which follows the middle between two samples."""
     kept, out = 0.0, np.empty(len(x))
     for k, middle in enumerate((x + np.append(x[1:], x[-1])) / 2):
         out[k] = kept
-        kept += (1 - np.exp(-H / TAU)) * (middle - kept)
+        kept += (1 - np.exp(-H / tau)) * (middle - kept)
     return out
 
 
@@ -56,10 +56,12 @@ def test_only_what_follows_a_gap_goes_on(moved):
     assert before.timing != after.timing
 
 
-def test_a_creep_that_goes_on_is_foretold_after_the_gap(moved):
+# the gap is of 0.3 s: a device that has forgotten what was before it stands where the drive has moved it within it
+@pytest.mark.parametrize("tau", [TAU, 0.03], ids=["longer than the gap", "a tenth of the gap"])
+def test_a_creep_that_goes_on_is_foretold_after_the_gap(moved, tau):
     u, q = moved
-    after = cut(q + GAIN * lagging(q), u)[1]
-    structure = Structure(AXIS).with_cause(CREEP, {"gain": GAIN, "tau": TAU, "slow": 0.0})
+    after = cut(q + GAIN * lagging(q, tau), u)[1]
+    structure = Structure(AXIS).with_cause(CREEP, {"gain": GAIN, "tau": tau, "slow": 0.0})
     left = {}
     for name, part in (("unknown", after), ("at rest", replace(after, resumed=False))):
         recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (NOISE,), (part,), ())
