@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from axis_records import AXIS, NOISE, H, fine, record
 from scipy.interpolate import CubicSpline
+from scipy.signal import lfilter
 
+from ctrlgen import user_device
 from ctrlgen.core.units import Quantity
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.diagnose import diagnose_recording
@@ -111,6 +113,57 @@ def test_a_delay_of_the_file_that_is_off_is_found_however_far(stated, true):
     corrected = end.restarted.device_with_causes
     assert [e.values["delay"].si for e in corrected.effect] == [end.values(0)["value"]]
     assert end.chi2 < 1.15 * end.n and not trials.objections(found)
+
+
+def two_readings(late: tuple[float, float], n: int = 1200) -> tuple[Device, Fitter]:
+    """Two lags of one drive, each read late by a number of its own [s], and what is read of them."""
+    lags = {"first": 0.05, "second": 0.12}
+    device = user_device(
+        "two_lags",
+        parameters={"gain": "1 mm/V"},
+        drive={"pump": "1 V"},
+        axes={name: "1 mm" for name in lags},
+        state={f"x{name}": "1 mm" for name in lags},
+        rates=lambda u, x, p: [
+            (p.gain * u.pump - value) / tau for value, tau in zip((x.xfirst, x.xsecond), lags.values(), strict=True)
+        ],
+        force=lambda x: [x.xfirst, x.xsecond],
+        restoring_force=lambda d: d.vector,
+    )
+    rng, t, parts = np.random.default_rng(5), H * np.arange(n), []
+    for first, role in ((1.3, "fit"), (1.7, "hold_out")):
+        u = np.clip((t - 0.05) / 0.3, 0, 1) * (0.5 * np.sin(2 * np.pi * first * t + 1) + 0.2 * np.sin(18 * t))
+        columns = []
+        for tau, lateness in zip(lags.values(), late, strict=True):
+            x = 1e-3 * lfilter([1 - np.exp(-H / tau)], [1, -np.exp(-H / tau)], np.append(0.0, u[:-1]))
+            columns.append(CubicSpline(t, x)(np.maximum(t - lateness, 0.0)))
+        y = np.column_stack(columns) + 1e-6 * rng.standard_normal((n, 2))
+        parts.append(record(u, y, role))
+    channels = tuple(f"reading.{name}" for name in lags)
+    recording = Recording("t", device.name, "series", channels, ("um",) * 2, (1e-6,) * 2, tuple(parts), ())
+    none = (np.zeros(0),) * 2
+    noise = Noise(np.full(2, 1e-6), none, (NoiseSource.STATED,) * 2, ("",) * 2, np.full(2, np.inf))
+    return device, Fitter(recording, noise)
+
+
+def test_readings_that_are_late_by_different_times_are_two_delays_and_not_one_of_all():
+    """What bars a second delay bars none that takes the place of the first."""
+    device, plain = two_readings((0.005, 0.013))
+    fitter, described = plain.described(device)
+    suspected = [
+        h
+        for h in hypotheses(device, nominal_physics(device), fitter.recording.channels, H, False)
+        if h.effect == "delay"
+    ]
+    every = next(h for h in suspected if h.at == "all")
+    trials = Trials(fitter, Screen(fitter, suspected), lambda _: None)
+    common = trials.fit(described.restarted.with_cause(every, {"delay": 0.008}), every, steps=40)
+    assert not candidates.fit_other_clocks(trials, common, ())
+    (own,) = candidates.fit_own_shifts(trials, common)
+    ages = {c.at: own.fit.values(k)["delay"] for k, c in enumerate(own.causes)}
+    assert ages == pytest.approx({"first": 0.005, "second": 0.013}, abs=1e-4)
+    ends = [plain.fit(t.fit.restarted) for t in (own, common)]
+    assert ends[0].chi2 < 1.15 * ends[0].n < 0.1 * ends[1].chi2
 
 
 @pytest.mark.long

@@ -16,6 +16,7 @@ from ctrlgen.diagnosis.selection.shifts import best_shift
 from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, REGIONS, SEARCH, SUBSETS
+from ctrlgen.effects import is_group
 from ctrlgen.estimation.fit import Fit
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis
 from ctrlgen.estimation.settings import FIT
@@ -46,6 +47,7 @@ def fit_candidates(
     candidates = (*candidates, *as_meant(trials, current, candidates))
     candidates = (*candidates, *finer_forms(trials, current))
     candidates = (*candidates, *fit_other_clocks(trials, current, () if alone else candidates))
+    candidates = (*candidates, *fit_own_shifts(trials, current))
     if trials.selection.parameters_may_mask_cause(current.fit):
         candidates = (*candidates, *_as_stated(trials, current))
     if not alone:
@@ -259,6 +261,32 @@ def fit_other_clocks(
 
     besides = [current, *trials.selection.ranked(singles)[: SEARCH.beside_clocks]]
     return tuple(t for fitted in trials.each(one, besides, lambda _: trying(*shifts)) for t in fitted)
+
+
+def fit_own_shifts(trials: Trials, current: CandidateModel) -> tuple[CandidateModel, ...]:
+    """Each reading shifted in time by a number of its own, in place of one shift of all of them, which bars another one beside it; begun
+    where that one ended, or at the best shift from there."""
+    if current.errors.is_noise:
+        return ()
+    h = min(r.sample_time for r in trials.fitter.recording.records)
+    fits: list[CandidateModel] = []
+    for k, every in enumerate(current.causes):
+        own = [o for o in trials.screen.hypotheses if o.effect == every.effect and not is_group(o.at)]
+        if every.effect == PARAMETER or not (every.shifts and is_group(every.at)) or len(own) < 2:
+            continue
+        structure, begun = current.fit.restarted.without(k), current.fit.values(k)
+        for cause in own:
+            structure = structure.with_cause(cause, begun)
+        try:
+            for i, cause in enumerate(own, len(current.causes) - 1):
+                (now,) = begun.values()
+                moved = structure.restarted(i, best_shift(trials.fitter, current.fit, cause, h, now)[0])
+                structure = min(structure, moved, key=trials.fitter.rough_objective)
+        except FAILURES as error:
+            trials.note_failure(own[0], error)
+            continue
+        fits += trials.tried(structure, own[0])
+    return tuple(fits)
 
 
 def _as_stated(trials: Trials, current: CandidateModel) -> tuple[CandidateModel, ...]:

@@ -26,7 +26,9 @@ def shifts_tried(h: float, low: float, high: float) -> np.ndarray:
     return within if len(within) else np.array([min(max(h, low), high)])
 
 
-def best_shift(fitter: Fitter, fit: Fit, cause: Hypothesis, h: float) -> tuple[dict[str, float], float]:
+def best_shift(
+    fitter: Fitter, fit: Fit, cause: Hypothesis, h: float, already: float = 0.0
+) -> tuple[dict[str, float], float]:
     """Where a fit of `cause` begins, at the shift of `shifts_tried` that leaves least of the residual of `fit` on the records to fit, and
     by how much it promises to lower the objective: what it takes away with all numbers as they are or, of a shift too short for that,
     with them refitted,
@@ -35,10 +37,11 @@ def best_shift(fitter: Fitter, fit: Fit, cause: Hypothesis, h: float) -> tuple[d
 
     s the whitened slope of the readings by the shift.
 
-    Exact for what `fit` predicts where nothing but the signal's own time is shifted; a start, not an estimate.
+    Exact for what `fit` predicts where nothing but the signal's own time is shifted; a start, not an estimate. `fit` has shifted what
+    the cause does by `already` [s].
     """
     device = fit.structure.device
-    name, (low, now, high), early = _range(cause, device)
+    name, (low, now, high), early = _range(cause, device, already)
     shifts = shifts_tried(h, low - now, high - now)
     moved = {
         f"reading.{c.name}" for c in channels(nominal_physics(device), Place.SENSOR) if means(cause.at, c.name, c.unit)
@@ -57,13 +60,13 @@ def best_shift(fitter: Fitter, fit: Fit, cause: Hypothesis, h: float) -> tuple[d
     )
 
 
-def _range(cause: Hypothesis, device: Device) -> tuple[str, tuple[float, float, float], bool]:
+def _range(cause: Hypothesis, device: Device, already: float) -> tuple[str, tuple[float, float, float], bool]:
     """The name of the number of a cause that shifts in time, its lowest value, that before and the highest [s], and whether it is by how
     much readings come early."""
     if cause.effect != PARAMETER:
         p = cause.law.amplitude()
         low, high = cause.bounds(p, cause.channel_on(device))
-        return p.name, (low, 0.0, high), cause.law.shifts_drive
+        return p.name, (low, already, high), cause.law.shifts_drive
     law, number = next((owner, number) for path, owner, number in numbers(device) if path == cause.path)
     low, high = suspected_range(cause, number, abs(number.si))
     return "value", (low, number.si, high), isinstance(law, Effect) and law.shifts_drive
