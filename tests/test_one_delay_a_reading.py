@@ -7,13 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from axis_records import AXIS, NOISE, H, fine, record
+from conftest import AXIS_FILE
 from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
-from ctrlgen import user_device
+from ctrlgen import load_device, user_device
 from ctrlgen.core.units import Quantity
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.diagnose import diagnose_recording
+from ctrlgen.diagnosis.report.answer import sentence
+from ctrlgen.diagnosis.report.explain import explain
+from ctrlgen.diagnosis.report.writeback import next_text
 from ctrlgen.diagnosis.selection import candidates
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.screen import Screen
@@ -167,14 +171,20 @@ def test_readings_that_are_late_by_different_times_are_two_delays_and_not_one_of
 
 
 @pytest.mark.long
-def test_a_diagnosis_tells_that_the_delay_of_the_file_is_off():
-    device = axis_with(law("delay", delay="5 ms"))
+def test_a_diagnosis_tells_that_the_delay_of_the_file_is_off(tmp_path):
+    file = tmp_path / "late.toml"
+    file.write_text(AXIS_FILE.read_text() + '\n[[effect]]\nkind = "delay"\nat = "axis"\ndelay = "5 ms"\n')
+    device = load_device(file)
     found = diagnose_recording(device, recorded(0.012).recording, jobs=0)
     (finding,) = found.findings
     assert (finding.effect, finding.location) == (PARAMETER, "sensor:axis.delay")
     low, high = finding.parameters["delay"].ci95
     assert low <= 12.0 <= high and high - low < 0.5  # ms
-    assert [e.kind for e in found.corrected.effect] == ["delay"]
+    assert "sensor:axis.delay" in sentence(found) and "12" in sentence(found)
+    assert "its number is what may be off" in " ".join(explain(found, "delay"))
+    file.write_text(next_text(found, file.read_text()))
+    (late,) = load_device(file).effect
+    assert late.kind == "delay" and low <= 1e3 * late.values["delay"].si <= high
 
 
 @pytest.mark.parametrize("samples", [30.0, 45.3])
