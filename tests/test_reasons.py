@@ -21,11 +21,13 @@ from ctrlgen.diagnosis.report.history_table import history_rows, most_gained, no
 from ctrlgen.diagnosis.report.html_report import page
 from ctrlgen.diagnosis.report.narrative import EMPIRICAL_ALONE, NOTHING_FOUND, next_steps, refusals
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal
+from ctrlgen.diagnosis.selection.findings import Finding
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection, Shortfall
-from ctrlgen.diagnosis.selection.not_taken import held_out_rms, not_taken, that_matter
+from ctrlgen.diagnosis.selection.not_taken import better_than_their_round, held_out_rms, not_taken, that_matter
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search_history import held_out_error
 from ctrlgen.diagnosis.selection.trials import Trials
+from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.structure import Structure
 
@@ -164,6 +166,31 @@ def test_what_is_not_taken_stands_by_its_gain_with_one_reason_each(few):
         Shortfall.UNCONFIRMED.value,
     ]
     assert [r.gain > 0 for r in rows] == [True, True, False] and rows[0].gain > rows[1].gain
+
+
+@pytest.mark.parametrize("verdict", Verdict)
+def test_a_refusal_that_matters_is_told_whatever_the_verdict(turned, verdict):
+    told = next_steps(replace(turned, verdict=verdict))
+    assert [step for step in told if step.startswith("Not taken: cyclic at sensor:axis, although the held-out error")]
+
+
+def test_what_later_rounds_overtook_stands_in_the_table_and_is_not_told(turned):
+    """It scored better than what its own round took; beside the answer it gains nothing, or no more than chance."""
+    search, (first, *_) = turned.search, turned.search.rounds
+    overtaken = Refusal(search.chosen, (DRIFT,), ("few",), 30.0)
+    rounds = (replace(first, refused=(*first.refused, overtaken)), *search.rounds[1:])
+    told = replace(turned, search=replace(search, rounds=rounds))
+    assert DRIFT in [r.causes[0] for _, r in better_than_their_round(told.search)]
+    assert any(row["cause"] == "drift at sensor:axis" for row in not_taken_rows(told.search))
+    assert refusals(told) == refusals(turned)
+
+
+def test_an_alternative_of_the_answer_is_not_told_once_more(turned):
+    ((_, refusal), *_) = that_matter(turned.search)
+    main = Finding("drift", "sensor:axis", {}, refusal.causes, None, {}, "", DRIFT)
+    assert refusals(turned) and not any(
+        said.startswith("cyclic at sensor:axis,") for said in refusals(replace(turned, findings=(main,)))
+    )
 
 
 def test_a_refusal_that_the_answer_has_does_not_matter_any_more(turned):

@@ -8,7 +8,7 @@ import numpy as np
 
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
-from ctrlgen.diagnosis.selection.not_taken import that_matter
+from ctrlgen.diagnosis.selection.not_taken import better_than_their_round
 from ctrlgen.diagnosis.selection.search_history import (
     NumberEntry,
     held_out_error,
@@ -78,7 +78,7 @@ def not_taken_rows(search: SearchResult) -> list[dict[str, str]]:
             "held_out": errors_text(held_out_error(search, refusal.candidate)),
             "reason": "; ".join(dict.fromkeys(refusal.reasons)),
         }
-        for _, refusal in that_matter(search)
+        for _, refusal in better_than_their_round(search)
     ]
 
 

@@ -148,7 +148,8 @@ def per_cent(share: float) -> str:
 def next_steps(diagnosis: Diagnosis) -> list[str]:
     """What to do next, in order."""
     first = [*([UNCHECKED] if implausible_notes(diagnosis) else []), *time_base_step(diagnosis)]
-    return [*first, *_steps(diagnosis), *luck_steps(diagnosis.findings)]
+    refused = [f"Not taken: {text}." for text in refusals(diagnosis)]
+    return [*first, *_steps(diagnosis), *refused, *luck_steps(diagnosis.findings)]
 
 
 def implausible_notes(diagnosis: Diagnosis) -> list[str]:
@@ -196,7 +197,7 @@ def _steps(diagnosis: Diagnosis) -> list[str]:
         )
     if verdict == Verdict.UNEXPLAINED:
         steps.append("Check wiring, units and clocks of the set-up: known effects do not explain the mismatch.")
-    return [*steps, *(f"Not taken: {text}." for text in refusals(diagnosis))]
+    return steps
 
 
 MORE_LEFT = "More than noise is left: the report shows where it is and of what it is a function."
@@ -231,12 +232,14 @@ def predicts_better(diagnosis: Diagnosis) -> bool:
 
 
 def refusals(diagnosis: Diagnosis) -> list[str]:
-    """Causes that scored better than what was taken, with what each would leave and what speaks against it, first what would gain
-    most."""
+    """Causes that score better than the answer, with what each would leave and what speaks against it, first what would gain most; those
+    that are told as alternatives left out."""
     search, said = diagnosis.search, []
-    for gain, refusal in that_matter(search)[:NAMED]:
-        better = "it scored better than what its round took"
-        if gain > 0 and (gained := most_gained(search, refusal.candidate)):
+    told = {h for f in diagnosis.findings for h in (f.cause, *f.alternatives)}
+    matter = [refusal for _, refusal in that_matter(search) if not told.issuperset(refusal.causes)]
+    for refusal in matter[:NAMED]:
+        better = "it scores better than the answer"
+        if gained := most_gained(search, refusal.candidate):
             channel, error, now = gained
             better = f"the held-out error of {short(channel)} would be {quantity(error)} instead of {quantity(now)}"
         names = " and ".join(map(cause_name, refusal.causes))

@@ -11,6 +11,7 @@ from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection
 from ctrlgen.diagnosis.selection.search_result import SearchResult
+from ctrlgen.diagnosis.settings import MODEL_SELECTION
 from ctrlgen.estimation.hypothesis import Hypothesis
 
 
@@ -50,6 +51,13 @@ def _second(t: CandidateModel, best: CandidateModel, before: CandidateModel, gai
 
 
 def that_matter(search: SearchResult) -> list[tuple[float, Refusal]]:
+    """Of `better_than_their_round` what is better than the answer too, by more than chance, as a cause that is taken must be: later rounds
+    overtake much of what one of them refused."""
+    least = MODEL_SELECTION.least_gain + MODEL_SELECTION.least_confirmed
+    return [(gain, refusal) for gain, refusal in better_than_their_round(search) if gain > least]
+
+
+def better_than_their_round(search: SearchResult) -> list[tuple[float, Refusal]]:
     """What was refused although it scored better than what its round took, of causes that the answer does not have, with what each
     would gain beside the answer, that which would gain most first."""
     compare = compared(search)
