@@ -88,6 +88,15 @@ def test_a_function_of_one_kind_gets_its_share_and_is_selected_first(kind, signa
     assert found.total.share == pytest.approx(PART, abs=CLOSE + 0.02)  # the ceiling costs the columns of all kinds
 
 
+@pytest.mark.parametrize(("axis", "period", "unit"), [("x", 0.11, "mm"), ("y", 0.13, "deg")])
+def test_a_pitch_is_that_of_its_own_axis_in_the_unit_of_that(axis, period, unit, signals, rng):
+    """Of a reading that several axes move."""
+    y = planted(np.sin(2 * np.pi * signals.position[axis] / period + 1.0), rng)
+    both = replace(signals, reading={}, units={"position x": "mm", "position y": "deg"})
+    (found,) = model_free_shares([y[:, None]], [both], ["sum"]).channels
+    assert found.pitch_unit == unit and found.periods[Kind.PITCH] == pytest.approx(period, rel=0.01)
+
+
 @pytest.mark.long
 def test_two_causes_add_up_to_the_ceiling(signals, rng):
     friction, cubic = (FUNCTIONS[kind](signals) for kind in (Kind.DIRECTION, Kind.POSITION))

@@ -128,7 +128,12 @@ def test_a_record_along_which_a_model_diverges_has_no_part_in_the_shares(found, 
 
 
 def channel(
-    parts: dict[Kind, float], total: float, constant: float = 0.0, past: float = 0.0, numbers: float = 0.0
+    parts: dict[Kind, float],
+    total: float,
+    constant: float = 0.0,
+    past: float = 0.0,
+    numbers: float = 0.0,
+    pitch: tuple[float, str] = (0.25e-3, "mm"),
 ) -> ChannelShares:
     """Shares of a channel with `parts` selected, each alone as much as it adds."""
     nothing = np.zeros(0)
@@ -147,9 +152,10 @@ def channel(
         1 - total,
         past,
         0.0,
-        {Kind.LINE: 0.02},
+        {Kind.LINE: 0.02, Kind.PITCH: pitch[0]},
         nothing,
         {},
+        pitch[1],
     )
 
 
@@ -178,6 +184,15 @@ def test_a_law_that_the_readings_show_directly_is_not_told_to_be_unconfirmed():
             "Speed (50 %), position (20 %) and a constant (10 %) together with lesser ones explain 90 % (85 ... 93 %) of what",
         ),
         (channel({Kind.LINE: 0.7}, 0.7), "A line of 50 Hz explains 70 % (65 ... 73 %) of what"),
+        (
+            channel({Kind.PITCH: 0.7}, 0.7),
+            "The place in a pitch of 0.25 mm (4 a mm) explains 70 % (65 ... 73 %) of what",
+        ),
+        (
+            channel({Kind.PITCH: 0.7}, 0.7, pitch=(np.radians(5.0), "deg")),
+            "The place in a pitch of 5 deg (72 a turn) explains 70 %",
+        ),
+        (channel({Kind.PITCH: 0.7}, 0.7, pitch=(0.25, "")), "The place in a pitch explains 70 %"),
         (channel({Kind.TIME: 0.03}, 0.04), "No signal explains more than 5 % of what"),
         # a part of nothing: together they predict no more than chance
         (channel({}, 0.0, constant=0.3), "No signal explains more than 5 %"),

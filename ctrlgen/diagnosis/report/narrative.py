@@ -10,6 +10,7 @@ from ctrlgen.diagnosis.report.experiment_sentences import experiment_sentence
 from ctrlgen.diagnosis.report.history_table import most_gained, quantity
 from ctrlgen.diagnosis.report.luck_sentences import luck_steps
 from ctrlgen.diagnosis.report.on_the_clock import used_for_another_run
+from ctrlgen.diagnosis.report.period_words import repeats
 from ctrlgen.diagnosis.report.time_base import time_base_step
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
@@ -29,6 +30,8 @@ SMALLEST = 0.1
 WIDE = 1.0
 # numbers of laws that are a share of nothing
 EXPONENTS = frozenset({"exponent", "power"})
+# numbers of laws after which their error or their force comes again
+PERIODS = frozenset({"period"})
 HARD_SPACE = "\u00a0"
 # share of its interval within which an estimate counts as on the interval's end
 EDGE = 1e-6
@@ -53,7 +56,14 @@ def cause_text(finding: Finding) -> str:
 
 
 def interval(e: Estimate, name: str = "") -> str:
-    """'4.12 % (3.93 ... 4.31 %)': value and 95 % interval of the number of this name, to two digits of the interval's width."""
+    """'4.12 % (3.93 ... 4.31 %)': value and 95 % interval of the number of this name, to two digits of the interval's width; of a period
+    with how often it repeats: '5 deg (4.98 ... 5.02 deg), 72 a turn'."""
+    known = math.isfinite(e.ci95[1] - e.ci95[0])
+    often = repeats(e.value, e.unit) if name in PERIODS and known else ""
+    return _with_interval(e, name) + (f", {often}" if often else "")
+
+
+def _with_interval(e: Estimate, name: str) -> str:
     ends = (e.value, *e.ci95)
     percent = e.unit == "1" and name not in EXPONENTS and all(abs(v) < WIDE for v in ends)
     best, factor = ("%", 100.0) if percent else sized(e.unit, e.value)

@@ -6,6 +6,7 @@ from enum import Enum
 
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.narrative import empirical_sentences, per_cent, short
+from ctrlgen.diagnosis.report.period_words import pitch
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.diagnosis.settings import SHARES
@@ -33,7 +34,6 @@ NO_FUNCTION = (Beside.CONSTANT, Beside.NUMBERS, Kind.RECORD, Kind.PROPORTION)
 NAMES: dict[Kind | Beside, str] = {
     Kind.DIRECTION: "the direction of motion",
     Kind.PROPORTION: "a part in proportion to position",
-    Kind.PITCH: "the place in a pitch",
     Kind.RATE: "the rate of the reading",
     Kind.TRAVEL_HISTORY: "the history of travel",
     Kind.DRIVE_HISTORY: "the history of the drive",
@@ -149,9 +149,11 @@ def named_parts(c: ChannelShares) -> list[tuple[Kind | Beside, float]]:
 
 
 def part_name(c: ChannelShares, part: Kind | Beside) -> str:
-    """'the direction of motion', 'a line of 2.2 Hz'."""
+    """'the direction of motion', 'a line of 2.2 Hz', 'the place in a pitch of 0.25 mm (4 a mm)'."""
     if part is Kind.LINE:
         return f"a line of {number(1 / c.periods[part], 3)} Hz"
+    if part is Kind.PITCH:
+        return f"the place in {pitch(c.periods[part], c.pitch_unit)}"
     return NAMES.get(part, part.value)
 
 

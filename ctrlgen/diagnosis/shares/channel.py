@@ -55,7 +55,7 @@ class ChannelSmoothers:
         self.kinds = design.kinds(axes)
         self.fitted: dict[tuple[frozenset[Kind], int], OutOfBlock] = {}
         numbers = standardised(numbers)[:, np.ptp(numbers, axis=0) > 0]
-        extra, self.periods = self._found_in_residual()
+        extra, self.periods, self.pitch_unit = self._found_in_residual()
         self.folds = common.with_columns([np.column_stack([numbers, *one.values()]) for one in extra])
         first = design.X.shape[1]
         self.free = np.arange(first, first + numbers.shape[1])
@@ -110,11 +110,14 @@ class ChannelSmoothers:
         gain = self.energy - after.squares
         return share_of(gain, self.energy, stands_out(gain))
 
-    def _found_in_residual(self) -> tuple[list[dict[Kind, np.ndarray]], dict[Kind, float]]:
-        """The columns of own past, pitch and line of each fold, and the median of the folds' periods."""
+    def _found_in_residual(self) -> tuple[list[dict[Kind, np.ndarray]], dict[Kind, float], str]:
+        """The columns of own past, pitch and line of each fold, the median of the folds' periods, and the unit of the axis of the pitch."""
         extra: list[dict[Kind, np.ndarray]] = []
-        periods: dict[Kind, list[float]] = {}
-        past, positions = self._past(), [b.abscissa for b in self.design.of_kind(Kind.POSITION, self.axes)]
+        lines: list[float] = []
+        # by axis: a turn and a way have no median
+        pitches_of: dict[int, list[float]] = {}
+        past, along = self._past(), list(self.design.of_kind(Kind.POSITION, self.axes))
+        positions = [block.abscissa for block in along]
         without = self.every_fold
         # the trend with position would pass for a long pitch
         if positions:
@@ -130,13 +133,17 @@ class ChannelSmoothers:
                 pitches = [standardised(pitch_columns(x, p)) for x, p in zip(positions, spacings, strict=True)]
                 best = int(np.argmax([np.sum((c.T @ y) ** 2) for c in pitches]))
                 columns[Kind.PITCH] = pitches[best]
-                periods.setdefault(Kind.PITCH, []).append(spacings[best])
+                pitches_of.setdefault(best, []).append(spacings[best])
             if np.isfinite(self.sample_time) and longest > 4 * SHARES.line_periods:
                 frequency = strongest_line(self._without_fold(k))
                 columns[Kind.LINE] = line_columns(self.blocks.rows, frequency)
-                periods.setdefault(Kind.LINE, []).append(self.sample_time / frequency)
+                lines.append(self.sample_time / frequency)
             extra.append(columns)
-        return extra, {kind: float(np.median(values)) for kind, values in periods.items()}
+        # the axis of most folds
+        axis = max(pitches_of, key=lambda i: len(pitches_of[i]), default=None)
+        found = {Kind.PITCH: [] if axis is None else pitches_of[axis], Kind.LINE: lines}
+        periods = {kind: float(np.median(values)) for kind, values in found.items() if values}
+        return extra, periods, "" if axis is None else along[axis].unit
 
     def _without_fold(self, k: int) -> list[np.ndarray]:
         """The residual (n,) of every record at its own rate about its mean, zero in fold k."""

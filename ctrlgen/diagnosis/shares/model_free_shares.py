@@ -118,4 +118,5 @@ def _shares(name: str, channel: ChannelSmoothers, spikes: float) -> ChannelShare
         periods=channel.periods,
         residual=np.where(usable, channel.y, np.nan),
         predictions={kind: np.where(usable, fit.prediction, np.nan) for kind, fit in alone.items()},
+        pitch_unit=channel.pitch_unit,
     )

@@ -46,7 +46,8 @@ class ChannelShares:
     rest: 1 - total. rest_own_past: what the residual's own past adds to the selected kinds; this part of the rest lasts
         longer than a sample and has no name.
     spikes: share of the samples that were left out as such.
-    periods: of a pitch [SI of the axis] and of a line [s], the middle one of the folds.
+    periods: of a pitch [SI of the axis] and of a line [s], the middle one of the folds. pitch_unit: in which the axis of the pitch is
+        told; empty where there is no pitch, or no unit.
     residual, predictions: (N,) [SI] at the drawn samples, the latter by kind and out of block; NaN where not valid.
     """
 
@@ -63,6 +64,7 @@ class ChannelShares:
     periods: dict[Kind, float]
     residual: np.ndarray
     predictions: dict[Kind, np.ndarray]
+    pitch_unit: str = ""
 
     @property
     def selected(self) -> tuple[KindShare, ...]:
