@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from ctrlgen.diagnosis.report.half_a_sample import half_a_sample
 from ctrlgen.diagnosis.report.nearly_as_large import nearly_as_large
 from ctrlgen.diagnosis.report.on_the_clock import a_pose_a_second
+from ctrlgen.diagnosis.report.worse_channels import worse_channels
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.dead_channels import LiveChannels
 from ctrlgen.diagnosis.selection.findings import Finding
@@ -43,6 +44,7 @@ def told_beside(
         *(s.sentence for s in spikes),
         *half_a_sample(recording, found),
         *nearly_as_large(found),
+        *worse_channels(search),
         *a_pose_a_second(recording, found),
         *map(RESTLESS.format, restless),
         *clock_note(search.fitter),
