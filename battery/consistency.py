@@ -22,7 +22,7 @@ NOISE = 1.5  # times the noise: more is not explained
 BY_MOTION = 1e-4  # chance of going so well with the motion: less is no noise
 HELD_OUT = re.compile(r"Held-out error of (\S+): (\S+) (\S+?)(?: -> (\S+) \S+?)?, noise (?:not known|(\S+) \S+?)[.;]")
 TAKES = re.compile(r"it takes away ((?:[<>] )?[\d.]+ %)")
-LEFT = re.compile(r"Left: (\S+) (\S+) in (\S+), (\S+) times the noise")
+LEFT = re.compile(r"[Ll]eft: (\S+) (\S+) in (\S+), (\S+) times the noise")
 ALIKE = (
     {"pm", "nm", "um", "mm", "m"},
     {"nrad", "urad", "mrad", "rad", "deg"},
@@ -163,7 +163,10 @@ def _sentence(d: dict[str, Any]) -> Iterator[str]:
     said = d["sentence"].replace("\u00a0", " ")
     if d["implausible"]:
         asked, head, rest = said.partition(f" {HEADS[d['verdict']]}: ")
-        if not asked.startswith(f"Check this first: {d['implausible'][0]}"):
+        whole = f"Check this first: {d['implausible'][0].removesuffix('.')}"
+        # a long one goes on in the notes
+        begun = asked.removesuffix(".").removesuffix(" (see the notes)")
+        if not asked.startswith(whole) and not (begun.startswith("Check this first: ") and whole.startswith(begun)):
             yield f"what cannot be right of the recording does not come first: {said[:40]}"
         said = head.lstrip() + rest
     if not said.startswith(HEADS[d["verdict"]] + ":"):

@@ -22,8 +22,10 @@ PLURAL = re.compile(
     r"(?<![\d.,])1 (?:independent |more )?(?:samples|poses|stretches|outliers|spikes|records|rows|gaps|replicates)\b"
 )
 ONE_AS_MANY = re.compile(r"(?<![\d.,])1 of (?!1000 )\S+ \w+ (?:are|is \w+s)\b")
+BETWEEN = re.compile(r"[.?] (?=[A-Z])")
 NO_NUMBER = re.compile(r"\b(?:nan|inf|null)\b")
 BETTER, WORSE = "predicts the held-out recordings better", "too uncertain to predict the held-out"
+SENTENCES, LONGEST = 3, 420  # of an answer: three lines of 140 characters
 SURE = 1.05  # errors that differ by less are told alike
 ROUNDING = 0.006
 
@@ -36,9 +38,16 @@ def screen_contradictions(
     statements = [] if d["shares"] is None else d["shares"]["statements"]
     every = [*said, *beside, *then, *map(_plain, statements), *map(_plain, d["notes"])]
     wrong = [] if " ".join(said) == _plain(d["sentence"]) else [f"another answer than diagnosis.json: {said}"]
-    for part in (_beside(d, beside), _steps(d, then), _statements(statements), *map(_words, every)):
+    for part in (_length(said), _beside(d, beside), _steps(d, then), _statements(statements), *map(_words, every)):
         wrong += part
     return wrong
+
+
+def _length(said: Sequence[str]) -> Iterator[str]:
+    """An answer is three sentences and three lines at most."""
+    count, size = sum(len(BETWEEN.split(text)) for text in said), len(" ".join(said))
+    if count > SENTENCES or size > LONGEST:
+        yield f"an answer of {count} sentences and {size} characters: {' '.join(said)}"
 
 
 def _plain(text: str) -> str:

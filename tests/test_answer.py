@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 from fitted_causes import CREEP, DRIFT, GAIN, fitted
 
-from ctrlgen.diagnosis.report.answer import answer
+from ctrlgen.diagnosis.report.answer import answer, notes_of
+from ctrlgen.diagnosis.report.answer_parts import LONGEST
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.findings import ChanceEntry, ChannelErrorEntry, Estimate, Finding
 from ctrlgen.diagnosis.selection.verdict import Verdict
+from ctrlgen.diagnosis.shares.design import Kind
+from ctrlgen.diagnosis.shares.shares_table import ChannelShares, KindShare, Share
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.recordings.plausibility import Implausible
 
@@ -22,9 +25,22 @@ def finding(cause, share: float | None, *alternatives, chance: ChanceEntry | Non
     return Finding(cause.effect, cause.location, {}, alternatives, taken, {}, "", cause, chance=chance)
 
 
-def told(
-    verdict: Verdict, *findings: Finding, passed=False, after=2.0, untried=(), taken=0.6, notes=(), held_out=True
-) -> list[str]:
+def told(verdict: Verdict, *findings: Finding, **given) -> list[str]:
+    return answer(made(verdict, *findings, **given))
+
+
+def made(
+    verdict: Verdict,
+    *findings: Finding,
+    passed=False,
+    after=2.0,
+    untried=(),
+    taken=0.6,
+    notes=(),
+    held_out=True,
+    shares=None,
+    uneven=(),
+) -> SimpleNamespace:
     errors = ChannelErrorEntry(
         rms_before=50.0,
         rms_after=after,
@@ -37,21 +53,110 @@ def told(
     noise = SimpleNamespace(known=np.ones(1, bool))
     fitter = SimpleNamespace(recording=SimpleNamespace(tolerance=(None,)), noise=noise)
     chosen = SimpleNamespace(fit=fitted(), causes=tuple(f.cause for f in findings))
-    return answer(
-        SimpleNamespace(
-            verdict=verdict,
-            findings=findings,
-            held_out={"reading.axis": errors},
-            device=SimpleNamespace(title="an axis"),
-            search=SimpleNamespace(chosen=chosen, fitter=fitter, unlikely=()),
-            residual_tests=SimpleNamespace(passed=passed, uneven={}),
-            untried=SimpleNamespace(sentences=lambda: list(untried)),
-            shares=None,
-            unconfirmed=(),
-            attribution=SimpleNamespace(explained=taken, held_out=held_out),
-            notes=notes,
-        )
+    return SimpleNamespace(
+        verdict=verdict,
+        findings=findings,
+        held_out={"reading.axis": errors},
+        device=SimpleNamespace(title="an axis"),
+        search=SimpleNamespace(chosen=chosen, fitter=fitter, unlikely=()),
+        residual_tests=SimpleNamespace(passed=passed, uneven=dict(uneven)),
+        untried=SimpleNamespace(sentences=lambda: list(untried)),
+        shares=shares,
+        unconfirmed=(),
+        attribution=SimpleNamespace(explained=taken, held_out=held_out),
+        notes=notes,
     )
+
+
+def of_pitch(share: float, period: float, unit: str) -> SimpleNamespace:
+    """Shares before of which so much is a function of the place in a pitch [SI], and after of which nothing is."""
+    row = KindShare(Kind.PITCH, Share(share, (share, share)), share, 1, ())
+    nothing = np.zeros(0)
+    before, after = (
+        ChannelShares(
+            "reading.axis",
+            1.0,
+            frozenset(),
+            0.0,
+            0.0,
+            rows,
+            total,
+            0.0,
+            0.0,
+            0.0,
+            {Kind.PITCH: period},
+            nothing,
+            {},
+            unit,
+        )
+        for rows, total in (((row,), row.alone), ((), Share(0.0, (0.0, 0.0))))
+    )
+    return SimpleNamespace(before=SimpleNamespace(channels=(before,)), after=SimpleNamespace(channels=(after,)))
+
+
+def test_a_pitch_that_no_finding_has_stands_in_the_sentence():
+    """With its unit and how often it repeats; a finding that has it, or a harmonic of it, tells its own period."""
+    pitch = "; by the model-free shares 64 % is a function of the place in a pitch of 0.25 mm (4 a mm)"
+    shares = of_pitch(0.64, 0.25e-3, "mm")
+    assert pitch in told(Verdict.PARTLY, finding(GAIN, 0.6), shares=shares)[0]
+    assert pitch not in told(Verdict.PARTLY, finding(GAIN, 0.6), shares=of_pitch(0.04, 0.25e-3, "mm"))[0]
+    law = Hypothesis("cyclic", "sensor:axis", "axis")
+    for period, has_it in ((0.25, True), (0.1251, True), (0.17, False)):
+        numbers = {"amplitude": Estimate(2.0, (1.9, 2.1), "um"), "period": Estimate(period, (period, period), "mm")}
+        first = told(Verdict.PARTLY, replace(finding(law, 0.6), parameters=numbers), shares=shares)[0]
+        assert ("model-free" not in first) == has_it and f"period = {period} mm, " in first and " a mm" in first
+
+
+def test_of_what_kind_all_is_stands_in_the_sentence_where_nothing_is_found():
+    both = of_pitch(0.64, np.radians(5.0), "deg")
+    shares = SimpleNamespace(before=both.before, after=both.before)
+    first = told(Verdict.UNEXPLAINED, shares=shares)[0]
+    kind = "what is left in axis is mostly a function of the place in a pitch of 5 deg (72 a turn) (64 %)"
+    assert first == f"Unexplained: the recording differs from an axis, and no known effect explains it; {kind}."
+
+
+def longest(verdict: Verdict, **given) -> SimpleNamespace:
+    """All that an answer may have to say at once."""
+    few = ChanceEntry(by_luck=0.12, p=0.12, looks=1.0, stretches=30, against="noise", reason=None)
+    kinds = ("heat_loss", "one_sided_saturation", "force_step", "worn_backlash", "drive_quantisation")
+    wordy = [Hypothesis(kind, f"stage:a_long_name_{k}", "axis") for k, kind in enumerate(kinds)]
+    numbers = {p.name: Estimate(2.0, (1.912, 2.123), "um") for p in wordy[0].law.params}
+    main = replace(finding(wordy[0], 0.55, *wordy[1:], chance=few), parameters=numbers)
+    main = replace(main, share=ShareEntry(value=0.55, ci95=(0.31, 0.72)), title=wordy[0].law.title)
+    others = [finding(cause, 0.2, GAIN, DRIFT, chance=few) for cause in wordy[1:3]]
+    uneven = {"reading.axis": ("a_long_name_of_a_file.csv", "another_long_name_of_a_file.csv", 23.0)}
+    lost = (
+        "3 of 4 causes worth a fit could not be fitted: no balance (backlash at stage:axis, coulomb at stage:axis).",
+    )
+    findings = (main, *others) if verdict is not Verdict.CONSISTENT else ()
+    return made(verdict, *findings, untried=lost, uneven=uneven, shares=of_pitch(0.64, 0.25e-3, "mm"), **given)
+
+
+@pytest.mark.parametrize("notes", [(), (Implausible(f"axis is 10 times too large; {'write another unit, ' * 12}"),)])
+@pytest.mark.parametrize("verdict", Verdict)
+def test_an_answer_is_three_sentences_and_three_lines_whatever_there_is_to_say(verdict, notes):
+    """Cause, doubt, a rival, the error before and after and what is left stay; what has no room stands in the notes."""
+    diagnosis = longest(verdict, notes=notes)
+    said = answer(diagnosis)
+    whole, beside = " ".join(said), "\n".join(notes_of(diagnosis))
+    assert len(said) <= 3 and len(whole) <= LONGEST, whole
+    assert "Held-out error of axis: 50 um -> 2 um, noise 1 um" in whole
+    assert ("Check this first: axis is 10 times too large" in whole) == bool(notes)
+    assert "3 of 4 causes worth a fit could not be fitted: no balance" in f"{whole}\n{beside}"
+    if verdict is Verdict.CONSISTENT:
+        return
+    for part in ("heat_loss at stage:a_long_name_0", "it may be luck (12 %)", "eft: 2 um in axis, 2 times the noise"):
+        assert part in whole
+    assert ("cannot tell it from one_sided_saturation at stage:a_long_name_1" in whole) == (
+        verdict is Verdict.AMBIGUOUS
+    )
+    assert "23 times what is left in another_long_name_of_a_file.csv: noise does not differ so" in beside
+    assert "64 % is a function of the place in a pitch of 0.25 mm (4 a mm)" in f"{whole}\n{beside}"
+
+
+def test_what_is_left_stands_beside_the_error_where_the_recording_is_to_be_checked_first():
+    *_, last = told(Verdict.PARTLY, finding(GAIN, 0.6), notes=(Implausible("axis is early"),))
+    assert last == "Held-out error of axis: 50 um -> 2 um, noise 1 um; left: 2 um in axis, 2 times the noise."
 
 
 def test_shares_of_the_records_to_fit_are_told_as_that():

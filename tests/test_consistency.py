@@ -164,6 +164,18 @@ def test_a_sound_first_screen_has_no_contradiction(sound, screen):
     assert screen_contradictions(sound, **screen) == []
 
 
+@pytest.mark.parametrize("more", ["More is said.", f"{'on and on ' * 30}"], ids=["a sentence", "a line"])
+def test_an_answer_that_is_too_long_is_found(sound, screen, more):
+    told = (
+        [*screen["answer"], "One is said.", more]
+        if more.endswith(".")
+        else [f"{screen['answer'][0]} {more}", *screen["answer"][1:]]
+    )
+    whole = sound | {"sentence": " ".join(told).replace("\u00a0", " ")}
+    (wrong,) = screen_contradictions(whole, **screen | {"answer": told})
+    assert wrong.startswith("an answer of ")
+
+
 WRONG_SCREEN = {
     "another answer than in diagnosis.json": ("answer", "Explained", "Certain"),
     "another error beside the figure": ("numbers", " nm", " um"),

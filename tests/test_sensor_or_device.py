@@ -33,8 +33,8 @@ from ctrlgen.diagnosis.evidence.other_readings import (
     read_by_another,
     read_turned,
 )
-from ctrlgen.diagnosis.report.answer import unlikely_rival
 from ctrlgen.diagnosis.report.experiment_sentences import experiment_sentence
+from ctrlgen.diagnosis.report.rival_words import unlikely_rival
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection, scored
 from ctrlgen.diagnosis.selection.rivals import rivals
 from ctrlgen.effects.gain import SensorGain
@@ -250,8 +250,8 @@ def test_a_number_that_is_set_is_wrong_by_a_slip_of_the_pen_alone():
         fits.append(SimpleNamespace(fit=fit, causes=begun.causes, cause=begun.causes[0]))
     chosen, rival = fits
     search = SimpleNamespace(chosen=chosen, unlikely=((rival,),))
-    told = unlikely_rival(SimpleNamespace(findings=(chosen,), search=search))
-    assert told.endswith("which is set and not measured, the one named by 1")
+    _, told = unlikely_rival(SimpleNamespace(findings=(chosen,), search=search))
+    assert told == "which is set and not measured, the one named by 1"
 
 
 @pytest.mark.parametrize(
@@ -314,10 +314,10 @@ def test_the_answer_tells_what_fits_alike_and_is_unlikely_of_its_size(fits):
 
     of_height, of_scale = (size_of(fit, 0)[0] for fit in (theirs, ours))
     assert of_scale == pytest.approx(GAIN / 0.005, rel=0.1) and of_height > 4
-    assert said() == ""
+    assert said() == ("", "")
     assert said(rival) == (
-        "; the readings alone do not tell it from a wrong mechanism:height, which would be off by "
-        f"{of_height:.2g} of its usual deviations, the one named by {of_scale:.2g}"
+        "a wrong mechanism:height",
+        f"which would be off by {of_height:.2g} of its usual deviations, the one named by {of_scale:.2g}",
     )
 
 

@@ -33,7 +33,7 @@ def print_recording(recording: Recording) -> None:
 
 def print_diagnosis(diagnosis: Diagnosis) -> None:
     """The verdict, the findings and the held-out errors of a diagnosis."""
-    from ctrlgen.diagnosis.report.answer import answer
+    from ctrlgen.diagnosis.report.answer import answer, notes_of
     from ctrlgen.diagnosis.report.narrative import gathered, next_steps
     from ctrlgen.diagnosis.report.shares_sentences import shares_sentences
     from ctrlgen.reporting.numbers import number
@@ -51,7 +51,7 @@ def print_diagnosis(diagnosis: Diagnosis) -> None:
         values = (e.rms_before, e.rms_after, e.noise_floor, e.uncertainty)
         table.add_row(channel, *("not known" if v is None else f"{number(v)} {e.unit}" for v in values))
     show_table(table)
-    for note in gathered(diagnosis.notes):
+    for note in gathered(notes_of(diagnosis)):
         out.print(f"note: {note}", markup=False, soft_wrap=True)
     for step in next_steps(diagnosis):
         out.print(f"next: {step}", markup=False, soft_wrap=True)

@@ -14,7 +14,7 @@ from ctrlgen.diagnosis.evidence.detectability import DetectabilityEntry
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.evidence.experiment_design import NextExperimentEntry
 from ctrlgen.diagnosis.evidence.residual_location import ResidualLocations
-from ctrlgen.diagnosis.report.answer import sentence
+from ctrlgen.diagnosis.report.answer import notes_of, sentence
 from ctrlgen.diagnosis.report.narrative import implausible_notes
 from ctrlgen.diagnosis.report.shares_sentences import noise_of, shares_sentences
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
@@ -152,7 +152,7 @@ def diagnosis_record(diagnosis: Diagnosis, provenance: Provenance) -> DiagnosisR
     """What diagnosis.json holds: nothing that changes from run to run."""
     d = diagnosis
     return DiagnosisRecord(
-        **origin(provenance.inputs, provenance.seed, d.notes),
+        **origin(provenance.inputs, provenance.seed, notes_of(d)),
         verdict=d.verdict,
         sentence=sentence(d),
         implausible=implausible_notes(d),

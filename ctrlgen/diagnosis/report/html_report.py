@@ -10,6 +10,7 @@ import numpy as np
 from ctrlgen.core.units import show
 from ctrlgen.devices.changed_numbers import written
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
+from ctrlgen.diagnosis.report.answer import notes_of
 from ctrlgen.diagnosis.report.diagnosis_first_screen import diagnosis_first_screen
 from ctrlgen.diagnosis.report.diagnosis_record import Provenance, location_record, shares_record
 from ctrlgen.diagnosis.report.figure_words import FIGURES
@@ -59,7 +60,7 @@ def page(diagnosis: Diagnosis, provenance: Provenance) -> str:
         tested=_tested(diagnosis),
         figures=figures,
         certainty=[figures[name] for name in CERTAINTY if name in figures],
-        notes=gathered(diagnosis.notes),
+        notes=gathered(notes_of(diagnosis)),
         changed=_changed(diagnosis),
         unknown=[] if diagnosis.unmodelled_force is None else diagnosis.unmodelled_force.sentences(),
         shares=shares_sentences(diagnosis),

@@ -89,16 +89,26 @@ def _to_width(value: float, width: float) -> str:
 
 
 def channel_sentence(channel: str, error: ChannelErrorEntry) -> str:
-    """'Held-out error of delta_x: 312 nm -> 5.2 nm, noise 5 nm.' Where the numbers are so uncertain that they may cause most of it, what is
-    left when they move within their uncertainty is told too."""
+    """`error_words` with `uncertain_words`, as a sentence."""
+    return f"{error_words(channel, error)}{uncertain_words(error)}."
+
+
+def error_words(channel: str, error: ChannelErrorEntry) -> str:
+    """'Held-out error of delta_x: 312 nm -> 5.2 nm, noise 5 nm'."""
     noise = "not known" if error.noise_floor is None else f"{number(error.noise_floor, 3)} {error.unit}"
     shown = [f"{number(v, 3)} {error.unit}" for v in (error.rms_before, error.rms_after)]
-    unsure = ""
-    if error.uncertainty is not None and error.uncertainty > (error.noise_floor or 0.0):
-        unsure = f"; the uncertainty of the parameters alone is {number(error.uncertainty, 3)} {error.unit}"
-        if error.rms_refitted < error.rms_after:
-            unsure += f", and with them moved within it {number(error.rms_refitted, 3)} {error.unit} are left"
-    return f"Held-out error of {short(channel)}: {' -> '.join(dict.fromkeys(shown))}, noise {noise}{unsure}."
+    return f"Held-out error of {short(channel)}: {' -> '.join(dict.fromkeys(shown))}, noise {noise}"
+
+
+def uncertain_words(error: ChannelErrorEntry) -> str:
+    """'; the uncertainty of the parameters alone is 3 nm, and with them moved within it 4.9 nm are left', where the numbers are so
+    uncertain that they may cause most of the error."""
+    if error.uncertainty is None or error.uncertainty <= (error.noise_floor or 0.0):
+        return ""
+    unsure = f"; the uncertainty of the parameters alone is {number(error.uncertainty, 3)} {error.unit}"
+    if error.rms_refitted < error.rms_after:
+        unsure += f", and with them moved within it {number(error.rms_refitted, 3)} {error.unit} are left"
+    return unsure
 
 
 def short(channel: str) -> str:
