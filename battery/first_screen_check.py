@@ -11,10 +11,9 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 NUMBER = r"[-+]?\d[\d.]*(?:e[-+]?\d+)?"
+UNIT = r"(?:\([^\s()]+\))?[^\s,;()]+"  # '(mN*m)/urad^3' too
 # 'x unit (low unit ... high unit)', '82 % (75 ... 88 %)'
-INTERVAL = re.compile(
-    rf"(?<![\d.+])({NUMBER})( [^\s,;()]+)? \(([<>] )?({NUMBER})(?: [^\s,;()]+)? \.\.\. ([<>] )?({NUMBER})"
-)
+INTERVAL = re.compile(rf"(?<![\d.+^])({NUMBER})( {UNIT})? \(([<>] )?({NUMBER})(?: {UNIT})? \.\.\. ([<>] )?({NUMBER})")
 WOULD = re.compile(rf"held-out error of (\S+) would be ({NUMBER}) (\S+) instead of ({NUMBER}) (\S+?)[:;]")
 EXPLAINS = re.compile(rf"^(.*?) explains? (?:> )?({NUMBER}) %")
 PART = re.compile(rf"\((?:> )?({NUMBER}) %\)")
@@ -22,7 +21,8 @@ PLURAL = re.compile(
     r"(?<![\d.,])1 (?:independent |more )?(?:samples|poses|stretches|outliers|spikes|records|rows|gaps|replicates)\b"
 )
 ONE_AS_MANY = re.compile(r"(?<![\d.,])1 of (?!1000 )\S+ \w+ (?:are|is \w+s)\b")
-BETWEEN = re.compile(r"[.?] (?=[A-Z])")
+# no initial of a name
+BETWEEN = re.compile(r"(?<=[\w)%]{2})[.?] (?=[A-Z])")
 NO_NUMBER = re.compile(r"\b(?:nan|inf|null)\b")
 BETTER, WORSE = "predicts the held-out recordings better", "too uncertain to predict the held-out"
 SENTENCES, LONGEST = 3, 420  # of an answer: three lines of 140 characters

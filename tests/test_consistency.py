@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import json
+from types import SimpleNamespace
 
 import pytest
 from conftest import AXIS_FILE
@@ -16,6 +17,7 @@ from battery.first_screen_check import BETTER, WORSE, screen_contradictions
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.diagnosis_first_screen import diagnosis_first_screen
 from ctrlgen.diagnosis.report.diagnosis_record import Provenance, diagnosis_record
+from ctrlgen.diagnosis.report.html_report import page
 from ctrlgen.diagnosis.report.narrative import channel_sentence
 from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry
 from ctrlgen.recordings.plausibility import Implausible
@@ -236,6 +238,22 @@ def test_errors_that_no_step_may_follow_from_are_found(sound, screen, findings, 
 def test_parts_that_are_no_part_of_the_whole_are_found(sound, screen, said, sound_one):
     shares = (sound["shares"] or {}) | {"statements": [said]}
     assert (screen_contradictions(sound | {"shares": shares}, **screen) == []) == sound_one
+
+
+@pytest.mark.parametrize(("value", "wrong"), [(22.3, 0), (3.0, 1)])
+def test_an_interval_in_any_unit_is_read(sound, screen, value, wrong):
+    told = [*screen["numbers"], ["stiffness", f"{value} (mN*m)/urad^3 (22.16 ... 22.44 (mN*m)/urad^3)"]]
+    assert len(screen_contradictions(sound, **screen | {"numbers": told})) == wrong
+
+
+def test_what_has_no_room_in_the_answer_stands_in_the_notes_of_every_result(found):
+    why = "no balance in any of the poses of this record, " * 8
+    lost = SimpleNamespace(sentences=lambda: [f"3 of 4 causes worth a fit could not be fitted: {why}."])
+    told = dataclasses.replace(found, untried=lost)
+    record = diagnosis_record(told, Provenance({}, 0))
+    assert "3 of 4 causes worth a fit could not be fitted." in record.sentence and why not in record.sentence
+    assert any(why in note for note in record.notes)
+    assert why in page(told, Provenance({}, 0))
 
 
 def test_what_cannot_be_right_of_the_recording_stands_before_the_answer(found):

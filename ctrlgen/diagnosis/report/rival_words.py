@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.answer_parts import Part, Yields
 from ctrlgen.diagnosis.report.narrative import per_cent
@@ -105,4 +106,5 @@ def _by_file(diagnosis: Diagnosis) -> list[Part]:
     alike = f"{ALIKE} {names} off together"
     note = f"{cause_name(main)}: {alike}; that it is this one rests on what the file states of those"
     whole = f"; {alike}: that it is this one rests on what the file states of those"
-    return [Part(whole, ((Yields.HOW_UNLIKELY, f"; {alike}"),), note)]
+    some = f"; {ALIKE} {number_of(len(others), 'other number')} off"
+    return [Part(whole, ((Yields.HOW_UNLIKELY, f"; {alike}"), (Yields.FURTHER_RIVALS, some)), note)]

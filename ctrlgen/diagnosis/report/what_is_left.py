@@ -65,7 +65,7 @@ def _uneven(diagnosis: Diagnosis) -> list[Part]:
 def _rest(diagnosis: Diagnosis) -> list[Part]:
     """'; left: 4.9 urad in theta_z, 1.4 times the noise, mostly a function of position'."""
     if any(e.noise_floor is None for e in diagnosis.held_out.values()):
-        return [Part("; whether more is left cannot be said: the noise is not known")]
+        return [Part("; whether more is left cannot be said without the noise")]
     channel, e = max(diagnosis.held_out.items(), key=lambda item: item[1].rms_after / (item[1].noise_floor or 1.0))
     ratio = e.rms_after / (e.noise_floor or 1.0)
     size = f"; left: {number(e.rms_after, 3)} {e.unit} in {short(channel)}, {number(ratio, 2)} times the noise"
