@@ -16,25 +16,26 @@ class Yields(IntEnum):
 
     UNCERTAINTY = 1
     RINGING = 2
-    HOW_UNLIKELY = 3
-    INTERVAL_OF_SHARE = 4
-    SECOND_NUMBER = 5
-    SECOND_BESIDE = 6
-    WHY_UNTRIED = 7
-    FURTHER_MOVED = 8
-    HOW_UNEVEN = 9
-    TITLE = 10
-    FURTHER_CHANNELS = 11
-    FURTHER_RIVALS = 12
-    BESIDE = 13
-    WHAT_TO_CHECK = 14
-    UNTRIED = 15
-    UNEVEN = 16
-    INTERVALS = 17
-    KIND = 18
-    PITCH = 19
-    MOVED = 20
-    UNCERTAINTY_THAT_DECIDES = 21
+    WHAT_NOISE = 3
+    HOW_UNLIKELY = 4
+    INTERVAL_OF_SHARE = 5
+    SECOND_NUMBER = 6
+    SECOND_BESIDE = 7
+    WHY_UNTRIED = 8
+    FURTHER_MOVED = 9
+    HOW_UNEVEN = 10
+    TITLE = 11
+    FURTHER_CHANNELS = 12
+    FURTHER_RIVALS = 13
+    BESIDE = 14
+    WHAT_TO_CHECK = 15
+    UNTRIED = 16
+    UNEVEN = 17
+    INTERVALS = 18
+    KIND = 19
+    PITCH = 20
+    MOVED = 21
+    UNCERTAINTY_THAT_DECIDES = 22
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,8 @@ class Composed:
 
 def composed(sentences: Sequence[Sequence[Part]], longest: int = LONGEST) -> Composed:
     """The sentences made of parts, of which some yield, in the order of `Yields` and of two the latter, until all are no longer than
-    `longest` or none can yield any more. A sentence whose parts are all empty is left out."""
+    `longest` or none can yield any more; what has room again where a larger one had to yield is told after all. A sentence whose parts are
+    all empty is left out."""
     parts = [part for sentence in sentences for part in sentence]
     step = [0] * len(parts)
 
@@ -66,11 +68,18 @@ def composed(sentences: Sequence[Sequence[Part]], longest: int = LONGEST) -> Com
         texts = ["".join(next(forms) for _ in sentence) for sentence in sentences]
         return tuple(_sentence(text) for text in texts if text)
 
+    yielded: list[tuple[Yields, int]] = []
     while len(" ".join(told())) > longest:
         left = [(p.shorter[k][0], -i) for i, (p, k) in enumerate(zip(parts, step, strict=True)) if k < len(p.shorter)]
         if not left:
             break
-        step[-min(left)[1]] += 1
+        yielded.append(min(left))
+        step[-yielded[-1][1]] += 1
+    for _, place in reversed(yielded):
+        step[-place] -= 1
+        # of one part the last form first
+        if len(" ".join(told())) > longest:
+            step[-place] += 1
     notes = tuple(p.note for p, k in zip(parts, step, strict=True) if k and p.note)
     return Composed(told(), notes)
 

@@ -166,7 +166,14 @@ def _little(diagnosis: Diagnosis, e: ChannelErrorEntry) -> str:
 def blind(diagnosis: Diagnosis) -> list[Part]:
     """'; the noise is not known, so errors below 3.6 um in axis cannot be judged', for the channels whose noise is not known."""
     unknown = {c: e for c, e in diagnosis.held_out.items() if e.noise_floor is None}
-    return _of_sizes("; the noise is not known, so errors below ", unknown, " cannot be judged")
+    if not unknown:
+        return []
+    sizes = [f"{number(e.rms_after, 3)} {e.unit} in {short(c)}" for c, e in unknown.items()]
+    few = [f"{sizes[0]} (others in the table)"] if len(sizes) > 2 else sizes
+    text, shorter = (
+        f"; the noise is not known, so errors below {_listed(named)} cannot be judged" for named in (sizes, few)
+    )
+    return [Part(text, ((Yields.FURTHER_CHANNELS, shorter),))]
 
 
 def _untold_noise(diagnosis: Diagnosis) -> dict[str, float]:
@@ -187,17 +194,10 @@ def untold(diagnosis: Diagnosis) -> list[Part]:
     p, seen = min(unsure.values()), "so few samples cannot tell whether it goes with the drive or the motion"
     if p < 1:
         seen = f"nothing of which is seen to go with the drive or the motion (p = {number(p, 2)})"
-    begin = "; the noise was neither stated nor recorded at rest and would be "
-    return _of_sizes(begin, {c: diagnosis.held_out[c] for c in unsure}, f", {seen}")
-
-
-def _of_sizes(begin: str, errors: dict[str, ChannelErrorEntry], end: str) -> list[Part]:
-    """A part on the errors of some channels, or of the first one and how many others: the table has them all."""
-    if not errors:
-        return []
-    sizes = [f"{number(e.rms_after, 3)} {e.unit} in {short(c)}" for c, e in errors.items()]
-    few = [f"{sizes[0]} (others in the table)"] if len(sizes) > 2 else sizes
-    return [Part(f"{begin}{_listed(sizes)}{end}", ((Yields.FURTHER_CHANNELS, f"{begin}{_listed(few)}{end}"),))]
+    sizes = [f"{number(e.rms_after, 3)} {e.unit} in {short(c)}" for c, e in diagnosis.held_out.items() if c in unsure]
+    unknown = "the noise was neither stated nor recorded at rest"
+    text = f"{unknown} and would be {_listed(sizes)}, {seen}"
+    return [Part(f"; {text}", ((Yields.WHAT_NOISE, f"; {unknown} and may be all of it"),), text)]
 
 
 def _listed(sizes: Sequence[str]) -> str:
