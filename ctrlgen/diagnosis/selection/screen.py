@@ -19,26 +19,17 @@ from functools import cached_property, partial
 import numpy as np
 
 from ctrlgen.diagnosis.selection.candidate_terms import CandidateTerm, Peaks, signal_peaks, signals_along
-from ctrlgen.diagnosis.selection.drive_levels import steps_of_drives
 from ctrlgen.diagnosis.selection.law_terms import LawTerms
 from ctrlgen.diagnosis.selection.motion_regions import Along, motion_of, on_either_side, suggested
 from ctrlgen.diagnosis.selection.regions import Leftover, Region, find_regions
 from ctrlgen.diagnosis.selection.score_gradient import ScoreGradient, Sums, law_terms
-from ctrlgen.diagnosis.selection.spatial_periods import (
-    jump_positions,
-    merged_periods,
-    resolved_way,
-    slowest_periods,
-    spatial_periods,
-)
+from ctrlgen.diagnosis.selection.shown_by_records import moments_of, shown_along_path, spectral_peaks
 from ctrlgen.diagnosis.selection.subset_search import SubsetSearch, Suspect
 from ctrlgen.diagnosis.settings import CONFUSABLE, SCREEN
 from ctrlgen.effects import Place
 from ctrlgen.estimation.fit import Fit, Fitter
-from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis, nominal_physics
-from ctrlgen.model.effect_terms import channels
-from ctrlgen.numerics.spectral_peaks import highest_peaks, periodogram
-from ctrlgen.recordings.recording import Record, Timing
+from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis
+from ctrlgen.recordings.recording import Timing
 
 Subsets = tuple[tuple[float, tuple[Suspect, ...]], ...]
 
@@ -198,9 +189,10 @@ class Screen:
     ) -> Callable[[Place, int], DataHints]:
         """What the records show at each place, after what `fit` explains; `regions` of what is left, where they are known already."""
         regions = self._regions(fit) if regions is None else regions
-        most, along = self._follow(fit), self._along_path(fit)
-        moments, part = self._moments()
-        common = {"lines": self._spectral_peaks(fit), "moments": moments}
+        most = self._follow(fit)
+        along = shown_along_path(self.fitter, fit, steps=self._begins_at("drive_levels", fit))
+        moments, part = moments_of(self.fitter.recording)
+        common = {"lines": spectral_peaks(self.fitter, fit), "moments": moments}
 
         def at(place: Place, i: int) -> DataHints:
             return DataHints(
@@ -211,61 +203,6 @@ class Screen:
 
         return at
 
-    def _moments(self) -> tuple[tuple[float, ...], float]:
-        """The middles of equal parts of the time that the records to fit take, and the length of a part, on their clock."""
-        series, records = self.fitter.recording.kind == "series", self.fitter.fit_records
-        ends = [(r.time[0], r.time[-1]) if series else (0.0, float(len(r.time))) for r in records] or [(0.0, 1.0)]
-        begin, end = min(a for a, _ in ends), max(b for _, b in ends)
-        part = (end - begin) / SCREEN.event_times
-        return tuple(begin + (k + 0.5) * part for k in range(SCREEN.event_times)), part
-
-    def _spectral_peaks(self, fit: Fit) -> tuple[float, ...]:
-        """The frequencies [Hz] of the highest peaks in the spectrum of what is left of the longest record, refined between bins."""
-        records = self.fitter.fit_records
-        if self.fitter.recording.kind == "poses" or not records:
-            return ()
-        k = int(np.argmax([r.valid.size for r in records]))
-        begin = sum(r.valid.size for r in records[:k])
-        residual = fit.residual[begin : begin + records[k].valid.size].reshape(records[k].valid.shape)
-        power = np.sum(periodogram(residual, np.hanning(len(residual)), SCREEN.spectrum_padding), axis=1)
-        best = highest_peaks(power, SCREEN.most_lines, distance=4 * SCREEN.spectrum_padding)
-        return tuple(
-            float(f) for f in np.sort(best) / (SCREEN.spectrum_padding * len(residual) * records[k].sample_time)
-        )
-
-    def _along_path(self, fit: Fit) -> dict[tuple[Place, int], dict[str, tuple[float, ...]]]:
-        """Of each sensor, the paths after which what is left of the longest record repeats, where it surely does, and the
-        places at which it jumps most."""
-        records = self.fitter.fit_records
-        if self.fitter.recording.kind == "poses" or not records:
-            return {}
-        record = max(records, key=lambda r: r.valid.size)
-        foreseen, behind = (self.fitter.predict(each, record) for each in (fit, _without_sensor_causes(fit)))
-        residual = record.observed - foreseen
-        sensors = channels(nominal_physics(fit.structure.device), Place.SENSOR)
-        names, sizes = [c.name for c in sensors], {c.name: c.scale for c in sensors}
-        read = [(i, c.removeprefix("reading.")) for i, c in enumerate(self.fitter.recording.channels)]
-        paths = (record.observed, foreseen, behind)
-
-        def periods(i: int, good: np.ndarray) -> tuple[float, ...]:
-            # what is read may be evenly sampled, and bent
-            shortest = max(resolved_way(y[good, i]) for y in paths)
-            return merged_periods(spatial_periods(y[good, i], residual[good, i], shortest) for y in paths)
-
-        by_sensor = {
-            (Place.SENSOR, names.index(name)): {
-                "spatial_periods": (
-                    *periods(i, good),
-                    *slowest_periods(foreseen[good, i], residual[good, i], sizes[name]),
-                ),
-                "jump_positions": jump_positions(record.observed[good, i], residual[good, i]),
-            }
-            for i, name in read
-            if name in names and np.any(good := record.valid[:, i] & np.isfinite(residual[:, i]))
-        }
-        drives = steps_of_drives(self.fitter, fit, record) if self._begins_at("drive_levels", fit) else {}
-        return by_sensor | self._along_axes(fit, record, residual) | drives
-
     def _begins_at(self, hint: str, fit: Fit) -> bool:
         """Whether a law that is suspected, and not in the fit, begins at this that the records show."""
         return any(
@@ -274,24 +211,6 @@ class Screen:
             if h not in fit.structure.causes
             for number in h.prior.parameters.values()
         )
-
-    def _along_axes(
-        self, fit: Fit, record: Record, residual: np.ndarray
-    ) -> dict[tuple[Place, int], dict[str, tuple[float, ...]]]:
-        """Of the force on each axis, the ways of the axis after which the residual of its own reading repeats, or of any where none
-        has its name."""
-        simulator = self.fitter.simulator(fit.structure, record)
-        ways = simulator.simulate_states(record, fit.theta)[0][:, simulator.n_x :]
-        names = [c.removeprefix("reading.") for c in self.fitter.recording.channels]
-        found = {}
-        for j, axis in enumerate(nominal_physics(fit.structure.device).axes):
-            own = [i for i, name in enumerate(names) if name == axis] or range(len(names))
-            shortest, good = resolved_way(ways[:, j]), record.valid & np.isfinite(residual)
-            repeats = merged_periods(
-                spatial_periods(ways[good[:, i], j], residual[good[:, i], i], shortest) for i in own if good[:, i].any()
-            )
-            found[Place.FORCE, j] = {"spatial_periods": repeats}
-        return found
 
     def _regions(self, fit: Fit) -> dict[Along, tuple[Region, ...]]:
         """The regions in which most of what is left is."""
@@ -372,18 +291,6 @@ def _largest_by_chance(cosine: np.ndarray, seen: np.ndarray, seed: int) -> float
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     draws = np.random.default_rng(seed).standard_normal((SCREEN.null_draws, len(seen)))
     return float(np.quantile(np.abs(draws @ root.T).max(axis=1), SCREEN.false_alarm_quantile))
-
-
-def _without_sensor_causes(fit: Fit) -> Fit:
-    """The fit with every cause at a sensor off: fringes count what is there, not what they have made of it."""
-    theta = fit.theta.copy()
-    for k, u in enumerate(fit.structure.free_parameters):
-        if not u.amplitude:
-            continue
-        cause = fit.structure.cause_of(u)
-        if cause.effect != PARAMETER and cause.law.place is Place.SENSOR:
-            theta[k] = u.nominal
-    return replace(fit, theta=theta)
 
 
 def _moves(
