@@ -22,7 +22,8 @@ QUANTILE = 0.9  # of the errors of the trials: a drive may have a few corners
 
 
 def across(drive: np.ndarray, a: int, b: int, way: Way) -> np.ndarray:
-    """One drive (b - a,) in the rows a to b, half open, of `drive` (n,), which is NaN there and may be elsewhere."""
+    """One drive (b - a,) in the rows a to b, half open, of `drive` (n,), which is known on both sides of them; in rows between where it is
+    known, too, since another drive is missing, it goes by these."""
     return _WAYS[way](drive, a, b)
 
 
@@ -49,11 +50,13 @@ def error(drive: np.ndarray, a: int, b: int, way: Way) -> float:
 
 
 def _held(u: np.ndarray, a: int, b: int) -> np.ndarray:
-    return np.full(b - a, u[a - 1])
+    rows = np.arange(a - 1, b)
+    return u[np.maximum.accumulate(np.where(np.isfinite(u[a - 1 : b]), rows, a - 1))][1:]
 
 
 def _linear(u: np.ndarray, a: int, b: int) -> np.ndarray:
-    return np.interp(np.arange(a, b), [a - 1, b], [u[a - 1], u[b]])
+    known = a - 1 + np.flatnonzero(np.isfinite(u[a - 1 : b + 1]))
+    return np.interp(np.arange(a, b), known, u[known])
 
 
 def _smooth(u: np.ndarray, a: int, b: int) -> np.ndarray:

@@ -89,8 +89,7 @@ def validate_record(
             )
             notes = clock_notes + gap_notes
             if not parts:
-                mend = 'write gap = "held" or "linear" if the drive is so between the rows that state it, or record without gaps'
-                faults = [Fault(where, f"{record.name}: {notes[-1]} No usable stretch remains; {mend}")]
+                faults = [Fault(where, _no_stretch(record, gap, gap_notes))]
     faults = faults or _nothing_changes(record, where)
     if faults:
         return Validated(faults=tuple(faults))
@@ -104,6 +103,18 @@ def validate_record(
         marked.append(stretch)
         notes += mark_notes
     return Validated(tuple(marked), tuple(notes))
+
+
+def _no_stretch(record: Record, gap: Gap | None, notes: Sequence[str]) -> str:
+    """Why nothing is left of a record between its gaps, and what to do."""
+    if not np.isfinite(record.drive).all(axis=1).any():  # then no gap has a beginning or an end
+        what = f"{record.name}: no row states every drive, so that it is known of none what it did together with the others"
+        return f"{what}; record all drives at one rate, or resample them to the rows of one"
+    mend = "record without gaps"
+    if gap not in ("held", "linear"):
+        instead = ' in place of "split"' if gap == "split" else ""
+        mend = f'write gap = "held" or "linear"{instead} if the drive is so between the rows that state it, or {mend}'
+    return f"{notes[-1]} No usable stretch remains; {mend}"
 
 
 def _missing_numbers(record: Record, kind: str, names: ChannelNames, where: str, recorded: np.ndarray) -> list[Fault]:

@@ -193,8 +193,7 @@ class MeasurementTable:
 
     def _filled_apart(self, names: Sequence[str]) -> str:
         """What is wrong where two columns of these names are hardly ever filled in one row; empty where they are."""
-        columns = {name: np.asarray(self.columns[name]) for name in dict.fromkeys(names)}
-        filled = {name: np.isfinite(column) for name, column in columns.items() if column.dtype.kind == "f"}
+        filled = {name: number_cells.are_filled(np.asarray(self.columns[name])) for name in dict.fromkeys(names)}
         for (a, has), (b, also) in combinations(filled.items(), 2):
             fewest = min(has.sum(), also.sum())
             if fewest > 1 and len(has) == len(also) and np.sum(has & also) < TOGETHER * fewest:

@@ -214,6 +214,14 @@ def usual(cell: str) -> str:
     return cell
 
 
+def are_filled(cells: np.ndarray) -> np.ndarray:
+    """Which cells of a column (n,) hold a number or a text: an OL was read in its row, an empty cell or signs alone were not."""
+    if cells.dtype.kind == "O":
+        texts = ("" if cell is None or cell != cell else str(cell) for cell in cells)
+        return np.array([any(map(str.isalnum, text)) for text in texts], dtype=bool)
+    return np.isfinite(cells) if cells.dtype.kind == "f" else np.ones(len(cells), dtype=bool)
+
+
 def are_whole(cells: np.ndarray) -> bool:
     """Whether every cell is a whole number without thousands, as those of an epoch in nanoseconds are."""
     return len(cells) > 0 and all(isinstance(c, (str, int)) and WHOLE.fullmatch(str(c)) for c in cells)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
+from ctrlgen.recordings.formats.number_cells import are_filled
 from ctrlgen.recordings.formats.time_stamps import TIME_NAME
 from ctrlgen.recordings.formats.unit_texts import bare_name
 
@@ -31,7 +32,7 @@ def gathered(table: MeasurementTable) -> MeasurementTable:
         if name == time:
             continue
         column = np.asarray(table.columns[name])
-        filled = _filled(column)
+        filled = are_filled(column)
         if len(np.unique(place[filled])) < filled.sum():
             return table
         whole &= bool(filled.all())
@@ -42,9 +43,3 @@ def gathered(table: MeasurementTable) -> MeasurementTable:
     lines = [table.lines[k] for k in begins.tolist()] if len(table.lines) else ()
     ordered = {name: columns[name] for name in names}
     return table if whole else replace(table, columns=ordered, lines=lines, notes=(*table.notes, told))
-
-
-def _filled(column: Column) -> Column:
-    if column.dtype.kind == "O":
-        return np.array([cell is not None and str(cell).strip() != "" for cell in column])
-    return np.isfinite(column.astype(float))

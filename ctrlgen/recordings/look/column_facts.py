@@ -333,8 +333,9 @@ def rests(drives: np.ndarray) -> list[tuple[int, int]]:
 
 
 def slow_clock(drives: np.ndarray) -> int:
-    """The number of rows of which each drive (n, drives) is written in one alone, as one is that is logged at a lower rate; 1 where not."""
-    apart = {int(k) for u in drives.T for k in np.diff(np.flatnonzero(np.isfinite(u)))}
+    """The number of rows of which one states every drive (n, drives), as it is where some are logged at a lower rate; 1 where rows that do
+    so are no even part of all, or no row does: drives that are written in turn."""
+    apart = {int(k) for k in np.diff(np.flatnonzero(np.isfinite(drives).all(axis=1)))}
     return apart.pop() if len(apart) == 1 else 1
 
 
