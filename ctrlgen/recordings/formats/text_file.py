@@ -70,7 +70,7 @@ def tables_of_text(path: Path, text: str, layout: Layout, notes: Sequence[str] =
     if not any(line.strip() for line in lines):
         raise fault(path, "has no rows; write a header and one row per sample")
     try:
-        lines, run = parted(lines)
+        lines, run = parted(lines, layout)
         separator = separator_of(lines, layout)
         blocks = _blocks(lines, separator, layout)
         if not blocks:
