@@ -212,6 +212,18 @@ def test_a_drive_that_stands_still_is_no_rest_while_a_reading_moves():
     assert settled(noise[:, None], 450, 600, REST) is None
 
 
+@pytest.mark.parametrize("glitch", [0, 2, 7, 40, 4000])  # counts
+@pytest.mark.parametrize("size", [1.0, 0.618, 1e-9])
+@pytest.mark.parametrize("noise", [0.0, 0.3])
+def test_a_glitch_at_its_end_makes_no_rest_of_what_settles(glitch, size, noise):
+    t, rng = np.arange(600.0), np.random.default_rng(4)
+    y = np.round(30 * np.exp(-t / 60) + noise * rng.standard_normal(600))
+    y[300:] = 0
+    y[550] = glitch
+    begin = settled(size * y[:, None], 0, 600, REST)
+    assert begin is not None and 120 <= begin <= 300
+
+
 def test_a_rest_of_the_drive_in_which_the_reading_settles_is_fitted(axis, tmp_path):
     t, u, y = motion(1)
     u[-300:], y[-300:] = 1.0, 50 * np.exp(-np.arange(300) / 200)
