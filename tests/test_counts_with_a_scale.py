@@ -105,6 +105,53 @@ def test_other_factors_are_told_alone(tmp_path, values, attributes):
     assert table_facts(read_table(tmp_path / "a.h5")).column("x").scale == 1.0
 
 
+@pytest.mark.parametrize("write, ending, x", [(hdf5, "h5", "x"), (tdms, "tdms", "log/x")])
+@pytest.mark.parametrize(
+    "key",
+    [
+        "scale",
+        "Scaling",
+        "scaleFactor",
+        "ScaleFactor",
+        "scale-um",
+        "x.scale",
+        "lsb",
+        "LSB",
+        "LSB_um",
+        "resolution",
+        "adcResolution",
+        "slope",
+    ],
+)
+def test_a_factor_that_is_proposed_is_told_to_who_writes_the_file_by_hand(tmp_path, write, ending, x, key):
+    path = tmp_path / f"a.{ending}"
+    write(path, {"x": (np.round(X / 0.01).astype("i4"), {key: 0.01})})
+    table = read_table(path)
+    assert table.scales == {x: 0.01}
+    assert [f"{x}: {key} = 0.01 stands beside it and is not applied" in note for note in table.notes].count(True) == 1
+
+
+@pytest.mark.parametrize("write, ending", [(hdf5, "h5"), (tdms, "tdms")])
+@pytest.mark.parametrize(
+    "key",
+    [
+        "resolution_bits",
+        "ADCResolutionBits",
+        "bitResolution",
+        "full_scale",
+        "FullScale",
+        "scale_range",
+        "scales",
+        "autoscale",
+    ],
+)
+def test_a_number_of_bits_or_a_range_is_no_factor(tmp_path, write, ending, key):
+    path = tmp_path / f"a.{ending}"
+    write(path, {"x": (np.round(X / 0.01).astype("i4"), {key: 16})})
+    table = read_table(path)
+    assert not table.scales and not any("stands beside it" in note for note in table.notes)
+
+
 def test_a_factor_of_the_cf_conventions_is_applied_once(tmp_path):
     hdf5(tmp_path / "a.h5", {"x": (np.round(X / 0.01).astype(int), {"units": "um", "scale_factor": 0.01})})
     column = table_facts(read_table(tmp_path / "a.h5")).column("x")
@@ -127,10 +174,60 @@ def test_a_unit_may_be_so_many_of_another(tmp_path, axis, unit, by):
     assert np.nanmax(np.abs(read[0].observed)) == pytest.approx(1e-6 * np.abs(6e-4 * counts).max(), rel=0.2)
 
 
-@pytest.mark.parametrize("unit", ["0 nm", "3 knorks", "nm 3", "1e999 nm"])
-def test_a_multiple_that_is_none_is_told(unit):
-    with pytest.raises(InputError, match="--unit"):
+@pytest.mark.parametrize(
+    "unit", ["0 nm", "3 knorks", "nm 3", "1e999 nm", "0.5", "3", "1e-3", "-.5", "2 1/min", "2/min"]
+)
+def test_a_multiple_that_is_none_is_told_as_it_was_typed(unit):
+    with pytest.raises(InputError) as raised:
         stated(f"reading.axis={unit}")
+    (fault,) = raised.value.faults
+    assert fault.where == unit
+
+
+@pytest.mark.parametrize("unit", ["1/min", "1/s", "1/rad", "1 /min", "1/s^2", "rad/s", "1", "%", "\u00b0", "\u00b5m"])
+def test_a_unit_that_begins_with_a_one_is_no_multiple(unit):
+    answers = stated(f"x={unit}")
+    assert answers.units == {"x": unit} and not answers.scales
+    if not unit.startswith("1"):
+        answers = stated(f"x=2.5e-1{unit}")
+        assert answers.units == {"x": unit} and answers.scales == {"x": 0.25}
+
+
+@pytest.mark.parametrize("key", ["scale", "lsb"])
+def test_a_unit_that_is_stated_is_that_of_one_count_whether_for_the_signal_or_its_column(tmp_path, axis, key):
+    counts = np.round(X / 6e-4).astype("i4")
+    hdf5(tmp_path / "a.h5", {"drive": (U, {"unit": "V"}), "position": (counts, {"unit": "nm", key: 0.6})})
+    for unit, scale in (("nm", 1.0), ("0.5 nm", 0.5), ("um", 1.0), ("-2e-4 um", -2e-4)):
+        for name in ("position", "reading.axis"):
+            seen = seen_of(tmp_path / "a.h5", axis, stated(f"{name}={unit}", rate="1 kHz"))
+            match = next(m for m in seen.matches if m.signal == "reading.axis")
+            assert seen.certain and (match.scale, match.unit) == (scale, unit.split()[-1])
+
+
+@pytest.mark.parametrize("key", ["scale", "lsb", "scaleFactor"])
+@pytest.mark.parametrize("unit", [{}, {"unit": "um"}])
+def test_a_factor_is_never_assumed_unsaid(tmp_path, axis, key, unit):
+    """Of a column with a unit or none, and of the time."""
+    counts = np.round(X / 6e-4).astype("i4")
+    columns = {
+        "time": (np.arange(N), {"unit": "s", key: 1e-3}),
+        "drive": (U, {"unit": "V"}),
+        "position": (counts, {key: 6e-4, **unit}),
+    }
+    hdf5(tmp_path / "a.h5", columns)
+    seen = seen_of(tmp_path / "a.h5", axis, stated())
+    text = recording_toml(seen, tmp_path, "r")
+    lines = [line for line in text.splitlines() if "scale = " in line]
+    assert not seen.certain
+    for line, factor in zip(lines, ("0.001", "0.0006"), strict=True):
+        assert f"# its whole numbers lack {factor}" in line or f"; its whole numbers lack {factor}" in line
+    assert ("the file states no unit, um is assumed" in lines[-1]) == (not unit)
+    told = seen_of(tmp_path / "a.h5", axis, stated("time=0.001 s", "position=0.0006 um"))
+    assert told.certain and "whole numbers lack" not in recording_toml(told, tmp_path, "r")
+    columns["time"] = (np.arange(N)[::-1].copy(), {"unit": "s", key: 1e-3})
+    hdf5(tmp_path / "b.h5", columns)
+    text = recording_toml(seen_of(tmp_path / "b.h5", axis, stated()), tmp_path, "r")
+    assert "# its whole numbers lack 0.001, which stands beside them and is assumed; falls" in text
 
 
 def test_the_rate_that_a_file_states_is_the_one_that_is_written(tmp_path, axis):

@@ -12,7 +12,7 @@ from ctrlgen.recordings.formats.checked_files import check_size, fault, package
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
 from ctrlgen.recordings.formats.nested_columns import columns_of
 from ctrlgen.recordings.formats.stated_rate import rate_of
-from ctrlgen.recordings.formats.unapplied import APPLIED, scale_of_counts, unapplied
+from ctrlgen.recordings.formats.unapplied import APPLIED, factors_of, scale_of_counts, unapplied
 from ctrlgen.recordings.formats.written_layout import Layout
 
 UNITS = ("unit", "units", "Unit", "Units", "UNIT")
@@ -46,8 +46,9 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
             return
         attributes = {key: _attribute(node, key) for key in (*UNITS, *FILL, "scale_factor", "add_offset")}
         value, said = _applied(node[()], attributes, name)
-        notes.extend([*said, *unapplied(name, ((key, _attribute(node, key)) for key in node.attrs))])
-        scale = scale_of_counts(value, ((key, _attribute(node, key)) for key in node.attrs if key not in APPLIED))
+        factors = factors_of((key, _attribute(node, key)) for key in node.attrs if key not in APPLIED)
+        notes.extend([*said, *unapplied(name, factors)])
+        scale = scale_of_counts(value, factors)
         for column in columns_of(value, name, "/"):
             scales.update({column.name: scale} if scale is not None else {})
             columns[column.name] = column.values

@@ -10,7 +10,7 @@ from ctrlgen.recordings.formats.checked_files import check_size, package
 from ctrlgen.recordings.formats.measurement_table import Clock, MeasurementTable
 from ctrlgen.recordings.formats.nested_columns import columns_of
 from ctrlgen.recordings.formats.stated_rate import rate_of
-from ctrlgen.recordings.formats.unapplied import NI_SCALE, scale_of_counts, unapplied
+from ctrlgen.recordings.formats.unapplied import NI_SCALE, factors_of, scale_of_counts, unapplied
 from ctrlgen.recordings.formats.written_layout import Layout
 
 UNSET = 1.0  # s: the time between readings of a waveform whose programmer did not set it
@@ -31,9 +31,9 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
             for column in columns_of(np.asarray(channel[:]), f"{group.name}/{channel.name}"):
                 columns[column.name] = column.values
                 given = channel.properties
-                notes += unapplied(column.name, given.items())
-                plain = ((key, value) for key, value in given.items() if not key.startswith(NI_SCALE))
-                if (scale := scale_of_counts(np.asarray(column.values), plain)) is not None:
+                factors = factors_of(item for item in given.items() if not item[0].startswith(NI_SCALE))
+                notes += unapplied(column.name, factors)
+                if (scale := scale_of_counts(np.asarray(column.values), factors)) is not None:
                     scales[column.name] = scale
                 if given.get("unit_string"):
                     units[column.name] = str(given["unit_string"])

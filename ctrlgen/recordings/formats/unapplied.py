@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ctrlgen.core.units import same_dimension
 from ctrlgen.recordings.formats.unit_texts import unit_of
 
-FACTOR = re.compile(
-    r"(^|[ _.])(gain|scale|scaling|factor|slope|multiplier|conversion|sensitivity)($|[ _.])", re.IGNORECASE
-)
-MULTIPLIES = re.compile(r"(.*[ _.])?(scale|scaling|factor|slope|multiplier|lsb|resolution)([ _.].*)?", re.IGNORECASE)
-"""Of these the ones by which numbers are multiplied; a gain or a sensitivity rather divides them."""
+MULTIPLIES = frozenset(("scale", "scaling", "factor", "slope", "multiplier", "lsb", "resolution"))
+"""Words of names of factors by which numbers are multiplied."""
+FACTORS = MULTIPLIES | {"gain", "conversion", "sensitivity"}
+"""The same with those that rather divide them."""
+OTHERS = frozenset(("bit", "bits", "full", "range", "min", "max"))
+"""Words beside which a number is no factor: resolution_bits = 16, full_scale = 10."""
+WORDS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
+"""The words of scaleFactor, scale_factor and ScaleFactor alike."""
 APPLIED = ("scale_factor",)  # which the CF conventions define
 MOST_UNITS = 6
 """Units among which an instrument changes."""
@@ -24,37 +27,49 @@ MOST_RANGES = 20
 NI_SCALE = "NI_"  # begins the properties of scales that the reader of TDMS applies
 
 
-def unapplied(name: str, attributes: Iterable[tuple[str, Any]]) -> list[str]:
-    """A note for each attribute of the column `name` that looks like a factor other than one."""
-    said = []
+class Factor(NamedTuple):
+    """An attribute that looks like a factor, and whether numbers are multiplied by it."""
+
+    key: str
+    number: float
+    multiplies: bool
+
+
+def factors_of(attributes: Iterable[tuple[str, Any]]) -> list[Factor]:
+    """Of the attributes of a column, which its reader does not apply, those that are factors other than one, and finite."""
+    found = []
     for key, value in attributes:
-        if key in APPLIED or key.startswith(NI_SCALE) or not FACTOR.search(re.sub(r"(?<=[a-z])(?=[A-Z])", "_", key)):
+        words = _words(key)
+        if not words & FACTORS or words & OTHERS:
             continue
         try:
             number = float(value)
         except (TypeError, ValueError):
             continue
-        if number != 1:
-            said.append(
-                f"{name}: {key} = {number:.12g} stands beside it and is not applied; where its numbers lack it, write scale = {number:.12g}"
-            )
-    return said
+        if np.isfinite(number) and number not in (0, 1):
+            found.append(Factor(key, number, bool(words & MULTIPLIES)))
+    return found
 
 
-def scale_of_counts(values: np.ndarray, attributes: Iterable[tuple[str, Any]]) -> float | None:
+def _words(name: str) -> set[str]:
+    return {word.lower() for word in WORDS.findall(name)}
+
+
+def unapplied(name: str, factors: Sequence[Factor]) -> list[str]:
+    """A note for each factor beside the column `name`."""
+    return [
+        f"{name}: {key} = {number:.12g} stands beside it and is not applied; where its numbers lack it, write scale = {number:.12g}"
+        for key, number, _ in factors
+    ]
+
+
+def scale_of_counts(values: np.ndarray, factors: Sequence[Factor]) -> float | None:
     """The factor that stands beside whole numbers (n,) that surely lack it: one by which whole numbers multiplied are whole no more, or of
     which they are no multiples. None where there is none, or more than one."""
     if values.dtype.kind not in "iu" or not values.size:
         return None
-    found = set()
-    for key, value in attributes:
-        try:
-            number = float(value)
-        except (TypeError, ValueError):
-            continue
-        lacking = number != round(number) or bool(np.any(values % number)) if number and np.isfinite(number) else False
-        if MULTIPLIES.fullmatch(key) and lacking:
-            found.add(number)
+    lacking = (f.number for f in factors if f.multiplies and (f.number != round(f.number) or np.any(values % f.number)))
+    found = set(lacking)
     return found.pop() if len(found) == 1 else None
 
 
@@ -71,7 +86,7 @@ def unapplied_columns(names: Sequence[str], columns: Sequence[np.ndarray]) -> li
                     f"{name}: states units that differ from row to row ({', '.join(cells)}), not applied: write one"
                 )
         elif (
-            FACTOR.search(name)
+            _words(name) & FACTORS
             and 1 < len(known := np.unique(column[np.isfinite(column.astype(float))])) <= MOST_RANGES
         ):
             said.append(

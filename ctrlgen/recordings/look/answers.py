@@ -15,8 +15,9 @@ from ctrlgen.core.files import validate
 from ctrlgen.core.units import parse, to_si
 from ctrlgen.recordings.formats.written_layout import Layout
 
-MULTIPLE = re.compile(r"(?P<number>[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?)\s*\*?\s*(?P<unit>\D.*)", re.ASCII)
-"""A unit of so many others: 0.6 nm a count, -1 um of an axis that counts the other way."""
+NUMBER = r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
+MULTIPLE = re.compile(rf"(?P<number>(?>{NUMBER}))\s*\*?\s*(?P<unit>(?:[^\W\d_]|[%\u00b0]).*)")
+"""A unit of so many others: 0.6 nm a count, -1 um of an axis that counts the other way; 1/min is one alone."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ def read_answers(
         read = validate(Layout, written, "--layout")
     stated, scales = _units(_pairs("--unit", units, "drive.axis=V"))
     if rate is not None:
-        _known("--rate", rate, "Hz")
+        _known("--rate", rate, "Hz", rate)
     if sum((time is not None, rate is not None, poses)) > 1:
         raise InputError("--rate", [Fault("time", "give one of --time, --rate and --poses")])
     which = int(table) if table is not None and table.isdecimal() else table
@@ -86,7 +87,7 @@ def _units(texts: dict[str, str]) -> tuple[dict[str, str], dict[str, float]]:
     for name, text in texts.items():
         match = MULTIPLE.fullmatch(text)
         units[name] = match["unit"] if match is not None else text
-        _known("--unit", f"1 {units[name]}", units[name])
+        _known("--unit", f"1 {units[name]}", units[name], text)
         if match is not None:
             scales[name] = float(match["number"])
             if not np.isfinite(scales[name]) or scales[name] == 0:
@@ -105,10 +106,11 @@ def _pairs(option: str, texts: Sequence[str], example: str) -> dict[str, str]:
     return pairs
 
 
-def _known(option: str, text: str, unit: str) -> None:
+def _known(option: str, text: str, unit: str, typed: str) -> None:
+    """Raises InputError, which shows what was `typed`, where `text` is no quantity above zero in a unit."""
     try:
         to_si(1.0, unit)
         if parse(text, unit) <= 0:
             raise ValueError("must be above zero")
     except ValueError as error:
-        raise InputError(option, [Fault(text, str(error))]) from None
+        raise InputError(option, [Fault(typed, str(error))]) from None

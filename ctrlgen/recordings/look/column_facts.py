@@ -72,6 +72,11 @@ class ColumnFacts:
         return bare_name(self.name)
 
     @property
+    def factor(self) -> str:
+        """What is assumed of the numbers of a column that is `counted`."""
+        return f"its whole numbers lack {self.scale:.12g}, which stands beside them and is assumed"
+
+    @property
     def last(self) -> str:
         """The name without its unit and without the groups that it is in."""
         return re.split(r"[./]", self.bare)[-1]

@@ -223,19 +223,16 @@ def _why_unmoved(column: ColumnFacts) -> str:
 
 
 def _match(model: Model, signal: str, column: ColumnFacts, unit: str | None, why: list[str], answers: Answers) -> Match:
-    """One match; a `unit` that nobody states is assumed, and asked, and so is a factor that stands beside counts."""
-    scale = column.scale if (stated := answers.scales.get(signal)) is None else stated
-    if unit is not None and column.counted and stated is None:
-        why = [
-            *why,
-            f"its whole numbers lack {scale:.12g}, which stands beside them and is assumed: {_range(column)} {unit}",
-        ]
-        return Match(signal, column.name, unit, False, tuple(why), scale)
-    if unit is not None:
-        return Match(signal, column.name, unit, True, tuple(why), scale)
-    assumed = _plausible(model, signal, column, signal_units(model)[signal])
-    why = [*why, f"the file states no unit, {assumed} is assumed: {_range(column)}"]
-    return Match(signal, column.name, assumed, False, tuple(why), scale)
+    """One match; a `unit` that nobody states is assumed, and asked, and so is a factor that stands beside counts: a unit that is stated
+    for them is that of one count."""
+    stated = answers.scale(signal) if column.counted else answers.scales.get(signal)
+    scale = column.scale if stated is None else stated
+    assumed = [column.factor] if column.counted and stated is None else []
+    if unit is None:
+        unit = _plausible(model, signal, column, signal_units(model)[signal])
+        assumed = [f"the file states no unit, {unit} is assumed", *assumed]
+    why = [*why, f"{'; '.join(assumed)}: {_range(column)} {unit}"] if assumed else why
+    return Match(signal, column.name, unit, not assumed, tuple(why), scale)
 
 
 def _remarks(model: Model, facts: TableFacts, matches: Sequence[Match], answers: Answers) -> list[str]:

@@ -63,16 +63,17 @@ def _record(proposal: Proposal, facts: TableFacts, folder: Path, role: str) -> l
         head.append(f"sample_rate = {toml(answers.rate)}")
     elif facts.falls:
         column = facts.column(facts.falls)
-        head.append(
-            f"time = {_column(column.name, column.unit or 's', column.scale)} # falls: reverse the rows of the file"
-        )
+        said = "; ".join([*([column.factor] if column.counted else []), "falls: reverse the rows of the file"])
+        head.append(f"time = {_column(column.name, column.unit or 's', column.scale)} # {said}")
     elif facts.time is None:
         stated = facts.table.stated_rate
         says = f"{stated[1]:.9g} Hz" if stated is not None else "1 kHz"
         why = f"the file says {stated[0]!r}" if stated is not None else "no column is a time"
         head.append(f'sample_rate = "{says}" # assumed: {why}')
     else:
-        head.append(f"time = {_column(facts.time.column, facts.time.unit, facts.column(facts.time.column).scale)}")
+        column = facts.column(facts.time.column)
+        said = f" # {column.factor}" if column.counted else ""
+        head.append(f"time = {_column(column.name, facts.time.unit, column.scale)}{said}")
     known = proposal.drives_of(facts)
     if not known:
         return ["[[record]]", *head, f'role = "{role}"', ""]
