@@ -31,7 +31,8 @@ def of_whole_days(values: np.ndarray, hours: Sequence[int]) -> WholeDays | None:
     steps = np.diff(time)
     falls = (hour[:-1] == 12) & (steps < 0) & (steps + HALF_DAY > 0) & (steps + HALF_DAY < SOON)
     usual = float(np.median(steps)) if len(steps) else 0.0
-    nights = (hour[:-1] == 11) & (hour[1:] == 12) & (np.abs(steps - 2 * HALF_DAY - usual) <= usual)
+    # of rows that follow soon: those of one a day leap by a day everywhere
+    nights = (hour[:-1] == 11) & (hour[1:] == 12) & (np.abs(steps - 2 * HALF_DAY - usual) <= usual) & (usual < SOON)
     if not len(hour) or hour.min() < 1 or hour.max() > 12 or not (falls | nights).any():
         return None
     time -= HALF_DAY * (hour == 12)

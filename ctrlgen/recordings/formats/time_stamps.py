@@ -100,8 +100,10 @@ def _dates(cells: list[str], first: str, dates: str | None) -> Stamps:
         hours = [0 if match is None else int(match[1]) for match in found]
         if (days := half_day_clock.of_whole_days(stamps.values, hours)) is not None:
             first_of = float(days.values[np.isfinite(days.values)][0])
-            notes = (*stamps.notes, half_day_clock.told(days))
-            return Stamps(np.round(days.values - first_of, 12), notes, stamps.begin + first_of)
+            later = np.timedelta64(round(first_of), "s")
+            begun = _instants(instants + later, said, notes)
+            told = (*begun.notes, half_day_clock.told(days))
+            return Stamps(np.round(days.values - first_of, 12), told, begun.begin)
     return stamps if zoned else _without_summer_time(stamps)
 
 
