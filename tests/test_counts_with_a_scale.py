@@ -267,6 +267,19 @@ def test_a_column_without_any_number_is_text(tmp_path, axis, cells):
     assert seen.certain and not any(c.question for c in seen.tables[0].columns)
 
 
+@pytest.mark.parametrize(
+    "cell, why",
+    [("0x41", "hexadecimal"), ("=A1+B1", "never calculated"), ("(12.5)", "in brackets"), ("24+5", "run into")],
+)
+@pytest.mark.parametrize("gaps", [False, True])
+def test_one_text_in_every_row_is_refused_with_its_reason_where_it_is_named(tmp_path, axis, cell, why, gaps):
+    rows = "".join(f"{t:.3f},{u:.6f},{'' if gaps and t < 0.01 else cell}\n" for t, u in zip(T, U, strict=True))
+    (tmp_path / "log.csv").write_text("t [s],drive [V],position [um]\n" + rows)
+    for answers in (stated(columns=("reading.axis=position",)), stated(columns=("reading.axis=2",))):
+        with pytest.raises(InputError, match=f"line {12 if gaps else 2} '{re.escape(cell)}'.*{why}"):
+            seen_of(tmp_path / "log.csv", axis, answers)
+
+
 @pytest.mark.parametrize("every", [2, 5, 20])
 def test_a_drive_that_is_logged_at_a_lower_rate_is_held_and_told(tmp_path, axis, every):
     u = np.repeat(np.random.default_rng(5).uniform(-2, 2, N // every), every)

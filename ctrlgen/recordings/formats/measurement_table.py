@@ -210,9 +210,11 @@ class MeasurementTable:
         more = f" and {len(bad) - number_cells.MOST_LISTED} more" if len(bad) > number_cells.MOST_LISTED else ""
         key = ", ".join(f'"{word}"' for word in words[: number_cells.MOST_WORDS]).replace("\\", "\\\\")
         what = f"column {name!r} holds text that is no number in {len(bad)} of {number_of(len(self.columns[name]), 'row')} ({listed}{more})"
-        remarks = not np.isfinite(cells.values).any()  # and a state INF is no infinity
-        if (len(words) > 1 or not remarks) and (why := number_cells.written_otherwise([text for _, text in bad])):
-            return AmbiguousFile(self.path, Ambiguous(f"{what}: {why}"))
+        remarks = not np.isfinite(cells.values).any()
+        if why := number_cells.written_otherwise([text for _, text in bad]):
+            # one text in every row may be a state: nothing is asked of it, and who names its column is told
+            state = remarks and len(words) == 1
+            return self.fault(f"{what}: {why}") if state else AmbiguousFile(self.path, Ambiguous(f"{what}: {why}"))
         if any(number_cells.has_unit(text) for _, text in bad):
             if all(re.fullmatch(r"[^a-z]*m", text) for text in words):
                 mend = "metres, or thousandths? Write the unit of its numbers into its name: 'x (m)', 'x (V)' for thousandths of it"
