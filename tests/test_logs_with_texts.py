@@ -11,9 +11,14 @@ from recorded import described
 import ctrlgen
 from ctrlgen.core.errors import InputError
 from ctrlgen.recordings.formats import read_table
+from ctrlgen.recordings.look.answers import read_answers
+from ctrlgen.recordings.look.column_facts import table_facts
+from ctrlgen.recordings.look.oddities import table_oddities
+from ctrlgen.recordings.look.proposal import propose
+from ctrlgen.recordings.look.proposed_file import recording_toml
 from ctrlgen.recordings.reader import load_recordings
 
-COUNT, LOADED = 300, 100
+COUNT, LOADED = 300, 60
 LEVER = "xy_lever_stage"
 
 
@@ -74,3 +79,27 @@ def test_what_becomes_a_record_is_what_was_written(tmp_path, lever, gap):
             truth, valid = log.columns[next(n for n in log.columns if n[0] == "x")][rows], record.valid[:, 0]
             np.testing.assert_allclose(1e6 * record.observed[valid, 0], truth[valid], rtol=1e-9, err_msg=log.described)
     assert min(outcomes.values()) > 0.1 * LOADED, outcomes
+
+
+def test_a_gap_that_look_proposes_is_bridged(tmp_path, lever):
+    """Of drives at a lower rate; those that are written in turn are refused by look already."""
+    bridged = 0
+    for seed in range(LOADED):
+        log = log_with_texts(seed)
+        (tmp_path / "a.txt").write_text(log.text)
+        reading = next(name for name in log.columns if name[0] == "x")
+        columns = ["drive.x=a", "drive.y=b", f"reading.delta_x={reading}"]
+        answers = read_answers(None, None, columns, [], None, None, False)
+        try:
+            facts = table_facts(read_table(tmp_path / "a.txt"), answers)
+            table_oddities(facts)
+            text = recording_toml(propose([facts], lever, answers), tmp_path, "r")
+        except InputError as error:
+            assert "in turn" in log.described or " apart " in log.described or log.merged, (log.described, str(error))
+            continue
+        if "gap = " in text:
+            (tmp_path / "recording.toml").write_text(text)
+            (record,) = load_recordings([tmp_path / "recording.toml"], lever, hold_out=False).records
+            assert np.isfinite(record.drive).all() and len(record.time) > 50
+            bridged += 1
+    assert bridged > 0.05 * LOADED
