@@ -74,5 +74,5 @@ def test_what_has_inertia_turns_back_by_itself():
 )
 def test_less_than_a_period_repeats_nothing_even_where_noise_alone_is_left(cell, periods, exact, told):
     pitch = Hypothesis("cyclic", "sensor:axis", "axis"), {"amplitude": 1e-5, "period": 2e-3 / periods, "phase": 0.0}
-    reason = f"the reading covers {periods:.1f} periods of it, and 1.5 are needed to see it repeat"
+    reason = f"the reading covers {periods:.1f} periods of it, and {1 if exact else 1.5} are needed to see it repeat"
     assert against(cell, "poses", [record(UP, UP, "fit", h=np.inf)], *pitch, exact) == ({0: reason} if told else {})

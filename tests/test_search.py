@@ -19,7 +19,6 @@ from ctrlgen.diagnosis.selection.objections import objections
 from ctrlgen.diagnosis.selection.rivals import replace_cause
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
 from ctrlgen.diagnosis.selection.search import Searcher
-from ctrlgen.diagnosis.selection.search_history import search_history
 from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import CONFUSABLE, SEARCH
@@ -376,51 +375,3 @@ def test_held_out_records_contradict_a_cause_beyond_two_standard_deviations(lost
     compare = ModelSelection(fitter, lambda *_: [])
     compare.held_out_loss = lambda t, errors: 100.0 + lost * (t is beside)
     assert compare.contradicted(without, beside) is contradicted
-
-
-def test_two_causes_that_held_out_records_confirm_together_alone_are_found(monkeypatch):
-    """A late reading and the harmonics of its scale: fitted alone, each is bent by the other and foretells worse than neither."""
-    bow = Hypothesis("bow", "sensor:axis", "axis")
-    fitter = fitter_of(lambda u: (y := played(u, 2e-7)) + 120 * y**2, n=700)
-    enough = ModelSelection.improves_enough
-    monkeypatch.setattr(ModelSelection, "improves_enough", lambda self, a, b: len(b.causes) != 1 and enough(self, a, b))
-    monkeypatch.setattr(candidates, "fit_subsets", lambda *_: ())  # that foresees them at once only by slopes
-
-    def found(searcher: Searcher) -> set[Hypothesis]:
-        described = searcher.trials.fit(Structure(AXIS))
-        begun = searcher.trials.with_errors(described)
-        return set(searcher.forward_rounds(begun, []).causes)
-
-    assert found(Searcher(fitter, Screen(fitter, [BACKLASH, bow]), lambda _: None)) == {BACKLASH, bow}
-
-
-def test_a_search_beside_what_was_refused_that_finds_nothing_leaves_all_as_it_was(monkeypatch):
-    """The errors of a refused model, and the readings that it marks, are not those of the model that stays; its trials are of the round."""
-    bow = Hypothesis("bow", "sensor:axis", "axis")
-    fitter = fitter_of(lambda u: (y := played(u, 2e-7)) + 120 * y**2, n=700)
-    monkeypatch.setattr(ModelSelection, "improves_enough", lambda self, a, b: False)
-    monkeypatch.setattr(candidates, "fit_subsets", lambda *_: ())
-    searcher = Searcher(fitter, Screen(fitter, [BACKLASH, bow]), lambda _: None)
-    begun = searcher.trials.with_errors(searcher.trials.fit(Structure(AXIS)))
-    before, rounds = searcher.trials.fitter, []
-    assert searcher.forward_rounds(begun, rounds).causes == () and len(rounds) == 1
-    trials = searcher.trials
-    assert trials.screen.fitter is trials.fitter
-    assert trials.fitter.error.weighted.sd == pytest.approx(before.error.weighted.sd, rel=0.1)
-    assert {a.round for a in searcher.trials.log if len(a.candidate.causes) == 2} == {2}
-
-
-def test_a_search_beside_what_was_refused_is_told_as_that(monkeypatch):
-    bow = Hypothesis("bow", "sensor:axis", "axis")
-    fitter, rounds = fitter_of(lambda u: (y := played(u, 2e-7)) + 120 * y**2, n=700), []
-    enough = ModelSelection.improves_enough
-    monkeypatch.setattr(ModelSelection, "improves_enough", lambda self, a, b: len(b.causes) != 1 and enough(self, a, b))
-    monkeypatch.setattr(candidates, "fit_subsets", lambda *_: ())
-    searcher = Searcher(fitter, Screen(fitter, [BACKLASH, bow]), lambda _: None)
-    described = searcher.trials.fit(Structure(AXIS))
-    found = searcher.forward_rounds(searcher.trials.with_errors(described), rounds)
-    told = search_history(
-        SimpleNamespace(rounds=rounds, chosen=found, fitter=searcher.trials.fitter, nominal=described)
-    )
-    assert len(told) == len(rounds) > 1 and "refuse each candidate alone: searched on beside" in told[0].decision
-    assert told[1].decision.startswith("added")

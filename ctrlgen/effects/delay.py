@@ -3,15 +3,9 @@
 import casadi as ca
 
 from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, State
-from ctrlgen.effects._kept_samples import samples_in
+from ctrlgen.effects._kept_samples import readings_kept, samples_in
 
 FREE_SAMPLES = 4  # kept beyond twice the file's delay where the delay is free
-SIZES = {"y": ("channel", 1.0), "r": ("channel/s", 10.0), "c": ("channel/s^2", 100.0)}
-
-
-def _kept(samples: int) -> tuple[State, ...]:
-    """The readings of so many samples and the present one, with slopes and second derivatives."""
-    return tuple(State(f"{name}{k}", *SIZES[name], stepped=True) for name in SIZES for k in range(samples + 1))
 
 
 class Delay(Effect):
@@ -28,12 +22,12 @@ class Delay(Effect):
     source = "T. I. Laakso et al., IEEE Signal Processing Magazine 13 (1996) 30: splitting the unit delay"
     params = (Param("delay", "ms", (0.0, 3.6e6), "age of the reading", off=0.0),)  # an hour: dead time of a process
     moves_in_time = True
-    states = _kept(1)  # of a delay that is off
+    states = readings_kept(1)  # of a delay that is off
     apart = True
 
     def kept(self, sample_time: float | None, free: bool) -> tuple[State, ...]:
         age = samples_in(self.values["delay"], sample_time)
-        return _kept(max(2 * age + FREE_SAMPLES if free else age, 1))
+        return readings_kept(max(2 * age + FREE_SAMPLES if free else age, 1))
 
     def reaches(self, sample_time: float) -> float:
         return 2 * self.values["delay"].si + FREE_SAMPLES * sample_time
