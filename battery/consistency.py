@@ -40,7 +40,7 @@ HEADS = {
 
 def contradictions(diagnosis: dict[str, Any]) -> list[str]:
     """What contradicts itself in the content of a diagnosis.json; nothing where all of it agrees."""
-    parts = (_shares, _channels, _causes, _verdict, _sentence, _numbers, _luck)
+    parts = (_shares, _terms, _channels, _causes, _verdict, _sentence, _numbers, _luck)
     return [text for part in parts for text in part(diagnosis)]
 
 
@@ -78,6 +78,13 @@ def _shares(d: dict[str, Any]) -> Iterator[str]:
         needed = any(w["without"] > largest["worth"][channel]["without"] for channel, w in first["worth"].items())
         if causes[0] <= max(causes) - NEARLY or not needed:
             yield f"the largest share is not first: {causes}"
+
+
+def _terms(d: dict[str, Any]) -> Iterator[str]:
+    """Empirical terms: each leaves less than there was, and takes away no more than that."""
+    for t in d["empirical_terms"]:
+        if not 0 < t["share"] <= 1 or not t["rms_after"] < t["rms_before"]:
+            yield f"{t['effect']} of {t['channel']}: a share of {t['share']}, {t['rms_before']} to {t['rms_after']}"
 
 
 def _channels(d: dict[str, Any]) -> Iterator[str]:

@@ -82,6 +82,12 @@ WRONG = {
 }
 
 
+@pytest.mark.parametrize(("share", "after", "wrong"), [(0.9, 2.0, False), (1.36, 2.0, True), (0.9, 11.0, True)])
+def test_an_empirical_term_takes_away_no_more_than_there_was(sound, share, after, wrong):
+    term = {"effect": "empirical_position", "channel": "reading.axis", "share": share, "rms_before": 10.0}
+    assert bool(contradictions(sound | {"empirical_terms": [term | {"rms_after": after}]})) is wrong
+
+
 @pytest.mark.parametrize("wrong", WRONG)
 def test_a_contradiction_is_found(sound, wrong):
     path, value = WRONG[wrong]

@@ -14,7 +14,7 @@ from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.report.diagnosis_record import Provenance, diagnosis_record
 from ctrlgen.diagnosis.report.writeback import next_text
-from ctrlgen.diagnosis.shares.empirical_terms import ridge_regression
+from ctrlgen.diagnosis.shares.empirical_terms import ridge_regression, taken_away
 from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.recordings.recording import Recording
 
@@ -211,3 +211,11 @@ def test_the_ridge_is_that_of_cross_validation(rng):
     assert c[:2] == pytest.approx([30, -20], abs=0.2) and np.abs(c[2:]).max() < 0.1
     H_trace = np.trace(X @ np.linalg.solve(X.T @ X + 1e-4 * np.eye(10), X.T))
     assert left <= np.sum((loud - X @ c) ** 2) / (1 - H_trace / float(loud @ loud)) ** 2 * (1 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("noise", "after", "share"), [(20.0, 40.0, 0.75), (0.0, 40.0, 0.6), (20.0, 10.0, 1.0), (100.0, 40.0, 0.0)]
+)
+def test_a_term_takes_away_no_more_than_is_left_beyond_a_noise_that_is_known(noise, after, share):
+    """Of 100; a noise that is guessed from what is left may be larger than what a term then leaves."""
+    assert taken_away(100.0, after, noise) == pytest.approx(share)

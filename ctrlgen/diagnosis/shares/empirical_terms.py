@@ -36,7 +36,7 @@ READING = "reading."
 @dataclass(frozen=True, eq=False)
 class EmpiricalTerm:
     """One smoother as an effect of the device. `share`: of what was left of `channel` on the held-out records that it takes away,
-    of energy beyond noise; `rms_before`, `rms_after` there [unit]; `kind` of the function."""
+    of energy beyond noise where that is known; `rms_before`, `rms_after` there [unit]; `kind` of the function."""
 
     effect: Effect
     channel: str
@@ -197,6 +197,12 @@ def ridge_regression(X: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float]:
     return best
 
 
+def taken_away(before: float, after: float, noise: float) -> float:
+    """Of the energy `before` beyond that of the `noise`, zero where it is not known, the share that is not left `after`, one at most: by
+    chance less may be left than noise."""
+    return min((before - after) / (before - noise), 1.0) if before > noise else 0.0
+
+
 def _confirmed(fitter: Fitter, before: Fit, after: Fit, kind: Kind, channel: str) -> EmpiricalTerm | None:
     """The term, if the held-out records confirm it."""
     i, records = fitter.recording.channels.index(channel), fitter.held_out_records
@@ -209,9 +215,9 @@ def _confirmed(fitter: Fitter, before: Fit, after: Fit, kind: Kind, channel: str
         misfit(fitter.noise, records, [r.observed - y for r, y in zip(records, read, strict=True)])
         for read in ([read for _, read in begun], corrected)
     )
-    excess = old.plain[:, i].sum() - old.n_plain[:, i].sum()
     gain = old.plain[:, i] - new.plain[:, i]
-    share = float(gain.sum() / excess) if excess > 0 else 0.0
+    noise = float(old.n_plain[:, i].sum()) if fitter.noise.known[i] else 0.0
+    share = taken_away(float(old.plain[:, i].sum()), float(new.plain[:, i].sum()), noise)
     if share < SHARES.told or not stands_out(gain):
         return None
     unit = fitter.recording.units[i]
