@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,10 +12,12 @@ from conftest import MESO_FILE, SCENARIOS
 
 from ctrlgen import load_device
 from ctrlgen.diagnosis.evidence.detectability import detectability
+from ctrlgen.diagnosis.selection import screen
 from ctrlgen.diagnosis.selection.confusable import explains_alike, explains_better, look_alike
 from ctrlgen.diagnosis.selection.findings import estimated_values
 from ctrlgen.diagnosis.selection.screen import Screen, Screened
 from ctrlgen.diagnosis.selection.subset_search import SubsetSearch, Suspect
+from ctrlgen.diagnosis.settings import SCREEN
 from ctrlgen.effects import Channel, laws
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, hypotheses, nominal_physics, why_not_offered
@@ -113,6 +116,18 @@ def test_in_settled_poses_no_lag_is_suspected_however_much_its_rounding_looks_li
     assert "no clock" in why_not_offered(
         laws()["high_pass"], device, nominal_physics(device), recording.channels, None, False
     )
+
+
+@pytest.mark.parametrize(("share", "seen"), [(0.98, True), (1.02, False)])
+def test_a_law_is_suspected_from_so_much_on_that_its_largest_amplitude_moves_the_readings(monkeypatch, share, seen):
+    """Of an offset as large as its bound, over the noise of the mean of all readings."""
+    fitter = axis_fitter()
+    fit = fitter.fit(Structure(AXIS))
+    deviation = Screen(fitter, [OFFSET]).run(fit).amplitude_sd[OFFSET.effect, OFFSET.location]
+    most = max(map(abs, OFFSET.bounds(OFFSET.law.amplitude(), OFFSET.channel_on(AXIS))))
+    monkeypatch.setattr(screen, "SCREEN", replace(SCREEN, least_reach=share * most / deviation))
+    found = Screen(fitter, [OFFSET]).run(fit)
+    assert [s.hypothesis for s in found.suspects] == [OFFSET] * seen and (OFFSET in found.undetectable) is not seen
 
 
 def test_a_frequency_ends_where_the_sampling_shows_no_higher_one_and_a_ratio_does_not():

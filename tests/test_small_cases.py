@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from conftest import ROOT
 
@@ -53,4 +52,6 @@ def test_friction_is_found_beside_spikes_that_it_hides():
     assert first.effect in {"coulomb", "stribeck"} and first.share.value > 0.85
     assert first.parameters["force"].value == pytest.approx(5e-3, rel=0.05)
     assert at_the_noise(found)
-    assert np.isclose(sum(s.count for s in found.spikes), 59 + 61, atol=12)
+    assert sum(s.count for s in found.spikes) == pytest.approx(
+        59 + 61, rel=0.1
+    )  # those of 50 nm stand nearest the rest
