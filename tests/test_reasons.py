@@ -20,6 +20,7 @@ from ctrlgen.diagnosis.report.explain import explain
 from ctrlgen.diagnosis.report.history_table import history_rows, most_gained, not_taken_rows
 from ctrlgen.diagnosis.report.html_report import page
 from ctrlgen.diagnosis.report.narrative import EMPIRICAL_ALONE, NOTHING_FOUND, next_steps, refusals
+from ctrlgen.diagnosis.selection import not_taken as not_taken_module
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal
 from ctrlgen.diagnosis.selection.findings import Finding
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection, Shortfall
@@ -28,6 +29,7 @@ from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search_history import held_out_error
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.selection.verdict import Verdict
+from ctrlgen.diagnosis.settings import MODEL_SELECTION
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.structure import Structure
 
@@ -172,6 +174,13 @@ def test_what_is_not_taken_stands_by_its_gain_with_one_reason_each(few):
 def test_a_refusal_that_matters_is_told_whatever_the_verdict(turned, verdict):
     told = next_steps(replace(turned, verdict=verdict))
     assert [step for step in told if step.startswith("Not taken: cyclic at sensor:axis, although the held-out error")]
+
+
+def test_a_refusal_matters_that_gains_as_much_as_a_cause_must(monkeypatch):
+    must = MODEL_SELECTION.least_gain + MODEL_SELECTION.least_confirmed
+    rows = [(must * share, DRIFT) for share in (1.01, 0.99)]
+    monkeypatch.setattr(not_taken_module, "better_than_their_round", lambda search: rows)
+    assert that_matter(None) == rows[:1]
 
 
 def test_what_later_rounds_overtook_stands_in_the_table_and_is_not_told(turned):

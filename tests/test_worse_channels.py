@@ -47,6 +47,27 @@ def test_one_that_shrank_or_grew_as_noise_lets_it_is_not(fitter, offsets):
     assert worse_channels(searched(fitter, *offsets)) == []
 
 
+@pytest.mark.parametrize(
+    ("length", "numbers", "told"), [(5.9, 0, False), (6.1, 0, True), (6.2, 1, False), (6.4, 1, True)]
+)
+def test_noise_explains_three_deviations_and_what_fitted_numbers_add(length, numbers, told):
+    """A device that leaves nothing, and an answer that is off by a vector of this length, in noise: x^2 beside 6 x + 2 k."""
+    samples = 100
+    record = SimpleNamespace(observed=np.zeros((samples, 1)), valid=np.ones((samples, 1), bool))
+    fits = [
+        SimpleNamespace(structure=SimpleNamespace(free_parameters=[SimpleNamespace(cause=0)] * numbers), off=off)
+        for off in (0.0, length / np.sqrt(samples))
+    ]
+    fitter = SimpleNamespace(
+        recording=SimpleNamespace(channels=("reading.axis",), units=("m",)),
+        noise=SimpleNamespace(whiten=lambda e, valid: e),
+        held_out_records=[record],
+        predict=lambda fit, r: np.full((samples, 1), fit.off),
+    )
+    nominal, chosen = (SimpleNamespace(fit=fit) for fit in fits)
+    assert bool(worse_channels(SimpleNamespace(fitter=fitter, nominal=nominal, chosen=chosen))) is told
+
+
 def test_of_several_readings_the_worst_is_first(fitter):
     """Of two readings of the axis, the second with half of the noise."""
     recording = fitter.recording
