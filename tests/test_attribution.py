@@ -158,6 +158,32 @@ def test_of_two_causes_that_make_up_for_one_another_one_has_what_both_take(monke
     assert found.serves[:2] == (1, 0)
 
 
+def test_a_cause_that_acts_in_one_block_has_a_share(monkeypatch):
+    """The last of twenty blocks holds four fifths of the error, which the first takes away; the second takes the rest. A third of the
+    samples that are drawn with replacement lack that block."""
+    last = np.arange(BLOCKS) == BLOCKS - 1
+
+    def by_block(S):
+        return 0.8 * last * (0 not in S) + 0.2 / BLOCKS * (1 not in S) + 1e-9
+
+    found = shared(monkeypatch, lambda S: 1e5 * by_block(S).sum(), 2, blocks=lambda S: by_block(S) / by_block(S).sum())
+    assert values(found) == pytest.approx([0.8, 0.2, 0.0], abs=1e-6)
+    assert 0.02 < found.shares[0].ci95[0] < 0.5
+
+
+def test_two_causes_that_nearly_cancel_have_a_share_each(monkeypatch):
+    """Each alone leaves two to two and a half times what there was, here more and there less; together they leave a hundredth."""
+    side = 0.8 * (-1.0) ** np.arange(BLOCKS)
+
+    def by_block(S):
+        alone = {(): 1 + 0 * side, (0,): 2.1 + side, (1,): 2.4 - side, (0, 1): 0.01 + 0 * side}
+        return alone[tuple(sorted(S))] / BLOCKS
+
+    found = shared(monkeypatch, lambda S: 1e5 * by_block(S).sum(), 2, blocks=lambda S: by_block(S) / by_block(S).sum())
+    assert values(found) == pytest.approx([0.645, 0.345, 0.01])
+    assert found.shares[1].ci95[0] == pytest.approx(ATTRIBUTION.least_share)
+
+
 @pytest.mark.parametrize(("without_weight", "first"), [(1.1e5, "gravity"), (3e4, "drive_offset")])
 def test_a_constant_is_part_of_the_law_that_needs_it(monkeypatch, without_weight, first):
     """A weight and the constant that balances it at home, each alone worse than neither; and a constant that leaves little without

@@ -333,7 +333,8 @@ class AttributionSettings:
     """Energy of a subset, over that of the device without any, that stands for a larger one: a cause without its partner may
     diverge."""
     comes_back: float = 0.5
-    """Share of the error that comes back without a law, from which on a constant beside it is part of the law. Judgement."""
+    """Share of the error that comes back without a law, from which on the law is needed: a constant beside it is part of it, and its
+    own share may be uncertain. Judgement."""
     updates: int = 2
     """Estimates of the discrepancy of a set of causes, after each of which the device's own numbers are fitted: those of the accepted
     model leave several times what they leave once they are fitted, and the second ends where the tables do to a per cent or two."""
