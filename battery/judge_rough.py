@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from battery.accepted import in_si, is_right, place_is_right
+from battery.plant_hexapod import COMPONENTS
 
 # Events, lines and slow or periodic curves: each fits something of whatever is left.
 ARTEFACTS = (
@@ -45,7 +46,7 @@ class Rough:
 
 def judge_rough(answer: dict[str, Any], diagnosis: dict[str, Any]) -> Rough:
     """The judgement of a messy case, or of one with memory."""
-    truths, small = answer["planted"], answer["background"]
+    truths, small = as_weighed(answer, diagnosis), answer["background"]
     findings, dominant = by_share(diagnosis), leading(truths)
     first = findings[0] if findings else None
     named = first is not None and any(_right(first, t) for t in dominant)
@@ -64,6 +65,26 @@ def judge_rough(answer: dict[str, Any], diagnosis: dict[str, Any]) -> Rough:
 
 
 SHARES = ("share", "share_varying")  # with each record's zero point counted as mismatch, and without: both are right
+
+
+def as_weighed(answer: dict[str, Any], diagnosis: dict[str, Any]) -> list[dict[str, Any]]:
+    """The planted causes, the largest share first. Where nobody states the noise of readings in two units, a share of all of them
+    depends on how the units count beside each other: they count by what the diagnosis leaves of each, as it says."""
+    planted, errors = answer["planted"], diagnosis.get("held_out", {})
+    channels = [f"reading.{name}" for name in COMPONENTS]
+    if not set(channels) <= set(errors) or any(
+        errors[c]["noise_floor"] or not errors[c]["rms_after"] for c in channels
+    ):
+        return planted
+    left = np.array([in_si(errors[c]["rms_after"], errors[c]["unit"]) ** 2 for c in channels])
+    left = np.repeat([left[:3].mean(), left[3:].mean()], 3)
+    weights = np.repeat(np.square([answer["noise"]["sd"][0], 1e-6 * answer["noise"]["sd"][1]]), 3) / left  # [rad, um]
+    both = zip(SHARES, ("parts", "parts_varying"), ("before_parts", "before_parts_varying"), strict=True)
+    shares = {
+        key: [float(weights @ t[parts] / (weights @ answer[before])) for t in planted] for key, parts, before in both
+    }
+    weighed = [t | {key: of[k] for key, of in shares.items()} for k, t in enumerate(planted)]
+    return sorted(weighed, key=lambda t: -t["share"])
 
 
 def by_share(diagnosis: dict[str, Any]) -> list[dict[str, Any]]:

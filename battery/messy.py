@@ -184,6 +184,10 @@ def shares(bench: Bench, dominant: Sequence[Planted], small: Sequence[Planted], 
     return {
         "shares": counted.shares,
         "shares_varying": free.shares,
+        "parts": counted.parts,
+        "parts_varying": free.parts,
+        "before_parts": counted.before_parts,
+        "before_parts_varying": free.before_parts,
         "least_error": counted.error,
         "mismatch": counted.before,
     }

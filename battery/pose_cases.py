@@ -259,6 +259,10 @@ def shares(bench: Bench, dominant: Sequence[Act], small: Sequence[Act], gauge: P
     return {
         "shares": counted.shares,
         "shares_varying": free.shares,
+        "parts": counted.parts,
+        "parts_varying": free.parts,
+        "before_parts": counted.before_parts,
+        "before_parts_varying": free.before_parts,
         "least_error": counted.error,
         "mismatch": counted.before,
     }

@@ -170,8 +170,9 @@ def told(
     both = known["shares"], known["shares_varying"]
     if not all(max(pair) >= LEAST_SHARE for pair in zip(*both, strict=True)) or min(map(sum, both)) < LEAST_TOGETHER:
         raise ValueError("a cause that is not dominant on the held-out record")
-    for truth, share, varying in zip(truths, known["shares"], known["shares_varying"], strict=True):
-        truth |= {"share": share, "share_varying": varying, "family": memory.FAMILIES.get(truth["name"])}
+    for k, truth in enumerate(truths):
+        truth |= {"share": both[0][k], "share_varying": both[1][k], "family": memory.FAMILIES.get(truth["name"])}
+        truth |= {"parts": known["parts"][k], "parts_varying": known["parts_varying"][k]}
     return {
         "planted": sorted(truths, key=lambda t: -t["share"]),
         "background": rest,
@@ -179,6 +180,8 @@ def told(
         "rough": rough,
         "least_error": known["least_error"],
         "mismatch": known["mismatch"],
+        "before_parts": known["before_parts"],
+        "before_parts_varying": known["before_parts_varying"],
     }
 
 

@@ -42,11 +42,14 @@ class Stated:
 
 @dataclass(frozen=True)
 class Attribution:
-    """`shares` by cause, their sum with the rest is 1; `error`: rms over the noise's, left with all dominant causes exact."""
+    """`shares` by cause, their sum with the rest is 1, and their `parts` in each channel; `error`: rms over the noise's, left with all
+    dominant causes exact; `before`: without any, and of that the `before_parts` of each channel, in squares, whose sum is 1."""
 
     shares: list[float]
+    parts: list[list[float]]
     error: float
     before: float
+    before_parts: list[float]
 
 
 def refit(observed: Array, model: Callable[[Array], Array], columns: Array, stated: Stated) -> Array:
@@ -105,17 +108,21 @@ def attribute(
     for k, column in enumerate(columns.T):
         flat[:, k] = centred(column.reshape(shape)).ravel()
 
-    def left(present: frozenset[int]) -> float:
+    def left(present: frozenset[int]) -> Array:
+        """The mean square of each channel over their number: the sum is that of all readings."""
         x = refit(centred(observed[0]), lambda x: centred(model(present, x, 0)), flat, stated)
-        return float(np.mean(centred(observed[1] - model(present, x, 1)) ** 2))
+        return np.mean(centred(observed[1] - model(present, x, 1)) ** 2, axis=0) / shape[1]
 
     everyone = frozenset(range(causes))
     energy = {S: left(S) for S in subsets(causes)}
     nothing = energy[frozenset()]
+    parts = np.array([shapley(energy, k, causes) for k in range(causes)]) / nothing.sum()
     return Attribution(
-        [shapley(energy, k, causes) / nothing for k in range(causes)],
-        float(np.sqrt(energy[everyone])),
-        float(np.sqrt(nothing)),
+        parts.sum(axis=1).tolist(),
+        parts.tolist(),
+        float(np.sqrt(energy[everyone].sum())),
+        float(np.sqrt(nothing.sum())),
+        (nothing / nothing.sum()).tolist(),
     )
 
 
@@ -124,7 +131,7 @@ def subsets(n: int) -> list[frozenset[int]]:
     return [frozenset(S) for size in range(n + 1) for S in combinations(range(n), size)]
 
 
-def shapley(energy: dict[frozenset[int], float], k: int, n: int) -> float:
-    """What cause `k` of `n` takes away, the mean over orders."""
+def shapley(energy: dict[frozenset[int], Array], k: int, n: int) -> Array:
+    """What cause `k` of `n` takes away of the energy of each channel, the mean over orders."""
     without: Sequence[frozenset[int]] = [S for S in energy if k not in S]
     return sum((energy[S] - energy[S | {k}]) / (n * comb(n - 1, len(S))) for S in without)

@@ -165,6 +165,18 @@ def test_shares_of_the_records_to_fit_are_told_as_that():
     assert "of the records to fit" not in told(Verdict.PARTLY, finding(GAIN, 1.0))[0]
 
 
+@pytest.mark.parametrize(
+    "noise, units, says", [(None, ("um", "urad"), True), (None, ("um", "um"), False), (1.0, ("um", "urad"), False)]
+)
+def test_how_readings_in_two_units_count_is_told_where_no_noise_says_it(noise, units, says):
+    diagnosis = made(Verdict.PARTLY, finding(CREEP, 0.6))
+    (error,) = diagnosis.held_out.values()
+    diagnosis.held_out = {
+        f"reading.{k}": error.model_copy(update={"noise_floor": noise, "unit": unit}) for k, unit in enumerate(units)
+    }
+    assert ("of the error, um and urad weighed by what is left of each" in answer(diagnosis)[0]) == says
+
+
 def test_of_a_law_that_is_there_or_is_not_the_numbers_that_are_measured_stand_first():
     for kind, name, unit in (("amplifier_lag", "tau", "ms"), ("slew_rate", "rate", "V/s")):
         cause = Hypothesis(kind, "actuator:axis", "axis")

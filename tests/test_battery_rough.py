@@ -9,7 +9,19 @@ import numpy as np
 import pytest
 
 from battery import __main__ as program
-from battery import axis_cases, cases, judge, laws, memory, messy, pose_cases, rough_cases, score, servo_cases, truth
+from battery import (
+    axis_cases,
+    cases,
+    judge,
+    judge_rough,
+    laws,
+    memory,
+    messy,
+    pose_cases,
+    rough_cases,
+    score,
+    servo_cases,
+)
 from battery.accepted import is_right
 from battery.plant_axis import Axis, Scene, move
 from battery.plant_hexapod import Hexapod
@@ -119,58 +131,6 @@ def test_temperatures_under_a_drive_linear_between_samples_are_those_of_many_sma
     )
 
 
-def test_shares_of_causes_that_have_nothing_in_common_are_their_energies():
-    t = np.arange(4000) / 4000
-    waves = [a * np.sin(2 * np.pi * f * t)[:, None] for a, f in ((300.0, 5), (200.0, 9), (30.0, 17))]
-    column = 1e3 * np.cos(2 * np.pi * 3 * t)[:, None]
-
-    def model(present, x, record):
-        return sum((waves[k] for k in present), x[0] * column)
-
-    observed = sum(waves) + 0.02 * column + 50
-    stated = truth.Stated(np.array([0.01]), np.array([0.02]))
-    for zeros, rest in ((True, 450), (False, 450 + 2500)):
-        found = truth.attribute((observed, observed), model, column, stated, 2, zeros)
-        assert found.shares == pytest.approx(np.array([45000, 20000]) / (65000 + rest), rel=1e-3)
-        assert found.error == pytest.approx(np.sqrt(rest), rel=1e-3)
-        assert found.before == pytest.approx(np.sqrt(65000 + rest), rel=1e-3)
-
-
-def test_numbers_that_the_file_states_do_not_bend_to_take_a_cause():
-    """A number stated to 0.3 % that could take four fifths of the error by moving a hundred deviations; free, it would."""
-    t = np.arange(200) / 200
-    column, rest = 1e4 * np.sin(2 * np.pi * 3 * t)[:, None], 1.5e3 * np.cos(2 * np.pi * 3 * t)[:, None]
-    cause = 0.3 * column + rest
-
-    def model(present, x, record):
-        return cause * (0 in present) + x[0] * column
-
-    stated = truth.Stated(np.array([0.005]), np.array([0.003]))
-    found = truth.attribute((cause, cause), model, column, stated, 1, False)
-    assert found.before == pytest.approx(np.sqrt(np.mean(cause**2)), rel=0.03)
-    assert found.error < 1 and found.shares[0] > 0.9999
-    free = truth.Stated(np.array([0.005]), np.array([1e3]))
-    assert truth.attribute((cause, cause), model, column, free, 1, False).before < 0.5 * found.before
-
-
-def test_a_refit_ends_at_the_optimum_where_numbers_act_by_their_ratio_alone():
-    """Force over stiffness, with sensitivities by difference quotients as `size.sensitivities` has them: both alike change nothing but
-    what these err by, and a law that is missing must not send the numbers there."""
-    t = np.arange(2000) / 2000
-    a, b, missing = (np.sin(2 * np.pi * f * t)[:, None] for f in (3, 7, 11))
-
-    def model(x):
-        ratio = (1 + x[0]) / (1 + x[1])
-        return 100 * (ratio * a + ratio**3 * b)
-
-    steps = 1e-4 * np.eye(2)
-    columns = np.column_stack([((model(s) - model(-s)) / 2e-4).ravel() for s in steps])
-    observed = model(np.array([0.1, 0.0])) + 30 * missing
-    x = truth.refit(observed, model, columns, truth.Stated(np.zeros(2), np.full(2, 0.5)))
-    assert (1 + x[0]) / (1 + x[1]) == pytest.approx(1.1, abs=2e-3)
-    assert np.abs(x).max() < 0.2
-
-
 def test_laws_of_a_hexapod_act_one_behind_the_other():
     """A drive a tenth too large warms its neighbours by a tenth more, and a sensor has its gain of what it reads in the turned frame."""
     bench = pose_cases.draw_bench(np.random.default_rng(1), "mems", False)
@@ -186,12 +146,6 @@ def test_laws_of_a_hexapod_act_one_behind_the_other():
     turn, sensor = replace(act["frame_turn"], amplitude=0.05), replace(act["sensor_gain"], amplitude=0.1)
     pose = bench.reading([turn], 0)
     assert bench.reading([sensor, turn], 0) == pytest.approx(pose + sensor.change(pose, 0.1, 0), rel=1e-12)
-
-
-def test_a_share_is_the_mean_over_orders():
-    energy = {frozenset(): 10.0, frozenset({0}): 4.0, frozenset({1}): 7.0, frozenset({0, 1}): 2.0}
-    assert truth.shapley(energy, 0, 2) == pytest.approx((6 + 5) / 2)
-    assert truth.shapley(energy, 0, 2) + truth.shapley(energy, 1, 2) == pytest.approx(8.0)
 
 
 @pytest.mark.parametrize(
@@ -351,6 +305,34 @@ def test_the_cause_with_the_largest_share_is_the_first():
     assert not rough(found("backlash", "sensor:axis", 0.66)).place
     inside = rough(found("coulomb", "stage:axis", 0.6, "backlash"))
     assert inside.in_set and not inside.first
+
+
+def test_readings_in_two_units_count_as_the_diagnosis_weighs_them_where_nobody_states_the_noise():
+    """A gain that takes all of one angle away and a turn that does so of two ways: four fifths and a fifth of the squares over the noise,
+    which nobody states. What the diagnosis leaves is the noise of the ways and four times that of the angles."""
+    angle, ways = [0, 0, 1, 0, 0, 0], [0, 0, 0, 0.5, 0.5, 0]
+    planted = [
+        {"name": name, "share": sum(parts), "parts": parts, "share_varying": sum(parts), "parts_varying": parts}
+        for name, parts in (("sensor_gain", [0.8 * v for v in angle]), ("frame_turn", [0.2 * v for v in ways]))
+    ]
+    before = [0.8 * a + 0.2 * w for a, w in zip(angle, ways, strict=True)]
+    case = {
+        "planted": planted,
+        "before_parts": before,
+        "before_parts_varying": before,
+        "noise": {"sd": [1e-7, 0.02]},
+    }
+    units = {"theta": ("urad", 0.4), "delta": ("nm", 20.0)}
+    held = {
+        f"reading.{kind}_{axis}": {"rms_after": left, "noise_floor": None, "unit": unit}
+        for kind, (unit, left) in units.items()
+        for axis in "xyz"
+    }
+    turn, gain = judge_rough.as_weighed(case, {"held_out": held})
+    assert (turn["name"], turn["share"]) == ("frame_turn", pytest.approx(0.2 / (0.2 + 0.8 / 16)))
+    assert (gain["name"], gain["share_varying"]) == ("sensor_gain", pytest.approx(0.05 / 0.25))
+    stated = {channel: e | {"noise_floor": 1.0} for channel, e in held.items()}
+    assert judge_rough.as_weighed(case, {"held_out": stated}) == planted
 
 
 def test_artefacts_count_only_above_a_real_cause_and_only_if_nobody_planted_them():

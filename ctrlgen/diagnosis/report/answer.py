@@ -188,7 +188,20 @@ def _share(diagnosis: Diagnosis, main: Finding) -> list[Part]:
     whole, value = (
         f"; it takes away {text} of the error{fitted}" for text in (with_ends(main.share), per_cent(main.share.value))
     )
-    return [Part(whole, ((Yields.INTERVAL_OF_SHARE, value),) if value != whole else ())]
+    return [Part(whole, ((Yields.INTERVAL_OF_SHARE, value),) if value != whole else ()), _weighed(diagnosis)]
+
+
+def _weighed(diagnosis: Diagnosis) -> Part:
+    """', um and urad weighed by what is left of each', where no noise says how readings in two units count beside each other."""
+    errors = diagnosis.held_out.values()
+    units = list(dict.fromkeys(e.unit for e in errors))
+    if len(units) < 2 or all(e.noise_floor for e in errors):
+        return Part("")
+    by = f"{' and '.join(units)} weighed by what is left of each"
+    note = (
+        f"Shares of all readings are of squares, {by}, as no noise says how they count; the table has them by reading."
+    )
+    return Part(f", {by}", ((Yields.HOW_WEIGHED, ""),), note)
 
 
 def _beside(others: list[Finding]) -> list[Part]:

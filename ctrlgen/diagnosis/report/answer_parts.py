@@ -23,19 +23,20 @@ class Yields(IntEnum):
     SECOND_BESIDE = 7
     WHY_UNTRIED = 8
     FURTHER_MOVED = 9
-    HOW_UNEVEN = 10
-    TITLE = 11
-    FURTHER_CHANNELS = 12
-    FURTHER_RIVALS = 13
-    BESIDE = 14
-    WHAT_TO_CHECK = 15
-    UNTRIED = 16
-    UNEVEN = 17
-    INTERVALS = 18
-    KIND = 19
-    PITCH = 20
-    MOVED = 21
-    UNCERTAINTY_THAT_DECIDES = 22
+    HOW_WEIGHED = 10
+    HOW_UNEVEN = 11
+    TITLE = 12
+    FURTHER_CHANNELS = 13
+    FURTHER_RIVALS = 14
+    BESIDE = 15
+    WHAT_TO_CHECK = 16
+    UNTRIED = 17
+    UNEVEN = 18
+    INTERVALS = 19
+    KIND = 20
+    PITCH = 21
+    MOVED = 22
+    UNCERTAINTY_THAT_DECIDES = 23
 
 
 @dataclass(frozen=True)

@@ -96,7 +96,8 @@ def attribute(
     left = dict(zip(subsets, energies, strict=True))
     serves = [_needed_by(left, g, n) for g in range(n)]
     constant = [causes[of.index(g)].prior.constant for g in range(n)]
-    needed = np.array([_needed(left, g, n, seed) and not constant[g] and not constant[serves[g] or g] for g in range(n)])
+    balanced = [constant[g] or (j is not None and constant[j]) for g, j in enumerate(serves)]
+    needed = np.array([_needed(left, g, n, seed) and not balanced[g] for g in range(n)])
     parts, told = _counted(np.array([_shapley(left, g, n) for g in range(n)]), before, after, serves, needed, seed)
     whole = np.sum(left[frozenset()] - left[everyone])
     back = [float(np.sum(left[everyone - {g}] - left[everyone]) / max(whole, 1e-300)) for g in range(n)]
