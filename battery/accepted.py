@@ -40,9 +40,9 @@ FAMILIES = {
 }
 # Truth -> how the names begin that are right for a law in a region: which region is judged apart
 IN_A_REGION = {
-    **dict.fromkeys(("friction_there", "friction_from", "stick_from"), ("coulomb", "stribeck")),
+    **dict.fromkeys(("friction_there", "friction_between", "friction_from", "stick_from"), ("coulomb", "stribeck")),
     "friction_one_way": ("directional_friction", "coulomb", "stribeck"),
-    **dict.fromkeys(("damping_there", "damping_fast"), ("viscous",)),
+    **dict.fromkeys(("damping_there", "damping_between", "damping_fast"), ("viscous",)),
     **dict.fromkeys(("knee", "stop_there"), ("end_stop", "stiffness_")),
     "scratch": ("scratch", "local_error"),
     "gain_beyond": ("saturation", "drive_gain"),
@@ -53,13 +53,14 @@ IN_A_REGION = {
 _CREEPS = ("creep", "thermal")
 EVIDENCE = {
     **dict.fromkeys(("coulomb", "stribeck", "friction_there", "friction_from", "stick_from"), ("dry friction",)),
-    "friction_one_way": ("dry friction",),
+    **dict.fromkeys(("friction_between", "friction_one_way"), ("dry friction",)),
     **dict.fromkeys(("hysteresis", "backlash", "play_there"), ("hysteresis",)),
     **dict.fromkeys(("stiffening", "softening", "end_stop", "knee", "stop_there"), ("elastic nonlinearity",)),
     **dict.fromkeys(("saturation", "dead_zone", "gain_beyond"), ("drive nonlinearity",)),
     **dict.fromkeys(("drive_gain", "sensor_gain", "stiffness", "home_offset"), ("gain and offset",)),
     **dict.fromkeys(("coupling", "heat_crosstalk"), ("cross-talk",)),
-    **dict.fromkeys(("viscous", "quadratic_damping", "resonance", "damping_there", "damping_fast"), ("dynamics",)),
+    **dict.fromkeys(("viscous", "quadratic_damping", "resonance"), ("dynamics",)),
+    **dict.fromkeys(("damping_there", "damping_between", "damping_fast"), ("dynamics",)),
     **dict.fromkeys(("creep", "log_creep", "thermal_lag"), _CREEPS),
     **dict.fromkeys(("delay", "low_pass"), ("timing",)),
     **dict.fromkeys(("bow", "frame_turn", "finite_rotation", "scratch"), ("sensor geometry",)),

@@ -47,6 +47,30 @@ def make_friction_there(scene: Scene, a: float, at: float, side: float) -> Hooks
     return _gated(lugre(scene, lambda v: a, a / PRESLIDING / scene.travel), lambda t, q: on(q))
 
 
+def _between(scene: Scene, at: float, half: float) -> Callable[[float], float]:
+    """1 within `half` of the place `at`, straight down to 0 outside over the way of an edge."""
+    width = RAMP * scene.travel
+
+    def share(q: float) -> float:
+        return min(max((half - abs(q - at)) / width + 0.5, 0.0), 1.0)
+
+    return share
+
+
+def make_friction_between(scene: Scene, a: float, at: float, half: float) -> Hooks:
+    """Bristles of level a [N] within `half` of the place `at`: a tight spot."""
+    if not a:
+        return Hooks()
+    on = _between(scene, at, half)
+    return _gated(lugre(scene, lambda v: a, a / PRESLIDING / scene.travel), lambda t, q: on(q))
+
+
+def make_damping_between(scene: Scene, a: float, at: float, half: float) -> Hooks:
+    """F = -a v within `half` of the place `at`, `a` [N s/m]."""
+    on = _between(scene, at, half)
+    return Hooks(force=lambda t, q, v: -a * v * on(q))
+
+
 def make_friction_from(scene: Scene, a: float, moment: float) -> Hooks:
     """Bristles of level a [N] from `moment` [s] on."""
     if not a:
@@ -154,14 +178,20 @@ def _moment(rng: Rng, s: Scene) -> dict[str, float]:
     return {"moment": float(rng.uniform(0.25, 0.5) * s.span)}
 
 
+def _stretch(rng: Rng, s: Scene) -> dict[str, float]:
+    return {"at": float(rng.uniform(-0.6, 0.6) * s.travel), "half": float(rng.uniform(0.2, 0.4) * s.travel)}
+
+
 DRAW: dict[str, Callable[[Rng, Scene], dict[str, Any]]] = {
     "friction_there": _place,
+    "friction_between": _stretch,
     "friction_from": _moment,
     "stick_from": lambda rng, s: (
         _moment(rng, s) | {"ratio": float(rng.uniform(1.5, 2.2)), "speed": float(rng.uniform(0.1, 0.3) * s.speed)}
     ),
     "friction_one_way": lambda rng, s: {"way": float(rng.choice([-1, 1]))},
     "damping_there": _place,
+    "damping_between": _stretch,
     "damping_fast": lambda rng, s: {
         "above": float(rng.uniform(0.6, 1.3) * s.speed),
         "bend": float(rng.uniform(0, 0.1)),
@@ -177,9 +207,11 @@ DRAW: dict[str, Callable[[Rng, Scene], dict[str, Any]]] = {
     "warm_reading": lambda rng, s: {"above": 295.0},
 }
 GUESS: dict[str, Callable[[Scene], float]] = {
-    **dict.fromkeys(("friction_there", "friction_from", "friction_one_way"), laws_stage.GUESS["coulomb"]),
+    **dict.fromkeys(
+        ("friction_there", "friction_between", "friction_from", "friction_one_way"), laws_stage.GUESS["coulomb"]
+    ),
     "stick_from": laws_stage.GUESS["stribeck"],
-    **dict.fromkeys(("damping_there", "damping_fast"), laws_stage.GUESS["viscous"]),
+    **dict.fromkeys(("damping_there", "damping_between", "damping_fast"), laws_stage.GUESS["viscous"]),
     "knee": lambda s: 0.05 * max(s.axis.stiffness, 1e3),
     "stop_there": lambda s: max(s.axis.stiffness, 1e3),
     "scratch": lambda s: 30 * s.noise,
@@ -205,7 +237,7 @@ def region_of(planted: Planted) -> Region:
     s = planted.shape
     if "side" in s:
         return Region("position", s["at"], np.inf) if s["side"] > 0 else Region("position", -np.inf, s["at"])
-    if planted.name == "scratch":
+    if "half" in s:
         return Region("position", s["at"] - s["half"], s["at"] + s["half"])
     if "moment" in s:
         return Region("time", s["moment"], np.inf)

@@ -18,6 +18,7 @@ from recovery import Planted
 FRICTION, REACH, DAMPER = 0.2, 3e-6, 60.0  # N, m, N s/m
 ABOVE, BELOW, WIDTH, SPEED, MOMENT, RISE = 2e-5, -1.5e-5, 4e-6, 2e-3, 1.2, 0.02  # m, m, m, m/s, s, s
 SPRING, SCRATCH, HALF, GAIN, LEVEL, GAP = 2e4, 3e-7, 6e-6, 0.1, 0.6, 2e-6  # N/m, m, m, 1, V, m
+TIGHT, LONG = 1e-5, 2e-5  # m
 Where = Callable[[float, float, float], float]
 
 
@@ -46,6 +47,19 @@ def coulomb_below(u, t):
 
 def coulomb_after(u, t):
     return _friction(u, lambda time, q, v: beyond(time, MOMENT, RISE))
+
+
+def tight(q: float) -> float:
+    """On the stretch, with a ramp at either end."""
+    return beyond(q, TIGHT - LONG / 2, WIDTH) * beyond(-q, -TIGHT - LONG / 2, WIDTH)
+
+
+def coulomb_on_stretch(u, t):
+    return _friction(u, lambda time, q, v: tight(q))
+
+
+def viscous_on_stretch(u, t):
+    return move(u, lambda time, q, v, memory: (-5 * DAMPER * v * tight(q), memory), fine=100)
 
 
 def viscous_above(u, t):
@@ -116,6 +130,16 @@ IN_A_REGION = {
     coulomb_above: Planted("stage:axis", _FRICTION | {"edge": ABOVE}, within={"force": 0.02, "edge": 0.01}),
     coulomb_below: Planted("stage:axis", _FRICTION | {"edge": BELOW}, within={"force": 0.02, "edge": 0.01}),
     coulomb_after: Planted("stage:axis", _FRICTION | {"moment": MOMENT}, within={"force": 0.02, "moment": 0.01}),
+    coulomb_on_stretch: Planted(
+        "stage:axis",
+        _FRICTION | {"position": TIGHT, "length": LONG},
+        within={"force": 0.03, "position": 0.02, "length": 0.03},
+    ),
+    viscous_on_stretch: Planted(
+        "stage:axis",
+        {"damping": 5 * DAMPER, "position": TIGHT, "length": LONG},
+        within={"damping": 0.03, "position": 0.02, "length": 0.03},
+    ),
     viscous_above: Planted("stage:axis", {"damping": DAMPER, "edge": ABOVE}, within={"damping": 0.03, "edge": 0.02}),
     viscous_below: Planted("stage:axis", {"damping": DAMPER, "edge": BELOW}, within={"damping": 0.03, "edge": 0.02}),
     backlash_above: _PLAY,

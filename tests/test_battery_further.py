@@ -18,10 +18,12 @@ AXIS = Axis(0.5, 30.0, 2e5, 10.0, 1e-4, 10.0)
 SCENE = Scene(AXIS, 2e-5, 1e-2, 7e-5, 1.0, 1.5)
 FORCES = (
     "friction_there",
+    "friction_between",
     "friction_from",
     "stick_from",
     "friction_one_way",
     "damping_there",
+    "damping_between",
     "damping_fast",
     "knee",
     "stop_there",
@@ -319,7 +321,7 @@ def test_false_names_and_several_causes():
 
 def test_every_law_is_in_the_plan_and_gaps_come_in_sets():
     rng = np.random.default_rng(2)
-    assert {name for (name,) in region_cases.plan(rng, 12)} == set(laws_region.NAMES)
+    assert {name for (name,) in region_cases.plan(rng, 14)} == set(laws_region.NAMES)
     rows = gap_cases.plan(rng, 8)
     assert [row[2] for row in rows[:4]] == list(gap_cases.WAYS) and len({row[3] for row in rows}) == 2
     assert {row[0] for row in spike_cases.plan(rng, 6)} == {"axis", "mems", "meso"}

@@ -34,6 +34,7 @@ NUMBERS = (
 WORDS = {
     "coulomb_above": "above a position of -11.5 um (-11.51 ... -11.49 um)",
     "viscous_below": "below a position of -11.5 um (-11.51 ... -11.49 um)",
+    "coulomb_on_stretch": "between positions of 3 um (2.86 ... 3.14 um) and 5 um (4.86 ... 5.14 um)",
     "end_stop": "below a position of -3 um (-3.1 ... -2.9 um)",
     "coulomb_after": "from 1.2 s (1.1 ... 1.3 s) on",
     "viscous_at_speed": "above a speed of 2 mm/s (1.9 ... 2.1 mm/s)",

@@ -221,6 +221,7 @@ def test_the_force_of_dry_friction_at_standstill_is_whatever_holds_the_stage():
         "coulomb_above",
         "coulomb_after",
         "coulomb_below",
+        "coulomb_on_stretch",
         "directional_friction",
         "stribeck",
         "stribeck_above",

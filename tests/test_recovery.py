@@ -50,6 +50,7 @@ BELOW = ("coulomb_below", "viscous_below", "backlash_below", "stiffness_below")
 ELSEWHERE = (
     "coulomb_after",
     "viscous_above",
+    "viscous_on_stretch",
     "asymmetric_drive_hysteresis",
     "asymmetric_hysteresis",
     "slack_friction",

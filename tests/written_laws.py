@@ -26,6 +26,7 @@ from written_terms import (
     lost,
     lugre_rate,
     met,
+    on_stretch,
     past,
     powered,
     ramp,
@@ -108,6 +109,15 @@ LAWS = {
         )
         for side, sign in SIDES.items()
     },
+    "coulomb_on_stretch": (
+        {"reach": 0.02, "smoothing": 0.3, "position": 0.2, "length": 0.5, "width": 0.3},
+        lambda s, p: -p.force * s.z * on_stretch(s),
+        lambda s, p: {"z": dahl_rate(s, p)},
+    ),
+    "viscous_on_stretch": (
+        {"position": 0.2, "length": 0.5, "width": 0.3},
+        lambda s, p: -p.damping * s.velocity * on_stretch(s),
+    ),
     "viscous_at_speed": ({"speed": 0.1}, too_fast),
     **{
         f"stiffness_{side}": (

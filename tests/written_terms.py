@@ -31,6 +31,12 @@ def past(s, p, sign):
     return beyond(sign * (s.displacement - p.edge), np.hypot(p.width, s.velocity * H / 4))
 
 
+def on_stretch(s):
+    """On the stretch of 0.5 about 0.2 with the edges of `past`, 0.3 wide."""
+    width = np.hypot(0.3, s.velocity * H / 4)
+    return beyond(s.displacement + 0.05, width) - beyond(s.displacement - 0.45, width)
+
+
 def ramp(x, corner):
     """From zero on in proportion, the corner rounded."""
     return x * x / (x + corner) if x > 0 else 0.0

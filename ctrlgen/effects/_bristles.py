@@ -40,6 +40,20 @@ def falling_rate(s: LawInputs, p: LawNumbers) -> Expression:
     return (s.velocity - ca.fabs(s.velocity) * s.states.z / level) / p.reach
 
 
+class RegionalFriction(Effect, listed=False):
+    """Delta F = -f z in a region, z Dahl's bristles of `coulomb`: one law, named once per region."""
+
+    place = Place.FORCE
+    family = Family.FRICTION
+    set_valued = True
+    requires = frozenset({"velocity"})
+    source = "P. R. Dahl, AIAA Journal 14 (1976) 1675: solid friction damping; in a region"
+    states = BRISTLES
+
+    def rates(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
+        return {"z": bristle_rate(s, p)}
+
+
 class FallingFriction(Effect, listed=False):
     """Delta F = -f z in a region, z of `falling_rate`: one law, named once per region."""
 

@@ -16,6 +16,11 @@ EDGE = (
     Param("edge", "travel", (-5.0, 5.0), "displacement at which it sets in"),
     Param("width", "travel", (1e-5, 0.5), "width over which it sets in"),
 )
+STRETCH = (
+    Param("position", "travel", (-5.0, 5.0), "d_0: middle of the stretch"),
+    Param("length", "travel", (1e-3, 2.0), "w: length of the stretch"),
+    Param("width", "travel", (1e-5, 0.5), "r: width over which it sets in and ends"),
+)
 # Of a sample: an integrator's step. A force that jumps between two nodes of a step acts too long or too short by a part of it.
 STEP = 0.25
 # Of the width w of (1 + tanh(2 x/w))/2: the straight ramp that changes as gradually, in the root mean square
@@ -60,9 +65,19 @@ def below(everywhere: str) -> dict[str, ShapeBounds]:
 def beyond_edge(s: LawInputs, p: LawNumbers, side: int) -> Expression:
     """(1 + tanh(2 sigma (d - d_0)/W))/2, W^2 = w^2 + (v h/4)^2: zero before the edge d_0 on its `side` sigma, one beyond, changing over
     the width w, but no faster than within a quarter of a sample h, so that the moment at which the edge is crossed counts."""
+    return (1 + ca.tanh(2 * side * (s.displacement - p.edge) / _over(s, p))) / 2
+
+
+def on_stretch(s: LawInputs, p: LawNumbers) -> Expression:
+    """(tanh(2 (x + w/2)/W) - tanh(2 (x - w/2)/W))/2, x = d - d_0: one on the `STRETCH` w about d_0, zero elsewhere, W as of an edge."""
+    x, half, width = s.displacement - p.position, p.length / 2, _over(s, p)
+    return (ca.tanh(2 * (x + half) / width) - ca.tanh(2 * (x - half) / width)) / 2
+
+
+def _over(s: LawInputs, p: LawNumbers) -> Expression:
+    """The width of an edge, or a quarter of the way of a sample."""
     h = 0.0 if math.isnan(s.sample_time) else s.sample_time
-    width = ca.sqrt(p.width**2 + (STEP * h * s.velocity) ** 2)
-    return (1 + ca.tanh(2 * side * (s.displacement - p.edge) / width)) / 2
+    return ca.sqrt(p.width**2 + (STEP * h * s.velocity) ** 2)
 
 
 def ramp(x: Expression, corner: Expression) -> Expression:

@@ -1,23 +1,9 @@
 """Dry friction in one part of the travel, or from one moment on: a cable that drags, a seal that touches, dirt on a guide."""
 
-from ctrlgen.effects import ActsIn, Effect, Expression, Family, LawInputs, LawNumbers, Place, Side, itself
-from ctrlgen.effects._bristles import BRISTLES, CONTACT, CREEPS, bristle_rate
+from ctrlgen.effects import ActsIn, Expression, LawInputs, LawNumbers, Side, itself
+from ctrlgen.effects._bristles import BRISTLES, CONTACT, CREEPS, RegionalFriction
 from ctrlgen.effects._region import EDGE, above, below, beyond_edge
 from ctrlgen.effects._smooth_step import CLOCK, WHEN, smooth_step
-
-
-class RegionalFriction(Effect, listed=False):
-    """Delta F = -f z in a region, z Dahl's bristles of `coulomb`: one law, named once per region."""
-
-    place = Place.FORCE
-    family = Family.FRICTION
-    set_valued = True
-    requires = frozenset({"velocity"})
-    source = "P. R. Dahl, AIAA Journal 14 (1976) 1675: solid friction damping; in a region"
-    states = BRISTLES
-
-    def rates(self, s: LawInputs, p: LawNumbers) -> dict[str, Expression]:
-        return {"z": bristle_rate(s, p)}
 
 
 class CoulombAbove(RegionalFriction):

@@ -9,9 +9,10 @@ from ctrlgen.estimation.law_prior import CREEPING, ONE_IN_A_HUNDRED, ONE_IN_TEN,
 
 _REASON = (
     "A law in one part of the motion is rarer than one everywhere, and is suspected where most of the residual is. Neither the law nor "
-    "its edge is of one form; 5 %: judgement."
+    "its edge is of one form; 5 % an edge: judgement."
 )
 _FORM = 0.05
+_TWO_ENDS = _FORM * 2**0.5
 
 
 def _seen(suggested: str) -> ParameterPrior:
@@ -22,6 +23,11 @@ def _seen(suggested: str) -> ParameterPrior:
 def _edge(suggested: str) -> dict[str, ParameterPrior]:
     """Starts of the edge from the recording, wide and sharp."""
     return {"edge": _seen(suggested), "width": ParameterPrior((3e-4, 0.05))}
+
+
+def _stretch() -> dict[str, ParameterPrior]:
+    """The same of a stretch with two ends."""
+    return {"position": _seen("middles"), "length": _seen("lengths"), "width": ParameterPrior((3e-4, 0.05))}
 
 
 def _friction(where: dict[str, ParameterPrior], log_prior_odds: float) -> LawPrior:
@@ -54,6 +60,7 @@ _FRICTIONS = {
     "coulomb_above": _friction(_edge("edges_above"), ONE_IN_TEN),
     "coulomb_below": _friction(_edge("edges_below"), ONE_IN_TEN),
     "coulomb_after": _friction(_FROM_A_MOMENT, ONE_IN_A_HUNDRED),
+    "coulomb_on_stretch": replace(_friction(_stretch(), ONE_IN_TEN), model_form_error=_TWO_ENDS),
 }
 
 
@@ -83,5 +90,6 @@ IN_A_REGION: Mapping[str, LawPrior] = {
     "temperature_sensitivity_above": _law(reference=_seen("warmer")),
     "viscous_above": _law(**_edge("edges_above")),
     "viscous_below": _law(**_edge("edges_below")),
+    "viscous_on_stretch": replace(_law(**_stretch()), model_form_error=_TWO_ENDS),
     "viscous_at_speed": _law(speed=_seen("speeds")),
 }

@@ -14,7 +14,8 @@ from ctrlgen.estimation.hypothesis import PARAMETER, nominal_physics
 from ctrlgen.model.effect_terms import channels
 
 Along = tuple[str, Place | None, int]
-"""A quantity: position, distance from home, speed or size of the drive at a place and its channel; time or temperature."""
+"""A quantity: position, the same between two ends (stretch), distance from home, speed or size of the drive at a place and its channel;
+time or temperature."""
 
 
 def motion_of(
@@ -33,12 +34,15 @@ def motion_of(
             along["drive", place, i] = np.abs(value)
         if place is Place.FORCE:
             along["position", place, i], along["distance", place, i] = displacement, np.abs(displacement)
+            along["stretch", place, i] = displacement
             along["speed", place, i] = np.abs(velocity)
     names = [c.name for c in channels(nominal_physics(fit.structure.device), Place.SENSOR)]
     for i, channel in enumerate(fitter.recording.channels):
         if (name := channel.removeprefix("reading.")) in names:
             read = np.concatenate([np.where(r.valid[:, i], r.observed[:, i], 0.0) for r in records])
-            along["position", Place.SENSOR, names.index(name)] = read
+            along["position", Place.SENSOR, names.index(name)] = along["stretch", Place.SENSOR, names.index(name)] = (
+                read
+            )
     return along
 
 
@@ -53,7 +57,7 @@ def on_either_side(motion: Mapping[Along, np.ndarray]) -> dict[Along, tuple[Regi
         )
         for key, x in motion.items()
         # a stretch has two ends
-        if key[1] is not Place.SENSOR and np.ptp(x) > 0
+        if key[0] != "stretch" and key[1] is not Place.SENSOR and np.ptp(x) > 0
     }
 
 
@@ -75,7 +79,7 @@ def suggested(regions: Mapping[Along, tuple[Region, ...]], place: Place, i: int)
 
     above = beyond(at("position"))
     below = tuple(region.high for region in at("position") if np.isinf(region.low))
-    stretches = at("position") if place is Place.SENSOR else ()
+    stretches = at("stretch")
     return {
         "since": beyond(at("time", None, 0)),
         "warmer": beyond(at("temperature", None, 0)),
@@ -114,7 +118,12 @@ def no_region(motion: Mapping[Along, np.ndarray], fit: Fit, k: int) -> str | Non
         return None
     edge = values[where.at]
     if where.side is Side.AROUND:
-        inside = np.abs(x - edge) < values[where.length] / 2
+        half = values[where.length] / 2
+        inside = np.abs(x - edge) < half
+        visited = min(np.mean(x < edge - half), np.mean(x > edge + half))
+        # a reading that is off at the end of its scale has no law of one edge
+        if cause.law.place is not Place.SENSOR and visited < REGIONS.least_inside:
+            return "one of its ends lies beyond all that was recorded, so that nothing tells it from the law beyond one edge"
     elif where.side is Side.BOTH:
         inside = np.abs(x) > edge
     else:

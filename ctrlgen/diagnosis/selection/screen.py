@@ -217,8 +217,9 @@ class Screen:
         self._follow(fit)
         if not self.motion:
             return {}
-        stretches = [key for key in self.motion if key[1] is Place.SENSOR]
-        return find_regions(Leftover.of(fit), self.motion, stretches, self.seed)
+        sought = {key: x for key, x in self.motion.items() if key[:2] != ("position", Place.SENSOR)}
+        stretches = [key for key in sought if key[0] == "stretch"]
+        return find_regions(Leftover.of(fit), sought, stretches, self.seed)
 
     def _screened(
         self,
