@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from misfits import noise_of, record
 from recording_folders import SERVO, servo_poses
 
 import ctrlgen
@@ -95,6 +97,35 @@ def test_poses_that_repeat_better_than_what_is_left_say_that_physics_is_left(tab
     given = replace(recording, records=tuple(map(repeated, recording.records)))
     before, after = corrected(table, given)
     assert after is before
+
+
+def of_three_channels(*sizes: float, law: float = 0.0):
+    """Noise of three channels, stated as one, after what is left of two records is `sizes` of it; the last has a square of the drive
+    beside, `law` times it."""
+    rng = np.random.default_rng(7)
+    drives = [rng.uniform(-1, 1, (60, 1)) for _ in range(2)]
+    parts = [
+        record(role, 60, 3, rng.standard_normal((60, 3)) * sizes + law * u**2 * [0, 0, 1], u)
+        for role, u in zip(("fit", "hold_out"), drives, strict=True)
+    ]
+    recording = SimpleNamespace(records=parts, units=("um",) * 3, channels=("reading.x", "reading.y", "reading.z"))
+    stated = replace(noise_of(3), sources=(NoiseSource.STATED_WHITE,) * 3)
+    fitter = SimpleNamespace(recording=recording, noise=stated, predict=lambda fit, r: np.zeros(r.observed.shape))
+    return stated_pose_noise(fitter, SimpleNamespace(theta=np.zeros(3)))
+
+
+def test_channels_whose_noise_is_stated_as_one_number_have_one_noise():
+    assert of_three_channels(2.0, 2.0, 2.0).sd == pytest.approx(np.full(3, 2.0), rel=0.1)
+    assert of_three_channels(1.0, 1.0, 1.0).sd == pytest.approx(np.ones(3), rel=1e-12)
+
+
+def test_what_is_left_of_three_channels_is_no_noise_where_it_differs():
+    """What is left of small laws that nothing tells, 1.3 and 1.9 times the noise of the third channel."""
+    assert of_three_channels(1.3, 1.9, 1.0).sd == pytest.approx(np.ones(3), rel=1e-12)
+
+
+def test_a_channel_that_holds_physics_has_the_noise_of_those_that_do_not():
+    assert of_three_channels(2.0, 2.0, 2.0, law=20.0).sd == pytest.approx(np.full(3, 2.0), rel=0.15)
 
 
 @pytest.mark.long

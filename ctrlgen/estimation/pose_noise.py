@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
@@ -18,38 +19,77 @@ def stated_pose_noise(fitter: Fitter, fit: Fit) -> Noise:
 
     What is left is noise of another size where no function of the drive predicts it (F test of drives, their squares and the way
     that each came), it has no memory from pose to pose (Ljung-Box), and the held-out poses have no more of it. Where poses repeat, they
-    vary as much: lost motion and creep only widen that.
+    vary as much: lost motion and creep only widen that. Channels whose noise is stated as the same number have the same noise: those
+    of which what is left is noise must agree on its size, and none may have less; one that has more holds physics beside it.
     """
-    recording, noise = fitter.recording, fitter.noise
-    records = [r for r in recording.records if r.role != "rest"]
-    left = [r.observed - fitter.predict(fit, r) for r in records]
+    noise = fitter.noise
+    every = ((i, _left(fitter, fit, i)) for i in np.flatnonzero(noise.stated).tolist())
+    left = {i: e for i, e in every if e is not None}
     sd, notes, sources, count = noise.sd.copy(), list(noise.notes), list(noise.sources), noise.count.copy()
-    for i in np.flatnonzero(noise.stated).tolist():
-        e = [v[r.valid[:, i], i] for v, r in zip(left, records, strict=True)]
-        features = np.vstack([_features(r.drive)[r.valid[:, i]] for r in records])
-        fitted = np.concatenate([np.full(len(v), r.role == "fit") for v, r in zip(e, records, strict=True)])
-        values = np.concatenate(e)
-        # each channel pays for its part of the numbers that were fitted
-        free = len(values) - len(fit.theta) / len(noise.sd)
-        if len(values) < NOISE_UPDATE.fewest_poses or free < len(values) / 2 or not np.isfinite(values).all():
+    for alike in _stated_alike(fitter, left):
+        told = [left[i] for i in alike if left[i].is_noise]
+        free = sum(e.free for e in told)
+        size = float(np.sqrt(sum(e.squares for e in told) / free)) if told else np.nan
+        ratio = size / noise.floor[alike[0]]
+        if not told or not 1 / NOISE_UPDATE.stated_factor < ratio < NOISE_UPDATE.stated_factor:
             continue
-        squares = float(values @ values)
-        size = float(np.sqrt(squares / free))
-        ratio = size / noise.floor[i]
-        off = 2 * min(float(f(squares / noise.floor[i] ** 2, free)) for f in (stats.chi2.cdf, stats.chi2.sf))
-        known = 1 / NOISE_UPDATE.stated_factor < ratio < NOISE_UPDATE.stated_factor
-        if not known or abs(ratio - 1) < NOISE_UPDATE.stated_margin or off > NOISE_UPDATE.noise_alone_p:
+        off = 2 * min(float(f(ratio**2 * free, free)) for f in (stats.chi2.cdf, stats.chi2.sf))
+        if abs(ratio - 1) < NOISE_UPDATE.stated_margin or off > NOISE_UPDATE.noise_alone_p:
             continue
-        if not _is_noise_alone(values, features, fitted, e) or _repeats_better(records, i, size, free):
+        if not all(_agrees(left[i], size, len(alike)) for i in alike):
             continue
-        sd[i], count[i], sources[i] = size, free, NoiseSource.RESIDUAL
-        notes[i] = (
-            f"{recording.channels[i]}: the stated noise is {1 / ratio:.2f} of what is left, which has nothing to do with the drive "
-            f"and no memory; {NoiseSource.RESIDUAL.value}"
-        )
+        for i in alike:
+            sd[i], count[i], sources[i] = size, free, NoiseSource.RESIDUAL
+            notes[i] = (
+                f"{fitter.recording.channels[i]}: the stated noise is {1 / ratio:.2f} of what is left, which has nothing to do with "
+                f"the drive and no memory; {NoiseSource.RESIDUAL.value}"
+            )
     if np.array_equal(sd, noise.sd):
         return noise
     return replace(noise, sd=sd, sources=tuple(sources), notes=tuple(notes), count=count)
+
+
+@dataclass(frozen=True)
+class _Left:
+    """The `squares` that a fit leaves of a channel, in `free` readings, and whether they are those of noise alone (`is_noise`)."""
+
+    squares: float
+    free: float
+    is_noise: bool
+
+
+def _left(fitter: Fitter, fit: Fit, i: int) -> _Left | None:
+    """What is left of channel `i`; None of too few readings."""
+    records = [r for r in fitter.recording.records if r.role != "rest"]
+    e = [(r.observed - fitter.predict(fit, r))[r.valid[:, i], i] for r in records]
+    features = np.vstack([_features(r.drive)[r.valid[:, i]] for r in records])
+    fitted = np.concatenate([np.full(len(v), r.role == "fit") for v, r in zip(e, records, strict=True)])
+    values = np.concatenate(e)
+    squares = float(values @ values)
+    # each channel pays for its part of the numbers that were fitted
+    free = len(values) - len(fit.theta) / len(fitter.noise.sd)
+    if len(values) < NOISE_UPDATE.fewest_poses or free < len(values) / 2 or not np.isfinite(values).all():
+        return None
+    alone = _is_noise_alone(values, features, fitted, e)
+    return _Left(squares, free, alone and not _repeats_better(records, i, float(np.sqrt(squares / free)), free))
+
+
+def _stated_alike(fitter: Fitter, channels: Iterable[int]) -> list[list[int]]:
+    """The channels in groups whose noise is stated as the same number of one unit."""
+    groups: dict[tuple[str, float], list[int]] = {}
+    for i in channels:
+        groups.setdefault((fitter.recording.units[i], float(fitter.noise.floor[i])), []).append(i)
+    return list(groups.values())
+
+
+def _agrees(left: _Left, size: float, channels: int) -> bool:
+    """Whether a channel, one of several, may have noise of this `size`: what is left is as large where it is noise, and no smaller
+    where it is not."""
+    x = left.squares / size**2
+    p = float(stats.chi2.cdf(x, left.free))
+    if left.is_noise:
+        p = 2 * min(p, float(stats.chi2.sf(x, left.free)))
+    return p * channels > NOISE_UPDATE.pose_alone_p
 
 
 def _features(drive: np.ndarray) -> np.ndarray:
