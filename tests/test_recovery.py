@@ -17,6 +17,7 @@ from recovery import N, Planted, fitter_of, recover
 import ctrlgen.effects  # noqa: F401
 from battery import laws
 from battery.hexapod_cases import FAULTS
+from battery.plant_hexapod import Hexapod
 from ctrlgen import load_device
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
@@ -120,6 +121,22 @@ def test_of_heaters_with_a_second_lag():
         y = warmed(u) * np.repeat([1, 1e-6], 3) + np.repeat([TURNED, SHIFTED], 3) * rng.standard_normal((n, 6))
         parts.append(record(u, y, role))
     recover(poses_of(parts, "series"), hexapod(), "second_pole", Planted("actuator:all", {"share": 0.1, "tau": 0.05}))
+
+
+@pytest.mark.parametrize("scale", [0.2, -0.04])
+def test_a_scale_of_an_angle_is_the_sensors_before_it_is_a_weights(scale):
+    """At angles of a milliradian the moment of a weight is in proportion to the angle, as an error of the scale is."""
+    rng, parts = np.random.default_rng(5), []
+    for n, role in ((60, "fit"), (30, "hold_out")):
+        u = rng.uniform(0.05, 0.5, (n, 6))
+        y = Hexapod().settled(u) * np.array([1, 1, 1 + scale, 1e-6, 1e-6, 1e-6])
+        parts.append(record(u, y + np.repeat([TURNED, SHIFTED], 3) * rng.standard_normal((n, 6)), role, h=np.inf))
+    fitter = poses_of(parts, "poses")
+    suspected = [
+        Hypothesis(law, f"{at}:theta_z", "theta_z") for law, at in (("payload", "mechanism"), ("sensor_gain", "sensor"))
+    ]
+    found = Searcher(fitter, Screen(fitter, suspected), lambda _: None).run(hexapod())
+    assert [c.effect for c in found.chosen.causes] == ["sensor_gain"]
 
 
 @pytest.mark.parametrize("effect", IN_ORDER)

@@ -16,7 +16,7 @@ class Payload(Effect):
     channel_unit = "rad"
     source = "definition: moment of a weight about a horizontal axis"
     params = (
-        Param("share", "1", (-0.5, 0.5), "angle of bending per angle of lean, near upright", off=0.0),
+        Param("share", "1", (-0.3, 0.3), "angle of bending per angle of lean, near upright", off=0.0),
         Param("lean", "deg", (-180.0, 180.0), "how far the centre of mass leans at home"),
     )
     at_bounds = itself("lean")

@@ -323,7 +323,11 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             "On a stage of constant stiffness the same as a gain of the drive, which is named first: judgement.",
             log_prior_odds=ONE_IN_TEN,
         ),
-        "payload": LawPrior("Upright, or hanging out sideways.", parameters={"lean": _starts((0.0, 90.0))}),
+        "payload": LawPrior(
+            "Upright, or hanging out sideways. Of small angles the same as a scale of the sensor, which is named first: judgement.",
+            log_prior_odds=ONE_IN_TEN,
+            parameters={"share": ParameterPrior(deviation=ASSUMED_SCALE), "lean": _starts((0.0, 90.0))},
+        ),
         **dict.fromkeys(
             (f"frame_rotation_{axis}" for axis in "xyz"),
             LawPrior(
