@@ -11,6 +11,10 @@ from ctrlgen.recordings.formats.text_cells import cells_of
 from ctrlgen.recordings.formats.unit_texts import unit_of
 
 DECLARED_NAME = re.compile(r"^\s*#\s*NAME(\d+)\s*=\s*(.+?)\s*$")
+LISTED = re.compile(
+    r"^\W*(?:column|col|channel|field|spalte|kanal)?[\s.]*(?P<k>\d+)\s*[:=.)]\s*(?P<name>[^\W\d].*?)\s*$", re.IGNORECASE
+)
+"""A line for each column: `# 1: t [s]`, `Column 2: Drive (V)`."""
 DECLARED_TIME = re.compile(r"^\s*#\s*SAMPLE_TIME\s*=\s*([\d.eE+-]+)\s*$")
 PAIRED = 2  # header rows in which every second cell repeats a key, as TwinCAT Scope writes them
 TOA = ("TOA5", "TOACI1")
@@ -32,6 +36,11 @@ def declared_names(lines: Sequence[str], block: Block, separator: str) -> Header
         notes = ("names are those that the header declares",)
         return Header(names, units_behind(names), notes=notes, sample_times=declared_time(lines, block))
     filled = [k for k in block.above if lines[k].strip()]
+    listed = [LISTED.match(lines[k]) for k in filled[-block.width :]]
+    found = {int(m["k"]): m["name"] for m in listed if m}
+    if len(found) == block.width > 1 and list(found) in ([*range(block.width)], [*range(1, block.width + 1)]):
+        names = tuple(found.values())
+        return Header(names, units_behind(names), notes=("names are those that the header lists, a line each",))
     kind = cells_of(lines[filled[0]], separator)[0] if filled else ""
     if kind not in TOA or len(filled) < 2 or len(names := tuple(cells_of(lines[filled[1]], separator))) != block.width:
         return None

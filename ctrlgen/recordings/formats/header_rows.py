@@ -23,7 +23,7 @@ FACTOR_LABELS = {
     "skalierung",
     "verst\u00e4rkung",
 }
-UNIT_LABELS = {"unit", "units", "einheit", "einheiten", "vunit", "vertical units", "y_unit_label"}
+UNIT_LABELS = {"unit", "units", "einheit", "einheiten", "vunit", "vertical units", "yunits", "y_unit_label"}
 DATES = re.compile("time|date|zeit|datum", re.IGNORECASE)
 MOST_PASSED = 3  # lines that hold neither names nor units and are shown
 LONGEST_SHOWN = 60  # characters of a line that a note shows
@@ -60,6 +60,9 @@ def names_and_units(candidates: Sequence[tuple[int, list[str]]], numeric: Collec
         return Header(())
     lines, rows = [line + 1 for line, _ in candidates], [cells for _, cells in candidates]
     names_at, units_at = _roles(rows, numeric)
+    if units_at == names_at == 0 and len(rows) == 1:  # labelled units, and no names
+        stated = {k: cell for k, cell in enumerate(rows[0]) if k and unit_of(cell)}
+        return Header(("",) * len(rows[0]), stated, notes=(f"line {lines[0]} holds units",))
     above = rows[names_at + 1] if names_at + 1 < len(rows) and names_at + 1 != units_at else []
     if units_at is not None and _tells_more(above, rows[names_at]):
         names_at, above = names_at + 1, []
@@ -73,6 +76,11 @@ def names_and_units(candidates: Sequence[tuple[int, list[str]]], numeric: Collec
     if units_at is not None and units_at != names_at:
         notes.append(f"line {lines[units_at]} holds units")
         stated = {k: cell for k, cell in enumerate(rows[units_at]) if cell and not is_number(cell) and unit_of(cell)}
+        notes += [
+            f"{names[k]}: its name says {unit}, line {lines[units_at]} says {stated[k]}, which is taken: write the right one"
+            for k, unit in units.items()
+            if k in stated and unit_of(unit) not in (None, unit_of(stated[k]))
+        ]
         units |= {k: cell.strip("[](){} ") for k, cell in stated.items()}
     between = range(max(names_at, units_at or 0))
     notes += _passed([(lines[n], rows[n]) for n in between if n not in (names_at, units_at)])

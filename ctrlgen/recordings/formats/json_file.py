@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from ctrlgen.recordings.formats.measurement_table import MeasurementTable
 from ctrlgen.recordings.formats.nested_columns import collected, columns_of, entries_beside
 from ctrlgen.recordings.formats.stated_rate import rate_of
 from ctrlgen.recordings.formats.text_encoding import decoded
+from ctrlgen.recordings.formats.unit_columns import units_beside
 from ctrlgen.recordings.formats.written_layout import Layout
 
 
@@ -42,6 +44,7 @@ def read(path: Path, layout: Layout) -> dict[str, MeasurementTable]:
         raise fault(path, f"is no JSON: line {error.lineno}: {error.msg}; export it again") from None
     content = _as_columns(content)
     columns, units, aliases, said = collected(columns_of(content))
+    units = _units_of_rows(content, columns) | units
     return {
         "data": MeasurementTable(
             path,
@@ -72,6 +75,21 @@ def _as_columns(content: Any) -> Any:
                 by_row if len(content) > len(first) else {name: list(part.values()) for name, part in content.items()}
             )
     return _with_names(content)
+
+
+def _units_of_rows(content: Any, columns: Collection[str]) -> dict[str, str]:
+    """Units that stand in every row beside their number, by the name of its column."""
+    lists = (
+        {name: cells for name, cells in content.items() if isinstance(cells, list)} if isinstance(content, dict) else {}
+    )
+    names = list(lists)
+    texts = {
+        k: lists[name]
+        for k, name in enumerate(names)
+        if name not in columns and all(isinstance(c, str) for c in lists[name])
+    }
+    beside = units_beside(names, texts, {k for k, name in enumerate(names) if name in columns})
+    return {names[k]: texts[j][0] for k, j in beside.items()}
 
 
 def _with_names(content: Any) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
@@ -18,6 +19,12 @@ SHARED = 1.5  # rows an instant, from which several signals are read at one time
 CHANGING = (
     0.5  # share of rows whose name is another than the row's before, from which a name is no state of the machine
 )
+SOURCES = frozenset((
+    "axis", "axes", "ch", "chan", "channel", "sensor", "probe", "motor", "joint", "node", "device", "slave", "addr", "address",
+    "id", "achse", "kanal",
+))  # fmt: skip
+"""Words of columns that name what a row was read of."""
+MOST_IN_TURN, FEWEST_IN_TURN = 16, 12
 Column = np.ndarray[Any, Any]
 
 
@@ -28,6 +35,7 @@ def widened(table: MeasurementTable) -> MeasurementTable:
     """
     found = _parts(table)
     if found is None:
+        _check_in_turn(table)
         _check_mixed(table)
         return table
     names, time, value, unit = found
@@ -109,6 +117,26 @@ def _check_mixed(table: MeasurementTable) -> None:
     if 2 <= len(set(cells)) <= min(MOST_SIGNALS, len(cells) // 2) and changing >= CHANGING:
         told = f"column {words[0]!r} names its signal ({', '.join(sorted(set(cells))[:5])})"
         raise table.fault(f"holds one reading a row and no time: {told}; log each with a time stamp")
+
+
+def _check_in_turn(table: MeasurementTable) -> None:
+    """Raises InputError where a column names the axis, or the sensor, of each row and several are written in turn: their readings are no
+    motion of one."""
+    for name, column in table.columns.items():
+        if len(column) < FEWEST_IN_TURN or not SOURCES & set(re.findall(r"[a-z]+", bare_name(name).lower())):
+            continue
+        cells = [str(cell) for cell in column]
+        changing = float(np.mean([a != b for a, b in pairwise(cells)]))
+        if 2 <= len(set(cells)) <= MOST_IN_TURN and changing >= CHANGING and _as_often(cells):
+            listed = ", ".join(sorted(set(cells))[:5])
+            told = f"holds rows of several sources in turn: column {name!r} goes through {listed}"
+            raise table.fault(f"{told}; write those of each to a file of its own")
+
+
+def _as_often(cells: list[str]) -> bool:
+    """Whether different cells stand in about as many rows each."""
+    counts = sorted(map(cells.count, set(cells)))
+    return counts[0] >= CHANGING * counts[-1]
 
 
 def _begins_with_a_word(column: Column) -> bool:

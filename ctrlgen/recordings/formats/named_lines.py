@@ -33,6 +33,8 @@ NAMED = re.compile(
 )
 """One number, or time, and its name."""
 BEFORE = re.compile(rf"^[\s(\[]*(?P<stamp>{STAMP}|\d{{9,19}}(?:\.\d+)?|\d+\.\d{{3,}})(?=[\s)\],;:|]|$)", re.ASCII)
+SINCE_BOOT = re.compile(r"^\s*[EWIDV] \((?P<stamp>\d+)\)(?=\s)")
+"""Of the ESP32 and its kin: milliseconds since it was switched on."""
 BEHIND = re.compile(r"\s(?P<stamp>\d{10,19})\s*$", re.ASCII)  # of the line protocol of InfluxDB
 DIGITS = re.compile(r"\d+(?:\.\d+)?")
 
@@ -75,7 +77,9 @@ def named_table(path: Path, lines: Sequence[str], notes: Sequence[str], layout: 
     names = list(dict.fromkeys(name for line in rows for name in line.cells))
     columns, units = dict[str, np.ndarray](), dict[str, str]()
     if timed := sum(bool(line.stamp) for line in rows) == len(rows):
-        columns["time" if "time" not in names else "time of line"] = np.array([r.stamp for r in rows], dtype=object)
+        when = "time" if "time" not in names else "time of line"
+        columns[when] = np.array([r.stamp for r in rows], dtype=object)
+        units |= {when: "ms"} if all(SINCE_BOOT.match(lines[r.place]) for r in rows) else {}
     for name in names:
         columns[name] = np.array([line.cells[name][0] if name in line.cells else None for line in rows], dtype=object)
         stated = {line.cells[name][1] for line in rows if name in line.cells}
@@ -97,7 +101,7 @@ def named_table(path: Path, lines: Sequence[str], notes: Sequence[str], layout: 
 
 def _parsed(place: int, line: str) -> _Line:
     cells, twice, kept, last = dict[str, tuple[str, str]](), False, list[str](), 0
-    before = BEFORE.match(line)
+    before = BEFORE.match(line) or SINCE_BOOT.match(line)
     for m in NAMED.finditer(line):
         unit = m["unit"] or ""
         if unit and unit_of(unit) is None:

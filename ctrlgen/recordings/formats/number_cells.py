@@ -94,7 +94,8 @@ OVER = frozenset(
 )
 """Words of instruments for a reading beyond their range, or lost."""
 NO_READING = re.compile(
-    r"[-\u2013*#?_.<>~+=/ ]+|[-+]?(over|under|ovr|ofl|ovf|ol)[-+]?|no (signal|data|reading)|not ?a ?number|n\.a\.|\(null\)",
+    r"[-\u2013*#?_.<>~+=/ ]+|[-+]?(over|under|ovr|ofl|ovf|ol)[-+]?|no[ _]?(signal|data|reading|value)|[-+]?F{4,}|-?1\.#[A-Z]+\d*"
+    r"|not ?a ?number|n\.a\.|\(null\)",
     re.IGNORECASE,
 )
 """The same within a column of numbers: nothing but signs, as in a display without a reading, and words that are names elsewhere."""
@@ -105,7 +106,7 @@ ZONES = "(?:UTC|GMT|WES?T|BST|CES?T|MEZ|MESZ|EES?T|[ECMP][SD]T|[JK]ST)"
 TIME = re.compile(
     rf"{DATE}|({DATE}[T ,;]\s*)?{CLOCK}\s*(Z|{ZONES}|[+-]\d{{2}}:?\d{{2}})?|\d{{8}}T\d{{6}}([.,]\d+)?Z?", re.ASCII
 )
-HEXADECIMAL = re.compile(r"0[xX][0-9A-Fa-f]+|[0-9A-Fa-f]+h", re.ASCII)
+HEXADECIMAL = re.compile(r"0[xX][0-9A-Fa-f]+|[0-9A-Fa-f]+h|[0-9A-F]{4,}|(?=.*\d)[0-9A-F]{2,}", re.ASCII)
 TOGETHER = re.compile(r"[+-]?\d+(?:[+-]\d+)*\+\d+(?:[+-]\d+)*", re.ASCII)
 FORMULA = re.compile(r"=.+")
 DIGITS = re.compile(r"[^A-Za-z]*\d[^A-Za-z]*")
@@ -124,9 +125,13 @@ OTHERWISE = (
     (re.compile(r"^[\u2010-\u2015\ufe63\uff0d](?=[\d.,])"), "-"),
     (re.compile(r"(?<=[\d.,])\s*[*x\u00b7\u00d7]\s*10\s*\^\s*(?=[+-]?\d)"), "e"),
     (re.compile(r"(?<=[\d.,])[ ]+(?=[eE][+-]?\d)"), ""),
+    (re.compile(r"^'(?=[+-]?[.\d])"), ""),
+    (re.compile(r'^="([^"]*)"$'), r"\1"),
+    (re.compile(r"^(?:np|numpy)\.\w+\(([^()]*)\)$"), r"\1"),
+    (re.compile(r"^([+-]?(?:\d+\.\d*|\.\d+))f$", re.ASCII), r"\1"),
 )
 """What programs write otherwise, and what stands in its place: blanks behind a sign, which fill a column; a minus behind its number; a dash
-for a minus; 10 to a power; a blank before an exponent."""
+for a minus; 10 to a power; a blank before an exponent; the marks of texts of a spreadsheet; scalars of NumPy; floats of C."""
 BLANKS = ("\u00a0", "\u202f", "\u2009", " ")
 
 

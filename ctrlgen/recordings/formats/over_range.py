@@ -14,6 +14,8 @@ HUGE = 9e29  # no reading in any unit: SCPI says 9.9e37 and 9.91e37, others 1e30
 COUNTS = (-9999, 9999, -99999, 99999, -999, -9999.99, 99999.9, 999999, -999999, 9999999, -32768, 32767, 65535, -2147483648, 2147483647,
           4294967295, 8388607, -8388608, 16777215, -999.25, -1e10, 1e10, -1e20, 1e20)  # fmt: skip
 """Numbers that loggers and converters write for none; some are readings, so they count only where they are far from all else."""
+LIMITS = frozenset(f"{2**bits - end}" for bits in (15, 16, 23, 24, 31, 32) for end in (0, 1))
+"""Digits of the ends of a converter's counts: times a power of ten, as a logger writes them in a unit, they are marks as well."""
 NINES = re.compile(r"-?9+\.?9*")
 FEWEST_NINES = 4  # of a number that fills the display of a sensor: 99.99
 NEAR = 0.25  # spans: one of `COUNTS` that repeats and stands between this and `FAR` beyond all others may be either, and is asked
@@ -61,12 +63,18 @@ def without_marks(
 
 
 def _full_displays(values: np.ndarray) -> list[float]:
-    """The ends of a range that are nothing but nines, such as 99.9999, as a display shows them that is full."""
+    """The ends of a range that are nothing but nines, such as 99.9999, as a display shows them that is full, or those of a converter times
+    a power of ten, such as -3276.8."""
     finite = values[np.isfinite(values)]
     ends = (float(finite.min()), float(finite.max())) if len(finite) else ()
     texts = ((end, f"{end:.10g}") for end in ends)
     return [
-        end for end, text in texts if text.count("9") >= FEWEST_NINES and NINES.fullmatch(text) and end not in COUNTS
+        end
+        for end, text in texts
+        if end not in COUNTS
+        and (
+            (text.count("9") >= FEWEST_NINES and NINES.fullmatch(text)) or text.replace(".", "").lstrip("-0") in LIMITS
+        )
     ]
 
 

@@ -1,4 +1,4 @@
-"""Time in two columns, whole seconds and their fraction: a stamp of ROS, a date with milliseconds beside it."""
+"""Time in two columns: whole seconds and their fraction, a stamp of ROS, a date with milliseconds beside it; a date and the time of day."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from ctrlgen.core.errors import InputError
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
+from ctrlgen.recordings.formats.number_cells import CLOCK, DATE
 from ctrlgen.recordings.formats.unit_texts import bare_name
 
 FRACTIONS = (
@@ -22,8 +23,17 @@ FRACTIONS = (
 
 
 def with_whole_time(table: MeasurementTable) -> MeasurementTable:
-    """The table with one column of time more, at its end, where a column of whole seconds has that of their fraction behind it."""
+    """The table with one column of time more, at its end, where a column of whole seconds has that of their fraction behind it, or one of
+    dates, which change, that of the time of day beside it: alone, this would tell a midnight, but not how many."""
     names = list(table.columns)
+    for pair in pairwise(names):
+        for date, clock in (pair, pair[::-1]):
+            cells = _dated(table.columns[date], table.columns[clock])
+            if cells is not None:
+                whole = f"time ({date} + {clock})"
+                note = f"{whole}: {date} holds dates and {clock} the time of day, read as one time"
+                columns, parts = {**table.columns, whole: cells}, frozenset(pair)
+                return replace(table, columns=columns, notes=(*table.notes, note), time_parts=parts)
     for before, name in pairwise(names):
         last = re.split(r"[./]", bare_name(name))[-1]
         size = next((size for pattern, size in FRACTIONS if pattern.fullmatch(last)), 0.0)
@@ -34,6 +44,21 @@ def with_whole_time(table: MeasurementTable) -> MeasurementTable:
             units, parts = {**table.units, whole: "s"}, frozenset((before, name))
             return replace(table, columns=columns, units=units, notes=(*table.notes, note), time_parts=parts)
     return table
+
+
+def _dated(dates: np.ndarray, clock: np.ndarray) -> np.ndarray | None:
+    """Texts of dates and of times of day (n,) as one text a row; None where the columns are no such pair or hold one date."""
+    if any(np.asarray(column).dtype.kind != "O" for column in (dates, clock)) or len(dates) != len(clock):
+        return None
+    days, times = ([c.strip() if isinstance(c, str) else "" for c in column] for column in (dates, clock))
+    if len(set(days) - {""}) < 2 or not all(re.fullmatch(DATE, day, re.ASCII) for day in set(days) - {""}):
+        return None
+    known = [time for time in times if time]
+    if not known or not all(re.fullmatch(CLOCK, time, re.ASCII) for time in known):
+        return None
+    return np.array(
+        [f"{day} {time}" if day and time else None for day, time in zip(days, times, strict=True)], dtype=object
+    )
 
 
 def _joined(table: MeasurementTable, before: str, name: str, size: float) -> np.ndarray | None:

@@ -6,6 +6,7 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Sequence
+from itertools import pairwise
 
 from ctrlgen.recordings.formats.layout_question import Ambiguous
 from ctrlgen.recordings.formats.number_cells import DATE, is_number, is_reading
@@ -13,6 +14,8 @@ from ctrlgen.recordings.formats.written_layout import MARKS, Layout
 
 SEPARATORS = ("\t", ";", "|", ",", " ")  # where two fit alike the earlier is meant: nobody writes numbers with it
 COMMENTS = ("#", "%", "//", "!")  # at the beginning of a line
+WORDED = re.compile(r"\s*(?:REM\b|\*\s+(?=[A-Za-z]))")
+"""The same before words: of BASIC, of SPICE. A star alone is a reading that did not fit."""
 ERRORS = re.compile(
     r"\s*#(N/?A|NV|NUM!|VALUE!|DIV/0!|REF!|NAME\?)\s*[^\w\s]", re.IGNORECASE
 )  # of a spreadsheet, and a separator
@@ -28,6 +31,8 @@ STARTS_WITH_NUMBER = re.compile(r'\s*"?[+-]?[.,]?\d')
 INSIDE = re.compile(r"\d\s*[,;\t ]")  # a number and more: (12.3) alone is how accountants write -12.3
 RULE = re.compile(r"[\s|+:=\-]*(?:-{2,}|={2,})[\s|+:=\-]*")
 """A line that is drawn between the names of a printed table and its rows: |---|---|."""
+RULED = re.compile(r"[\s,;|]*[-=]{2,}(?:[\s,;|]+[-=]{2,})+[\s,;|]*")
+"""The same between separators, under names and no row of numbers: ----,----."""
 DRAWN = str.maketrans({**dict.fromkeys("\u2502\u2506\u2551", "|"), **dict.fromkeys("\u2500\u2550\u2501", "-"),
                        **dict.fromkeys("\u250c\u252c\u2510\u251c\u253c\u2524\u2514\u2534\u2518\u255e\u256a\u2561", "+")})  # fmt: skip
 """Signs of which tables are drawn."""
@@ -38,12 +43,16 @@ NAMED = {"tab": "\t", "comma": ",", "semicolon": ";"}
 
 def is_comment(line: str) -> bool:
     """Whether a line is a remark: in a header it may hold names, in a table it is skipped. #N/A of a spreadsheet begins a row."""
-    return line.lstrip().startswith(COMMENTS) and not ERRORS.match(line)
+    return (line.lstrip().startswith(COMMENTS) and not ERRORS.match(line)) or bool(WORDED.match(line))
 
 
 def without_mark(line: str) -> str:
     """A line without the mark of a comment."""
-    return re.sub(r"^\s*(#|%|//|!)+\s?", "", line)
+    return (
+        re.sub(r"^\s*((#|%|//|!)+|REM\b|\*(?=\s))\s*", "", line)
+        if WORDED.match(line)
+        else re.sub(r"^\s*(#|%|//|!)+\s?", "", line)
+    )
 
 
 def cells_of(line: str, separator: str) -> list[str]:
@@ -97,6 +106,10 @@ def _undrawn(lines: Sequence[str]) -> list[str]:
     if bars > filled / 2:
         lines = [line.translate(DRAWN) for line in lines]
         lines = ["" if RULE.fullmatch(line) and ("|" in line or "+" in line) else line for line in lines]
+    lines = [
+        "" if RULED.fullmatch(line) and not STARTS_WITH_NUMBER.match(above) else line
+        for above, line in pairwise(["", *lines])
+    ]
     arrows = sum(bool(ARROW.match(line)) for line in lines)
     if arrows > filled / 2:
         mark = Counter(c for line in lines for c in ARROW.sub("", line) if c in ";,\t").most_common(1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import re
 from pathlib import Path
 
 from ctrlgen.core.counts import number_of
@@ -29,6 +30,8 @@ WESTERN = frozenset("µ°²³±äöüßéèà·ÄÖÜ".encode("cp1252"))
 """Bytes of signs that units and German names are written with in cp1252, the encoding of Windows in Europe and America."""
 MSDOS = frozenset("µ°²±äöüßéèàÄÖÜ".encode("cp437"))
 """The same in the encoding of MS-DOS, which some instruments keep: one byte of µ before a letter would be a Chinese sign."""
+COLOURS = re.compile(r"\x1b\[[\d;]*m")
+"""What colours lines on a terminal."""
 SAMPLE = 200_000  # bytes at the head of a file, by which an encoding is known
 
 
@@ -57,7 +60,7 @@ def decoded_bytes(path: Path, content: bytes, encoding: str | None = None) -> tu
         except (UnicodeDecodeError, LookupError) as error:
             what = f"cannot be read as {stated} ({error})"
             raise AmbiguousFile(path, Ambiguous(what, {'encoding = "cp1252"': "(for one) with its encoding"})) from None
-    text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+    text = COLOURS.sub("", text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n"))
     lost = len(text) - len(text.rstrip("\0"))
     if lost and lost < len(text):  # a logger that lost its power
         text = text.rstrip("\0")
@@ -66,6 +69,12 @@ def decoded_bytes(path: Path, content: bytes, encoding: str | None = None) -> tu
             f"{number_of(lost, 'null character at the end is', 'null characters at the end are')} left out",
         ]
     if "\0" in text:
+        before, *_, behind = parts = text.split("\0")
+        plain = all(c.isprintable() or c in "\n\t" for c in before + behind)
+        if plain and not any(parts[1:-1]):
+            line = before.count("\n") + 1
+            what = f"holds {len(parts) - 1} null characters in line {line}, as a logger writes that lost its power: rows may be lost there"
+            raise fault(path, f"{what}; delete that line and write a record for the rows before and after it")
         raise fault(
             path, "is no text, although its ending or its beginning says so; export it again, or give it its own ending"
         )

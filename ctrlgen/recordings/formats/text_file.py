@@ -21,6 +21,7 @@ from ctrlgen.recordings.formats.layout_question import Ambiguous, AmbiguousFile
 from ctrlgen.recordings.formats.measurement_table import Clock, MeasurementTable
 from ctrlgen.recordings.formats.named_lines import named_table
 from ctrlgen.recordings.formats.number_cells import TIME, NumberStyle
+from ctrlgen.recordings.formats.pages import joined
 from ctrlgen.recordings.formats.rows_of_signals import lies_on_its_side, on_its_side
 from ctrlgen.recordings.formats.run_together import parted
 from ctrlgen.recordings.formats.stated_rate import stated_rate
@@ -29,7 +30,9 @@ from ctrlgen.recordings.formats.text_cells import cells_of, separator_of, stray_
 from ctrlgen.recordings.formats.text_encoding import decoded
 from ctrlgen.recordings.formats.text_header import header_of
 from ctrlgen.recordings.formats.unapplied import unapplied_columns
+from ctrlgen.recordings.formats.unit_columns import units_beside
 from ctrlgen.recordings.formats.units_in_cells import without_prefixes, without_units
+from ctrlgen.recordings.formats.unpadded_fractions import unpadded
 from ctrlgen.recordings.formats.written_layout import Layout
 
 STYLED = 1000  # rows, the first and others evenly over the table, by which the style of its numbers is known
@@ -83,10 +86,11 @@ def tables_of_text(path: Path, text: str, layout: Layout, notes: Sequence[str] =
             what = f"holds no rows of numbers (cells separated by {NAMES.get(separator, repr(separator))})"
             raise Ambiguous(what, {'separator = ";"': "(for one) with its separator, or export the numbers as text"})
         scaled = [factor_of(lines, factors, block, separator) for block in blocks]
-        return [
+        tables = [
             _table(path, lines, block, separator, layout, (*notes, *run), *by)
             for block, by in zip(blocks, scaled, strict=True)
         ]
+        return joined(tables)
     except Ambiguous as error:
         raise AmbiguousFile(path, error) from None
 
@@ -114,6 +118,9 @@ def _table(
     sample = [cells_of(lines[k], separator) for k in rows[: STYLED // 10] + rows[:: max(1, len(rows) // STYLED)]]
     cells = [[row[i] for row in sample if i < len(row)] for i in range(block.width)]
     style, notes = number_cells.style_of(cells, layout, separator)
+    for k, told in enumerate(map(unpadded, cells)):
+        if told:
+            raise fault(path, f"column {header.names[k] or k!r} {told}")
     dated = " " in cells[0][0] and not lines[rows[0]].lstrip().startswith('"')
     columns = columns_of("\n".join(lines[k] for k in rows), block, separator, style, dated)
     columns, multiplication = multiplied(columns, factor_line, factor)
@@ -124,6 +131,9 @@ def _table(
     columns, prefixes = without_prefixes(columns, units)
     columns, of_cells = without_units(columns)
     units |= of_cells
+    texts = {k: column for k, column in enumerate(columns) if column.dtype.kind == "O"}
+    beside = units_beside(names, texts, set(range(len(columns))) - set(units))
+    units |= {k: next(cell for cell in texts[j] if cell) for k, j in beside.items()}
     unique = _unique(names)
     cut = [f"line {block.cut + 1}, the last, ends before its last cell; left out"] if block.cut is not None else []
     cut += _between(lines, rows)
@@ -143,6 +153,7 @@ def _table(
             *notes,
             *(f"{unique[k]}: its cells end in {unit}, its unit" for k, unit in of_cells.items()),
             *(f"{unique[k]}: its cells end in {', '.join(p)}, read as prefixes of SI" for k, p in prefixes.items()),
+            *(f"{unique[k]}: {unique[j]} says {units[k]} in every row, its unit" for k, j in beside.items()),
             *unapplied_columns(unique, columns),
             *cut,
         ),
@@ -152,7 +163,7 @@ def _table(
         own_times={unique[k]: unique[time] for k, time in own.items()},
         style=style,
         missing=layout.missing,
-        stated_rate=stated_rate([*(lines[k] for k in block.above), *_entries(lines, block, separator)]),
+        stated_rate=stated_rate([*(lines[k] for k in block.above), *_entries(lines, block, separator)], style.decimal),
     )
 
 

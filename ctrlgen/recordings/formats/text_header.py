@@ -66,7 +66,7 @@ def _is_entry(cells: Sequence[str]) -> bool:
     """Whether two cells are a key and what it says, as `Date:, 05 MAR 2024`, or what a program prints before a matrix, `data =`, and no
     names of two columns."""
     label = cells[0].removesuffix(":").strip().lower()
-    return (len(cells) == 2 and cells[1] == "=") or (
+    return (len(cells) > 1 and cells[1] == "=") or (
         len(cells) == 2
         and cells[0].endswith(":")
         and not cells[1].endswith(":")
@@ -87,6 +87,8 @@ def _ends_empty(lines: Sequence[str], block: Block, separator: str) -> bool:
 
 def _fitting(line: str, width: int, separator: str) -> list[str] | None:
     """The cells of a line above a table, as many as the table has columns; None for another line."""
+    if line.startswith("@"):  # a setting of xmgrace
+        return None
     text = without_mark(line) if is_comment(line) else line
     cells = [QUOTED.sub(r"\1", cell) for cell in cells_of(text, separator)]
     beyond = cells[width:]

@@ -25,6 +25,7 @@ DAYS = {  # the years 2000 to 2049 in days, and the shortest step of a row that 
     "since 1900, as spreadsheets write dates": (36526.0, 54789.0, SHORTEST_STEP),
     "since the year 0, as MATLAB's datenum counts them": (730486.0, 748749.0, SHORT_STEP),
     "since 4713 BC, as Julian dates are": (2451544.0, 2469808.0, SHORT_STEP),
+    "since 17 November 1858, as modified Julian dates are": (51544.0, 69808.0, SHORTEST_STEP),
 }
 HUNDREDS = {
     "1601": (1.2e17, 1.7e17),

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from ctrlgen.core.counts import number_of
 from ctrlgen.core.units import same_dimension
 from ctrlgen.recordings.formats.unit_texts import unit_of
 
@@ -19,6 +21,13 @@ OTHERS = frozenset(("bit", "bits", "full", "range", "min", "max"))
 """Words beside which a number is no factor: resolution_bits = 16, full_scale = 10."""
 WORDS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 """The words of scaleFactor, scale_factor and ScaleFactor alike."""
+FLAGS = frozenset((
+    "valid", "invalid", "validity", "quality", "status", "ok", "good", "bad", "error", "err", "fault", "alarm", "overrange", "overload",
+    "flag", "flags", "saturated", "clipped",
+))  # fmt: skip
+"""Words of columns that say of each row whether it was read rightly."""
+MOST_FLAGS, MOSTLY = 8, 0.6
+"""Different flags of a column, and the share of rows that hold the usual one. Judgement."""
 APPLIED = ("scale_factor",)  # which the CF conventions define
 MOST_UNITS = 6
 """Units among which an instrument changes."""
@@ -73,10 +82,26 @@ def scale_of_counts(values: np.ndarray, factors: Sequence[Factor]) -> float | No
     return found.pop() if len(found) == 1 else None
 
 
+def _flags(name: str, column: np.ndarray) -> str:
+    """What is told of a column that says of each row whether it was read rightly, where a few rows differ; empty for any other."""
+    if not _words(name) & FLAGS:
+        return ""
+    cells = ["" if cell is None or cell != cell else str(cell) for cell in column]
+    counts = Counter(cells).most_common(MOST_FLAGS + 1)
+    usual, often = counts[0] if counts else ("", 0)
+    if not 1 < len(counts) <= MOST_FLAGS or often < MOSTLY * len(cells):
+        return ""
+    others = ", ".join(cell or "empty" for cell, _ in counts[1:])
+    told = f"{name}: is {others} in {number_of(len(cells) - often, 'row')} and {usual or 'empty'} in all others"
+    return f"{told}, not applied: empty the readings of these rows where it says that they are none"
+
+
 def unapplied_columns(names: Sequence[str], columns: Sequence[np.ndarray]) -> list[str]:
     """A note for each column that states units, or a factor, that change from row to row: of an instrument that changes its range."""
     said = []
     for name, column in zip(names, columns, strict=True):
+        if flagged := _flags(name, column):
+            said.append(flagged)
         if column.dtype.kind == "O":
             cells = list(dict.fromkeys(cell for cell in column if isinstance(cell, str)))
             units = [unit_of(cell) for cell in cells] if 1 < len(cells) <= MOST_UNITS else [None]

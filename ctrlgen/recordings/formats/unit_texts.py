@@ -21,6 +21,8 @@ AFTER_MARK = re.compile(r"^(?P<name>.*[^\W_][)\]]?)(?:\s*[,:|]\s*|\s+[-\u2013\u2
 BESIDE = re.compile(
     r"(?P<unit>[^\W\d]\w*)\s*[*x\u00d7]\s*(?=\d)[\d.eE^+-]+|[*x\u00d7]\s*(?=\d)[\d.eE^+-]+\s*(?P<behind>[^\W\d]\w*)"
 )
+BEFORE = re.compile(r"^[\[({]\s*(?P<unit>[^\[\](){}]+?)\s*[\])}]\s*(?P<name>[^\W\d][^\[\](){}]*)$")
+"""A unit in brackets in front of its name: [ms] time."""
 SAID = re.compile(r"^(?P<name>.*?)(?:^|\s+)in\s+(?P<unit>[^\s()\[\]]{1,12})$")
 """A unit after a word: C1 in V, Zeit in s, and the `in s` of a column of time."""
 WORDS = {
@@ -32,15 +34,18 @@ WORDS = {
     "newton": "N", "newtons": "N", "hertz": "Hz", "watt": "W", "watts": "W", "kelvin": "K", "arcsec": "arcsecond",
     "rpm": "rpm", "r/min": "rpm", "rev/min": "rpm", "u/min": "rpm", "rev": "turn", "revs": "turn", "rev/s": "turn/s", "rps": "turn/s",
     "dps": "deg/s", "%fs": "percent", "% fs": "percent", "%f.s.": "percent", "pct": "percent", "\u00e5": "angstrom",
-    "n.m": "N*m", "torr": "torr", "ohms": "ohm", "radian": "rad", "radians": "rad", "hz": "Hz", "khz": "kHz", "%": "percent",
+    "msek": "ms", "mikrosekunden": "us", "n.m": "N*m", "torr": "torr", "ohms": "ohm", "radian": "rad", "radians": "rad", "hz": "Hz",
+    "khz": "kHz", "%": "percent",
     "millisekunden": "ms", "mikrometer": "um", "nanometre": "nm", "millivolts": "mV",
     "\u0441": "s", "\u043c\u0441": "ms", "\u043c\u043a\u0441": "us", "\u0432": "V", "\u043c\u0432": "mV", "\u043c\u043a\u043c": "um",
-    "\u043d\u043c": "nm", "\u043c\u043c": "mm", "\u0433\u0446": "Hz",
+    "\u79d2": "s", "\u6beb\u79d2": "ms", "\u5fae\u79d2": "us", "\u7eb3\u7c73": "nm", "\u5fae\u7c73": "um", "\u6beb\u7c73": "mm",
+    "\u4f0f": "V", "\u043d\u043c": "nm", "\u043c\u043c": "mm", "\u0433\u0446": "Hz",
 }  # fmt: skip
 LETTERS = {
     "C": "degC", "g": "g_0", "mil": "thou", "mils": "thou",  # of a log: neither coulombs nor grams nor a mil of angle
     "Gs": "gauss", "as": "arcsecond", "px": "pixel", "ue": "microstrain", "\u00b5": "um", "\u03bc": "um", "Ohm": "ohm",
-    "S": "s", "MS": "ms", "US": "us", "MM": "mm", "Mm": "mm", "UM": "um", "MV": "mV", "MA": "mA",  # no log is in siemens, MV or Mm
+    "S": "s", "MS": "ms", "US": "us", "MM": "mm", "Mm": "mm", "UM": "um", "MV": "mV", "MA": "mA", "mS": "ms", "uS": "us",
+    "\u00b5S": "us", "\u03bcS": "us",  # no log is in siemens, MV or Mm
     "Nm": "N*m", "mNm": "mN*m", "Ncm": "N*cm", "Nmm": "N*mm", "kNm": "kN*m",
 }  # fmt: skip
 SCALED = re.compile(r"(?P<number>\d*\.?\d+(?:[eE][+-]?\d{1,2})?|10\^[+-]?\d{1,2})\s*[*\u00b7]?\s*(?P<unit>[^\W\d].*)")
@@ -54,6 +59,8 @@ COUNTS = {
     "increments",
     "ct",
     "cts",
+    "cnt",
+    "cnts",
     "lsb",
     "digit",
     "digits",
@@ -85,7 +92,9 @@ LONGEST = 40  # characters of a unit in a file: more is a remark
 @cache
 def unit_of(text: str) -> str | None:
     """The unit that a text of a file states, as ctrlgen writes it, '1' for a count; None for a text that is no unit."""
-    bare = text.strip().strip("[](){}<>").strip()
+    bare = (
+        text.replace("\u00c2", "").strip().strip("[](){}<>").strip()
+    )  # of a text in UTF-8 that was written as Latin-1 once more
     if len(bare) > LONGEST:
         return None
     since = re.fullmatch(r"(\w+) since .*", bare)  # CF conventions: "seconds since 2024-01-01"
@@ -150,6 +159,8 @@ def split_name(name: str) -> tuple[str, str | None]:
         stated = unit_of(unit) is not None or scaled_unit(unit) is not None
         if square or (unit not in LETTERS_OF_NAMES and stated and not _is_of_a_node(name, unit)):
             return match["name"].strip(), match["unit"] or None
+    if (match := BEFORE.match(name)) and unit_of(match["unit"]) is not None:
+        return match["name"], match["unit"]
     if (match := SAID.match(name)) and match["unit"] not in LETTERS_OF_NAMES and is_unit_cell(match["unit"]):
         return match["name"].strip() or name, match["unit"]
     if match := PLAIN.match(name):

@@ -17,9 +17,11 @@ SLOW = 10.0  # usual steps that such a motion spans at least
 
 
 AGAIN = {2.0**bits: f"its counter of {bits} bits" for bits in (16, 24, 32)} | {
-    size: f"it counts to {size:g} and" for size in (60.0, 1e3, 3600.0, 6e4, 86400.0, 1e6, 3.6e6, 8.64e7)
+    size: f"it counts to {size:g} and"
+    for size in (60.0, 1e3, 3600.0, 6e4, 86400.0, 1e6, 3.6e6, 8.64e7, 604800.0, 6.048e8)
 }
-"""After how much a clock begins again: a counter, or what is over whole seconds, minutes, hours and days, in s and parts of it."""
+"""After how much a clock begins again: a counter, or what is over whole seconds, minutes, hours, days and weeks, as GPS
+counts them, in s and parts of it."""
 
 
 class Wrapped(NamedTuple):
