@@ -38,6 +38,7 @@ COUNT_NAME = re.compile(
     re.IGNORECASE,
 )
 """Names of columns that number the rows."""
+COUNTED = 0.8  # of the steps of a column that numbers the rows: at others rows were lost, or it begins again
 JUMP = 0.25  # of its range: a reading does not go so far to its end in one row, a command does
 NOISE_REST = 200  # rows: the shortest record at rest from which a diagnosis takes the noise
 NEWEST_FIRST = (
@@ -45,6 +46,9 @@ NEWEST_FIRST = (
 )
 SLOW_CLOCK = 0.6  # share of rows in which a drive stands still from which it steps by a slower clock
 LONG_STEP = 0.05  # s: a time without a unit that goes on by more is rather one in ms, of a rate below 20 kHz. Judgement
+SHORTEST_UNSTATED = 2e-5  # s: rows a second apart in days, or 70 ms in hours
+ROUND = np.array((1, 1.25, 2, 2.5, 3, 4, 5, 6, 7.5, 8, 10))
+SAME_STEP = 2e-4  # of a step: half of the last of four digits
 EVEN = 0.01  # of a step: rounding of a time that rises evenly
 SAME_RATE = 0.01  # of a rate: a time and a header that differ by less say the same
 SMOOTH = 0.1  # median of second differences over that of first ones, of a drive that is a curve and no steps
@@ -249,6 +253,7 @@ def _time(table: MeasurementTable, columns: tuple[ColumnFacts, ...], chosen: str
 
     Raises `AmbiguousFile` for dates that can be read two ways.
     """
+    columns = tuple(c for c in columns if chosen or c.name not in table.time_parts)
     named = [c for c in columns if TIME_NAME.match(c.bare)] or [c for c in columns if TIME_NAME.match(c.last)]
     dated = [c for c in columns if c.values is None]
     of_unit = [c for c in columns if c.unit is not None and same_dimension(c.unit, "s")]
@@ -263,7 +268,8 @@ def _time(table: MeasurementTable, columns: tuple[ColumnFacts, ...], chosen: str
 
 def _time_in(table: MeasurementTable, facts: ColumnFacts, chosen: bool) -> TimeFacts | None:
     """The time in one column; None where it holds none. Raises `AmbiguousFile`."""
-    unit, stamps = facts.unit or epoch_unit(facts.finite) or _unit_by_rate(table, facts) or "s", facts.values is None
+    unit = facts.unit or epoch_unit(facts.finite) or _unit_by_rate(table, facts) or rounder_unit(facts.finite)
+    stamps = facts.values is None
     if not same_dimension(unit, "s") or (facts.question is not None and not chosen):
         return None
     try:
@@ -320,12 +326,27 @@ def _unit_by_rate(table: MeasurementTable, column: ColumnFacts) -> str | None:
     return next((unit for unit, many in EPOCHS.items() if abs(rows / many - 1) < SAME_RATE), None)
 
 
+def rounder_unit(values: np.ndarray) -> str:
+    """The unit of a time (n,) that states none: "day" or "h" where its steps are far too short for seconds and a round number of them in
+    that unit alone, as 1 ms is 1.1574e-8 of a day; else "s"."""
+    step = usual_step(values) if len(values) > 2 else 0.0
+    if not 0 < step < SHORTEST_UNSTATED or _is_round(step):
+        return "s"
+    return next((unit for unit in ("day", "h") if _is_round(step * to_si(1.0, unit))), "s")
+
+
+def _is_round(step: float) -> bool:
+    """Whether it is, but for the rounding of a file, one digit and zeros, or an eighth of such."""
+    digit = step / 10.0 ** np.floor(np.log10(step))
+    return bool(np.min(np.abs(digit / ROUND - 1)) < SAME_STEP)
+
+
 def is_a_count(column: ColumnFacts) -> bool:
     """Whether a column numbers the rows, or is a time since 1970 beside the one that is used: no signal of a device."""
     steps = np.diff(column.finite)
     if len(steps) < 2 or column.unit not in (None, "1"):
         return False
-    numbered = COUNT_NAME.search(column.last) is not None and bool(np.all(steps == steps[0])) and steps[0] == 1
+    numbered = COUNT_NAME.search(column.last) is not None and bool(np.mean(steps == 1) >= COUNTED)
     return numbered or (bool(np.all(steps >= 0)) and epoch_unit(column.finite) not in (None, "day"))
 
 

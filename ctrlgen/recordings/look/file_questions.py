@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
+from ctrlgen.core.counts import number_of
+from ctrlgen.core.errors import InputError
+from ctrlgen.core.units import same_dimension
 from ctrlgen.model.model import Model
 from ctrlgen.recordings.formats.number_cells import TIME
-from ctrlgen.recordings.look.answers import Answers
+from ctrlgen.recordings.look.answers import Answers, layout_option
 from ctrlgen.recordings.look.column_facts import (
     NEWEST_FIRST,
     SAME_RATE,
@@ -19,6 +25,8 @@ from ctrlgen.recordings.look.column_facts import (
 )
 from ctrlgen.recordings.look.signal_words import DRIVE_WORDS, READING_WORDS, words_of
 
+PERHAPS_TIME = re.compile(r"(?i)time|zeit|stamp|elapsed|clock|since|date|datum|uhr|^t\b|^[mj]d\b")
+"""Words of names of columns that may be a time which is not read."""
 MOST_LISTED, MOST_UNREAD = 12, 3
 """Columns that a question lists: of numbers, and of text."""
 
@@ -49,9 +57,34 @@ def free_columns(facts: TableFacts, left: Sequence[str]) -> str:
 
 
 def _of_digits(facts: TableFacts, column: ColumnFacts) -> bool:
-    """Whether every cell of a column of text holds digits and none is a date: numbers written otherwise, and no remarks."""
+    """Whether most cells of a column of text hold digits and none is a date: numbers written otherwise, and no remarks."""
     cells = [str(cell) for cell in facts.table.columns[column.name]]
-    return all(any(c.isdigit() for c in cell) and not TIME.fullmatch(cell) for cell in cells)
+    return np.mean([any(map(str.isdigit, cell)) for cell in cells]) > 0.5 and not any(map(TIME.fullmatch, cells))
+
+
+def _unread_time(facts: TableFacts) -> str:
+    """Why the first column that is named as a time, and holds text or a unit that is not known, is none; empty where there is none."""
+    for column in facts.columns:
+        words = PERHAPS_TIME.search(column.name)
+        if words is None or column.name in facts.table.time_parts:
+            continue
+        if column.question is not None:
+            return f" ({column.question.asked(layout_option)})"
+        if column.values is None:
+            try:
+                facts.table.time(column.name, "s")
+            except InputError as error:
+                first = next((str(cell) for cell in facts.table.columns[column.name] if cell), "")
+                if not column.unread or TIME.match(first):
+                    return f" ({'; '.join(fault.what for fault in error.faults)})"
+                none = f"column {column.name!r} holds {first!r}, which is no time that is read"
+                return f" ({none}; write seconds, or ISO 8601 (2024-03-31T01:59:58.000))"
+        elif column.unit is not None and not same_dimension(column.unit, "s"):
+            return f" (column {column.name!r} is in {column.unit})"
+        elif column.moves and np.any(np.diff(column.finite) < 0):
+            falls = np.flatnonzero(np.diff(column.finite) < 0)
+            return f" (column {column.name!r} falls in {number_of(len(falls), 'row')}, first after row {falls[0]})"
+    return ""
 
 
 def time_questions(facts: TableFacts, answers: Answers) -> list[str]:
@@ -61,10 +94,11 @@ def time_questions(facts: TableFacts, answers: Answers) -> list[str]:
     if facts.falls:
         return [f"time is column {facts.falls!r}, which {NEWEST_FIRST}"]
     if facts.time is None and not known:
+        unread = _unread_time(facts)
         rising = next((c for c in facts.columns if c.unit is None and rises_evenly(c)), None)
         perhaps = shlex.join(["--time", "COLUMN" if rising is None else rising.name])
         otherwise = f'state sample_rate, or kind = "poses" ({perhaps}, --rate 1kHz or --poses)'
-        return [f"no column is a time: {f'{says}, else {perhaps} or --poses)' if says else otherwise}"]
+        return [f"no column is a time{unread}: {f'{says}, else {perhaps} or --poses)' if says else otherwise}"]
     if facts.time is not None and not known and (step := assumed_step(facts)):
         name, unit = facts.time.column, facts.time.unit
         fits = stated is not None and abs(step * stated[1] - 1) < SAME_RATE

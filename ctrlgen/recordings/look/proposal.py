@@ -27,7 +27,7 @@ from ctrlgen.recordings.look.column_facts import (
 )
 from ctrlgen.recordings.look.file_questions import free_columns, perhaps_times, time_questions, with_own_rate
 from ctrlgen.recordings.look.oddities import fitting_units, implausible_range
-from ctrlgen.recordings.look.signal_words import DRIVE_WORDS, READING_WORDS, words_of
+from ctrlgen.recordings.look.signal_words import DRIVE_WORDS, ERROR_WORDS, READING_WORDS, words_of
 from ctrlgen.recordings.moved import Stretch, moved_of
 from ctrlgen.recordings.plausibility import implausible
 from ctrlgen.recordings.schema import signal_units
@@ -53,6 +53,8 @@ ALIKE = {
 UNIT, CHANNEL, ROLE, OTHER_ROLE, PLACE, POSSIBLE = 3.0, 4.0, 2.0, -2.0, 0.1, 0.5
 """Likeness of a unit of the right dimension, the channel's name, a word of the role, one of the other role, the place in the file, and of
 a column of which nothing speaks against it."""
+UNKNOWN_UNIT = re.compile(r"[\[({]\s*([^\[\](){}]*[^\W\d_][^\[\](){}]*?)\s*[\])}]\s*$")
+"""What stands in brackets behind a name and is no unit, nor a number of a list."""
 NAMED = 1.0
 """Likeness from which more than the want of another column speaks for one."""
 CLEAR = 1.0
@@ -208,6 +210,8 @@ def _chosen(model: Model, facts: TableFacts, signals: Sequence[str], answers: An
         unit = answers.unit(signal) or column.unit
         if unit is not None and not same_dimension(unit, units[signal]):
             what = f"{name} is in {unit}, and {signal} in {units[signal]} or a multiple of it"
+            if unit not in answers.units.values() and answers.unit(signal) is None:
+                what += f"; where one {unit} is so much of it, say how much: {shlex.join(['--unit', f'{signal}=10{units[signal]}'])}"
             raise InputError("--column", [Fault(signal, what)])
         matches.append(_match(model, signal, column, unit, [], answers))
     return matches
@@ -230,7 +234,9 @@ def _match(model: Model, signal: str, column: ColumnFacts, unit: str | None, why
     assumed = [column.factor] if column.counted and stated is None else []
     if unit is None:
         unit = _plausible(model, signal, column, signal_units(model)[signal])
-        assumed = [f"the file states no unit, {unit} is assumed", *assumed]
+        behind = UNKNOWN_UNIT.search(column.name)
+        lacks = "the file states no unit" if behind is None else f"its unit {behind[1]!r} is not known"
+        assumed = [f"{lacks}, {unit} is assumed", *assumed]
     why = [*why, f"{'; '.join(assumed)}: {_range(column)} {unit}"] if assumed else why
     return Match(signal, column.name, unit, not assumed, tuple(why), scale)
 
@@ -311,6 +317,7 @@ def _likeness(model: Model, signal: str, column: ColumnFacts) -> float:
     score = UNIT if column.unit is not None else POSSIBLE
     score += CHANNEL if _names(channel, column.bare, model, role) else 0.0
     own, other = (DRIVE_WORDS, READING_WORDS) if role == "drive" else (READING_WORDS, DRIVE_WORDS)
+    score += OTHER_ROLE * bool(words & ERROR_WORDS)
     score += ROLE * bool(words & own) + OTHER_ROLE * bool(words & other)
     if role == "drive" and column.unit is not None and not _within(model, channel, column):
         score += OTHER_ROLE
