@@ -67,7 +67,15 @@ class StuckSettings:
     """Share of successive differences that change sign: two thirds in white noise, few in motion."""
 
 
-OUTLIERS, STUCK = OutlierSettings(), StuckSettings()
+@dataclass(frozen=True)
+class HeldSettings:
+    """From how many changes, and of which share of them one rate apart, a channel is known to be held between its readings. Judgement."""
+
+    fewest: int = 20
+    usual: float = 0.8
+
+
+OUTLIERS, STUCK, HELD = OutlierSettings(), StuckSettings(), HeldSettings()
 
 
 def outliers(values: np.ndarray, drive: np.ndarray) -> np.ndarray:
@@ -168,6 +176,19 @@ def stuck_samples(observed: np.ndarray, drive: np.ndarray) -> np.ndarray:
         elif frozen:
             marked[a:b] = True
     return marked
+
+
+def held_for(observed: np.ndarray, drive: np.ndarray) -> int:
+    """The rows for which one channel `observed` (n,) is held, where it changes in one row of so many alone while the drive (n, n_u)
+    moves in others too: it was read at a lower rate. 1 where it is not held."""
+    changes = np.flatnonzero(observed[1:] != observed[:-1]) + 1
+    apart = np.diff(changes)
+    if len(apart) < HELD.fewest or not np.isfinite(observed).all():
+        return 1
+    rows = int(np.gcd.reduce(apart))
+    moving = np.flatnonzero((np.diff(drive, axis=0) != 0).any(axis=1)) + 1
+    followed = len(moving) == 0 or bool(np.all((moving - moving[0]) % rows == 0))
+    return 1 if followed or np.mean(apart == rows) < HELD.usual else rows
 
 
 def _runs(y: np.ndarray) -> list[tuple[int, int]]:

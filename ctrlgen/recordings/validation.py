@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -24,7 +25,7 @@ from ctrlgen.model.model import Model
 from ctrlgen.recordings.after_gaps import Described
 from ctrlgen.recordings.alike_units import unit_within
 from ctrlgen.recordings.gaps import SHORTEST, Gap, rows_between, stretches
-from ctrlgen.recordings.outliers import outliers, stuck_samples
+from ctrlgen.recordings.outliers import held_for, outliers, stuck_samples
 from ctrlgen.recordings.recording import Record
 from ctrlgen.recordings.usual_step import BREAK
 
@@ -35,6 +36,7 @@ HELD_OUT = 0.3  # of a series, at its end: random samples would leak through the
 EVERY = 3  # of poses, the third, sixth, ... are held out
 OVER_LIMIT = 1e-6  # of the drive's range: rounding of the file
 RESTLESS = 0.01  # of the drive's range: more is no rest
+MOST_RUNS = 20  # that follow one another in a file: a time that falls more often is out of order
 REPEAT_BLOCKS = 10  # into which a held-out record is cut to be looked for among the fitted ones
 
 
@@ -195,9 +197,14 @@ def _sample_time(record: Record, where: str) -> tuple[float, list[str], list[Fau
     backward = np.flatnonzero(step <= 0)
     if len(backward):
         k = int(backward[0])
+        mend = "sort the rows, remove repeated ones, or give sample_rate if the samples are evenly spaced"
+        if np.all(t[backward + 1] <= t[0] + np.median(step)) and len(backward) <= MOST_RUNS:
+            runs = pairwise([0, *(backward + 1).tolist(), len(t)])
+            listed = ", ".join(f"rows = [{a}, {b}]" for a, b in runs)
+            mend = f"it begins again as another run does: write a record for each of {listed}"
         what = (
             f"does not increase from row {k} ({t[k]:.9g} s) to row {k + 1} ({t[k + 1]:.9g} s), {number_of(len(backward), 'such step')} in "
-            "all; sort the rows, remove repeated ones, or give sample_rate if the samples are evenly spaced"
+            f"all; {mend}"
         )
         return np.nan, [], [Fault(f"{where}.time", what)]
     regular = step[step <= BREAK * np.median(step)]
@@ -235,6 +242,9 @@ def mark(record: Record, kind: str, names: ChannelNames, recorded: np.ndarray) -
                 notes.append(f"{title}: {state}; the channel may be dead.")
         elif kind == "series":
             stuck = stuck_samples(y, record.drive)
+            if (rows := held_for(y, record.drive)) > 1:
+                what = f"changes in one row of {rows} alone: it was read at a lower rate and held, by up to {rows - 1} rows too late"
+                notes.append(f"{title}: {what}; empty the rows that repeat it, and the others are used.")
             marks["in stretches that repeat one value to the last bit (stuck or clipped)"] = stuck
             marks["outliers"] = far = outliers(np.where(stuck, np.nan, y), record.drive)
             spikes += [(k, i, float(y[k] - chord)) for k, chord in _chords(y, far)]
