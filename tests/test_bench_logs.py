@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bench_logs import BENCH, T, U, X
+from bench_logs import BENCH, HEAD, T, U, X, csv, rows
 
 from ctrlgen.core.errors import InputError
 from ctrlgen.core.units import to_si
 from ctrlgen.devices import load_device
 from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.formats import read_table
+from ctrlgen.recordings.look.answers import read_answers
 from ctrlgen.recordings.look.column_facts import table_facts
 from ctrlgen.recordings.look.oddities import table_oddities
 from ctrlgen.recordings.look.proposal import propose
@@ -70,3 +71,50 @@ def test_a_log_of_the_bench_is_read_rightly_or_told(name, tmp_path, axis):
                 )
     for words in log.told:
         assert any(words in line for line in said), (words, said)
+
+
+def facts_of(folder, text, answers=None):
+    (folder / "log.csv").write_text(text)
+    table = read_table(folder / "log.csv")
+    return table_facts(table) if answers is None else table_facts(table, answers)
+
+
+def answered(*columns, units=(), time=None, rate=None):
+    return read_answers(None, None, columns, units, time, rate, False)
+
+
+def test_a_reading_in_volts_is_asked_for_what_one_is_and_read_with_the_answer(tmp_path, axis):
+    text = csv("t (s),u (V),probe (V)\n", x=X / 10)
+    chosen = answered("reading.axis=probe (V)")
+    with pytest.raises(InputError, match=r"where one V is so much of it, say how much: --unit reading.axis=10um"):
+        propose([facts_of(tmp_path, text, chosen)], axis, chosen)
+    chosen = answered("reading.axis=probe (V)", units=("reading.axis=10um",))
+    proposal = propose([facts_of(tmp_path, text, chosen)], axis, chosen)
+    np.testing.assert_allclose(found_in(proposal.tables[0], proposal)["reading.axis"], 1e-6 * X, atol=1e-12)
+
+
+def test_the_answer_that_is_proposed_for_lost_rows_places_them(tmp_path, axis):
+    log = BENCH["rows lost, told by their number"]
+    chosen = answered(time="seq", units=("seq=1ms",))
+    facts = facts_of(tmp_path, log.text, chosen)
+    proposal = propose([facts], axis, chosen)
+    assert proposal.certain and facts.time.gaps == ((49, 3),)
+    np.testing.assert_allclose(found_in(facts, proposal)["time"], np.delete(T, [50, 51, 52]), atol=1e-9)
+
+
+def test_the_word_for_an_actual_value_makes_a_column_the_reading(tmp_path, axis):
+    text = "t (s),aux (um),Istwert (um),Spannung (V)\n" + rows(",", T, 0.5 * X, X, U)
+    assert [m.column for m in propose([facts_of(tmp_path, text)], axis).matches] == ["Spannung (V)", "Istwert (um)"]
+
+
+def test_what_ordinary_logs_hold_is_none_of_this(tmp_path):
+    """Few fractions, rounded instants, a state in turn, a clock by its own step, a remark with a star among rows."""
+    few = "".join(f"{k},{0.1 * k:.2f}\n" for k in range(1, 9)) + "9,1.5\n"
+    assert not facts_of(tmp_path, "t (s),x\n" + few).table.notes
+    beats = "t (s),alive,x\n" + rows(",", T, np.arange(len(T)) % 2, X)
+    assert "alive" in facts_of(tmp_path, beats).table.columns
+    lost = "t (s),u (V),x (um)\n" + rows(",", T, U, ["*****" if k == 5 else f"{v}" for k, v in enumerate(X)])
+    assert facts_of(tmp_path, lost).columns[2].missing == 1
+    one_day = "Date,Time,x\n" + "".join(f"2024-03-05,10:00:00.{k:03d},{v}\n" for k, v in enumerate(X))
+    assert list(facts_of(tmp_path, one_day).table.columns) == ["Date", "Time", "x"]
+    assert "another run" not in " ".join(facts_of(tmp_path, csv(HEAD) + csv("", T + T[-1] + T[1])).table.notes)

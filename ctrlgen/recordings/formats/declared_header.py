@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from ctrlgen.recordings.formats.header_rows import Header, units_behind
 from ctrlgen.recordings.formats.text_blocks import Block
-from ctrlgen.recordings.formats.text_cells import cells_of
+from ctrlgen.recordings.formats.text_cells import cells_of, without_mark
 from ctrlgen.recordings.formats.unit_texts import unit_of
 
 DECLARED_NAME = re.compile(r"^\s*#\s*NAME(\d+)\s*=\s*(.+?)\s*$")
@@ -36,7 +36,7 @@ def declared_names(lines: Sequence[str], block: Block, separator: str) -> Header
         notes = ("names are those that the header declares",)
         return Header(names, units_behind(names), notes=notes, sample_times=declared_time(lines, block))
     filled = [k for k in block.above if lines[k].strip()]
-    listed = [LISTED.match(lines[k]) for k in filled[-block.width :]]
+    listed = [LISTED.match(without_mark(lines[k])) for k in filled[-block.width :]]
     found = {int(m["k"]): m["name"] for m in listed if m}
     if len(found) == block.width > 1 and list(found) in ([*range(block.width)], [*range(1, block.width + 1)]):
         names = tuple(found.values())

@@ -10,7 +10,7 @@ import numpy as np
 
 from ctrlgen.core.errors import InputError
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
-from ctrlgen.recordings.formats.time_stamps import TIME_NAME
+from ctrlgen.recordings.formats.time_stamps import TIME_NAME, epoch_unit
 from ctrlgen.recordings.formats.unit_texts import bare_name
 
 NEAR = 0.5  # of a step: how exactly a page goes on in time where the one before it ends
@@ -23,19 +23,13 @@ def joined(tables: Sequence[MeasurementTable]) -> list[MeasurementTable]:
     if first is None or len(tables) < 2 or not _are_alike(tables):
         return list(tables)
     columns = {
-        name: np.concatenate([np.asarray(table.columns[name], dtype=_kind(tables, name)) for table in tables])
+        name: np.concatenate([np.asarray(table.columns[name]) for table in tables])  # texts make objects of numbers
         for name in first.columns
     }
     whole = replace(first, columns=columns, lines=[line for table in tables for line in table.lines])
-    timed = next((name for name in columns if TIME_NAME.match(bare_name(name))), None)
-    try:
-        time = whole.time(timed, "s").values if timed is not None else np.empty(0)
-    except InputError:
-        return list(tables)
-    steps = np.diff(time)
-    usual = float(np.median(steps)) if len(steps) and np.isfinite(time).all() else 0.0
+    timed = [name for name in columns if TIME_NAME.match(bare_name(name))]
     seams = np.cumsum([len(table.lines) for table in tables])[:-1] - 1
-    if not usual > 0 or np.any(steps <= 0) or np.any(np.abs(steps[seams] / usual - 1) > NEAR):
+    if not any(_goes_on(whole, name, seams) for name in timed):
         return list(tables)
     again = ", ".join(str(table.lines[0]) for table in tables[1:])
     told = (
@@ -62,6 +56,13 @@ def _are_alike(tables: Sequence[MeasurementTable]) -> bool:
     )
 
 
-def _kind(tables: Sequence[MeasurementTable], name: str) -> type:
-    texts = any(np.asarray(table.columns[name]).dtype.kind == "O" for table in tables)
-    return object if texts else float
+def _goes_on(table: MeasurementTable, name: str, seams: np.ndarray) -> bool:
+    """Whether the time of a column rises, and from row `seams` (n,) to the next as it usually does."""
+    column = table.columns[name]
+    try:
+        time = table.time(name, (None if column.dtype.kind == "O" else epoch_unit(column)) or "s").values
+    except InputError:
+        return False
+    steps = np.diff(time)
+    usual = float(np.median(steps)) if len(steps) and np.isfinite(time).all() else 0.0
+    return usual > 0 and bool(np.all(steps > 0) and np.all(np.abs(steps[seams] / usual - 1) <= NEAR))

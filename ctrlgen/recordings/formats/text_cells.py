@@ -14,7 +14,7 @@ from ctrlgen.recordings.formats.written_layout import MARKS, Layout
 
 SEPARATORS = ("\t", ";", "|", ",", " ")  # where two fit alike the earlier is meant: nobody writes numbers with it
 COMMENTS = ("#", "%", "//", "!")  # at the beginning of a line
-WORDED = re.compile(r"\s*(?:REM\b|\*\s+(?=[A-Za-z]))")
+WORDED = re.compile(r"\s*(?:REM\b|\*\s+(?=[A-Za-z\[(]))")
 """The same before words: of BASIC, of SPICE. A star alone is a reading that did not fit."""
 ERRORS = re.compile(
     r"\s*#(N/?A|NV|NUM!|VALUE!|DIV/0!|REF!|NAME\?)\s*[^\w\s]", re.IGNORECASE

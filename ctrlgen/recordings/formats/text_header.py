@@ -54,7 +54,8 @@ def header_of(lines: Sequence[str], block: Block, separator: str, layout: Layout
     if pairs := paired(candidates):
         return replace(pairs, more_rows=own)
     plain = [(k, cells) for k, cells in candidates if not is_comment(lines[k])]
-    header = names_and_units(plain or candidates, _numeric(lines, block, separator))
+    nameless = plain and all(is_unit_row(cells) for _, cells in plain)  # and the names stand in a remark
+    header = names_and_units(candidates if nameless else plain or candidates, _numeric(lines, block, separator))
     if not header.names:
         header = _numbered(lines, block, separator) or _short(lines, block, separator)
     notes = header.notes

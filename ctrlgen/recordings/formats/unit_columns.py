@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping, Sequence
 
+from ctrlgen.recordings.formats.number_cells import is_number, usual
 from ctrlgen.recordings.formats.unit_texts import unit_of
 
 NAMED = re.compile(r"(?P<of>.*?)[\s._/-]*units?", re.IGNORECASE)
@@ -25,6 +26,6 @@ def units_beside(
             continue
         ends = [match["of"] + end for end in VALUE] if match["of"] else []
         of = next((names.index(end) for end in ends if end in names), k - 1 if not match["of"] else -1)
-        if of in without and of not in texts:
+        if of in without and (of not in texts or any(is_number(usual(str(cell))) for cell in texts[of])):
             found[of] = k
     return found

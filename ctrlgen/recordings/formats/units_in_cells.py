@@ -17,7 +17,7 @@ PREFIXES = {"": 0, "f": -15, "p": -12, "n": -9, "u": -6, "\u00b5": -6, "\u03bc":
             "MEG": 6, "G": 9, "T": 12}  # fmt: skip
 """Powers of ten of the letters that instruments and circuit simulators write behind numbers."""
 ALSO_UNITS = {"m", "K", "G", "T"}
-"""Metres, kelvins, gauss, teslas: where every cell ends in one of them it tells nothing. An f in every cell is the mark of C's floats."""
+"""Metres, kelvins, gauss, teslas: where every cell ends in one of them it tells nothing. An f alone is the mark of C's floats."""
 PREFIXED = re.compile(r"([+\u2212-]?(?:\d+\.?\d*|\.\d+))\s*([a-zA-Z\u00b5\u03bc]{0,3})")
 
 
@@ -37,7 +37,7 @@ def without_prefixes(
         letters = {m[2] for m in matches if m}
         whole = all(m is not None or c.lower() in MISSING for m, c in zip(matches, cells, strict=True))
         other = k in units and unit_of(units[k]) not in (None, *letters)
-        alone = letters == {"f"} or (len(letters) == 1 and letters <= ALSO_UNITS and not other)
+        alone = letters <= {"", "f"} or (len(letters) == 1 and letters <= ALSO_UNITS and not other)
         if not whole or alone or not letters - {""} or not letters <= set(PREFIXES):
             continue
         found[k] = np.array([None if m is None else f"{m[1]}e{PREFIXES[m[2]]}" for m in matches], dtype=object)

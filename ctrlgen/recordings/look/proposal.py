@@ -210,7 +210,7 @@ def _chosen(model: Model, facts: TableFacts, signals: Sequence[str], answers: An
         unit = answers.unit(signal) or column.unit
         if unit is not None and not same_dimension(unit, units[signal]):
             what = f"{name} is in {unit}, and {signal} in {units[signal]} or a multiple of it"
-            if unit not in answers.units.values() and answers.unit(signal) is None:
+            if answers.unit(signal) is None:
                 what += f"; where one {unit} is so much of it, say how much: {shlex.join(['--unit', f'{signal}=10{units[signal]}'])}"
             raise InputError("--column", [Fault(signal, what)])
         matches.append(_match(model, signal, column, unit, [], answers))
