@@ -44,6 +44,9 @@ def check(file: Path, device: Path | None = None, figure: Path | None = None, po
             raise InputError(file, faults)
         out.print(f"{file}: every file is as it was generated", markup=False)
     elif file.is_dir() or (file.suffix != ".py" and "kind" not in read_toml(file)):
+        if not file.is_dir() and not {"device", "path", "record"} & read_toml(file).keys():
+            what = 'is missing; a device file begins with kind = "axis" or another (ctrlgen new device begins one)'
+            raise InputError(file, [Fault("kind", f"{what}, a scenario has device and path")])
         _check_scenario(file)
     else:
         _check_device(file, figure, point)

@@ -87,7 +87,10 @@ def read_toml(path: Path | str) -> dict[str, Any]:
     try:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError(path, [Fault("syntax", f"{error}; see https://toml.io for the notation")]) from None
+        what = f"{error}; see https://toml.io for the notation"
+        if Path(path).suffix.lower() != ".toml":
+            what = f"{error}: it is no TOML, as devices and recordings are; what a file of measurements holds tells ctrlgen look"
+        raise InputError(path, [Fault("syntax", what)]) from None
     except ValueError:  # of Python: more than 4300 digits
         raise InputError(path, [Fault("syntax", "has a whole number of thousands of digits; correct it")]) from None
     except RecursionError:
@@ -118,14 +121,21 @@ def _with_all_units(model: type[BaseModel], errors: Sequence[Any]) -> list[Fault
     """The faults that pydantic tells, those of one number that may be of several dimensions as one that names a unit of each."""
     faults: list[Fault] = []
     numbers: dict[tuple[str, str], int] = {}  # where each is, and what is said of it: its place among the faults
-    for details in errors:
-        unit = details.get("ctx", {}).get("error")
+    units = [details.get("ctx", {}).get("error") for details in errors]
+    of_another_kind = {
+        _place(model, details["loc"])
+        for details, unit in zip(errors, units, strict=True)
+        if isinstance(unit, ValueError) and not isinstance(unit, WrongUnit)
+    }  # faults of numbers whose unit is right for one of the dimensions
+    for details, unit in zip(errors, units, strict=True):
         if isinstance(unit, WrongUnit):
+            if _place(model, details["loc"]) in of_another_kind:
+                continue
             k = numbers.setdefault((_place(model, details["loc"]), unit.said), len(faults))
             if k < len(faults):
                 faults[k] = Fault(faults[k].where, f"{faults[k].what}, or {unit.instead}")
                 continue
-        faults += _faults(model, details)
+        faults += [fault for fault in _faults(model, details) if fault not in faults]
     return faults
 
 

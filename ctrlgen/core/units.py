@@ -211,18 +211,27 @@ def parse(text: object, unit: str) -> float:
     if not math.isfinite(value):
         raise ValueError(f"{reprlib.repr(text)} is not a finite number")
     absolute = unit in ("degC", "degF", "K")
+    _check_written(str(text), f"{value:g} {unit}", written)
     if (written == "" and unit != "1") or (absolute and "delta" in written) or not same_dimension(written, unit):
         if written == "":
             raise WrongUnit(f"{text!r} has no unit", f'write for example "{value:g} {unit}"', ";")
-        plain = ("a plain number", f'"{value:g}" without a unit')
-        needed, example = plain if unit == "1" else (unit, f'"{value:g} {unit}"')
-        raise WrongUnit(f"{text!r} has the wrong unit", f"{needed} is needed, for example {example}", ":")
+        needed, behind = ("a plain number", "") if unit == "1" else (unit, f" {unit}")
+        raise WrongUnit(f"{text!r} has the wrong unit", f'{needed} is needed, for example "{value:g}{behind}"', ":")
     si = to_si(value, written)
     if not abs(si) <= largest(unit):
         raise ValueError(f"{text!r} is far too large; {show(largest(unit), unit)} is the most that is read")
     if 0 < abs(si) < SMALLEST:
         raise ValueError(f"{text!r} is too small to reckon with; write 0 where nothing is meant")
     return si
+
+
+def _check_written(text: str, example: str, written: str) -> None:
+    """Raises ValueError, with an `example` of what to write, where what is `written` behind the number of a text is no unit."""
+    try:
+        _affine(written)
+    except ValueError as error:
+        why = f"{text!r} has a decimal comma; write a point" if written[0] == "," else str(error)
+        raise ValueError(why) if "write" in why else WrongUnit(why, f'write for example "{example}"', ";") from None
 
 
 @cache

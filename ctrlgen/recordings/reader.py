@@ -169,7 +169,12 @@ class _Content:
 def _described(path: Path) -> dict[str, Any]:
     """The tables of a recording.toml. Raises InputError, also for a file that is plainly something else."""
     if path.suffix.lower() in READERS:
-        raise InputError(path, [Fault("file", f"is a measurement; name the {FILE} that describes it")])
+        what = (
+            f"is a measurement; name the {FILE} that describes it"
+            if path.exists()
+            else "does not exist; check the path"
+        )
+        raise InputError(path, [Fault("file", what)])
     table = read_toml(path)
     if "record" not in table and ("path" in table or "name" in table):
         what = f"describes a {'scenario' if 'path' in table else 'device'}; name a {FILE}"

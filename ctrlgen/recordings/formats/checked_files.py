@@ -17,7 +17,7 @@ INSTALLED_AS = {"nptdms": "npTDMS"}
 
 def fault(path: Path, what: str) -> InputError:
     """The error that says `what` is wrong with a file."""
-    return InputError(path, [Fault(path.name, what)])
+    return InputError(path, [Fault(path.name or "file", what)])
 
 
 def check_size(path: Path, size: float, what: str = "holds") -> None:

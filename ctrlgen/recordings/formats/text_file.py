@@ -26,7 +26,7 @@ from ctrlgen.recordings.formats.rows_of_signals import lies_on_its_side, on_its_
 from ctrlgen.recordings.formats.run_together import parted
 from ctrlgen.recordings.formats.stated_rate import stated_rate
 from ctrlgen.recordings.formats.text_blocks import MOST_LISTED, Block, blocks_of, kind_of
-from ctrlgen.recordings.formats.text_cells import cells_of, separator_of, stray_quotes, whole_lines
+from ctrlgen.recordings.formats.text_cells import cells_of, is_comment, separator_of, stray_quotes, whole_lines
 from ctrlgen.recordings.formats.text_encoding import decoded
 from ctrlgen.recordings.formats.text_header import header_of
 from ctrlgen.recordings.formats.unapplied import unapplied_columns
@@ -80,6 +80,12 @@ def tables_of_text(path: Path, text: str, layout: Layout, notes: Sequence[str] =
             rows = [k for k, line in enumerate(lines, 1) if kind_of(line, separator) == "row"]
             if len(rows) == 1 and len(cells_of(lines[rows[0] - 1], separator)) > 1:
                 raise fault(path, f"holds a single row of numbers, line {rows[0]}; is the file complete? Record longer")
+            filled = [line for line in lines if line.strip() and not is_comment(line)]
+            if len(filled) == 1 and len(cells_of(filled[0], separator)) > 1:
+                raise fault(
+                    path,
+                    f"holds names of columns, {filled[0].strip()[:LONGEST_SHOWN]!r}, and no rows; is the file complete?",
+                )
             if named := next((line for line in lines if NAMED.match(line)), None):
                 what = f"writes names beside the numbers of its rows, such as {named.strip()[:LONGEST_SHOWN]!r}"
                 raise fault(path, f"{what}; write the names once, above the columns, and rows of numbers alone")
