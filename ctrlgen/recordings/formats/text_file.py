@@ -137,7 +137,7 @@ def _table(
     columns, prefixes = without_prefixes(columns, units)
     columns, of_cells = without_units(columns)
     units |= of_cells
-    texts = {k: column for k, column in enumerate(columns) if column.dtype.kind == "O"}
+    texts = {k: column.tolist() for k, column in enumerate(columns) if column.dtype.kind == "O"}
     beside = units_beside(names, texts, set(range(len(columns))) - set(units))
     units |= {k: next(cell for cell in texts[j] if cell) for k, j in beside.items()}
     unique = _unique(names)

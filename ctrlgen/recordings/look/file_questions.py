@@ -59,7 +59,8 @@ def free_columns(facts: TableFacts, left: Sequence[str]) -> str:
 def _of_digits(facts: TableFacts, column: ColumnFacts) -> bool:
     """Whether most cells of a column of text hold digits and none is a date: numbers written otherwise, and no remarks."""
     cells = [str(cell) for cell in facts.table.columns[column.name]]
-    return np.mean([any(map(str.isdigit, cell)) for cell in cells]) > 0.5 and not any(map(TIME.fullmatch, cells))
+    digits = [any(map(str.isdigit, cell)) for cell in cells]
+    return sum(digits) > len(cells) / 2 and not any(map(TIME.fullmatch, cells))
 
 
 def _unread_time(facts: TableFacts) -> str:
