@@ -10,7 +10,7 @@ from ctrlgen.core.errors import InputError
 from ctrlgen.core.units import to_si
 from ctrlgen.devices import load_device
 from ctrlgen.model.assembly import build_model
-from ctrlgen.recordings.formats import read_table
+from ctrlgen.recordings.formats import long_text_file, read_table
 from ctrlgen.recordings.look.answers import read_answers
 from ctrlgen.recordings.look.column_facts import table_facts
 from ctrlgen.recordings.look.oddities import table_oddities
@@ -118,3 +118,13 @@ def test_what_ordinary_logs_hold_is_none_of_this(tmp_path):
     one_day = "Date,Time,x\n" + "".join(f"2024-03-05,10:00:00.{k:03d},{v}\n" for k, v in enumerate(X))
     assert list(facts_of(tmp_path, one_day).table.columns) == ["Date", "Time", "x"]
     assert "another run" not in " ".join(facts_of(tmp_path, csv(HEAD) + csv("", T + T[-1] + T[1])).table.notes)
+
+
+def test_flags_of_a_long_file_are_counted_in_all_of_its_rows(tmp_path, monkeypatch):
+    monkeypatch.setattr(long_text_file, "LONG", 1 << 18)
+    rows_of = "".join(f"{0.001 * k:.3f},{np.sin(k / 50):.6f},{int(k % 100 != 7)}\n" for k in range(40_000))
+    table = facts_of(tmp_path, "t (s),x (um),x valid\n" + rows_of).table
+    assert isinstance(table.lines, range)  # read piece by piece
+    assert [note for note in table.notes if "not applied" in note] == [
+        "x valid: is 0 in 400 rows and 1 in all others, not applied: empty the readings of these rows where it says that they are none"
+    ]

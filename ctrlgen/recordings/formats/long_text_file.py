@@ -25,6 +25,7 @@ from ctrlgen.recordings.formats.named_lines import are_named
 from ctrlgen.recordings.formats.text_blocks import Block
 from ctrlgen.recordings.formats.text_cells import separator_of
 from ctrlgen.recordings.formats.text_encoding import decoded_bytes
+from ctrlgen.recordings.formats.unapplied import unapplied_columns
 from ctrlgen.recordings.formats.written_layout import Layout
 
 LONG = 8 << 20
@@ -87,10 +88,13 @@ def whole_table(
 ) -> MeasurementTable:
     """The table of all rows, with notes that count their lines."""
     first, last, more = known.lines[0], known.lines[-1], rows - len(known.lines)
+    of_parts = unapplied_columns(list(known.columns), list(known.columns.values()))
     notes = [
         re.sub(r"\bline (\d+)", lambda m: f"line {int(m[1]) + (more if int(m[1]) > last else 0)}", note)
         for note in known.notes
+        if note not in of_parts
     ]
+    notes += unapplied_columns(list(columns), list(columns.values()))
     for name, found in zip(columns, words, strict=True):
         for word, places in found.items():
             count = number_of(len(places), "reading is", "readings are")
