@@ -141,6 +141,31 @@ def test_files_of_one_bench_are_alike_between_samples(axis, tmp_path):
     assert 'between_samples = "linear" # assumed: every drive is a smooth curve' in alone
 
 
+@pytest.mark.parametrize(
+    "others, taken",
+    [
+        (("motor_temp [degC]",), "motor_temp [degC]"),
+        (("motor_temp [degC]", "T_room [degC]"), "T_room [degC]"),
+        (("motor_temp [degC]", "magnet_temp [degC]"), None),
+        (("pressure [Pa]",), None),
+    ],
+)
+def test_a_temperature_beside_the_signals_is_that_of_the_surroundings(axis, tmp_path, others, taken):
+    """Where one column alone can be it; laws of temperature are offered only where the recording names it."""
+    t = 1e-3 * np.arange(500)
+    rows = "".join(f"{a:.3f},{np.sin(6 * a):.6f},{40 * np.sin(6 * a):.6f}{f',{21 + a}' * len(others)}\n" for a in t)
+    (tmp_path / "log.csv").write_text(",".join(["time [s]", "drive [V]", "position [um]", *others]) + "\n" + rows)
+    proposal = propose([table_facts(read_table(tmp_path / "log.csv"))], axis)
+    assert proposal.ambient == taken and set(proposal.left) == set(others) - {taken}
+    text = recording_toml(proposal, tmp_path, "t")
+    assert ("ambient" in text) == (taken is not None)
+    if taken is not None:
+        (tmp_path / "recording.toml").write_text(text)
+        assert load_recordings(tmp_path / "recording.toml", axis, hold_out=False).records[0].ambient[
+            0
+        ] == pytest.approx(294.15)
+
+
 @pytest.mark.long
 def test_new_recording_writes_what_look_proposes(tmp_path):
     t = 1e-3 * np.arange(1000)

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from axis_records import AXIS, NOISE, H, move, record
+from axis_records import AXIS, NOISE, H, K, move, record
 from conftest import DEVICE, SCENARIOS
 from planted_axis import ON_AXIS, asymmetric_hysteresis, bouc_wen, drive_hysteresis, given
 from planted_poses import FAR_OFF, IN_ORDER, ON_HEXAPOD, payload, warmed
@@ -245,6 +245,24 @@ def test_of_a_reading_that_moves_in_the_warmth_alone():
     recover(fitter, AXIS, "temperature_sensitivity_above", planted)
 
 
+@pytest.mark.parametrize("law", ["gain_of_temperature", "scale_of_temperature", "stiffness_of_temperature"])
+def test_of_a_number_that_changes_with_the_warmth(law):
+    """2 permille a kelvin of the drive, of the scale, or of the spring, whose force is that in the middle of each tenth of a sample."""
+    rng, t, parts, slope = np.random.default_rng(3), H * np.arange(N), [], 2e-3
+    for u, role in zip(given(N), ("fit", "hold_out"), strict=True):
+        room = 2 * np.sin(2 * np.pi * 0.9 * t + rng.uniform(0, 6))
+        softer = lambda now, q, v, memory: (-slope * room[int(now / H + 1e-6)] * K * (q + v * H / 20), memory)  # noqa: E731, B023
+        y = {
+            "gain_of_temperature": lambda: move(u * (1 + slope * room)),  # noqa: B023
+            "scale_of_temperature": lambda: move(u) * (1 + slope * room),  # noqa: B023
+            "stiffness_of_temperature": lambda: move(u, softer),  # noqa: B023
+        }[law]() + NOISE * rng.standard_normal(N)
+        parts.append(replace(record(u, y, role), ambient=room))
+    fitter = fitter_of(AXIS, ("reading.axis",), ("um",), (NOISE,), "series", parts)
+    at = {"gain": "actuator:axis", "scale": "sensor:axis", "stiffness": "stage:axis"}[law.partition("_")[0]]
+    recover(fitter, AXIS, law, Planted(at, {"slope": slope}))
+
+
 STATED = {
     "zero_per_record",
     "autocollimator",
@@ -311,5 +329,6 @@ def test_no_law_is_left_out():
         "payload",
         "second_pole",
         "temperature_sensitivity_above",
+        *(f"{what}_of_temperature" for what in ("gain", "scale", "stiffness")),
     }
     assert not set(Effect.library) - battery - here - STATED - FINER - IN_THE_LOOP - SMOOTHERS

@@ -22,7 +22,7 @@ from ctrlgen.recordings.look.answers import NOTHING, Answers, layout_option
 from ctrlgen.recordings.look.column_facts import ColumnFacts, TableFacts, rests, table_facts
 from ctrlgen.recordings.look.oddities import table_oddities
 from ctrlgen.recordings.look.proposal import Proposal, propose
-from ctrlgen.recordings.look.proposed_file import recording_toml
+from ctrlgen.recordings.look.proposed_file import MOST_LEFT, recording_toml
 from ctrlgen.reporting.numbers import number
 
 MOST_GAPS = 3  # that are listed
@@ -105,9 +105,17 @@ def _read(file: Path, answers: Answers, look_at: str = "") -> TableFacts:
 
 
 def print_proposal(proposal: Proposal) -> None:
-    """What is asked, and what is odd, one line each."""
+    """What is asked, assumed, not used, and what is odd, one line each."""
     for question in proposal.asked:
         out.print(f"to be answered: {question}", markup=False, soft_wrap=True)
+    if proposal.ambient is not None:
+        out.print(
+            f"assumed: {proposal.ambient} is the temperature of what surrounds the device", markup=False, soft_wrap=True
+        )
+    if proposal.left:
+        more = len(proposal.left) - MOST_LEFT
+        unused = [*proposal.left[:MOST_LEFT], *([f"{more} more"] if more > 0 else [])]
+        out.print(f"not used: {', '.join(unused)}", markup=False, soft_wrap=True)
     for remark in proposal.remarks:
         out.print(f"odd: {remark}", markup=False, soft_wrap=True)
 

@@ -166,6 +166,9 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             "Right at the rise at which home was set, unless the fit says otherwise.",
             parameters={"reference": _starts((0.0,))},
         ),
+        "gain_of_temperature": LawPrior("As common as another gain, where a temperature was recorded: judgement."),
+        "scale_of_temperature": LawPrior("As common as another scale, where a temperature was recorded: judgement."),
+        "stiffness_of_temperature": LawPrior("In balance it is `gain_of_temperature`.", unless=frozenset({"balanced"})),
         "zero_per_record": LawPrior(
             "Within one record it is a home offset, and over several it fits the mean of whatever is missing: it is stated.",
             suspected=False,

@@ -249,10 +249,10 @@ def _check_stiffness(model: Model) -> None:
     if not (np.all(np.isfinite(low)) and np.all(np.isfinite(high))):
         return
     slope = ca.densify(ca.diag(ca.jacobian(model.balance, model.z)))
-    stiffness = ca.Function("stiffness", [model.x, model.z, model.u, model.p], [slope])
+    stiffness = ca.Function("stiffness", [model.x, model.z, model.u, model.p, model.ambient_symbol], [slope])
     stroke = low + np.linspace(0, 1, STROKE_POINTS)[:, None] * (high - low)
     rest, u, p = (np.tile(v, (STROKE_POINTS, 1)) for v in (model.rest, 0 * model.u_scale, model.p_nominal))
-    (values,) = evaluate(stiffness.map(STROKE_POINTS), rest, stroke, u, p)
+    (values,) = evaluate(stiffness.map(STROKE_POINTS), rest, stroke, u, p, np.zeros((STROKE_POINTS, 1)))
     for z, value in zip(stroke, values, strict=True):
         bad = np.flatnonzero(~(value < 0))  # NaN too
         if bad.size:

@@ -28,6 +28,7 @@ from ctrlgen.recordings.look.column_facts import (
 from ctrlgen.recordings.look.file_questions import free_columns, perhaps_times, time_questions, with_own_rate
 from ctrlgen.recordings.look.oddities import fitting_units, implausible_range
 from ctrlgen.recordings.look.signal_words import DRIVE_WORDS, ERROR_WORDS, READING_WORDS, words_of
+from ctrlgen.recordings.look.surroundings import temperature_of_surroundings
 from ctrlgen.recordings.moved import Stretch, moved_of
 from ctrlgen.recordings.plausibility import implausible
 from ctrlgen.recordings.schema import signal_units
@@ -98,6 +99,8 @@ class Proposal:
     missing: tuple[str, ...]
     remarks: tuple[str, ...]
     answers: Answers = NOTHING
+    ambient: str | None = None
+    """The column that is the temperature of the surroundings."""
 
     @property
     def kind(self) -> str:
@@ -180,7 +183,9 @@ def propose(tables: Sequence[TableFacts], model: Model, answers: Answers = NOTHI
     _check_lengths(first, matches)
     remarks = _remarks(model, first, matches, answers)
     left = [c.name for c in first.columns if c.moves and c.name not in {*taken, *(m.column for m in matches)}]
-    return Proposal(model, tuple(tables), tuple(matches), tuple(left), tuple(asked), tuple(remarks), answers)
+    ambient = temperature_of_surroundings([first.column(name) for name in left])
+    left = [name for name in left if name != ambient]
+    return Proposal(model, tuple(tables), tuple(matches), tuple(left), tuple(asked), tuple(remarks), answers, ambient)
 
 
 def _check_lengths(facts: TableFacts, matches: Sequence[Match]) -> None:

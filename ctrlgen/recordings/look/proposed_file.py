@@ -55,6 +55,10 @@ def _record(proposal: Proposal, facts: TableFacts, folder: Path, role: str) -> l
     """The [[record]] tables of one file: what moves, and the rests before or after, which give the noise."""
     path = Path(os.path.relpath(facts.table.path.resolve(), folder.resolve())).as_posix()
     head, answers = [f"file = {toml(path)}"], proposal.answers
+    if proposal.ambient is not None:
+        column = facts.column(proposal.ambient)
+        known = _column(column.name, column.unit or "degC", column.scale)
+        head.append(f"conditions = {{ ambient = {known} }} # assumed: the temperature of what surrounds the device")
     if answers.table is not None:
         head.append(f"table = {answers.table if isinstance(answers.table, int) else toml(answers.table)}")
     if proposal.kind == "poses":
