@@ -49,6 +49,7 @@ from ctrlgen.estimation.profile_likelihood import profiles
 from ctrlgen.estimation.residual_tests import run_residual_tests
 from ctrlgen.estimation.simulator import compiled_simulator
 from ctrlgen.estimation.spikes import find_spikes
+from ctrlgen.estimation.unstated_drive import fits_the_other_way, turned
 from ctrlgen.recordings.recording import Recording
 
 Progress = Callable[[str], None]
@@ -99,6 +100,10 @@ def _diagnose(
     step(f"refit of the device as described, {number_of(len(offered.hypotheses), 'hypothesis', 'hypotheses')}")
     searcher = Searcher(ready.fitter, Screen(ready.fitter, offered.hypotheses, seed), step, jobs)
     search = searcher.run(ready.device)
+    if fits_the_other_way(search.fitter, search.chosen.fit):
+        step("the same with the drive read the other way between its samples")
+        other = turned(recording, search.fitter.recording)
+        return _diagnose(device, other, seed, step, checkpoint, laws, jobs)
     step("shares of the residual")
     shares = residual_shares(search.fitter, search.nominal.fit, search.chosen.fit, seed)
     evidence = None if shares is None else evidence_of(search, shares.before, offered.hypotheses, laws is None)

@@ -11,7 +11,7 @@ from ctrlgen.core.errors import CtrlgenError, Fault, InputError, SolverError
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.needed_memory import refuse_what_memory_cannot_hold
 from ctrlgen.diagnosis.selection.dead_channels import LiveChannels, without_dead_channels
-from ctrlgen.diagnosis.selection.failures import FAILURES, reason_of
+from ctrlgen.diagnosis.selection.failures import FAILURES, UNSOLVED, reason_of
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.checkpoint import Checkpoint
 from ctrlgen.estimation.described_device import described
@@ -22,6 +22,7 @@ from ctrlgen.estimation.late_readings import settling_time_of
 from ctrlgen.estimation.noise import Noise, estimate_noise
 from ctrlgen.estimation.noise_update import correct_stated_noise, update_guessed_noise
 from ctrlgen.estimation.settings import NOISE_UPDATE
+from ctrlgen.estimation.unstated_drive import as_described_fits
 from ctrlgen.recordings.recording import Recording
 
 OF_OTHER_RECORDINGS = "left out, as other recordings had it alone: {}"
@@ -52,7 +53,8 @@ def prepared(
     device = _in_units_of_the_reader(device, recording)
     recording = _relative_ambient(_with_both_roles(recording))
     live = without_dead_channels(device, recording, effects)
-    fitter = _without_outliers(device, Fitter(live.recording, noise_before_fits(device, live.recording), checkpoint))
+    fitter = Fitter(live.recording, noise_before_fits(device, live.recording), checkpoint)
+    fitter = _without_outliers(device, _with_drive_read(device, fitter))
     return Prepared(device, live, _with_noise(device, fitter))
 
 
@@ -94,6 +96,14 @@ def _relative_ambient(recording: Recording) -> Recording:
 def noise_before_fits(device: Device, recording: Recording) -> Noise:
     """The noise of every channel, before any fit."""
     return estimate_noise(recording, settling_time_of(device))
+
+
+def _with_drive_read(device: Device, fitter: Fitter) -> Fitter:
+    """The fitter with drives that may be held or linear between samples as the readings have it; as they are where they cannot tell."""
+    try:
+        return as_described_fits(device, fitter)
+    except UNSOLVED:
+        return fitter
 
 
 def _without_outliers(device: Device, fitter: Fitter) -> Fitter:

@@ -164,7 +164,7 @@ def _run(record: Record, places: Sequence[int | None], lifted: Lifted, noise: np
     """A record folded into repetitions of the path, and the drift (n_y,) [SI] a period that was taken out; `noise` (n_y,) [SI] of it where
     that is stated. Raises ValueError with what is wrong."""
     n, every = lifted.n, _every(record, lifted)
-    if record.linear and not lifted.static:
+    if record.linear and not record.either and not lifted.static:
         raise ValueError(
             'between_samples = "linear", but a player holds each drive until the next sample; record it so, or leave the key out'
         )

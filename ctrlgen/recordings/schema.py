@@ -87,8 +87,10 @@ class RecordTable(Section):
     """Time of the first row on the clock common to all records. Left out everywhere: as the columns of time say, where files go on from
     each other by them and lie close together; else 0 s.
     """
-    between_samples: Literal["held", "linear"] = "held"
-    """Whether the drive is held at a sample's value until the next sample or is linear between them."""
+    between_samples: Literal["held", "linear", "held or linear"] = "held"
+    """Whether the drive is held at a sample's value until the next sample or is linear between them. `held or linear`: nobody knows; a
+    diagnosis takes what the readings fit, and says so, everything else takes it as linear.
+    """
     gap: Literal["linear", "held", "split"] | None = None
     """What the drive does across rows that are missing, or that hold no number for it: `linear` or `held` bridges every gap that is a
     whole number of samples so, `split` ends a record there and begins another. Left out: gaps of at most 100 samples are bridged where

@@ -276,6 +276,7 @@ def thinned(record: Record, m: int, can: Thinnable) -> Record:
         observed=np.where(valid, observed, np.nan),
         valid=valid,
         linear=record.linear if held else True,
+        either=False,  # between rows that are an average of several, straight lines are right
         ambient=None if ambient is None else ambient[: len(rows)],
     )
 

@@ -137,7 +137,9 @@ class Proposal:
         """What the drive does between samples, as TOML: of all files together, for they come from one bench. A drive that steps in one of
         them is held; curves do not tell."""
         ways = {between_samples(values) for facts in self.tables for values in self.drives_of(facts)}
-        return '"linear" # assumed: every drive is a smooth curve' if ways == {"linear"} else '"held"'
+        if ways == {"linear"}:
+            return '"held or linear" # every drive is a smooth curve, which does not tell: write which, if you know it'
+        return '"held"'
 
     @property
     def certain(self) -> bool:
