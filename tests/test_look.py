@@ -15,6 +15,7 @@ from conftest import AXIS_FILE, DEVICES
 from ctrlgen import build_model, load_device
 from ctrlgen.app.look_console import described, look
 from ctrlgen.core.errors import InputError
+from ctrlgen.recordings.derived_drives import derived_drives
 from ctrlgen.recordings.formats import read_table
 from ctrlgen.recordings.formats.unit_texts import split_name, unit_of
 from ctrlgen.recordings.look.column_facts import between_samples, rests, table_facts
@@ -164,6 +165,39 @@ def test_a_temperature_beside_the_signals_is_that_of_the_surroundings(axis, tmp_
         assert load_recordings(tmp_path / "recording.toml", axis, hold_out=False).records[0].ambient[
             0
         ] == pytest.approx(294.15)
+
+
+def test_speeds_that_nobody_recorded_are_taken_from_the_position(tmp_path):
+    """Of an imposed motion; check says how, where a recording.toml lacks them."""
+    made = ctrlgen("new", "device", tmp_path / "pull.toml", "--kind", "tested-axis", "--no-ask")
+    assert made.returncode == 0, made.stderr
+    model, t = build_model(load_device(tmp_path / "pull.toml")), 1e-3 * np.arange(1000)
+    rows = "".join(f"{a:.3f},{np.sin(6 * a):.6f},{3 * np.sin(6 * a):.6f}\n" for a in t)
+    (tmp_path / "log.csv").write_text("time [s],position [mm],force [N]\n" + rows)
+    proposal = propose([table_facts(read_table(tmp_path / "log.csv"))], model)
+    assert proposal.certain and set(proposal.derived) == {"drive.velocity", "drive.acceleration"}
+    text = recording_toml(proposal, tmp_path, "t")
+    (tmp_path / "recording.toml").write_text(text)
+    speed = load_recordings(tmp_path / "recording.toml", model, hold_out=False).records[0].drive[500, 1]
+    assert speed == pytest.approx(6e-3 * np.cos(3), rel=1e-3)
+    (tmp_path / "recording.toml").write_text(text.partition("[derivatives]")[0])
+    with pytest.raises(InputError, match=r'\[derivatives\] "drive.velocity" = \{ of = "drive.position", order = 1 \}'):
+        load_recordings(tmp_path / "recording.toml", model)
+
+
+@pytest.mark.parametrize(
+    "missing, recorded, of",
+    [
+        ("drive.acceleration", ["drive.position", "drive.velocity"], ("drive.velocity", 1)),
+        ("drive.position", ["drive.velocity"], ("drive.velocity", -1)),
+        ("drive.q1_velocity", ["drive.q1_position", "drive.q2_position"], ("drive.q1_position", 1)),
+        ("drive.position", ["drive.acceleration"], None),
+        ("reading.velocity", ["reading.position"], None),
+        ("drive.axis", ["drive.position"], None),
+    ],
+)
+def test_what_is_a_derivative_of_what(missing, recorded, of):
+    assert derived_drives([missing], recorded).get(missing) == of
 
 
 @pytest.mark.long

@@ -102,6 +102,17 @@ def test_a_jacobian_is_what_its_entries_say():
     assert {limit.text for limit in build_model(device).limits} >= {"0 V <= drive of px <= 120 V"}
 
 
+def test_a_zero_has_the_unit_of_its_place():
+    """Found otherwise it is told, and written into the next file, as a number that the file takes: of its row, of another, or in SI."""
+    text = MEASURED.replace('"3 nm/V"', "0").replace('["0.1 urad/V", "0.3 urad/V"]', "[0, 0]")
+    device = read(text, readings=[])
+    units = {path: q.text for path, q in device.quantities() if path.startswith("jacobian") and not q.si}
+    assert units == {"jacobian[0][1]": "0 um/V", "jacobian[2][0]": "0 rad/V", "jacobian[2][1]": "0 rad/V"}
+    assert read(text, readings=[], jacobian=[["0.21 um/V", units["jacobian[0][1]"]], ["-2 nm/V", "0.19 um/V"], [0, 0]])
+    notch = read(NOTCH)
+    assert all(q.text != "0" for path, q in notch.quantities() if path.startswith("compliance"))
+
+
 WRONG = {
     (r'"-0.802 rad/N"', '"0.802 rad/N"'): "rows theta_y and delta_z: what stands across the diagonal differs by",
     (r'"9.12e-2 rad/\(N', '"-9.12e-2 rad/(N'): "not positive definite: on the diagonal theta_x must be above zero",

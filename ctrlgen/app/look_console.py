@@ -108,6 +108,9 @@ def print_proposal(proposal: Proposal) -> None:
     """What is asked, assumed, not used, and what is odd, one line each."""
     for question in proposal.asked:
         out.print(f"to be answered: {question}", markup=False, soft_wrap=True)
+    for name, (of, order) in proposal.derived.items():
+        what = "its integral" if order < 0 else f"its derivative {order}" if order > 1 else "its slope"
+        out.print(f"assumed: {name} is not recorded and taken from {of}: {what}", markup=False, soft_wrap=True)
     if proposal.ambient is not None:
         out.print(
             f"assumed: {proposal.ambient} is the temperature of what surrounds the device", markup=False, soft_wrap=True

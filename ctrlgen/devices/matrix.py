@@ -30,7 +30,7 @@ from ctrlgen.devices.device_physics import BalancedPhysics, SensedPoints
 from ctrlgen.devices.driven import proportional
 from ctrlgen.devices.limit import Limit
 from ctrlgen.devices.matrix_actuator import MatrixActuator
-from ctrlgen.devices.matrix_entries import Entry, entry_faults, units_of
+from ctrlgen.devices.matrix_entries import Entry, entry_faults, units_of, with_units
 from ctrlgen.devices.place import Direction, Place
 from ctrlgen.devices.stated_matrix import matrix_faults, symmetric_note
 from ctrlgen.devices.travel import ends_of
@@ -84,6 +84,7 @@ class MatrixDevice(Device):
         faults += [] if faults else self._unmoved()
         if faults:
             raise ValueError("; ".join(faults))
+        object.__setattr__(self, self.form, with_units(getattr(self, self.form), *self._units()))
         return self
 
     @property
@@ -136,13 +137,16 @@ class MatrixDevice(Device):
 
     def _entry_faults(self) -> list[str]:
         """Rows and columns that are too few or too many, and entries in a wrong unit."""
+        return entry_faults(self.form, getattr(self, self.form), *self._units())
+
+    def _units(self) -> tuple[dict[str, str], dict[str, str]]:
+        """The SI units of the rows and of the columns of the stated matrix, by their names."""
         directions, loads = units_of(self.directions), units_of(self._load_order)
-        rows, columns = {
+        return {
             "compliance": (directions, loads),
             "stiffness": (loads, directions),
             "jacobian": (directions, {a.name: a.drive_unit for a in self.actuator}),
         }[self.form]
-        return entry_faults(self.form, getattr(self, self.form), rows, columns)
 
     def _numbers(self, deviations: bool = False) -> np.ndarray:
         """The matrix as the file states it [SI], directions by conjugate loads or by drives; or its `deviations`, 0 where none is."""
@@ -164,8 +168,10 @@ class MatrixDevice(Device):
                 f"actuator: as far as the matrix tells, {', '.join(self.axes)} push only together; place them otherwise"
             ]
         reach = np.abs(m.rows * self._travels)
-        arm = max((reach[i].max() for i, name in enumerate(self.directions) if name[0] == "t"), default=1.0)
-        way = max((reach[i].max() for i, name in enumerate(self.directions) if name[0] == "d"), default=1.0)
+        arm = max((reach[i].max() for i, name in enumerate(self.directions) if name[0] == "t"), default=0.0)
+        arm = arm or 1.0  # nothing turns
+        way = max((reach[i].max() for i, name in enumerate(self.directions) if name[0] == "d"), default=0.0)
+        way = way or 1.0
         sized = reach / np.array([[arm if name[0] == "t" else way] for name in self.directions])
         followed = sized[[self.directions.index(name) for name in self.channels]]
         still = [name for name in (*self.channels, *self.readings) if sized[self.directions.index(name)].max() <= MOVED]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Annotated
 
 from ctrlgen.core.counts import number_of
@@ -31,8 +32,31 @@ def entry_faults(
             written = written_unit(entry.text)
             if same_dimension(written, f"({of})/({per})") or (entry.si == 0 and written == "1"):
                 continue
-            example = "/".join(f"({unit})" if set(unit) & set("*/") else unit for unit in (of, per))
             faults.append(
-                f'{key}[{i}][{j}]: {row} per {column} = {entry.text!r} has the wrong unit; write for example "1 {example}", or 0'
+                f'{key}[{i}][{j}]: {row} per {column} = {entry.text!r} has the wrong unit; write for example "1 {_unit(of, per)}", or 0'
             )
     return faults
+
+
+def with_units(
+    stated: Sequence[Sequence[Quantity]], rows: Mapping[str, str], columns: Mapping[str, str]
+) -> tuple[tuple[Quantity, ...], ...]:
+    """The entries, a zero without a unit in that of an entry of its dimension, first of its row, or in SI where none states one: a
+    diagnosis that finds it otherwise tells and writes it in that unit."""
+    units = [[unit for e in row if (unit := written_unit(e.text)) != "1"] for row in stated]
+
+    def of_its_place(entry: Quantity, i: int, of: str, per: str) -> Quantity:
+        if written_unit(entry.text) != "1" or entry.si:
+            return entry
+        own = _unit(of, per)
+        near = [*units[i], *(unit for row in units for unit in row), own]
+        return replace(entry, text=f"0 {next(unit for unit in near if same_dimension(unit, own))}")
+
+    return tuple(
+        tuple(of_its_place(entry, i, of, per) for entry, per in zip(row, columns.values(), strict=True))
+        for i, (row, of) in enumerate(zip(stated, rows.values(), strict=True))
+    )
+
+
+def _unit(of: str, per: str) -> str:
+    return "/".join(f"({unit})" if set(unit) & set("*/") else unit for unit in (of, per))

@@ -15,6 +15,7 @@ from ctrlgen.core.names import meant
 from ctrlgen.core.units import In, Quantity, parse, parse_difference, same_dimension
 from ctrlgen.devices.section import Section
 from ctrlgen.model.model import Model
+from ctrlgen.recordings.derived_drives import derived_drives, written
 from ctrlgen.recordings.formats.written_layout import Layout
 
 FILE = "recording.toml"
@@ -281,6 +282,8 @@ class _Check:
         for name, unit in units.items():
             if name.startswith("drive.") and name not in columns and name not in self.written.derivatives:
                 what = f'is missing, and the device cannot be simulated without it; add "{name}" = {{ column = "...", unit = "{unit}" }}'
+                for of in derived_drives([name], columns).values():
+                    what += f', or under [derivatives] "{name}" = {written(*of)}'
                 self._fault(f"{where}.columns", f"{name} {what}")
         if all(name.startswith("drive.") for name in columns):
             known = next((name for name in units if name.startswith("reading.")), "reading")

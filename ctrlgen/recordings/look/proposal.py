@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import parse, same_dimension, to_si
 from ctrlgen.model.model import Model
 from ctrlgen.recordings.alike_units import size_of
+from ctrlgen.recordings.derived_drives import derived_drives
 from ctrlgen.recordings.look.answers import NOTHING, Answers, layout_option
 from ctrlgen.recordings.look.column_facts import (
     ColumnFacts,
@@ -101,6 +102,8 @@ class Proposal:
     answers: Answers = NOTHING
     ambient: str | None = None
     """The column that is the temperature of the surroundings."""
+    derived: Mapping[str, tuple[str, int]] = field(default_factory=dict)
+    """Drives that no column is, each with the drive of which it is a derivative and the order."""
 
     @property
     def kind(self) -> str:
@@ -170,10 +173,11 @@ def propose(tables: Sequence[TableFacts], model: Model, answers: Answers = NOTHI
     matches.sort(key=lambda match: signals.index(match.signal))
     found = {match.signal for match in matches}
     left = [c.name for c in columns if c.name not in {m.column for m in matches}]
+    derived = derived_drives([name for name in signals if name not in found], found)
     asked = [
         f"{name}: which column? Free are {free_columns(first, left)} ({shlex.join(['--column', f'{name}=COLUMN'])})"
         for name in signals
-        if name.startswith("drive.") and name not in found
+        if name.startswith("drive.") and name not in found | set(derived)
     ]
     if not any(name.startswith("reading.") for name in found):
         known = next(name for name in signals if name.startswith("reading."))
@@ -187,7 +191,9 @@ def propose(tables: Sequence[TableFacts], model: Model, answers: Answers = NOTHI
     left = [c.name for c in first.columns if c.moves and c.name not in {*taken, *(m.column for m in matches)}]
     ambient = temperature_of_surroundings([first.column(name) for name in left])
     left = [name for name in left if name != ambient]
-    return Proposal(model, tuple(tables), tuple(matches), tuple(left), tuple(asked), tuple(remarks), answers, ambient)
+    return Proposal(
+        model, tuple(tables), tuple(matches), tuple(left), tuple(asked), tuple(remarks), answers, ambient, derived
+    )
 
 
 def _check_lengths(facts: TableFacts, matches: Sequence[Match]) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ctrlgen.core.escaping import toml
 from ctrlgen.core.file_format import FORMAT
+from ctrlgen.recordings.derived_drives import written
 from ctrlgen.recordings.look.column_facts import NOISE_REST, TableFacts, rests, slow_clock
 from ctrlgen.recordings.look.proposal import Proposal
 from ctrlgen.recordings.settled_readings import settled
@@ -40,6 +41,13 @@ def recording_toml(proposal: Proposal, folder: Path, title: str) -> str:
     more = len(proposal.left) - MOST_LEFT
     unused = [*proposal.left[:MOST_LEFT], *([f"{more} more"] if more > 0 else [])]
     lines += [f"# not used: {', '.join(unused)}"] if unused else []
+    if proposal.derived:
+        lines += [
+            "",
+            "[derivatives]",
+            "# assumed: no column is one of these; state a low_pass above if what they are of is noisy",
+        ]
+        lines += [f"{toml(name)} = {written(*of)}" for name, of in proposal.derived.items()]
     lines += [f"# to be answered: {question}" for question in proposal.missing]
     lines += [f"# odd: {remark}" for remark in proposal.remarks]
     # names of columns stand in comments, too, where nothing escapes what is not shown
