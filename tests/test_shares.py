@@ -69,6 +69,7 @@ FUNCTIONS = {
     Kind.DRIVE_LAG: lambda s: s.drive["u"] - lfilter([0.02], [1, -0.98], s.drive["u"]),  # 0.1 s
     Kind.OTHER_AXIS: lambda s: s.position["y"] ** 2,
     Kind.PRODUCT: lambda s: s.position["x"] * s.position["y"],
+    Kind.WARM_PRODUCT: lambda s: s.position["x"] * s.temperature,
     Kind.TEMPERATURE: lambda s: np.exp(s.temperature),
     Kind.PITCH: lambda s: np.sin(2 * np.pi * s.position["x"] / 0.11 + 1.0),
     Kind.TIME: lambda s: np.sin(2 * np.pi * s.time / T[-1]),

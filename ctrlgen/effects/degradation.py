@@ -1,4 +1,4 @@
-"""An actuator that slowly loses strength."""
+"""A drive that does less, or more, in the course of time: an actuator that loses strength, a screw that warms up."""
 
 from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, itself
 from ctrlgen.effects._incipient import CLOCK, lost_share

@@ -11,6 +11,7 @@ from ctrlgen.diagnosis.report.history_table import most_gained, quantity
 from ctrlgen.diagnosis.report.luck_sentences import luck_steps
 from ctrlgen.diagnosis.report.on_the_clock import used_for_another_run
 from ctrlgen.diagnosis.report.period_words import repeats
+from ctrlgen.diagnosis.report.smaller_causes import smaller_causes_step
 from ctrlgen.diagnosis.report.time_base import time_base_step
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
@@ -169,7 +170,7 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
     """What to do next, in order."""
     first = [*([UNCHECKED] if implausible_notes(diagnosis) else []), *time_base_step(diagnosis)]
     refused = [f"Not taken: {text}." for text in refusals(diagnosis)]
-    return [*first, *_steps(diagnosis), *refused, *luck_steps(diagnosis.findings)]
+    return [*first, *_steps(diagnosis), *smaller_causes_step(diagnosis), *refused, *luck_steps(diagnosis.findings)]
 
 
 def implausible_notes(diagnosis: Diagnosis) -> list[str]:

@@ -40,6 +40,7 @@ NAMES: dict[Kind | Beside, str] = {
     Kind.OTHER_AXIS: "another axis",
     Kind.DRIVE_LAG: "the low-passed drive",
     Kind.PRODUCT: "the product of two signals",
+    Kind.WARM_PRODUCT: "the product of temperature and another signal",
     Kind.RECORD: "a constant for each record",
 }
 

@@ -32,6 +32,7 @@ class Kind(Enum):
     OTHER_AXIS = "other axis"
     DRIVE_LAG = "low-passed drive"
     PRODUCT = "product of two"
+    WARM_PRODUCT = "product with temperature"
     TEMPERATURE = "temperature"
     RECORD = "record"
     PITCH = "place in a pitch"

@@ -56,6 +56,10 @@ SPEAKS_FOR: dict[Kind, tuple[tuple[Family, ...], str]] = {
         (Family.CROSS_TALK, Family.ELASTIC, Family.HYSTERESIS),
         "second order of the kinematics, stiffness that another axis changes, hysteresis that differs by side",
     ),
+    Kind.WARM_PRODUCT: (
+        (Family.THERMAL, Family.CROSS_TALK),
+        "a stiffness, a gain or a scale that changes with the surroundings' temperature",
+    ),
     Kind.TEMPERATURE: ((Family.THERMAL,), "expansion, and sensors that see the surroundings"),
     Kind.RECORD: ((Family.GAIN, Family.EVENTS), "the zero point of each record, or what happened between them"),
     Kind.PITCH: ((Family.PERIODIC,), "fringes, teeth, slots, resolvers and screws repeat along the way"),

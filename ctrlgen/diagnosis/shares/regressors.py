@@ -21,6 +21,7 @@ from ctrlgen.diagnosis.shares.signals import Signals
 
 # signals of one kind, up to which each gets all its columns
 FEW = 2
+WARMTH = "temperature"
 
 
 def own_axes(signals: Sequence[Signals], channel: str) -> frozenset[str]:
@@ -217,14 +218,15 @@ class _Builder:
         if len(self.drive) <= FEW:
             signals += [(u, frozenset(), x) for u, x in self.drive.items()]
         if self.ambient is not None:
-            signals.append(("temperature", frozenset(), self.ambient))
+            signals.append((WARMTH, frozenset(), self.ambient))
         plain = {name: standardised(x) for name, _, x in signals}
         for (one, at, x), (other, of, _) in combinations(signals, 2):
             moving = {one, other} - set(self.axes)
             # of two axes the positions alone
             if at and of and at != of and moving:
                 continue
-            yield Columns(Kind.PRODUCT, one, "", at | of, x, (plain[one] * plain[other])[:, None])
+            kind = Kind.WARM_PRODUCT if other == WARMTH else Kind.PRODUCT
+            yield Columns(kind, one, "", at | of, x, (plain[one] * plain[other])[:, None])
 
     @cached_property
     def ambient(self) -> np.ndarray | None:
@@ -239,7 +241,7 @@ class _Builder:
         nothing: frozenset[str] = frozenset()
         if self.ambient is not None:
             values = splines(self.ambient, self.count(1))
-            yield Columns(Kind.TEMPERATURE, "temperature", "K", nothing, self.ambient, values)
+            yield Columns(Kind.TEMPERATURE, WARMTH, "K", nothing, self.ambient, values)
         t = self.drawn([s.time for s in self.signals])
         unit = "" if self.settled else "s"
         yield Columns(Kind.TIME, "pose" if self.settled else "time", unit, nothing, t, splines(t, self.count(1)))
