@@ -100,7 +100,16 @@ def test_the_laws_of_two_channels_and_those_with_a_clock_are_these():
     couplings = {"stiffness_coupling", "damping_coupling", "inertia_coupling"}
     empirical = {"empirical_history", "empirical_position", "empirical_speed"}
     two = (
-        {"abbe_arm", "coupling", "drive_crosstalk", "feedthrough", "link_compliance", "squareness", "swapped"}
+        {
+            "abbe_arm",
+            "coupling",
+            "cross_scale",
+            "drive_crosstalk",
+            "feedthrough",
+            "link_compliance",
+            "squareness",
+            "swapped",
+        }
         | couplings
         | empirical
     )

@@ -237,3 +237,12 @@ def test_where_nothing_is_found_no_number_of_it_is_uncertain_and_no_error_change
     assert next_steps(replace(turned, empirical_terms=()))[0] == NOTHING_FOUND
     assert turned.search.chosen is turned.search.nominal
     assert all(e.rms_before == e.rms_after for e in turned.held_out.values())
+
+
+@pytest.mark.parametrize("before, after, said", [(50.0, 4.0, True), (50.0, 1.9, False), (30.0, 4.0, False)])
+def test_where_smaller_causes_were_not_sought_it_says_how_they_are(creeping, before, after, said):
+    """Below a hundredth of the energy a search takes only what takes most away, and noise alone is no reason."""
+    (channel, was), *_ = creeping.held_out.items()
+    errors = {channel: was.model_copy(update={"rms_before": before, "rms_after": after, "noise_floor": 1.0})}
+    left = replace(creeping, held_out=errors, residual_tests=replace(creeping.residual_tests, passed=False))
+    assert any("diagnose device.next.toml with the same recordings" in step for step in next_steps(left)) == said

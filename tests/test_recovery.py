@@ -151,7 +151,15 @@ def test_of_poses_one_after_the_other(effect):
     recover(fitter, device, effect, planted)
 
 
-def test_of_a_grid_plate_that_is_not_square():
+@pytest.mark.parametrize(
+    "law, truth, of_x",
+    [
+        ("squareness", {"angle": 0.004}, lambda x, y: 0.004 * y),
+        ("cross_scale", {"rate": 400.0}, lambda x, y: 400 * x * y),
+    ],
+)
+def test_of_two_axes_of_a_sensor(law, truth, of_x):
+    """A grid plate that is not square; an axis that reads 0.4 permille more for each micrometre of the other."""
     table = {
         "kind": "matrix",
         "name": "stage",
@@ -165,10 +173,10 @@ def test_of_a_grid_plate_that_is_not_square():
     rng, device, parts = np.random.default_rng(10), validate(Device.library["matrix"], table, "device"), []
     for n, role in ((60, "fit"), (30, "hold_out")):
         u = rng.uniform(0, 100, (n, 2))
-        y = 2e-7 * u + np.outer(0.004 * 2e-7 * u[:, 1], [1, 0]) + SHIFTED * rng.standard_normal((n, 2))
+        y = 2e-7 * u + np.outer(of_x(*(2e-7 * u).T), [1, 0]) + SHIFTED * rng.standard_normal((n, 2))
         parts.append(record(u, y, role, h=np.inf))
     fitter = fitter_of(device, ("reading.delta_x", "reading.delta_y"), ("um", "um"), (SHIFTED, SHIFTED), "poses", parts)
-    recover(fitter, device, "squareness", Planted("sensor:delta_x", {"angle": 0.004}, "delta_y"))
+    recover(fitter, device, law, Planted("sensor:delta_x", truth, "delta_y"))
 
 
 def test_of_a_table_out_of_balance():
@@ -320,6 +328,7 @@ def test_no_law_is_left_out():
         *(law.__name__ for law in ON_AXIS | IN_A_REGION),
         *ON_HEXAPOD,
         "squareness",
+        "cross_scale",
         *SHARED,
         *IN_ORDER,
         "clock_offset",

@@ -338,6 +338,11 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
                 of_one_body=True,
             ),
         ),
+        "cross_scale": LawPrior(
+            "Rarer than axes that are not square: judgement. Of a pose of six components finite rotations say as much.",
+            log_prior_odds=ONE_IN_TEN,
+            unless=frozenset({"spatial"}),
+        ),
         "squareness": LawPrior(
             "Of a pose of six components a frame that stands turned in one reading says the same.",
             unless=frozenset({"spatial"}),
