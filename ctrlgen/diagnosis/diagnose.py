@@ -27,7 +27,7 @@ from ctrlgen.devices import Device
 from ctrlgen.diagnosis.evidence.chance_by_luck import doubted, with_chances
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.evidence.supporting_analyses import run_supporting_analyses
-from ctrlgen.diagnosis.prepared_recording import prepared
+from ctrlgen.diagnosis.prepared_recording import is_read_the_wrong_way, prepared
 from ctrlgen.diagnosis.report.told_beside import told_beside
 from ctrlgen.diagnosis.selection.direct_detection import directly_detected_findings
 from ctrlgen.diagnosis.selection.failures import FAILURES, reason_of
@@ -49,7 +49,7 @@ from ctrlgen.estimation.profile_likelihood import profiles
 from ctrlgen.estimation.residual_tests import run_residual_tests
 from ctrlgen.estimation.simulator import compiled_simulator
 from ctrlgen.estimation.spikes import find_spikes
-from ctrlgen.estimation.unstated_drive import fits_the_other_way, turned
+from ctrlgen.estimation.unstated_drive import turned
 from ctrlgen.recordings.recording import Recording
 
 Progress = Callable[[str], None]
@@ -100,7 +100,7 @@ def _diagnose(
     step(f"refit of the device as described, {number_of(len(offered.hypotheses), 'hypothesis', 'hypotheses')}")
     searcher = Searcher(ready.fitter, Screen(ready.fitter, offered.hypotheses, seed), step, jobs)
     search = searcher.run(ready.device)
-    if fits_the_other_way(search.fitter, search.chosen.fit):
+    if is_read_the_wrong_way(search.fitter, search.chosen.fit):
         step("the same with the drive read the other way between its samples")
         other = turned(recording, search.fitter.recording)
         return _diagnose(device, other, seed, step, checkpoint, laws, jobs)

@@ -22,7 +22,7 @@ from ctrlgen.estimation.late_readings import settling_time_of
 from ctrlgen.estimation.noise import Noise, estimate_noise
 from ctrlgen.estimation.noise_update import correct_stated_noise, update_guessed_noise
 from ctrlgen.estimation.settings import NOISE_UPDATE
-from ctrlgen.estimation.unstated_drive import as_described_fits
+from ctrlgen.estimation.unstated_drive import as_described_fits, fits_the_other_way
 from ctrlgen.recordings.recording import Recording
 
 OF_OTHER_RECORDINGS = "left out, as other recordings had it alone: {}"
@@ -104,6 +104,14 @@ def _with_drive_read(device: Device, fitter: Fitter) -> Fitter:
         return as_described_fits(device, fitter)
     except UNSOLVED:
         return fitter
+
+
+def is_read_the_wrong_way(fitter: Fitter, fit: Fit) -> bool:
+    """Whether a model's drives, of which nobody states it, fit better the other way (`fits_the_other_way`); not where that fails."""
+    try:
+        return fits_the_other_way(fitter, fit)
+    except UNSOLVED:
+        return False
 
 
 def _without_outliers(device: Device, fitter: Fitter) -> Fitter:
