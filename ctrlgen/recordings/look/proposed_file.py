@@ -65,8 +65,8 @@ def _record(proposal: Proposal, facts: TableFacts, folder: Path, role: str) -> l
     head, answers = [f"file = {toml(path)}"], proposal.answers
     if proposal.ambient is not None:
         column = facts.column(proposal.ambient)
-        known = _column(column.name, column.unit or "degC", column.scale)
-        head.append(f"conditions = {{ ambient = {known} }} # assumed: the temperature of what surrounds the device")
+        warmth = _column(column.name, column.unit or "degC", column.scale)
+        head.append(f"conditions = {{ ambient = {warmth} }} # assumed: the temperature of what surrounds the device")
     if answers.table is not None:
         head.append(f"table = {answers.table if isinstance(answers.table, int) else toml(answers.table)}")
     if proposal.kind == "poses":
