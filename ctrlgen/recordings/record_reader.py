@@ -187,7 +187,7 @@ class RecordReader:
             drive=drive[kept],
             observed=observed[kept],
             linear=table.between_samples != "held",
-            either=table.between_samples == "held or linear",
+            either=table.between_samples == "unstated",
             poses=self.written.kind == "poses",
             ambient=None if ambient is None else (np.zeros(n) + ambient)[kept],
             valid=(after_lead_in & recorded)[kept],

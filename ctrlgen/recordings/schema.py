@@ -88,8 +88,8 @@ class RecordTable(Section):
     """Time of the first row on the clock common to all records. Left out everywhere: as the columns of time say, where files go on from
     each other by them and lie close together; else 0 s.
     """
-    between_samples: Literal["held", "linear", "held or linear"] = "held"
-    """Whether the drive is held at a sample's value until the next sample or is linear between them. `held or linear`: nobody knows; a
+    between_samples: Literal["held", "linear", "unstated"] = "held"
+    """Whether the drive is held at a sample's value until the next sample or is linear between them. `unstated`: nobody knows; a
     diagnosis takes what the readings fit, and says so, everything else takes it as linear.
     """
     gap: Literal["linear", "held", "split"] | None = None

@@ -123,7 +123,7 @@ def _check_in_turn(table: MeasurementTable) -> None:
     """Raises InputError where a column names the axis, or the sensor, of each row and several are written in turn: their readings are no
     motion of one."""
     for name, column in table.columns.items():
-        if len(column) < FEWEST_IN_TURN or not SOURCES & set(re.findall(r"[a-z]+", bare_name(name).lower())):
+        if len(column) < FEWEST_IN_TURN or name in table.units or not _names_a_source(bare_name(name)):
             continue
         cells = [str(cell) for cell in column]
         changing = float(np.mean([a != b for a, b in pairwise(cells)]))
@@ -133,10 +133,16 @@ def _check_in_turn(table: MeasurementTable) -> None:
             raise table.fault(f"{told}; write those of each to a file of its own")
 
 
+def _names_a_source(name: str) -> bool:
+    """Whether a name is that of what a row was read of, `axis` or `node id`: CH1 is a reading, and an x-axis a coordinate."""
+    words = re.findall(r"[a-z]+\d*", name.lower())
+    return bool(words) and (words[0] in SOURCES or words[-1] == "id")
+
+
 def _as_often(cells: list[str]) -> bool:
-    """Whether different cells stand in about as many rows each."""
+    """Whether different cells stand in about as many rows each, and in more than one: a coordinate that rises goes through none again."""
     counts = sorted(map(cells.count, set(cells)))
-    return counts[0] >= CHANGING * counts[-1]
+    return counts[0] >= max(CHANGING * counts[-1], 2)
 
 
 def _begins_with_a_word(column: Column) -> bool:

@@ -141,7 +141,7 @@ class Proposal:
         them is held; curves do not tell."""
         ways = {between_samples(values) for facts in self.tables for values in self.drives_of(facts)}
         if ways == {"linear"}:
-            return '"held or linear" # every drive is a smooth curve, which does not tell: write which, if you know it'
+            return '"unstated" # every drive is a smooth curve, which does not tell: write which, if you know it'
         return '"held"'
 
     @property
