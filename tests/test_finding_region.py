@@ -14,7 +14,7 @@ from ctrlgen.diagnosis.report.answer import where
 from ctrlgen.diagnosis.selection.edge_intervals import edge_intervals, moved_by_form, out_to_visited
 from ctrlgen.diagnosis.selection.finding_region import region_of
 from ctrlgen.diagnosis.selection.findings import Estimate, estimated_values, finding_estimates
-from ctrlgen.diagnosis.selection.motion_regions import along_region
+from ctrlgen.diagnosis.selection.motion_regions import along_region, no_region
 from ctrlgen.effects import Effect, Place
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.structure import Structure
@@ -153,3 +153,21 @@ def test_a_region_lies_along_what_its_own_axis_does_or_along_what_all_share(kind
     cause = SimpleNamespace(effect=kind, law=Effect.library.get(kind), acts_on=lambda device: [1])
     fit = SimpleNamespace(structure=SimpleNamespace(causes=(cause,), device=None))
     assert along_region(motion, fit, 0) is (motion[key] if key else None)
+
+
+@pytest.mark.parametrize(
+    "law, middle, length, there",
+    [
+        ("coulomb_on_stretch", 0.0, 0.5, True),
+        ("coulomb_on_stretch", 0.9, 0.5, False),
+        ("local_error", 0.9, 0.5, True),
+        ("local_error", 0.9, 1e-4, False),
+    ],
+)
+def test_a_force_on_a_stretch_that_ends_beyond_all_that_was_recorded_is_that_beyond_an_edge(law, middle, length, there):
+    """A reading that is off at the end of its scale has no law of one edge."""
+    cause = Hypothesis(law, "sensor:axis" if law == "local_error" else "stage:axis", "axis")
+    values = {"position": middle, "length": length}
+    fit = SimpleNamespace(structure=SimpleNamespace(causes=(cause,), device=AXIS), values=lambda k: values)
+    motion = {("position", place, 0): np.linspace(-1, 1, 1001) for place in (Place.FORCE, Place.SENSOR)}
+    assert (no_region(motion, fit, 0) is None) == there
