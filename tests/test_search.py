@@ -12,6 +12,7 @@ from misfits import errors_of, left, weighed_by
 from scipy.signal import lfilter
 
 from ctrlgen.diagnosis.selection import candidates, confusable, rivals, search
+from ctrlgen.diagnosis.selection.attribution import Attribution, ShareEntry
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, linearised_optimum
 from ctrlgen.diagnosis.selection.candidates import fit_subsets, restart_elsewhere
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection
@@ -178,6 +179,17 @@ def test_fits_of_the_last_comparison_serve_the_rivals(monkeypatch):
     found = Searcher(fitter, Screen(fitter, [BACKLASH, LATE]), lambda _: None).run(AXIS)
     assert found.chosen.causes == (BACKLASH,)
     assert (LATE,) in kinds["swapped"] and (LATE,) not in kinds["rivals"]
+
+
+@pytest.mark.parametrize(("share", "sought"), [(0.5, 1), (0.001, 0)])
+def test_no_rival_is_sought_of_what_takes_away_less_than_is_worth_a_name(monkeypatch, share, sought):
+    """A pose set may have nine such causes beside two, and what might stand in the place of each is fitted again."""
+    told, calls = ShareEntry(value=share, ci95=(share, share)), []
+    account = Attribution((told,), ShareEntry(value=1 - share, ci95=(0.0, 1.0)), True)
+    monkeypatch.setattr(search, "supported", lambda trials, nominal, current, seed: (current, account))
+    monkeypatch.setattr(search, "rivals", lambda trials, current, k, rounds: calls.append(k) or ((), ()))
+    found = Searcher(fitter_of(played, n=700), Screen(fitter_of(played, n=700), [BACKLASH]), lambda _: None).run(AXIS)
+    assert found.chosen.causes == (BACKLASH,) and len(calls) == sought and found.rivals == ((),)
 
 
 def test_what_explains_better_once_all_is_fitted_takes_the_place_of_a_cause():

@@ -70,6 +70,12 @@ class Attribution:
     channels: dict[str, tuple[float, ...]] = field(default_factory=dict)
     serves: tuple[int | None, ...] = ()
 
+    def is_named(self, k: int) -> bool:
+        """Whether cause k is a cause of the answer, or a part of one: not one that takes away less than is worth a name."""
+        share = self.shares[k]
+        served = bool(self.serves) and self.serves[k] is not None
+        return self.rest is None or (served if share is None else share.value >= ATTRIBUTION.least_share)
+
     @property
     def explained(self) -> float:
         """The share that all causes take away together; 0 where nothing is to share, or more is left than there was."""

@@ -108,11 +108,13 @@ class Searcher:
         rounds: Sequence[Round],
         withdrawn: tuple[Hypothesis, ...],
     ) -> SearchResult:
-        """The chosen model `current` with its account, and with the rivals of each of its causes."""
+        """The chosen model `current` with its account, and with the rivals of each of its causes that has a name in the answer."""
         trials, each = self.trials, range(len(current.causes))
         bare = tuple(trials.each(lambda branch, k: _without(branch, current, k, nominal), each))
         screened = trials.screened(current)
-        found_alike = trials.each(lambda branch, k: rivals(branch, current, k, rounds), each)
+        named = [k for k in each if account.is_named(k)]
+        told = dict(zip(named, trials.each(lambda branch, k: rivals(branch, current, k, rounds), named), strict=True))
+        found_alike = [told.get(k, ((), ())) for k in each]
         alike, unlikely = (tuple(rows[i] for rows in found_alike) for i in (0, 1))
         log = (tuple(trials.log), tuple(trials.screen.hypotheses))
         return SearchResult(
