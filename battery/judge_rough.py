@@ -69,16 +69,14 @@ SHARES = ("share", "share_varying")  # with each record's zero point counted as 
 
 def as_weighed(answer: dict[str, Any], diagnosis: dict[str, Any]) -> list[dict[str, Any]]:
     """The planted causes, the largest share first. Where nobody states the noise of readings in two units, a share of all of them
-    depends on how the units count beside each other: they count by what the diagnosis leaves of each, as it says."""
+    depends on how the units count beside each other: they count by what the diagnosis says of each."""
     planted, errors = answer["planted"], diagnosis.get("held_out", {})
     channels = [f"reading.{name}" for name in COMPONENTS]
-    if not set(channels) <= set(errors) or any(
-        errors[c]["noise_floor"] or not errors[c]["rms_after"] for c in channels
-    ):
+    if not set(channels) <= set(errors) or any(errors[c].get("counts_as") is None for c in channels):
         return planted
-    left = np.array([in_si(errors[c]["rms_after"], errors[c]["unit"]) ** 2 for c in channels])
-    left = np.repeat([left[:3].mean(), left[3:].mean()], 3)
-    weights = np.repeat(np.square([answer["noise"]["sd"][0], 1e-6 * answer["noise"]["sd"][1]]), 3) / left  # [rad, um]
+    counts = np.array([in_si(errors[c]["counts_as"], errors[c]["unit"]) for c in channels])
+    noise = np.repeat([answer["noise"]["sd"][0], 1e-6 * answer["noise"]["sd"][1]], 3)  # [rad, um]
+    weights = (noise / counts) ** 2
     both = zip(SHARES, ("parts", "parts_varying"), ("before_parts", "before_parts_varying"), strict=True)
     shares = {
         key: [float(weights @ t[parts] / (weights @ answer[before])) for t in planted] for key, parts, before in both

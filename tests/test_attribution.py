@@ -184,6 +184,24 @@ def test_two_causes_that_nearly_cancel_have_a_share_each(monkeypatch):
     assert found.shares[1].ci95[0] == pytest.approx(ATTRIBUTION.least_share)
 
 
+def test_what_stands_in_for_a_cause_that_is_missing_has_no_share_of_it(monkeypatch):
+    """A creep alone leaves 60 of 100 that a bow causes; beside the bow it takes one of them away."""
+    table = {(): 1e5, (0,): 2e4, (1,): 6e4, (0, 1): 1.9e4}
+    found = shared(monkeypatch, lambda S: table[tuple(sorted(S))], 2)
+    assert values(found) == pytest.approx([0.8, 0.01, 0.19])
+
+
+def test_of_many_causes_those_that_are_needed_are_shared_in_all_their_orders(monkeypatch):
+    """Two that nearly cancel, beside five that take away a hundredth each."""
+    both = {(): 1e5, (0,): 1.5e5, (1,): 1.6e5, (0, 1): 6e3}
+
+    def energy(S):
+        return both[tuple(sorted(S & {0, 1}))] - 1e3 * len(S - {0, 1})
+
+    found = shared(monkeypatch, energy, 7)
+    assert values(found) == pytest.approx([0.52, 0.42, *[0.01] * 5, 0.01])
+
+
 @pytest.mark.parametrize(("without_weight", "first"), [(1.1e5, "gravity"), (3e4, "drive_offset")])
 def test_a_constant_is_part_of_the_law_that_needs_it(monkeypatch, without_weight, first):
     """A weight and the constant that balances it at home, each alone worse than neither; and a constant that leaves little without
@@ -221,7 +239,8 @@ def test_that_sets_are_weighed_otherwise_than_the_tables_is_taken_away_by_no_cau
 
 def test_a_set_gives_no_reading_up_for_the_others(tmp_path):
     """A heater 12 % too strong, and heaters that warm each other by 2.2 %, half cancel in some components. Alone the first leaves more of
-    all than with the numbers of the model if each component has a discrepancy of its own."""
+    all than with the numbers of the model if each component has a discrepancy of its own. The same where nobody states the noise: the
+    device's numbers are held by the file against what a set leaves, not against what stands for the noise."""
     (tmp_path / "device.toml").write_text(hexapod_cases.device_text())
     device, sd = load_device(tmp_path / "device.toml"), np.array([1e-6] * 3 + [12e-9] * 3)
     gain = Hypothesis("drive_gain", "actuator:1Y", "1Y")
@@ -247,6 +266,9 @@ def test_a_set_gives_no_reading_up_for_the_others(tmp_path):
         theta = np.array([fit.values(k)[p.name] if p.cause == 0 else values[p.path] for p in alone.free_parameters])
         as_accepted = attribution.as_fitted(fitter, fitter.fit(alone, theta, steps=0), fitter.fit_records).plain.sum()
         assert energy < as_accepted
+        untold = Fitter(recording, replace(noise_of(6, known=False), sd=sd))
+        left_untold = attribution.left_by(untold, fit, frozenset({k}), fitter.fit_records).plain.sum()
+        assert left_untold == pytest.approx(energy, rel=0.02)
 
 
 def test_causes_that_need_each_other_share_what_they_take_together(monkeypatch):

@@ -324,14 +324,14 @@ def test_readings_in_two_units_count_as_the_diagnosis_weighs_them_where_nobody_s
     }
     units = {"theta": ("urad", 0.4), "delta": ("nm", 20.0)}
     held = {
-        f"reading.{kind}_{axis}": {"rms_after": left, "noise_floor": None, "unit": unit}
+        f"reading.{kind}_{axis}": {"counts_as": left, "unit": unit}
         for kind, (unit, left) in units.items()
         for axis in "xyz"
     }
     turn, gain = judge_rough.as_weighed(case, {"held_out": held})
     assert (turn["name"], turn["share"]) == ("frame_turn", pytest.approx(0.2 / (0.2 + 0.8 / 16)))
     assert (gain["name"], gain["share_varying"]) == ("sensor_gain", pytest.approx(0.05 / 0.25))
-    stated = {channel: e | {"noise_floor": 1.0} for channel, e in held.items()}
+    stated = {channel: e | {"counts_as": None} for channel, e in held.items()}
     assert judge_rough.as_weighed(case, {"held_out": stated}) == planted
 
 

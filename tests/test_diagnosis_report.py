@@ -109,7 +109,7 @@ def test_the_json_is_the_contract(found):
     assert low < finding["parameters"]["gain"]["value"] < high and low < 0.03 < high
     error = result["held_out"]["reading.axis"]
     assert error["unit"] == "nm" and error["rms_refitted"] == pytest.approx(error["noise_floor"], rel=0.1)
-    assert len(error) == 7 and error["goes_with_motion"] is None
+    assert len(error) == 8 and error["goes_with_motion"] is error["counts_as"] is None
     assert error["rms_before"] > 10 * error["rms_after"] and error["noise_floor"] == pytest.approx(5, rel=0.05)
     assert 0 < error["uncertainty"] < error["noise_floor"]
 

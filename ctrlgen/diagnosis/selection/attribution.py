@@ -7,11 +7,13 @@ one for all readings over their noise, as E counts them. What a cause takes away
     phi_k = mean over orders of E(before k) - E(after k),      sum phi = E(none) - E(all),
 
 the average over all orders in which the causes may be added (R. Lindeman, P. Merenda, R. Gold, Introduction to Bivariate and
-Multivariate Analysis, 1980; L. Shapley, Contributions to the Theory of Games II, 1953, 307). With the numbers of the accepted model
-instead, a set would be told by an error that nobody sees: that of a device whose numbers fit what is not there, often several times
-"before". Freed of what the file states, numbers would bend to take what is missing. No set and all causes are fitted as every other set
-is: the tables' own fits weigh each reading by its own discrepancy, and what that changes would be counted as taken away by whichever
-cause comes first, or last. With what the tables call before and after, in energies beyond noise,
+Multivariate Analysis, 1980; L. Shapley, Contributions to the Theory of Games II, 1953, 307), those first without which much of the error
+comes back: while these are missing, a creep stands in for a bow, and would have what the bow takes away. With the numbers of the
+accepted model instead, a set would be told by an error that nobody sees: that of a device whose numbers fit what is not there,
+often several times "before". Freed of what the file states, numbers would bend to take what is missing. No set and all causes are
+fitted as every other set is: the tables' own fits weigh each reading by its own discrepancy, and what that changes would be
+counted as taken away by whichever cause comes first, or last. With what the tables call before and after, in energies beyond
+noise,
 
     share_k = phi_k/sum phi (before - after)/before,   left = after/before,
 
@@ -45,6 +47,9 @@ from ctrlgen.estimation.structure import Structure
 from ctrlgen.numerics.levenberg_marquardt import levenberg_marquardt
 from ctrlgen.recordings.recording import Record
 from ctrlgen.reporting.result_file import FiniteOrNull, Keys
+
+Groups = frozenset[int]
+"""Causes by number; those of one law at one place are one."""
 
 
 class ShareEntry(Keys):
@@ -89,6 +94,7 @@ def attribute(
     fit = model.fit
     causes, of = fit.structure.causes, _groups(fit.structure.causes)
     n = max(of, default=-1) + 1
+    everyone = frozenset(range(n))
     held = described.predicted.excess > ATTRIBUTION.least_excess * np.sum(described.predicted.n_plain)
     records = fitter.held_out_records if held else fitter.fit_records
     known = fitter.noise.known
@@ -96,15 +102,22 @@ def attribute(
     if not n or before.sum() <= 0:
         return Attribution((None,) * len(causes), None, held)
     after = _by_block(known, as_fitted(fitter, fit, records))
-    everyone, subsets = frozenset(range(n)), _subsets(n)
-    members = [frozenset(k for k, group in enumerate(of) if group in S) for S in subsets]
-    energies = in_forks(lambda present: _left_or_all(known, fitter, fit, present, records, before), members, jobs)
-    left = dict(zip(subsets, energies, strict=True))
-    serves = [_needed_by(left, g, n) for g in range(n)]
+
+    def left_by_all(sets: list[Groups]) -> dict[Groups, np.ndarray]:
+        members = [frozenset(k for k, group in enumerate(of) if group in S) for S in sets]
+        energies = in_forks(lambda present: _left_or_all(known, fitter, fit, present, records, before), members, jobs)
+        return dict(zip(sets, energies, strict=True))
+
+    left = left_by_all(list(dict.fromkeys([frozenset(), everyone, *(everyone - {g} for g in range(n))])))
+    first = _first(left, everyone)
+    left |= left_by_all([S for S in _sets(everyone, first) if S not in left])
+    # of more, not all pairs are fitted
+    serves = [_needed_by(left, g, n) if n <= ATTRIBUTION.most_causes else None for g in range(n)]
+    taken = np.array([_taken(left, g, first, everyone) for g in range(n)])
     constant = [causes[of.index(g)].prior.constant for g in range(n)]
     balanced = [constant[g] or (j is not None and constant[j]) for g, j in enumerate(serves)]
-    needed = np.array([_needed(left, g, n, seed) and not balanced[g] for g in range(n)])
-    parts, told = _counted(np.array([_shapley(left, g, n) for g in range(n)]), before, after, serves, needed, seed)
+    needed = np.array([_needed(left, taken[g], everyone, g, seed) and not balanced[g] for g in range(n)])
+    parts, told = _counted(taken, before, after, serves, needed, seed)
     whole = np.sum(left[frozenset()] - left[everyone])
     back = [float(np.sum(left[everyone - {g}] - left[everyone]) / max(whole, 1e-300)) for g in range(n)]
     _lead_constants(parts, told, serves, back, constant)
@@ -130,11 +143,31 @@ def attribute(
     )
 
 
-def _needed(left: dict[frozenset[int], np.ndarray], g: int, n: int, seed: int) -> bool:
+def _first(left: dict[Groups, np.ndarray], everyone: Groups) -> Groups:
+    """The causes without which `ATTRIBUTION.first_share` of the error comes back, those first without which most does and no more of
+    them than all orders are averaged of; every one where none is so."""
+    back = {g: float(np.sum(left[everyone - {g}] - left[everyone])) for g in everyone}
+    least = ATTRIBUTION.first_share * float(np.sum(left[frozenset()] - left[everyone]))
+    most = sorted((g for g in everyone if back[g] > max(least, 0.0)), key=lambda g: -back[g])
+    return frozenset(most[: ATTRIBUTION.most_causes]) or everyone
+
+
+def _sets(everyone: Groups, first: Groups) -> list[Groups]:
+    """The sets of causes whose energies the parts are made of: those of the `first`, and all of these with those of the others; of few
+    causes every one, which also tell what serves what."""
+    sets = [*_subsets(first), *(first | S for S in _subsets(everyone - first))]
+    return list(dict.fromkeys([*sets, *(_subsets(everyone) if len(everyone) <= ATTRIBUTION.most_causes else ())]))
+
+
+def _taken(left: dict[Groups, np.ndarray], g: int, first: Groups, everyone: Groups) -> np.ndarray:
+    """What cause g takes away of each block and channel: of the `first` as they come among themselves, of another one beside these."""
+    return _shapley(left, g, first, frozenset()) if g in first else _shapley(left, g, everyone - first, first)
+
+
+def _needed(left: dict[Groups, np.ndarray], taken: np.ndarray, everyone: Groups, g: int, seed: int) -> bool:
     """Whether cause g takes away much, and for certain most of the error comes back without it, however it acts alone."""
-    everyone = frozenset(range(n))
     nothing, all_ = left[frozenset()], left[everyone]
-    if _shapley(left, g, n).sum() <= ATTRIBUTION.vague_share * (nothing - all_).sum():
+    if taken.sum() <= ATTRIBUTION.vague_share * (nothing - all_).sum():
         return False
     comes_back = (left[everyone - {g}] - all_) - ATTRIBUTION.comes_back * (nothing - all_)
     return bool(np.quantile(_weights(len(nothing), seed) @ comes_back.sum(axis=-1), 0.025) > 0)
@@ -199,11 +232,10 @@ def _with_intervals(
     return np.column_stack([value, np.minimum(low, value), np.maximum(high, value)])
 
 
-def _needed_by(left: dict[frozenset[int], np.ndarray], k: int, n: int) -> int | None:
-    """The cause j that takes away most more beside cause k than without it: [E(-k-j) - E(-k)] against [E(-j) - E]; None where no
-    such set was fitted."""
+def _needed_by(left: dict[Groups, np.ndarray], k: int, n: int) -> int | None:
+    """The cause j that takes away most more beside cause k than without it: [E(-k-j) - E(-k)] against [E(-j) - E]; None of one cause."""
     everyone = frozenset(range(n))
-    pairs = {j: everyone - {k, j} for j in everyone - {k} if everyone - {k, j} in left}
+    pairs = {j: everyone - {k, j} for j in everyone - {k}}
 
     def more(j: int) -> float:
         beside = left[everyone - {j}] - left[everyone]
@@ -260,27 +292,30 @@ def _left_or_all(
     return left * (most / left.sum() if left.sum() > most else 1.0)
 
 
-def _subsets(n: int) -> list[frozenset[int]]:
-    """The sets of causes: every one, or none, those of one, all but one and all where there are too many."""
+def _subsets(causes: Groups) -> list[Groups]:
+    """Sets of causes: every one, or none, those of one, all but one and all where there are too many."""
+    n = len(causes)
     sizes = range(n + 1) if n <= ATTRIBUTION.most_causes else (0, 1, n - 1, n)
-    return [frozenset(chosen) for size in sizes for chosen in combinations(range(n), size)]
+    return [frozenset(chosen) for size in sizes for chosen in combinations(sorted(causes), size)]
 
 
-def _shapley(left: dict[frozenset[int], np.ndarray], k: int, n: int) -> np.ndarray:
-    """What cause k takes away of each block and channel, the mean over orders; of many causes, that of coming first and last, which
-    is the same where readings are sums of what each does and energies so of pairs at most, scaled so that the parts add up."""
+def _shapley(left: dict[Groups, np.ndarray], k: int, among: Groups, beside: Groups) -> np.ndarray:
+    """What cause k takes away of each block and channel, the mean over orders `among` which it comes `beside` others; of many causes, that
+    of coming first and last, which is the same where readings are sums of what each does and energies so of pairs at most, scaled so that
+    the parts add up."""
+    n = len(among)
     if n <= ATTRIBUTION.most_causes:
         return sum(
-            (left[S] - left[S | {k}]) / (n * comb(n - 1, len(S))) for S in left if k not in S and S | {k} in left
+            (left[beside | S] - left[beside | S | {k}]) / (n * comb(n - 1, len(S))) for S in _subsets(among - {k})
         )
-    everyone = frozenset(range(n))
+    whole = beside | among
 
     def both(j: int) -> np.ndarray:
-        first = left[frozenset()] - left[frozenset({j})]
-        return (first + left[everyone - {j}] - left[everyone]) / 2
+        first = left[beside] - left[beside | {j}]
+        return (first + left[whole - {j}] - left[whole]) / 2
 
-    total = sum(both(j).sum() for j in range(n))
-    all_ = (left[frozenset()] - left[everyone]).sum()
+    total = sum(both(j).sum() for j in among)
+    all_ = (left[beside] - left[whole]).sum()
     return both(k) * (all_ / total if total > 0 else 1.0)
 
 
@@ -297,22 +332,27 @@ def left_by(fitter: Fitter, fit: Fit, present: frozenset[int], records: list[Rec
     nothing = np.zeros(0)
     reduced = Fit(structure, theta, (), 0.0, fit.n, nothing, nothing, 0.0, fit.shapes)
     for _ in range(ATTRIBUTION.updates):
-        problem = CausesAsFound(structure, _alike(fitter.with_errors_of(reduced)), reduced.theta)
+        problem = CausesAsFound(structure, _alike(fitter, reduced), reduced.theta)
         x = levenberg_marquardt(problem, problem.start, ATTRIBUTION.steps)
         reduced = replace(reduced, theta=problem.to_si(x)[: problem.k])
     return as_fitted(fitter, reduced, records)
 
 
-def _alike(fitter: Fitter) -> Fitter:
-    """The same with one discrepancy of all readings, over their noise, where there is any: E counts their squares over that alike. With
-    one of its own for each, a set would give up a few readings for the others, and leave more of all than without its causes."""
-    errors = fitter.error
-    if errors.is_noise:
-        return fitter
-    floor = fitter.noise.floor
+def _alike(fitter: Fitter, fit: Fit) -> Fitter:
+    """The fitter with one discrepancy of all readings, over their noise, as a fit leaves it, where there is any: E counts their squares
+    over that alike. With one of its own for each, a set would give up a few readings for the others, and leave more of all than without
+    its causes. Where the noise is not known, what stands for it is what the best model leaves, and whatever a set leaves more is
+    discrepancy: weighed by that alone, the device's numbers would bend as if the file stated nothing."""
+    weighed = fitter.with_errors_of(fit)
+    errors, floor = weighed.error, fitter.noise.floor
     left = np.where(errors.rms > 0, errors.rms / floor, 1.0) ** 2
+    unknown = ~fitter.noise.known
+    if unknown.any():
+        left[unknown] = np.maximum(as_fitted(fitter, fit, fitter.fit_records).plain_mean[unknown], 1.0)
+    if left.max() <= 1.0:
+        return weighed
     tau = np.full(len(floor), left @ errors.tau / left.sum())
-    return replace(fitter, errors=replace(errors, rms=np.sqrt(left.mean()) * floor, tau=tau))
+    return replace(weighed, errors=replace(errors, rms=np.sqrt(left.mean()) * floor, tau=tau))
 
 
 def _key(structure: Structure, p: FreeParameter) -> tuple[Hypothesis | None, str]:

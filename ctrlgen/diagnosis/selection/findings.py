@@ -162,6 +162,11 @@ class ChannelErrorEntry(Keys):
         description="Probability that noise goes so well with the drive and the motion by chance as what is left does, by which what is "
         "left is judged where neither a statement nor a rest tells the noise; null where one does."
     )
+    counts_as: Number = Field(
+        default=None,
+        description="What stands for the noise in shares of all readings where it is not known: what is left of the readings of this "
+        "unit in the records to fit; null where the noise is known.",
+    )
 
 
 def held_out_errors(search: SearchResult, known: np.ndarray, tests: ResidualTests) -> dict[str, ChannelErrorEntry]:
@@ -187,6 +192,7 @@ def held_out_errors(search: SearchResult, known: np.ndarray, tests: ResidualTest
             uncertainty=beside,
             rms_refitted=rms[2],
             goes_with_motion=tests.by_motion.get(channel),
+            counts_as=None if known[i] else float(floor[i] * scale),
         )
     return errors
 

@@ -332,6 +332,9 @@ class AttributionSettings:
     diverged: float = 4.0
     """Energy of a subset, over that of the device without any, that stands for a larger one: a cause without its partner may
     diverge."""
+    first_share: float = 0.05
+    """Share of the error that comes back without a cause, from which on it is among those that come first. Judgement: half of what may
+    be a cause whose amplitude is not certain."""
     comes_back: float = 0.5
     """Share of the error that comes back without a law, from which on the law is needed: a constant beside it is part of it, and its
     own share may be uncertain. Judgement."""
