@@ -191,6 +191,13 @@ def test_what_stands_in_for_a_cause_that_is_missing_has_no_share_of_it(monkeypat
     assert values(found) == pytest.approx([0.8, 0.01, 0.19])
 
 
+@pytest.mark.parametrize(("back", "share"), [(3.8e3, 0.038), (4.6e3, (4e4 + 4.6e3) / 2e5)])
+def test_what_comes_first_is_that_without_which_a_twentieth_of_the_error_comes_back(monkeypatch, back, share):
+    """Of 80 that both take away: 4.2."""
+    table = {(): 1e5, (0,): 2e4, (1,): 6e4, (0, 1): 2e4 - back}
+    assert shared(monkeypatch, lambda S: table[tuple(sorted(S))], 2).shares[1].value == pytest.approx(share)
+
+
 def test_of_many_causes_those_that_are_needed_are_shared_in_all_their_orders(monkeypatch):
     """Two that nearly cancel, beside five that take away a hundredth each."""
     both = {(): 1e5, (0,): 1.5e5, (1,): 1.6e5, (0, 1): 6e3}

@@ -54,15 +54,10 @@ class RegionalFriction(Effect, listed=False):
         return {"z": bristle_rate(s, p)}
 
 
-class FallingFriction(Effect, listed=False):
+class FallingFriction(RegionalFriction, listed=False):
     """Delta F = -f z in a region, z of `falling_rate`: one law, named once per region."""
 
-    place = Place.FORCE
-    family = Family.FRICTION
-    set_valued = True
-    requires = frozenset({"velocity"})
     source = "C. Canudas de Wit et al., IEEE Trans. Autom. Control 40 (1995) 419, eqs. (1)-(4); in a region"
-    states = BRISTLES
 
     @classmethod
     def from_plainer(cls, numbers: dict[str, float]) -> dict[str, float]:

@@ -69,9 +69,13 @@ def beyond_edge(s: LawInputs, p: LawNumbers, side: int) -> Expression:
 
 
 def on_stretch(s: LawInputs, p: LawNumbers) -> Expression:
-    """(tanh(2 (x + w/2)/W) - tanh(2 (x - w/2)/W))/2, x = d - d_0: one on the `STRETCH` w about d_0, zero elsewhere, W as of an edge."""
-    x, half, width = s.displacement - p.position, p.length / 2, _over(s, p)
-    return (ca.tanh(2 * (x + half) / width) - ca.tanh(2 * (x - half) / width)) / 2
+    """`plateau` of the displacement on the `STRETCH`, W as of an edge."""
+    return plateau(s.displacement - p.position, p.length, _over(s, p))
+
+
+def plateau(x: Expression, length: Expression, width: Expression) -> Expression:
+    """(tanh(2 (x + w/2)/W) - tanh(2 (x - w/2)/W))/2: one on the stretch w about zero, zero elsewhere, changing over W at both ends."""
+    return (ca.tanh(2 * (x + length / 2) / width) - ca.tanh(2 * (x - length / 2) / width)) / 2
 
 
 def _over(s: LawInputs, p: LawNumbers) -> Expression:

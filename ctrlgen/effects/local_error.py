@@ -3,6 +3,7 @@
 import casadi as ca
 
 from ctrlgen.effects import ActsIn, Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, Side, itself
+from ctrlgen.effects._region import plateau
 
 
 class LocalError(Effect):
@@ -32,6 +33,4 @@ class LocalError(Effect):
         return "its error is so large beside its length that the reading would turn back" if steep else ""
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
-        x, half = s.value - p.position, p.length / 2
-        bell = ca.tanh(2 * (x + half) / p.rounding) - ca.tanh(2 * (x - half) / p.rounding)
-        return p.error * bell / (2 * ca.tanh(p.length / p.rounding))
+        return p.error * plateau(s.value - p.position, p.length, p.rounding) / ca.tanh(p.length / p.rounding)
