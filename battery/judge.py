@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from battery.accepted import ROUGH_TRUTHS, SAME_LAW, TRUTHS, in_si, is_right, place_is_right
 from battery.judge_further import Further, judge_further
@@ -13,9 +13,19 @@ from battery.judge_rough import Rough, judge_rough
 ROUGH = ("messy", "memory", "forms", "regional", "gaps", "spikes")
 
 
+class Number(NamedTuple):
+    """A number of a finding beside the planted one: whether its 95 % interval holds that, and how far `off` it is, relative to it; None
+    where zero was planted."""
+
+    law: str
+    name: str
+    inside: bool
+    off: float | None
+
+
 @dataclass
 class Judgement:
-    """One case. `named`: (truth, name given or 'none'); `covered`: (name, parameter, inside); `places`: (channel, place) right;
+    """One case. `named`: (truth, name given or 'none'); its `covered` numbers; `places`: (channel, place) right;
     `bands`: whether a line's frequency lies in the band with the largest excess; `rough`: of messy cases and memory, the latter as
     `series` or poses, `alone` or over a background; `luck`: of each finding whether it is there, and the chance that luck found it;
     `contradictions` within the file; `further`: None where it failed; `set_of` gaps and the `way` in which rows are missing; `cpu` [s]
@@ -33,7 +43,7 @@ class Judgement:
     named: list[tuple[str, str]] = field(default_factory=list)
     places: list[tuple[bool, bool]] = field(default_factory=list)
     bands: list[bool] = field(default_factory=list)
-    covered: list[tuple[str, str, bool]] = field(default_factory=list)
+    covered: list[Number] = field(default_factory=list)
     ratio: float | None = None
     seconds: float | None = None
     autocorrelated: bool = False
@@ -49,7 +59,7 @@ class Judgement:
     memory: float | None = None
 
 
-def _covered(finding: dict[str, Any], truth: dict[str, Any]) -> list[tuple[str, str, bool]]:
+def _covered(finding: dict[str, Any], truth: dict[str, Any]) -> list[Number]:
     if finding["effect"] not in {truth["name"], SAME_LAW.get(truth["name"])}:
         return []
     out = []
@@ -60,8 +70,10 @@ def _covered(finding: dict[str, Any], truth: dict[str, Any]) -> list[tuple[str, 
         interval = given[name].get("ci95") if name else None
         if not interval or any(end is None for end in interval):
             continue
-        low, high = (in_si(float(end), given[name].get("unit") or "") for end in interval)
-        out.append((truth["name"], str(name), low <= value(truth) <= high))
+        unit, planted = given[name].get("unit") or "", value(truth)
+        low, high = (in_si(float(end), unit) for end in interval)
+        off = abs(in_si(float(given[name]["value"]), unit) / planted - 1) if planted else None
+        out.append(Number(truth["name"], str(name), low <= planted <= high, off))
     return out
 
 

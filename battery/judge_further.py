@@ -36,6 +36,12 @@ class Located:
         """Whether the region is found."""
         return self.overlap >= ENOUGH
 
+    @property
+    def f1(self) -> float:
+        """Harmonic mean of the share of the stated samples that are in the true region, and of the true ones that are stated: of the
+        overlap J it is 2 J/(1 + J)."""
+        return 2 * self.overlap / (1 + self.overlap)
+
 
 @dataclass(frozen=True)
 class Evidence:

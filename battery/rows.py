@@ -50,3 +50,9 @@ def number(what: str, values: Sequence[float], at: float, goal: str, most: float
     """A row of the quantile `at` of `values`, at most `most`."""
     value = float(np.quantile(values, at)) if len(values) else None
     return Row(what, None, len(values), value, goal, None if value is None or most is None else value <= most)
+
+
+def mean(what: str, values: Sequence[float], goal: str, least: float) -> Row:
+    """A row of the mean of `values`, at least `least`."""
+    value = float(np.mean(values)) if len(values) else None
+    return Row(what, None, len(values), value, goal, None if value is None else value >= least)

@@ -113,8 +113,8 @@ def table(judged: Sequence[Judgement]) -> list[Row]:
         share("location, output or actuator", [c for c, _ in places], ">= 95 %", 0.95),
         share("location, place", [p for _, p in places], ">= 85 %", 0.85),
         share("location, band of a line", [b for j in smooth for b in j.bands], ">= 85 %", 0.85),
-        share("coverage of 95 % intervals", [c[2] for c in covered], "90-98 %", 0.90, 0.98),
-        share("coverage, autocorrelated noise", [c[2] for c in colour], "90-98 %", 0.90, 0.98),
+        share("coverage of 95 % intervals", [c.inside for c in covered], "90-98 %", 0.90, 0.98),
+        share("coverage, autocorrelated noise", [c.inside for c in colour], "90-98 %", 0.90, 0.98),
         number("held-out error / floor, median", ratios, 0.5, "<= 1.05", 1.05),
         number("held-out error / floor, 95th percentile", ratios, 0.95, "<= 1.3", 1.3),
         number(

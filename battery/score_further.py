@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from battery.judge import Judgement
 from battery.judge_further import NEAR_BEST, TOLD, Evidence, Further
-from battery.rows import Row, number, share
+from battery.rows import Row, mean, number, share
 
 UNSET = "none set"
 KNOWN = ("single", "weak", "multiple", "hexapod_single", "messy", "memory", "forms", "regional", "gaps", "spikes")
@@ -27,10 +27,13 @@ def further_rows(judged: Sequence[Judgement]) -> list[Row]:
 
     best = [f.over_best for f in of(*KNOWN) if f.over_best is not None]
     edges = [inside for f in of("regional") if f.located for inside in f.located.edges]
+    regions = [f.located.f1 for f in of("regional") if f.located]
+    off = [c.off for j in judged if j.kind in KNOWN for c in j.covered if c.off is not None]
     memory = [j.memory for j in judged if j.memory is not None]
     return [
         share("regional, law first", rough("regional", _law), ">= 90 %", 0.90),
         share("regional, region overlaps by 0.8", rough("regional", _region), ">= 90 %", 0.90),
+        mean("regional, localisation F1, mean", regions, ">= 0.80", 0.80),
         share("regional, coverage of the ends' 95 % intervals", edges, ">= 88 %", 0.88),
         share("regional, nothing beside it", rough("regional", lambda j: j.rough.nothing_beside), UNSET),
         share("region stated where none is", [f.false_region for f in of(*EVERYWHERE)], "<= 2 %", most=0.02),
@@ -42,6 +45,7 @@ def further_rows(judged: Sequence[Judgement]) -> list[Row]:
         share("messy, false name above 5 % share", [f.false_name for f in of("messy")], "<= 3 %", most=0.03),
         number("held-out error / best achievable, median", best, 0.5, "<= 1.02", 1.02),
         number("held-out error / best achievable, 90th percentile", best, 0.9, "<= 1.5", 1.5),
+        number("a number off the planted one, relative, median", off, 0.5, UNSET),
         share("held-out error worse than before", [j.further.worse for j in judged if j.further], "0 %", most=0.0),
         number("largest memory [GB]", memory, 1.0, "<= 1.5", 1.5),
     ]

@@ -32,7 +32,7 @@ def rough_rows(judged: Sequence[Judgement]) -> list[Row]:
         share("messy, 'partly' or 'explained'", [j.rough.answered for j in messy], UNSET),
         number("messy, held-out error / least possible, median", best, 0.5, UNSET),
         number("messy, held-out error / least possible, 95th percentile", best, 0.95, UNSET),
-        share("messy, coverage of 95 % intervals", [c[2] for j in messy for c in j.covered], ">= 88 %", 0.88),
+        share("messy, coverage of 95 % intervals", [c.inside for j in messy for c in j.covered], ">= 88 %", 0.88),
         share("memory, family first", [j.rough.first for j in memory], ">= 95 %", 0.95),
         share("memory, place", [j.rough.place for j in memory], ">= 95 %", 0.95),
         share("memory alone, nothing beside it", alone, ">= 90 %", 0.90),

@@ -228,6 +228,7 @@ def test_a_law_in_a_region_is_right_half_right_or_wrong():
     assert right.located.law and right.located.found and right.over_best == pytest.approx(1) and not right.worse
     half = judged(DRAG, finding("coulomb_above", edge=(-6.0, "um"))).further
     assert half.located.law and not half.located.found and half.located.overlap == pytest.approx(0.5, abs=0.01)
+    assert half.located.f1 == pytest.approx(2 / 3, abs=0.01)  # all true samples among twice as many
     everywhere = judged(DRAG, finding("coulomb", force=(0.2, "N"))).further
     assert everywhere.located.law and not everywhere.located.found and everywhere.located.overlap < 0.5
     wrong = judged(DRAG, finding("asymmetric_viscous")).further
@@ -257,6 +258,21 @@ def test_an_answer_may_not_be_worse_than_the_device_as_described():
     rows = {r.what: r for r in score.table([failed, judged(DRAG, finding("coulomb_above", edge=(2.0, "um")))])}
     assert (rows["regional, law first"].hits, rows["regional, law first"].n) == (1, 2)
     assert rows["held-out error worse than before"].met and rows["regional, region overlaps by 0.8"].hits == 1
+    half = judged(DRAG, finding("coulomb_above", edge=(-6.0, "um")))
+    rows = {r.what: r for r in score.table([half, judged(DRAG, finding("asymmetric_viscous")), failed])}
+    localised = rows["regional, localisation F1, mean"]
+    assert localised.value == pytest.approx(1 / 3, abs=0.01) and localised.n == 2 and not localised.met
+
+
+def test_a_number_is_held_to_the_planted_one():
+    planted = {"name": "backlash", "location": "stage:axis", "amplitude": 2e-6, "shape": {}, "share": 1.0}
+    case = {"case": "c", "class": "single", "planted": [planted], "noise": {"sd": 5e-9}}
+    gap = {"value": 2050.0, "unit": "nm", "ci95": [1900.0, 2200.0]}
+    near = judged(case, finding("backlash", "stage:axis", 1.0) | {"parameters": {"gap": gap}})
+    (number,) = near.covered
+    assert number.inside and number.off == pytest.approx(0.025)
+    rows = {r.what: r for r in score.table([near])}
+    assert rows["a number off the planted one, relative, median"].value == pytest.approx(0.025)
 
 
 def test_rows_that_are_missing_are_judged_against_the_whole_record():

@@ -370,5 +370,5 @@ def test_the_table_counts_rough_cases_apart():
     assert (rows["messy, dominant cause first"].hits, rows["messy, dominant cause first"].n) == (1, 2)
     assert rows["memory, family first"].met and rows["memory, family first, series, messy"].n == 1
     assert (rows["nulls, anything but 'consistent'"].hits, rows["nulls, false names"].hits) == (1, 1)
-    assert rows["coverage of 95 % intervals"].n == 0 and judged[1].covered == [("free_play", "gap", True)]
+    assert rows["coverage of 95 % intervals"].n == 0 and judged[1].covered == [("free_play", "gap", True, 0.0)]
     assert rows["location, place"].n == 0
