@@ -264,17 +264,6 @@ def test_an_answer_may_not_be_worse_than_the_device_as_described():
     assert localised.value == pytest.approx(1 / 3, abs=0.01) and localised.n == 2 and not localised.met
 
 
-def test_a_number_is_held_to_the_planted_one():
-    planted = {"name": "backlash", "location": "stage:axis", "amplitude": 2e-6, "shape": {}, "share": 1.0}
-    case = {"case": "c", "class": "single", "planted": [planted], "noise": {"sd": 5e-9}}
-    gap = {"value": 2050.0, "unit": "nm", "ci95": [1900.0, 2200.0]}
-    near = judged(case, finding("backlash", "stage:axis", 1.0) | {"parameters": {"gap": gap}})
-    (number,) = near.covered
-    assert number.inside and number.off == pytest.approx(0.025)
-    rows = {r.what: r for r in score.table([near])}
-    assert rows["a number off the planted one, relative, median"].value == pytest.approx(0.025)
-
-
 def test_rows_that_are_missing_are_judged_against_the_whole_record():
     truth = DRAG["planted"][0] | {"name": "free_play", "family": "backlash"}
     base = {k: v for k, v in DRAG.items() if k not in {"region", "samples"}} | {"class": "gaps", "planted": [truth]}

@@ -372,3 +372,19 @@ def test_the_table_counts_rough_cases_apart():
     assert (rows["nulls, anything but 'consistent'"].hits, rows["nulls, false names"].hits) == (1, 1)
     assert rows["coverage of 95 % intervals"].n == 0 and judged[1].covered == [("free_play", "gap", True, 0.0)]
     assert rows["location, place"].n == 0
+
+
+def test_a_number_is_held_to_the_planted_one_and_a_zero_of_each_record_is_no_false_name():
+    gap = {"gap": {"value": 1050.0, "ci95": [900.0, 1200.0], "unit": "nm"}}
+    free = ANSWER | {"planted": [PLAY | {"name": "free_play"}], "class": "memory"}
+    zero = found("zero_per_record", "sensor:axis", 0.06)
+    held = {"reading.axis": {"rms_before": 9.0, "rms_after": 1.0, "noise_floor": 1.0, "unit": "nm"}}
+    play = found("backlash", "stage:axis", 0.7) | {"parameters": gap}
+    given = {"verdict": "partly", "findings": [play, zero], "held_out": held}
+    near = judge.judge(free, given)
+    (number,) = near.covered
+    assert number.inside and number.off == pytest.approx(0.05)
+    off = {row.what: row for row in score.table([near])}["a number off the planted one, relative, median"]
+    assert off.value == pytest.approx(0.05)
+    alone = free | {"rough": False}  # no record is off its zero
+    assert not near.further.false_name and judge.judge(alone, given).further.false_name

@@ -120,7 +120,6 @@ def test_the_laws_of_two_channels_and_those_with_a_clock_are_these():
     finer |= {"cogging_of_slots", "worn_backlash", "stribeck_above", "stribeck_after", "stribeck_below"}
     assert {k for k, law in library if not prior_of(law).suspected} == empirical | finer | mirrors | {
         "plane_mirror",
-        "zero_per_record",
     }
     clocked = {
         "coulomb_after",

@@ -83,7 +83,7 @@ def test_a_law_that_cannot_act_there_is_not_offered_and_an_unknown_one_is_a_faul
     ]
     (heat,) = explain(creeping, "heat_crosstalk")
     assert heat.startswith("heat_crosstalk: not offered, because it needs heat")
-    assert "never suspected" in explain(creeping, "zero_per_record")[0]
+    assert "never suspected" in explain(creeping, "empirical_speed")[0]
     with pytest.raises(InputError, match="known are: "):
         explain(creeping, "no_such_law")
 

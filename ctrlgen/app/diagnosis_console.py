@@ -74,8 +74,7 @@ def findings_table(findings: Sequence[Finding]) -> Table:
     )
     table.columns[5].no_wrap = True
     for finding in findings:
-        sets = (finding.parameters, *finding.terms)
-        rows = [(name, interval(e, name)) for numbers in sets for name, e in numbers.items()]
+        rows = [(name, interval(e, name)) for name, e in finding.numbers]
         alike = ", ".join(map(cause_name, finding.alternatives))
         told = (finding.effect, finding.location, share_text(finding), chance_text(finding))
         for k, (name, text) in enumerate(rows):

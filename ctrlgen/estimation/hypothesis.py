@@ -285,8 +285,9 @@ def _of_law(
 
 def _stated_once(law: type[Effect], device: Device) -> list[Effect]:
     """The laws of this kind that the file of `device` has, where a reading has one at most: of a second shift in time the file's number is
-    the sum, and what is rounded stays so."""
-    return [e for e in device.effect if e.kind == law.kind] if law.moves_in_time or law.in_steps else []
+    the sum, what is rounded stays so, and a zero that is free is."""
+    once = law.moves_in_time or law.in_steps or prior_of(law).of_each_record
+    return [e for e in device.effect if e.kind == law.kind] if once else []
 
 
 def _longest_shift(law: type[Effect], physics: DevicePhysics, sample_time: float | None) -> float:

@@ -170,9 +170,10 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
         "scale_of_temperature": LawPrior("As common as another scale, where a temperature was recorded: judgement."),
         "stiffness_of_temperature": LawPrior("In balance it is `gain_of_temperature`.", unless=frozenset({"balanced"})),
         "zero_per_record": LawPrior(
-            "Within one record it is a home offset, and over several it fits the mean of whatever is missing: it is stated.",
-            suspected=False,
+            "Sensors are zeroed anew, or drift, between runs; but zeros fit the mean of whatever is missing: judgement.",
+            log_prior_odds=ONE_IN_TEN,
             constant=True,
+            of_each_record=True,
             parameters={"share": ParameterPrior(fixed_range=(0.8, 1.2))},
         ),
         **OF_DRIVES,

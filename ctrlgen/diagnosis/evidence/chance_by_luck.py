@@ -52,6 +52,7 @@ Causes = frozenset[int]
 NO_MODEL = "without it no such device can be simulated"
 UNSEEN = "the held-out records do not show it"
 IN_THE_FILE = "the readings alone hardly show it: without it numbers of the device would contradict its file"
+OWN = "each record has its own, and no other one can confirm it"
 FEW = "{} of the held-out records, and no chance below 5 % with fewer than {}"
 NOISE = "noise"
 REST = "what no law reaches"
@@ -154,8 +155,8 @@ def doubted(verdict: Verdict, findings: Sequence[Finding]) -> Verdict:
 def _entry(search: SearchResult, finding: Finding, members: Causes, look: Look, memory: Memory) -> ChanceEntry:
     """The chance of a finding; without a number where no answer of these records could be below `LUCK.certain`, which would only say so."""
     against = REST if memory.repeats else NOISE
-    reason = NO_MODEL if not look.known else None
-    if look.known and look.by_luck > LUCK.certain:
+    reason = NO_MODEL if not look.known else OWN if finding.cause.prior.of_each_record else None
+    if reason is None and look.by_luck > LUCK.certain:
         if finding.role is Role.UNSEEN:
             reason = UNSEEN
         elif any(hides_in_device(search, k) for k in members):

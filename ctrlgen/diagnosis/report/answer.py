@@ -166,6 +166,8 @@ def _main(diagnosis: Diagnosis) -> list[Part]:
 
 def _numbers(main: Finding) -> list[Part]:
     """', gap = 4.1 um (4 ... 4.2 um), below a position of 3 mm (2.9 ... 3.1 mm)'; a period does not yield."""
+    if main.in_each_record:
+        return [_zeros(main.in_each_record)]
     shown = _first_numbers(main)
     least = {name: e for k, (name, e) in enumerate(shown.items()) if k == 0 or name in PERIODS}
     bare = {name: replace(e, ci95=(e.value, e.value)) for name, e in least.items()}
@@ -174,6 +176,18 @@ def _numbers(main: Finding) -> list[Part]:
     )
     numbers = Part(first, tuple(zip((Yields.SECOND_NUMBER, Yields.INTERVALS), shorter, strict=True)))
     return [numbers, *(Part(f", {text}") for text in where(main))]
+
+
+def _zeros(in_records: dict[str, Estimate]) -> Part:
+    """': -0.3 um (-0.31 ... -0.29 um) in day2.csv to 0.4 um (0.39 ... 0.41 um) in day3.csv', the least and the largest."""
+    ends = [f(in_records.items(), key=lambda row: row[1].value) for f in (min, max)]
+    text, bare = (
+        " to ".join(
+            f"{interval(replace(e, ci95=e.ci95 if told else (e.value, e.value)))} in {record}" for record, e in ends
+        )
+        for told in (True, False)
+    )
+    return Part(f": {text}", ((Yields.INTERVALS, f": {bare}"),))
 
 
 def _share(diagnosis: Diagnosis, main: Finding) -> list[Part]:

@@ -81,6 +81,9 @@ class FindingEntry(Cause):
     terms: list[dict[str, EstimateEntry]] = Field(
         description="Parameters of further terms of the same law at the same place, such as harmonics."
     )
+    in_each_record: dict[str, EstimateEntry] = Field(
+        description="What it is in each record, by the record's name, where it is another one there, such as the zero of a sensor."
+    )
     alternatives: list[AlternativeEntry] = Field(
         description="Other causes that explain the recording equally well in its place."
     )

@@ -7,6 +7,7 @@ import numpy as np
 from ctrlgen.core.units import from_si
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.history_table import errors_text
+from ctrlgen.diagnosis.report.narrative import per_cent
 from ctrlgen.diagnosis.selection.candidate_model import Attempt
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.confusable import likeness, look_alike
@@ -14,6 +15,7 @@ from ctrlgen.diagnosis.selection.not_taken import compared
 from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.diagnosis.selection.search_history import held_out_error, numbers_of_cause
 from ctrlgen.diagnosis.selection.subset_search import Suspect
+from ctrlgen.diagnosis.settings import SEARCH
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.hypothesis import Hypothesis, nominal_physics, selected_laws, why_not_offered
 from ctrlgen.estimation.law_needs import not_offered
@@ -147,6 +149,8 @@ def _score(diagnosis: Diagnosis, h: Hypothesis) -> str:
 
 def _never_fitted(diagnosis: Diagnosis, h: Hypothesis) -> str:
     """Why a hypothesis that was offered was never fitted."""
+    if h.prior.of_each_record:
+        return f"never were such constants {per_cent(SEARCH.least_of_zeros)} of what was left of its reading"
     for screened in _screens(diagnosis):
         for other, why in screened.dropped.items():
             if _key(other) == _key(h):

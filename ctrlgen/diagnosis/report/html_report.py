@@ -110,7 +110,7 @@ def _row(f: Finding) -> dict[str, Any]:
         "effect": f.effect,
         "location": f.location,
         "of": f.cause.of,
-        "numbers": [(name, interval(e, name)) for numbers in (f.parameters, *f.terms) for name, e in numbers.items()],
+        "numbers": [(name, interval(e, name)) for name, e in f.numbers],
         "alternatives": [
             {"effect": h.effect, "location": h.location, "reason": why_alike(f.cause, h)} for h in f.alternatives
         ],

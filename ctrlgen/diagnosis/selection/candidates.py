@@ -15,6 +15,7 @@ from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.diagnosis.selection.shifts import best_shift
 from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.selection.trials import Trials
+from ctrlgen.diagnosis.selection.zeros_of_records import fit_own_zeros
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, REGIONS, SEARCH, SUBSETS
 from ctrlgen.effects import is_group
 from ctrlgen.estimation.fit import Fit
@@ -34,7 +35,7 @@ def fit_candidates(
         suspects = [s for s in suspects if s.z**2 >= much_of(current)]
     else:
         suspects = [*suspects, *nearer_when_simulated(trials, current, screened, suspects)]
-    candidates = fit_each(trials, current.fit, suspects)
+    candidates = (*fit_own_zeros(trials, current), *fit_each(trials, current.fit, suspects))
     alone = leaves_noise_alone(trials, current, candidates)
     if not (plainly or current.errors.is_noise):
         begun = [t for t in candidates if not alone or takes_away_much(t, current)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -17,6 +17,7 @@ from ctrlgen.diagnosis.selection.law_titles import title
 from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.selection.verdict import terms_of_findings, unconfirmed
 from ctrlgen.diagnosis.selection.way_covered import moves_one_way
+from ctrlgen.diagnosis.selection.zeros_of_records import zeros_in_records
 from ctrlgen.diagnosis.settings import ATTRIBUTION, LUCK
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, nominal_physics
@@ -111,7 +112,7 @@ class Finding:
     as harmonics. role: a `cause`; `minor`: above the noise and below a hundredth of the mismatch; `part`: it takes away nothing
     itself, and the finding `serves` needs it; `unseen`: only the records to fit can show it. title: what the law is called on this
     machine, empty where its own title serves. support: what the model-free shares say of it. chance: that luck found it, None where it was
-    read from the data.
+    read from the data. in_each_record: what it is in each record, by the name of that, of a law that is another one in each.
     """
 
     effect: str
@@ -128,6 +129,13 @@ class Finding:
     title: str = ""
     support: SupportEntry | None = None
     chance: ChanceEntry | None = None
+    in_each_record: dict[str, Estimate] = field(default_factory=dict)
+
+    @property
+    def numbers(self) -> list[tuple[str, Estimate]]:
+        """Its parameters and those of its further terms, and what it is in each record, with their names."""
+        of_law = [(name, e) for numbers in (self.parameters, *self.terms) for name, e in numbers.items()]
+        return [*of_law, *((f"in {record}", e) for record, e in self.in_each_record.items())]
 
     @property
     def region(self) -> RegionEntry | None:
@@ -270,6 +278,7 @@ def findings(search: SearchResult, shares: Attribution, profiles: tuple[Profile,
                 role,
                 causes[served] if role is Role.PART and served is not None else None,
                 _title(search, cause),
+                in_each_record=_in_each_record(search, cause),
             )
         )
     main = _leading(search, rows)
@@ -339,6 +348,21 @@ def _numbers_of(search: SearchResult, k: int, estimates: dict[str, Estimate]) ->
             middle = sum(fixed) / 2
             parameters[p.name] = Estimate(middle, (middle, middle), p.unit)
     return parameters
+
+
+def _in_each_record(search: SearchResult, cause: Hypothesis) -> dict[str, Estimate]:
+    """The zero of its reading in each record, of a cause that is another one there."""
+    if not cause.prior.of_each_record:
+        return {}
+    recording = search.fitter.recording
+    unit = recording.units[recording.channels.index(f"reading.{cause.at}")]
+    zeros = zeros_in_records(search.fitter, search.chosen.fit, cause).items()
+    return {
+        name: Estimate(
+            difference(value, unit), (difference(value - reach, unit), difference(value + reach, unit)), unit
+        )
+        for name, (value, reach) in zeros
+    }
 
 
 def _worth(search: SearchResult, k: int, shares: Attribution) -> dict[str, WorthEntry]:

@@ -164,6 +164,12 @@ class ModelSelection:
         n, n_held = (self.samples(m, errors) for m in (after.fitted, after.held_out))
         added = len(after.fit.structure.free_parameters) - len(before.fit.structure.free_parameters)
         needed = MODEL_SELECTION.least_gain + added * np.log(max(n, 2))
+        if each := _of_each_record(before, after):
+            # no number is held to another record: all of them tell, and each has its price
+            price = each * len(self.fitter.recording.records) * np.log(max(n + n_held, 2))
+            if gain + confirmed <= needed + price:
+                return Shortfall.GAIN
+            return None if errors.is_noise or self.matters(before, after) else Shortfall.SMALL
         # parameters of the device masked it, so the readings hardly show it
         masked = before.fit.penalty - after.fit.penalty > MODEL_SELECTION.hidden_share * gain
         unseen = (
@@ -311,3 +317,9 @@ def wins_by_block(before: Misfit, after: Misfit) -> bool:
     return bool(
         np.sum(gains[0]) > 0 and any(np.mean(gain[drawn].sum(axis=1) <= 0) < MODEL_SELECTION.block_p for gain in gains)
     )
+
+
+def _of_each_record(before: CandidateModel, after: CandidateModel) -> int:
+    """How many causes `after` has more, where all of them are another number in each record; 0 otherwise."""
+    new = [c for c in after.causes if c not in before.causes]
+    return len(new) if all(c.prior.of_each_record for c in new) else 0

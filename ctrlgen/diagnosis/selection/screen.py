@@ -103,10 +103,11 @@ class Screen:
         threshold: float | None = None,
     ) -> Screened:
         """All hypotheses that the fit does not contain yet, without those `dropped`, any whose law cannot be evaluated, and what no
-        term of the model shows: offsets of the recorders' clocks, shifts that the file has. Laws in a region are begun in the `regions`,
-        those of what is left unless given. With the `threshold`, where another screen has told it, each is looked at alone: no sets."""
+        term of the model shows: offsets of the recorders' clocks, shifts that the file has, zeros of each record. Laws in a region are
+        begun in the `regions`, those of what is left unless given. With the `threshold`, where another screen has told it, each is
+        looked at alone: no sets."""
         beside, dropped = (h.beside(fit.structure.causes) for h in self.hypotheses), dropped or {}
-        shown = (h for h in beside if h is not None and not (h.shifts if h.effect == PARAMETER else h.law.shifts_drive))
+        shown = (h for h in beside if h is not None and not _unseen(h))
         open_ = [h for h in shown if h not in dropped]
         sums: Sums | None = None
         columns: list[CandidateTerm] = []
@@ -273,6 +274,11 @@ class Screen:
 
         by_chance = partial(_largest_by_chance, cosine, seen, self.seed)
         return Screened(suspects, cosine, by_chance, sds, together, undetectable)
+
+
+def _unseen(h: Hypothesis) -> bool:
+    """Whether no slope of the model shows a hypothesis."""
+    return h.shifts if h.effect == PARAMETER else h.law.shifts_drive or h.prior.of_each_record
 
 
 def _suspect(column: CandidateTerm, z: float, amplitude: float, distinct_share: float, j: int) -> Suspect:

@@ -114,6 +114,8 @@ class SearchSettings:
     """Relative change of the noise below which it counts as unchanged."""
     same_noise_size: float = 0.02
     """The same of noise that only the misfit tells: it is the yardstick of everything else. Judgement."""
+    least_of_zeros: float = 0.5
+    """Share of what is left of a reading that zeros of its records must take away to be tried. Judgement: most of it."""
     candidates_per_round: int = 6
     """Single candidates fitted a round, and as many sets of each size."""
     far_off: float = 0.1

@@ -1,0 +1,98 @@
+"""A reading whose zero is another in each record, as of a sensor that is zeroed anew before every run."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from axis_records import AXIS, NOISE, H, move, record
+
+from ctrlgen.core.files import validate
+from ctrlgen.diagnosis.diagnose import diagnose_recording
+from ctrlgen.diagnosis.report.answer import answer
+from ctrlgen.diagnosis.report.explain import explain
+from ctrlgen.diagnosis.report.luck_sentences import luck_text
+from ctrlgen.recordings.recording import Recording
+
+UM = 1e-6
+LAWS = ("zero_per_record", "home_offset", "drift", "coulomb", "drive_offset", "stiffening", "hysteresis")
+ROLES = ("fit", "hold_out", "hold_out")
+
+
+def runs(zeros, roles=ROLES, law=None, n=1000, change=lambda y, t: y, noise=NOISE):
+    """Runs of the axis under different drives, which read so far off [m]; `change` (position, time on the common clock)."""
+    rng, parts = np.random.default_rng(1), []
+    for k, (zero, role) in enumerate(zip(zeros, roles, strict=True)):
+        t = np.arange(n) * H
+        u = 1.2 * np.sin(2 * np.pi * (1.7 + 0.6 * k) * t) + 0.4 * np.sin(2 * np.pi * (11 + 3 * k) * t + k)
+        y = change(move(u, law), t + 3.0 * k) + zero + NOISE * rng.standard_normal(n)
+        parts.append(record(u, y, role, first=3.0 * k))
+    return Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (noise,), tuple(parts), ())
+
+
+def diagnosed(recording, device=AXIS):
+    return diagnose_recording(device, recording, jobs=0, laws=LAWS)
+
+
+def effects(found):
+    return [f.effect for f in found.findings]
+
+
+@pytest.mark.parametrize(
+    "zeros, roles",
+    [
+        ((0, 0.5), ROLES[:2]),
+        ((0.2, -0.3, 0.4), ROLES),
+        ((0.2, -0.3, 0.4, -0.1), ("fit", "fit", "hold_out", "hold_out")),
+    ],
+)
+def test_a_zero_that_is_another_in_each_record_is_found_with_its_values(zeros, roles):
+    found = diagnosed(runs(UM * np.array(zeros), roles))
+    (finding,) = found.findings
+    assert finding.effect == "zero_per_record" and found.verdict == "explained"
+    assert finding.share.value == pytest.approx(1.0, abs=0.01)
+    assert len(finding.in_each_record) == len(zeros)
+    for estimate, zero in zip(finding.in_each_record.values(), zeros, strict=True):
+        low, high = estimate.ci95
+        assert estimate.unit == "um" and low < zero < high and high - low < 0.01
+    assert found.held_out["reading.axis"].rms_after == pytest.approx(NOISE / UM, rel=0.1)
+    told = re.findall(r"(\S+) um \([^)]*\) in ", answer(found)[0])
+    assert [float(x) for x in told] == pytest.approx([min(zeros), max(zeros)], abs=0.001)
+    assert "no other one can confirm it" in luck_text(finding)
+
+
+def test_friction_beside_such_zeros_is_found_with_its_force():
+    found = diagnosed(
+        runs(UM * np.array([0.2, -0.3, 0.4]), law=lambda t, q, v, memory: (-0.05 * np.tanh(v / 1e-5), memory))
+    )
+    assert set(effects(found)) == {"coulomb", "zero_per_record"}
+    (friction,) = [f for f in found.findings if f.effect == "coulomb"]
+    assert friction.parameters["force"].value == pytest.approx(0.05, rel=0.05)
+
+
+def test_what_is_the_same_in_all_records_or_goes_on_in_time_is_no_zero_of_each():
+    (constant,) = effects(diagnosed(runs([0.3 * UM] * 3)))
+    assert constant in ("home_offset", "drive_offset")
+    drifting = diagnosed(runs([0.0] * 3, change=lambda y, t: y + 0.1 * UM * t))
+    assert effects(drifting) == ["drift"]
+
+
+def test_nothing_is_found_where_nothing_differs():
+    found = diagnosed(runs([0.0] * 3))
+    assert found.verdict == "consistent" and not found.findings
+
+
+def test_a_zero_that_the_file_leaves_free_is_not_found_again():
+    loose = validate(
+        type(AXIS),
+        AXIS.model_dump(mode="json") | {"effect": [{"kind": "zero_per_record", "at": "axis", "share": 1}]},
+        "d",
+    )
+    found = diagnosed(runs(UM * np.array([0.2, -0.3, 0.4])), loose)
+    assert found.verdict == "consistent" and not found.findings
+
+
+def test_it_is_told_why_such_zeros_were_not_tried():
+    (said,) = explain(diagnosed(runs([0.2 * UM] * 2, ROLES[:2])), "zero_per_record")
+    assert said.endswith("never were such constants 50 % of what was left of its reading.")
