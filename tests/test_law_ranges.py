@@ -102,6 +102,7 @@ def test_the_laws_of_two_channels_and_those_with_a_clock_are_these():
     two = (
         {
             "abbe_arm",
+            "arcuate_motion",
             "coupling",
             "cross_scale",
             "drive_crosstalk",

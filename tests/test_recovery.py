@@ -156,10 +156,11 @@ def test_of_poses_one_after_the_other(effect):
     [
         ("squareness", {"angle": 0.004}, lambda x, y: 0.004 * y),
         ("cross_scale", {"rate": 400.0}, lambda x, y: 400 * x * y),
+        ("arcuate_motion", {"rate": -160.0}, lambda x, y: -160 * y**2),
     ],
 )
 def test_of_two_axes_of_a_sensor(law, truth, of_x):
-    """A grid plate that is not square; an axis that reads 0.4 permille more for each micrometre of the other."""
+    """A grid plate that is not square; an axis that reads 0.4 permille more for each micrometre of the other; leaf springs of 3.75 mm."""
     table = {
         "kind": "matrix",
         "name": "stage",
@@ -329,6 +330,7 @@ def test_no_law_is_left_out():
         *ON_HEXAPOD,
         "squareness",
         "cross_scale",
+        "arcuate_motion",
         *SHARED,
         *IN_ORDER,
         "clock_offset",

@@ -297,6 +297,7 @@ LAWS = {
     "sensor_gain": ({}, lambda s, p: p.gain * s.value),
     "sensor_step": (EVENT, lambda s, p: p.offset * event(s, p)),
     "square_drive": ({}, lambda s, p: p.curvature * s.value**2),
+    "arcuate_motion": ({}, lambda s, p: p.rate * s.all[s.partner] ** 2),
     "cross_scale": ({}, lambda s, p: p.rate * s.value * s.all[s.partner]),
     "squareness": ({}, lambda s, p: p.angle * s.all[s.partner]),
     "stiffening": ({}, lambda s, p: -p.k3 * s.displacement**3),

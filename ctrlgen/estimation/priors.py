@@ -339,6 +339,10 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
                 of_one_body=True,
             ),
         ),
+        "arcuate_motion": LawPrior(
+            "Every guide on leaf springs has it. Of a pose of six components the mechanism's own kinematics say as much.",
+            unless=frozenset({"spatial"}),
+        ),
         "cross_scale": LawPrior(
             "Rarer than axes that are not square: judgement. Of a pose of six components finite rotations say as much.",
             log_prior_odds=ONE_IN_TEN,
