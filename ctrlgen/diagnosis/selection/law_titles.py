@@ -204,6 +204,12 @@ TITLES: Mapping[str, tuple[tuple[str, str], ...]] = MappingProxyType(
             ("electromagnetic", "Hysteresis of the motor's iron: the force lags behind the current"),
             ("", "Hysteresis of the actuator: its force lags behind the drive"),
         ),
+        "zero_per_record": (
+            (
+                "",
+                "Another constant in each record: a sensor that is zeroed anew, or a force, such as a weight, that changed between them",
+            ),
+        ),
     }
 )
 

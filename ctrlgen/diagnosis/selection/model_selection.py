@@ -166,7 +166,8 @@ class ModelSelection:
         needed = MODEL_SELECTION.least_gain + added * np.log(max(n, 2))
         if each := _of_each_record(before, after):
             # no number is held to another record: all of them tell, and each has its price
-            price = each * len(self.fitter.recording.records) * np.log(max(n + n_held, 2))
+            runs = len(self.fitter.fit_records) + len(self.fitter.held_out_records)
+            price = each * runs * np.log(max(n + n_held, 2))
             if gain + confirmed <= needed + price:
                 return Shortfall.GAIN
             return None if errors.is_noise or self.matters(before, after) else Shortfall.SMALL
