@@ -7,10 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from functools import partial
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator
 
 from ctrlgen.core.units import same_dimension
 from ctrlgen.devices.device_physics import BalancedPhysics, DevicePhysics, ImposedPhysics
+from ctrlgen.devices.part_names import name_of_part
 from ctrlgen.devices.section import Section
 
 ActuatorName = Literal[
@@ -48,6 +52,9 @@ SensorName = Literal[
     "autocollimator",
     "accelerometer",
 ]
+_Actuator = Annotated[ActuatorName, BeforeValidator(partial(name_of_part, names=ActuatorName))]
+_Transmission = Annotated[TransmissionName, BeforeValidator(partial(name_of_part, names=TransmissionName))]
+_Sensor = Annotated[SensorName, BeforeValidator(partial(name_of_part, names=SensorName))]
 # By what an actuator works. A servo, as a servo motor with its own controller is called for short, works as its motor does.
 FAMILIES: Mapping[str, str] = {
     **dict.fromkeys(
@@ -67,13 +74,14 @@ LONGEST_PIEZO, WIDEST_PIEZO = 2e-3, 0.04
 
 
 class Machine(Section):
-    """`[machine]`: the parts of the machine. Each key may be left out; `ctrlgen check` says what is then inferred."""
+    """`[machine]`: the parts of the machine. Each key may be left out; `ctrlgen check` says what is then inferred. Other words of the field
+    for a part, such as a ball screw or a linear scale, are understood (`part_names`)."""
 
-    actuator: ActuatorName | None = None
+    actuator: _Actuator | None = None
     """What moves it."""
-    transmission: TransmissionName | tuple[TransmissionName, ...] | None = None
+    transmission: _Transmission | tuple[_Transmission, ...] | None = None
     """What stands between actuator and reading, one name or several; "none" for a direct drive."""
-    sensor: SensorName | None = None
+    sensor: _Sensor | None = None
     """What the readings come from."""
 
 
