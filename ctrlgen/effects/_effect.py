@@ -84,6 +84,8 @@ class Effect:
     limits_rate: ClassVar[str] = ""
     # Its amplitude [s] moves a signal in time, so far that no slope at zero tells what it would explain.
     moves_in_time: ClassVar[bool] = False
+    # Of a wave, with a `phase`: further numbers that change their sign with its amplitude, as those of even harmonics do half a turn later.
+    of_even_harmonics: ClassVar[tuple[str, ...]] = ()
     # The force at standstill takes any value that holds the stage there (dry friction). The integrator must then be
     # implicit, in the effect's states too, whose rates must be linear in the states.
     set_valued: ClassVar[bool] = False

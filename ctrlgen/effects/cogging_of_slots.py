@@ -29,6 +29,7 @@ class CoggingOfSlots(Effect):
         Param("cosine", "1", (-1.0, 1.0), f"b: share {SHARE}, a quarter of its own period ahead"),
     )
     at_bounds = itself("period", "phase", "sine", "cosine")
+    of_even_harmonics = ("sine", "cosine")
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         angle = 2 * math.pi * s.displacement / p.period + p.phase

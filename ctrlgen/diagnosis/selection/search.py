@@ -26,6 +26,7 @@ from ctrlgen.diagnosis.selection.failures import FAILURES
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.not_taken import not_taken
 from ctrlgen.diagnosis.selection.other_laws import stands_for_another, takes_over
+from ctrlgen.diagnosis.selection.positive_waves import with_positive_waves
 from ctrlgen.diagnosis.selection.precedence import acting_first, everywhere_first, one_loop_first
 from ctrlgen.diagnosis.selection.pruning import all_pruned, no_worse, without_needless
 from ctrlgen.diagnosis.selection.rivals import acting_instead, replacements, rivals, simplified, swapped
@@ -77,7 +78,7 @@ class Searcher:
         trials = self.trials
         if found is not current:
             current = self._in_plainest_form(self._finely_timed(found))
-        current = self.without_unseen_pitches(current)
+        current = with_positive_waves(self.without_unseen_pitches(current))
         # its numbers are not bent by the errors of a better model
         nominal = scored(trials.fitter, trials.fitter.described(device)[1])
         current, account = supported(trials, nominal, current, trials.screen.seed)
@@ -92,7 +93,7 @@ class Searcher:
         """The result with a model that explains alike in place of the chosen one, which is its rival now; as given where it does not, or
         would not stay as it is beside the device as described (`no_worse`)."""
         trials = self.trials
-        rival = trials.converged(rival)
+        rival = with_positive_waves(trials.converged(rival))
         if not explains_alike(trials.selection, rival, result.chosen):
             return result
         if no_worse(trials, result.nominal, rival) is not rival:
