@@ -7,10 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import BeforeValidator
+from pydantic import ValidationInfo, field_validator
 
 from ctrlgen.core.units import same_dimension
 from ctrlgen.devices.device_physics import BalancedPhysics, DevicePhysics, ImposedPhysics
@@ -52,9 +51,6 @@ SensorName = Literal[
     "autocollimator",
     "accelerometer",
 ]
-_Actuator = Annotated[ActuatorName, BeforeValidator(partial(name_of_part, names=ActuatorName))]
-_Transmission = Annotated[TransmissionName, BeforeValidator(partial(name_of_part, names=TransmissionName))]
-_Sensor = Annotated[SensorName, BeforeValidator(partial(name_of_part, names=SensorName))]
 # By what an actuator works. A servo, as a servo motor with its own controller is called for short, works as its motor does.
 FAMILIES: Mapping[str, str] = {
     **dict.fromkeys(
@@ -77,12 +73,20 @@ class Machine(Section):
     """`[machine]`: the parts of the machine. Each key may be left out; `ctrlgen check` says what is then inferred. Other words of the field
     for a part, such as a ball screw or a linear scale, are understood (`part_names`)."""
 
-    actuator: _Actuator | None = None
+    actuator: ActuatorName | None = None
     """What moves it."""
-    transmission: _Transmission | tuple[_Transmission, ...] | None = None
+    transmission: TransmissionName | tuple[TransmissionName, ...] | None = None
     """What stands between actuator and reading, one name or several; "none" for a direct drive."""
-    sensor: _Sensor | None = None
+    sensor: SensorName | None = None
     """What the readings come from."""
+
+    @field_validator("actuator", "transmission", "sensor", mode="before")
+    @classmethod
+    def _by_its_name(cls, given: object, info: ValidationInfo) -> object:
+        names = {"actuator": ActuatorName, "transmission": TransmissionName, "sensor": SensorName}[str(info.field_name)]
+        if isinstance(given, list | tuple):
+            return tuple(name_of_part(word, names) for word in given)
+        return name_of_part(given, names)
 
 
 @dataclass(frozen=True)
