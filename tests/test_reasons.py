@@ -231,6 +231,19 @@ def test_a_refusal_is_told_in_a_channel_in_which_it_would_be_better_or_in_none(t
     assert not any("would be" in said for said in refusals(told))
 
 
+def test_a_refusal_is_told_with_the_causes_beside_it_that_were_dropped_since(turned):
+    """Its error is that of all of them."""
+    ((_, refusal), *_) = that_matter(turned.search)
+    fit = refusal.candidate.fit
+    structure = fit.restarted.with_cause(DRIFT, {"rate": 1e-9})
+    wider = replace(refusal.candidate, fit=replace(fit, structure=structure, theta=structure.start))
+    rounds = [replace(r, refused=(replace(refusal, candidate=wider),)) for r in turned.search.rounds[:1]]
+    told = replace(turned, search=replace(turned.search, rounds=tuple(rounds)))
+    assert [said.partition(",")[0] for said in refusals(told)] == ["cyclic at sensor:axis beside drift at sensor:axis"]
+    assert not_taken_rows(told.search)[0]["cause"].endswith(" beside drift at sensor:axis")
+    assert refusals(turned)[0].startswith("cyclic at sensor:axis, although ")
+
+
 def test_where_nothing_is_found_no_number_of_it_is_uncertain_and_no_error_changes(turned):
     first, *_ = next_steps(turned)
     assert first == (EMPIRICAL_ALONE if turned.empirical_terms else NOTHING_FOUND)

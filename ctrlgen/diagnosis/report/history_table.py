@@ -72,7 +72,7 @@ def not_taken_rows(search: SearchResult) -> list[dict[str, str]]:
     """What scored better than what its round took, that which would gain most beside the answer first."""
     return [
         {
-            "cause": " and ".join(map(cause_name, refusal.causes)),
+            "cause": " and ".join(map(cause_name, refusal.causes)) + dropped_beside(search, refusal),
             "numbers": _numbers(search, refusal),
             "better": number(refusal.gain, 4),
             "held_out": errors_text(held_out_error(search, refusal.candidate)),
@@ -80,6 +80,14 @@ def not_taken_rows(search: SearchResult) -> list[dict[str, str]]:
         }
         for _, refusal in better_than_their_round(search)
     ]
+
+
+def dropped_beside(search: SearchResult, refusal: Refusal) -> str:
+    """' beside drift at sensor:axis', the causes that were there when others were refused, and that the answer does not have: without them
+    those would leave another error."""
+    beside = (c for c in refusal.candidate.causes if c not in (*refusal.causes, *search.chosen.causes))
+    names = " and ".join(dict.fromkeys(map(cause_name, beside)))
+    return f" beside {names}" if names else ""
 
 
 def _numbers(search: SearchResult, refusal: Refusal) -> str:

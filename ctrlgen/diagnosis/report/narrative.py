@@ -7,7 +7,7 @@ import re
 
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.experiment_sentences import experiment_sentence
-from ctrlgen.diagnosis.report.history_table import most_gained, quantity
+from ctrlgen.diagnosis.report.history_table import dropped_beside, most_gained, quantity
 from ctrlgen.diagnosis.report.luck_sentences import luck_steps
 from ctrlgen.diagnosis.report.on_the_clock import used_for_another_run
 from ctrlgen.diagnosis.report.period_words import repeats
@@ -263,7 +263,7 @@ def refusals(diagnosis: Diagnosis) -> list[str]:
         if gained := most_gained(search, refusal.candidate):
             channel, error, now = gained
             better = f"the held-out error of {short(channel)} would be {quantity(error)} instead of {quantity(now)}"
-        names = " and ".join(map(cause_name, refusal.causes))
+        names = " and ".join(map(cause_name, refusal.causes)) + dropped_beside(search, refusal)
         said.append(f"{names}, although {better}: {'; '.join(dict.fromkeys(refusal.reasons))}")
     return said
 
