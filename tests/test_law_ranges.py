@@ -18,6 +18,7 @@ ONE_WAY = {
     "link_load": (-2.0, 4.0),
     "amplifier_lag": (-0.5, 1.5),
     "low_pass": (-0.5, 1.5),
+    "soft_coupling": (-0.5, 1.5),
     "coil_heating": (-0.1, 1.0),
     "heater_resistance": (-1e-3, 1e-2),
     "heater_resistance_of_second_order": (-1e-3, 1e-2),

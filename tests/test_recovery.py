@@ -334,6 +334,7 @@ def test_no_law_is_left_out():
         *SHARED,
         *IN_ORDER,
         "clock_offset",
+        "soft_coupling",  # tests/test_soft_coupling.py
         "eccentricity",  # tests/test_rotary_servo.py
         "feedthrough",  # tests/test_feedthrough.py
         "heater_resistance_of_second_order",  # tests/test_heat_loss.py

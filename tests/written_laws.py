@@ -243,6 +243,11 @@ LAWS = {
         lambda s, p: p.share * (s.w - s.value),
         lambda s, p: {"w": s.v / 0.06, "v": (s.value - s.w - 1.4 * s.v) / 0.06},
     ),
+    "soft_coupling": (
+        {"frequency": 8.0, "damping": 0.1},
+        lambda s, p: p.share * (s.w - s.value),
+        lambda s, p: {"w": 16 * np.pi * s.v, "v": 16 * np.pi * (s.value - s.w - 0.2 * s.v)},
+    ),
     "low_pass": (
         {"tau": 0.06, "damping": 0.7},
         lambda s, p: p.share * (s.w - s.value),

@@ -303,7 +303,7 @@ def _longest_shift(law: type[Effect], physics: DevicePhysics, sample_time: float
 
 def _needs_a_clock(law: type[Effect], sample_time: float | None) -> bool:
     """Whether all of a law is in time, of which settled poses tell nothing: at rest, what creeps or forgets is a gain."""
-    return sample_time is None and law.family in (Family.TIMING, Family.CREEP)
+    return sample_time is None and law.family in (Family.TIMING, Family.CREEP, Family.DYNAMICS)
 
 
 def _together(law: type[Effect], physics: DevicePhysics, fitting: Sequence[Channel]) -> list[str]:

@@ -18,7 +18,6 @@ from ctrlgen.estimation.law_prior import (
     CREEPING,
     LEVELLING_OFF,
     ONE_IN_TEN,
-    SECOND_ORDER_FILTER,
     LawPrior,
     ParameterPrior,
     peaks,
@@ -26,6 +25,7 @@ from ctrlgen.estimation.law_prior import (
 from ctrlgen.estimation.priors_in_a_region import IN_A_REGION
 from ctrlgen.estimation.priors_of_a_lag import HYSTERESIS, OF_A_LAG
 from ctrlgen.estimation.priors_of_drives import OF_DRIVES
+from ctrlgen.estimation.priors_of_filters import OF_FILTERS
 from ctrlgen.estimation.priors_of_heat import OF_HEAT
 from ctrlgen.estimation.priors_of_time import OF_TIME
 
@@ -107,25 +107,11 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             unless=frozenset({"balanced"}),
             parameters={"before": _starts((0.5,))},
         ),
-        "high_pass": LawPrior(
-            "A leak acts on the whole reading: one that is fitted to a part of it stands for something else. From a coupling to a "
-            "charge amplifier.",
-            model_form_error=0.005,
-            parameters={
-                "share": ParameterPrior(plausible_range=(0.8, 1.2)),
-                "tau": _starts((0.02, 0.15, 1.0, 8.0, 60.0)),
-            },
-        ),
         "home_offset": LawPrior(
             "Readings are zeroed before a run, and an offset fits the mean of any residual of one sign, as of friction in one "
             "direction: judgement.",
             log_prior_odds=ONE_IN_TEN,
             constant=True,
-        ),
-        "low_pass": LawPrior(
-            "No filter has exactly two poles; 0.5 %: judgement.",
-            model_form_error=0.005,
-            parameters=SECOND_ORDER_FILTER,
         ),
         "quantisation": LawPrior(
             "Steps of half a decade each, from 1e-4 to 0.1 of the typical size.",
@@ -176,6 +162,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             of_each_record=True,
             parameters={"share": ParameterPrior(fixed_range=(0.8, 1.2))},
         ),
+        **OF_FILTERS,
         **OF_DRIVES,
         # Force ----------------------------------------------------------------------------------------------------------------
         "asymmetric_hysteresis": LawPrior(
