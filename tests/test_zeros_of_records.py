@@ -9,10 +9,16 @@ import pytest
 from axis_records import AXIS, NOISE, H, move, record
 
 from ctrlgen.core.files import validate
+from ctrlgen.devices import Device
 from ctrlgen.diagnosis.diagnose import diagnose_recording
 from ctrlgen.diagnosis.report.answer import answer
 from ctrlgen.diagnosis.report.explain import explain
 from ctrlgen.diagnosis.report.luck_sentences import luck_text
+from ctrlgen.diagnosis.selection.zeros_of_records import zeros_in_records
+from ctrlgen.estimation.fit import Fitter
+from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.noise import estimate_noise
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Recording
 
 UM = 1e-6
@@ -96,3 +102,31 @@ def test_a_zero_that_the_file_leaves_free_is_not_found_again():
 def test_it_is_told_why_such_zeros_were_not_tried():
     (said,) = explain(diagnosed(runs([0.2 * UM] * 2, ROLES[:2])), "zero_per_record")
     assert said.endswith("never were such constants 50 % of what was left of its reading.")
+
+
+def test_readings_of_which_one_ends_in_the_name_of_the_other_keep_their_zeros_apart():
+    """Two tested axes, whose forces are read with another zero in each run: 5 and -3 N, 1 and 2 N."""
+    numbers = {
+        "mass": "1 kg",
+        "damping": "0 N*s/m",
+        "stiffness": "0 N/m",
+        "stroke": "1 m",
+        "speed": "9 m/s",
+        "force": "99 N",
+    }
+    axes = [{"name": name, **numbers} for name in ("x", "a_x")]
+    table = {"kind": "tested_axes", "name": "bench", "title": "a bench", "source": "round numbers", "axis": axes}
+    device, rng, parts = validate(Device.library["tested_axes"], table, "device"), np.random.default_rng(3), []
+    for zeros, role in (((5.0, 1.0), "fit"), ((-3.0, 2.0), "hold_out")):
+        motion = 0.1 * rng.standard_normal((200, 6))
+        accelerations = motion[:, 4:]
+        parts.append(record(motion, accelerations + zeros + 0.01 * rng.standard_normal((200, 2)), role))
+    names = ("reading.x", "reading.a_x")
+    recording = Recording("t", "bench", "series", names, ("N", "N"), (0.01, 0.01), tuple(parts), ())
+    fitter, structure = Fitter(recording, estimate_noise(recording, 0.0)), Structure(device)
+    causes = [Hypothesis("zero_per_record", f"sensor:{at}", at) for at in ("x", "a_x")]
+    for cause in causes:
+        structure = structure.with_cause(cause, {"share": 1.0})
+    fit = fitter.fit(structure)
+    told = [zeros_in_records(fitter, fit, cause) for cause in causes]
+    assert [value for zeros in told for value, _ in zeros.values()] == pytest.approx([5.0, -3.0, 1.0, 2.0], abs=0.01)

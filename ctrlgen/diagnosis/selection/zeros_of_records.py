@@ -6,6 +6,7 @@ beyond one mean of all records.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 
 import numpy as np
@@ -15,11 +16,9 @@ from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import SEARCH
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.settings import STATISTICS
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Recording
-
-WITHIN = 1.96
-"""Deviations to either side of a 95 % interval."""
 
 
 def has_several_runs(recording: Recording) -> bool:
@@ -59,22 +58,21 @@ def zeros_in_records(fitter: Fitter, fit: Fit, cause: Hypothesis) -> dict[str, t
     """The zero of the reading in each record that moves, by the record's name, and how far its 95 % interval reaches to either side [SI]:
     that of a constant under the errors of the fit. Of records with one name also the time at which each begins."""
     i, found = fitter.recording.channels.index(f"reading.{cause.at}"), {}
+    own = re.compile(rf"{cause.effect}_\d+_{cause.law.states[0].name}_{re.escape(cause.at)}")
     runs = [r for r in fitter.recording.records if r.role != "rest"]
     often = Counter(r.name for r in runs)
     for record in runs:
         simulator = fitter.simulator(fit.structure, record)
         names = simulator.model.x_names
         (place,) = (
-            k
-            for k, x in enumerate(simulator.free_initial_states)
-            if x < len(names) and names[x].startswith(f"{cause.effect}_") and names[x].endswith(f"_{cause.at}")
+            k for k, x in enumerate(simulator.free_initial_states) if x < len(names) and own.fullmatch(names[x])
         )
         constant = np.zeros(record.observed.shape)
         constant[:, i] = 1.0
         told = float(np.sum(fitter.error.whiten(constant, record.valid) ** 2))
         value = float(fitter.begun(fit, record)[0][place])
         begun = f" from {record.time[0]:g} s" if often[record.name] > 1 else ""
-        found[record.name + begun] = value, WITHIN / np.sqrt(told) if told > 0 else np.inf
+        found[record.name + begun] = value, STATISTICS.z_95 / np.sqrt(told) if told > 0 else np.inf
     return found
 
 
