@@ -94,6 +94,7 @@ def test_the_json_is_the_contract(found):
             "support",
             "chance",
             "region",
+            "in_each_record",
         )
     }
     assert (finding["effect"], finding["location"]) == ("creep", "stage:axis")

@@ -175,4 +175,5 @@ def test_a_rival_takes_the_place_where_it_explains_alike_and_foretells_no_worse(
     monkeypatch.setattr(search, "explains_alike", lambda *_: alike)
     monkeypatch.setattr(search, "no_worse", lambda *_: rival if no_worse else fewer)
     monkeypatch.setattr(search, "attribute", lambda *_: None)
+    monkeypatch.setattr(search, "with_positive_waves", lambda t: t)
     assert searcher.with_rival(result, rival).chosen is (rival if taken else described)
