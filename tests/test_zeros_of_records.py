@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from ctrlgen.diagnosis.diagnose import diagnose_recording
 from ctrlgen.diagnosis.report.answer import answer
 from ctrlgen.diagnosis.report.explain import explain
 from ctrlgen.diagnosis.report.luck_sentences import luck_text
-from ctrlgen.diagnosis.selection.zeros_of_records import zeros_in_records
+from ctrlgen.diagnosis.selection.zeros_of_records import has_several_runs, zeros_in_records
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.noise import estimate_noise
@@ -33,7 +34,7 @@ def runs(zeros, roles=ROLES, law=None, n=1000, change=lambda y, t: y, noise=NOIS
         t = np.arange(n) * H
         u = 1.2 * np.sin(2 * np.pi * (1.7 + 0.6 * k) * t) + 0.4 * np.sin(2 * np.pi * (11 + 3 * k) * t + k)
         y = change(move(u, law), t + 3.0 * k) + zero + NOISE * rng.standard_normal(n)
-        parts.append(record(u, y, role, first=3.0 * k))
+        parts.append(replace(record(u, y, role, first=3.0 * k), name=f"run_{k}.csv"))
     return Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (noise,), tuple(parts), ())
 
 
@@ -130,3 +131,15 @@ def test_readings_of_which_one_ends_in_the_name_of_the_other_keep_their_zeros_ap
     fit = fitter.fit(structure)
     told = [zeros_in_records(fitter, fit, cause) for cause in causes]
     assert [value for zeros in told for value, _ in zeros.values()] == pytest.approx([5.0, -3.0, 1.0, 2.0], abs=0.01)
+
+
+def test_the_parts_of_one_file_have_one_zero():
+    """Two halves of a run that differ by half a micrometre hold a jump, and no sensor that was zeroed in between."""
+    whole = runs(UM * np.array([0.0, 0.5]), ROLES[:2])
+    names = ("log (1).csv[0:1000] from 0 s", "log (1).csv[1000:2000] (last 1000 of 2000)")
+    one, two = (
+        replace(whole, records=tuple(replace(r, name=name) for r, name in zip(whole.records, given, strict=True)))
+        for given in (names, ("log (1).csv[0:1000]", "log (2).csv[0:1000]"))
+    )
+    assert not has_several_runs(one) and has_several_runs(two)
+    assert "zero_per_record" not in effects(diagnosed(one)) and effects(diagnosed(two)) == ["zero_per_record"]

@@ -18,12 +18,19 @@ from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.settings import STATISTICS
 from ctrlgen.estimation.structure import Structure
-from ctrlgen.recordings.recording import Recording
+from ctrlgen.recordings.recording import Record, Recording
+
+_PART = re.compile(r"(\[\d+:\d+\])?( from [^ ]+ s)?( \([^()]*\))?$")
+"""What the name of a record has behind that of its file: rows, where a gap ends, and which part of a divided record it is."""
 
 
 def has_several_runs(recording: Recording) -> bool:
-    """Whether readings in time are recorded in two runs or more."""
-    return recording.kind == "series" and sum(r.role != "rest" for r in recording.records) > 1
+    """Whether readings in time are recorded in two runs or more: the parts of one file have one zero."""
+    return recording.kind == "series" and len({_run(r) for r in recording.records if r.role != "rest"}) > 1
+
+
+def _run(record: Record) -> str:
+    return _PART.sub("", record.name)
 
 
 def fit_own_zeros(trials: Trials, current: CandidateModel) -> tuple[CandidateModel, ...]:
@@ -39,13 +46,15 @@ def fit_own_zeros(trials: Trials, current: CandidateModel) -> tuple[CandidateMod
 
 def own_zeros(fitter: Fitter, fit: Fit) -> dict[str, float]:
     """By channel the share of the squares that a fit leaves about their mean, of the records to fit and those held out, that a mean of
-    each record takes away: sum_r n_r (m_r - m)^2 / sum (e - m)^2 of the residual e."""
+    each run takes away: sum_r n_r (m_r - m)^2 / sum (e - m)^2 of the residual e. The parts of one file are one run."""
     runs = [r for r in fitter.recording.records if r.role != "rest"]
     left = [r.observed - fitter.predict(fit, r) for r in runs]
     shares = {}
     for i, channel in enumerate(fitter.recording.channels):
-        parts = [e[r.valid[:, i] & np.isfinite(e[:, i]), i] for e, r in zip(left, runs, strict=True)]
-        parts = [e for e in parts if len(e)]
+        of_run: dict[str, list[np.ndarray]] = {}
+        for e, r in zip(left, runs, strict=True):
+            of_run.setdefault(_run(r), []).append(e[r.valid[:, i] & np.isfinite(e[:, i]), i])
+        parts = [e for e in map(np.concatenate, of_run.values()) if len(e)]
         if len(parts) > 1:
             every = np.concatenate(parts)
             whole = float(np.sum((every - every.mean()) ** 2))
