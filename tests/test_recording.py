@@ -57,6 +57,7 @@ def test_rows_split_a_file_and_keep_their_time(tmp_path, model):
     described(tmp_path, {**record, "role": "fit", "rows": [0, 250]}, {**record, "role": "hold_out", "rows": [250, 400]})
     fit, held = load_recordings([tmp_path], model).records
     assert (fit.name, held.name) == ("a.csv[0:250]", "a.csv[250:400]")
+    assert fit.file == held.file and fit.file.endswith("a.csv")
     assert len(fit.time) == 250 and held.time[0] == pytest.approx(0.25)
     assert np.allclose(held.observed[:, 0], 1e-6 * samples()["x"][250:], rtol=1e-15)
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from axis_records import record
+from scipy.signal import lsim
 
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
@@ -12,22 +15,16 @@ from ctrlgen.diagnosis.diagnose import diagnose_recording
 from ctrlgen.estimation.hypothesis import hypotheses, nominal_physics
 from ctrlgen.recordings.recording import Recording
 
-H, FINE, NOISE = 2e-3, 20, 5e-7
+H, NOISE = 2e-3, 5e-7
 SERVO = {"kind": "servo", "name": "table", "title": "a table", "source": "round numbers", "travel": "40 mm"}
 TABLE = validate(Device.library["servo"], SERVO, "device")
 LAWS = ("soft_coupling", "low_pass", "delay", "drift", "vibration", "notch", "amplifier_lag", "cyclic", "home_offset")
 
 
 def followed(u, frequency, damping):
-    """The load (n,) [m] on a spring that follows `u`, linear between samples; semi-implicit steps of a twentieth of a sample."""
-    w, x, v, out = 2 * np.pi * frequency, u[0], 0.0, []
-    for here, there in zip(u, [*u[1:], u[-1]], strict=True):
-        out.append(x)
-        for j in range(FINE):
-            at = here + (there - here) * (j + 0.5) / FINE
-            v += H / FINE * (w**2 * (at - x) - 2 * damping * w * v)
-            x += H / FINE * v
-    return np.array(out)
+    """The load (n,) [m] on a spring that follows `u`, linear between samples, at rest where that begins: exact."""
+    w = 2 * np.pi * frequency
+    return lsim(([w**2], [1, 2 * damping * w, w**2]), u, H * np.arange(len(u)))[1]
 
 
 def recorded(frequency, damping, n=1500):
@@ -39,7 +36,7 @@ def recorded(frequency, damping, n=1500):
         parts.append(
             record(u, followed(u, frequency, damping) + NOISE * rng.standard_normal(n), role, first=4.0 * k, h=H)
         )
-    parts = [type(p)(**{**vars(p), "linear": True}) for p in parts]
+    parts = [replace(p, linear=True) for p in parts]
     return Recording("t", TABLE.name, "series", ("reading.axis",), ("um",), (NOISE,), tuple(parts), ())
 
 
@@ -52,7 +49,7 @@ def test_a_load_that_rings_behind_a_servo_is_found_with_its_frequency(frequency,
     assert numbers["frequency"].value == pytest.approx(frequency, rel=0.01)
     assert numbers["damping"].value == pytest.approx(damping, rel=0.1)
     held = found.held_out["reading.axis"]
-    assert held.rms_after < max(1.5 * held.noise_floor, 0.005 * held.rms_before)  # half of the form error of the law
+    assert held.rms_after < 1.1 * held.noise_floor  # noise: 1500 samples tell it to 2 %
 
 
 def test_it_is_not_offered_for_settled_poses():

@@ -136,10 +136,9 @@ def test_readings_of_which_one_ends_in_the_name_of_the_other_keep_their_zeros_ap
 def test_the_parts_of_one_file_have_one_zero():
     """Two halves of a run that differ by half a micrometre hold a jump, and no sensor that was zeroed in between."""
     whole = runs(UM * np.array([0.0, 0.5]), ROLES[:2])
-    names = ("log (1).csv[0:1000] from 0 s", "log (1).csv[1000:2000] (last 1000 of 2000)")
     one, two = (
-        replace(whole, records=tuple(replace(r, name=name) for r, name in zip(whole.records, given, strict=True)))
-        for given in (names, ("log (1).csv[0:1000]", "log (2).csv[0:1000]"))
+        replace(whole, records=tuple(replace(r, file=file) for r, file in zip(whole.records, files, strict=True)))
+        for files in (("day_1.csv", "day_1.csv"), ("day_1.csv", "day_2.csv"))
     )
     assert not has_several_runs(one) and has_several_runs(two)
     assert "zero_per_record" not in effects(diagnosed(one)) and effects(diagnosed(two)) == ["zero_per_record"]

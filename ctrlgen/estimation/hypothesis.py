@@ -302,7 +302,8 @@ def _longest_shift(law: type[Effect], physics: DevicePhysics, sample_time: float
 
 
 def _needs_a_clock(law: type[Effect], sample_time: float | None) -> bool:
-    """Whether all of a law is in time, of which settled poses tell nothing: at rest, what creeps or forgets is a gain."""
+    """Whether all of a law is in time, of which settled poses tell nothing: at rest, what creeps or forgets is a gain, and what goes by
+    speed or rings does nothing."""
     return sample_time is None and law.family in (Family.TIMING, Family.CREEP, Family.DYNAMICS)
 
 
@@ -342,7 +343,8 @@ def why_not_offered(
     if missing := law.requires - there:
         return f"it needs {' and '.join(sorted(missing))}, which the device or the recording does not have"
     if _needs_a_clock(law, sample_time):
-        return "the poses are settled and have no clock: at rest, what creeps or is late cannot be told from a gain"
+        at_rest = "what creeps or is late cannot be told from a gain, and what goes by speed or rings does nothing"
+        return f"the poses are settled and have no clock: at rest, {at_rest}"
     if law.place is Place.HEAT and "heat" not in there:
         return "no actuator of the device is heated"
     if _stated_once(law, device):

@@ -28,6 +28,7 @@ class RecordReader:
         self.faults, self.rows, self.notes = self.read_from.faults, table.rows, self.read_from.notes
         # [s] of the first row, by a column of time that says when the record was
         self.first_time: float | None = None
+        self.file = str(folder / table.file)
         self.name = table.file + (f"[{table.rows[0]}:{table.rows[1]}]" if table.rows else "")
 
     def read(self, names: validation.ChannelNames) -> Record | None:
@@ -181,6 +182,7 @@ class RecordReader:
         observed[~after_lead_in[:, 0]] = np.nan
         return Record(
             name=self.name,
+            file=self.file,
             role=table.role,
             time=time[kept],
             sample_time=period * every,

@@ -38,7 +38,8 @@ class Record(Shown):
     neighbours of each outlier that was marked. `held`: first row, row behind the last and channel of each stretch in which a
     reading was found to be held although the device moves. `resumed`: the device had moved before it, after a gap in which the drive is not
     known, in the rest of a divided record or before the first row, so that what it remembers of that is not known either.
-    `either`: nobody stated whether the drive is held or linear; `linear` is what is taken.
+    `either`: nobody stated whether the drive is held or linear; `linear` is what is taken. `file`: that of which it is a part, empty where
+    it is of none.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Record(Shown):
     held: tuple[tuple[int, int, int], ...] = ()
     resumed: bool = False
     either: bool = False
+    file: str = ""
 
     def facts(self) -> dict[str, object]:
         """What it is, in a few words."""

@@ -39,5 +39,5 @@ def _numbers(diagnosis: Diagnosis) -> tuple[tuple[str, str], ...]:
     for main in diagnosis.findings[:1]:
         told.append((f"share of {cause_name(main.cause)}", share_text(main)))
         told.append(("chance by luck", chance_text(main)))
-        told += [(name, interval(one, name)) for name, one in list(main.parameters.items())[:NUMBERS]]
+        told += [(name, interval(one, name)) for name, one in main.numbers[:NUMBERS]]
     return tuple((name, hard(value)) for name, value in told)

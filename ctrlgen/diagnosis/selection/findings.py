@@ -135,7 +135,7 @@ class Finding:
     def numbers(self) -> list[tuple[str, Estimate]]:
         """Its parameters and those of its further terms, and what it is in each record, with their names."""
         of_law = [(name, e) for numbers in (self.parameters, *self.terms) for name, e in numbers.items()]
-        return [*of_law, *((f"in {record}", e) for record, e in self.in_each_record.items())]
+        return [*of_law, *((f"zero in {record}", e) for record, e in self.in_each_record.items())]
 
     @property
     def region(self) -> RegionEntry | None:

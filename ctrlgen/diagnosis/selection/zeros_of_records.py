@@ -20,17 +20,14 @@ from ctrlgen.estimation.settings import STATISTICS
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Record, Recording
 
-_PART = re.compile(r"(\[\d+:\d+\])?( from [^ ]+ s)?( \([^()]*\))?$")
-"""What the name of a record has behind that of its file: rows, where a gap ends, and which part of a divided record it is."""
-
 
 def has_several_runs(recording: Recording) -> bool:
     """Whether readings in time are recorded in two runs or more: the parts of one file have one zero."""
-    return recording.kind == "series" and len({_run(r) for r in recording.records if r.role != "rest"}) > 1
+    return recording.kind == "series" and len({_file(r) for r in recording.records if r.role != "rest"}) > 1
 
 
-def _run(record: Record) -> str:
-    return _PART.sub("", record.name)
+def _file(record: Record) -> str:
+    return record.file or record.name
 
 
 def fit_own_zeros(trials: Trials, current: CandidateModel) -> tuple[CandidateModel, ...]:
@@ -53,7 +50,7 @@ def own_zeros(fitter: Fitter, fit: Fit) -> dict[str, float]:
     for i, channel in enumerate(fitter.recording.channels):
         of_run: dict[str, list[np.ndarray]] = {}
         for e, r in zip(left, runs, strict=True):
-            of_run.setdefault(_run(r), []).append(e[r.valid[:, i] & np.isfinite(e[:, i]), i])
+            of_run.setdefault(_file(r), []).append(e[r.valid[:, i] & np.isfinite(e[:, i]), i])
         parts = [e for e in map(np.concatenate, of_run.values()) if len(e)]
         if len(parts) > 1:
             every = np.concatenate(parts)
