@@ -107,8 +107,6 @@ def judge(answer: dict[str, Any], diagnosis: dict[str, Any] | None, seconds: flo
     if [t["name"] for t in truths] == ["vibration"]:  # other laws have no band of their own
         j.bands = [_in_band(diagnosis.get("residual_location", {}), truths[0]["shape"]["frequency"])]
     left = [f for f in left if not any(_harmonic(f, t) or _cubic(f, t) for t in truths)]
-    # each of these records has a zero of its own, which no answer lists
-    left = [f for f in left if not answer.get("rough") or f["effect"] != "zero_per_record"]
     left = [
         f
         for f in left

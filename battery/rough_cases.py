@@ -22,6 +22,7 @@ DEVICES = ("axis", "mems", "axis", "axis", "meso")  # of messy cases, in turn
 NULLS = ("spikes", "coloured", "understated", "overstated", "linear", "linear_hexapod")
 STATED = {"understated": 0.7, "overstated": 1.5}  # noise over the true one
 MEMORY = (10.0, 300.0)  # size of a memory alone, as battery.messy.DOMINANT
+ZEROS = {"name": "zero_per_record", "location": "sensor:all"}  # what the zero point of each record is, as a law
 ZERO = 0.05  # largest zero point of a record over the rms of the largest cause
 LEAST_SHARE = 0.1  # of the mismatch on the held-out record, of a dominant cause
 LEAST_TOGETHER = 0.8  # of all dominant causes
@@ -175,7 +176,7 @@ def told(
         truth |= {"parts": known["parts"][k], "parts_varying": known["parts_varying"][k]}
     return {
         "planted": sorted(truths, key=lambda t: -t["share"]),
-        "background": rest,
+        "background": [*rest, ZEROS] if rough else rest,
         "device": device,
         "rough": rough,
         "least_error": known["least_error"],
