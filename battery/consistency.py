@@ -150,6 +150,8 @@ def _verdict(d: dict[str, Any]) -> Iterator[str]:
         yield "explained, and more than noise is left"
     if verdict == "explained" and any(f["role"] == "unseen" for f in d["findings"]):
         yield "explained by what no held-out record shows"
+    if verdict in {"explained", "partly"} and d["findings"] and d["findings"][0]["size_untold"]:
+        yield f"{verdict} by {_name(d['findings'][0])}, whose size may be zero"
     if verdict in {"explained", "partly", "ambiguous"} and not d["findings"]:
         yield f"{verdict} by nothing"
     if verdict == "consistent" and d["findings"]:

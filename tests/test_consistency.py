@@ -78,6 +78,7 @@ WRONG = {
     "a chance below its own p": ("findings.0.chance.by_luck", 0.0),
     "a p of more signs than there are": ("findings.0.chance.stretches", 3),
     "a reason for a doubt that there is not": ("findings.0.chance.reason", "few"),
+    "explained by a law whose size may be zero": ("findings.0.size_untold", True),
     "no test and no reason": ("findings.0.chance.p", None),
 }
 

@@ -91,11 +91,8 @@ def test_the_json_is_the_contract(found):
             "worth",
             "alternatives",
             "source",
-            "support",
-            "chance",
-            "region",
-            "in_each_record",
-        )
+        ),
+        *("support", "chance", "region", "in_each_record", "size_untold"),
     }
     assert (finding["effect"], finding["location"]) == ("creep", "stage:axis")
     assert finding["of"] is None and finding["parameters"]["tau"]["unit"] == "s"

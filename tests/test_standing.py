@@ -10,7 +10,7 @@ import pytest
 from ctrlgen.diagnosis.report.nearly_as_large import nearly_as_large
 from ctrlgen.diagnosis.selection import search
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
-from ctrlgen.diagnosis.selection.findings import Finding, Role, WorthEntry, leading
+from ctrlgen.diagnosis.selection.findings import Estimate, Finding, Role, WorthEntry, leading, size_untold
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.standing import Evidence, answer_of, borne_out_instead, by_heat, in_standing, possible
 from ctrlgen.diagnosis.selection.verdict import Verdict
@@ -91,6 +91,36 @@ def test_alone_it_makes_the_answer_ambiguous_unless_noise_alone_is_left(verdict)
     assert (
         answer_of(verdict, in_standing([finding("coulomb")], Evidence(*2 * [shares(0.9, 0.0)])), exact=False) == verdict
     )
+
+
+@pytest.mark.parametrize("verdict", Verdict)
+def test_a_cause_whose_size_may_be_zero_explains_nothing(verdict):
+    """Something acts, which is not said to be this."""
+    untold = [replace(finding("coulomb_above"), size_untold=True), finding("creep", 0.1)]
+    named = verdict in (Verdict.PARTLY, Verdict.EXPLAINED)
+    for exact in (False, True):
+        assert answer_of(verdict, untold, exact) is (Verdict.UNEXPLAINED if named else verdict)
+        assert answer_of(verdict, untold[::-1], exact) is verdict
+
+
+@pytest.mark.parametrize(
+    ("sizes", "untold"),
+    [
+        ([(0.0, 48.0)], True),
+        ([(1e-9, 48.0)], False),
+        ([(-2.0, 3.0), (-9.0, 1.0)], True),
+        ([(-2.0, 3.0), (1.0, 9.0)], False),
+    ],
+)
+def test_the_size_of_a_law_is_told_where_one_of_its_terms_has_one(sizes, untold):
+    """The shape of a law, whose interval may hold zero too, does not count."""
+    free = [SimpleNamespace(cause=k, amplitude=True, nominal=0.0, unit="N", path=f"s{k}") for k in range(len(sizes))]
+    free.append(SimpleNamespace(cause=0, amplitude=False, nominal=0.0, unit="N", path="shape"))
+    estimates = {f"s{k}": Estimate(ends[1], ends, "N") for k, ends in enumerate(sizes)}
+    fit = SimpleNamespace(structure=SimpleNamespace(free_parameters=free))
+    search = SimpleNamespace(chosen=SimpleNamespace(fit=fit))
+    assert size_untold(search, range(len(sizes)), estimates) is untold
+    assert not size_untold(search, [len(sizes)], estimates)
 
 
 def test_of_two_that_explain_alike_the_one_that_the_shares_bear_out_takes_the_place_of_the_other():

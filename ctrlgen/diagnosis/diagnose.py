@@ -126,7 +126,7 @@ def _diagnose(
     found = (*findings(search, search.account, likelihoods), *detected)
     if evidence is not None:
         found = in_standing(found, evidence, detected)
-        answer = answer_of(answer, found, search.chosen.errors.is_noise)
+    answer = answer_of(answer, found, search.chosen.errors.is_noise)
     found = with_chances(found, search)
     answer = doubted(answer, found)
     explained = answer == Verdict.EXPLAINED and (tests.passed or within_tolerance(search))

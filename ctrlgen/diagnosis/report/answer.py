@@ -121,7 +121,7 @@ def _cause(diagnosis: Diagnosis, channel: str) -> list[Part]:
         known = "effect that could be tried" if diagnosis.untried.sentences() else "known effect"
         none = Part(f"{head}: the recording differs from {title}, and no {known} explains it")
         return [none, of_what_kind(diagnosis, channel), pitch_part(diagnosis, channel)]
-    first = Part(f"{head}: {_too_much_left(diagnosis)}")
+    first = Part(f"{head}: {_too_much_left(diagnosis) or _size_untold(diagnosis)}")
     return [first, *_main(diagnosis), *rival_parts(diagnosis), pitch_part(diagnosis, channel)]
 
 
@@ -148,6 +148,12 @@ def _too_much_left(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict != Verdict.UNEXPLAINED or left <= 1 - VERDICT.most:
         return ""
     return f"what was found leaves {'all' if left >= 1 else per_cent(left)} of the error; the best of it is "
+
+
+def _size_untold(diagnosis: Diagnosis) -> str:
+    """'the size of no law is told; nearest comes ', where that is why nothing is explained."""
+    untold = diagnosis.verdict == Verdict.UNEXPLAINED and diagnosis.findings[0].size_untold
+    return "of what acts no law has a size that is told; nearest comes " if untold else ""
 
 
 def _main(diagnosis: Diagnosis) -> list[Part]:

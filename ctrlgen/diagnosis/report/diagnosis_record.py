@@ -84,6 +84,9 @@ class FindingEntry(Cause):
     in_each_record: dict[str, EstimateEntry] = Field(
         description="What it is in each record, by the record's name, where it is another one there, such as the zero of a sensor."
     )
+    size_untold: bool = Field(
+        description="Whether the intervals of all its sizes hold that at which it is off: something acts there, which need not be this."
+    )
     alternatives: list[AlternativeEntry] = Field(
         description="Other causes that explain the recording equally well in its place."
     )

@@ -113,6 +113,7 @@ class Finding:
     itself, and the finding `serves` needs it; `unseen`: only the records to fit can show it. title: what the law is called on this
     machine, empty where its own title serves. support: what the model-free shares say of it. chance: that luck found it, None where it was
     read from the data. in_each_record: what it is in each record, by the name of that, of a law that is another one in each.
+    size_untold: whether the intervals of all its sizes hold that at which it is off: something acts there, which need not be this.
     """
 
     effect: str
@@ -130,6 +131,7 @@ class Finding:
     support: SupportEntry | None = None
     chance: ChanceEntry | None = None
     in_each_record: dict[str, Estimate] = field(default_factory=dict)
+    size_untold: bool = False
 
     @property
     def numbers(self) -> list[tuple[str, Estimate]]:
@@ -279,6 +281,7 @@ def findings(search: SearchResult, shares: Attribution, profiles: tuple[Profile,
                 causes[served] if role is Role.PART and served is not None else None,
                 _title(search, cause),
                 in_each_record=_in_each_record(search, cause),
+                size_untold=size_untold(search, (first, *others), estimates),
             )
         )
     main = _leading(search, rows)
@@ -348,6 +351,14 @@ def _numbers_of(search: SearchResult, k: int, estimates: dict[str, Estimate]) ->
             middle = sum(fixed) / 2
             parameters[p.name] = Estimate(middle, (middle, middle), p.unit)
     return parameters
+
+
+def size_untold(search: SearchResult, terms: Sequence[int], estimates: dict[str, Estimate]) -> bool:
+    """Whether the intervals of all sizes of the causes `terms` hold the value at which their law is off."""
+    free = search.chosen.fit.structure.free_parameters
+    sizes = [u for u in free if u.cause in terms and u.amplitude]
+    ends = [(float(from_si(u.nominal, u.unit)), estimates[u.path].ci95) for u in sizes]
+    return bool(ends) and all(low <= off <= high for off, (low, high) in ends)
 
 
 def _in_each_record(search: SearchResult, cause: Hypothesis) -> dict[str, Estimate]:

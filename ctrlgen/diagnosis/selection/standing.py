@@ -107,6 +107,10 @@ def by_heat(shares: Sequence[tuple[Family, float]], offered: Sequence[Hypothesis
 
 
 def answer_of(verdict: Verdict, findings: Sequence[Finding], exact: bool) -> Verdict:
-    """The verdict: ambiguous where the first cause is contradicted by the shares, unless the model leaves noise alone (`exact`)."""
-    doubted = bool(findings) and findings[0].contradicted and not exact
-    return Verdict.AMBIGUOUS if doubted and verdict in (Verdict.PARTLY, Verdict.EXPLAINED) else verdict
+    """The verdict: ambiguous where the first cause is contradicted by the shares, unless the model leaves noise alone (`exact`);
+    unexplained where the readings do not tell that its size is not zero: then something acts there, and its name is not known."""
+    if not findings or verdict not in (Verdict.PARTLY, Verdict.EXPLAINED):
+        return verdict
+    if findings[0].contradicted and not exact:
+        return Verdict.AMBIGUOUS
+    return Verdict.UNEXPLAINED if findings[0].size_untold else verdict
