@@ -252,8 +252,9 @@ def test_fringes_that_the_records_cannot_part_are_one():
         starts = tuple({"amplitude": 1e-8, "phase": 0.0, "period": path / periods} for periods in (5.0, 5.0 + apart))
         fit = fitter.fit(Structure(AXIS, (fringe, once_more), starts), steps=0)
         told = "the records are too short to tell it from another line of its kind"
-        assert objections(fitter.recording, fit) == ({} if part else {1: told})
-        assert objections(fitter.recording, fit, (fringe, once_more)) == {}
+        against = {} if part else {1: told}
+        # both may have been told apart when they were accepted, and have moved together since
+        assert objections(fitter.recording, fit) == objections(fitter.recording, fit, (fringe, once_more)) == against
 
 
 TURNED = "its amplitude is so large beside its period that the reading would turn back"

@@ -31,7 +31,8 @@ def objections(
     recording: Recording, fit: Fit, accepted: Sequence[Hypothesis] = (), exact: bool = False
 ) -> dict[int, str]:
     """The reason by cause, by its place in the structure, of each that is not yet `accepted` and meets an objection; and of an accepted
-    one that has grown so long, while others came and went, that the records do not show that it repeats.
+    one that has grown so long, while others came and went, that the records do not show that it repeats, or so near to another line of
+    its kind that they no longer tell the two apart.
 
     `exact`: the model leaves noise alone, so that an event, a short line or a pitch of one period is what it looks like.
     """
@@ -51,8 +52,8 @@ def objections(
         if reason:
             reasons[k] = reason
     for j, k in combinations(range(len(causes)), 2):
-        new = k if causes[k] not in accepted else j
-        if causes[new] not in accepted and new not in reasons and _same_line(recording, fit, j, k):
+        new = j if causes[k] in accepted and causes[j] not in accepted else k
+        if new not in reasons and _same_line(recording, fit, j, k):
             reasons[new] = "the records are too short to tell it from another line of its kind"
     return reasons
 
