@@ -131,6 +131,10 @@ def sensor_saturation(u, t):
     return 1.5e-4 * np.sin(np.arctan(y / 1.5e-4))
 
 
+def sensor_limit(u, t):
+    return np.minimum(move(u), 4e-5)
+
+
 def coil_heating(u, t):
     """Copper of 4 Ohm that 8 W would heat by 80 K in the end, in steps of a sample; cold at first."""
     resistance, warmth, out = 4.0, 0.0, []
@@ -328,6 +332,7 @@ ON_AXIS = {
     drive_quantisation: Planted("actuator:axis", {"quantum": 8 / 1024, "grid": 0.25}, within={"grid": 0.02}),
     soft_saturation: Planted("actuator:axis", {"level": 2.2, "sharpness": 2.0}),
     sensor_saturation: Planted("sensor:axis", {"level": 1.5e-4, "sharpness": 2.0}),
+    sensor_limit: Planted("sensor:axis", {"level": 4e-5}),
     slew_rate: Planted("actuator:axis", {"rate": 12.0}),
     asymmetric_slew_rate: Planted("actuator:axis", {"rate": 12.0, "excess": -2 / 3}),
     back_emf: Planted("actuator:axis", {"emf": 40.0, "tau": 3e-3}, within={"emf": 0.03, "tau": 0.03}),

@@ -18,7 +18,7 @@ from recovery import Planted
 FRICTION, REACH, DAMPER = 0.2, 3e-6, 60.0  # N, m, N s/m
 ABOVE, BELOW, WIDTH, SPEED, MOMENT, RISE = 2e-5, -1.5e-5, 4e-6, 2e-3, 1.2, 0.02  # m, m, m, m/s, s, s
 SPRING, SCRATCH, HALF, GAIN, LEVEL, GAP = 2e4, 3e-7, 6e-6, 0.1, 0.6, 2e-6  # N/m, m, m, 1, V, m
-TIGHT, LONG = 1e-5, 2e-5  # m
+TIGHT, LONG, BUFFER = 1e-5, 2e-5, 1e5  # m, m, N/m
 Where = Callable[[float, float, float], float]
 
 
@@ -97,6 +97,11 @@ def end_stop(u, t):
     return _spring(u, lambda q: max(BELOW - q, 0.0))
 
 
+def damped_stop(u, t):
+    """A buffer as soft as half the stage, which a speed of 2 mm/s toward it makes twice as strong."""
+    return move(u, lambda now, q, v, _: (max(BELOW - q, 0.0) * BUFFER * max(1 - v / SPEED, 0.0), 0.0), fine=100)
+
+
 def local_error(u, t):
     y = move(u)
     return y + SCRATCH * np.where(np.abs(y - ABOVE) < HALF, (1 + np.cos(np.pi * (y - ABOVE) / HALF)) / 2, 0.0)
@@ -148,6 +153,9 @@ IN_A_REGION = {
     stiffness_below: Planted("stage:axis", {"stiffness": -SPRING, "edge": BELOW}),
     stiffness_beyond: Planted("stage:axis", {"stiffness": SPRING, "edge": ABOVE}),
     end_stop: Planted("stage:axis", {"stiffness": SPRING, "gap": BELOW}, within={"stiffness": 0.02}),
+    damped_stop: Planted(
+        "stage:axis", {"stiffness": BUFFER, "gap": BELOW, "speed": SPEED}, within={"stiffness": 0.02, "speed": 0.03}
+    ),
     local_error: Planted(
         "sensor:axis", {"error": SCRATCH, "position": ABOVE, "length": HALF}, within={"error": 0.05, "length": 0.1}
     ),

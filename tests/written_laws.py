@@ -15,6 +15,7 @@ from written_terms import (
     H,
     bends,
     beyond,
+    buffer,
     clipped,
     collimated,
     dahl_rate,
@@ -203,6 +204,7 @@ LAWS = {
         {"speed": 0.3, **WEIGHTS},
         lambda s, p: p.size * bends((1 + s.velocities[s.partner] / np.hypot(s.velocities[s.partner], 0.3)) / 2),
     ),
+    "damped_stop": ({"gap": -0.4, "speed": 0.7}, buffer),
     "end_stop": ({"gap": -0.4, "power": 1.5}, stop),
     "face_tilt": ({}, lambda s, p: -p.tilt * s.all[s.partner]),
     "expansion": ({}, lambda s, p: p.slope * (s.temperature - s.temperature_at_rest) * s.value),
@@ -256,6 +258,10 @@ LAWS = {
     "one_sided_saturation": (
         {"level": -0.4},
         lambda s, p: p.share * (-0.4 - s.value) ** 2 / (-0.4 - s.value + 4e-5) if s.value < -0.4 else 0.0,
+    ),
+    "sensor_limit": (
+        {"level": 0.4},
+        lambda s, p: -p.share * (s.value - 0.4) ** 2 / (s.value - 0.4 + 4e-5) if s.value > 0.4 else 0.0,
     ),
     "notch": (
         {"tau": 0.06, "damping": 0.7},

@@ -126,6 +126,12 @@ def stop(s, p):
     return -side * p.stiffness * x**2 / (x + 1e-3 * e) * (1 + x / e) ** (p.power - 1)
 
 
+def buffer(s, p):
+    side = sign(p.gap)
+    x = max(side * (s.displacement - p.gap), 0.0)
+    return -side * p.stiffness * x**2 / (x + 1e-6 * s.travel) * max(1 + side * s.velocity / p.speed, 0.0)
+
+
 def logarithmic(s, p):
     return p.gain / 2 * sum(min(max(2 * p.decades - j, 0), 1) * getattr(s, f"z{j}") for j in range(9))
 

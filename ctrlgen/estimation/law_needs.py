@@ -101,13 +101,16 @@ NEEDS: Mapping[str, LawNeeds] = MappingProxyType(
             sensors=frozenset({"capacitive", "strain gauge", "load cell", "accelerometer"}),
         ),
         # What counts, or measures by a reference that lasts, has no curve; light, a field or a bridge has
-        "sensor_saturation": LawNeeds(
-            "it needs a sensor that measures by a level",
-            sensors=frozenset(
-                {
-                    *("capacitive", "eddy current", "LVDT", "potentiometer", "strain gauge", "load cell"),
-                    *("tachometer", "autocollimator", "accelerometer"),
-                }
+        **dict.fromkeys(
+            ("sensor_limit", "sensor_saturation"),
+            LawNeeds(
+                "it needs a sensor that measures by a level",
+                sensors=frozenset(
+                    {
+                        *("capacitive", "eddy current", "LVDT", "potentiometer", "strain gauge", "load cell"),
+                        *("tachometer", "autocollimator", "accelerometer"),
+                    }
+                ),
             ),
         ),
         **dict.fromkeys(

@@ -27,8 +27,8 @@ class ParameterPrior:
         the residual), "drive_levels" (of the drive after which it repeats), "jump_positions" (places along the path at which it
         jumps), "moments" (times spread over the recording); where most of the residual is, by a test whose level holds:
         "edges_above", "edges_below", "edges_outward", "edges_beyond" (ways from home), "speeds", "drives", "since" (a time) and
-        "warmer" (a temperature) beyond which it is, "middles" and "lengths" of stretches of the reading. Frequencies in Hz always
-        take the lines of the residual's spectrum as well.
+        "warmer" (a temperature) beyond which it is, "middles" and "lengths" of stretches of the reading; "reading_ends", its largest
+        and smallest. Frequencies in Hz always take the lines of the residual's spectrum as well.
     only_from_data: the law is not suspected where the recording suggests no start.
     plausible_range: of an amplitude: a fit that ends outside is another cause under this law's name, and is rejected.
     usual: of a shape: the value of the plain form of the law, which is taken where the fit does not exclude it: what the records to fit

@@ -27,6 +27,7 @@ from ctrlgen.estimation.priors_of_a_lag import HYSTERESIS, OF_A_LAG
 from ctrlgen.estimation.priors_of_drives import OF_DRIVES
 from ctrlgen.estimation.priors_of_filters import OF_FILTERS
 from ctrlgen.estimation.priors_of_heat import OF_HEAT
+from ctrlgen.estimation.priors_of_stops import OF_STOPS
 from ctrlgen.estimation.priors_of_time import OF_TIME
 
 
@@ -128,6 +129,15 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             of_one_reference=True,
             parameters={"gain": ParameterPrior(deviation=ASSUMED_SCALE)},
         ),
+        "sensor_limit": LawPrior(
+            "A range is chosen for what is to be read, and an end of it that is reached is mostly seen: judgement. A sensor is at its "
+            "end or it is not.",
+            log_prior_odds=ONE_IN_TEN,
+            parameters={
+                "share": ParameterPrior(fixed_range=(0.5, 1.5)),
+                "level": ParameterPrior(start_from_data="reading_ends", only_from_data=True),
+            },
+        ),
         "sensor_saturation": LawPrior(
             "A sensor's curve is first of all a cubic, and drives level off more often: judgement. Its form: as `soft_saturation`.",
             log_prior_odds=ONE_IN_TEN,
@@ -226,15 +236,7 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             form_of="dry friction",
             parameters={"speed": peaks(0.05, 0.2, 0.7)},
         ),
-        "end_stop": LawPrior(
-            "A contact is neither a spring nor Hertz's ball; 5 %: judgement. A spring is plainest. A stop beyond the peak is "
-            "untouched; a soft one is a second spring, from where most of the residual is.",
-            model_form_error=0.05,
-            parameters={
-                "gap": replace(peaks(-0.97, -0.9, -0.7, -0.4, 0.4, 0.7, 0.9, 0.97), start_from_data="edges_outward"),
-                "power": ParameterPrior((1.0, 1.5), usual=1.0),
-            },
-        ),
+        **OF_STOPS,
         "force_factor": LawPrior(
             "Higher orders of the force factor; 2 %: judgement. A coil is in the middle of its gap, or off it by as much as is usual.",
             model_form_error=0.02,

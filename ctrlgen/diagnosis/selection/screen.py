@@ -19,6 +19,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from ctrlgen.diagnosis.selection.candidate_terms import CandidateTerm, Peaks, signal_peaks, signals_along
+from ctrlgen.diagnosis.selection.ends_of_readings import ends_of_readings
 from ctrlgen.diagnosis.selection.law_terms import LawTerms
 from ctrlgen.diagnosis.selection.motion_regions import Along, motion_of, on_either_side, suggested
 from ctrlgen.diagnosis.selection.regions import Leftover, Region, find_regions
@@ -192,13 +193,14 @@ class Screen:
         regions = self._regions(fit) if regions is None else regions
         most = self._follow(fit)
         along = shown_along_path(self.fitter, fit, steps=self._begins_at("drive_levels", fit))
+        ends = ends_of_readings(self.fitter, fit)
         moments, part = moments_of(self.fitter.recording)
         common = {"lines": spectral_peaks(self.fitter, fit), "moments": moments}
 
         def at(place: Place, i: int) -> DataHints:
             return DataHints(
                 most.get((place, i), {}) | {"s": part},
-                common | along.get((place, i), {}) | suggested(regions, place, i),
+                common | along.get((place, i), {}) | ends.get((place, i), {}) | suggested(regions, place, i),
                 SCREEN.event_times * part,
             )
 

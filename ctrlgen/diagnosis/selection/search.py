@@ -22,6 +22,7 @@ from ctrlgen.diagnosis.selection.begun_again import begun_again
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round
 from ctrlgen.diagnosis.selection.candidates import finer_forms, fit_candidates, restart_elsewhere, takes_away_much
 from ctrlgen.diagnosis.selection.confusable import explains_alike
+from ctrlgen.diagnosis.selection.ends_of_readings import limits_where_readings_pile_up
 from ctrlgen.diagnosis.selection.failures import FAILURES
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.not_taken import not_taken
@@ -70,6 +71,8 @@ class Searcher:
             current = self.settled(current)
             if np.allclose(noise.floor, before.floor, rtol=SEARCH.same_noise, atol=0):
                 break
+        current = self.beside_limits(current, rounds)
+        trials = self.trials
         # in the steps and on the clock in which it is told: its rivals, which the report lists, are fitted once
         current = self._finely_timed(self.settled(current))
         better = self._compared(current)
@@ -303,6 +306,28 @@ class Searcher:
             other.trials = whole.apart()
             found = other.forward_rounds(other.trials.with_errors(other.trials.converged(begun)), again, most)
             if other.trials.selection.improves_enough(current, found):
+                other.trials.log[:0] = whole.log
+                self.trials, self.markings, rounds[:] = other.trials, other.markings, again
+                return found
+            whole.log += other.trials.log
+        return current
+
+    def beside_limits(self, current: CandidateModel, rounds: list[Round]) -> CandidateModel:
+        """What a search finds that begins with a limit of a sensor whose readings pile up at one value, where more than noise is left
+        without (`ends_of_readings`)."""
+        whole = self.trials
+        if current.errors.is_noise:
+            return current
+        bare = whole.fitter.described(current.fit.structure.device)[1].restarted
+        offered = [h for h in whole.screen.hypotheses if h not in current.causes]
+        for limit, start in limits_where_readings_pile_up(whole.fitter, current.fit.structure.device, offered):
+            other, again = copy.copy(self), list(rounds)
+            other.trials = whole.apart()
+            begun = other.trials.tried(bare.with_cause(limit, start), limit, steps=FIT.max_steps)
+            if not begun:
+                continue
+            found = other.settled(other.forward_rounds(other.settled(begun[0]), again))
+            if limit in found.causes and other.trials.selection.improves_enough(current, found):
                 other.trials.log[:0] = whole.log
                 self.trials, self.markings, rounds[:] = other.trials, other.markings, again
                 return found

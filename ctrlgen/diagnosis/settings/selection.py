@@ -312,6 +312,20 @@ class ObjectionsSettings:
 
 
 @dataclass(frozen=True)
+class PiledReadingsSettings:
+    """When readings pile up at an end of what a sensor reads (`ends_of_readings`)."""
+
+    width: float = 8.0
+    """Standard deviations of the noise in which those at one value are: four either way."""
+    fewest: int = 20
+    """Readings below which a motion that turns there does it."""
+    crowd: float = 6.0
+    """Times as many as within the next such width: a sine has 2.4 times as many. Judgement."""
+    moves: float = 0.01
+    """Share of its range by which a drive goes on meanwhile, so that it is no dwell. Judgement."""
+
+
+@dataclass(frozen=True)
 class DirectDetectionSettings:
     """Causes read directly from the readings: dead channels, quantisation."""
 
@@ -363,5 +377,6 @@ CONFUSABLE = ConfusableSettings()
 MODEL_SELECTION = ModelSelectionSettings()
 PRECEDENCE = PrecedenceSettings()
 OBJECTIONS = ObjectionsSettings()
+PILES = PiledReadingsSettings()
 DIRECT_DETECTION = DirectDetectionSettings()
 ATTRIBUTION = AttributionSettings()

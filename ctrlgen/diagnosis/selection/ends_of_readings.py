@@ -1,0 +1,74 @@
+"""Readings that pile up at one value while the drive goes on: a sensor at the end of its range, or a stage at a stop.
+
+Near its largest value a motion that turns, as a sine, has about 2.4 times as many readings as next to that; one that ends there has many
+times as many, all within the noise. What then is missing of the motion looks like many laws, each of which takes some of it away: what
+else the device lacks shows only beside a limit of the sensor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ctrlgen.devices import Device
+from ctrlgen.diagnosis.settings import PILES
+from ctrlgen.effects import Place
+from ctrlgen.estimation.fit import Fit, Fitter
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, nominal_physics
+from ctrlgen.model.effect_terms import channels
+from ctrlgen.recordings.recording import Record
+
+ENDS = "reading_ends"  # name of a start value in `estimation.priors`
+
+
+def ends_of_readings(fitter: Fitter, fit: Fit) -> dict[tuple[Place, int], dict[str, tuple[float, ...]]]:
+    """Of each sensor the largest reading [SI] to fit and the smallest, where they lie above and below zero."""
+    sensors = [c.name for c in channels(nominal_physics(fit.structure.device), Place.SENSOR)]
+    found = {}
+    for i, channel in enumerate(fitter.recording.channels):
+        name = channel.removeprefix("reading.")
+        read = [r.observed[r.valid[:, i], i] for r in fitter.fit_records]
+        if name not in sensors or not any(len(y) for y in read):
+            continue
+        y = np.concatenate(read)
+        ends = (float(end) for end, side in ((y.max(), 1), (y.min(), -1)) if end * side > 0)
+        found[Place.SENSOR, sensors.index(name)] = {ENDS: tuple(ends)}
+    return found
+
+
+def limits_where_readings_pile_up(
+    fitter: Fitter, device: Device, offered: Sequence[Hypothesis]
+) -> list[tuple[Hypothesis, dict[str, float]]]:
+    """The laws offered that begin at an end of the readings, where those pile up at one, with that as their start [SI]."""
+    found = []
+    for h in offered:
+        if h.effect == PARAMETER:
+            continue
+        at_end = [p.name for p in h.law.params if h.prior.of(p).start_from_data == ENDS]
+        channel = f"reading.{h.at}"
+        if not at_end or channel not in fitter.recording.channels:
+            continue
+        i = fitter.recording.channels.index(channel)
+        shape = {p.name: sum(fixed) / 2 for p in h.law.params if (fixed := h.prior.of(p).fixed_range)}
+        found += [(h, shape | {at_end[0]: end}) for end in piled_ends(fitter.fit_records, i, fitter.noise.floor[i])]
+    return found
+
+
+def piled_ends(records: Sequence[Record], i: int, noise: float) -> list[float]:
+    """The values [SI] at either end of what channel `i` reads at which readings pile up, as their mean, while a drive goes on by
+    `PILES.moves` of its range: `PILES.fewest` of them or more within the `noise`, `PILES.crowd` times as many as beside them."""
+    read = np.concatenate([r.observed[r.valid[:, i], i] for r in records] or [np.zeros(0)])
+    drive = np.concatenate([r.drive[r.valid[:, i]] for r in records])
+    if not len(read) or not noise > 0:
+        return []
+    span, width, ends = np.ptp(drive, axis=0), PILES.width * noise, []
+    for side in (1, -1):
+        depth = float(np.max(side * read)) - side * read
+        at_end, beside = depth < width, int(np.sum((depth >= width) & (depth < 2 * width)))
+        count, end = int(at_end.sum()), float(np.mean(read[at_end]))
+        moved = np.ptp(drive[at_end], axis=0)
+        goes_on = bool((moved > PILES.moves * span)[span > 0].any())
+        if count >= PILES.fewest and count >= PILES.crowd * max(beside, 1) and goes_on and side * end > 0:
+            ends.append(end)
+    return ends
