@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from ctrlgen.diagnosis.report.shares_sentences import part_name
 from ctrlgen.diagnosis.shares.design import Kind
 from ctrlgen.diagnosis.shares.families import SPEAKS_FOR, alone, family_of, ranking
 from ctrlgen.diagnosis.shares.model_free_shares import model_free_shares
@@ -87,6 +88,25 @@ def test_a_function_of_one_kind_gets_its_share_and_is_selected_first(kind, signa
     assert row.alone.share == pytest.approx(PART, abs=CLOSE)
     assert row.alone.ci95[0] - CLOSE <= row.alone.share <= row.alone.ci95[1] + CLOSE
     assert found.total.share == pytest.approx(PART, abs=CLOSE + 0.02)  # the ceiling costs the columns of all kinds
+
+
+@pytest.mark.parametrize(
+    ("product", "factors"),
+    [
+        (lambda s: s.position["x"] * s.position["y"], ("position of x", "position of y")),
+        (lambda s: s.position["x"] * np.sign(np.gradient(s.position["x"])), ("position of x", "direction of x")),
+        (lambda s: s.drive["u"] * s.temperature, ("the drive", "temperature")),
+        (
+            lambda s: s.position["x"] * (s.position["y"] + s.drive["u"] + 0.5 * np.sign(np.gradient(s.position["x"]))),
+            (),
+        ),
+    ],
+)
+def test_the_two_signals_of_a_product_are_named_where_one_product_makes_up_most(product, factors, signals, rng):
+    (found,) = model_free_shares([planted(product(signals), rng)[:, None]], [signals], ["x"]).channels
+    kind = Kind.WARM_PRODUCT if "temperature" in factors else Kind.PRODUCT
+    assert found.factors.get(kind, ()) == factors
+    assert (part_name(found, kind) == " times ".join(factors)) == bool(factors)
 
 
 @pytest.mark.parametrize(("axis", "period", "unit"), [("x", 0.11, "mm"), ("y", 0.13, "deg")])

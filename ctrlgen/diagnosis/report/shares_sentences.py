@@ -150,7 +150,9 @@ def named_parts(c: ChannelShares) -> list[tuple[Kind | Beside, float]]:
 
 
 def part_name(c: ChannelShares, part: Kind | Beside) -> str:
-    """'the direction of motion', 'a line of 2.2 Hz', 'the place in a pitch of 0.25 mm (4 a mm)'."""
+    """'the direction of motion', 'a line of 2.2 Hz', 'the place in a pitch of 0.25 mm (4 a mm)', 'position times direction'."""
+    if isinstance(part, Kind) and part in c.factors:
+        return " times ".join(c.factors[part])
     if part is Kind.LINE:
         return f"a line of {number(1 / c.periods[part], 3)} Hz"
     if part is Kind.PITCH:

@@ -66,6 +66,8 @@ class SharesSettings:
     random motion a lag of a third or a sixth of the record got a share above 5 % in 8 and 9, one of a twelfth in 1."""
     pose_lags: tuple[float, ...] = (1.0, 3.0)
     """The same in poses, for settled poses."""
+    one_product: float = 0.5
+    """Share of what all products of two signals predict that one has, from which it is named."""
     same_signal: float = 0.9995
     """Correlation of a drive with a position, speed or acceleration above which it is that signal and no further regressor:
     what differs is then below 3 % of it."""

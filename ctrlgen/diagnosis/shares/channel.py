@@ -20,7 +20,7 @@ from ctrlgen.diagnosis.shares.cross_validation import (
     standard_error,
     stands_out,
 )
-from ctrlgen.diagnosis.shares.design import Design, Kind
+from ctrlgen.diagnosis.shares.design import Columns, Design, Kind
 from ctrlgen.diagnosis.shares.periodic import line_columns, pitch_columns, strongest_line, strongest_pitch
 from ctrlgen.diagnosis.shares.regressors import standardised
 from ctrlgen.diagnosis.shares.shares_table import Share
@@ -109,6 +109,19 @@ class ChannelSmoothers:
         """The share that a prediction has with all that it stands beside, mean and numbers, 0 where chance could show it."""
         gain = self.energy - after.squares
         return share_of(gain, self.energy, stands_out(gain))
+
+    def factors_of(self, kind: Kind, prediction: np.ndarray) -> tuple[str, ...]:
+        """What the two signals are called of the one product that makes up most of a `prediction` (N,) by products of this kind; nothing
+        where none does."""
+        usable = self.common.usable
+        p = prediction[usable] - np.mean(prediction[usable])
+
+        def part(block: Columns) -> float:
+            x = block.values[usable, 0] - np.mean(block.values[usable, 0])
+            return float((x @ p) ** 2 / max(float((x @ x) * (p @ p)), 1e-300))
+
+        best = max(self.design.of_kind(kind, self.axes), key=part, default=None)
+        return best.factors if best is not None and part(best) > SHARES.one_product else ()
 
     def _found_in_residual(self) -> tuple[list[dict[Kind, np.ndarray]], dict[Kind, float], str]:
         """The columns of own past, pitch and line of each fold, the median of the folds' periods, and the unit of the axis of the pitch."""

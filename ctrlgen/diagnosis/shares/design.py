@@ -46,7 +46,8 @@ class Columns:
     """Columns (N, p) of unit variance and zero mean of one kind, made of one signal, or of two.
 
     `axes`: the axes that the signal belongs to. `signal` and `unit` name `abscissa` (N,), over which a figure shows them; if
-    `of_abscissa`, they are functions of it and are held beyond its range, else each column is clamped to its own range.
+    `of_abscissa`, they are functions of it and are held beyond its range, else each column is clamped to its own range. `factors`: what
+    the two signals of a product are called.
     """
 
     kind: Kind
@@ -55,6 +56,7 @@ class Columns:
     axes: frozenset[str]
     abscissa: np.ndarray
     values: np.ndarray
+    factors: tuple[str, ...] = ()
 
     @property
     def of_abscissa(self) -> bool:
@@ -68,6 +70,9 @@ class Columns:
             Kind.TEMPERATURE,
             Kind.TIME,
         )
+
+
+PRODUCTS = (Kind.PRODUCT, Kind.WARM_PRODUCT)
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,7 +30,7 @@ from ctrlgen.diagnosis.shares.channel import (
     without_spikes,
 )
 from ctrlgen.diagnosis.shares.cross_validation import Folds
-from ctrlgen.diagnosis.shares.design import Kind
+from ctrlgen.diagnosis.shares.design import PRODUCTS, Kind
 from ctrlgen.diagnosis.shares.regressors import build_design, own_axes
 from ctrlgen.diagnosis.shares.shares_table import ChannelShares, KindShare, SharesTable
 from ctrlgen.diagnosis.shares.signals import Signals
@@ -102,6 +102,8 @@ def _shares(name: str, channel: ChannelSmoothers, spikes: float) -> ChannelShare
             gain = channel.share(joint, channel.fit([*selected, kind])).share
             rows.append(KindShare(kind, channel.share(channel.base, fit), gain, None, ()))
     rows.sort(key=lambda row: (row.kind is Kind.PAST, -row.alone.share))
+    told = {kind: channel.factors_of(kind, alone[kind].prediction) for kind in PRODUCTS if kind in alone}
+    factors = {kind: names for kind, names in told.items() if names}
     # all columns at once cost more than they tell where there are few blocks
     whole = max((channel.whole_share(f) for f in (selection.everything, joint)), key=lambda s: s.share)
     return ChannelShares(
@@ -119,4 +121,5 @@ def _shares(name: str, channel: ChannelSmoothers, spikes: float) -> ChannelShare
         residual=np.where(usable, channel.y, np.nan),
         predictions={kind: np.where(usable, fit.prediction, np.nan) for kind, fit in alone.items()},
         pitch_unit=channel.pitch_unit,
+        factors=factors,
     )

@@ -226,7 +226,15 @@ class _Builder:
             if at and of and at != of and moving:
                 continue
             kind = Kind.WARM_PRODUCT if other == WARMTH else Kind.PRODUCT
-            yield Columns(kind, one, "", at | of, x, (plain[one] * plain[other])[:, None])
+            product = (plain[one] * plain[other])[:, None]
+            yield Columns(kind, one, "", at | of, x, product, (self._called(one), self._called(other)))
+
+    def _called(self, signal: str) -> str:
+        """What a factor of a product is called: 'position', 'direction', 'the drive'; with its name where there are several."""
+        if signal in self.drive:
+            return "the drive" if len(self.drive) == 1 else signal
+        what, of, axis = signal.partition(" of ") if signal not in self.axes else ("position", " of ", signal)
+        return what if len(self.axes) == 1 else f"{what}{of}{axis}"
 
     @cached_property
     def ambient(self) -> np.ndarray | None:

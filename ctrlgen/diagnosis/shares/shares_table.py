@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -48,6 +48,7 @@ class ChannelShares:
     spikes: share of the samples that were left out as such.
     periods: of a pitch [SI of the axis] and of a line [s], the middle one of the folds. pitch_unit: in which the axis of the pitch is
         told; empty where there is no pitch, or no unit.
+    factors: of products, by kind, the two signals of the one that makes up most of what all of that kind predict.
     residual, predictions: (N,) [SI] at the drawn samples, the latter by kind and out of block; NaN where not valid.
     """
 
@@ -65,6 +66,7 @@ class ChannelShares:
     residual: np.ndarray
     predictions: dict[Kind, np.ndarray]
     pitch_unit: str = ""
+    factors: dict[Kind, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def selected(self) -> tuple[KindShare, ...]:
