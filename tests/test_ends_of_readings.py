@@ -53,8 +53,7 @@ def test_a_stop_that_hardly_gives_is_no_limit_of_the_sensor():
     """The reading stands there too, and the stage comes away from a stop later than a sensor that has lost it finds it again."""
 
     def stopped(now, q, v, memory):
-        deep = max(q - 3.1e-5, 0.0)
-        return -2e6 * deep - 50 * v * (deep > 0), 0.0
+        return -2e6 * max(q - 3.1e-5, 0.0), 0.0
 
     answer = diagnosed(stopped, (-1.0, 1.0))
     assert answer.findings[0].effect == "end_stop"

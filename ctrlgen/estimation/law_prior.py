@@ -27,8 +27,8 @@ class ParameterPrior:
         the residual), "drive_levels" (of the drive after which it repeats), "jump_positions" (places along the path at which it
         jumps), "moments" (times spread over the recording); where most of the residual is, by a test whose level holds:
         "edges_above", "edges_below", "edges_outward", "edges_beyond" (ways from home), "speeds", "drives", "since" (a time) and
-        "warmer" (a temperature) beyond which it is, "middles" and "lengths" of stretches of the reading; "reading_ends", its largest
-        and smallest. Frequencies in Hz always take the lines of the residual's spectrum as well.
+        "warmer" (a temperature) beyond which it is, "middles" and "lengths" of stretches of the reading; "reading_ends", at which
+        readings pile up. Frequencies in Hz always take the lines of the residual's spectrum as well.
     only_from_data: the law is not suspected where the recording suggests no start.
     plausible_range: of an amplitude: a fit that ends outside is another cause under this law's name, and is rejected.
     usual: of a shape: the value of the plain form of the law, which is taken where the fit does not exclude it: what the records to fit
@@ -85,6 +85,7 @@ class LawPrior:
     form_of: name of the physics of which laws are forms, finer than their `Effect.family`; a place has at most one form of it.
     refines: the plainer laws of which this is a finer form, with more numbers. It is never suspected itself, but tried in the place of
         one of them that is among the causes, where that leaves more than noise.
+    at_once: of a finer form: it is also tried in the place of a plainer one that is but a candidate, which alone may take too little.
     unless: what a device must not have (words of `Effect.requires`) for the law to be suspected there: another law says the same.
     suspected: False for what a device file may state, and no recording shows beside what else it shows.
     in_a_region: the law is another one in a part of the motion: it is tried beside the others and never takes their turn.
@@ -111,6 +112,7 @@ class LawPrior:
     model_form_error: float = 0.0
     form_of: str | None = None
     refines: frozenset[str] = frozenset()
+    at_once: bool = False
     unless: frozenset[str] = frozenset()
     suspected: bool = True
     in_a_region: bool = False

@@ -13,10 +13,9 @@ OF_STOPS: Mapping[str, LawPrior] = {
         "judgement.",
         log_prior_odds=ONE_IN_TEN,
         model_form_error=0.1,
-        parameters={
-            "gap": replace(peaks(-0.9, -0.7, -0.4, 0.4, 0.7, 0.9), start_from_data="edges_outward"),
-            "speed": peaks(0.03, 0.3),
-        },
+        refines=frozenset({"end_stop"}),
+        at_once=True,
+        parameters={"gap": peaks(-0.9, 0.9), "speed": peaks(0.03, 0.3)},
     ),
     "end_stop": LawPrior(
         "A contact is neither a spring nor Hertz's ball; 5 %: judgement. A spring is plainest. A stop beyond the peak is "

@@ -23,18 +23,14 @@ ENDS = "reading_ends"  # name of a start value in `estimation.priors`
 
 
 def ends_of_readings(fitter: Fitter, fit: Fit) -> dict[tuple[Place, int], dict[str, tuple[float, ...]]]:
-    """Of each sensor the largest reading [SI] to fit and the smallest, where they lie above and below zero."""
+    """Of each sensor the ends of its readings to fit at which they pile up (`piled_ends`)."""
     sensors = [c.name for c in channels(nominal_physics(fit.structure.device), Place.SENSOR)]
-    found = {}
-    for i, channel in enumerate(fitter.recording.channels):
-        name = channel.removeprefix("reading.")
-        read = [r.observed[r.valid[:, i], i] for r in fitter.fit_records]
-        if name not in sensors or not any(len(y) for y in read):
-            continue
-        y = np.concatenate(read)
-        ends = (float(end) for end, side in ((y.max(), 1), (y.min(), -1)) if end * side > 0)
-        found[Place.SENSOR, sensors.index(name)] = {ENDS: tuple(ends)}
-    return found
+    read = [(i, c.removeprefix("reading.")) for i, c in enumerate(fitter.recording.channels)]
+    return {
+        (Place.SENSOR, sensors.index(name)): {ENDS: tuple(piled_ends(fitter.fit_records, i, fitter.noise.floor[i]))}
+        for i, name in read
+        if name in sensors
+    }
 
 
 def limits_where_readings_pile_up(
