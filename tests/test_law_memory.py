@@ -223,6 +223,7 @@ def test_the_force_of_dry_friction_at_standstill_is_whatever_holds_the_stage():
         "coulomb_below",
         "coulomb_on_stretch",
         "directional_friction",
+        "friction_of_load",
         "stribeck",
         "stribeck_above",
         "stribeck_after",

@@ -38,7 +38,7 @@ def at_neutral(law: type[Effect], where, amplitude: float) -> dict[str, float]:
 
 def test_laws_say_what_they_generalise():
     assert set(GENERAL) == {
-        *("directional_friction", "stribeck", "asymmetric_hysteresis", "slack_friction"),
+        *("directional_friction", "friction_of_load", "stribeck", "asymmetric_hysteresis", "slack_friction"),
         *("asymmetric_displacement_hysteresis", "asymmetric_drive_hysteresis"),
         *("heater_resistance_of_second_order", "asymmetric_slew_rate"),
     }

@@ -285,6 +285,7 @@ FINER = {
     "power_creep",
     "cogging_of_slots",
     "worn_backlash",
+    "friction_of_load",
     "weighted_displacement_hysteresis",
     "weighted_drive_hysteresis",
     *(f"stribeck_{where}" for where in ("above", "after", "below")),

@@ -318,6 +318,11 @@ LAWS = {
         {"position": 0.2, "width": 0.3},
         lambda s, p: p.offset / (1 + exp(-4 * (s.value - 0.2) / 0.3)),
     ),
+    "friction_of_load": (
+        {"reach": 0.02, "smoothing": 0.05, "load": 0.3},
+        lambda s, p: -p.force * (1 + abs(s.force) / 0.3) * s.z,
+        lambda s, p: {"z": dahl_rate(s, p)},
+    ),
     "stribeck": (
         {"breakaway": 1.8, "speed": 0.5, "reach": 0.02},
         lambda s, p: -p.force * s.z,

@@ -269,6 +269,15 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             form_of="hysteresis",
             parameters={"slack": peaks(0.1, 0.3, 0.6), "reach": peaks(0.03, 0.1, 0.3)},
         ),
+        "friction_of_load": LawPrior(
+            "Dry friction that is the same under every load is commoner: judgement. " + _DRY_FRICTION,
+            log_prior_odds=-1.0,
+            model_form_error=0.05,
+            form_of="dry friction",
+            refines=frozenset({"coulomb"}),
+            at_once=True,
+            parameters={"reach": peaks(1e-3, 0.01), "smoothing": CREEPING, "load": peaks(0.1, 1.0)},
+        ),
         "stribeck": LawPrior(
             "Dry friction that does not fall with speed is commoner: judgement. " + _DRY_FRICTION,
             log_prior_odds=-1.0,
