@@ -5,13 +5,15 @@ functions of the uniform cubic B-spline (C. de Boor, A Practical Guide to Spline
 
     u_i(t) = (1-t)^3 c_{j,i} + (4 + 3 t^2 (t-2)) c_{j+1,i} + ... + t^3 c_{j+3,i},    the four functions adding up to 6
 
-a piece has continuous curvature and costs M + 3 rows; a closed path without a join is periodic.
+a piece has continuous curvature and costs M + 3 rows; a closed path without a join is periodic. The C counts k M in 32 bits: a piece of
+more ends where that does.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from math import ceil, sqrt
 
 import numpy as np
 import scipy
@@ -25,6 +27,7 @@ KINK = 2.5  # times the median of the neighbouring fourth differences: a possibl
 NOISE = 1e-3  # of the tolerance: floor of that median
 JOIN = 4  # rows that one more piece costs, its entry in the table of pieces included
 MOST_KINKS = 64
+PLACES = 2**32  # values of k M in the C, which looks for the segment of a sample in words of 32 bits
 
 
 @dataclass(frozen=True)
@@ -169,13 +172,15 @@ def kinks(drive: np.ndarray, scale: np.ndarray) -> list[int]:
 def fit(drive: np.ndarray, low: np.ndarray, high: np.ndarray, tolerance: np.ndarray, closed: bool) -> Spline | None:
     """The spline of fewest rows found within `tolerance` (axes,) of `drive` (samples, axes); None where a table is no longer.
 
-    The pieces begin at the limits' switches, and at kinks as long as merging two neighbours does not need fewer rows.
+    The pieces begin at the limits' switches, and at kinks as long as merging two neighbours does not need fewer rows; and where a longer
+    one had more than `PLACES`.
     """
     n = len(drive)
     fixed = set(switches(drive, low, high))
     around = _segments(drive, tolerance, True, n) + 3 if closed and not fixed else n
-    edges = [0, *sorted({*fixed, *kinks(drive, tolerance)}), n]
-    count = [_segments(drive[a:b], tolerance, False, b - a) for a, b in pairwise(edges)]
+    if around < n and _parts(n, around - 3) > 1:
+        around = n
+    edges, count = _counted(drive, tolerance, [0, *sorted({*fixed, *kinks(drive, tolerance)}), n])
     merged: dict[tuple[int, int], int] = {}
     while True:
         best, place = 0, None
@@ -183,7 +188,8 @@ def fit(drive: np.ndarray, low: np.ndarray, high: np.ndarray, tolerance: np.ndar
             a, c, most = edges[i], edges[i + 2], count[i] + count[i + 1] + JOIN
             if b not in fixed:
                 if (a, c) not in merged:
-                    merged[a, c] = _segments(drive[a:c], tolerance, False, most)
+                    together = _segments(drive[a:c], tolerance, False, most)
+                    merged[a, c] = together if _parts(c - a, together) == 1 else most + 1
                 if place is None or most - merged[a, c] > best:
                     best, place = most - merged[a, c], i
         if place is None or best < 0:
@@ -197,6 +203,27 @@ def fit(drive: np.ndarray, low: np.ndarray, high: np.ndarray, tolerance: np.ndar
         return Spline((Piece(0, n, around - 3, _control(drive, around - 3, True) / 6),), True)
     spans = zip(edges, edges[1:], count, strict=False)
     return Spline(tuple(Piece(a, b, m, _control(drive[a:b], m, False) / 6) for a, b, m in spans), False)
+
+
+def _parts(samples: int, segments: int) -> int:
+    """The fewest equal pieces, each with its share of the segments, that a piece must be cut into to have `PLACES` at most."""
+    return ceil(sqrt(samples * segments / PLACES))
+
+
+def _counted(drive: np.ndarray, tolerance: np.ndarray, edges: list[int]) -> tuple[list[int], list[int]]:
+    """Edges of pieces, those among `edges` and more where a piece had too many places, and the segments of each piece."""
+    kept, counts, waiting = [edges[0]], [], list(pairwise(edges))[::-1]
+    while waiting:
+        a, b = waiting.pop()
+        count = _segments(drive[a:b], tolerance, False, b - a)
+        parts = _parts(b - a, count)
+        if parts > 1:
+            cuts = [a + (b - a) * i // parts for i in range(parts + 1)]
+            waiting.extend(list(pairwise(cuts))[::-1])
+        else:
+            kept.append(b)
+            counts.append(count)
+    return kept, counts
 
 
 def _segments(drive: np.ndarray, tolerance: np.ndarray, periodic: bool, most: int) -> int:
