@@ -43,13 +43,14 @@ class Clocked(Generic[B]):
     def step_at(self, estimate: B, tick: int, target: np.ndarray, held: np.ndarray) -> tuple[ControllerStep | None, B]:
         """A step at `tick` of a clock that counts samples, 32 bits wide; `held` (n_u,) is the drive of the last call.
 
-        Calls that were missed are made up for (`elapsed`), with the bit CLOCK. None where no sample has passed: drives and state stay. A
-        clock that went back, and a held drive out of range, leave the state unknown."""
+        Calls that were missed are made up for (`elapsed`), with the bit CLOCK. None where no sample has passed: drives and state stay, and
+        so does the bit UNSURE. A clock that went back, and a held drive out of range, leave the state unknown."""
         status = ControllerStatus(0)
         if estimate.tick is not None:
             since = (tick - estimate.tick) % 2**32
             if since == 0:
-                return None, estimate
+                refused, _ = self.elapsed(estimate, 0, held)
+                return None, self.forget(estimate) if refused & ControllerStatus.INPUT else estimate
             if since > 1:
                 status, caught_up = ControllerStatus.CLOCK, estimate
                 if since < BACKWARD:

@@ -590,6 +590,20 @@ uint32_t flexure_axis_online_f32_observe(flexure_axis_online_f32_state *state, c
     return status;
 }
 
+/* The answer where no sample has passed: state and out stay as they are. An out without drives that can have been held is not that of the
+ * last call, and no drive for the hardware. */
+static uint32_t flexure_axis_online_f32_wait_for_sample(flexure_axis_online_f32_state *state, flexure_axis_online_f32_output *out)
+{
+    uint32_t status;
+    if (flexure_axis_online_f32_drive_inside(out->drive) != 0) {
+        status = flexure_axis_online_f32_is_ringing(state, 0.0f);
+    } else {
+        flexure_axis_online_f32_set_safe(out);
+        status = flexure_axis_online_f32_forget(state);
+    }
+    return status;
+}
+
 uint32_t flexure_axis_online_f32_step_at(flexure_axis_online_f32_state *state, uint32_t tick, const float target[3], flexure_axis_online_f32_output *out)
 {
     uint32_t status = 0U;
@@ -607,6 +621,8 @@ uint32_t flexure_axis_online_f32_step_at(flexure_axis_online_f32_state *state, u
     }
     if (since != 0U) {
         status |= flexure_axis_online_f32_step(state, target, out);
+    } else {
+        status |= flexure_axis_online_f32_wait_for_sample(state, out);
     }
     return status;
 }

@@ -1206,6 +1206,20 @@ uint32_t mems_hexapod_online_f32_observe(mems_hexapod_online_f32_state *state, c
     return status;
 }
 
+/* The answer where no sample has passed: state and out stay as they are. An out without drives that can have been held is not that of the
+ * last call, and no drive for the hardware. */
+static uint32_t mems_hexapod_online_f32_wait_for_sample(mems_hexapod_online_f32_state *state, mems_hexapod_online_f32_output *out)
+{
+    uint32_t status;
+    if (mems_hexapod_online_f32_drive_inside(out->drive) != 0) {
+        status = mems_hexapod_online_f32_is_unsure(state);
+    } else {
+        mems_hexapod_online_f32_set_safe(out);
+        status = mems_hexapod_online_f32_forget(state);
+    }
+    return status;
+}
+
 uint32_t mems_hexapod_online_f32_step_at(mems_hexapod_online_f32_state *state, uint32_t tick, const float target[6], mems_hexapod_online_f32_output *out)
 {
     uint32_t status = 0U;
@@ -1223,6 +1237,8 @@ uint32_t mems_hexapod_online_f32_step_at(mems_hexapod_online_f32_state *state, u
     }
     if (since != 0U) {
         status |= mems_hexapod_online_f32_step(state, target, out);
+    } else {
+        status |= mems_hexapod_online_f32_wait_for_sample(state, out);
     }
     return status;
 }

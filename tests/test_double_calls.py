@@ -1,0 +1,149 @@
+"""A second call at the same tick of the clock, of every kind of controller that has one: it says no less of the device than the first,
+and never gives the hardware a drive beyond its limits, whatever `out` holds."""
+
+from __future__ import annotations
+
+import subprocess
+
+import pytest
+from conftest import SCENARIOS
+
+import ctrlgen
+from ctrlgen import build_model, generate, load_device, load_scenario
+from ctrlgen.firmware.c.real import Real
+from ctrlgen.firmware.c.toolchains import FLAGS
+
+HEATERS = 'kind = "circle"\ndiameter = "6 um"\ncentre = { x = "6 um", y = "6 um" }\nplane = ["x", "y"]\n'
+LINE = 'kind = "line"\nstart = { axis = "-20 um" }\nend = { axis = "30 um" }\n'
+
+
+def heated(**other):
+    """Two heaters whose temperatures lag by 20 ms: 10 K/W, and 0.1 um/K."""
+    return ctrlgen.user_device(
+        "heated",
+        parameters={"tau": "20 ms", "r": "10 K/W", "g": "0.1 um/K", "k": "1 N/um"},
+        state={"a": ("-10 K", "120 K"), "b": ("-10 K", "120 K")},
+        drive={"x": ("0 W", "12 W"), "y": ("0 W", "12 W")},
+        axes={"x": ("-1 um", "12 um"), "y": ("-1 um", "12 um")},
+        rates=lambda u, x, p: [(p.r * u.x - x.a) / p.tau, (p.r * u.y - x.b) / p.tau],
+        force=lambda x, p: [p.k * p.g * x.a, p.k * p.g * x.b],
+        restoring_force=lambda d, p: p.k * d.vector,
+        **other,
+    )
+
+
+def coil(**other):
+    """An axis with inertia."""
+    return ctrlgen.user_device(
+        "coil",
+        parameters={"m": "0.5 kg", "c": "200 N*s/m", "k": "0.2 N/um", "f": "10 N/A"},
+        axes={"axis": "100 um"},
+        drive={"coil": "4 A"},
+        force=lambda u, p: p.f * u.coil,
+        mass=lambda p: p.m,
+        restoring_force=lambda d, p: p.k * d.axis,
+        damping_force=lambda v, p: p.c * v.axis,
+        **other,
+    )
+
+
+# what: the device, its path, more of the scenario, limits of its drives
+KINDS = {
+    "heaters": (heated, HEATERS, "", (0.0, 12.0)),
+    "heaters with rates": (lambda: heated(drive_rate={"x": "1 W/ms", "y": "1 W/ms"}), HEATERS, "", (0.0, 12.0)),
+    "times that vary": (heated, HEATERS, 'sample_times = ["0.5 ms", "2 ms"]\n', (0.0, 12.0)),
+    "checksum": (heated, HEATERS, "checksum = true\n", (0.0, 12.0)),
+    "given at the start": (
+        lambda: load_device(SCENARIOS / "devices" / "mems_hexapod_run_time.toml"),
+        'kind = "circle"\ndiameter = "20 um"\ncentre = { delta_z = "20 um" }\n',
+        "",
+        (0.0, 1.0),
+    ),
+    "mass": (coil, LINE, "", (-4.0, 4.0)),
+    "mass with rates": (lambda: coil(drive_rate={"coil": "150 A/s"}), LINE, "", (-4.0, 4.0)),
+}
+
+MAIN = """
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "{name}.h"
+#define SIZE {U}_DRIVE_SIZE
+static {online}_output out, before;
+static {name}_state state, kept;
+static const {real} target[{U}_TARGET_SIZE] = {{ 0 }};
+static void fresh(int known)
+{{
+    {name}_init(&state);
+    if (known == 0) {{ (void){name}_forget(&state); }}
+    (void){name}_step_at(&state, 7U, target, &out);
+}}
+int main(void)
+{{
+    static const {real} WRONG[] = {{ ({real})NAN, ({real})INFINITY, -({real})INFINITY, ({real})12689.6, ({real})-12689.6 }};
+    unsigned k, i, known, wrong = 0;
+    for (known = 0; known < 2; known++) {{ /* in use: nothing changes, and the bit UNSURE is that of the next sample */
+        unsigned next;
+        unsigned twice;
+        fresh((int)known);
+        before = out;
+        kept = state;
+        twice = {name}_step_at(&state, 7U, target, &out);
+        if ((memcmp(&before, &out, sizeof out) != 0) || (memcmp(&kept, &state, sizeof state) != 0)) {{ wrong |= 1; }}
+        next = {name}_step_at(&state, 8U, target, &out);
+        if (twice != ({U}_CLOCK | (next & {U}_UNSURE))) {{ wrong |= 2; }}
+        if ((known == 0) != ((twice & {U}_UNSURE) != 0U)) {{ wrong |= 4; }}
+    }}
+    for (k = 0; k < sizeof WRONG / sizeof WRONG[0]; k++) {{
+        for (i = 0; i < SIZE; i++) {{ /* an output that is another one */
+            unsigned told, j;
+            fresh(1);
+            before = out;
+            out.drive[i] = WRONG[k];
+            told = {name}_step_at(&state, 7U, target, &out);
+            if (told != ({U}_CLOCK | {U}_UNSURE)) {{ wrong |= 8; }}
+            for (j = 0; j < SIZE; j++) {{
+                if (!((out.drive[j] >= ({real}){low}) && (out.drive[j] <= ({real}){high}))) {{ wrong |= 16; }}
+                if (({rated} != 0) && (memcmp(&out.drive[j], &before.drive[j], sizeof out.drive[j]) != 0)) {{ wrong |= 32; }}
+            }}
+            if (({name}_step_at(&state, 8U, target, &out) & ({U}_UNSURE | {U}_CLOCK | {U}_LOST)) != {U}_UNSURE) {{ wrong |= 64; }}
+        }}
+    }}
+    (void)printf("%u\\n", wrong);
+    return 0;
+}}
+"""
+
+
+@pytest.fixture(scope="module", params=list(KINDS))
+def made(request, tmp_path_factory):
+    device, path, more, limits = KINDS[request.param]
+    device, out = device(), tmp_path_factory.mktemp("c")
+    file = out / "scenario.toml"
+    file.write_text(
+        f'title = "t"\ndevice = "{device.name}"\nsample_rate = "1 kHz"\nduration = "0.05 s"\n{more}[path]\n{path}'
+    )
+    scenario = load_scenario(out, device)
+    return generate(scenario, build_model(device), out / "c"), limits, "rates" in request.param
+
+
+@pytest.mark.parametrize("real", list(Real))
+def test_a_second_call_in_a_sample_changes_nothing_and_hides_nothing(made, compiler, real, tmp_path):
+    folder, (low, high), rated = made
+    online = folder.online[real]
+    for name in filter(None, (online, folder.checked.get(real))):
+        text = MAIN.format(
+            name=name, online=online, U=online.upper(), real=real.value, low=low, high=high, rated=int(rated)
+        )
+        (tmp_path / "main.c").write_text(text)
+        words = [
+            compiler,
+            *FLAGS[:1],
+            *FLAGS[-2:],
+            f"-I{folder.path}",
+            tmp_path / "main.c",
+            folder.path / f"{online}.c",
+        ]
+        words += [folder.path / f"{name}.c"] * (name != online)
+        subprocess.run([*map(str, words), "-lm", "-o", str(tmp_path / "main")], check=True)
+        assert int(subprocess.run([str(tmp_path / "main")], capture_output=True, text=True).stdout) == 0, name
