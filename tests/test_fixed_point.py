@@ -268,7 +268,8 @@ def test_rules_of_misra_are_kept_but_for_those_of_the_list(circle):
         "--enable=warning,style,performance,portability",
     ]
     done = subprocess.run([*words, "--template={id}", circle.source], capture_output=True, text=True)
-    assert set(done.stderr.split()) == {"misra-c2012-2.5"}  # constants of the interface, as DEVIATIONS.md says
+    # constants of the interface, and the bits of a float, as DEVIATIONS.md says
+    assert set(done.stderr.split()) == {"misra-c2012-2.5", "misra-c2012-19.2"}
     if shutil.which("clang"):
         warned = ["-Weverything", "-Wno-padded", "-Wno-declaration-after-statement", "-Werror"]
         subprocess.run(["clang", "-std=c99", *warned, "-fsyntax-only", circle.source], check=True)

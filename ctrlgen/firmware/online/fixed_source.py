@@ -13,12 +13,13 @@ from ctrlgen.controller.fixed_point import FixedPoint, fixed_point
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import base_unit
 from ctrlgen.firmware.c.real import Integers, Real
-from ctrlgen.firmware.online.fixed_vectors import fixed_vectors
+from ctrlgen.firmware.online.fixed_vectors import edges, fixed_vectors
 from ctrlgen.firmware.online.online import build_of, header_context
 from ctrlgen.numerics.scaled_integers import IntegerRows
 from ctrlgen.trajectory.scenario import Scenario
 
-WAITED, MISSING = 6, 5  # calls of fixed_selftest.c.j2 that wait, and those without a pointer
+# calls of fixed_selftest.c.j2 that wait, those without a pointer, and those of a conversion without one
+WAITED, MISSING, UNCONVERTED = 6, 5, 2
 TERMS, INDENT = 2, "\n        "  # of a sum, on a line
 
 
@@ -75,7 +76,9 @@ def _test(controller: Controller, fixed: FixedPoint, command: np.ndarray) -> dic
     given = fixed_vectors(controller, fixed, command)
     n, n_s, n_u = (len(b) for b in (fixed.bits.displacement, fixed.bits.state, fixed.bits.drive))
     rest = fixed.state_of(np.zeros(n, dtype=int))
-    counts = {"waited": WAITED, "spoilt": 2 * (n_s + n) + 1, "missing": MISSING}
+    given["edges"] = edges(fixed.bits.target.tolist())
+    converted = sum(map(len, given["edges"])) + UNCONVERTED
+    counts = {"waited": WAITED, "spoilt": 2 * (n_s + n) + 1, "missing": MISSING, "converted": converted}
     calls = len(given["rows"]) + sum(counts.values())
     return given | counts | {"calls": calls, "safe": [0] * (n_u + n) + [int(v) for v in rest]}
 
@@ -91,7 +94,8 @@ def _numbers(fixed: FixedPoint, header: Mapping[str, Any]) -> dict[str, Any]:
         (name, [(c, base_unit(u)) for c, u in zip(s.channels, s.units, strict=True)], b) for name, s, b in arrays
     ]
     numbers.insert(2, ("displacement", [(axis, "m") for axis in header["axes"]], fixed.bits.displacement))
-    return {"numbers": numbers}
+    follow = ", ".join(dict.fromkeys(base_unit(u) for u in header["follow"].units))
+    return {"numbers": numbers, "target_bits": [int(b) for b in fixed.bits.target], "follow_units": follow}
 
 
 def _ranges(fixed: FixedPoint) -> dict[str, Any]:

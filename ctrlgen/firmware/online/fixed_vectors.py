@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from fractions import Fraction
+from math import floor
 from typing import Any
 
 import numpy as np
@@ -9,6 +12,7 @@ import numpy as np
 from ctrlgen.controller.feedforward import Controller
 from ctrlgen.controller.fixed_point import FixedPoint
 from ctrlgen.controller.fixed_step import WORD, FixedController, FixedStep
+from ctrlgen.firmware.c.real import Real
 
 ALONG = 16  # vectors along the command
 ANYWHERE = 6  # displacements drawn in the range, and on its corners; from each a jump
@@ -37,6 +41,29 @@ def fixed_vectors(controller: Controller, fixed: FixedPoint, command: np.ndarray
         "settling": fixed.settling,
         "cooling": fixed.unknown,
     }
+
+
+def edges(bits: Sequence[int]) -> list[list[tuple[int, int | None]]]:
+    """Of each number of a target, which counts 2^-bits: bits of floats, and what they count, halves away from zero; None for those that are
+    no number or that 32 bits do not count."""
+    return [[(Real.FLOAT.bits(value), _counted(value, b)) for value in _edges(b)] for b in bits]
+
+
+def _edges(bits: int) -> list[float]:
+    """Floats at which a conversion changes its way."""
+    one, most = np.float32(2.0**-bits), np.float32(2.0 ** (31 - bits))
+    around = [0.49 * one, one / 2, 1.49 * one, 1.5 * one, 2**23 * one, (2**24 - 1) * one, 2**25 * one]
+    below = np.nextafter(most, np.float32(0.0))
+    ends = [below, most, 2 * most, np.float32(np.inf)]
+    sizes = [np.float32(0.0), np.finfo(np.float32).smallest_subnormal, *around, *ends]
+    return [float(sign * size) for size in sizes for sign in (1, -1)] + [np.nan]
+
+
+def _counted(value: float, bits: int) -> int | None:
+    if not np.isfinite(value):
+        return None
+    size = floor(abs(Fraction(value)) * Fraction(2) ** bits + Fraction(1, 2))
+    return None if size >= WORD else size if value > 0 else -size
 
 
 def _row(how: int, target: np.ndarray, step: FixedStep) -> dict[str, Any]:
