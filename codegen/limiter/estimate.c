@@ -104,6 +104,7 @@ uint32_t limiter_elapsed(limiter_state *state, uint32_t ticks, const real drive[
             state->u[k] = drive[k];
         }
 #endif
+        state->tick += ticks; /* told, and not to be made up for again */
         status = is_unsure(state);
     } else {
         status = LIMITER_INPUT; /* no drive that was held */

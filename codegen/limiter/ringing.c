@@ -90,6 +90,7 @@ uint32_t limiter_elapsed(limiter_state *state, uint32_t ticks, const real drive[
             state->u[i] = drive[i];
         }
 #endif
+        state->tick += ticks; /* told, and not to be made up for again */
         status = is_ringing(state, REAL(0.0));
     } else {
         status = LIMITER_INPUT; /* no drive that was held */

@@ -21,6 +21,11 @@ class Ticking(Protocol):
         """The tick; None before the first."""
 
 
+def later(tick: int | None, ticks: int) -> int | None:
+    """The tick of a clock of 32 bits, if it runs, so many `ticks` on."""
+    return None if tick is None else (tick + ticks) % 2**32
+
+
 B = TypeVar("B", bound=Ticking)
 
 
@@ -34,7 +39,7 @@ class Clocked(Generic[B]):
 
     @abstractmethod
     def elapsed(self, estimate: B, ticks: int, drive: np.ndarray) -> tuple[ControllerStatus, B]:
-        """`ticks` samples passed under this `drive` (n_u,) without a call."""
+        """`ticks` samples passed under this `drive` (n_u,) without a call: the clock is so much later, and none is made up for again."""
 
     @abstractmethod
     def step(self, estimate: B, target: np.ndarray, *, settle: bool = False) -> tuple[ControllerStep, B]:

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ctrlgen.controller.clocked import Clocked
+from ctrlgen.controller.clocked import Clocked, later
 from ctrlgen.controller.contraction import FOREVER, Contraction
 from ctrlgen.controller.controller_step import ControllerStatus, ControllerStep, State, answer
 from ctrlgen.controller.feedforward import Controller
@@ -92,7 +92,8 @@ class Estimator(Clocked[Belief]):
             unsure = max(unsure, self.bounds.settling)
         unsure = _later(unsure, ticks)
         status = ControllerStatus.UNSURE if unsure else ControllerStatus(0)
-        return status, replace(estimate, state=(x, z, *(drive for _ in last)), unsure=unsure)
+        tick = later(estimate.tick, ticks)
+        return status, replace(estimate, state=(x, z, *(drive for _ in last)), unsure=unsure, tick=tick)
 
     def observe(self, estimate: Belief, measured: np.ndarray, error: float) -> tuple[ControllerStatus, Belief]:
         """The actuators' states were `measured` (n_states,) to within `error` >= 0, SI: believed is the end that is farther from rest.

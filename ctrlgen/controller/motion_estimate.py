@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ctrlgen.controller.clocked import Clocked
+from ctrlgen.controller.clocked import Clocked, later
 from ctrlgen.controller.controller_step import ControllerStatus, ControllerStep, State, answer
 from ctrlgen.controller.lost_state import UNLIMITED
 from ctrlgen.controller.motion_feedforward import MotionController
@@ -96,7 +96,7 @@ class MotionEstimator(Clocked[MotionBelief]):
             return ControllerStatus.LOST, estimate
         if not np.all((drive >= m.u_bounds[0]) & (drive <= m.u_bounds[1])):
             return ControllerStatus.INPUT, estimate
-        after = replace(estimate, state=(x, z, *(drive for _ in last)))
+        after = replace(estimate, state=(x, z, *(drive for _ in last)), tick=later(estimate.tick, ticks))
         if ticks:
             static = self.controller.kernels.static
             for _ in range(SETTLING_SWEEPS):

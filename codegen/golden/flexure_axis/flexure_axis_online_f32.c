@@ -525,6 +525,7 @@ uint32_t flexure_axis_online_f32_elapsed(flexure_axis_online_f32_state *state, u
                 }
             }
         }
+        state->tick += ticks; /* told, and not to be made up for again */
         status = flexure_axis_online_f32_is_ringing(state, 0.0f);
     } else {
         status = FLEXURE_AXIS_ONLINE_F32_INPUT; /* no drive that was held */
@@ -610,14 +611,14 @@ uint32_t flexure_axis_online_f32_step_at(flexure_axis_online_f32_state *state, u
     uint32_t since = 1U;
     if ((state != NULL) && (out != NULL) && (state->ready == FLEXURE_AXIS_ONLINE_F32_BUILD)) {
         since = (state->ticking != 0U) ? (tick - state->tick) : 1U;
-        state->ticking = 1U;
-        state->tick = tick;
         if (since != 1U) {
             status = FLEXURE_AXIS_ONLINE_F32_CLOCK;
         }
         if ((since > 1U) && ((since >= 2147483648U) || (flexure_axis_online_f32_elapsed(state, since - 1U, out->drive) == FLEXURE_AXIS_ONLINE_F32_INPUT))) {
             (void)flexure_axis_online_f32_forget(state);
         }
+        state->ticking = 1U;
+        state->tick = tick;
     }
     if (since != 0U) {
         status |= flexure_axis_online_f32_step(state, target, out);

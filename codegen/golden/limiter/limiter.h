@@ -107,7 +107,8 @@ uint32_t limiter_observe(limiter_state *state, const float measured[LIMITER_STAT
  * settled, with UNSURE until it is. INPUT, and nothing changes: the drive is NULL or out of its limits. Returns UNSURE as the next step will, or 0. */
 uint32_t limiter_elapsed(limiter_state *state, uint32_t ticks, const float drive[LIMITER_DRIVE_SIZE]);
 /* Step at this tick of a clock that counts samples, whatever calls the program; it may wrap. out must still hold the last drive. CLOCK: samples
- * passed without a call, which are made up for as by elapsed, or none passed: then drive and state stay as they are, and UNSURE as it was. A
+ * passed without a call, of which elapsed was not told and which are made up for as by it, or none passed: then drive and state stay as they
+ * are, and UNSURE as it was. Samples of step and settle in between are not counted: settle once, not once a sample, and do not step. A
  * clock that goes back leaves the state unknown, and so does an out without a drive within its limits, which is given the safe one. */
 uint32_t limiter_step_at(limiter_state *state, uint32_t tick, const float target[LIMITER_TARGET_SIZE], limiter_output *out);
 #ifdef __cplusplus

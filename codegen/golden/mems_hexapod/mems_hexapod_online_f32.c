@@ -1112,6 +1112,7 @@ uint32_t mems_hexapod_online_f32_elapsed(mems_hexapod_online_f32_state *state, u
         } else {
             state->unsure = 0U;
         }
+        state->tick += ticks; /* told, and not to be made up for again */
         status = mems_hexapod_online_f32_is_unsure(state);
     } else {
         status = MEMS_HEXAPOD_ONLINE_F32_INPUT; /* no drive that was held */
@@ -1226,14 +1227,14 @@ uint32_t mems_hexapod_online_f32_step_at(mems_hexapod_online_f32_state *state, u
     uint32_t since = 1U;
     if ((state != NULL) && (out != NULL) && (state->ready == MEMS_HEXAPOD_ONLINE_F32_BUILD)) {
         since = (state->ticking != 0U) ? (tick - state->tick) : 1U;
-        state->ticking = 1U;
-        state->tick = tick;
         if (since != 1U) {
             status = MEMS_HEXAPOD_ONLINE_F32_CLOCK;
         }
         if ((since > 1U) && ((since >= 2147483648U) || (mems_hexapod_online_f32_elapsed(state, since - 1U, out->drive) == MEMS_HEXAPOD_ONLINE_F32_INPUT))) {
             (void)mems_hexapod_online_f32_forget(state);
         }
+        state->ticking = 1U;
+        state->tick = tick;
     }
     if (since != 0U) {
         status |= mems_hexapod_online_f32_step(state, target, out);
