@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 from dataclasses import replace
 
@@ -104,6 +105,11 @@ def test_the_c_plays_every_part_of_such_a_path(drive, curves, compiler, real, tm
     )
     for end in "ch":
         (tmp_path / f"wave.{end}").write_text(render(f"player.{end}", context))
+    # that much is told, as a share of a sample, where it is not little
+    said = re.search(r"A float rounds the time: .* (\S+) of a sample", (tmp_path / "wave.h").read_text())
+    assert (said is None) == (real is Real.DOUBLE) and (
+        said is None or 0.01 < float(said[1]) <= 2 * real.epsilon * 1.05 * SAMPLES
+    )
     (tmp_path / "main.c").write_text(MAIN.format(p="wave", real=real.value, rate=context["rate"]))
     program = tmp_path / "wave"
     words = [compiler, *FLAGS, f"-I{tmp_path}", tmp_path / "main.c", tmp_path / "wave.c", "-o", program]
@@ -113,6 +119,6 @@ def test_the_c_plays_every_part_of_such_a_path(drive, curves, compiler, real, tm
     rows = np.array([line.split() for line in told.stdout.splitlines()], dtype=float)
     assert not rows[:, 0].any()
     assert np.abs(rows[:, 1] - compression.drives(k)[:, 0]).max() < 8 * real.epsilon
-    # the time is rounded as a number of that arithmetic: so much of the steepest change from sample to sample
-    steep = 4 * real.epsilon * SAMPLES * np.abs(np.diff(drive, axis=0)).max()
+    # the time, its product and the sample's place are rounded: so much of the steepest change from sample to sample
+    steep = 2 * real.epsilon * SAMPLES * np.abs(np.diff(drive, axis=0)).max()
     assert np.abs(rows[:, 2] - compression.drives(k, np.full(len(k), 0.25))[:, 0]).max() < 8 * real.epsilon + steep
