@@ -33,7 +33,8 @@ def bent_compliance(segments: Sequence[Segment], load: np.ndarray) -> np.ndarray
 def _guided(s: Segment) -> Segment:
     if float(s.shear_y) >= 0:
         return s
-    return replace(s, EI_z=1 / (1 / s.EI_z + 12 * s.shear_y / s.length**2), shear_y=0.0)
+    between = float(s.whole) or float(s.length)
+    return replace(s, EI_z=1 / (1 / s.EI_z + 12 * s.shear_y / between**2), shear_y=0.0)
 
 
 def _curved(segments: Sequence[Segment], load: np.ndarray) -> np.ndarray:

@@ -17,7 +17,8 @@ from ctrlgen.physics.screw import Matrix, Scalar, move, series
 @dataclass(frozen=True)
 class Segment:
     """A straight, uniform piece of a flexure: length [m], area [m^2] and second moments I_y, I_z [m^4] of its section, rigidities EA [N],
-    EI_y, EI_z, GJ [N m^2], and how far it shears, 1/(kappa G A) along y and z [1/N]."""
+    EI_y, EI_z, GJ [N m^2], and how far it shears, 1/(kappa G A) along y and z [1/N]; of a piece of a longer one `whole`, the length of
+    that [m]."""
 
     length: Any
     area: Any
@@ -29,6 +30,7 @@ class Segment:
     GJ: Any
     shear_y: Any = 0.0
     shear_z: Any = 0.0
+    whole: Any = 0.0
 
 
 def bent(s: Segment, x: Any, left: Any, load: Any) -> tuple[Any, Any, Any]:

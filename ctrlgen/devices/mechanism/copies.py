@@ -44,10 +44,19 @@ class Copied:
 
 @dataclass(frozen=True, eq=False)
 class Placed(Copied):
-    """A copy of an element or actuator and the numbers of the bodies between which it acts, `GROUND` for none."""
+    """A copy of an element or actuator and the numbers of the bodies between which it acts, `GROUND` for none; `run`: of a piece of a
+    divided blade all pieces."""
 
     first: int
     second: int
+    run: tuple[Placed, ...] = ()
+
+    def numbers(self, p: SimpleNamespace) -> SimpleNamespace:
+        """Its numbers among the values `p` of the description; of a piece with the length of the whole blade as `held_length` [m]."""
+        found = super().numbers(p)
+        if not self.run:
+            return found
+        return SimpleNamespace(**vars(found), held_length=sum(piece.numbers(p).length for piece in self.run))
 
 
 class CopiedParts(Device):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Annotated, Any, Literal
 
@@ -111,9 +111,10 @@ class Blade(Beam):
             )
         return self
 
-    def notes(self) -> list[str]:
+    def notes(self, held_length: float | None, poisson: float) -> list[str]:
         """Width and thickness against the length; of a slender blade what its held ends would change, from a tenth of the length on."""
-        wide, thick = self.width.si / self.length.si, self.thickness.si / self.length.si
+        length = self.length.si if held_length is None else held_length
+        wide, thick = self.width.si / length, self.thickness.si / length
         if self.slender:
             changed = "shear and held ends are left out (slender = true), which change its stiffness by more than 2 %"
             return [f"it is {wide:.2g} times as wide as it is long: {changed}"] if wide > SLENDEST else []
@@ -131,8 +132,13 @@ class Blade(Beam):
 
     def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
         """One piece of rectangular section. Source: `held_flexure`; slender, S1 eq. (21)-(23)."""
-        segment = flexure.blade_segment if self.slender else held_flexure.held_blade
-        return (segment(p.length, p.thickness, p.width, m.young, m.poisson),)
+        if self.slender:
+            return (flexure.blade_segment(p.length, p.thickness, p.width, m.young, m.poisson),)
+        whole = getattr(p, "held_length", None)
+        if whole is None:
+            return (held_flexure.held_blade(p.length, p.thickness, p.width, m.young, m.poisson),)
+        blade = held_flexure.held_blade(whole, p.thickness, p.width, m.young, m.poisson)
+        return (replace(blade, length=p.length, whole=whole),)
 
     def section(self, p: SimpleNamespace) -> Sequence[Any]:
         """Area and section moduli of the rectangle."""
@@ -154,9 +160,9 @@ class Wire(Beam):
         """Its length, and the square in its section."""
         return self.length.si, *[self.diameter.si / np.sqrt(2)] * 2
 
-    def notes(self) -> list[str]:
+    def notes(self, held_length: float | None, poisson: float) -> list[str]:
         """Its diameter against its length, and what that changes."""
-        return _thick(self.diameter.si / self.length.si, self.slender, "it is")
+        return _thick(self.diameter.si / self.length.si, self.slender, "it is", poisson)
 
     def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
         """One piece of round section. Source: S1 eq. (24), with shear where it is not slender."""
@@ -194,9 +200,9 @@ class Strut(Beam):
         """Its length, and the square in the section of its thinner part."""
         return self.length.si, *[min(self.wire_diameter.si, self.rod_diameter.si) / np.sqrt(2)] * 2
 
-    def notes(self) -> list[str]:
+    def notes(self, held_length: float | None, poisson: float) -> list[str]:
         """The diameter of its wires against their length, and what that changes."""
-        return _thick(self.wire_diameter.si / self.wire_length.si, self.slender, "its wires are")
+        return _thick(self.wire_diameter.si / self.wire_length.si, self.slender, "its wires are", poisson)
 
     def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
         """Three pieces, wire, rod, wire. Source: S1 section 5.2, with shear where it is not slender."""
@@ -253,10 +259,10 @@ class CircularHinge(Flexible):
         """Its length 2 R, its neck and its depth."""
         return 2 * self.hinge.R.si, self.hinge.t.si, 0.0 if self.hinge.b is None else self.hinge.b.si
 
-    def notes(self) -> list[str]:
+    def notes(self, held_length: float | None, poisson: float) -> list[str]:
         """Where its equations leave their range of t/R, and where they leave out that it is deep."""
         R, t, b = (0.0 if q is None else q.si for q in (self.hinge.R, self.hinge.t, self.hinge.b))
-        nu = USUAL if self.hinge.poisson is None else self.hinge.poisson.si
+        nu = poisson if self.hinge.poisson is None else self.hinge.poisson.si
         stiffer = 1 / (1 - nu**2 * circular_hinge.plane_strain_share(R, t, b)) - 1
         if stiffer < DEEP:
             return self.hinge.notes()
@@ -284,7 +290,7 @@ class CircularHinge(Flexible):
         return (FlexureSection("neck", R, area, about_y, about_z / (1 + t / (2 * R)) ** 0.45, torsion),)
 
 
-def _thick(ratio: float, slender: bool, what: str) -> list[str]:
+def _thick(ratio: float, slender: bool, what: str, nu: float) -> list[str]:
     """What a round piece with so many times its length as its diameter lacks: shear where it is `slender`, and what its held ends make
     of it, as of a square bar of its area."""
     if ratio <= SLENDEST:
@@ -293,13 +299,13 @@ def _thick(ratio: float, slender: bool, what: str) -> list[str]:
     if ratio > THICKEST:
         return [f"{told}, which is no flexure: nothing was compared beyond {THICKEST:g}"]
     side = ratio * np.sqrt(np.pi) / 2
-    bar, beam = held_flexure.held_blade(1.0, side, side, 1.0, USUAL), flexure.blade_segment(1.0, side, side, 1.0, USUAL)
-    free = 0.0 if slender else held_flexure.shear_share(side, USUAL)
+    bar, beam = held_flexure.held_blade(1.0, side, side, 1.0, nu), flexure.blade_segment(1.0, side, side, 1.0, nu)
+    free = 0.0 if slender else held_flexure.shear_share(side, nu)
     held = 1 / bar.EI_z + 12 * bar.shear_y
     yields = beam.EA / bar.EA, beam.EI_z * held / (1 + free)
     left_out = "shear and held ends are left out (slender = true)" if slender else "what its ends hold is left out"
     along, across = (percent(1 / share - 1, sign=True) for share in yields)
     return [
         f"{told}: {left_out}, which changes its stiffness between ends that do not turn by about {along} along and {across} across, at a "
-        f"Poisson's ratio of {USUAL:g}"
+        f"Poisson's ratio of {nu:g}"
     ]

@@ -73,8 +73,9 @@ class Joining(Section):
         """The uniform pieces that it consists of, from its fixed end; none where it yields at one point, its pivot."""
         return ()
 
-    def notes(self) -> list[str]:
-        """Where its sizes leave the range of its equations."""
+    def notes(self, held_length: float | None, poisson: float) -> list[str]:
+        """Where its sizes leave the range of its equations; `held_length` [m] is that of the blade of which it is a piece, `poisson`
+        that of its material."""
         return []
 
     def pivot(self, p: SimpleNamespace) -> Any:

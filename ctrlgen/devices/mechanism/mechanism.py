@@ -26,6 +26,7 @@ from ctrlgen.devices.mechanism.bent_beams import BentBeam, ThermalActuator
 from ctrlgen.devices.mechanism.condensed import MOST_STEPS, SPARE_STEPS, Condensed, nominal
 from ctrlgen.devices.mechanism.constraints import free_between_springs
 from ctrlgen.devices.mechanism.copies import Copied, CopiedParts, Placed
+from ctrlgen.devices.mechanism.divided_blades import blade_runs, with_runs
 from ctrlgen.devices.mechanism.flexures import Blade, CircularHinge, Strut, Wire
 from ctrlgen.devices.mechanism.flexures_alone import alone_remarks
 from ctrlgen.devices.mechanism.force_readings import reach as load_reach
@@ -41,6 +42,7 @@ from ctrlgen.devices.mechanism.overlaps import flexures_in_one_place, overlap_re
 from ctrlgen.devices.mechanism.ported_parts import Ported
 from ctrlgen.devices.mechanism.reach import buckling_remarks, reach_remarks
 from ctrlgen.devices.mechanism.second_order import SecondOrder
+from ctrlgen.devices.mechanism.size_remarks import size_remarks
 from ctrlgen.devices.mechanism.springs import Spring
 from ctrlgen.devices.mechanism.stated_compliances import Compliance, ComplianceMatrix
 from ctrlgen.devices.mechanism.super_element import MATRICES, SuperElement, matrix_files, with_matrices
@@ -219,15 +221,8 @@ class Mechanism(CopiedParts):
             for r, seen in zip(self.placed_readings, self.reading_scale, strict=True)
             if r.section.of is None and seen * (1.0 if r.section.about is None else self.size) <= least
         ]
-        return (
-            [
-                Fault(
-                    "reading", f"no actuator moves (or loads) what {', '.join(unread)} reads; read in another direction"
-                )
-            ]
-            if unread
-            else []
-        )
+        told = f"no actuator moves (or loads) what {', '.join(unread)} reads; read in another direction"
+        return [Fault("reading", told)] if unread else []
 
     @property
     def second_order(self) -> bool:
@@ -270,8 +265,17 @@ class Mechanism(CopiedParts):
 
     @cached_property
     def placed_elements(self) -> tuple[Placed, ...]:
-        """Every copy of every element."""
+        """Every copy of every element, pieces of a divided blade with all of it."""
+        return with_runs(self._elements_apart, self.blade_runs)
+
+    @cached_property
+    def _elements_apart(self) -> tuple[Placed, ...]:
         return tuple(self._between(c, c.section.from_, c.section.to) for c in self._copies("element"))
+
+    @_as_described
+    def blade_runs(self) -> tuple[tuple[int, ...], ...]:
+        """The numbers of the elements that are pieces of one blade, as the file describes them."""
+        return blade_runs(self, self._elements_apart)
 
     @cached_property
     def placed_super_elements(self) -> tuple[Ported, ...]:
@@ -375,15 +379,8 @@ class Mechanism(CopiedParts):
 
     def remarks(self) -> list[str]:
         """Remarks on flexures and loads outside of the range of their equations, and on inertia that the condensed model does not show."""
-        dense = {m.name for m in self.material if m.density is not None}
-        light = [
-            f"{e.name}: a hinge has no mass of its own; count it to the bodies that it joins"
-            for e in self.element
-            if isinstance(e, CircularHinge) and e.material in dense
-        ]
         return (
-            [f"{e.name}: {note}" for e in (*self.material, *self.element, *self.super_element) for note in e.notes()]
-            + light
+            size_remarks(self)
             + overlap_remarks(self.placed_elements)
             + inertia_remarks(self)
             + alone_remarks(self)

@@ -10,6 +10,7 @@ from ctrlgen.core.units import show
 from ctrlgen.devices.mechanism.bent_tangent import displaced_lines
 from ctrlgen.devices.mechanism.condensed import Condensed, nominal
 from ctrlgen.devices.mechanism.constraints import freedoms, redundant_constraints
+from ctrlgen.devices.mechanism.divided_blades import divided_lines
 from ctrlgen.devices.mechanism.drawing import Drawing
 from ctrlgen.devices.mechanism.flexures_alone import alone_lines
 from ctrlgen.devices.mechanism.linear_range import range_lines
@@ -37,7 +38,7 @@ def summary(device: Drawing) -> list[str]:
         + (f"{number_of(ported, 'super-element')}, " if ported else "")
         + number_of(len(device.placed_actuators), "actuator")
     ]
-    lines += [part_line(s) for s in device.super_element]
+    lines += [part_line(s) for s in device.super_element] + divided_lines(device)
     free, over = freedoms(device)
     lines.append(f"degrees of freedom without actuators: {free}; redundant constraints: {over}")
     if over:

@@ -78,7 +78,7 @@ class ComplianceMatrix(Joining):
         """(6, 6) with moments before forces: symmetric by reciprocity."""
         return np.array(self.compliance_si)[:, [3, 4, 5, 0, 1, 2]]
 
-    def notes(self) -> list[str]:
+    def notes(self, held_length: float | None, poisson: float) -> list[str]:
         """That it was made symmetric."""
         return symmetric_note("compliance_si", self._per_load)
 
