@@ -1,6 +1,7 @@
 """How far each drive takes its axis alone, what stops it before the end of its travel, and where it buckles a flexure.
 
-An axis alone: the other drives at zero, their axes free. Along it the displacements are d_0 + v x, d_0 those under the constant loads.
+An axis alone: the other drives at zero, their axes free. Along it the displacements are d_0 + v x, d_0 those under the constant loads, and
+of a mechanism of second order those of `bent_reach`.
 What a drive presses may buckle as what a load does (`loaded_tangent`): a push rod at 4 pi^2 EI/l^2 at the latest, between ends that do not
 turn. The axes are then at a point that the linear equations still have and no mechanism.
 """
@@ -8,7 +9,7 @@ turn. The axes are then at a point that the linear equations still have and no m
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import casadi as ca
@@ -16,9 +17,11 @@ import numpy as np
 
 from ctrlgen.core.percent import percent
 from ctrlgen.core.units import show
+from ctrlgen.devices.mechanism.bent_reach import Force, bent_way, home_of, pulled_home
 from ctrlgen.devices.mechanism.condensed import KEPT, Condensed, nominal
 from ctrlgen.devices.mechanism.drawing import Drawing
 from ctrlgen.devices.mechanism.drives import held_forces
+from ctrlgen.devices.mechanism.flexures import Beam
 from ctrlgen.devices.mechanism.loaded_tangent import LoadedTangent, loaded_tangent
 from ctrlgen.devices.mechanism.loads import DrivenLoads
 from ctrlgen.devices.mechanism.stretching import Stretching
@@ -26,6 +29,9 @@ from ctrlgen.devices.travel import ends_of
 from ctrlgen.physics.screw import numbers
 
 HARDLY, FAR = 0.1, 1e3  # of its travel: a drive that takes its axis less far, or farther, was not meant so
+STRETCHED = 0.01  # of a force: where stretching makes less of it, it makes less than twice that of a stress
+SMALL = 1e-3  # of a way, where the force is linear
+NOTICED = 0.05  # of a reach or a stress: what stretching makes of it is told from there on
 PRESSED = 1.0  # -p of a flexure: less bends no column by more than a tenth
 STEPS = 30  # halvings of an interval
 FLOOR = 1e-9  # of a stress limit, as in the limit itself
@@ -44,7 +50,8 @@ class Stressed:
 
 @dataclass(frozen=True, eq=False)
 class Reach:
-    """Of an axis alone, each from the lower to the upper side [m]: its `travel`, and where its drive takes it."""
+    """Of an axis alone, each from the lower to the upper side [m]: its `travel`, and where its drive takes it; of a mechanism of second
+    order the displacements (points, n) on its `bent` way, and by how much of itself the force at its ends is `off` a linear one."""
 
     name: str
     travel: tuple[float, float]
@@ -52,6 +59,8 @@ class Reach:
     home: np.ndarray
     way: np.ndarray
     own: int
+    bent: np.ndarray | None = None
+    off: float = 0.0
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -62,12 +71,55 @@ class Reach:
 
     def at(self, x: float) -> np.ndarray:
         """(n,) the displacements of all axes with its own at x."""
-        return self.home + self.way * (x - self.home[self.own])
+        if self.bent is None:
+            return self.home + self.way * (x - self.home[self.own])
+        return np.array([np.interp(x, self.bent[:, self.own], of_one) for of_one in self.bent.T])
 
 
 @lru_cache(maxsize=KEPT)
 def reaches(c: Condensed) -> tuple[Reach, ...]:
-    """Of each axis of a mechanism of numbers without cubic springs."""
+    """Of each axis of a mechanism of numbers without cubic springs, with the force that the model has."""
+    straight = straight_reaches(c)
+    if not (c.pushes and c.device.second_order):
+        return straight
+    return bent_reaches(c, straight, c.device.geometric_stiffening)
+
+
+@lru_cache(maxsize=KEPT)
+def bent_reaches(c: Condensed, straight: tuple[Reach, ...], stretches: bool) -> tuple[Reach, ...]:
+    """With the force of second order, and of flexures that stretch; those that it does not bring to an end of their drive within ten times
+    their travel stay `straight`."""
+    loads = loaded_tangent(c).loads
+    force = pulled_home(c, loads, Stretching(loads.s) if stretches else None)
+    found = []
+    for r, ends in zip(straight, held_forces(c), strict=True):
+        travel, most = max(map(abs, r.travel)), max(map(abs, ends))
+        home = home_of(force, r.home, most)
+        sides = [
+            np.array([home]) if not f else None if home is None else bent_way(force, home, r.own, r.way, f, travel)
+            for f in ends
+        ]
+        if home is None or any(side is None for side in sides):
+            found.append(r)
+            continue
+        whole = np.vstack(sides)
+        drive = (float(sides[0][-1, r.own]), float(sides[1][-1, r.own]))
+        way = replace(r, home=home, drive=drive, bent=whole[np.argsort(whole[:, r.own])])
+        found.append(replace(way, off=max(_off(force, way, end) for end in way.ends)))
+    return tuple(found)
+
+
+def _off(force: Force, r: Reach, end: float) -> float:
+    if end == r.home[r.own]:
+        return 0.0
+    small = SMALL * (end - r.home[r.own])
+    linear = force(r.at(r.home[r.own] + small))[r.own] / SMALL
+    return float(abs(force(r.at(end))[r.own] / linear - 1))
+
+
+@lru_cache(maxsize=KEPT)
+def straight_reaches(c: Condensed) -> tuple[Reach, ...]:
+    """Of each axis, with a linear force."""
     placed, loads = c.device.placed_actuators, loaded_tangent(c).loads
     n = len(placed)
     stiffness = numbers(c.held_stiffness) + numbers(loads.stiffness) if c.pushes else np.eye(n)
@@ -89,13 +141,44 @@ def _told(device: Drawing) -> tuple[Reach, ...]:
 def reach_lines(device: Drawing) -> list[str]:
     """What `ctrlgen check` prints: where each drive takes its axis alone, and the largest stress on that way."""
     lines = []
-    for r in _told(device):
+    for r, stretched in zip(_told(device), _stretched(device), strict=True):
         parts = [f"its drive reaches {_span(r.drive)}", f"its travel is {_span(r.travel)}"]
         for s in stresses(nominal(device), r):
             beyond = "" if s.met is None else f", its limit from {show(s.met, 'um')} on"
             parts.append(f"stress of {s.material} on it up to {show(s.most, 'MPa')} of {show(s.limit, 'MPa')}{beyond}")
-        lines.append(f"{r.name} alone: {'; '.join(parts)}")
+        lines.append(f"{r.name} alone: {'; '.join([*parts, *_left_out(nominal(device), r, stretched)])}")
     return lines
+
+
+def _stretched(device: Drawing) -> tuple[Reach | None, ...]:
+    """Of every axis that is told its reach with flexures that stretch, where the model has them not."""
+    c = nominal(device)
+    if not c.pushes or device.geometric_stiffening or not any(isinstance(e, Beam) for e in device.element):
+        return (None,) * len(_told(device))
+    return bent_reaches(c, straight_reaches(c), True) if _told(device) else ()
+
+
+def _is_stopped(c: Condensed, r: Reach, stretched: Reach) -> bool:
+    """Whether stretching keeps an axis from an end that it has in the model, or takes a stress beyond its limit."""
+    if stretched.off < STRETCHED:
+        return False
+    falls_short = any(abs(two) < (1 - NOTICED) * abs(one) for one, two in zip(r.ends, stretched.ends, strict=True))
+    return falls_short or any(
+        more.most > more.limit >= s.most for s, more in zip(stresses(c, r), stresses(c, stretched, True), strict=True)
+    )
+
+
+def _left_out(c: Condensed, r: Reach, stretched: Reach | None) -> list[str]:
+    """What stretching makes of the reach of an axis and of the stress on it."""
+    if stretched is None or stretched.off < STRETCHED:
+        return []
+    parts = []
+    if any(abs(one - other) > NOTICED * abs(one) for one, other in zip(r.ends, stretched.ends, strict=True)):
+        parts.append(f"its drive reaches {_span(stretched.drive)}")
+    for s, more in zip(stresses(c, r), stresses(c, stretched, True), strict=True):
+        if abs(more.most - s.most) > NOTICED * s.most:
+            parts.append(f"stress of {s.material} up to {show(more.most, 'MPa')}")
+    return [f"with flexures that stretch (geometric_stiffening = true) {', '.join(parts)}"] if parts else []
 
 
 def reach_remarks(device: Drawing) -> list[str]:
@@ -114,6 +197,12 @@ def reach_remarks(device: Drawing) -> list[str]:
             for s in stresses(nominal(device), r)
             if s.met is not None and abs(s.met) < HARDLY * most
         ]
+    for r, stretched in zip(_told(device), _stretched(device), strict=True):
+        if stretched is not None and _is_stopped(nominal(device), r, stretched):
+            told = _left_out(nominal(device), r, stretched)
+            remarks += [
+                f"{r.name} alone goes less far than the model says: {what}; state it, or move less" for what in told
+            ]
     return remarks
 
 
@@ -128,10 +217,10 @@ def _span(ends: tuple[float, float]) -> str:
 
 
 @lru_cache(maxsize=KEPT)
-def _stress(c: Condensed) -> dict[str, ca.Function]:
+def _stress(c: Condensed, stretches: bool) -> dict[str, ca.Function]:
     """Of each material with a limit its largest stress [Pa] with the axes at d (n,)."""
     loads, d, found = loaded_tangent(c).loads, ca.SX.sym("d", len(c.directions)), {}
-    stretched = Stretching(loads.s).extra_load if c.device.geometric_stiffening else None
+    stretched = Stretching(loads.s).extra_load if stretches else None
     for m in c.device.material:
         if m.stress_limit is not None:
             floor, constant = FLOOR * m.stress_limit.si, loads.wrench if loads.there else None
@@ -141,11 +230,11 @@ def _stress(c: Condensed) -> dict[str, ca.Function]:
     return found
 
 
-def stresses(c: Condensed, r: Reach) -> list[Stressed]:
-    """Of each material with a stress limit, along an axis alone."""
-    found = []
+def stresses(c: Condensed, r: Reach, stretches: bool | None = None) -> list[Stressed]:
+    """Of each material with a stress limit, along an axis alone; whether flexures stretch, left out: as the model has it."""
+    found, laws = [], _stress(c, c.device.geometric_stiffening if stretches is None else stretches)
     for m in c.device.material:
-        if (law := _stress(c).get(m.name)) is None:
+        if (law := laws.get(m.name)) is None:
             continue
         limit, start = m.stress_limit.si, float(r.home[r.own])
         at_ends = {end: float(law(r.at(end))) for end in r.ends}
