@@ -20,6 +20,7 @@ class Drawing(Protocol):
     super_element: tuple[Any, ...]
     output: Any
     dynamics: Any
+    effect: tuple[Any, ...]
     load: tuple[Any, ...]
     gravity: Any
     kinematics: Any

@@ -40,6 +40,7 @@ from ctrlgen.devices.mechanism.modes import guyan_modes, inertia_faults, inertia
 from ctrlgen.devices.mechanism.name_faults import name_faults
 from ctrlgen.devices.mechanism.overlaps import flexures_in_one_place, overlap_remarks
 from ctrlgen.devices.mechanism.ported_parts import Ported
+from ctrlgen.devices.mechanism.pose_range import pose_remarks
 from ctrlgen.devices.mechanism.reach import buckling_remarks, reach_remarks
 from ctrlgen.devices.mechanism.second_order import SecondOrder
 from ctrlgen.devices.mechanism.size_remarks import size_remarks
@@ -389,8 +390,8 @@ class Mechanism(CopiedParts):
         )
 
     def range_remarks(self) -> list[str]:
-        """Where the stiffness under constant loads is off, the drives buckle a flexure, or what is of third order counts."""
-        return load_remarks(self) + buckling_remarks(self) + third_order_remarks(self)
+        """Where the stiffness under constant loads is off, the drives buckle a flexure, or what is of higher order counts."""
+        return load_remarks(self) + buckling_remarks(self) + third_order_remarks(self) + pose_remarks(self)
 
     def physics(self, p: SimpleNamespace) -> DevicePhysics:
         """The condensed mechanism with the values `p`."""
