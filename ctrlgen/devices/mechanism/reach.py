@@ -40,12 +40,13 @@ FLOOR = 1e-9  # of a stress limit, as in the limit itself
 @dataclass(frozen=True)
 class Stressed:
     """Along an axis alone the largest stress of a material [Pa], its limit, and the displacement [m] nearest home from which on it is
-    above that; None where it is not, or everywhere."""
+    above that; None where it is not, or everywhere. `home`: the stress without drives, by constant loads [Pa]."""
 
     material: str
     most: float
     limit: float
     met: float | None
+    home: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,6 +159,17 @@ def _stretched(device: Drawing) -> tuple[Reach | None, ...]:
     return bent_reaches(c, straight_reaches(c), True) if _told(device) else ()
 
 
+def _overloaded(device: Drawing) -> list[str]:
+    """Materials that the constant loads alone stress beyond their limit."""
+    return [
+        f"the constant loads alone stress {s.material} to {show(s.home, 'MPa')}, above its limit of {show(s.limit, 'MPa')}: check the "
+        "loads, gravity and the units, or make the flexures that carry them stronger"
+        for r in _told(device)[:1]
+        for s in stresses(nominal(device), r)
+        if s.home > s.limit
+    ]
+
+
 def _is_stopped(c: Condensed, r: Reach, stretched: Reach) -> bool:
     """Whether stretching keeps an axis from an end that it has in the model, or takes a stress beyond its limit."""
     if stretched.off < STRETCHED:
@@ -197,6 +209,7 @@ def reach_remarks(device: Drawing) -> list[str]:
             for s in stresses(nominal(device), r)
             if s.met is not None and abs(s.met) < HARDLY * most
         ]
+    remarks += _overloaded(device)
     for r, stretched in zip(_told(device), _stretched(device), strict=True):
         if stretched is not None and _is_stopped(nominal(device), r, stretched):
             told = _left_out(nominal(device), r, stretched)
@@ -239,10 +252,11 @@ def stresses(c: Condensed, r: Reach, stretches: bool | None = None) -> list[Stre
         limit, start = m.stress_limit.si, float(r.home[r.own])
         at_ends = {end: float(law(r.at(end))) for end in r.ends}
         met = None
-        if float(law(r.home)) <= limit:
+        home = float(law(r.home))
+        if home <= limit:
             places = [_beyond(law, limit, r, start, end) for end, most in at_ends.items() if most > limit]
             met = min(places, key=abs, default=None)
-        found.append(Stressed(m.name, max(at_ends.values()), limit, met))
+        found.append(Stressed(m.name, max(home, *at_ends.values()), limit, met, home))
     return found
 
 

@@ -20,6 +20,7 @@ from ctrlgen.physics.screw import Matrix, TwistComponent, WrenchComponent, rotat
 Inertia = Annotated[Quantity, In("kg*mm^2", positive=True)]
 STIFFEST, SOFTEST = 1300e9, 1e6  # Pa: beyond diamond and below rubber
 DENSEST, LIGHTEST = 23e3, 10.0  # kg/m^3: beyond osmium and below foams
+STRONGEST = 0.1  # of Young's modulus: what bonds of a perfect crystal bear
 FLAT = 0.01  # a flat plate has the sum; its numbers are rounded
 
 
@@ -59,6 +60,10 @@ class Material(Section):
         if self.density is not None and not LIGHTEST <= self.density.si <= DENSEST:
             word = "above osmium" if self.density.si > DENSEST else "below foams"
             notes.append(f"density = {self.density.text!r} is {word}: check the unit")
+        if self.stress_limit is not None and self.stress_limit.si > STRONGEST * young:
+            notes.append(
+                f"stress_limit = {self.stress_limit.text!r} is above a tenth of young, which nothing bears: check the unit"
+            )
         return notes
 
 
