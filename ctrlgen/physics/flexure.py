@@ -163,3 +163,21 @@ def rectangular_stress(about_y: Matrix, about_z: Matrix, tension: Matrix, shear:
     """
     normal = ca.fabs(about_y) + ca.fabs(about_z) + ca.fabs(tension)
     return ca.sqrt(normal**2 + 3 * shear**2 + floor**2)
+
+
+def sheared_rectangle(bent: Sequence[Matrix], shear: Matrix, along: Sequence[Matrix]) -> Matrix:
+    """Largest von Mises stress inside of a rectangular section [Pa], where transverse shear is largest, 3/2 of its mean.
+
+    `bent`: stress by bending about y and z and by tension, each at its largest, `shear` that by torsion, `along`: mean shear along y and z
+    [Pa]. In the middle of the sides that are parallel to a shear force there is none of the bending in its plane. Source: S. Timoshenko,
+    Strength of Materials I, section 26. Wide sections have more at the middle of their short sides for a force across them.
+    """
+    about_y, about_z, tension = (ca.fabs(x) for x in bent)
+    across_y, across_z = (3 / 2 * ca.fabs(x) + ca.fabs(shear) for x in along)
+    return ca.sqrt(ca.fmax((about_y + tension) ** 2 + 3 * across_y**2, (about_z + tension) ** 2 + 3 * across_z**2))
+
+
+def sheared_circle(bent: Sequence[Matrix], shear: Matrix, along: Sequence[Matrix]) -> Matrix:
+    """The same of a round section, 4/3 of the mean at its middle line, where the bending in the plane of the force is zero."""
+    tension, across = bent[2], 4 / 3 * ca.sqrt(along[0] ** 2 + along[1] ** 2) + ca.fabs(shear)
+    return ca.sqrt(tension**2 + 3 * across**2)

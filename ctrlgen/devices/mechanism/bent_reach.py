@@ -76,18 +76,22 @@ def _balanced(force: Force, start: np.ndarray, free: list[int], scale: float) ->
             return d
         nudge = NUDGE * max(float(np.abs(d).max()), 1e-9)
         slopes = [(force(d + nudge * e)[free] - force(d - nudge * e)[free]) / (2 * nudge) for e in np.eye(len(d))[free]]
-        d[free] -= np.linalg.solve(np.array(slopes).T, r)
+        try:
+            d[free] -= np.linalg.solve(np.array(slopes).T, r)
+        except np.linalg.LinAlgError:  # it buckles there
+            return None
     return None if free else d
 
 
 def _shortened(force: Force, way: np.ndarray, own: int, others: list[int], push: float) -> np.ndarray | None:
     """The way with its last point where the push is the one asked for, by halving the last step."""
     low, high = 0.0, 1.0
-    end: np.ndarray | None = way[-1]
+    end: np.ndarray = way[-1]
     while high - low > SETTLED:
         middle = (low + high) / 2
-        end = _balanced(force, way[-2] + middle * (way[-1] - way[-2]), others, abs(push))
-        if end is None:
+        there = _balanced(force, way[-2] + middle * (way[-1] - way[-2]), others, abs(push))
+        if there is None:
             return None
+        end = there
         low, high = (low, middle) if abs(force(end)[own]) >= abs(push) else (middle, high)
     return np.vstack([way[:-1], end])

@@ -333,10 +333,12 @@ class Condensed:
         floor: float,
         extra_load: Callable[[int, Any, Matrix], Matrix] | None = None,
         constant: Callable[[int], Matrix] | None = None,
+        sheared: bool = False,
     ) -> tuple[tuple[str, ...], Matrix]:
         """Of the flexures of a material: the names of the sections that are stressed most, and the largest stress there (m,) [Pa] with
         the axes displaced by `d` (n,) [m]; `floor` [Pa] as in `flexure.round_stress`, `extra_load` beside the linear one as in
-        `stretching.Stretching`, `constant` wrench on the free end of an element, at the global origin, as in `loads.Loads`."""
+        `stretching.Stretching`, `constant` wrench on the free end of an element, at the global origin, as in `loads.Loads`; `sheared`: the
+        stress inside of the sections, where transverse shear is largest."""
         names, stresses, q = [], [], self.loads(d)
         for k, e in enumerate(self.device.placed_elements):
             if getattr(e.section, "material", None) != material:
@@ -351,7 +353,9 @@ class Condensed:
                 if extra_load is not None:
                     load += extra_load(k, section.back, d)
                 names.append(f"{e.name}_{section.name}")
-                stresses.append(e.section.largest_stress(*section.stresses(load), floor))
+                *bent, torsion = section.stresses(load)
+                inside = e.section.sheared_stress(bent, torsion, section.mean_shear(load)) if sheared else None
+                stresses.append(e.section.largest_stress(*bent, torsion, floor) if inside is None else inside)
         return tuple(names), ca.vertcat(*stresses)
 
 

@@ -41,6 +41,10 @@ class FlexureSection:
         """Bending about y and z, tension and torsion [Pa] by the loads (6, n) [N, N m] there, in the flexure's frame."""
         return load[4, :] / self.about_y, load[5, :] / self.about_z, load[0, :] / self.area, load[3, :] / self.torsion
 
+    def mean_shear(self, load: Matrix) -> tuple[Matrix, Matrix]:
+        """Transverse force over area along y and z [Pa]."""
+        return load[1, :] / self.area, load[2, :] / self.area
+
 
 class Flexible(Joining):
     """A flexure made of a material."""
@@ -59,6 +63,11 @@ class Flexible(Joining):
     @staticmethod
     def largest_stress(about_y: Matrix, about_z: Matrix, tension: Matrix, shear: Matrix, floor: float) -> Matrix:
         """The largest stress of a section [Pa], from the stresses by bending, tension and torsion."""
+        raise NotImplementedError
+
+    @staticmethod
+    def sheared_stress(bent: Sequence[Matrix], shear: Matrix, along: Sequence[Matrix]) -> Matrix:
+        """The largest stress inside of a section [Pa], where transverse shear counts, which `largest_stress` leaves out."""
         raise NotImplementedError
 
 
@@ -95,6 +104,7 @@ class Blade(Beam):
 
     ideal = ("delta_x", "delta_z", "theta_y")
     largest_stress = staticmethod(flexure.rectangular_stress)
+    sheared_stress = staticmethod(flexure.sheared_rectangle)
 
     kind: Literal["blade"]
     """A blade: thin along its y axis."""
@@ -150,6 +160,7 @@ class Wire(Beam):
 
     ideal = ("delta_x",)
     largest_stress = staticmethod(flexure.round_stress)
+    sheared_stress = staticmethod(flexure.sheared_circle)
 
     kind: Literal["wire"]
     """A wire or rod of round section."""
@@ -180,6 +191,7 @@ class Strut(Beam):
 
     ideal = ("delta_x",)
     largest_stress = staticmethod(flexure.round_stress)
+    sheared_stress = staticmethod(flexure.sheared_circle)
 
     kind: Literal["strut"]
     """A rod between two equal wires; both wires are part of `length`."""
@@ -221,6 +233,7 @@ class CircularHinge(Flexible):
 
     ideal = ("delta_x", "delta_y", "delta_z", "theta_x", "theta_y")
     largest_stress = staticmethod(flexure.rectangular_stress)
+    sheared_stress = staticmethod(flexure.sheared_rectangle)
 
     kind: Literal["hinge"]
     """A right circular hinge by the equations of S2."""

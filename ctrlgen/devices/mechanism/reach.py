@@ -8,7 +8,7 @@ turn. The axes are then at a point that the linear equations still have and no m
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -96,18 +96,19 @@ def bent_reaches(c: Condensed, straight: tuple[Reach, ...], stretches: bool) -> 
     for r, ends in zip(straight, held_forces(c), strict=True):
         travel, most = max(map(abs, r.travel)), max(map(abs, ends))
         home = home_of(force, r.home, most)
-        sides = [
-            np.array([home]) if not f else None if home is None else bent_way(force, home, r.own, r.way, f, travel)
-            for f in ends
-        ]
-        if home is None or any(side is None for side in sides):
+        sides = [] if home is None else [_side(force, home, r, push, travel) for push in ends]
+        known = [side for side in sides if side is not None]
+        if home is None or len(known) < len(ends):
             found.append(r)
             continue
-        whole = np.vstack(sides)
-        drive = (float(sides[0][-1, r.own]), float(sides[1][-1, r.own]))
+        whole, drive = np.vstack(known), (float(known[0][-1, r.own]), float(known[1][-1, r.own]))
         way = replace(r, home=home, drive=drive, bent=whole[np.argsort(whole[:, r.own])])
         found.append(replace(way, off=max(_off(force, way, end) for end in way.ends)))
     return tuple(found)
+
+
+def _side(force: Force, home: np.ndarray, r: Reach, push: float, travel: float) -> np.ndarray | None:
+    return bent_way(force, home, r.own, r.way, push, travel) if push else home[None, :]
 
 
 def _off(force: Force, r: Reach, end: float) -> float:
@@ -146,7 +147,15 @@ def reach_lines(device: Drawing) -> list[str]:
         parts = [f"its drive reaches {_span(r.drive)}", f"its travel is {_span(r.travel)}"]
         for s in stresses(nominal(device), r):
             beyond = "" if s.met is None else f", its limit from {show(s.met, 'um')} on"
-            parts.append(f"stress of {s.material} on it up to {show(s.most, 'MPa')} of {show(s.limit, 'MPa')}{beyond}")
+            inside = sheared_stress(nominal(device), s.material, [r.at(end) for end in r.ends])
+            more = (
+                f", inside of flexures {show(inside, 'MPa')} by transverse shear"
+                if inside > (1 + NOTICED) * s.most
+                else ""
+            )
+            parts.append(
+                f"stress of {s.material} on it up to {show(s.most, 'MPa')} of {show(s.limit, 'MPa')}{beyond}{more}"
+            )
         lines.append(f"{r.name} alone: {'; '.join([*parts, *_left_out(nominal(device), r, stretched)])}")
     return lines
 
@@ -157,6 +166,26 @@ def _stretched(device: Drawing) -> tuple[Reach | None, ...]:
     if not c.pushes or device.geometric_stiffening or not any(isinstance(e, Beam) for e in device.element):
         return (None,) * len(_told(device))
     return bent_reaches(c, straight_reaches(c), True) if _told(device) else ()
+
+
+def sheared_stress(c: Condensed, material: str, places: Sequence[np.ndarray]) -> float:
+    """The largest stress [Pa] inside of the sections of a material, where transverse shear is largest, with the axes at `places` (n,)."""
+    return max(float(_stress(c, c.device.geometric_stiffening, True)[material](place)) for place in places)
+
+
+def _sheared_off(device: Drawing) -> list[str]:
+    """Materials whose limit the stress that the model has keeps, and that inside of the sections does not."""
+    c, remarks = nominal(device), []
+    for r in _told(device):
+        for s in stresses(c, r):
+            inside = sheared_stress(c, s.material, [r.at(end) for end in r.ends])
+            if inside > s.limit >= s.most:
+                remarks.append(
+                    f"{r.name} alone shears {s.material} to {show(inside, 'MPa')} inside of a short flexure, above its limit of "
+                    f"{show(s.limit, 'MPa')}; the limit of the model holds bending, tension and torsion, here {show(s.most, 'MPa')}: "
+                    "make the flexure longer or thicker, or load it less"
+                )
+    return remarks
 
 
 def _overloaded(device: Drawing) -> list[str]:
@@ -209,7 +238,7 @@ def reach_remarks(device: Drawing) -> list[str]:
             for s in stresses(nominal(device), r)
             if s.met is not None and abs(s.met) < HARDLY * most
         ]
-    remarks += _overloaded(device)
+    remarks += _overloaded(device) + _sheared_off(device)
     for r, stretched in zip(_told(device), _stretched(device), strict=True):
         if stretched is not None and _is_stopped(nominal(device), r, stretched):
             told = _left_out(nominal(device), r, stretched)
@@ -230,14 +259,14 @@ def _span(ends: tuple[float, float]) -> str:
 
 
 @lru_cache(maxsize=KEPT)
-def _stress(c: Condensed, stretches: bool) -> dict[str, ca.Function]:
+def _stress(c: Condensed, stretches: bool, sheared: bool = False) -> dict[str, ca.Function]:
     """Of each material with a limit its largest stress [Pa] with the axes at d (n,)."""
     loads, d, found = loaded_tangent(c).loads, ca.SX.sym("d", len(c.directions)), {}
     stretched = Stretching(loads.s).extra_load if stretches else None
     for m in c.device.material:
         if m.stress_limit is not None:
             floor, constant = FLOOR * m.stress_limit.si, loads.wrench if loads.there else None
-            names, stress = c.stress(m.name, d, floor, stretched, constant)
+            names, stress = c.stress(m.name, d, floor, stretched, constant, sheared)
             if names:
                 found[m.name] = ca.Function("stress", [d], [ca.mmax(stress)])
     return found
