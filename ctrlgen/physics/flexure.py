@@ -46,6 +46,11 @@ def shear_ratio(poisson: Scalar) -> Scalar:
     return 1 / (2 * (1 + poisson))
 
 
+def shear_over(E: Scalar, nu: Scalar, G: Scalar | None) -> Scalar:
+    """chi = G/E of a crystal whose shear modulus `G` [Pa] is stated; without it that of S1 eq. (22)."""
+    return shear_ratio(nu) if G is None else G / E
+
+
 def torsion_ratio(t: Scalar, w: Scalar) -> Scalar:
     """beta = J/I_z of a rectangular section t x w, t <= w: 12 (1/3 - 0.21 (t/w) (1 - (t/w)^4 / 12)).
 
@@ -95,20 +100,22 @@ def segments_compliance(segments: Sequence[Segment]) -> Matrix:
     return series(tuple(parts))
 
 
-def blade_compliance(l: Scalar, t: Scalar, w: Scalar, E: Scalar, nu: Scalar) -> Matrix:
+def blade_compliance(l: Scalar, t: Scalar, w: Scalar, E: Scalar, nu: Scalar, G: Scalar | None = None) -> Matrix:
     """[C^b]: blade of length l, thickness t (along y), width w (along z), t <= w, shape (6, 6).
 
     EA = E t w, EI_z = E w t^3/12, EI_y = E t w^3/12, GJ = chi beta EI_z.
-    Source: S1 eq. (21)-(23). `l`, `t`, `w` [m], `E` [Pa], `nu` [1].
+    Source: S1 eq. (21)-(23). `l`, `t`, `w` [m], `E` [Pa], `nu` [1], `G` [Pa] as in `shear_over`.
     """
-    return segment_compliance(blade_segment(l, t, w, E, nu))
+    return segment_compliance(blade_segment(l, t, w, E, nu, G))
 
 
-def blade_segment(l: Scalar, t: Scalar, w: Scalar, E: Scalar, nu: Scalar) -> Segment:
+def blade_segment(l: Scalar, t: Scalar, w: Scalar, E: Scalar, nu: Scalar, G: Scalar | None = None) -> Segment:
     """The blade of `blade_compliance`."""
     A, I_y, I_z = t * w, t * w**3 / 12, w * t**3 / 12
     EI_z = E * w * t**3 / 12
-    return Segment(l, A, I_y, I_z, E * t * w, E * t * w**3 / 12, EI_z, shear_ratio(nu) * torsion_ratio(t, w) * EI_z)
+    return Segment(
+        l, A, I_y, I_z, E * t * w, E * t * w**3 / 12, EI_z, shear_over(E, nu, G) * torsion_ratio(t, w) * EI_z
+    )
 
 
 def wire_compliance(l: Scalar, d: Scalar, E: Scalar, nu: Scalar) -> Matrix:
@@ -120,11 +127,11 @@ def wire_compliance(l: Scalar, d: Scalar, E: Scalar, nu: Scalar) -> Matrix:
     return segment_compliance(wire_segment(l, d, E, nu))
 
 
-def wire_segment(l: Scalar, d: Scalar, E: Scalar, nu: Scalar) -> Segment:
+def wire_segment(l: Scalar, d: Scalar, E: Scalar, nu: Scalar, G: Scalar | None = None) -> Segment:
     """The wire of `wire_compliance`."""
     A, I = ca.pi * d**2 / 4, ca.pi * d**4 / 64
     EI = E * ca.pi * d**4 / 64
-    return Segment(l, A, I, I, E * ca.pi * d**2 / 4, EI, EI, 2 * shear_ratio(nu) * EI)
+    return Segment(l, A, I, I, E * ca.pi * d**2 / 4, EI, EI, 2 * shear_over(E, nu, G) * EI)
 
 
 def round_section(d: Scalar) -> tuple[Scalar, Scalar, Scalar]:

@@ -14,14 +14,14 @@ its ends, about the middle of its length, over those of the slender beam (l/EA, 
 
 with f of each rising from 0 to 1, f(x) = (a x + b x^2)/(1 + c x + b x^2), g(r) = (1 + u r)/(1 + v r), and
 
-    S(x) = 2 (1 + nu) x^2 (1 + 0.2/(1 + 0.31 x + 0.032 x^2))      shear, 6/5 of a slender section, 1 where the ends hold all of it
-    T = tanh(m)/m,  m^2 = 6 (1 - nu) (1 + 0.12 nu^2) (J/J_0) / (q^2 C),  C = ((1 - r^2)/(1 + r^2))^3.5,  J_0 = w t^3/3.
+    S(x) = E/G x^2 (1 + 0.2/(1 + 0.31 x + 0.032 x^2))      shear, 6/5 of a slender section, 1 where the ends hold all of it
+    T = tanh(m)/m,  m^2 = 12 (1 - nu^2) G/E (1 + 0.12 nu^2) (J/J_0) / (q^2 C),  C = ((1 - r^2)/(1 + r^2))^3.5,  J_0 = w t^3/3.
 
 The forms are those of the theories: Timoshenko's shear; of a plate one term in the width (L. V. Kantorovich, V. I. Krylov, Approximate
 Methods of Higher Analysis (1958), chapter 4), which gives the compliances within 3 %; the warping of thin sections, S. P.
 Timoshenko, J. N. Goodier, Theory of Elasticity (1970), section 109, and for wide leaf springs D. M. Brouwer, J. P. Meijaard, J. B. Jonker,
 Precis. Eng. 37 (2013) 73. The coefficients are least squares to Kirchhoff plates, plane stress and solids of finite elements,
-0.03 <= q <= 5, 0 <= r <= 1, s <= 0.5, nu from 0.2 to 0.4 (solids: 0.33), and hold them to 0.7 %, torsion of solids to 2 %
+0.03 <= q <= 5, 0 <= r <= 1, s <= 0.5, nu from 0.2 to 0.4 (solids: 0.33), E/G = 2 (1 + nu), and hold them to 0.7 %, torsion of solids to 2 %
 (`tests/test_held_flexure.py`).
 """
 
@@ -58,30 +58,33 @@ def thinned(r: Scalar, uv: tuple[float, float]) -> Scalar:
     return (1 + u * r) / (1 + v * r)
 
 
-def shear_share(x: Scalar, nu: Scalar) -> Scalar:
-    """S: deflection by shear over that by bending between held ends, x the depth over the length."""
-    return 2 * (1 + nu) * x**2 * (1 + 0.2 / (1 + 0.31 * x + 0.032 * x**2))
+def shear_share(x: Scalar, nu: Scalar, chi: Scalar | None = None) -> Scalar:
+    """S: deflection by shear over that by bending between held ends, x the depth over the length; `chi` G/E of a crystal."""
+    return (2 * (1 + nu) if chi is None else 1 / chi) * x**2 * (1 + 0.2 / (1 + 0.31 * x + 0.032 * x**2))
 
 
-def warping_share(q: Scalar, r: Scalar, nu: Scalar) -> Scalar:
+def warping_share(q: Scalar, r: Scalar, nu: Scalar, chi: Scalar | None = None) -> Scalar:
     """Torsional compliance over l/GJ with ends that do not warp."""
     J = torsion_ratio(r, 1.0) / 4
     C = ((1 - r**2) / (1 + r**2)) ** 3.5 + LEAST_WARPING
-    m = ca.sqrt(6 * (1 - nu) * (1 + 0.12 * nu**2) * J / C) / q
+    stiff = 6 * (1 - nu) if chi is None else 12 * (1 - nu**2) * chi
+    m = ca.sqrt(stiff * (1 + 0.12 * nu**2) * J / C) / q
     T = ca.tanh(m) / m
     return 1 - T + 4.12 * r**2 * T**2 * J
 
 
-def held_blade(l: Scalar, t: Scalar, w: Scalar, E: Scalar, nu: Scalar) -> Segment:
-    """A blade of length l, thickness t (along y), width w (along z), t <= w [m], with the compliances above: E [Pa], nu [1].
+def held_blade(l: Scalar, t: Scalar, w: Scalar, E: Scalar, nu: Scalar, G: Scalar | None = None) -> Segment:
+    """A blade of length l, thickness t (along y), width w (along z), t <= w [m], with the compliances above: E [Pa], nu [1],
+    G [Pa] of a crystal.
 
     EI are those of bending alone; what is left of the deflection is counted as shear, and may be negative where the blade is thin.
     """
-    s, q, r, tau = blade_segment(l, t, w, E, nu), w / l, t / w, t / l
+    s, q, r, tau = blade_segment(l, t, w, E, nu, G), w / l, t / w, t / l
+    chi = None if G is None else G / E
     theta_z = 1 - nu**2 * (held_share(q * thinned(r, THETA_Z_THICK), THETA_Z) + 0.134 * tau)
-    delta_y = 1 - nu**2 * (held_share(q * thinned(r, DELTA_Y_THICK), DELTA_Y) + 0.924 * tau) + shear_share(tau, nu)
+    delta_y = 1 - nu**2 * (held_share(q * thinned(r, DELTA_Y_THICK), DELTA_Y) + 0.924 * tau) + shear_share(tau, nu, chi)
     theta_y = 1 - nu**2 * held_share(q * (1 + 3.73 * r), THETA_Y)
-    delta_z = 1 - nu**2 * held_share(q * (1 + 2.19 * r), DELTA_Z) + shear_share(q, nu)
+    delta_z = 1 - nu**2 * held_share(q * (1 + 2.19 * r), DELTA_Z) + shear_share(q, nu, chi)
     axial = 1 - nu**2 * held_share(q * (1 + 0.94 * r), AXIAL) * (1 + 0.6 * tau)
     return Segment(
         l,
@@ -91,17 +94,17 @@ def held_blade(l: Scalar, t: Scalar, w: Scalar, E: Scalar, nu: Scalar) -> Segmen
         s.EA / axial,
         s.EI_y / theta_y,
         s.EI_z / theta_z,
-        s.GJ / warping_share(q, r, nu),
+        s.GJ / warping_share(q, r, nu, chi),
         l**2 * (delta_y - theta_z) / (12 * s.EI_z),
         l**2 * (delta_z - theta_y) / (12 * s.EI_y),
     )
 
 
-def timoshenko_wire(l: Scalar, d: Scalar, E: Scalar, nu: Scalar) -> Segment:
+def timoshenko_wire(l: Scalar, d: Scalar, E: Scalar, nu: Scalar, G: Scalar | None = None) -> Segment:
     """A round wire of length l and diameter d [m] that shears, kappa = 6 (1 + nu)/(7 + 6 nu); its ends are free to contract.
 
     Source: G. R. Cowper, J. Appl. Mech. 33 (1966) 335. `E` [Pa], `nu` [1].
     """
-    s = wire_segment(l, d, E, nu)
-    shear = 2 * (1 + nu) / (E * s.area) * (7 + 6 * nu) / (6 * (1 + nu))
+    s = wire_segment(l, d, E, nu, G)
+    shear = (2 * (1 + nu) / E if G is None else 1 / G) / s.area * (7 + 6 * nu) / (6 * (1 + nu))
     return Segment(l, s.area, s.I_y, s.I_z, s.EA, s.EI_y, s.EI_z, s.GJ, shear, shear)

@@ -64,7 +64,9 @@ def beam_stiffness(a: Any) -> Matrix:
 
     Entry (6, 5) is printed as -0.22; by symmetry it equals (2, 3) = -0.0216.
     """
-    return inverse(blade_compliance(a.beam_length, a.beam_width, a.thickness, a.young, a.poisson))
+    return inverse(
+        blade_compliance(a.beam_length, a.beam_width, a.thickness, a.young, a.poisson, getattr(a, "shear", None))
+    )
 
 
 def stiffness(a: Any) -> Matrix:

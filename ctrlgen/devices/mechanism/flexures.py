@@ -143,11 +143,11 @@ class Blade(Beam):
     def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
         """One piece of rectangular section. Source: `held_flexure`; slender, S1 eq. (21)-(23)."""
         if self.slender:
-            return (flexure.blade_segment(p.length, p.thickness, p.width, m.young, m.poisson),)
+            return (flexure.blade_segment(p.length, p.thickness, p.width, m.young, m.poisson, m.shear),)
         whole = getattr(p, "held_length", None)
         if whole is None:
-            return (held_flexure.held_blade(p.length, p.thickness, p.width, m.young, m.poisson),)
-        blade = held_flexure.held_blade(whole, p.thickness, p.width, m.young, m.poisson)
+            return (held_flexure.held_blade(p.length, p.thickness, p.width, m.young, m.poisson, m.shear),)
+        blade = held_flexure.held_blade(whole, p.thickness, p.width, m.young, m.poisson, m.shear)
         return (replace(blade, length=p.length, whole=whole),)
 
     def section(self, p: SimpleNamespace) -> Sequence[Any]:
@@ -178,7 +178,7 @@ class Wire(Beam):
     def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
         """One piece of round section. Source: S1 eq. (24), with shear where it is not slender."""
         segment = flexure.wire_segment if self.slender else held_flexure.timoshenko_wire
-        return (segment(p.length, p.diameter, m.young, m.poisson),)
+        return (segment(p.length, p.diameter, m.young, m.poisson, m.shear),)
 
     def section(self, p: SimpleNamespace) -> Sequence[Any]:
         """Area and section moduli of the round section."""
@@ -219,8 +219,8 @@ class Strut(Beam):
     def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
         """Three pieces, wire, rod, wire. Source: S1 section 5.2, with shear where it is not slender."""
         segment = flexure.wire_segment if self.slender else held_flexure.timoshenko_wire
-        wire = segment(p.wire_length, p.wire_diameter, m.young, m.poisson)
-        return wire, segment(p.length - 2 * p.wire_length, p.rod_diameter, m.young, m.poisson), wire
+        wire = segment(p.wire_length, p.wire_diameter, m.young, m.poisson, m.shear)
+        return wire, segment(p.length - 2 * p.wire_length, p.rod_diameter, m.young, m.poisson, m.shear), wire
 
     def section(self, p: SimpleNamespace) -> Sequence[Any]:
         """Area and section moduli of its wires."""
@@ -259,10 +259,11 @@ class CircularHinge(Flexible):
         plane are 8 to 9 % stiffer and those in it 2 % softer.
         """
         h = self.hinge.geometry(p.hinge, E=m.young, nu=m.poisson)
+        G = h.G if m.shear is None else m.shear
         plane = self.hinge.planar(p.hinge, E=m.young, nu=m.poisson)
-        turn, across, coupled = circular_hinge.out_of_plane(h.R, h.t, h.b, h.E, h.G)
+        turn, across, coupled = circular_hinge.out_of_plane(h.R, h.t, h.b, h.E, G)
         held = circular_hinge.locked(h.R, h.t, h.b, h.E, h.G)
-        saint_venant = h.G * flexure.torsion_ratio(h.t, h.b) / (h.E * plane[2, 2])
+        saint_venant = G * flexure.torsion_ratio(h.t, h.b) / (h.E * plane[2, 2])
         twist = 1 / (saint_venant + h.b**2 / (12 * held))
         return compliance_of_entries(
             (twist, turn, plane[2, 2]), (plane[0, 0], plane[1, 1], across), plane[2, 1], coupled

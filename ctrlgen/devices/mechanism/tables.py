@@ -20,6 +20,7 @@ from ctrlgen.physics.screw import Matrix, TwistComponent, WrenchComponent, rotat
 Inertia = Annotated[Quantity, In("kg*mm^2", positive=True)]
 STIFFEST, SOFTEST = 1300e9, 1e6  # Pa: beyond diamond and below rubber
 DENSEST, LIGHTEST = 23e3, 10.0  # kg/m^3: beyond osmium and below foams
+SHEAR = (0.1, 1.0)  # of Young's modulus: from layered crystals to cubic ones along their soft axis
 STRONGEST = 0.1  # of Young's modulus: what bonds of a perfect crystal bear
 FLAT = 0.01  # a flat plate has the sum; its numbers are rounded
 
@@ -33,6 +34,8 @@ class Material(Section):
     """Young's modulus."""
     poisson: Annotated[Quantity, In("1", low=0.0, high=0.5)]
     """Poisson's ratio."""
+    shear: Annotated[Quantity, In("GPa", positive=True)] | None = None
+    """Shear modulus of a crystal, such as silicon along <100>. Left out: young/(2 (1 + poisson))."""
     density: Annotated[Quantity, In("kg/m^3", positive=True)] | None = None
     """Mass per volume: with it, its blades, wires and struts have mass. Left out: none has."""
     stress_limit: Annotated[Quantity, In("MPa", positive=True)] | None = None
@@ -57,6 +60,8 @@ class Material(Section):
             notes.append(
                 f"young = {self.young.text!r} is {'above diamond' if young > STIFFEST else 'below rubber'}: check the unit"
             )
+        if self.shear is not None and not SHEAR[0] * young <= self.shear.si <= SHEAR[1] * young:
+            notes.append(f"shear = {self.shear.text!r} is {self.shear.si / young:.2g} times young: check the unit")
         if self.density is not None and not LIGHTEST <= self.density.si <= DENSEST:
             word = "above osmium" if self.density.si > DENSEST else "below foams"
             notes.append(f"density = {self.density.text!r} is {word}: check the unit")
