@@ -46,6 +46,11 @@ class FlexureSection:
         return load[1, :] / self.area, load[2, :] / self.area
 
 
+def stated_shear(material: SimpleNamespace) -> Any:
+    """The shear modulus of a crystal [Pa]; None of a material that states none."""
+    return getattr(material, "shear", None)
+
+
 class Flexible(Joining):
     """A flexure made of a material."""
 
@@ -143,11 +148,11 @@ class Blade(Beam):
     def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
         """One piece of rectangular section. Source: `held_flexure`; slender, S1 eq. (21)-(23)."""
         if self.slender:
-            return (flexure.blade_segment(p.length, p.thickness, p.width, m.young, m.poisson, m.shear),)
+            return (flexure.blade_segment(p.length, p.thickness, p.width, m.young, m.poisson, stated_shear(m)),)
         whole = getattr(p, "held_length", None)
         if whole is None:
-            return (held_flexure.held_blade(p.length, p.thickness, p.width, m.young, m.poisson, m.shear),)
-        blade = held_flexure.held_blade(whole, p.thickness, p.width, m.young, m.poisson, m.shear)
+            return (held_flexure.held_blade(p.length, p.thickness, p.width, m.young, m.poisson, stated_shear(m)),)
+        blade = held_flexure.held_blade(whole, p.thickness, p.width, m.young, m.poisson, stated_shear(m))
         return (replace(blade, length=p.length, whole=whole),)
 
     def section(self, p: SimpleNamespace) -> Sequence[Any]:
@@ -178,7 +183,7 @@ class Wire(Beam):
     def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
         """One piece of round section. Source: S1 eq. (24), with shear where it is not slender."""
         segment = flexure.wire_segment if self.slender else held_flexure.timoshenko_wire
-        return (segment(p.length, p.diameter, m.young, m.poisson, m.shear),)
+        return (segment(p.length, p.diameter, m.young, m.poisson, stated_shear(m)),)
 
     def section(self, p: SimpleNamespace) -> Sequence[Any]:
         """Area and section moduli of the round section."""
@@ -219,8 +224,8 @@ class Strut(Beam):
     def segments(self, p: SimpleNamespace, m: SimpleNamespace) -> tuple[Segment, ...]:
         """Three pieces, wire, rod, wire. Source: S1 section 5.2, with shear where it is not slender."""
         segment = flexure.wire_segment if self.slender else held_flexure.timoshenko_wire
-        wire = segment(p.wire_length, p.wire_diameter, m.young, m.poisson, m.shear)
-        return wire, segment(p.length - 2 * p.wire_length, p.rod_diameter, m.young, m.poisson, m.shear), wire
+        wire = segment(p.wire_length, p.wire_diameter, m.young, m.poisson, stated_shear(m))
+        return wire, segment(p.length - 2 * p.wire_length, p.rod_diameter, m.young, m.poisson, stated_shear(m)), wire
 
     def section(self, p: SimpleNamespace) -> Sequence[Any]:
         """Area and section moduli of its wires."""
@@ -259,7 +264,8 @@ class CircularHinge(Flexible):
         plane are 8 to 9 % stiffer and those in it 2 % softer.
         """
         h = self.hinge.geometry(p.hinge, E=m.young, nu=m.poisson)
-        G = h.G if m.shear is None else m.shear
+        shear = stated_shear(m)
+        G = h.G if shear is None else shear
         plane = self.hinge.planar(p.hinge, E=m.young, nu=m.poisson)
         turn, across, coupled = circular_hinge.out_of_plane(h.R, h.t, h.b, h.E, G)
         held = circular_hinge.locked(h.R, h.t, h.b, h.E, h.G)
