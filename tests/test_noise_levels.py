@@ -156,16 +156,23 @@ def test_a_stated_deviation_stands_where_nothing_else_tells_and_yields_to_a_rest
     assert two.sd[0] == pytest.approx(2e-9, rel=SIGMAS / np.sqrt(2 * n))
 
 
-@pytest.mark.parametrize("steps, counts", [(0.5, False), (4.0, True)])
-def test_rounding_counts_where_it_is_larger_than_the_noise(steps, counts, rng):
-    """A step q adds q^2/12 to what is not known of a reading on the move."""
-    sd = 1e-9
+@pytest.mark.parametrize("steps", [0.5, 1.8, 2.2, 3.0, 4.0, 6.0])
+def test_a_rest_tells_the_noise_of_a_motion_beside_steps_of_any_size(steps, rng):
+    """On the move a step q adds q^2/12 to the noise, however much of it a rest in the middle of a step shows: of steps of six deviations
+    16 readings of 6,000 have left theirs."""
+    sd, n = 1e-9, 6000
     q = steps * sd
-    rest = np.round(noise(rng, 6000, sd) / q) * q
-    floor = np.std(rest)
+    rest = np.round(noise(rng, n, sd) / q) * q
     found = estimate_noise(recording(record(rest, "rest")), SETTLING)
-    wanted = np.hypot(floor, q / np.sqrt(12)) if counts else floor
-    assert found.floor[0] == pytest.approx(wanted, rel=SIGMAS / np.sqrt(2 * 6000))
+    # four deviations of a level that so many readings tell
+    assert found.floor[0] == pytest.approx(np.hypot(sd, q / np.sqrt(12)), rel=SIGMAS / np.sqrt(2 * n))
+
+
+@pytest.mark.parametrize("steps", [2.5, 3.2])
+def test_the_colour_of_what_a_rest_shows_beside_its_steps_is_kept(steps, rng):
+    rest = np.round(noise(rng, 6000, 1e-9 * np.sqrt(1 - 0.6**2), (0.6,)) / (steps * 1e-9)) * steps * 1e-9
+    found = estimate_noise(recording(record(rest, "rest")), SETTLING)
+    assert len(found.ar[0]) and found.floor[0] == pytest.approx(1e-9 * np.hypot(1, steps / np.sqrt(12)), rel=0.08)
 
 
 @pytest.mark.parametrize("repeats", [3, 20])

@@ -255,10 +255,19 @@ def repeatability(records: tuple[Record, ...], i: int) -> tuple[float, int]:
 def _with_rounding(sd: float, a: np.ndarray, rounding: float) -> tuple[float, np.ndarray]:
     """Noise of a device that moves, from noise at rest and the standard deviation of the rounding error [SI].
 
-    A quantisation step above the noise hides it at rest, and on the move its rounding error is white noise itself.
+    A quantisation step q above the noise hides it at rest, and on the move its rounding error is white noise itself. Readings that scatter
+    by s < q/2 about the middle of a step cross its ends with the probability s^2/q^2, which those of a normal deviation sigma do with
+
+        s^2/q^2 = 2 Q(q/(2 sigma)),   on the move sigma^2 + q^2/12   (B. Widrow, I. Kollar, Quantization Noise, 2008);
+
+    about an end of a step they scatter more. What is seen of the colour of the noise is kept where it is more than the rounding.
     """
-    floor = stationary_deviation(sd, a)
-    return (float(np.hypot(rounding, floor)), np.zeros(0)) if rounding > floor else (sd, a)
+    floor, step = stationary_deviation(sd, a), rounding * np.sqrt(12.0)
+    if not 0 < floor < step / 2:
+        return (max(sd, rounding), a) if floor else (rounding, np.zeros(0))
+    sigma = step / 2 / float(stats.norm.isf((floor / step) ** 2 / 2))
+    moving = float(np.hypot(sigma, rounding))
+    return (sd * moving / floor, a) if floor > rounding else (moving, np.zeros(0))
 
 
 def _third_differences(record: Record, i: int) -> list[np.ndarray]:
