@@ -24,7 +24,7 @@ class DirectionalFriction(Effect):
         Param("reach", "travel", (1e-6, 0.03), "displacement over which the contact yields"),
     )
     at_bounds = itself("skew", "reach")
-    plainer = Plainer("coulomb", {"skew": 0.0}, {"smoothing": SHARPEST})
+    plainer = Plainer("coulomb", {"skew": 0.0}, {"smoothing": SHARPEST}, constant="skew")
     states = (State("z", "1", 1.0), State("w", "1", 1.0))
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

@@ -32,7 +32,7 @@ def swapped(trials: Trials, current: CandidateModel, before: int) -> CandidateMo
     of time alone not that of a law that acts with the motion and is told from it by errors of form alone."""
     causes, compare = len(current.causes), trials.selection
     for k in range(before if causes == before + 1 else causes):
-        for rival in replacements(trials, current, k):
+        for rival in (*replacements(trials, current, k), *beside_offsets(trials, current, k)):
             takes_place = explains_better(compare, rival, current) or is_commoner(compare, rival, current)
             takes_place &= not follows_the_motion_as_well(current, k, rival)
             if takes_place and not trials.objections(rival, current.causes):
@@ -182,6 +182,7 @@ def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Rou
         *plainer,
         *replacements(trials, current, k),
         *twins(trials, current, k),
+        *(offsets := beside_offsets(trials, current, k)),
         *_in_place_of(k, there, tried),
     ]
     hidden = hidden_rivals(trials, current, k, candidates)
@@ -189,7 +190,9 @@ def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Rou
     slack = SEARCH.bound_slack if stands_for_another(current.fit, k) else 0.0
 
     def is_alike(t: CandidateModel) -> bool:
-        return t in plainer or t in hidden or explains_alike(trials.selection, t, current, slack)
+        # the numbers of two laws in place of one are no reason to believe that one
+        more = SEARCH.bound_slack if t in offsets else slack
+        return t in plainer or t in hidden or explains_alike(trials.selection, t, current, more)
 
     alike = {
         t.cause: t
@@ -214,6 +217,27 @@ def rivals(trials: Trials, current: CandidateModel, k: int, rounds: Sequence[Rou
         return tuple(t for t in trials.selection.ranked(models) if not trials.objections(t, there))
 
     return sound(list(alike.values())), sound(unlikely)
+
+
+def beside_offsets(trials: Trials, current: CandidateModel, k: int) -> list[CandidateModel]:
+    """The model with the plainer law and an offset in the place of cause k, of which a part is a constant once the stage has moved: of
+    each offset that is offered and not there, as its cause, the best first. Friction that differs by direction is friction alike and a
+    sensor that does not read zero."""
+    cause = current.causes[k]
+    plain = plainer(cause)
+    relation = None if plain is None else cause.law.plainer
+    if plain is None or relation is None or not relation.constant or plain not in trials.screen.hypotheses:
+        return []
+    begun = current.fit.restarted.without(k).with_cause(plain, plainer_start(current.fit, k, plain))
+    there = {h.effect for h in current.causes}
+    offsets = [h for h in trials.screen.hypotheses if h.effect != PARAMETER and h.prior.constant]
+    offsets = [h for h in offsets if h.at == cause.at and h.effect not in there]
+
+    def one(branch: Trials, offset: Hypothesis) -> list[CandidateModel]:
+        return branch.tried(begun.with_cause(offset, {offset.law.amplitude().name: 0.0}), offset)
+
+    tried = trials.each(one, offsets, lambda offset: f"{trying(plain, offset)} instead")
+    return trials.selection.ranked([trials.converged(t) for fitted in tried for t in fitted])
 
 
 def _in_place_of(k: int, there: Sequence[Hypothesis], tried: Sequence[CandidateModel]) -> list[CandidateModel]:

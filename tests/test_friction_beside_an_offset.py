@@ -1,0 +1,60 @@
+"""Friction alike both ways of a stage whose sensor, or amplifier, does not read zero is no friction that differs by direction."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from axis_records import AXIS, NOISE, H, K, move, record
+
+import ctrlgen
+from ctrlgen.recordings.recording import Recording
+
+N, REACH, FRICTION = 2000, 3e-6, 0.3  # rows, m, N
+LAWS = ("coulomb", "directional_friction", "home_offset", "drive_offset", "stribeck", "stiffening")
+
+
+def rubbing(skew: float):
+    """Dahl's friction, larger forward by `skew` of it once the contact has slid."""
+
+    def force(now, q, v, memory):
+        z, w, before = memory or (0.0, 0.0, 0.0)
+        step = q - before
+        z += (step - abs(step) * z) / REACH
+        w += abs(step) * (1 - w) / REACH
+        return -FRICTION * (z + skew * w), (z, w, q)
+
+    return force
+
+
+def diagnosed(force, zero: float):
+    rng, t = np.random.default_rng(2), H * np.arange(N)
+    parts = [record(np.zeros(400), zero + NOISE * rng.standard_normal(400), "rest")]
+    fit = 0.9 * np.sin(2 * np.pi * 1.3 * t) + 0.25 * np.sin(2 * np.pi * 9.7 * t)
+    held = 0.8 * np.sin(2 * np.pi * 1.9 * t + 1) + 0.3 * np.sin(2 * np.pi * 6.1 * t)
+    for role, u in (("fit", fit), ("hold_out", held)):
+        u = np.minimum(t / 0.1, 1.0) * u
+        y = move(u, force, fine=50) + zero + NOISE * rng.standard_normal(N)
+        parts.append(record(u, y, role))
+    recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (None,), tuple(parts), ())
+    return ctrlgen.diagnose(AXIS, recording, laws=LAWS, jobs=1)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("zero", [4e-7, -1.2e-6])
+def test_a_sensor_that_does_not_read_zero_makes_no_friction_differ_by_direction(zero):
+    answer = diagnosed(rubbing(0.0), zero)
+    named = {f.effect: f for f in answer.findings}
+    assert "coulomb" in named and "directional_friction" not in named
+    assert named["coulomb"].parameters["force"].value == pytest.approx(FRICTION, rel=0.02)
+    offset = next(f for f in answer.findings if f.effect in ("home_offset", "drive_offset"))
+    told = {offset.effect, *(a.effect for a in offset.alternatives)}
+    assert "home_offset" in told
+    size = offset.parameters["offset"].value * (1e-6 if offset.effect == "home_offset" else 10.0 / K)
+    assert size == pytest.approx(zero, rel=0.05)
+
+
+@pytest.mark.long
+def test_friction_that_differs_by_direction_is_told_or_told_from_an_offset_by_nothing():
+    answer = diagnosed(rubbing(0.3), 0.0)
+    named = {f.effect for f in answer.findings} | {a.effect for f in answer.findings for a in f.alternatives}
+    assert "directional_friction" in named and named & {"coulomb", "directional_friction", "drive_offset"}
