@@ -47,7 +47,8 @@ def fit_candidates(
     if not alone:
         candidates = (*candidates, *fit_in_regions(trials, current, screened, candidates))
     candidates = (*candidates, *as_meant(trials, current, candidates))
-    candidates = (*candidates, *finer_at_once(trials, current, candidates))
+    if not alone:
+        candidates = (*candidates, *finer_at_once(trials, current, candidates))
     candidates = (*candidates, *finer_forms(trials, current))
     candidates = (*candidates, *fit_other_clocks(trials, current, () if alone else candidates))
     candidates = (*candidates, *fit_own_shifts(trials, current))
