@@ -10,24 +10,29 @@ import numpy as np
 import pytest
 from axis_records import AXIS, H, move, record
 from axis_records import NOISE as READ
+from conftest import AXIS_FILE, ROOT
 from play_records import NOISE, SERVO, N, lagging, moved
 from recovery import fitter_of
 
+from ctrlgen import build_model, load_device
+from ctrlgen.core.errors import InputError
 from ctrlgen.core.files import validate
 from ctrlgen.devices import Device
-from ctrlgen.diagnosis.selection.candidates import finer_forms
+from ctrlgen.diagnosis.selection.finer_forms import can_have, finer_forms
 from ctrlgen.diagnosis.selection.model_selection import ModelSelection
 from ctrlgen.diagnosis.selection.rivals import simplified
 from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.search import Searcher
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import SEARCH
-from ctrlgen.effects import Effect
+from ctrlgen.effects import Effect, Place
+from ctrlgen.estimation.device_with_causes import device_with_causes
 from ctrlgen.estimation.error_model import ErrorModel
-from ctrlgen.estimation.hypothesis import Hypothesis
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, hypotheses, nominal_physics
 from ctrlgen.estimation.noise import Noise, NoiseSource
 from ctrlgen.estimation.priors import prior_of
 from ctrlgen.estimation.structure import Structure
+from ctrlgen.model.effect_terms import channels
 
 OFFERED = [Hypothesis(kind, "stage:axis", "axis") for kind in ("displacement_hysteresis", "backlash", "creep")]
 TWO_GROUPS = np.r_[np.linspace(1e-6, 3e-6, 80), np.linspace(2e-5, 3e-5, 20)]  # half widths of plays of equal weight [m]
@@ -275,3 +280,24 @@ def test_two_groups_of_plays_are_one_hysteresis_and_nothing_beside_it():
 @pytest.mark.long
 def test_plays_of_even_weights_keep_the_plain_law():
     assert [c.effect for c in found(EVEN).causes] == ["displacement_hysteresis"]
+
+
+DEVICES = [*sorted((ROOT / "scenarios" / "devices").glob("*.toml")), AXIS_FILE]
+
+
+@pytest.mark.parametrize("file", DEVICES, ids=[file.stem for file in DEVICES])
+def test_a_finer_form_is_tried_on_devices_that_can_have_it_alone(file):
+    """Of every law that a device of settled poses is offered: a model is made of the forms that are tried, and of the others none."""
+    device = load_device(file)
+    physics = nominal_physics(device)
+    readings = tuple(f"reading.{c.name}" for c in channels(physics, Place.SENSOR))
+    kinds = {h.effect: h for h in hypotheses(device, physics, readings, None, False) if h.effect != PARAMETER}
+    for finer in (f for h in kinds.values() for f in h.finer):
+        channel = finer.channel_on(device)
+        numbers = {p.name: channel.si(p.bounds[1] / 2, p) for p in finer.law.params}
+        stated = device_with_causes(device, (finer,), (numbers,))
+        if can_have(device, finer):
+            build_model(stated)
+        else:
+            with pytest.raises(InputError, match="does not fit this device"):
+                build_model(stated)

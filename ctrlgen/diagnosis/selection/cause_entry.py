@@ -20,6 +20,11 @@ def cause_noun(cause: Hypothesis) -> str:
     return f"a wrong {cause.location}" if cause.effect == PARAMETER else cause_name(cause)
 
 
+def trying(*causes: Hypothesis) -> str:
+    """The message of progress while `causes` are tried."""
+    return "trying " + ", ".join(f"{c.effect} at {c.location}" for c in causes)
+
+
 class EffectAt(Keys):
     """An effect at a location."""
 

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round, linearised_optimum
-from ctrlgen.diagnosis.selection.candidates import significant, trying
+from ctrlgen.diagnosis.selection.candidates import significant
+from ctrlgen.diagnosis.selection.cause_entry import trying
 from ctrlgen.diagnosis.selection.confusable import explains_alike, explains_better, is_commoner
 from ctrlgen.diagnosis.selection.failures import FAILURES
 from ctrlgen.diagnosis.selection.form_errors import follows_the_motion_as_well, hardly_told, hidden_rivals

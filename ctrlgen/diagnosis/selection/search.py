@@ -20,10 +20,11 @@ from ctrlgen.devices import Device
 from ctrlgen.diagnosis.selection.attribution import Attribution, attribute
 from ctrlgen.diagnosis.selection.begun_again import begun_again
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round
-from ctrlgen.diagnosis.selection.candidates import finer_forms, fit_candidates, restart_elsewhere, takes_away_much
+from ctrlgen.diagnosis.selection.candidates import fit_candidates, restart_elsewhere, takes_away_much
 from ctrlgen.diagnosis.selection.confusable import explains_alike
 from ctrlgen.diagnosis.selection.ends_of_readings import limits_where_readings_pile_up
 from ctrlgen.diagnosis.selection.failures import FAILURES
+from ctrlgen.diagnosis.selection.finer_forms import finer_forms
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.not_taken import not_taken
 from ctrlgen.diagnosis.selection.other_laws import stands_for_another, takes_over
