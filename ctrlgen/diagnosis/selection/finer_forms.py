@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.cause_entry import trying
+from ctrlgen.diagnosis.selection.failures import FAILURES
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import SEARCH
 from ctrlgen.estimation.hypothesis import DataHints, Hypothesis, nominal_physics
@@ -51,8 +52,11 @@ def _in_finer_forms(
 
         shapes = finer.shapes(finer.channel_on(others.device), peaks(finer, others.device), begun({}))
         starts = [others.with_cause(finer, shape | begun(shape)) for shape in shapes]
-        if len(starts) > 1:
-            starts = sorted(starts, key=branch.fitter.rough_objective)[: SEARCH.restarts]
+        try:
+            starts = sorted(starts, key=branch.fitter.rough_objective)[: SEARCH.restarts] if len(starts) > 1 else starts
+        except FAILURES as error:
+            branch.note_failure(finer, error)
+            return []
         # a finer form that leaves more than the plain one is none
         fitted = branch.tried(starts[0], finer, steps=FIT.max_steps, enough=model.fit.objective)
         return [branch.begun_better(t, starts[1:]) for t in fitted]
