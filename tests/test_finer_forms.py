@@ -282,12 +282,13 @@ def test_plays_of_even_weights_keep_the_plain_law():
     assert [c.effect for c in found(EVEN).causes] == ["displacement_hysteresis"]
 
 
-DEVICES = [*sorted((ROOT / "scenarios" / "devices").glob("*.toml")), AXIS_FILE]
+DEVICES = [AXIS_FILE, *sorted(ROOT.glob("scenarios/devices/*.toml")), *sorted(ROOT.glob("scenarios/*/device.toml"))]
 
 
-@pytest.mark.parametrize("file", DEVICES, ids=[file.stem for file in DEVICES])
+@pytest.mark.parametrize("file", DEVICES, ids=["/".join(file.parts[-2:]) for file in DEVICES])
 def test_a_finer_form_is_tried_on_devices_that_can_have_it_alone(file):
-    """Of every law that a device of settled poses is offered: a model is made of the forms that are tried, and of the others none."""
+    """Of every law that a device of settled poses is offered: a model is made in which all numbers of the forms that are tried act, and of
+    the others none."""
     device = load_device(file)
     physics = nominal_physics(device)
     readings = tuple(f"reading.{c.name}" for c in channels(physics, Place.SENSOR))
@@ -296,8 +297,9 @@ def test_a_finer_form_is_tried_on_devices_that_can_have_it_alone(file):
         channel = finer.channel_on(device)
         numbers = {p.name: channel.si(p.bounds[1] / 2, p) for p in finer.law.params}
         stated = device_with_causes(device, (finer,), (numbers,))
+        paths = [f"effect[{len(device.effect)}].{name}" for name in numbers]
         if can_have(device, finer):
-            build_model(stated)
+            assert set(paths) <= set(build_model(stated, paths).moved_by)
         else:
             with pytest.raises(InputError, match="does not fit this device"):
-                build_model(stated)
+                build_model(stated, paths)

@@ -19,6 +19,7 @@ REQUIREMENTS: Mapping[str, str] = MappingProxyType(
         "sample_time": "a sample time",
         "second_order_kinematics": "the second-order kinematics of the links, and a pose that is without it",
         "spatial": "a pose of six components",
+        "spring": "a stage that pulls home",
         "state": "heaters, whose temperature it reads",
         "tangent_compliance": "the tangent compliance of the stages",
         "unheated": "actuators without heaters",

@@ -19,7 +19,7 @@ class FrictionOfLoad(Effect):
     place = Place.FORCE
     family = Family.FRICTION
     set_valued = True
-    requires = frozenset({"velocity", "force"})
+    requires = frozenset({"velocity", "spring"})
     source = (
         "P. R. Dahl, AIAA Journal 14 (1976) 1675: solid friction damping; in proportion to the load: Amontons (1699)"
     )

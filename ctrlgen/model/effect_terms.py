@@ -297,6 +297,7 @@ def available(physics: DevicePhysics, sample_time: float | None = None) -> froze
         "displacement_command": balanced and same_dimension(physics.force_unit, physics.travel_unit),
         "force": any(same_dimension(physics.force_unit, unit) for unit in ("N", "N*m")),
         "spatial": len(physics.components) == 6,
+        "spring": _pulls_home(physics),
         "voltage": any(same_dimension(unit, "V") for unit in physics.drive.units),
         "second_order_kinematics": physics.second_order_kinematics is not None,
         "tangent_compliance": isinstance(physics, BalancedPhysics) and physics.tangent_compliance is not None,
@@ -308,6 +309,12 @@ def in_loop(physics: DevicePhysics) -> bool:
     """Whether a feedback loop acts on the readings."""
     loop = physics.feedback if isinstance(physics, InertialPhysics) else None
     return loop is not None and loop.measures == "reading"
+
+
+def _pulls_home(physics: DevicePhysics) -> bool:
+    """Whether the restoring force depends on the displacement: not that of a stage whose stiffness is zero."""
+    d = ca.SX.sym("d", len(physics.axes))
+    return bool(ca.depends_on(ca.densify(ca.SX(physics.restoring_force(d))), d))
 
 
 def _has_heaters(physics: DevicePhysics) -> TypeGuard[BalancedPhysics]:

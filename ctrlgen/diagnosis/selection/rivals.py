@@ -229,6 +229,9 @@ def beside_offsets(trials: Trials, current: CandidateModel, k: int) -> list[Cand
     relation = None if plain is None else cause.law.plainer
     if plain is None or relation is None or not relation.constant or plain not in trials.screen.hypotheses:
         return []
+    # a part below a hundredth of the law's squares has no name, as an offset has none
+    if current.fit.values(k)[relation.constant] ** 2 < MODEL_SELECTION.least_share:
+        return []
     begun = current.fit.restarted.without(k).with_cause(plain, plainer_start(current.fit, k, plain))
     there = {h.effect for h in current.causes}
     offsets = [h for h in trials.screen.hypotheses if h.effect != PARAMETER and h.prior.constant]
