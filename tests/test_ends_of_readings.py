@@ -40,6 +40,7 @@ def stiffer(now, q, v, memory):
     return -CUBIC * q**3, 0.0
 
 
+@pytest.mark.long
 def test_what_else_is_left_out_is_found_beside_the_limit_of_the_sensor():
     """A cubic spring looks like one that levels off together with the limit, and is none of the laws that take most away alone."""
     answer = diagnosed(stiffer, (-1.0, 3.1e-5))
@@ -49,6 +50,7 @@ def test_what_else_is_left_out_is_found_beside_the_limit_of_the_sensor():
     assert found["sensor_limit"].parameters["level"].value == pytest.approx(31.0, abs=0.01)
 
 
+@pytest.mark.long
 def test_a_stop_that_hardly_gives_is_no_limit_of_the_sensor():
     """The reading stands there too, and the stage comes away from a stop later than a sensor that has lost it finds it again."""
 
