@@ -10,7 +10,7 @@ import ctrlgen
 from ctrlgen.recordings.recording import Recording
 
 N, REACH, FRICTION = 2000, 3e-6, 0.3  # rows, m, N
-LAWS = ("coulomb", "directional_friction", "home_offset", "drive_offset", "stribeck", "stiffening")
+LAWS = ("coulomb", "directional_friction", "home_offset", "drive_offset", "zero_per_record", "stribeck", "stiffening")
 
 
 def rubbing(skew: float):
