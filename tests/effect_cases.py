@@ -98,6 +98,7 @@ SUGGESTED = {
     "warmer": (-0.3, 0.2),
     "middles": (-0.3, 0.4),
     "lengths": (0.1, 0.6),
+    "reading_ends": (-0.3, 0.2),
 }
 
 

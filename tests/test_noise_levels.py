@@ -156,16 +156,16 @@ def test_a_stated_deviation_stands_where_nothing_else_tells_and_yields_to_a_rest
     assert two.sd[0] == pytest.approx(2e-9, rel=SIGMAS / np.sqrt(2 * n))
 
 
+@pytest.mark.parametrize("at", [0.0, 0.2, 0.3])
 @pytest.mark.parametrize("steps", [0.5, 1.8, 2.2, 3.0, 4.0, 6.0])
-def test_a_rest_tells_the_noise_of_a_motion_beside_steps_of_any_size(steps, rng):
-    """On the move a step q adds q^2/12 to the noise, however much of it a rest in the middle of a step shows: of steps of six deviations
-    16 readings of 6,000 have left theirs."""
+def test_a_rest_tells_the_noise_of_a_motion_beside_steps_of_any_size(steps, at, rng):
+    """On the move a step q adds q^2/12 to the noise, however much of it a rest shows that stands `at` so many steps from the middle of
+    one: to 8 %, as little is known of an end of a step that hardly any reading has left."""
     sd, n = 1e-9, 6000
     q = steps * sd
-    rest = np.round(noise(rng, n, sd) / q) * q
+    rest = np.round(noise(rng, n, sd) / q + at) * q
     found = estimate_noise(recording(record(rest, "rest")), SETTLING)
-    # four deviations of a level that so many readings tell
-    assert found.floor[0] == pytest.approx(np.hypot(sd, q / np.sqrt(12)), rel=SIGMAS / np.sqrt(2 * n))
+    assert found.floor[0] == pytest.approx(np.hypot(sd, q / np.sqrt(12)), rel=0.08)
 
 
 @pytest.mark.parametrize("steps", [2.5, 3.2])

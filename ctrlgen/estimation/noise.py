@@ -194,7 +194,8 @@ def _of_series(recording: Recording, i: int, settling: float) -> _ChannelNoise:
         long = [s for s in stretches if len(s) >= NOISE.shortest_stretch and np.ptp(s) > 0]
         quiet = without_events([without_lines(detrended(s, degree)) for s in long])
         if quiet:
-            found = _from_stretches(quiet, source, rounding, degree + 1)
+            beneath = None if source is NoiseSource.PERIODS else _beneath_steps(long, rounding * np.sqrt(12.0))
+            found = _from_stretches(quiet, source, rounding, degree + 1, beneath)
             ratio = (
                 stationary_deviation(found.sd, found.ar) / stated if stated and source is NoiseSource.DWELLS else 0.0
             )
@@ -204,7 +205,7 @@ def _of_series(recording: Recording, i: int, settling: float) -> _ChannelNoise:
                 f"; in dwells of the drive it scatters by {ratio:.2g} times that, which is taken for motion"
             )
     if stated:
-        sd, _ = _with_rounding(stated, np.zeros(0), rounding)
+        sd, _ = _with_rounding(stated, np.zeros(0), rounding, None)
         return _ChannelNoise(sd, NoiseSource.STATED_WHITE, NOISE.stated_samples, stated_details)
     deviation, n = fastest_part(recording, i)
     # third differences of white noise have 1 + 9 + 9 + 1 = 20 times its variance
@@ -222,7 +223,9 @@ def fastest_part(recording: Recording, i: int) -> tuple[float, int]:
     return max(deviation(np.concatenate(thirds)), least, 1e-300), sum(map(len, thirds))
 
 
-def _from_stretches(stretches: list[np.ndarray], source: NoiseSource, rounding: float, removed: int) -> _ChannelNoise:
+def _from_stretches(
+    stretches: list[np.ndarray], source: NoiseSource, rounding: float, removed: int, beneath: float | None
+) -> _ChannelNoise:
     """The autoregressive noise of stretches of pure noise.
 
     A polynomial with as many coefficients as were `removed` takes the power of so many of the L/tau independent samples of a
@@ -231,7 +234,7 @@ def _from_stretches(stretches: list[np.ndarray], source: NoiseSource, rounding: 
     innovation, a = autoregression(stretches)
     tau = (innovation / max(1 - float(np.sum(a)), 1e-3) / max(stationary_deviation(innovation, a), 1e-300)) ** 2
     kept = sum(max(len(s) - removed * max(tau, 1.0), len(s) / 2) for s in stretches) / sum(map(len, stretches))
-    sd, a = _with_rounding(innovation / np.sqrt(kept), a, rounding)
+    sd, a = _with_rounding(innovation / np.sqrt(kept), a, rounding, beneath)
     n, ratio = sum(map(len, stretches)), stationary_deviation(sd, a) / sd
     details = f", {number_of(n, 'sample')}, autoregressive of order {len(a)}"
     if ratio > NOISE.slow_ratio:
@@ -252,22 +255,37 @@ def repeatability(records: tuple[Record, ...], i: int) -> tuple[float, int]:
     return float(np.sqrt(np.sum((y - mean[group]) ** 2) / max(count, 1))), count
 
 
-def _with_rounding(sd: float, a: np.ndarray, rounding: float) -> tuple[float, np.ndarray]:
-    """Noise of a device that moves, from noise at rest and the standard deviation of the rounding error [SI].
+def _with_rounding(sd: float, a: np.ndarray, rounding: float, beneath: float | None) -> tuple[float, np.ndarray]:
+    """Noise of a device that moves, from noise at rest and the standard deviation of the rounding error [SI]; `beneath`, that of what was
+    rounded, where the steps of the readings tell it.
 
-    A quantisation step q above the noise hides it at rest, and on the move its rounding error is white noise itself. Readings that scatter
-    by s < q/2 about the middle of a step cross its ends with the probability s^2/q^2, which those of a normal deviation sigma do with
-
-        s^2/q^2 = 2 Q(q/(2 sigma)),   on the move sigma^2 + q^2/12   (B. Widrow, I. Kollar, Quantization Noise, 2008);
-
-    about an end of a step they scatter more. What is seen of the colour of the noise is kept where it is more than the rounding.
+    A quantisation step above the noise hides it at rest, and on the move its rounding error is white noise itself. What is seen of the
+    colour of the noise is kept where it is more than the rounding.
     """
-    floor, step = stationary_deviation(sd, a), rounding * np.sqrt(12.0)
-    if not 0 < floor < step / 2:
-        return (max(sd, rounding), a) if floor else (rounding, np.zeros(0))
-    sigma = step / 2 / float(stats.norm.isf((floor / step) ** 2 / 2))
-    moving = float(np.hypot(sigma, rounding))
+    floor = stationary_deviation(sd, a)
+    if beneath is None and floor >= rounding:
+        return sd, a
+    moving = float(np.hypot(rounding, floor if beneath is None else beneath))
     return (sd * moving / floor, a) if floor > rounding else (moving, np.zeros(0))
+
+
+def _beneath_steps(stretches: list[np.ndarray], step: float) -> float | None:
+    """Standard deviation [SI] of normal noise that leaves one step q of the readings now and then: where it is m above the middle of the
+    step, it leaves the step upward and downward with the probabilities p and p',
+
+        z(p) = (q/2 - m)/sigma,   z(p') = (q/2 + m)/sigma,   sigma = q/(z(p) + z(p')),   p = Q(z)
+
+    (B. Widrow, I. Kollar, Quantization Noise, 2008); of an end that was not left p is half a reading. None where a third of the readings
+    or more are elsewhere: what they scatter by tells it then.
+    """
+    left, n = np.zeros(2), 0
+    for y in stretches if step > 0 else ():
+        code = np.round((y - np.median(y)) / step)
+        left += [np.sum(code > 0), np.sum(code < 0)]
+        n += len(y)
+    if n == 0 or left.sum() > n / 3:
+        return None
+    return step / float(np.sum(stats.norm.isf(np.maximum(left, 0.5) / n)))
 
 
 def _third_differences(record: Record, i: int) -> list[np.ndarray]:
