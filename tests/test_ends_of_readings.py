@@ -73,6 +73,14 @@ def test_a_pile_is_told_from_a_motion_that_turns(high, low, told):
     assert piled_ends([part], 0, 1e-3) == pytest.approx(told, abs=1e-3)
 
 
+@pytest.mark.parametrize(("noise", "told"), [(0.005, True), (0.05, False), (0.3, False)])
+def test_a_sensor_that_reads_little_more_than_noise_has_no_ends(noise, told):
+    rng = np.random.default_rng(1)
+    u = 3 * np.sin(2 * np.pi * 0.011 * np.arange(3000))
+    part = record(u, np.clip(u, -0.9, 0.9) + noise * rng.standard_normal(3000), "fit")
+    assert bool(piled_ends([part], 0, noise)) is told
+
+
 def test_a_drive_that_dwells_there_makes_no_pile():
     rng = np.random.default_rng(1)
     u = np.clip(np.sin(2 * np.pi * 0.011 * np.arange(3000)), -1.0, 0.9)

@@ -56,9 +56,10 @@ def piled_ends(records: Sequence[Record], i: int, noise: float) -> list[float]:
     `PILES.moves` of its range: `PILES.fewest` of them or more within the `noise`, `PILES.crowd` times as many as beside them."""
     read = np.concatenate([r.observed[r.valid[:, i], i] for r in records] or [np.zeros(0)])
     drive = np.concatenate([r.drive[r.valid[:, i]] for r in records])
-    if not len(read) or not noise > 0:
+    width = PILES.width * noise
+    if not len(read) or not 0 < width < PILES.narrow * np.ptp(read):
         return []
-    span, width, ends = np.ptp(drive, axis=0), PILES.width * noise, []
+    span, ends = np.ptp(drive, axis=0), []
     for side in (1, -1):
         depth = float(np.max(side * read)) - side * read
         at_end, beside = depth < width, int(np.sum((depth >= width) & (depth < 2 * width)))

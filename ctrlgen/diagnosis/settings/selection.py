@@ -317,6 +317,8 @@ class PiledReadingsSettings:
 
     width: float = 8.0
     """Standard deviations of the noise in which those at one value are: four either way."""
+    narrow: float = 0.05
+    """Share of what the sensor reads that this may be at most: within more, any reading is near an end. Judgement."""
     fewest: int = 20
     """Readings below which a motion that turns there does it."""
     crowd: float = 6.0
