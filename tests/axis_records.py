@@ -83,6 +83,19 @@ def fitter_of(change=lambda u: move(u), after=lambda y: y, n=1500, seed=4) -> Fi
     return Fitter(recording, estimate_noise(recording, SETTLING))
 
 
+def runs_from_rest(force=None, read=lambda y: y, n=2000, seed=2) -> Recording:
+    """A rest, a run to fit and one to hold out that begin there, of an axis under another `force` as in `move`; `read` (position ->
+    reading without noise)."""
+    rng, t = np.random.default_rng(seed), H * np.arange(n)
+    parts = [record(np.zeros(400), read(np.zeros(400)) + NOISE * rng.standard_normal(400), "rest")]
+    fit = 0.9 * np.sin(2 * np.pi * 1.3 * t) + 0.25 * np.sin(2 * np.pi * 9.7 * t)
+    held = 0.8 * np.sin(2 * np.pi * 1.9 * t + 1) + 0.3 * np.sin(2 * np.pi * 6.1 * t)
+    for role, u in (("fit", fit), ("hold_out", held)):
+        u = np.minimum(t / 0.1, 1.0) * u
+        parts.append(record(u, read(move(u, force, fine=100)) + NOISE * rng.standard_normal(n), role))
+    return Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (None,), tuple(parts), ())
+
+
 def fine(u: np.ndarray, push: np.ndarray | float = 0.0) -> np.ndarray:
     """The position ten times a sample, under a drive held and another force `push` [N]."""
     A, B = np.array([[0, 1], [-K / M, -C / M]]), np.array([[0], [1 / M]])

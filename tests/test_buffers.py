@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from axis_records import AXIS, NOISE, H, move, record
+from axis_records import AXIS, runs_from_rest
 
 import ctrlgen
-from ctrlgen.recordings.recording import Recording
 
-N = 2000
 LAWS = (
     *("end_stop", "damped_stop", "stiffness_above", "stiffness_below", "stiffness_beyond", "viscous_above"),
     *("viscous_below", "coulomb_above", "coulomb_below", "coulomb", "stiffening", "quadratic_damping", "resonance"),
@@ -28,15 +26,7 @@ def touched(spring: float, damper: float, edge: float):
 
 
 def diagnosed(force):
-    rng, t = np.random.default_rng(2), H * np.arange(N)
-    parts = [record(np.zeros(400), NOISE * rng.standard_normal(400), "rest")]
-    fit = 0.8 * np.sin(2 * np.pi * 1.3 * t) + 0.25 * np.sin(2 * np.pi * 9.7 * t)
-    held = 0.7 * np.sin(2 * np.pi * 1.9 * t + 1) + 0.3 * np.sin(2 * np.pi * 6.1 * t)
-    for role, u in (("fit", fit), ("hold_out", held)):
-        u = np.minimum(t / 0.1, 1.0) * u
-        parts.append(record(u, move(u, force, fine=50) + NOISE * rng.standard_normal(N), role))
-    recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (None,), tuple(parts), ())
-    return ctrlgen.diagnose(AXIS, recording, laws=LAWS, jobs=1)
+    return ctrlgen.diagnose(AXIS, runs_from_rest(force), laws=LAWS, jobs=1)
 
 
 @pytest.mark.long

@@ -20,6 +20,7 @@ from ctrlgen.diagnosis.report.diagnosis_record import Provenance, diagnosis_reco
 from ctrlgen.diagnosis.report.html_report import page
 from ctrlgen.diagnosis.report.narrative import channel_sentence
 from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry
+from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.recordings.plausibility import Implausible
 from ctrlgen.reporting.result_file import json_text
 
@@ -128,6 +129,16 @@ def test_consistent_beyond_the_noise_needs_numbers_that_may_move_so_far_and_says
     assert told in contradictions(record | {"sentence": record["sentence"].replace(moved, "")})
     error["rms_refitted"] = 1.6
     assert told in contradictions(record)
+
+
+def test_an_answer_whose_size_is_not_told_says_so_and_contradicts_nothing(found):
+    """The law is named, as the nearest; 'explained' or 'partly' would not be believed."""
+    untold = tuple(dataclasses.replace(f, size_untold=True) for f in found.findings)
+    for verdict, sound_one in ((Verdict.UNEXPLAINED, True), (Verdict.PARTLY, False)):
+        answer = dataclasses.replace(found, verdict=verdict, findings=untold)
+        record = json.loads(json_text(diagnosis_record(answer, Provenance({}, 0))))
+        assert ("the records tell the size of no law that acts so; the nearest is " in record["sentence"]) is sound_one
+        assert (contradictions(record) == []) is sound_one
 
 
 @pytest.mark.parametrize("p, excused", [(0.2, True), (2e-5, False), (None, False)])

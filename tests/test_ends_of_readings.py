@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from axis_records import AXIS, NOISE, H, move, record
+from axis_records import AXIS, record, runs_from_rest
 
 import ctrlgen
 from ctrlgen.diagnosis.selection.ends_of_readings import piled_ends
-from ctrlgen.recordings.recording import Recording
 
-N = 2000
 CUBIC = 4e13  # N/m^3
 LAWS = (
     *("stiffening", "cubic_sensor", "sensor_saturation", "soft_saturation", "sensor_limit", "end_stop"),
@@ -18,22 +16,9 @@ LAWS = (
 )
 
 
-def drives() -> list[tuple[str, np.ndarray]]:
-    """From rest."""
-    t = H * np.arange(N)
-    fit = 1.1 * np.sin(2 * np.pi * 1.3 * t) + 0.25 * np.sin(2 * np.pi * 9.7 * t)
-    held = 0.9 * np.sin(2 * np.pi * 1.9 * t + 1) + 0.4 * np.sin(2 * np.pi * 5.1 * t)
-    return [("fit", np.minimum(t / 0.1, 1.0) * fit), ("hold_out", np.minimum(t / 0.1, 1.0) * held)]
-
-
 def diagnosed(force, limit: tuple[float, float]):
     """The answer for an axis under another `force`, whose sensor reads within `limit` [m]; its noise is behind that."""
-    rng = np.random.default_rng(2)
-    parts = [record(np.zeros(400), NOISE * rng.standard_normal(400), "rest")]
-    for role, u in drives():
-        parts.append(record(u, np.clip(move(u, force, fine=100), *limit) + NOISE * rng.standard_normal(N), role))
-    recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (None,), tuple(parts), ())
-    return ctrlgen.diagnose(AXIS, recording, laws=LAWS, jobs=1)
+    return ctrlgen.diagnose(AXIS, runs_from_rest(force, lambda y: np.clip(y, *limit)), laws=LAWS, jobs=1)
 
 
 def stiffer(now, q, v, memory):

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
-from axis_records import AXIS, NOISE, H, K, move, record
+from axis_records import AXIS, KF, K, runs_from_rest
 
 import ctrlgen
-from ctrlgen.recordings.recording import Recording
 
-N, REACH, FRICTION = 2000, 3e-6, 0.3  # rows, m, N
+REACH, FRICTION = 3e-6, 0.3  # m, N
 LAWS = ("coulomb", "directional_friction", "home_offset", "drive_offset", "zero_per_record", "stribeck", "stiffening")
 
 
@@ -27,16 +25,7 @@ def rubbing(skew: float):
 
 
 def diagnosed(force, zero: float):
-    rng, t = np.random.default_rng(2), H * np.arange(N)
-    parts = [record(np.zeros(400), zero + NOISE * rng.standard_normal(400), "rest")]
-    fit = 0.9 * np.sin(2 * np.pi * 1.3 * t) + 0.25 * np.sin(2 * np.pi * 9.7 * t)
-    held = 0.8 * np.sin(2 * np.pi * 1.9 * t + 1) + 0.3 * np.sin(2 * np.pi * 6.1 * t)
-    for role, u in (("fit", fit), ("hold_out", held)):
-        u = np.minimum(t / 0.1, 1.0) * u
-        y = move(u, force, fine=50) + zero + NOISE * rng.standard_normal(N)
-        parts.append(record(u, y, role))
-    recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (None,), tuple(parts), ())
-    return ctrlgen.diagnose(AXIS, recording, laws=LAWS, jobs=1)
+    return ctrlgen.diagnose(AXIS, runs_from_rest(force, lambda y: y + zero), laws=LAWS, jobs=1)
 
 
 @pytest.mark.long
@@ -49,7 +38,7 @@ def test_a_sensor_that_does_not_read_zero_makes_no_friction_differ_by_direction(
     offset = next(f for f in answer.findings if f.effect in ("home_offset", "drive_offset"))
     told = {offset.effect, *(a.effect for a in offset.alternatives)}
     assert "home_offset" in told
-    size = offset.parameters["offset"].value * (1e-6 if offset.effect == "home_offset" else 10.0 / K)
+    size = offset.parameters["offset"].value * (1e-6 if offset.effect == "home_offset" else KF / K)
     assert size == pytest.approx(zero, rel=0.05)
 
 

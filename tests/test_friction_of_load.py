@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
-from axis_records import AXIS, NOISE, H, K, move, record
+from axis_records import AXIS, K, runs_from_rest
 
 import ctrlgen
-from ctrlgen.recordings.recording import Recording
 
-N, REACH = 2000, 2e-6  # rows, m
+REACH = 2e-6  # m
 LAWS = (
     *("coulomb", "friction_of_load", "directional_friction", "coulomb_above", "coulomb_below", "coulomb_on_stretch"),
     *("viscous_above", "stribeck", "bouc_wen", "quadratic_damping", "stiffening", "drive_offset"),
@@ -29,15 +27,7 @@ def rubbing(least: float, of_load: float):
 
 
 def diagnosed(force):
-    rng, t = np.random.default_rng(2), H * np.arange(N)
-    parts = [record(np.zeros(400), NOISE * rng.standard_normal(400), "rest")]
-    fit = 0.9 * np.sin(2 * np.pi * 1.3 * t) + 0.25 * np.sin(2 * np.pi * 9.7 * t)
-    held = 0.8 * np.sin(2 * np.pi * 1.9 * t + 1) + 0.3 * np.sin(2 * np.pi * 6.1 * t)
-    for role, u in (("fit", fit), ("hold_out", held)):
-        u = np.minimum(t / 0.1, 1.0) * u
-        parts.append(record(u, move(u, force, fine=50) + NOISE * rng.standard_normal(N), role))
-    recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (None,), tuple(parts), ())
-    return ctrlgen.diagnose(AXIS, recording, laws=LAWS, jobs=1)
+    return ctrlgen.diagnose(AXIS, runs_from_rest(force), laws=LAWS, jobs=1)
 
 
 @pytest.mark.long

@@ -12,8 +12,8 @@ class Plainer:
 
     Both count in the units of the laws' bounds. Numbers of one name mean the same in both laws; where they do not,
     `Effect.as_plainer` translates them. `left`: parts in proportion to the signal, over the amplitude, which the law `kind` has not; of
-    each the law that says it beside `kind` at the same place. `constant`: the number whose part is
-    a constant once the stage has moved: an offset beside `kind` says the same.
+    each the law that says it beside `kind` at the same place. `constant`: the number whose part is a constant once the stage has moved: an
+    offset beside `kind` says the same.
     """
 
     kind: str

@@ -5,9 +5,10 @@ import casadi as ca
 from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, Plainer, ShapeBounds
 from ctrlgen.effects._bristles import BRISTLES, CONTACT, CREEPS, bristle_rate
 
-STRONGEST = (
-    1e3  # loads that occur over the one that doubles the friction: what is left of the friction at no load is nothing
-)
+LIGHTEST, HEAVIEST = (
+    1e-3,
+    1e3,
+)  # loads that double the friction, over those that occur: beyond, one of its two parts is nothing
 
 
 class FrictionOfLoad(Effect):
@@ -23,9 +24,9 @@ class FrictionOfLoad(Effect):
     source = (
         "P. R. Dahl, AIAA Journal 14 (1976) 1675: solid friction damping; in proportion to the load: Amontons (1699)"
     )
-    params = (*CONTACT, Param("load", "channel", (1 / STRONGEST, STRONGEST), "F_2: load that doubles it"))
+    params = (*CONTACT, Param("load", "channel", (LIGHTEST, HEAVIEST), "F_2: load that doubles it"))
     at_bounds = CREEPS | {"load": ShapeBounds(high="dry friction that is the same under every load")}
-    plainer = Plainer("coulomb", {"load": STRONGEST})
+    plainer = Plainer("coulomb", {"load": HEAVIEST})
     states = BRISTLES
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:

@@ -29,7 +29,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ctrlgen.physics.flexure import Segment, blade_segment, torsion_ratio, wire_segment
+from ctrlgen.physics.flexure import Segment, blade_segment, shear_over, torsion_ratio, wire_segment
 from ctrlgen.physics.screw import Scalar
 
 WIDEST, THICKEST = 5.0, 0.5
@@ -58,17 +58,16 @@ def thinned(r: Scalar, uv: tuple[float, float]) -> Scalar:
     return (1 + u * r) / (1 + v * r)
 
 
-def shear_share(x: Scalar, nu: Scalar, chi: Scalar | None = None) -> Scalar:
-    """S: deflection by shear over that by bending between held ends, x the depth over the length; `chi` G/E of a crystal."""
-    return (2 * (1 + nu) if chi is None else 1 / chi) * x**2 * (1 + 0.2 / (1 + 0.31 * x + 0.032 * x**2))
+def shear_share(x: Scalar, chi: Scalar) -> Scalar:
+    """S: deflection by shear over that by bending between held ends, x the depth over the length, `chi` G/E."""
+    return x**2 / chi * (1 + 0.2 / (1 + 0.31 * x + 0.032 * x**2))
 
 
-def warping_share(q: Scalar, r: Scalar, nu: Scalar, chi: Scalar | None = None) -> Scalar:
-    """Torsional compliance over l/GJ with ends that do not warp."""
+def warping_share(q: Scalar, r: Scalar, nu: Scalar, chi: Scalar) -> Scalar:
+    """Torsional compliance over l/GJ with ends that do not warp, `chi` G/E."""
     J = torsion_ratio(r, 1.0) / 4
     C = ((1 - r**2) / (1 + r**2)) ** 3.5 + LEAST_WARPING
-    stiff = 6 * (1 - nu) if chi is None else 12 * (1 - nu**2) * chi
-    m = ca.sqrt(stiff * (1 + 0.12 * nu**2) * J / C) / q
+    m = ca.sqrt(12 * (1 - nu**2) * chi * (1 + 0.12 * nu**2) * J / C) / q
     T = ca.tanh(m) / m
     return 1 - T + 4.12 * r**2 * T**2 * J
 
@@ -79,12 +78,11 @@ def held_blade(l: Scalar, t: Scalar, w: Scalar, E: Scalar, nu: Scalar, G: Scalar
 
     EI are those of bending alone; what is left of the deflection is counted as shear, and may be negative where the blade is thin.
     """
-    s, q, r, tau = blade_segment(l, t, w, E, nu, G), w / l, t / w, t / l
-    chi = None if G is None else G / E
+    s, q, r, tau, chi = blade_segment(l, t, w, E, nu, G), w / l, t / w, t / l, shear_over(E, nu, G)
     theta_z = 1 - nu**2 * (held_share(q * thinned(r, THETA_Z_THICK), THETA_Z) + 0.134 * tau)
-    delta_y = 1 - nu**2 * (held_share(q * thinned(r, DELTA_Y_THICK), DELTA_Y) + 0.924 * tau) + shear_share(tau, nu, chi)
+    delta_y = 1 - nu**2 * (held_share(q * thinned(r, DELTA_Y_THICK), DELTA_Y) + 0.924 * tau) + shear_share(tau, chi)
     theta_y = 1 - nu**2 * held_share(q * (1 + 3.73 * r), THETA_Y)
-    delta_z = 1 - nu**2 * held_share(q * (1 + 2.19 * r), DELTA_Z) + shear_share(q, nu, chi)
+    delta_z = 1 - nu**2 * held_share(q * (1 + 2.19 * r), DELTA_Z) + shear_share(q, chi)
     axial = 1 - nu**2 * held_share(q * (1 + 0.94 * r), AXIAL) * (1 + 0.6 * tau)
     return Segment(
         l,
@@ -106,5 +104,5 @@ def timoshenko_wire(l: Scalar, d: Scalar, E: Scalar, nu: Scalar, G: Scalar | Non
     Source: G. R. Cowper, J. Appl. Mech. 33 (1966) 335. `E` [Pa], `nu` [1].
     """
     s = wire_segment(l, d, E, nu, G)
-    shear = (2 * (1 + nu) / E if G is None else 1 / G) / s.area * (7 + 6 * nu) / (6 * (1 + nu))
+    shear = (7 + 6 * nu) / (6 * (1 + nu)) / (shear_over(E, nu, G) * E * s.area)
     return Segment(l, s.area, s.I_y, s.I_z, s.EA, s.EI_y, s.EI_z, s.GJ, shear, shear)

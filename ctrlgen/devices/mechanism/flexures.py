@@ -320,7 +320,7 @@ def _thick(ratio: float, slender: bool, what: str, nu: float) -> list[str]:
         return [f"{told}, which is no flexure: nothing was compared beyond {THICKEST:g}"]
     side = ratio * np.sqrt(np.pi) / 2
     bar, beam = held_flexure.held_blade(1.0, side, side, 1.0, nu), flexure.blade_segment(1.0, side, side, 1.0, nu)
-    free = 0.0 if slender else held_flexure.shear_share(side, nu)
+    free = 0.0 if slender else held_flexure.shear_share(side, flexure.shear_ratio(nu))
     held = 1 / bar.EI_z + 12 * bar.shear_y
     yields = beam.EA / bar.EA, beam.EI_z * held / (1 + free)
     left_out = "shear and held ends are left out (slender = true)" if slender else "what its ends hold is left out"

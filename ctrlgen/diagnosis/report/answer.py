@@ -151,9 +151,9 @@ def _too_much_left(diagnosis: Diagnosis) -> str:
 
 
 def _size_untold(diagnosis: Diagnosis) -> str:
-    """'the size of no law is told; nearest comes ', where that is why nothing is explained."""
+    """'the records tell the size of no law that acts so; the nearest is ', where that is why nothing is explained."""
     untold = diagnosis.verdict == Verdict.UNEXPLAINED and diagnosis.findings[0].size_untold
-    return "of what acts no law has a size that is told; nearest comes " if untold else ""
+    return "the records tell the size of no law that acts so; the nearest is " if untold else ""
 
 
 def _main(diagnosis: Diagnosis) -> list[Part]:

@@ -11,11 +11,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ctrlgen.devices import Device
 from ctrlgen.diagnosis.settings import PILES
 from ctrlgen.effects import Place
 from ctrlgen.estimation.fit import Fit, Fitter
-from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, nominal_physics
+from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis, nominal_physics
 from ctrlgen.model.effect_terms import channels
 from ctrlgen.recordings.recording import Record
 
@@ -34,20 +33,17 @@ def ends_of_readings(fitter: Fitter, fit: Fit) -> dict[tuple[Place, int], dict[s
 
 
 def limits_where_readings_pile_up(
-    fitter: Fitter, device: Device, offered: Sequence[Hypothesis]
+    fitter: Fitter, fit: Fit, offered: Sequence[Hypothesis]
 ) -> list[tuple[Hypothesis, dict[str, float]]]:
-    """The laws offered that begin at an end of the readings, where those pile up at one, with that as their start [SI]."""
-    found = []
+    """The laws offered that begin at an end of the readings, with each end at which those pile up as a start [SI]."""
+    ends, device, found = ends_of_readings(fitter, fit), fit.structure.device, []
     for h in offered:
-        if h.effect == PARAMETER:
+        if h.effect == PARAMETER or not any(h.prior.of(p).start_from_data == ENDS for p in h.law.params):
             continue
-        at_end = [p.name for p in h.law.params if h.prior.of(p).start_from_data == ENDS]
-        channel = f"reading.{h.at}"
-        if not at_end or channel not in fitter.recording.channels:
-            continue
-        i = fitter.recording.channels.index(channel)
-        shape = {p.name: sum(fixed) / 2 for p in h.law.params if (fixed := h.prior.of(p).fixed_range)}
-        found += [(h, shape | {at_end[0]: end}) for end in piled_ends(fitter.fit_records, i, fitter.noise.floor[i])]
+        amplitude, channel = h.law.amplitude(), h.channel_on(device)
+        hints = DataHints(suggested=ends.get((h.law.place, h.acts_on(device)[0]), {}))
+        present = sum(h.prior.of(amplitude).fixed_range or h.bounds(amplitude, channel)) / 2
+        found += [(h, {amplitude.name: present} | shape) for shape in h.shapes(channel, hints)]
     return found
 
 

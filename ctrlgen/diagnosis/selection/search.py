@@ -321,7 +321,7 @@ class Searcher:
             return current
         bare = whole.fitter.described(current.fit.structure.device)[1].restarted
         offered = [h for h in whole.screen.hypotheses if h not in current.causes]
-        for limit, start in limits_where_readings_pile_up(whole.fitter, current.fit.structure.device, offered):
+        for limit, start in limits_where_readings_pile_up(whole.fitter, current.fit, offered):
             other, again = copy.copy(self), list(rounds)
             other.trials = whole.apart()
             begun = other.trials.tried(bare.with_cause(limit, start), limit, steps=FIT.max_steps)
