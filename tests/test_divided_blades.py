@@ -158,6 +158,20 @@ def test_what_holds_moves_or_loads_the_body_between_makes_it_a_clamp_and_so_does
     assert point_compliance(loaded(tmp_path, rounded)).compliance[0, 3] == pytest.approx(one, rel=2e-3)
 
 
+@pytest.mark.parametrize(("degrees", "one_blade"), [(0.0, True), (0.02, True), (0.2, False), (5.0, False)])
+def test_pieces_that_meet_at_an_angle_are_two_blades(tmp_path, degrees, one_blade):
+    """A kink in the plane of the blade, by a thousandth of a radian and more: both keep their thin direction."""
+    l, a = 10e-3, np.radians(degrees)
+    along = np.array([np.cos(a), 0.0, -np.sin(a)])
+    text = drawing([l, l], [0.2e-3, 0.2e-3], 10e-3)
+    head, piece, rest = text.partition('name = "piece1"')
+    straight = f"at = {place(np.zeros(3))}\nalong = {vector(np.array([1.0, 0.0, 0.0]))}"
+    assert straight in rest
+    kinked = f"at = {place(l * (along - [1.0, 0.0, 0.0]))}\nalong = {vector(along)}"
+    device = loaded(tmp_path, head + piece + rest.replace(straight, kinked, 1))
+    assert bool(device.blade_runs) is one_blade
+
+
 def test_a_piece_is_as_wide_as_its_blade_is_long_and_check_says_what_is_one_blade(tmp_path):
     """Of sixteen pieces of a square blade each is sixteen times as wide as long, which no note tells."""
     divided = loaded(tmp_path, drawing([1e-3] * 16, [0.2e-3] * 16, 16e-3))

@@ -58,6 +58,15 @@ def test_a_pile_is_told_from_a_motion_that_turns(high, low, told):
     assert piled_ends([part], 0, 1e-3) == pytest.approx(told, abs=1e-3)
 
 
+@pytest.mark.parametrize(("high", "told"), [(0.97, False), (0.93, True)])
+def test_a_little_more_than_a_motion_that_turns_is_no_pile(high, told):
+    """Of noise that hides it: at ends of 0.97 and 0.93 are five and ten times as many as beside them, at that of a sine two."""
+    rng = np.random.default_rng(1)
+    u = np.sin(2 * np.pi * 0.011 * np.arange(3000))
+    part = record(u, np.minimum(u, high) + 2e-3 * rng.standard_normal(3000), "fit")
+    assert bool(piled_ends([part], 0, 2e-3)) is told
+
+
 @pytest.mark.parametrize(("noise", "told"), [(0.005, True), (0.05, False), (0.3, False)])
 def test_a_sensor_that_reads_little_more_than_noise_has_no_ends(noise, told):
     rng = np.random.default_rng(1)

@@ -61,6 +61,15 @@ def test_what_a_lever_leaves_out_of_its_pose_is_told_with_its_size(tmp_path, see
         assert not told
 
 
+@pytest.mark.parametrize(("share", "tells"), [(0.008, False), (0.012, True)])
+def test_a_hundredth_of_the_motion_is_told_and_less_is_not(tmp_path, share, tells):
+    push, out, travel = (6e-3, 0.0), (20e-3, 30e-3), 0.4e-3
+    up, down = bent(push, out, travel)
+    travel *= share * abs(up - down)[1] / abs(up + down)[1]  # the second order goes as the square
+    remarks = loaded(tmp_path, lever(push, out, "delta_y", float(travel))).range_remarks()
+    assert any(TOLD.match(x) for x in remarks) is tells
+
+
 def test_nothing_is_told_where_the_file_has_the_second_order(tmp_path):
     push, out = (6e-3, 0.0), (20e-3, 30e-3)
     effect = '\n[[effect]]\nkind = "finite_rotation"\nat = "delta_y"\nshare = "1"\n'

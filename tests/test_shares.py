@@ -96,6 +96,8 @@ def test_a_function_of_one_kind_gets_its_share_and_is_selected_first(kind, signa
         (lambda s: s.position["x"] * s.position["y"], ("position of x", "position of y")),
         (lambda s: s.position["x"] * np.sign(np.gradient(s.position["x"])), ("position of x", "direction of x")),
         (lambda s: s.drive["u"] * s.temperature, ("the drive", "temperature")),
+        # three quarters of it
+        (lambda s: s.position["x"] * (s.position["y"] + 0.6 * s.drive["u"]), ("position of x", "position of y")),
         (
             lambda s: s.position["x"] * (s.position["y"] + s.drive["u"] + 0.5 * np.sign(np.gradient(s.position["x"]))),
             (),

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 
+import casadi as ca
 import numpy as np
 import pytest
 from mechanism_files import HEAD, hinged, loaded, place
 
 from ctrlgen.devices.mechanism.reach import reach_lines, reach_remarks
+from ctrlgen.physics import flexure
 
 E, T, TRAVEL = 100e9, 0.2e-3, 2e-6
 INSIDE = re.compile(r"up to ([\d.]+) MPa of [\d.]+ MPa.*, inside of flexures ([\d.]+) MPa by transverse shear")
@@ -65,6 +67,26 @@ def test_wide_short_blades_and_thick_wires_are_sheared_inside(tmp_path, seed):
         "inside of a short flexure" in x
         for x in reach_remarks(loaded(tmp_path, carried(length, section, force, above)))
     )
+
+
+@pytest.mark.parametrize(
+    ("section", "half_width"),
+    [
+        (flexure.sheared_circle, lambda z: np.sqrt(0.25 - z**2)),
+        (flexure.sheared_rectangle, lambda z: np.full_like(z, 0.5)),
+    ],
+)
+def test_the_shear_in_the_middle_of_a_section_is_that_of_the_force_above_it(section, half_width):
+    """tau = V Q/(I b), Q the first moment of the area above the middle, I and b its second moment and width; sections one high, V = 1."""
+    z = np.linspace(-0.5, 0.5, 20001)
+    b, up = 2 * half_width(z), z >= 0
+    area, second = np.trapezoid(b, z), np.trapezoid(b * z**2, z)
+    tau = np.trapezoid((b * z)[up], z[up]) / (second * b[10000])
+    none, mean = ca.DM(0.0), ca.DM(1 / area)
+    for along in ((mean, none), (none, mean)):
+        assert float(section((none, none, none), none, along)) == pytest.approx(np.sqrt(3) * tau, rel=1e-3)
+    pulled = float(section((none, none, ca.DM(2.0)), ca.DM(0.5), (mean, none)))
+    assert pulled == pytest.approx(np.hypot(2.0, np.sqrt(3) * (tau + 0.5)), rel=1e-3)
 
 
 def test_a_force_through_a_neck_shears_it_where_it_does_not_bend_it(tmp_path):
