@@ -219,7 +219,7 @@ def test_where_what_is_left_alone_tells_the_noise_finer_forms_are_tried(source, 
 
     current.fit.values = lambda k: {}
     finer_forms(SimpleNamespace(fitter=SimpleNamespace(noise=noise), each=each), current)
-    assert [finer.effect for _, _, finer in forms] == (["bouc_wen_of_power"] if tried else [])
+    assert [finer.effect for _, finer in forms] == (["bouc_wen_of_power"] if tried else [])
 
 
 def test_a_finer_form_acts_where_the_plain_law_does():

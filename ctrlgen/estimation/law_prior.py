@@ -85,7 +85,6 @@ class LawPrior:
     form_of: name of the physics of which laws are forms, finer than their `Effect.family`; a place has at most one form of it.
     refines: the plainer laws of which this is a finer form, with more numbers. It is never suspected itself, but tried in the place of
         one of them that is among the causes, where that leaves more than noise.
-    at_once: of a finer form: it is also tried in the place of a plainer one that is but a candidate, which alone may take too little.
     unless: what a device must not have (words of `Effect.requires`) for the law to be suspected there: another law says the same.
     suspected: False for what a device file may state, and no recording shows beside what else it shows.
     in_a_region: the law is another one in a part of the motion: it is tried beside the others and never takes their turn.
@@ -112,7 +111,6 @@ class LawPrior:
     model_form_error: float = 0.0
     form_of: str | None = None
     refines: frozenset[str] = frozenset()
-    at_once: bool = False
     unless: frozenset[str] = frozenset()
     suspected: bool = True
     in_a_region: bool = False

@@ -275,7 +275,6 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
             model_form_error=0.05,
             form_of="dry friction",
             refines=frozenset({"coulomb"}),
-            at_once=True,
             parameters={"reach": peaks(1e-3, 0.01), "smoothing": CREEPING, "load": peaks(0.1, 1.0)},
         ),
         "stribeck": LawPrior(

@@ -14,7 +14,6 @@ OF_STOPS: Mapping[str, LawPrior] = {
         log_prior_odds=ONE_IN_TEN,
         model_form_error=0.1,
         refines=frozenset({"end_stop"}),
-        at_once=True,
         parameters={"gap": peaks(-0.9, 0.9), "speed": peaks(0.03, 0.3)},
     ),
     "end_stop": LawPrior(

@@ -12,7 +12,7 @@ from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.cause_entry import trying
 from ctrlgen.diagnosis.selection.failures import FAILURES
 from ctrlgen.diagnosis.selection.far_off import nearer_when_simulated
-from ctrlgen.diagnosis.selection.finer_forms import finer_at_once, finer_forms
+from ctrlgen.diagnosis.selection.finer_forms import finer_forms
 from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.diagnosis.selection.shifts import best_shift
 from ctrlgen.diagnosis.selection.subset_search import Suspect
@@ -47,8 +47,6 @@ def fit_candidates(
     if not alone:
         candidates = (*candidates, *fit_in_regions(trials, current, screened, candidates))
     candidates = (*candidates, *as_meant(trials, current, candidates))
-    if not alone:
-        candidates = (*candidates, *finer_at_once(trials, current, candidates))
     candidates = (*candidates, *finer_forms(trials, current))
     candidates = (*candidates, *fit_other_clocks(trials, current, () if alone else candidates))
     candidates = (*candidates, *fit_own_shifts(trials, current))
