@@ -78,7 +78,7 @@ def write(ending: str, folder: Path, rows: int = ROWS) -> None:
     channels += [f"reading.{model.signals['reading'].channels[i]}" for i in readings]
     column = (lambda k: k + 1) if ending == "npy" else (lambda k: f'"{names[k]}"')
     lines = ['title = "long"', f'device = "{model.device.name}"', 'kind = "series"', "[[record]]", 'role = "fit"']
-    lines += [f'file = "log.{ending}"', f'sample_rate = "{1 / STEP:.9g} Hz"', "[columns]"]
+    lines += [f'file = "log.{ending}"', f'sample_rate = "{1 / STEP:.9g} Hz"', 'between_samples = "held"', "[columns]"]
     lines += [f'"{c}" = {{ column = {column(k)}, unit = "{units[k]}" }}' for k, c in enumerate(channels)]
     (folder / "recording.toml").write_text("\n".join(lines) + "\n")
 

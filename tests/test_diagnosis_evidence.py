@@ -38,7 +38,7 @@ from ctrlgen.estimation.robust_covariance import robust_deviations, sandwich_ove
 from ctrlgen.estimation.simulator import Simulator
 from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.reader import load_recordings
-from ctrlgen.recordings.recording import Record, Recording
+from ctrlgen.recordings.recording import Recording
 from ctrlgen.reporting.result_file import json_text
 
 CREEP, DRIFT, CUBIC = (
@@ -140,7 +140,7 @@ def pose_fitter(meso, on_drive, on_pose):
     u = rng.uniform(-2e-4, 2e-4, (60, 6))
     noise = np.repeat([2e-6, 2e-7], 3)
     blank = record(u, np.zeros((60, 6)), "fit", h=np.inf)
-    blank = Record(**{**blank.__dict__, "drive": u * on_drive})
+    blank = replace(blank, drive=u * on_drive)
     y = simulator.simulate(blank, np.zeros(0)) * on_pose + noise * rng.standard_normal((60, 6))
     parts = [record(u[a], y[a], role, h=np.inf) for role, a in (("fit", slice(0, 40)), ("hold_out", slice(40, 60)))]
     units = ("deg",) * 3 + ("um",) * 3
@@ -270,7 +270,7 @@ def test_drift_and_creep_get_an_experiment_that_separates_them():
     u = found.proposed.drive[:, 0]
     y = move(u, lambda *a: creeping(*a, gain=4e-4, tau=2.0))
     y = y + NOISE * np.random.default_rng(9).standard_normal(len(u))
-    new = Record(**{**found.proposed.__dict__, "observed": y[:, None]})
+    new = replace(found.proposed, observed=y[:, None])
     parts = (*fitter.recording.records, new)
     both = Fitter(Recording(**{**fitter.recording.__dict__, "records": parts}), fitter.noise)
     gained = both.fit(drift.structure).objective - both.fit(creep.structure).objective

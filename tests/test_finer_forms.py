@@ -95,7 +95,7 @@ def test_friction_that_sticks_from_a_moment_on_falls_with_the_speed(monkeypatch)
     assert simplified(trials, finer).causes == finer.causes
     # where no further cause could be trusted beside the error of the plain form, a better form takes that away
     searcher = Searcher(trials.fitter, trials.screen, lambda _: None)
-    searcher.trials, searcher.markings = trials, SEARCH.most_markings
+    searcher.trials, trials.markings = trials, SEARCH.most_markings
     monkeypatch.setattr(ModelSelection, "residual_within_model_form_error", lambda *_: True)
     assert [c.effect for c in searcher.forward_rounds(plain, []).causes] == ["stribeck_after"]
 

@@ -18,7 +18,7 @@ from ctrlgen.core.errors import InputError
 from ctrlgen.recordings.derived_drives import derived_drives
 from ctrlgen.recordings.formats import read_table
 from ctrlgen.recordings.formats.unit_texts import split_name, unit_of
-from ctrlgen.recordings.look.column_facts import between_samples, rests, table_facts
+from ctrlgen.recordings.look.column_facts import course_of, rests, table_facts
 from ctrlgen.recordings.look.oddities import table_oddities
 from ctrlgen.recordings.look.proposal import propose
 from ctrlgen.recordings.look.proposed_file import recording_toml
@@ -131,7 +131,7 @@ def test_a_reading_before_its_drive_is_told():
 def test_files_of_one_bench_are_alike_between_samples(axis, tmp_path):
     """A smooth drive does not tell; one that steps does, for the other too."""
     t = 1e-3 * np.arange(1000)
-    drives = {"fit": np.random.default_rng(0).normal(size=1000), "held_out": np.sin(6 * t)}
+    drives = {"fit": np.repeat(np.random.default_rng(0).normal(size=100), 10), "held_out": np.sin(6 * t)}
     for name, drive in drives.items():
         rows = "".join(f"{a:.3f},{b:.6f},{c:.6f}\n" for a, b, c in zip(t, drive, 40 * drive, strict=True))
         (tmp_path / f"{name}.csv").write_text("time [s],drive [V],position [um]\n" + rows)
@@ -218,12 +218,12 @@ def test_a_log_of_one_row_says_so(tmp_path):
         read_table(tmp_path / "log.csv")
 
 
-def test_steps_are_held_and_curves_are_linear():
+def test_steps_are_told_from_curves_and_from_what_is_neither():
     t = np.arange(3000) / RATE
-    assert between_samples(np.sin(2 * np.pi * 3 * t)) == "linear"
-    assert between_samples(np.abs((5 * t) % 2 - 1)) == "linear"  # a triangle has corners
-    assert between_samples(np.repeat(np.sin(2 * np.pi * 3 * t[:300]), 10)) == "held"
-    assert between_samples(np.random.default_rng(0).normal(size=3000)) == "held"
+    assert course_of(np.sin(2 * np.pi * 3 * t)) == "curve"
+    assert course_of(np.abs((5 * t) % 2 - 1)) == "curve"  # a triangle has corners
+    assert course_of(np.repeat(np.sin(2 * np.pi * 3 * t[:300]), 10)) == "steps"
+    assert course_of(np.random.default_rng(0).normal(size=3000)) == "rough"
 
 
 def test_oddities_of_columns(tmp_path):

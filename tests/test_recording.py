@@ -70,9 +70,13 @@ def test_the_ambient_temperature_is_a_constant_or_a_column(conditions, tmp_path,
     assert np.allclose(record.ambient, wanted, rtol=1e-12)
 
 
-def test_the_drive_is_held_unless_it_is_said_to_be_linear(tmp_path, model):
-    fit, held = load_recordings([two(tmp_path, samples(), between_samples="linear")], model).records
-    assert fit.linear and not held.linear
+@pytest.mark.parametrize(
+    "way, linear, either", [("held", False, False), ("linear", True, False), ("unstated", True, True)]
+)
+def test_what_the_drive_does_between_samples_is_open_unless_it_is_stated(way, linear, either, tmp_path, model):
+    fit, left_out = load_recordings([two(tmp_path, samples(), between_samples=way)], model).records
+    assert (fit.linear, fit.either) == (linear, either)
+    assert left_out.linear and left_out.either and not left_out.smooth
 
 
 def test_two_recordings_are_joined_channel_by_channel(tmp_path, model):

@@ -36,6 +36,7 @@ from ctrlgen.estimation.robust_covariance import widening
 from ctrlgen.estimation.settings import DISCREPANCY, NOISE_UPDATE, STATISTICS
 from ctrlgen.estimation.simulator import compiled_simulator
 from ctrlgen.estimation.structure import Structure
+from ctrlgen.estimation.unstated_drive import as_described_fits, told_of_reading
 from ctrlgen.model.assembly import build_model, movable, symbolic_model
 from ctrlgen.recordings.plausibility import suspected, with_plausibility
 from ctrlgen.recordings.reader import load_recordings
@@ -186,7 +187,8 @@ def _calibration(
     progress("noise")
     settling = settling_time_of(device)
     usable, notes = _usable(device, recording, settling)
-    fitter = _weighed(Fitter(usable, estimate_noise(usable, settling)), specimen(device, chosen))
+    fitter = as_described_fits(device, Fitter(usable, estimate_noise(usable, settling)))
+    fitter = _weighed(fitter, specimen(device, chosen))
     fit, told = _told(fitter, device, chosen, progress)
     covariance = _covariance_within_bounds(fitter, device, fit, told, [c for c in chosen if c not in told])
     order, of_sensor = [constants.index(c) for c in told], np.zeros(covariance.shape)
@@ -207,6 +209,7 @@ def _calibration(
         notes.append(f"{', '.join(more)} {what}")
     noise = fitter.noise
     notes += [note for note, source in zip(noise.notes, noise.sources, strict=True) if not source.stated]
+    notes += told_of_reading(fitter, fit)
     notes += _sensor_notes(rows, of_sensor)
     unique = tuple(dict.fromkeys(notes))
     return Calibration(device, inputs, fitter.recording, tuple(rows), covariance, errors, unique, of_sensor)

@@ -27,10 +27,10 @@ from ctrlgen.devices import Device
 from ctrlgen.diagnosis.evidence.chance_by_luck import doubted, with_chances
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.evidence.supporting_analyses import run_supporting_analyses
-from ctrlgen.diagnosis.prepared_recording import is_read_the_wrong_way, prepared
+from ctrlgen.diagnosis.prepared_recording import prepared
 from ctrlgen.diagnosis.report.told_beside import told_beside
 from ctrlgen.diagnosis.selection.direct_detection import directly_detected_findings
-from ctrlgen.diagnosis.selection.failures import FAILURES, reason_of
+from ctrlgen.diagnosis.selection.failures import FAILURES, UNSOLVED, reason_of
 from ctrlgen.diagnosis.selection.findings import findings, held_out_errors
 from ctrlgen.diagnosis.selection.offered_laws import offered_laws
 from ctrlgen.diagnosis.selection.screen import Screen
@@ -43,13 +43,13 @@ from ctrlgen.diagnosis.shares.empirical_terms import EmpiricalTerm, empirical_te
 from ctrlgen.diagnosis.shares.gather import ResidualShares, residual_shares
 from ctrlgen.estimation.checkpoint import Checkpoint
 from ctrlgen.estimation.described_device import forget_described
-from ctrlgen.estimation.fit import forget_predictions
+from ctrlgen.estimation.fit import Fitter, forget_predictions
 from ctrlgen.estimation.hypothesis import selected_laws
 from ctrlgen.estimation.profile_likelihood import profiles
 from ctrlgen.estimation.residual_tests import run_residual_tests
 from ctrlgen.estimation.simulator import compiled_simulator
 from ctrlgen.estimation.spikes import find_spikes
-from ctrlgen.estimation.unstated_drive import turned
+from ctrlgen.estimation.unstated_drive import read_with_less, way_of
 from ctrlgen.recordings.recording import Recording
 
 Progress = Callable[[str], None]
@@ -91,19 +91,21 @@ def _diagnose(
     checkpoint: Checkpoint | None,
     laws: Sequence[str] | None,
     jobs: int,
+    way: str | None = None,
 ) -> Diagnosis:
+    """`way`: in which drives of which nobody states it are read between samples first; as the device as described fits where None."""
     effects = selected_laws(laws)
     step("noise")
-    ready = prepared(device, recording, effects, checkpoint)
+    ready = prepared(device, recording, effects, checkpoint, way)
     known = ready.fitter.noise.known
     offered = offered_laws(ready.device, ready.fitter, effects, chosen=laws is not None)
     step(f"refit of the device as described, {number_of(len(offered.hypotheses), 'hypothesis', 'hypotheses')}")
     searcher = Searcher(ready.fitter, Screen(ready.fitter, offered.hypotheses, seed), step, jobs)
     search = searcher.run(ready.device)
-    if is_read_the_wrong_way(search.fitter, search.chosen.fit):
-        step("the same with the drive read the other way between its samples")
-        other = turned(recording, search.fitter.recording)
-        return _diagnose(device, other, seed, step, checkpoint, laws, jobs)
+    other = search.fitter if way else _read_with_less(search)
+    if other is not search.fitter:
+        step(f"the same with the drive read as {way_of(other.recording)} between its samples")
+        return _diagnose(device, recording, seed, step, checkpoint, laws, jobs, way_of(other.recording))
     step("shares of the residual")
     shares = residual_shares(search.fitter, search.nominal.fit, search.chosen.fit, seed)
     evidence = None if shares is None else evidence_of(search, shares.before, offered.hypotheses, laws is None)
@@ -155,6 +157,15 @@ def _diagnose(
         next_experiment=analyses.next_experiment,
         untried=missing,
     )
+
+
+def _read_with_less(search: SearchResult) -> Fitter:
+    """The search's fitter with drives that may be anything between samples read so that the answer leaves less or needs a law less; as it
+    is where none is, or where a fit fails."""
+    try:
+        return read_with_less(search.fitter, search.chosen.fit)
+    except UNSOLVED:
+        return search.fitter
 
 
 def _empirical_terms(

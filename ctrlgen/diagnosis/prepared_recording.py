@@ -22,7 +22,7 @@ from ctrlgen.estimation.late_readings import settling_time_of
 from ctrlgen.estimation.noise import Noise, estimate_noise
 from ctrlgen.estimation.noise_update import correct_stated_noise, update_guessed_noise
 from ctrlgen.estimation.settings import NOISE_UPDATE
-from ctrlgen.estimation.unstated_drive import as_described_fits, fits_the_other_way
+from ctrlgen.estimation.unstated_drive import as_described_fits, read_as
 from ctrlgen.recordings.recording import Recording
 
 OF_OTHER_RECORDINGS = "left out, as other recordings had it alone: {}"
@@ -41,9 +41,14 @@ class Prepared:
 
 
 def prepared(
-    device: Device, recording: Recording, effects: Sequence[type[Effect]], checkpoint: Checkpoint | None
+    device: Device,
+    recording: Recording,
+    effects: Sequence[type[Effect]],
+    checkpoint: Checkpoint | None,
+    way: str | None = None,
 ) -> Prepared:
-    """Device, recording and noise as a search takes them.
+    """Device, recording and noise as a search takes them. `way`: in which drives of which nobody states it are read between samples (one of
+    `WAYS`); as the device as described fits the readings where None.
 
     Raises InputError where no record is to fit or none is held out, where no channel varies, or where memory does not hold the
     recording; SolverError where the device as described cannot be simulated along it.
@@ -54,7 +59,10 @@ def prepared(
     recording = _relative_ambient(_with_both_roles(recording))
     live = without_dead_channels(device, recording, effects)
     fitter = Fitter(live.recording, noise_before_fits(device, live.recording), checkpoint)
-    fitter = _without_outliers(device, _with_drive_read(device, fitter))
+    read = (
+        _with_drive_read(device, fitter) if way is None else replace(fitter, recording=read_as(fitter.recording, way))
+    )
+    fitter = _without_outliers(device, read)
     return Prepared(device, live, _with_noise(device, fitter))
 
 
@@ -99,19 +107,11 @@ def noise_before_fits(device: Device, recording: Recording) -> Noise:
 
 
 def _with_drive_read(device: Device, fitter: Fitter) -> Fitter:
-    """The fitter with drives that may be held or linear between samples as the readings have it; as they are where they cannot tell."""
+    """The fitter with drives that may be anything between samples as the readings have it; as they are where they cannot tell."""
     try:
         return as_described_fits(device, fitter)
     except UNSOLVED:
         return fitter
-
-
-def is_read_the_wrong_way(fitter: Fitter, fit: Fit) -> bool:
-    """Whether a model's drives, of which nobody states it, fit better the other way (`fits_the_other_way`); not where that fails."""
-    try:
-        return fits_the_other_way(fitter, fit)
-    except UNSOLVED:
-        return False
 
 
 def _without_outliers(device: Device, fitter: Fitter) -> Fitter:

@@ -273,7 +273,10 @@ class Fitter:
         if self.checkpoint is None:
             return _fit_at(problem, self._descended(problem, problem.to_scaled(start), steps, enough))
         s, noise, corner = problem.structure, self.error.weighted, self.error.corner
-        valid = [*(r.valid for r in self.recording.records), *(r.linear for r in self.recording.records if r.either)]
+        valid = [
+            *(r.valid for r in self.recording.records),
+            *((r.linear, r.smooth) for r in self.recording.records if r.either),
+        ]
         begun = (s.starts, s.expanded_at, sorted(s.nominal_starts.items()), s.free, s.finer, self.clock)
         key = key_of(s.causes, *begun, start, problem.expected, steps, enough, noise.sd, corner, *noise.ar, *valid)
         optimum = self.checkpoint.recall(key)

@@ -350,7 +350,7 @@ class Simulator:
 
     def inputs(self, record: Record) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Drive u and u+ (n, n_u), ambient (n, 1). Of poses u+ is the pose's own drive and u that of the pose before."""
-        u, ambient = record.drive, self.ambient_of(record)[:, None]
+        u, ambient = record.applied, self.ambient_of(record)[:, None]
         if not self.poses:
             return u, np.vstack([u[1:], u[-1:]]), ambient
         return np.vstack([u[:1], u[:-1]]), u, ambient

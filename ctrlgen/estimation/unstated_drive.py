@@ -1,12 +1,14 @@
-"""A drive of which nobody states whether it is held or linear between its samples: what the readings fit.
+"""A drive of which nobody states what it does between its samples: held, in straight lines or a smooth curve, as the readings have it.
 
-A smooth drive does not tell. Read wrongly it is late, or early, by half a sample, which is a law of the library and no physics.
+A slow drive does not tell. One that is read wrongly is late, or early, by half a sample, or, where lines are taken for a curve, too weak
+by (w h)^2 / 12 at a frequency w: laws of the library, such as a reading that picks up -h^2 F / (12 m) of a force F, and no physics.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import replace
+from operator import itemgetter
 
 import numpy as np
 
@@ -14,19 +16,17 @@ from ctrlgen.devices import Device
 from ctrlgen.estimation.described_device import described
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.recordings.recording import Record, Recording
 from ctrlgen.reporting.numbers import number
 
+LINEAR, SMOOTH, HELD = WAYS = ("linear", "smooth", "held")
 BETTER, SAME = 1e-3, 1e-2
 """Shares of the squares of what is left: less, and it makes no difference how the drive is read; by which two readings of it may differ
 where one of them needs a law less. Judgement."""
 TAKEN = (
-    "whether the drive is held or linear between its samples is not stated: {} is taken, with which the device as described leaves {} "
-    "times the noise in the records to fit, and {} times with the other; write between_samples if you know it"
-)
-TURNED = (
-    "whether the drive is held or linear between its samples is not stated: {} is taken, because with the other the answer needed another "
-    "law, or left more; write between_samples if you know it"
+    "what the drive does between its samples is not stated: {} is taken, with which the answer leaves {} times the noise in the records to "
+    "fit, and {}; write between_samples if you know it"
 )
 
 
@@ -35,53 +35,92 @@ def is_open(recording: Recording) -> bool:
     return any(r.either and r.role != "rest" for r in recording.records)
 
 
-def read_as(recording: Recording, linear: bool) -> Recording:
-    """The recording with every drive that may be either read as linear, or as held."""
-    records = (replace(r, linear=linear) if r.either else r for r in recording.records)
-    return replace(recording, records=tuple(records))
+def way_of(recording: Recording) -> str:
+    """The one of `WAYS` in which such drives of a recording are read."""
+    r = next(r for r in recording.records if r.either)
+    return SMOOTH if r.smooth else LINEAR if r.linear else HELD
 
 
-def turned(recording: Recording, read: Recording) -> Recording:
-    """The `recording` read the other way than `read` is, for good, with a note that says so."""
-    linear = not any(r.linear for r in read.records if r.either)
-    records = (replace(r, linear=linear, either=False) if r.either else r for r in recording.records)
-    return replace(recording, records=tuple(records), notes=(*recording.notes, TURNED.format(_way(linear))))
+def read_as(recording: Recording, way: str) -> Recording:
+    """The recording with every drive that may be either read in one of `WAYS`."""
+
+    def read(r: Record) -> Record:
+        return replace(r, linear=way != HELD, smooth=way == SMOOTH) if r.either else r
+
+    return replace(recording, records=tuple(map(read, recording.records)))
 
 
 def as_described_fits(device: Device, fitter: Fitter) -> Fitter:
-    """The fitter with such drives read as the device as described fits the readings better, and a note of it; as linear where that makes
-    no difference."""
+    """The fitter with such drives read as the device as described fits the readings best; as linear where that makes no difference."""
     if not is_open(fitter.recording):
         return fitter
-    ways = {linear: replace(fitter, recording=read_as(fitter.recording, linear)) for linear in (True, False)}
-    left = {linear: _left(*described(way, device)) for linear, way in ways.items()}
-    if not left[False] < (1 - BETTER) * left[True] and not left[True] < (1 - BETTER) * left[False]:
-        return ways[True]
-    linear = left[True] < left[False]
-    note = TAKEN.format(_way(linear), *(number(np.sqrt(left[way])) for way in (linear, not linear)))
-    chosen = ways[linear]
-    return replace(chosen, recording=replace(chosen.recording, notes=(*chosen.recording.notes, note)))
+    ways = {way: replace(fitter, recording=read_as(fitter.recording, way)) for way in WAYS}
+    left = {way: _left(*described(read, device)) for way, read in ways.items()}
+    best = min(WAYS, key=left.__getitem__)
+    return ways[best if left[best] < (1 - BETTER) * left[LINEAR] else LINEAR]
 
 
-def fits_the_other_way(fitter: Fitter, fit: Fit) -> bool:
-    """Whether a fitted model with such drives read the other way leaves less, or as little without a law by which a reading is late."""
+def read_better(fitter: Fitter, fit: Fit) -> Fitter:
+    """The fitter with such drives read as a fitted model leaves clearly least, its numbers fitted again; as given where none does so."""
     if not is_open(fitter.recording):
-        return False
-    linear = any(r.linear for r in fitter.recording.records if r.either)
-    other = replace(fitter, recording=read_as(fitter.recording, not linear))
-    plain, most = fit.restarted, 1 - SAME
-    for k in reversed(range(len(plain.causes))):
-        if plain.causes[k].effect != PARAMETER and plain.causes[k].law.moves_in_time:
-            plain, most = plain.without(k), 1 + SAME
-    return _left(other, other.fit(plain)) < most * _left(fitter, fit)
+        return fitter
+    left, best = min(_left_in_other_ways(fitter, fit.restarted), key=itemgetter(0))
+    return best if left < (1 - SAME) * _left(fitter, fit) else fitter
+
+
+def read_with_less(fitter: Fitter, fit: Fit) -> Fitter:
+    """The fitter with such drives read as a fitted model leaves as little without a law by which a reading is late, or without any one law
+    that it needs as they are read now; otherwise as it leaves clearly less; as given where none does so."""
+    if not is_open(fitter.recording):
+        return fitter
+    now = _left(fitter, fit)
+    left, best = min(_left_in_other_ways(fitter, fit.restarted), key=itemgetter(0))
+    simpler = []
+    for plain, timed in _with_less(fit.restarted):
+        most = (1 + SAME) * min(now, left)
+        if not timed:
+            most = min(most, (1 - SAME) * _left(fitter, fitter.fit(plain)))
+        simpler += [found for found in _left_in_other_ways(fitter, plain) if found[0] < most]
+    if simpler:
+        return min(simpler, key=itemgetter(0))[1]
+    return best if left < (1 - SAME) * now else fitter
+
+
+def _left_in_other_ways(fitter: Fitter, structure: Structure) -> list[tuple[float, Fitter]]:
+    """What a structure leaves, fitted with such drives read in each other way."""
+    return [(_left(other, other.fit(structure)), other) for other in _other_ways(fitter)]
+
+
+def _other_ways(fitter: Fitter) -> list[Fitter]:
+    now = way_of(fitter.recording)
+    return [replace(fitter, recording=read_as(fitter.recording, way)) for way in WAYS if way != now]
+
+
+def _with_less(structure: Structure) -> Iterator[tuple[Structure, bool]]:
+    """The structure without all laws of timing, and without any other one of its laws; and whether it is the first."""
+    timed = [k for k, c in enumerate(structure.causes) if c.effect != PARAMETER and c.law.moves_in_time]
+    if timed:
+        plain = structure
+        for k in reversed(timed):
+            plain = plain.without(k)
+        yield plain, True
+    for k in range(len(structure.causes)):
+        if k not in timed:
+            yield structure.without(k), False
+
+
+def told_of_reading(fitter: Fitter, fit: Fit) -> list[str]:
+    """In which way such drives are read, with what a fitted model leaves in each; nothing where all is stated."""
+    if not is_open(fitter.recording):
+        return []
+    others = [
+        f"{number(np.sqrt(_left(other, fit)))} times with {way_of(other.recording)}" for other in _other_ways(fitter)
+    ]
+    return [TAKEN.format(way_of(fitter.recording), number(np.sqrt(_left(fitter, fit))), " and ".join(others))]
 
 
 def _left(fitter: Fitter, fit: Fit) -> float:
     """Mean squares of what a fit leaves of such records, in those of the noise."""
-    records: Sequence[Record] = [r for r in fitter.fit_records if r.either]
+    records = [r for r in fitter.fit_records if r.either]
     squares = [((r.observed - fitter.predict(fit, r)) / fitter.noise.floor)[r.valid] ** 2 for r in records]
     return float(np.mean(np.concatenate(squares)))
-
-
-def _way(linear: bool) -> str:
-    return "linear" if linear else "held"

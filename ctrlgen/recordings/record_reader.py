@@ -189,7 +189,7 @@ class RecordReader:
             drive=drive[kept],
             observed=observed[kept],
             linear=table.between_samples != "held",
-            either=table.between_samples == "unstated",
+            either=table.between_samples == "unstated" and self.written.kind == "series",
             poses=self.written.kind == "poses",
             ambient=None if ambient is None else (np.zeros(n) + ambient)[kept],
             valid=(after_lead_in & recorded)[kept],

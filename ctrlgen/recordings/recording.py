@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from ctrlgen.core.shown import Shown
 from ctrlgen.core.tabular import Column, Drawn, Tabular
 from ctrlgen.core.units import from_si
+from ctrlgen.recordings.smooth_drive import with_lines_as_strong
 
 
 class Timing(NamedTuple):
@@ -38,8 +40,9 @@ class Record(Shown):
     neighbours of each outlier that was marked. `held`: first row, row behind the last and channel of each stretch in which a
     reading was found to be held although the device moves. `resumed`: the device had moved before it, after a gap in which the drive is not
     known, in the rest of a divided record or before the first row, so that what it remembers of that is not known either.
-    `either`: nobody stated whether the drive is held or linear; `linear` is what is taken. `file`: that of which it is a part, empty where
-    it is of none.
+    `smooth`: the drive is a curve between samples, not one of straight lines, as which `applied` has it; it is `linear` too.
+    `either`: nobody stated what the drive does between samples; `linear` and `smooth` are what is taken. `file`: that of which it is a
+    part, empty where it is of none.
     """
 
     name: str
@@ -59,6 +62,7 @@ class Record(Shown):
     resumed: bool = False
     either: bool = False
     file: str = ""
+    smooth: bool = False
 
     def facts(self) -> dict[str, object]:
         """What it is, in a few words."""
@@ -73,6 +77,11 @@ class Record(Shown):
     def __post_init__(self) -> None:
         if np.isinf(self.sample_time):  # not where it is still to be found
             object.__setattr__(self, "poses", True)
+
+    @cached_property
+    def applied(self) -> np.ndarray:
+        """(n, n_u) the drive as a simulation takes it: held, or in straight lines (`with_lines_as_strong` of one that is `smooth`)."""
+        return with_lines_as_strong(self.drive) if self.smooth else self.drive
 
     @property
     def timing(self) -> Timing:

@@ -88,9 +88,9 @@ class RecordTable(Section):
     """Time of the first row on the clock common to all records. Left out everywhere: as the columns of time say, where files go on from
     each other by them and lie close together; else 0 s.
     """
-    between_samples: Literal["held", "linear", "unstated"] = "held"
-    """Whether the drive is held at a sample's value until the next sample or is linear between them. `unstated`: nobody knows; a
-    diagnosis takes what the readings fit, and says so, everything else takes it as linear.
+    between_samples: Literal["held", "linear", "unstated"] = "unstated"
+    """What the drive does between samples: it is held at a sample's value until the next one, or goes in straight lines. `unstated`: nobody
+    knows; a diagnosis takes what of these or of a smooth curve the readings fit, and says so, everything else takes straight lines.
     """
     gap: Literal["linear", "held", "split"] | None = None
     """What the drive does across rows that are missing, or that hold no number for it: `linear` or `held` bridges every gap that is a

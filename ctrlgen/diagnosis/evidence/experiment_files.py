@@ -69,8 +69,8 @@ def _recording(fitter: Fitter, simulator: Simulator, chosen: Experiment) -> str:
             lines += ['time = { column = "time [s]", unit = "s" }', f"start = {start}"]
         elif np.isfinite(record.sample_time):
             lines.append(f'dwell = "{record.sample_time:.9g} s"')
-        if record.linear:
-            lines.append('between_samples = "linear"')
+        if timed:
+            lines.append(f"between_samples = {toml('linear' if record.linear else 'held')}")
     lines += ["", "[columns]"]
     for c, u in zip(signal.channels, signal.units, strict=True):
         lines.append(f'"drive.{c}" = {{ column = "{c} [{u}]", unit = "{u}" }}')

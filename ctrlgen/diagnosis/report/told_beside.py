@@ -15,6 +15,7 @@ from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.estimation.drive_clock import STAMPS, TOLD, stamp_deviation
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.spikes import Spikes, marking_notes
+from ctrlgen.estimation.unstated_drive import told_of_reading
 from ctrlgen.reporting.numbers import number
 
 RESTLESS = "{}: at rest the residual jumps or has memory, so it is not noise; something acts there that the device file does not describe"
@@ -42,6 +43,7 @@ def told_beside(
         *search.fitter.noise.notes,
         *marking_notes(live.recording, recording),
         *(s.sentence for s in spikes),
+        *told_of_reading(search.fitter, search.chosen.fit),
         *half_a_sample(recording, found),
         *nearly_as_large(found),
         *worse_channels(search),

@@ -149,7 +149,7 @@ class ScoreGradient:
         record = r.aligned(record, self.p)
         before = np.vstack([r.starting_state(record, self.p, start), after[:-1]])
         inputs = (before, *r.inputs(record))
-        seen = (before if series else after, record.drive, inputs[3], after)
+        seen = (before if series else after, record.applied, inputs[3], after)
         size = min(CANDIDATE_TERMS.block, n)
         memory = self.laws.start(record.time[0])
         if record.resumed and series:

@@ -27,6 +27,7 @@ from ctrlgen.diagnosis.selection.failures import FAILURES
 from ctrlgen.diagnosis.selection.finer_forms import finer_forms
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.not_taken import not_taken
+from ctrlgen.diagnosis.selection.other_data import learn_mismatch, marked_again, read_again
 from ctrlgen.diagnosis.selection.other_laws import stands_for_another, takes_over
 from ctrlgen.diagnosis.selection.positive_waves import with_positive_waves
 from ctrlgen.diagnosis.selection.precedence import acting_first, everywhere_first, one_loop_first
@@ -42,7 +43,6 @@ from ctrlgen.estimation.drive_clock import with_drive_clock
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.integration_error import MOST_FINER, MOST_IN_SEARCH, with_steps_that_suffice
-from ctrlgen.estimation.isolated_outliers import mark_again
 from ctrlgen.estimation.noise_update import update_noise
 from ctrlgen.estimation.settings import FIT
 
@@ -52,7 +52,6 @@ class Searcher:
 
     def __init__(self, fitter: Fitter, screen: Screen, step: Callable[[str], None], jobs: int = 1) -> None:
         self.trials = Trials(fitter, screen, step, jobs)
-        self.markings = 0
 
     def run(self, device: Device) -> SearchResult:
         """Rounds until nothing more is justified, again where they have taught the noise; then the rivals of each cause."""
@@ -61,21 +60,17 @@ class Searcher:
         trials.use(fitter)
         rounds: list[Round] = []
         current = trials.with_noise_update(trials.fit(nominal_fit.restarted, steps=FIT.max_steps))
-        self._learn_mismatch(current)
+        learn_mismatch(trials, current)
         for _ in range(SEARCH.most_noise_updates):
             current = self.forward_rounds(current, rounds)
-            before = trials.fitter.noise
-            noise = update_noise(trials.fitter, current.fit)
-            if noise is before:
-                break
-            trials.use(trials.fitter.with_noise(noise))
-            current = self.settled(current)
-            if np.allclose(noise.floor, before.floor, rtol=SEARCH.same_noise, atol=0):
+            before = trials.fitter.noise.floor
+            current = self._under_its_noise(current)
+            if np.allclose(trials.fitter.noise.floor, before, rtol=SEARCH.same_noise, atol=0):
                 break
         current = self.beside_limits(current, rounds)
         trials = self.trials
         # in the steps and on the clock in which it is told: its rivals, which the report lists, are fitted once
-        current = self._finely_timed(self.settled(current))
+        current = self._under_its_noise(self._finely_timed(self.settled(current)))
         better = self._compared(current)
         current = self._in_plainest_form(current if better is current else self._finely_timed(better))
         found = self.without_other_laws(current, rounds)
@@ -126,6 +121,15 @@ class Searcher:
             trials.fitter, nominal, current, account, bare, alike, tuple(rounds), screened, withdrawn, *log, unlikely
         )
 
+    def _under_its_noise(self, current: CandidateModel) -> CandidateModel:
+        """The model settled under the noise that it teaches, which steps too long and a clock that was off would have been part of."""
+        trials = self.trials
+        noise = update_noise(trials.fitter, current.fit)
+        if noise is trials.fitter.noise:
+            return current
+        trials.use(trials.fitter.with_noise(noise))
+        return self.settled(current)
+
     def settled(self, current: CandidateModel) -> CandidateModel:
         """The same model fitted to its end under its own errors, without the causes that it then does not need."""
         return without_needless(self.trials, self._converged(current))
@@ -175,7 +179,7 @@ class Searcher:
             return current
         other.trials.log[:0] = whole.log
         other.trials.suspecting_again(whole.screen)
-        self.trials, self.markings, rounds[:] = other.trials, other.markings, again
+        self.trials, rounds[:] = other.trials, again
         return found
 
     def without_unseen_pitches(self, current: CandidateModel) -> CandidateModel:
@@ -238,25 +242,6 @@ class Searcher:
         # a shape that was bent by the clock, and stays so from where it stands, would be refuted by noise alone
         return self.settled(simplified(trials, scored(fitter, fit, current.cause)))
 
-    def _learn_mismatch(self, described: CandidateModel) -> None:
-        """What the device as described leaves on the held-out records is what causes are measured by."""
-        self.trials.mismatch = described.held_out.plain_mean * self.trials.fitter.noise.floor**2
-
-    def _marked_again(self, current: CandidateModel) -> CandidateModel:
-        """The same model fitted to the readings without the spikes that it uncovers, and with those that it explains."""
-        trials = self.trials
-        fitter = trials.fitter
-        if self.markings >= SEARCH.most_markings:
-            return current
-        recording = mark_again(fitter.recording, lambda record: fitter.predict(current.fit, record), fitter.noise)
-        if recording is fitter.recording:
-            return current
-        self.markings += 1
-        trials.beaten = {}  # by readings that were not all right
-        trials.use(replace(fitter, recording=recording))
-        self._learn_mismatch(scored(trials.fitter, trials.fitter.described(current.fit.structure.device)[1]))
-        return trials.with_noise_update(trials.with_errors(trials.converged(current)))
-
     def forward_rounds(self, current: CandidateModel, rounds: list[Round], most: float = np.inf) -> CandidateModel:
         """Forward rounds from `current`, with swaps in between, until nothing more is justified, or there are the `most` causes;
         appends each to `rounds`."""
@@ -265,7 +250,7 @@ class Searcher:
         while True:
             trials.step(f"screening, {number_of(len(current.causes), 'cause')} so far")
             trials.new_round(len(rounds) + 1)
-            current = self._marked_again(current)
+            current = read_again(trials, marked_again(trials, current))
             if len(current.causes) >= most or trials.selection.residual_within_model_form_error(current):
                 return self._in_finer_form(current)
             screened = trials.screened(current)
@@ -308,7 +293,7 @@ class Searcher:
             found = other.forward_rounds(other.trials.with_errors(other.trials.converged(begun)), again, most)
             if other.trials.selection.improves_enough(current, found):
                 other.trials.log[:0] = whole.log
-                self.trials, self.markings, rounds[:] = other.trials, other.markings, again
+                self.trials, rounds[:] = other.trials, again
                 return found
             whole.log += other.trials.log
         return current
@@ -330,7 +315,7 @@ class Searcher:
             found = other.settled(other.forward_rounds(other.settled(begun[0]), again))
             if limit in found.causes and other.trials.selection.improves_enough(current, found):
                 other.trials.log[:0] = whole.log
-                self.trials, self.markings, rounds[:] = other.trials, other.markings, again
+                self.trials, rounds[:] = other.trials, again
                 return found
             whole.log += other.trials.log
         return current

@@ -48,6 +48,7 @@ class Trials:
         self.latest: tuple[Fitter, Fit, Screened] | None = None
         self.bare: dict[int, tuple[Fit, Fit, Screened]] = {}
         self.mismatch: np.ndarray | None = None
+        self.markings = 0  # of spikes, each against another model
         # of a cause and another that came nowhere near in its place: the sets of causes that were beside them
         self.beaten: dict[tuple[Hypothesis, Hypothesis], tuple[frozenset[Hypothesis], ...]] = {}
         self.refused: list[Refusal] = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
@@ -365,15 +366,16 @@ def slow_clock(drives: np.ndarray) -> int:
     return apart.pop() if len(apart) == 1 else 1
 
 
-def between_samples(drive: np.ndarray) -> str:
-    """ "held" for a drive that steps, "linear" for one that is a curve as sampled: second differences far below the first ones."""
+def course_of(drive: np.ndarray) -> Literal["steps", "curve", "rough"]:
+    """How a drive goes from row to row: it stands still in most rows; it is a curve as sampled, its second differences far below the first
+    ones; or neither, as a random one or one that was measured with noise."""
     u = drive[np.isfinite(drive)]
     first = np.diff(u)
     moving = first[:-1] != 0
     if moving.sum() < REST or np.mean(first == 0) > SLOW_CLOCK:
-        return "held"
+        return "steps"
     bend, slope = (
         np.median(np.abs(np.diff(first)[moving])),
         np.median(np.abs(first[:-1][moving])),
     )  # a few corners do not count
-    return "linear" if bend < SMOOTH * slope else "held"
+    return "curve" if bend < SMOOTH * slope else "rough"

@@ -21,7 +21,7 @@ from ctrlgen.recordings.look.answers import NOTHING, Answers, layout_option
 from ctrlgen.recordings.look.column_facts import (
     ColumnFacts,
     TableFacts,
-    between_samples,
+    course_of,
     is_a_count,
     is_a_time,
     named,
@@ -138,11 +138,12 @@ class Proposal:
     @property
     def between_samples(self) -> str:
         """What the drive does between samples, as TOML: of all files together, for they come from one bench. A drive that steps in one of
-        them is held; curves do not tell."""
-        ways = {between_samples(values) for facts in self.tables for values in self.drives_of(facts)}
-        if ways == {"linear"}:
-            return '"unstated" # every drive is a smooth curve, which does not tell: write which, if you know it'
-        return '"held"'
+        them is held; others do not tell."""
+        courses = {course_of(values) for facts in self.tables for values in self.drives_of(facts)}
+        if "steps" in courses:
+            return '"held"'
+        what = "every drive is a smooth curve, which does not tell" if courses == {"curve"} else "no drive tells"
+        return f'"unstated" # {what}: write "held" or "linear", if you know it'
 
     @property
     def certain(self) -> bool:
@@ -262,7 +263,7 @@ def _remarks(model: Model, facts: TableFacts, matches: Sequence[Match], answers:
     step = facts.time.step if facts.time is not None else np.inf
     step = 1 / parse(answers.rate, "Hz") if answers.rate is not None else step
     known = np.isfinite(step) or kind_of(facts, answers) == "poses"
-    linear = {between_samples(column) for column in u.T} == {"linear"}
+    linear = {course_of(column) for column in u.T} == {"curve"}
     seen = moved_of(model, drives, readings, [Stretch(u, y, step, linear)]) if known and readings else None
     if seen is not None:
         return implausible(seen)
