@@ -64,6 +64,19 @@ def test_constants_of_the_closed_form_of_a_lag_are_found_with_deviations_as_stat
 
 
 @pytest.mark.long
+def test_a_drive_of_which_nobody_states_that_it_was_held_is_found_to_be(tmp_path):
+    """In straight lines it would lead by half a sample, a twelfth of the time constant."""
+    device, folder = record_lag(tmp_path, 5.7e-3, 500.0, 0)
+    stated = calibrate(device, folder)
+    text = (folder / "recording.toml").read_text()
+    assert text.count('between_samples = "held"') == 2
+    (folder / "recording.toml").write_text(text.replace('between_samples = "held"', ""))
+    found = calibrate(device, folder)
+    assert [row.value for row in found.constants] == pytest.approx([row.value for row in stated.constants], rel=1e-9)
+    assert any("held is taken" in note for note in found.notes) and not any("is taken" in note for note in stated.notes)
+
+
+@pytest.mark.long
 def test_a_constant_on_which_the_recording_says_nothing_keeps_its_default(tmp_path):
     text = DEVICE.read_text().replace('input = "actuator.ambient"', "")
     device = tmp_path / "device.toml"
