@@ -121,6 +121,7 @@ class Storm:
     resets: int = 0
     late: int = 0
     double: int = 0
+    untimed: int = 0
     told: int = 0  # calls with UNSURE
     promised: list[np.ndarray] = field(default_factory=list)
     hot: list[np.ndarray] = field(default_factory=list)
@@ -166,21 +167,22 @@ def storm(c: Compiled, calls: int, seed: int, forgets: bool = True) -> Storm:
         if rng.random() < 0.1:
             target = targets[rng.integers(len(targets))]
         if event > 0.99:  # the equilibrium is asked for, and the path goes on at once or after some time
-            status = c.settle(target)
+            c.settle(target)
             waited = int(rng.choice([0, 1, 20, 100]))
             drive = np.array(c.out.drive)
-            device.hold(drive, waited)
-            c.elapsed(waited, drive)
-            c.state.tick = tick = (tick + waited) % 2**32
-            tick += 1 if waited == 0 else 0
-            c.state.ticking = 1
+            device.hold(drive, 1 + waited)
+            if rng.random() < 0.5:  # told, or found by the clock
+                c.elapsed(waited, drive)
+            tick += 1 + waited
         tick = (tick + 1) % 2**32
-        status = c.step_at(tick, target)
+        untimed = 0.96 < event < 0.98  # a call without the clock, which counts it as a sample
+        status = c.step(target) if untimed else c.step_at(tick, target)
+        found.untimed += untimed
         found.calls += 1
         if status == CLOCK:  # late, and made up for
             status = 0
         drive = np.array(c.out.drive)
-        if event > 0.97 and event < 0.98:  # the same sample again, for another target: refused
+        if 0.95 < event < 0.96:  # the same sample again, for another target: refused
             found.double += 1
             found.calls += 1
             assert c.step_at(tick, targets[0]) == CLOCK | (UNSURE if c.state.unsure else 0)

@@ -132,21 +132,8 @@ def test_a_second_call_in_a_sample_changes_nothing_and_hides_nothing(made, compi
     folder, (low, high), rated = made
     online = folder.online[real]
     for name in filter(None, (online, folder.checked.get(real))):
-        text = MAIN.format(
-            name=name, online=online, U=online.upper(), real=real.value, low=low, high=high, rated=int(rated)
-        )
-        (tmp_path / "main.c").write_text(text)
-        words = [
-            compiler,
-            *FLAGS[:1],
-            *FLAGS[-2:],
-            f"-I{folder.path}",
-            tmp_path / "main.c",
-            folder.path / f"{online}.c",
-        ]
-        words += [folder.path / f"{name}.c"] * (name != online)
-        subprocess.run([*map(str, words), "-lm", "-o", str(tmp_path / "main")], check=True)
-        assert int(subprocess.run([str(tmp_path / "main")], capture_output=True, text=True).stdout) == 0, name
+        more = {"low": low, "high": high, "rated": int(rated)}
+        assert answered(folder, name, MAIN, compiler, real, tmp_path, **more) == ["0"], name
 
 
 TOLD = """
@@ -194,14 +181,101 @@ int main(void)
 """
 
 
+def answered(folder, name, text, compiler, real, scratch, **more):
+    """What a program prints that calls the controller `name` of the folder."""
+    online = folder.online[real]
+    far = "0, 0, 0, 0, 0, (float)2e-5" if "hexapod" in online else "(float)5e-6, (float)5e-6"
+    far = "(float)5e-6" if "coil" in online else far
+    (scratch / "main.c").write_text(
+        text.format(name=name, online=online, U=online.upper(), real=real.value, far=far, **more)
+    )
+    words = [compiler, *FLAGS[:1], *FLAGS[-2:], f"-I{folder.path}", scratch / "main.c", folder.path / f"{online}.c"]
+    words += [folder.path / f"{name}.c"] * (name != online)
+    subprocess.run([*map(str, words), "-lm", "-o", str(scratch / "main")], check=True)
+    return subprocess.run([str(scratch / "main")], capture_output=True, text=True).stdout.split()
+
+
 @pytest.mark.parametrize("real", list(Real))
 def test_samples_that_the_program_tells_of_are_not_made_up_for_again(made, compiler, real, tmp_path):
     """Else UNSURE ends in half the time, and a device whose amplifier was off is believed under drives."""
     folder, *_ = made
-    far = "0, 0, 0, 0, 0, (float)2e-5" if "hexapod" in folder.online[real] else "(float)5e-6, (float)5e-6"
-    far = "(float)5e-6" if "coil" in folder.online[real] else far
-    online = folder.online[real]
-    (tmp_path / "main.c").write_text(TOLD.format(online=online, U=online.upper(), real=real.value, far=far))
-    words = [compiler, *FLAGS[:1], *FLAGS[-2:], f"-I{folder.path}", tmp_path / "main.c", folder.path / f"{online}.c"]
-    subprocess.run([*map(str, words), "-o", str(tmp_path / "main")], check=True)
-    assert int(subprocess.run([str(tmp_path / "main")], capture_output=True, text=True).stdout) == 0
+    assert answered(folder, folder.online[real], TOLD, compiler, real, tmp_path) == ["0"]
+
+
+MIXED = """
+#include <stdio.h>
+#include <string.h>
+#include "{name}.h"
+static {name}_state clocked, mixed, held;
+static {online}_output told, out;
+static const {real} TARGET[2][{U}_TARGET_SIZE] = {{ {{ 0 }}, {{ {far} }} }};
+static uint32_t seed = 12345U;
+static uint32_t drawn(uint32_t below)
+{{
+    seed = (seed * 1664525U) + 1013904223U;
+    return (seed >> 8) % below;
+}}
+/* A clock, and one that some of the calls do not read: step, settle, samples that are told. Wrong: a bit for each promise. */
+int main(void)
+{{
+    unsigned wrong = 0U, k, seen = 0U;
+    uint32_t tick = 0xFFFFFE00U;
+    {name}_init(&clocked);
+    {name}_init(&mixed);
+    for (k = 0U; k < 2000U; k++) {{
+        const uint32_t call = (k == 0U) ? 0U : drawn(8U), missed = drawn(5U);
+        const {real} *target = TARGET[drawn(2U)];
+        uint32_t one, two, clock = 0U;
+        if (call == 1U) {{ /* missed, and told of to one of them */
+            (void){name}_elapsed(&mixed, missed, out.drive);
+            tick += missed;
+            clock = (missed != 0U) ? {U}_CLOCK : 0U;
+        }}
+        tick += 1U;
+        if (call == 2U) {{
+            one = {name}_settle(&clocked, target, &told);
+            two = {name}_settle(&mixed, target, &out);
+        }} else if ((call == 3U) || (call == 4U)) {{
+            one = {name}_step_at(&clocked, tick, target, &told);
+            two = {name}_step(&mixed, target, &out);
+        }} else {{
+            one = {name}_step_at(&clocked, tick, target, &told);
+            two = {name}_step_at(&mixed, tick, target, &out);
+        }}
+        seen |= 1U << call;
+        if ((call == 2U) ? (one != two) : (one != (two | clock))) {{ wrong |= 1U; }}
+        if ((memcmp(&clocked, &mixed, sizeof mixed) != 0) || (memcmp(&told, &out, sizeof out) != 0)) {{ wrong |= 2U; }}
+    }}
+    held = mixed;
+    (void){name}_step(&mixed, TARGET[1], &out); /* twice in a sample: the next one is none */
+    (void){name}_step(&mixed, TARGET[1], &out);
+    if (({name}_step_at(&mixed, tick + 2U, TARGET[1], &out) & {U}_CLOCK) == 0U) {{ wrong |= 4U; }}
+    if (({name}_step_at(&mixed, tick + 3U, TARGET[1], &out) & {U}_CLOCK) != 0U) {{ wrong |= 8U; }}
+    mixed = held;
+    for (k = 0U; k < 3U; k++) {{ (void){name}_step(&mixed, TARGET[1], &out); }} /* thrice: it went back */
+    {{
+        const uint32_t back = {name}_step_at(&mixed, tick + 2U, TARGET[1], &out);
+        if ((back & ({U}_CLOCK | {U}_UNSURE)) != ({U}_CLOCK | {U}_UNSURE)) {{ wrong |= 16U; }}
+    }}
+#ifdef {U}_SHORTEST
+    {name}_init(&mixed); /* how many samples that took is not known */
+    (void){name}_step_at(&mixed, 1U, TARGET[1], &out);
+    if (({name}_step_after(&mixed, ({real})9e-4, ({real})2e-3, TARGET[1], &out) & ({U}_CLOCK | {U}_UNSURE)) != 0U) {{ wrong |= 32U; }}
+    {{
+        const uint32_t uncounted = {name}_step_at(&mixed, 2U, TARGET[1], &out);
+        if ((uncounted & ({U}_CLOCK | {U}_UNSURE)) != ({U}_CLOCK | {U}_UNSURE)) {{ wrong |= 64U; }}
+    }}
+    if (({name}_step_at(&mixed, 3U, TARGET[1], &out) & {U}_CLOCK) != 0U) {{ wrong |= 128U; }}
+#endif
+    (void)printf("%u %u\\n", wrong, seen);
+    return 0;
+}}
+"""
+
+
+@pytest.mark.parametrize("real", list(Real))
+def test_a_call_that_reads_no_clock_is_a_sample_of_it(made, compiler, real, tmp_path):
+    """Else step_at makes up for samples that were stepped: a heater is believed to have been driven for twice as long."""
+    folder, *_ = made
+    for name in filter(None, (folder.online[real], folder.checked.get(real))):
+        assert answered(folder, name, MIXED, compiler, real, tmp_path) == ["0", "255"], name

@@ -1,9 +1,10 @@
 /* Whether the state may be wrong, sample by sample. limiter.c includes this for a device that remembers. */
 
-/* UNSURE while the state may be wrong; a sample less of it then. */
+/* A sample: the clock of step_at goes on by one; UNSURE while the state may be wrong, a sample less of it then. */
 static uint32_t count_down(limiter_state *state)
 {
     uint32_t status = 0U;
+    state->tick += 1U;
     if (state->unsure != 0U) {
         status = LIMITER_UNSURE;
         if (state->unsure != LIMITER_FOREVER) {

@@ -61,13 +61,14 @@ static real bounded(real size, const real ahead[NY])
     return left;
 }
 
-/* A sample of a motion that comes from here and leads ahead. */
+/* A sample of a motion that comes from here and leads ahead; the clock of step_at goes on by one. */
 static uint32_t follow_on(limiter_state *state, const real from[NY], const real ahead[NY], real left)
 {
     static const real HELD[NY] = HELD_TABLE; /* what a held drive leaves, per change in a sample */
     const real size = (state->ringing * DECAY) + added(state, from, left);
     real held = REAL(0.0);
     int i;
+    state->tick += 1U;
     state->ringing = bounded(size, ahead);
     for (i = 0; i < NY; i++) {
         held += HELD[i] * magnitude(ahead[i] - from[i]);

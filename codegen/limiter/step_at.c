@@ -33,6 +33,11 @@ uint32_t limiter_step_at(limiter_state *state, uint32_t tick, const real target[
     uint32_t since = 1U;
     if ((state != NULL) && (out != NULL) && (state->ready == LIMITER_BUILD)) {
         since = (state->ticking != 0U) ? (tick - state->tick) : 1U;
+#if VARIED
+        if (state->ticking == UNCOUNTED) {
+            since = BACKWARD;
+        }
+#endif
         if (since != 1U) {
             status = LIMITER_CLOCK;
         }
@@ -40,7 +45,9 @@ uint32_t limiter_step_at(limiter_state *state, uint32_t tick, const real target[
             (void)limiter_forget(state);
         }
         state->ticking = 1U;
-        state->tick = tick;
+        if (since != 0U) {
+            state->tick = tick - 1U; /* and one more, as every sample */
+        }
     }
     if (since != 0U) {
         status |= limiter_step(state, target, out);

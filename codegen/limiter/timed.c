@@ -87,6 +87,9 @@ uint32_t limiter_step_after(limiter_state *state, real since, real ahead, const 
             }
             set_begin(state, time);
             state->stepping = 1U;
+#if ESTIMATED
+            state->ticking = UNCOUNTED;
+#endif
         }
     }
     return status | step_sample(state, wanted, out);

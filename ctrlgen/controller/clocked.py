@@ -43,7 +43,7 @@ class Clocked(Generic[B]):
 
     @abstractmethod
     def step(self, estimate: B, target: np.ndarray, *, settle: bool = False) -> tuple[ControllerStep, B]:
-        """A sample."""
+        """A sample: the clock is one later, but where the state is lost."""
 
     def step_at(self, estimate: B, tick: int, target: np.ndarray, held: np.ndarray) -> tuple[ControllerStep | None, B]:
         """A step at `tick` of a clock that counts samples, 32 bits wide; `held` (n_u,) is the drive of the last call.
@@ -63,5 +63,5 @@ class Clocked(Generic[B]):
                 if since >= BACKWARD or refused & ControllerStatus.INPUT:
                     caught_up = self.forget(estimate)
                 estimate = caught_up
-        step, estimate = self.step(replace(estimate, tick=tick), target)  # type: ignore[type-var]
+        step, estimate = self.step(replace(estimate, tick=later(tick, -1)), target)  # type: ignore[type-var]
         return replace(step, status=step.status | status), estimate

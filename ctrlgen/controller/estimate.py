@@ -70,7 +70,7 @@ class Estimator(Clocked[Belief]):
             unsure = max(unsure, self.bounds.settling)
         if unsure:
             step = replace(step, status=step.status | ControllerStatus.UNSURE)
-        return step, replace(estimate, state=step.state, unsure=_later(unsure, 1))
+        return step, replace(estimate, state=step.state, unsure=_later(unsure, 1), tick=later(estimate.tick, 1))
 
     def elapsed(self, estimate: Belief, ticks: int, drive: np.ndarray) -> tuple[ControllerStatus, Belief]:
         """`ticks` samples passed under this `drive` (n_u,) without a call; status INPUT, and nothing else, for a drive out of its range.

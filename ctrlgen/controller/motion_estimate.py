@@ -84,7 +84,7 @@ class MotionEstimator(Clocked[MotionBelief]):
             size = float(self.bounds.drive @ np.abs(step.drive - wanted))
         size += float(np.sum(np.abs(behind - estimate.ahead)))
         left = self._bounded(self.bounds.decay * estimate.ringing + self._counted(size), ahead)
-        after = replace(estimate, state=step.state, ahead=ahead, ringing=left)
+        after = replace(estimate, state=step.state, ahead=ahead, ringing=left, tick=later(estimate.tick, 1))
         told = self._told(after, float(self.bounds.held @ np.abs(ahead - behind)))
         return replace(step, status=step.status | told), after
 

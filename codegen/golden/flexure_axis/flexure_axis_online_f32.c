@@ -220,13 +220,14 @@ static float flexure_axis_online_f32_bounded(float size, const float ahead[2])
     return left;
 }
 
-/* A sample of a motion that comes from here and leads ahead. */
+/* A sample of a motion that comes from here and leads ahead; the clock of step_at goes on by one. */
 static uint32_t flexure_axis_online_f32_follow_on(flexure_axis_online_f32_state *state, const float from[2], const float ahead[2], float left)
 {
     static const float HELD[2] = { 0.0011920454f, 7.993895e-06f }; /* what a held drive leaves, per change in a sample */
     const float size = (state->ringing * 0.99918395f) + flexure_axis_online_f32_added(state, from, left);
     float held = 0.0f;
     int i;
+    state->tick += 1U;
     state->ringing = flexure_axis_online_f32_bounded(size, ahead);
     for (i = 0; i < 2; i++) {
         held += HELD[i] * flexure_axis_online_f32_magnitude(ahead[i] - from[i]);
@@ -243,7 +244,7 @@ static uint32_t flexure_axis_online_f32_stay(flexure_axis_online_f32_state *stat
     return flexure_axis_online_f32_follow_on(state, still, still, 0.0f);
 }
 
-void flexure_axis_online_f32_init_20000hz_d41c3760(flexure_axis_online_f32_state *state)
+void flexure_axis_online_f32_init_20000hz_f8cca9da(flexure_axis_online_f32_state *state)
 {
     static const float X_REST[1] = { 0.0f }; /* SI */
     if (state != NULL) {
@@ -618,7 +619,9 @@ uint32_t flexure_axis_online_f32_step_at(flexure_axis_online_f32_state *state, u
             (void)flexure_axis_online_f32_forget(state);
         }
         state->ticking = 1U;
-        state->tick = tick;
+        if (since != 0U) {
+            state->tick = tick - 1U; /* and one more, as every sample */
+        }
     }
     if (since != 0U) {
         status |= flexure_axis_online_f32_step(state, target, out);

@@ -27,12 +27,12 @@
 extern "C" {
 #endif
 
-/* For _Static_assert(FLEXURE_AXIS_ONLINE_F32_ABI == 4U, "..."): raised when code written for an older header must be changed. */
-#define FLEXURE_AXIS_ONLINE_F32_ABI (4U)
+/* For _Static_assert(FLEXURE_AXIS_ONLINE_F32_ABI == 5U, "..."): raised when code written for an older header must be changed. */
+#define FLEXURE_AXIS_ONLINE_F32_ABI (5U)
 #define FLEXURE_AXIS_ONLINE_F32_VERSION "0.1.0" /* of ctrlgen */
 #define FLEXURE_AXIS_ONLINE_F32_DEVICE_HASH (0x5f641b21U) /* the first 32 bits of the SHA-256 of the device's description */
 #define FLEXURE_AXIS_ONLINE_F32_RATE_HZ (20000U) /* samples a second */
-#define FLEXURE_AXIS_ONLINE_F32_BUILD (0xD41C3760U) /* of device, followed signal, rate, limits and arithmetic; the mark of an initialised state */
+#define FLEXURE_AXIS_ONLINE_F32_BUILD (0xF8CCA9DAU) /* of device, followed signal, rate, limits and arithmetic; the mark of an initialised state */
 #define FLEXURE_AXIS_ONLINE_F32_TARGET_SIZE (3U)
 #define FLEXURE_AXIS_ONLINE_F32_DRIVE_SIZE (1U)
 #define FLEXURE_AXIS_ONLINE_F32_DISPLACEMENT_SIZE (1U)
@@ -56,7 +56,7 @@ typedef struct {
     float ahead[2]; /* where the motion leads, weighted */
     float ringing; /* how far the device is off it at most, in 1 thousandth of its range; 0.5 or less is told as none */
     uint32_t ready; /* FLEXURE_AXIS_ONLINE_F32_BUILD once flexure_axis_online_f32_init was called */
-    uint32_t ticking; /* 1 once flexure_axis_online_f32_step_at was called, at this */
+    uint32_t ticking; /* 1 once flexure_axis_online_f32_step_at was called, at this; each sample since counts */
     uint32_t tick;
 } flexure_axis_online_f32_state;
 
@@ -67,17 +67,17 @@ typedef struct {
 
 /* What flexure_axis_online_f32_init calls. It is linked by a name of this build, rate and hash of device, signal and limits: a program that was
  * compiled with this header and is linked with another build of the same prefix is told so by the linker. */
-void flexure_axis_online_f32_init_20000hz_d41c3760(flexure_axis_online_f32_state *state);
+void flexure_axis_online_f32_init_20000hz_f8cca9da(flexure_axis_online_f32_state *state);
 
 /* A cold device at rest. Also the way out of status LOST: hold the safe drive until the device has settled, then call it.
  * Behind a reset, a brown-out or a watchdog nobody knows whether it is: call flexure_axis_online_f32_forget then. */
 static inline void flexure_axis_online_f32_init(flexure_axis_online_f32_state *state)
 {
-    flexure_axis_online_f32_init_20000hz_d41c3760(state);
+    flexure_axis_online_f32_init_20000hz_f8cca9da(state);
 }
 
 /* Drive of the equilibrium at the position of target; the state becomes that equilibrium. Hold the drive until the device has settled: FLEXURE_AXIS_ONLINE_F32_SETTLING samples,
- * until which the status has UNSURE. Call it once a sample for so long, or flexure_axis_online_f32_elapsed with the time that has passed. */
+ * until which the status has UNSURE. Call it once a sample for so long, or flexure_axis_online_f32_elapsed with the samples that passed without a call. */
 uint32_t flexure_axis_online_f32_settle(flexure_axis_online_f32_state *state, const float target[FLEXURE_AXIS_ONLINE_F32_TARGET_SIZE], flexure_axis_online_f32_output *out);
 /* Drive of the motion that target and its derivatives say at this moment; the state becomes that of the motion. A motion beyond a limit
  * of displacement, state or stress is answered as by settle. A drive that was limited is not made up for: UNSURE tells of what that sets ringing, and of targets that do not go on from one another. */
@@ -95,15 +95,16 @@ uint32_t flexure_axis_online_f32_observe(flexure_axis_online_f32_state *state, c
 uint32_t flexure_axis_online_f32_elapsed(flexure_axis_online_f32_state *state, uint32_t ticks, const float drive[FLEXURE_AXIS_ONLINE_F32_DRIVE_SIZE]);
 /* Step at this tick of a clock that counts samples, whatever calls the program; it may wrap. out must still hold the last drive. CLOCK: samples
  * passed without a call, of which elapsed was not told and which are made up for as by it, or none passed: then drive and state stay as they
- * are, and UNSURE as it was. Samples of step and settle in between are not counted: settle once, not once a sample, and do not step. A
- * clock that goes back leaves the state unknown, and so does an out without a drive within its limits, which is given the safe one. */
+ * are, and UNSURE as it was. Every step and every settle in between counts as a sample. A clock that goes back leaves the state unknown,
+ * as does one at which fewer samples passed than were stepped; and so does an out without a drive within its
+ * limits, which is given the safe one. */
 uint32_t flexure_axis_online_f32_step_at(flexure_axis_online_f32_state *state, uint32_t tick, const float target[FLEXURE_AXIS_ONLINE_F32_TARGET_SIZE], flexure_axis_online_f32_output *out);
 #ifdef __cplusplus
 }
 #endif
 
 #else
-#if (FLEXURE_AXIS_ONLINE_F32_BUILD != 0xD41C3760U) /* the header that was read first is another one */
+#if (FLEXURE_AXIS_ONLINE_F32_BUILD != 0xF8CCA9DAU) /* the header that was read first is another one */
 #error "two different headers are named flexure_axis_online_f32.h: give one of the controllers a name of its own, by controller = in its scenario.toml"
 #endif
 #endif

@@ -31,12 +31,12 @@
 extern "C" {
 #endif
 
-/* For _Static_assert(LIMITER_ABI == 4U, "..."): raised when code written for an older header must be changed. */
-#define LIMITER_ABI (4U)
+/* For _Static_assert(LIMITER_ABI == 5U, "..."): raised when code written for an older header must be changed. */
+#define LIMITER_ABI (5U)
 #define LIMITER_VERSION "0.1.0" /* of ctrlgen */
 #define LIMITER_DEVICE_HASH (0x39f6d797U) /* the first 32 bits of the SHA-256 of the device's description */
 #define LIMITER_RATE_HZ (1000U) /* samples a second */
-#define LIMITER_BUILD (0xE58D3E00U) /* of device, followed signal, rate, limits and arithmetic; the mark of an initialised state */
+#define LIMITER_BUILD (0x1714BF56U) /* of device, followed signal, rate, limits and arithmetic; the mark of an initialised state */
 #define LIMITER_TARGET_SIZE (6U)
 #define LIMITER_DRIVE_SIZE (6U)
 #define LIMITER_DISPLACEMENT_SIZE (6U)
@@ -61,7 +61,7 @@ typedef struct {
     float z[LIMITER_DISPLACEMENT_SIZE]; /* displacement_1X, displacement_1Y, displacement_2X, displacement_2Y, displacement_3X, displacement_3Y [m] */
     uint32_t ready; /* LIMITER_BUILD once limiter_init was called */
     uint32_t unsure; /* samples until what is believed is known, or LIMITER_FOREVER */
-    uint32_t ticking; /* 1 once limiter_step_at was called, at this */
+    uint32_t ticking; /* 1 once limiter_step_at was called, at this; each sample since counts */
     uint32_t tick;
 } limiter_state;
 
@@ -73,17 +73,17 @@ typedef struct {
 
 /* What limiter_init calls. It is linked by a name of this build, rate and hash of device, signal and limits: a program that was
  * compiled with this header and is linked with another build of the same prefix is told so by the linker. */
-void limiter_init_1000hz_e58d3e00(limiter_state *state);
+void limiter_init_1000hz_1714bf56(limiter_state *state);
 
 /* A cold device at rest. Also the way out of status LOST: hold the safe drive until the device has settled, then call it.
  * Behind a reset, a brown-out or a watchdog nobody knows whether it is: call limiter_forget then. */
 static inline void limiter_init(limiter_state *state)
 {
-    limiter_init_1000hz_e58d3e00(state);
+    limiter_init_1000hz_1714bf56(state);
 }
 
 /* Drive of the equilibrium at target; the state becomes that equilibrium. Hold the drive until the device has settled: LIMITER_SETTLING samples,
- * until which the status has UNSURE. Call it once a sample for so long, or limiter_elapsed with the time that has passed. */
+ * until which the status has UNSURE. Call it once a sample for so long, or limiter_elapsed with the samples that passed without a call. */
 uint32_t limiter_settle(limiter_state *state, const float target[LIMITER_TARGET_SIZE], limiter_output *out);
 /* Drive that brings the device to target at the next sample, held until then. Call once a sample. */
 uint32_t limiter_step(limiter_state *state, const float target[LIMITER_TARGET_SIZE], limiter_output *out);
@@ -108,15 +108,16 @@ uint32_t limiter_observe(limiter_state *state, const float measured[LIMITER_STAT
 uint32_t limiter_elapsed(limiter_state *state, uint32_t ticks, const float drive[LIMITER_DRIVE_SIZE]);
 /* Step at this tick of a clock that counts samples, whatever calls the program; it may wrap. out must still hold the last drive. CLOCK: samples
  * passed without a call, of which elapsed was not told and which are made up for as by it, or none passed: then drive and state stay as they
- * are, and UNSURE as it was. Samples of step and settle in between are not counted: settle once, not once a sample, and do not step. A
- * clock that goes back leaves the state unknown, and so does an out without a drive within its limits, which is given the safe one. */
+ * are, and UNSURE as it was. Every step and every settle in between counts as a sample. A clock that goes back leaves the state unknown,
+ * as does one at which fewer samples passed than were stepped; and so does an out without a drive within its
+ * limits, which is given the safe one. */
 uint32_t limiter_step_at(limiter_state *state, uint32_t tick, const float target[LIMITER_TARGET_SIZE], limiter_output *out);
 #ifdef __cplusplus
 }
 #endif
 
 #else
-#if (LIMITER_BUILD != 0xE58D3E00U) /* the header that was read first is another one */
+#if (LIMITER_BUILD != 0x1714BF56U) /* the header that was read first is another one */
 #error "two different headers are named limiter.h: give one of the controllers a name of its own, by controller = in its scenario.toml"
 #endif
 #endif

@@ -66,8 +66,8 @@ typedef float real;
 #define SECANT_STEPS 3
 #define GROUPS 0
 #define GIVEN 0
-#define INIT limiter_init_1000hz_e58d3e00
-#define INIT_WITH limiter_init_with_1000hz_e58d3e00
+#define INIT limiter_init_1000hz_1714bf56
+#define INIT_WITH limiter_init_with_1000hz_1714bf56
 #define Z_LOW_TABLE { 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f }
 #define Z_HIGH_TABLE { 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f, 5.5e-05f }
 #define Z_SLACK_TABLE { 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f, 4e-11f }

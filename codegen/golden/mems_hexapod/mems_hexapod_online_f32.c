@@ -662,7 +662,7 @@ static uint32_t mems_hexapod_online_f32_into_reach(const mems_hexapod_online_f32
     return status;
 }
 
-void mems_hexapod_online_f32_init_1000hz_e58d3e00(mems_hexapod_online_f32_state *state)
+void mems_hexapod_online_f32_init_1000hz_1714bf56(mems_hexapod_online_f32_state *state)
 {
     if (state != NULL) {
         int i;
@@ -702,10 +702,11 @@ static uint32_t mems_hexapod_online_f32_set_lost(mems_hexapod_online_f32_state *
     return MEMS_HEXAPOD_ONLINE_F32_LOST;
 }
 
-/* UNSURE while the state may be wrong; a sample less of it then. */
+/* A sample: the clock of step_at goes on by one; UNSURE while the state may be wrong, a sample less of it then. */
 static uint32_t mems_hexapod_online_f32_count_down(mems_hexapod_online_f32_state *state)
 {
     uint32_t status = 0U;
+    state->tick += 1U;
     if (state->unsure != 0U) {
         status = MEMS_HEXAPOD_ONLINE_F32_UNSURE;
         if (state->unsure != MEMS_HEXAPOD_ONLINE_F32_FOREVER) {
@@ -1234,7 +1235,9 @@ uint32_t mems_hexapod_online_f32_step_at(mems_hexapod_online_f32_state *state, u
             (void)mems_hexapod_online_f32_forget(state);
         }
         state->ticking = 1U;
-        state->tick = tick;
+        if (since != 0U) {
+            state->tick = tick - 1U; /* and one more, as every sample */
+        }
     }
     if (since != 0U) {
         status |= mems_hexapod_online_f32_step(state, target, out);

@@ -31,12 +31,12 @@
 extern "C" {
 #endif
 
-/* For _Static_assert(MEMS_HEXAPOD_ONLINE_F32_ABI == 4U, "..."): raised when code written for an older header must be changed. */
-#define MEMS_HEXAPOD_ONLINE_F32_ABI (4U)
+/* For _Static_assert(MEMS_HEXAPOD_ONLINE_F32_ABI == 5U, "..."): raised when code written for an older header must be changed. */
+#define MEMS_HEXAPOD_ONLINE_F32_ABI (5U)
 #define MEMS_HEXAPOD_ONLINE_F32_VERSION "0.1.0" /* of ctrlgen */
 #define MEMS_HEXAPOD_ONLINE_F32_DEVICE_HASH (0x39f6d797U) /* the first 32 bits of the SHA-256 of the device's description */
 #define MEMS_HEXAPOD_ONLINE_F32_RATE_HZ (1000U) /* samples a second */
-#define MEMS_HEXAPOD_ONLINE_F32_BUILD (0xE58D3E00U) /* of device, followed signal, rate, limits and arithmetic; the mark of an initialised state */
+#define MEMS_HEXAPOD_ONLINE_F32_BUILD (0x1714BF56U) /* of device, followed signal, rate, limits and arithmetic; the mark of an initialised state */
 #define MEMS_HEXAPOD_ONLINE_F32_TARGET_SIZE (6U)
 #define MEMS_HEXAPOD_ONLINE_F32_DRIVE_SIZE (6U)
 #define MEMS_HEXAPOD_ONLINE_F32_DISPLACEMENT_SIZE (6U)
@@ -61,7 +61,7 @@ typedef struct {
     float z[MEMS_HEXAPOD_ONLINE_F32_DISPLACEMENT_SIZE]; /* displacement_1X, displacement_1Y, displacement_2X, displacement_2Y, displacement_3X, displacement_3Y [m] */
     uint32_t ready; /* MEMS_HEXAPOD_ONLINE_F32_BUILD once mems_hexapod_online_f32_init was called */
     uint32_t unsure; /* samples until what is believed is known, or MEMS_HEXAPOD_ONLINE_F32_FOREVER */
-    uint32_t ticking; /* 1 once mems_hexapod_online_f32_step_at was called, at this */
+    uint32_t ticking; /* 1 once mems_hexapod_online_f32_step_at was called, at this; each sample since counts */
     uint32_t tick;
 } mems_hexapod_online_f32_state;
 
@@ -73,17 +73,17 @@ typedef struct {
 
 /* What mems_hexapod_online_f32_init calls. It is linked by a name of this build, rate and hash of device, signal and limits: a program that was
  * compiled with this header and is linked with another build of the same prefix is told so by the linker. */
-void mems_hexapod_online_f32_init_1000hz_e58d3e00(mems_hexapod_online_f32_state *state);
+void mems_hexapod_online_f32_init_1000hz_1714bf56(mems_hexapod_online_f32_state *state);
 
 /* A cold device at rest. Also the way out of status LOST: hold the safe drive until the device has settled, then call it.
  * Behind a reset, a brown-out or a watchdog nobody knows whether it is: call mems_hexapod_online_f32_forget then. */
 static inline void mems_hexapod_online_f32_init(mems_hexapod_online_f32_state *state)
 {
-    mems_hexapod_online_f32_init_1000hz_e58d3e00(state);
+    mems_hexapod_online_f32_init_1000hz_1714bf56(state);
 }
 
 /* Drive of the equilibrium at target; the state becomes that equilibrium. Hold the drive until the device has settled: MEMS_HEXAPOD_ONLINE_F32_SETTLING samples,
- * until which the status has UNSURE. Call it once a sample for so long, or mems_hexapod_online_f32_elapsed with the time that has passed. */
+ * until which the status has UNSURE. Call it once a sample for so long, or mems_hexapod_online_f32_elapsed with the samples that passed without a call. */
 uint32_t mems_hexapod_online_f32_settle(mems_hexapod_online_f32_state *state, const float target[MEMS_HEXAPOD_ONLINE_F32_TARGET_SIZE], mems_hexapod_online_f32_output *out);
 /* Drive that brings the device to target at the next sample, held until then. Call once a sample. */
 uint32_t mems_hexapod_online_f32_step(mems_hexapod_online_f32_state *state, const float target[MEMS_HEXAPOD_ONLINE_F32_TARGET_SIZE], mems_hexapod_online_f32_output *out);
@@ -108,15 +108,16 @@ uint32_t mems_hexapod_online_f32_observe(mems_hexapod_online_f32_state *state, c
 uint32_t mems_hexapod_online_f32_elapsed(mems_hexapod_online_f32_state *state, uint32_t ticks, const float drive[MEMS_HEXAPOD_ONLINE_F32_DRIVE_SIZE]);
 /* Step at this tick of a clock that counts samples, whatever calls the program; it may wrap. out must still hold the last drive. CLOCK: samples
  * passed without a call, of which elapsed was not told and which are made up for as by it, or none passed: then drive and state stay as they
- * are, and UNSURE as it was. Samples of step and settle in between are not counted: settle once, not once a sample, and do not step. A
- * clock that goes back leaves the state unknown, and so does an out without a drive within its limits, which is given the safe one. */
+ * are, and UNSURE as it was. Every step and every settle in between counts as a sample. A clock that goes back leaves the state unknown,
+ * as does one at which fewer samples passed than were stepped; and so does an out without a drive within its
+ * limits, which is given the safe one. */
 uint32_t mems_hexapod_online_f32_step_at(mems_hexapod_online_f32_state *state, uint32_t tick, const float target[MEMS_HEXAPOD_ONLINE_F32_TARGET_SIZE], mems_hexapod_online_f32_output *out);
 #ifdef __cplusplus
 }
 #endif
 
 #else
-#if (MEMS_HEXAPOD_ONLINE_F32_BUILD != 0xE58D3E00U) /* the header that was read first is another one */
+#if (MEMS_HEXAPOD_ONLINE_F32_BUILD != 0x1714BF56U) /* the header that was read first is another one */
 #error "two different headers are named mems_hexapod_online_f32.h: give one of the controllers a name of its own, by controller = in its scenario.toml"
 #endif
 #endif

@@ -340,7 +340,7 @@ static int three_stacks_online_f32_line_search(const three_stacks_online_f32_sta
     return three_stacks_online_f32_limit_all(out->drive, THREE_STACKS_ONLINE_F32_U_LOW, THREE_STACKS_ONLINE_F32_U_HIGH, THREE_STACKS_ONLINE_F32_U_SLACK, 3);
 }
 
-void three_stacks_online_f32_init_1000hz_6531ca46(three_stacks_online_f32_state *state)
+void three_stacks_online_f32_init_1000hz_47c3030e(three_stacks_online_f32_state *state)
 {
     if (state != NULL) {
         int i;

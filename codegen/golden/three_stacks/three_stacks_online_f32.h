@@ -29,12 +29,12 @@
 extern "C" {
 #endif
 
-/* For _Static_assert(THREE_STACKS_ONLINE_F32_ABI == 4U, "..."): raised when code written for an older header must be changed. */
-#define THREE_STACKS_ONLINE_F32_ABI (4U)
+/* For _Static_assert(THREE_STACKS_ONLINE_F32_ABI == 5U, "..."): raised when code written for an older header must be changed. */
+#define THREE_STACKS_ONLINE_F32_ABI (5U)
 #define THREE_STACKS_ONLINE_F32_VERSION "0.1.0" /* of ctrlgen */
 #define THREE_STACKS_ONLINE_F32_DEVICE_HASH (0x75df1da7U) /* the first 32 bits of the SHA-256 of the device's description */
 #define THREE_STACKS_ONLINE_F32_RATE_HZ (1000U) /* samples a second */
-#define THREE_STACKS_ONLINE_F32_BUILD (0x6531CA46U) /* of device, followed signal, rate, limits and arithmetic; the mark of an initialised state */
+#define THREE_STACKS_ONLINE_F32_BUILD (0x47C3030EU) /* of device, followed signal, rate, limits and arithmetic; the mark of an initialised state */
 #define THREE_STACKS_ONLINE_F32_TARGET_SIZE (2U)
 #define THREE_STACKS_ONLINE_F32_DRIVE_SIZE (3U)
 #define THREE_STACKS_ONLINE_F32_DISPLACEMENT_SIZE (2U)
@@ -62,12 +62,12 @@ typedef struct {
 
 /* What three_stacks_online_f32_init calls. It is linked by a name of this build, rate and hash of device, signal and limits: a program that was
  * compiled with this header and is linked with another build of the same prefix is told so by the linker. */
-void three_stacks_online_f32_init_1000hz_6531ca46(three_stacks_online_f32_state *state);
+void three_stacks_online_f32_init_1000hz_47c3030e(three_stacks_online_f32_state *state);
 
 /* A cold device at rest, its drives off. Also the way out of status LOST: hold the safe drive until the device has settled, then call it. */
 static inline void three_stacks_online_f32_init(three_stacks_online_f32_state *state)
 {
-    three_stacks_online_f32_init_1000hz_6531ca46(state);
+    three_stacks_online_f32_init_1000hz_47c3030e(state);
 }
 
 /* Drive of the equilibrium at target; the state becomes that equilibrium. Call it once a sample
@@ -80,7 +80,7 @@ uint32_t three_stacks_online_f32_step(three_stacks_online_f32_state *state, cons
 #endif
 
 #else
-#if (THREE_STACKS_ONLINE_F32_BUILD != 0x6531CA46U) /* the header that was read first is another one */
+#if (THREE_STACKS_ONLINE_F32_BUILD != 0x47C3030EU) /* the header that was read first is another one */
 #error "two different headers are named three_stacks_online_f32.h: give one of the controllers a name of its own, by controller = in its scenario.toml"
 #endif
 #endif

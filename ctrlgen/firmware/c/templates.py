@@ -20,7 +20,7 @@ from ctrlgen.firmware.c.real import Real
 # Of the interface of the generated C, in every header: raised when code that was written for an older header must be changed or compiled
 # anew because a function, a structure (that of the state too) or the meaning of an argument or a status changed.
 # tests/interface_digests.json holds the digest of the interface that belongs to the number.
-ABI = 4
+ABI = 5
 # Sources of a firmware and what of their context is their own name.
 SOURCES = {
     "online.c": "prefix",

@@ -172,7 +172,7 @@ def _texts(context: Mapping[str, Any]) -> dict[str, str]:
     if context["times"] is not None:
         shortest, longest = context["times"]
         within = within_test("h", shortest, longest, context["real"])
-        texts |= {"TIME_WITHIN": within, "SAMPLE_TIME": literal(context["sample_time"])}
+        texts |= {"TIME_WITHIN": within, "SAMPLE_TIME": literal(context["sample_time"]), "UNCOUNTED": "2U"}
     if context["nearest_slopes"] is not None:
         texts["NEAREST_SWEEP"] = _nearest_sweep(context)
     for mode in limited_modes(context)[:1]:
