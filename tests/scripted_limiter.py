@@ -296,6 +296,8 @@ def odd_cases(rng: np.random.Generator, device: Device) -> list[tuple[str, np.nd
     """Targets that are no command, and states that nothing but a defect could leave."""
     cases = []
     for mode in ("settle", "step") if device.moving else ("settle",):
+        for _ in range(300 if device.own else 0):  # of which some lead away from the target, whatever the drives
+            cases.append((mode, *sample(rng, device, (mode, *PLAIN[:-1], REACHED[0]))))
         for bad in (np.nan, np.inf, -np.inf, 65.0, -65.0, 64.0, -64.0):
             for i in range(N):
                 x, z, target = sample(rng, device, (mode, *PLAIN))

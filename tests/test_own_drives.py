@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import shutil
+
 import casadi as ca
 import numpy as np
 import pytest
 from conftest import SCENARIOS
+from reset_storm import compiled
 from scipy.optimize import brentq
 
 from ctrlgen import ControllerStatus, build_model, load_scenario
 from ctrlgen.controller.few_coordinates import few_coordinates
 from ctrlgen.controller.motion_feedforward import controller_of
 from ctrlgen.controller.own_drives import has_own_drives
+from ctrlgen.firmware.c.real import Real
 from ctrlgen.numerics.proven_polynomial import proven_inverse
 
 V = ca.SX.sym("v")
@@ -51,6 +55,27 @@ def test_one_sample_goes_as_far_toward_a_target_as_bisection_finds(controller, r
             assert np.all((step.drive >= m.u_bounds[0]) & (step.drive <= m.u_bounds[1]))
         state = step.state
     assert limited > 30
+
+
+@pytest.mark.parametrize("real", list(Real))
+def test_an_axis_that_rests_but_for_rounding_holds_no_other(real, controller, tmp_path):
+    """Whatever is left of heat: with one axis at home the others go as far as from rest, in C as in Python."""
+    if not shutil.which("gcc"):
+        pytest.skip("gcc is missing: the C was not tried")
+    c, m = compiled(tmp_path)[real], controller.kernels.nominal
+    pose = ca.Function("pose", [m.z], [m.signals["pose"].expr])
+    wanted = np.array([0, 8e-6, 12e-6, 30e-6, 12e-6, 30e-6])
+    target, moved = pose(wanted).full().ravel(), np.arange(6) > 0
+    for left in (0.0, *(10.0**-k for k in range(18, 8, -1))):  # W for a sample
+        x, z = controller.rest()
+        x = controller.kernels.moving.advance(x, z, np.full(6, left)).full().ravel()
+        z = controller.kernels.static.settle(x, z, np.zeros(6)).full().ravel()
+        step = controller.step((x, z), target)
+        c.c_init(c.at)
+        c.elapsed(1, np.full(6, left))
+        assert ControllerStatus.DRIVE in step.status and c.step(target) == step.status
+        gone = np.array([step.displacement, c.out.displacement])[:, moved] / wanted[moved]
+        assert gone.min() > 0.8793 and gone.max() < 0.8794, left
 
 
 @pytest.mark.parametrize("start", [1.0, 0.2])

@@ -412,9 +412,9 @@ static void wanted_drives(const limiter_state *state, int settling, limiter_outp
 #define TAKE_HELD(k) out->drive[k] = held[k];
 #define BEGIN_AT(k) reached[k] = out->displacement[k];
 /* Keeps the limits of drives that out->drive does not keep: as far from origin toward out->displacement as every drive can lead the
- * displacement of its own. The drives held within their limits lead to reached, and the slowest of those that were beyond says how much of the
- * line is gone. As drives rise with their displacements, or fall, all lie between those of origin and held; limited is 1 if one does not,
- * because those of origin are inadmissible. */
+ * displacement of its own. The drives held within their limits lead to reached, and the slowest of those that were beyond by more than the slack
+ * says how much of the line is gone. As drives rise with their displacements, or fall, all lie between those of origin and held, but for the
+ * slack; limited is 1 if one does not, because those of origin are inadmissible. */
 static uint32_t into_reach(const limiter_state *state, int settling, const real origin[N], limiter_output *out, int *limited)
 {
     real held[NU];
@@ -440,7 +440,7 @@ static uint32_t into_reach(const limiter_state *state, int settling, const real 
         REACHED(state, x, out->displacement, held, reached);
         for (i = 0; i < N; i++) {
             const real whole = out->displacement[i] - origin[i];
-            if ((out->drive[i] > held[i]) || (out->drive[i] < held[i])) {
+            if ((out->drive[i] > (held[i] + U_SLACK[i])) || (out->drive[i] < (held[i] - U_SLACK[i]))) { /* by more than rounding */
                 const real gone = reached[i] - origin[i];
                 const real most = share * whole;
                 if (((whole > REAL(0.0)) && (gone < most)) || ((whole < REAL(0.0)) && (gone > most))) {

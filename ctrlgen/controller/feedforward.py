@@ -258,14 +258,15 @@ class Controller:
         """As `_line_search` where each drive leads a displacement of its own: as far as every one can, in closed form.
 
         Drives held within their limits lead to displacements r. Of the line as much is gone, max(0, min_i (r_i - o_i) / (t_i - o_i)),
-        as the slowest of those that are beyond allows. As drives rise with their displacements, or fall, all lie between those of
+        as the slowest of those that are beyond by more than the slack allows: less is what rounding leaves of a state, and an axis that
+        rests would hold the others. As drives rise with their displacements, or fall, all lie between those of
         origin o and r.
         """
         (low, high), slack, (x, z) = self.kernels.nominal.u_bounds, self.slacks[2], now[:2]
         held, _ = clamp(at_target, low, high, slack)
         x_then = answer(k.advance, x, target if k is self.kernels.static else z, held)
         gone, whole, share = answer(k.settle, x_then, target, held) - origin, target - origin, 1.0
-        for i in np.flatnonzero((at_target > held) | (at_target < held)):
+        for i in np.flatnonzero((at_target > held + slack) | (at_target < held - slack)):
             if (whole[i] > 0 and gone[i] < share * whole[i]) or (whole[i] < 0 and gone[i] > share * whole[i]):
                 share = gone[i] / whole[i]
         reached = origin + (REACH_FRACTION * share if share > 0 else 0.0) * whole

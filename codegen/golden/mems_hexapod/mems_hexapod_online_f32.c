@@ -601,9 +601,9 @@ static void mems_hexapod_online_f32_wanted_drives(const mems_hexapod_online_f32_
 }
 
 /* Keeps the limits of drives that out->drive does not keep: as far from origin toward out->displacement as every drive can lead the
- * displacement of its own. The drives held within their limits lead to reached, and the slowest of those that were beyond says how much of the
- * line is gone. As drives rise with their displacements, or fall, all lie between those of origin and held; limited is 1 if one does not,
- * because those of origin are inadmissible. */
+ * displacement of its own. The drives held within their limits lead to reached, and the slowest of those that were beyond by more than the slack
+ * says how much of the line is gone. As drives rise with their displacements, or fall, all lie between those of origin and held, but for the
+ * slack; limited is 1 if one does not, because those of origin are inadmissible. */
 static uint32_t mems_hexapod_online_f32_into_reach(const mems_hexapod_online_f32_state *state, int settling, const float origin[6], mems_hexapod_online_f32_output *out, int *limited)
 {
     float held[6];
@@ -636,7 +636,7 @@ static uint32_t mems_hexapod_online_f32_into_reach(const mems_hexapod_online_f32
         mems_hexapod_online_f32_reached_displacement(x, reached);
         for (i = 0; i < 6; i++) {
             const float whole = out->displacement[i] - origin[i];
-            if ((out->drive[i] > held[i]) || (out->drive[i] < held[i])) {
+            if ((out->drive[i] > (held[i] + MEMS_HEXAPOD_ONLINE_F32_U_SLACK[i])) || (out->drive[i] < (held[i] - MEMS_HEXAPOD_ONLINE_F32_U_SLACK[i]))) { /* by more than rounding */
                 const float gone = reached[i] - origin[i];
                 const float most = share * whole;
                 if (((whole > 0.0f) && (gone < most)) || ((whole < 0.0f) && (gone > most))) {
