@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 from conftest import DEVICE, ROOT, SCENARIOS
-from traced_calls import BOARD, program
+from traced_calls import BOARD, numbers, program
 
 from ctrlgen import build_model, generate, load_scenario, solve
 from ctrlgen.firmware.c.real import Real
@@ -78,6 +78,18 @@ TARGETS = {
     "Cortex-M3": Target(
         ("arm-none-eabi-gcc", *M3, "-std=c11", "-Os", "-ffp-contract=off", *SECTIONS),
         ("qemu-system-arm", "-M", "mps2-an385", *QEMU),
+        ARM,
+        board=True,
+    ),
+}
+# Whose arithmetic keeps more digits than a number has, or rounds a product and a sum at once
+ROUNDING = {
+    "x87": Target(("gcc", "-m32", "-mno-sse", "-mfpmath=387", "-std=c99", "-O2"), (), MULTILIB),
+    "x87 of GNU": Target(("gcc", "-m32", "-mno-sse", "-mfpmath=387", "-std=gnu11", "-O2"), (), MULTILIB),
+    "fused": Target(("gcc", "-march=native", "-std=gnu11", "-O3", "-ffp-contract=fast")),
+    "fused, Cortex-M7": Target(
+        ("arm-none-eabi-gcc", *M7, "-std=gnu11", "-O3", "-ffp-contract=fast"),
+        ("qemu-system-arm", "-M", "mps2-an500", *QEMU),
         ARM,
         board=True,
     ),
@@ -157,6 +169,22 @@ def expected(compiler, tmp_path_factory):
 @pytest.mark.parametrize("name", ["C++98", "32 bits", "big-endian", "Cortex-M7"])
 def test_the_circles_c_answers_the_same_bits_on_a_strangers_target(name, real, circle_c, expected, tmp_path):
     assert answers(circle_c, real, TARGETS[name], tmp_path) == expected(circle_c, real)
+
+
+@pytest.mark.parametrize("real", list(Real))
+@pytest.mark.parametrize("name", list(ROUNDING))
+def test_another_rounding_changes_no_status_and_no_more_than_digits(name, real, circle_c, expected, tmp_path):
+    """Of every kind of answer the largest difference, in the largest number that it ever has."""
+    largest: dict[str, float] = {}
+    off: dict[str, float] = {}
+    there = answers(circle_c, real, ROUNDING[name], tmp_path)
+    for mine, other in zip(expected(circle_c, real), there, strict=True):
+        (status, wanted), (told, got) = numbers(mine, real), numbers(other, real)
+        assert told == status
+        what = status.rpartition(" ")[0]
+        largest[what] = max([largest.get(what, 0.0), *map(abs, wanted)])
+        off[what] = max([off.get(what, 0.0), *(abs(a - b) for a, b in zip(wanted, got, strict=True))])
+    assert largest and all(off[what] <= 100 * real.epsilon * largest[what] for what in largest), (off, largest)
 
 
 @pytest.mark.long

@@ -156,6 +156,10 @@ extern unsigned int stack_top[];
 extern void initialise_monitor_handles(void);
 extern int main(void);
 void reset(void);
+void _init(void);
+void _fini(void);
+void _init(void) {}
+void _fini(void) {}
 static void fault(void) { _Exit(99); }
 __attribute__((section(".vectors"), used)) static void *const VECTORS[16] = {
     stack_top, (void *)reset, (void *)fault, (void *)fault, (void *)fault, (void *)fault, (void *)fault
