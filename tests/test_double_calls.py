@@ -279,3 +279,41 @@ def test_a_call_that_reads_no_clock_is_a_sample_of_it(made, compiler, real, tmp_
     folder, *_ = made
     for name in filter(None, (folder.online[real], folder.checked.get(real))):
         assert answered(folder, name, MIXED, compiler, real, tmp_path) == ["0", "255"], name
+
+
+BYTES = """
+#include <stdio.h>
+#include <string.h>
+#include "{name}.h"
+int main(void)
+{{
+    static {name}_state one, two;
+    static {online}_output told, out;
+    const {real} target[{U}_TARGET_SIZE] = {{ {far} }};
+    unsigned k, wrong = 0U;
+    (void)memset(&one, 0xAA, sizeof one);
+    (void)memset(&two, 0x55, sizeof two);
+    (void)memset(&out, 0xAA, sizeof out);
+    (void)memset(&told, 0x55, sizeof told);
+    {name}_init(&one);
+    {name}_init(&two);
+    for (k = 0U; k < 3U; k++) {{
+        if (memcmp(&one, &two, sizeof one) != 0) {{ wrong |= 1U << k; }}
+        (void)({name}_step(&one, target, &out) | {name}_step(&two, target, &told));
+        if (memcmp(&told, &out, sizeof out) != 0) {{ wrong |= 8U; }}
+        if (k == 1U) {{ (void)({name}_forget(&one) | {name}_forget(&two)); }}
+    }}
+    (void)printf("%u\\n", wrong);
+    return 0;
+}}
+"""
+
+
+@pytest.mark.parametrize("real", list(Real))
+def test_no_byte_of_a_state_is_left_to_the_compiler(made, compiler, real, tmp_path):
+    """Two states that were led alike are alike byte by byte, as a firmware with two channels or a CRC over a copy compares them."""
+    folder, *_ = made
+    for name in filter(None, (folder.online[real], folder.checked.get(real))):
+        assert answered(folder, name, BYTES, compiler, real, tmp_path) == ["0"], name
+        words = [compiler, "-std=c99", "-Wpadded", "-Werror", "-fsyntax-only", "-x", "c", f"{folder.path / name}.h"]
+        assert subprocess.run(words, capture_output=True).returncode == 0, name

@@ -13,7 +13,7 @@
  * channels), MOVING (kernels for the next sample), MOTION (targets with derivatives), GIVEN (constants that are given at the
  * start), PIVOTED (targets of a pivot), ESTIMATED (states that are stepped from sample to sample, which can be believed wrongly), REMEMBERING
  * (how they go on depends on where the stage is), RINGING (a stage with inertia, which may be off its motion; NY numbers tell of that), OBSERVED (these can be measured), VARIED (the
- * time of a sample, state->h, may vary). SETTLE_DRIVE_LIMITED and STEP_DRIVE_LIMITED: drives beyond their limits can be needed. SETTLE_EXAMINED_FIRST and
+ * time of a sample, state->h, may vary), FILLED (a word of zeros in place of padding). SETTLE_DRIVE_LIMITED and STEP_DRIVE_LIMITED: drives beyond their limits can be needed. SETTLE_EXAMINED_FIRST and
  * STEP_EXAMINED_FIRST: whether a state is lost is asked before it is used. STATE_BY_MODE and DRIVE_BY_MODE: the line search calls one
  * kernel to settle and another to step, as ADVANCE_BY_MODE says of drives within reach. OWN_DRIVES: each drive leads one displacement of its
  * own. U_BOUNDS_ONCE: one function alone reads the limits of drives.
@@ -607,6 +607,9 @@ void INIT(limiter_state *state)
         state->ringing = REAL(0.0);
         state->ticking = 0U;
         state->tick = 0U;
+#endif
+#if FILLED
+        state->unused = 0U;
 #endif
         state->ready = LIMITER_BUILD;
     }

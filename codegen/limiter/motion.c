@@ -100,6 +100,9 @@ static uint32_t motion_drives(limiter_state *at, const limiter_state *state, con
     }
     status |= follow_on(at, join, &join[NY], left);
 #endif
+#if FILLED
+    at->unused = 0U;
+#endif
     at->ready = LIMITER_BUILD;
     return status;
 }

@@ -52,6 +52,9 @@ uint32_t INIT_WITH(limiter_state *state, const limiter_constants *constants)
         state->ticking = 0U;
         state->tick = 0U;
 #endif
+#if FILLED
+        state->unused = 0U;
+#endif
         state->ready = LIMITER_BUILD;
         status = 0U;
     }

@@ -41,6 +41,7 @@ typedef float real;
 #define REST_GIVEN 0
 #define CHANGING 0
 #define DOUBLE 0
+#define FILLED 0
 #define ESTIMATED 1
 #define REMEMBERING 0
 #define RINGING 0

@@ -97,6 +97,7 @@ def _features(context: Mapping[str, Any]) -> dict[str, int]:
         "REST_GIVEN": bool(context["rest_given"]),
         "CHANGING": context["changing"] is not None,
         "DOUBLE": context["real"] is Real.DOUBLE,
+        "FILLED": "unused" in context["words"],
         "ESTIMATED": context["estimated"] is not None,
         "REMEMBERING": context["estimated"] is not None and "z" in modes["step"]["advance"].arguments,
         "RINGING": context["ringing"] is not None,

@@ -12,6 +12,7 @@ import numpy as np
 from ctrlgen.controller.contraction import FOREVER, KNOWN
 from ctrlgen.controller.estimate import EXACT
 from ctrlgen.controller.feedforward import SECANT_STEPS, Controller
+from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.controller.lost_state import FAR
 from ctrlgen.controller.nearest_displacement import SWEEPS
 from ctrlgen.controller.ringing import STILL, TOLD
@@ -35,6 +36,9 @@ CLOCK_WORDS = ("ticking", "tick")  # of one that is told what time it is (step_a
 ESTIMATE_WORDS = ("unsure", *CLOCK_WORDS)  # of one whose state can be wrong (estimate.c)
 
 TIME_WORDS = ("stepping",)  # of one whose sample times vary (timed.c)
+FILLING = (
+    "unused",
+)  # behind an odd number of words beside doubles: a structure without padding, whose bytes are all written
 
 
 def online_context(scenario: Scenario, controller: Controller, real: Real, prefix: str) -> dict[str, Any]:
@@ -80,10 +84,7 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
             "ringing": kernels.ringing,
             # of modes that are led nobody measures the amplitudes
             "observed": kernels.can_be_observed,
-            "words": WORDS
-            + ESTIMATE_WORDS * (kernels.contraction is not None)
-            + CLOCK_WORDS * (kernels.ringing is not None)
-            + TIME_WORDS * (kernels.times is not None),
+            "words": _words(kernels, real),
             "forever": FOREVER,
             "share_known": KNOWN,
             "share_still": STILL,
@@ -107,6 +108,13 @@ def online_context(scenario: Scenario, controller: Controller, real: Real, prefi
     context["bits_wanted"] = _bits_wanted(context)
     context["limiter"] = limiter_text(prefix, real, context["macros"])
     return context
+
+
+def _words(kernels: ControllerKernels, real: Real) -> tuple[str, ...]:
+    """The integers of a controller's state."""
+    words = WORDS + ESTIMATE_WORDS * (kernels.contraction is not None)
+    words += CLOCK_WORDS * (kernels.ringing is not None) + TIME_WORDS * (kernels.times is not None)
+    return words + FILLING * (real is Real.DOUBLE and len(words) % 2 == 1)
 
 
 def build_of(scenario: Scenario, controller: Controller, arithmetic: str) -> dict[str, Any]:
