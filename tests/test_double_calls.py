@@ -317,3 +317,23 @@ def test_no_byte_of_a_state_is_left_to_the_compiler(made, compiler, real, tmp_pa
         assert answered(folder, name, BYTES, compiler, real, tmp_path) == ["0"], name
         words = [compiler, "-std=c99", "-Wpadded", "-Werror", "-fsyntax-only", "-x", "c", f"{folder.path / name}.h"]
         assert subprocess.run(words, capture_output=True).returncode == 0, name
+
+
+SIZES = """
+#include <stdio.h>
+#include "{name}.h"
+int main(void)
+{{
+    (void)printf("%u %u\\n", (unsigned)sizeof({online}_state), (unsigned)sizeof({online}_output));
+    return 0;
+}}
+"""
+
+
+@pytest.mark.parametrize("real", list(Real))
+def test_the_readme_states_the_memory_that_a_controller_takes(made, compiler, real, tmp_path):
+    folder, *_ = made
+    rows = [line.split(" | ") for line in (folder.path / "README.md").read_text().splitlines()]
+    told = {row[0].strip("| "): row[1 + (real is Real.DOUBLE)].removesuffix(" B") for row in rows if len(row) > 3}
+    sizes = answered(folder, folder.online[real], SIZES, compiler, real, tmp_path)
+    assert [told["state"], told["output"]] == sizes

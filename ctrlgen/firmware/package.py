@@ -166,6 +166,7 @@ def _memory(c: dict[str, Any], contexts: Mapping[Real, dict[str, Any]]) -> list[
     chosen: list[PlayerCandidate | None] = [contexts[real].get("chosen") for real in Real]
     rated = nu if c["rated"] else 0
     more = [rated, c["given_numbers"], len(c["ringing"].weights) + 1 if c["ringing"] else 0]
+    more.append(x + n + 1 if c["times"] else 0)  # where the last sample began, and its time
     given = "".join(f" + {count}" for count in more if count)
     words = len(c["words"])
     told = "a word" if words == 1 else f"{words} words of 4 B"
