@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 import shlex
 import shutil
@@ -41,6 +42,21 @@ MATCHES = [
 
 def test_every_command_prints_an_example():
     assert {name for name, told in COMMANDS.items() if EXAMPLE.search(told or "")} == set(COMMANDS)
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_the_help_of_a_command_shows_every_word_in_unbroken_paragraphs(name, monkeypatch, capsys):
+    """Words in brackets are not taken for styles, and no line of the source begins a line of the terminal, but where it is indented."""
+    monkeypatch.setenv("COLUMNS", "2000")
+    app([*name.split(), "--help"], standalone_mode=False)
+    shown = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
+    groups = {f"{group.name} ": group.typer_instance for group in app.registered_groups}
+    known = {c.callback.__name__: c for c in app.registered_commands}
+    known |= {f"{n}{c.callback.__name__}": c for n, group in groups.items() for c in group.registered_commands}
+    for paragraph in inspect.getdoc(known[name].callback).split("\n\n"):
+        lines = paragraph.strip("\b\n").splitlines() if paragraph.startswith("\b") else [paragraph]
+        lines = [" ".join(line.split()) for line in lines]
+        assert lines == [line for line in shown if line in lines]
 
 
 def needed(line: str) -> set[str]:

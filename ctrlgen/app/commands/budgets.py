@@ -52,12 +52,12 @@ def budget(
     What is uncertain stands in uncertainty.toml beside the scenario, each sd with its source:
 
     \b
-      \\[numbers]
+      [numbers]
       "actuator.thermal_resistance" = { sd = "5 %", source = "five specimens" }
-      \\[surroundings]
+      [surroundings]
       sd = "0.5 K"
       source = "laboratory log"
-      \\[drive]
+      [drive]
       gain = { sd = "0.1 %", source = "data sheet of the reference" }
       converter = { bits = 16, source = "data sheet" }
 

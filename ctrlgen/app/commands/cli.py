@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Callable
 
 import typer
+from rich.markup import escape
 
 from ctrlgen.app.commands import (  # noqa: F401, they register their commands
     budgets,
@@ -29,8 +30,8 @@ app.registered_commands.sort(key=lambda command: PANELS.index(command.rich_help_
 for command in (
     *app.registered_commands,
     *new.new.registered_commands,
-):  # typer keeps a docstring's line breaks: let the terminal break its paragraphs
-    command.help = re.sub(r"(?<=[^\n\b])\n(?=\w)", " ", inspect.getdoc(command.callback) or "")
+):  # typer keeps line breaks, and rich takes [words] for styles: the terminal breaks paragraphs, and every word is shown
+    command.help = escape(re.sub(r"(?<=[^\n\b])\n(?=\S)", " ", inspect.getdoc(command.callback) or ""))
 
 
 def execute(check: Callable[[], None] = lambda: None) -> int:

@@ -200,10 +200,10 @@ def calibrate(
 ) -> None:
     """Fit the constants of one specimen to a short recording of it, for the C that is given them when it starts.
 
-    The numbers that the device file names in \\[run_time] are fitted, within their bounds, and no others:
+    The numbers that the device file names in [run_time] are fitted, within their bounds, and no others:
 
     \b
-      \\[run_time]
+      [run_time]
       constants = [
           "actuator.time_constant",
           { number = "actuator.thermal_resistance", low = "450 K/W", high = "650 K/W" },
@@ -294,7 +294,7 @@ def batch(
     JOBS.toml, paths as seen from it:
 
     \b
-      [\\[job]]
+      [[job]]
       device = "devices/stage.toml"
       recordings = ["runs/*", ["a", "b"]]   # a diagnosis each; a and b joined
 
