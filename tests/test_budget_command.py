@@ -145,7 +145,7 @@ def test_the_command_leaves_page_record_and_figures(tmp_path):
     record = json.loads((tmp_path / "b" / "budget.json").read_text())
     assert faults(record, "budget") == [] and record["seed"] == 3 and record["probability"] == pytest.approx(0.99)
     assert (
-        "keeps 550 degC with 99 %: margin" in done.stdout
+        "keeps ≤ 550 degC with 99 %: margin" in done.stdout
         and "next: halve the sd of actuator.thermal_resistance" in done.stdout
     )
     names = [entry["name"] for entry in record["contributors"]]
@@ -219,7 +219,7 @@ def test_the_report_of_a_solution_holds_the_budget_to_first_order(circle, tmp_pa
     )
     assert f"<code>{first.name}</code>" in page and f"{1e9 * first.peak['translation']:.3g}" in page
     assert f'<code>{hidden.name}</code></td><td class="n">{hidden.sd}' not in page
-    assert "keeps 550 degC with 99.9 %: margin" in page and "<code>ctrlgen budget</code> gives the whole" in page
+    assert "keeps ≤ 550 degC with 99.9 %: margin" in page and "<code>ctrlgen budget</code> gives the whole" in page
     assert section.sources["uncertainty"] in page
 
 

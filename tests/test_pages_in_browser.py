@@ -133,3 +133,17 @@ def test_the_legend_of_a_figure_tells_its_series_apart_without_colour(browser, p
     marks = "[...one.querySelectorAll('.u-marker path')].map(p => p.getAttribute('d') + p.style.strokeDasharray)"
     for shown in browser.run(f"[...document.querySelectorAll('.uplot')].map(one => {marks})"):
         assert shown and len(set(shown)) == len(shown)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_label_of_an_axis_is_longer_than_its_panel_is_high(browser, pages, name):
+    browser.open(pages[name])
+    browser.run(OPEN)
+    labels = "JSON.parse(one.querySelector('script.chart').textContent).panels.map(p => p.label)"
+    heights = "[...one.querySelectorAll('.u-over')].map(o => o.clientHeight)"
+    pen = "document.createElement('canvas').getContext('2d')"
+    length = f"(pen => {{ pen.font = '12px system-ui, sans-serif'; return pen.measureText(LABEL).width; }})({pen})"
+    for shown, high in browser.run(f"[...document.querySelectorAll('figure.alive')].map(one => [{labels}, {heights}])"):
+        assert len(shown) == len(high)
+        for label, height in zip(shown, high, strict=True):
+            assert browser.run(length.replace("LABEL", repr(label))) <= height, label

@@ -8,6 +8,7 @@ from rich.markup import escape
 
 from ctrlgen.app.console import Column, out, show_table, table_of
 from ctrlgen.core.counts import number_of
+from ctrlgen.core.to_digits import to_digits
 from ctrlgen.core.units import difference, from_si, show, show_difference
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ SHOWN_COSTS = ("scenario", "worst", "player")
 def print_shaper(problem: PathProblem) -> None:
     """The mode that a shaped path leaves at rest, and by how much longer it lasts; nothing where it is not shaped."""
     if (used := problem.shaper) is not None:
-        mode = f"{show(used.frequency, 'Hz')}, damping ratio {used.damping_ratio:.3g}"
+        mode = f"{show(used.frequency, 'Hz')}, damping ratio {to_digits(used.damping_ratio, 3)}"
         out.print(f"shaped by {used.kind} for a mode of {mode}: {show(used.times[-1], 's')} longer", soft_wrap=True)
 
 
@@ -103,7 +104,7 @@ def print_comparison(outcome: Outcome) -> None:
             continue
         unit = "" if row.unit == "1" else f" {row.unit}"
         verdict = "[green]ok[/green]" if row.passed else f"[red]OUT from sample {row.first} ({row.build})[/red]"
-        numbers = (f"{value:.2g}{unit}" for value in (row.worst, row.limit))
+        numbers = (f"{to_digits(value, 2)}{unit}" for value in (row.worst, row.limit))
         table.add_row(row.build.real.value, f"{row.what}, {row.signal}", *numbers, verdict)
     show_table(table)
     good = sum(row.passed for row in comparison.rows)
@@ -150,7 +151,9 @@ def print_workspace(summary: WorkspaceSummary) -> None:
     named = list(enumerate(zip(signal_.channels, signal_.units, strict=True)))
 
     def place(pose: Any) -> str:
-        shown = (f"{c} {from_si(pose[i], u):.4g} {u}" for i, (c, u) in named if abs(pose[i]) > 1e-3 * signal_.scale[i])
+        shown = (
+            f"{c} {to_digits(from_si(pose[i], u))} {u}" for i, (c, u) in named if abs(pose[i]) > 1e-3 * signal_.scale[i]
+        )
         return ", ".join(shown) or "home"
 
     table = table_of(("from", "left"), *((place(base), "right") for base in summary.bases), ("anywhere", "right"))
@@ -158,7 +161,7 @@ def print_workspace(summary: WorkspaceSummary) -> None:
         rounding = ROUNDING * signal_.scale[i]
         ends = ([v if abs(v) > rounding else 0.0 for v in r[i]] for r in (*summary.ranges, summary.extent))
         table.add_row(
-            escape(f"{channel} [{unit}]"), *(" ... ".join(f"{from_si(v, unit):.4g}" for v in e) for e in ends)
+            escape(f"{channel} [{unit}]"), *(" ... ".join(f"{to_digits(from_si(v, unit))}" for v in e) for e in ends)
         )
     show_table(table)
     for i, (channel, _) in named:
@@ -169,7 +172,7 @@ def print_workspace(summary: WorkspaceSummary) -> None:
         out.print(summary.shown_area, markup=False)
     for what, ball in summary.balls:
         out.print(
-            f"largest ball of {what}: radius {ball.radius:.4g} typical sizes around {place(ball.centre)}",
+            f"largest ball of {what}: radius {to_digits(ball.radius)} typical sizes around {place(ball.centre)}",
             soft_wrap=True,
         )
     sizes = ", ".join(f"{show(v, u)}" for v, u in sorted(set(zip(signal_.scale, signal_.units, strict=True))))
@@ -195,7 +198,8 @@ def print_simulated(result: Simulated) -> None:
         error = difference(result.error(reading), unit)
         out.print(f"{reading}: measured less simulated {number(error)} {unit} rms", markup=False, soft_wrap=True)
     for v in result.broken:
-        reached = f"{v.limit.channels[v.channel]} reaches {show(v.value[v.worst], v.limit.unit)} at {result.trace.time[v.worst]:.4g} s"
+        at = to_digits(result.trace.time[v.worst])
+        reached = f"{v.limit.channels[v.channel]} reaches {show(v.value[v.worst], v.limit.unit)} at {at} s"
         out.print(
             f"beyond {v.limit.text}: {reached}; there the device file need not hold", markup=False, soft_wrap=True
         )

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ctrlgen.app.workspace_summary import WorkspaceSummary
+from ctrlgen.core.to_digits import to_digits
 from ctrlgen.core.units import from_si
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.page_figure import FirstScreen, PageFigure
@@ -26,9 +27,9 @@ def workspace_page(summary: WorkspaceSummary, drawn: str) -> str:
     rows = []
     for i, (channel, unit) in enumerate(zip(signal.channels, signal.units, strict=True)):
         ends = [_ends(summary, r, i) for r in (*summary.ranges, summary.extent)]
-        size = f"{from_si(signal.scale[i], unit):.4g}"
+        size = f"{to_digits(from_si(signal.scale[i], unit))}"
         rows.append((f"{channel} [{unit}]", ends, size, " … ".join(dict.fromkeys(summary.bound_by[i]))))
-    balls = [(what, f"{ball.radius:.4g}", _place(summary, ball.centre)) for what, ball in summary.balls]
+    balls = [(what, f"{to_digits(ball.radius)}", _place(summary, ball.centre)) for what, ball in summary.balls]
     device = summary.workspace.model.device
     return render(
         Path(__file__).with_name("workspace.html.j2"),
@@ -46,7 +47,7 @@ def workspace_page(summary: WorkspaceSummary, drawn: str) -> str:
 def _first_screen(summary: WorkspaceSummary, figure: PageFigure) -> FirstScreen:
     signal, ball = summary.workspace.model.signals["pose"], summary.leading
     i = ball.channels[0]
-    radius = f"{from_si(ball.radius * signal.scale[i], signal.units[i]):.3g} {signal.units[i]}"
+    radius = f"{to_digits(from_si(ball.radius * signal.scale[i], signal.units[i]), 3)} {signal.units[i]}"
     named = " and ".join(signal.channels[k] for k in ball.channels)
     answer = (
         f"Every pose within {radius} of {_place(summary, ball.centre)} in {named} can be held under all limits."
@@ -72,11 +73,11 @@ def _ends(summary: WorkspaceSummary, ends: np.ndarray, i: int) -> str:
     """'-12.3 … 14' in the unit of channel i."""
     signal = summary.workspace.model.signals["pose"]
     shown = [v if abs(v) > ROUNDING * signal.scale[i] else 0.0 for v in ends[i]]
-    return " … ".join(f"{from_si(v, signal.units[i]):.4g}" for v in shown)
+    return " … ".join(f"{to_digits(from_si(v, signal.units[i]))}" for v in shown)
 
 
 def _place(summary: WorkspaceSummary, pose: np.ndarray) -> str:
     signal = summary.workspace.model.signals["pose"]
     named = zip(signal.channels, signal.units, signal.scale, pose, strict=True)
-    told = [f"{c} = {from_si(v, u):.4g} {u}" for c, u, size, v in named if abs(v) > NOTHING * size]
+    told = [f"{c} = {to_digits(from_si(v, u))} {u}" for c, u, size, v in named if abs(v) > NOTHING * size]
     return ", ".join(told) or "home"

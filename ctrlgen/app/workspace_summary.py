@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ctrlgen.core.to_digits import to_digits
 from ctrlgen.core.units import from_si
 from ctrlgen.trajectory.workspace import Ball, Workspace
 
@@ -45,7 +46,7 @@ class WorkspaceSummary:
         units = [signal.units[k] for k in (x, y)]
         unit = f"{units[0]}^2" if units[0] == units[1] else f"{units[0]}*{units[1]}"
         size = self.area * from_si(1.0, units[0]) * from_si(1.0, units[1])
-        return f"slice of {signal.channels[x]} and {signal.channels[y]}: {size:.4g} {unit}"
+        return f"slice of {signal.channels[x]} and {signal.channels[y]}: {to_digits(size)} {unit}"
 
 
 def workspace_numbers(summary: WorkspaceSummary) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from ctrlgen.budget.budget_shares import printed_shares
 from ctrlgen.budget.error_budget import COVERAGE, ErrorBudget
 from ctrlgen.core.counts import number_of
 from ctrlgen.core.files import write_text
+from ctrlgen.core.to_digits import to_digits
 from ctrlgen.core.units import difference, from_si
 from ctrlgen.reporting.chart import Chart, Curve, Panel
 from ctrlgen.reporting.html import render
@@ -36,7 +37,7 @@ def write_budget(out: Path, budget: ErrorBudget) -> None:
     for name, text in figures.items():
         write_text(out / "figures" / f"{name}.svg", text)
     words = {
-        "band": ("Along the path", f"Combined standard uncertainty times {record.coverage_factor:.3g}."),
+        "band": ("Along the path", f"Combined standard uncertainty times {to_digits(record.coverage_factor, 3)}."),
         "contributors": ("Contributors", "The standard uncertainty that each of the largest causes, and all combined."),
     }
     drawn = page_figures(figures, words, {"band": chart_band(budget)}, ("band",))
@@ -54,7 +55,7 @@ def write_budget(out: Path, budget: ErrorBudget) -> None:
 
 def first_screen(b: BudgetRecord, figure: PageFigure) -> FirstScreen:
     """How far the device may be off, whether every limit is kept, what to measure or tighten next."""
-    bands = ", ".join(f"± {g.band95:.4g} {g.unit} ({g.name})" for g in b.groups)
+    bands = ", ".join(f"± {to_digits(g.band95)} {g.unit} ({g.name})" for g in b.groups)
     lost = [row for row in b.limits if not row.kept]
     likely = f"{100 * b.probability:.10g} %"
     kept = (
@@ -62,8 +63,8 @@ def first_screen(b: BudgetRecord, figure: PageFigure) -> FirstScreen:
         if lost
         else f"every limit is kept at {likely}"
     )
-    numbers = [(f"95 % band, {g.name}", f"± {g.band95:.4g} {g.unit}") for g in b.groups]
-    numbers += [(f"rms, {g.name}", f"{g.combined_rms:.4g} {g.unit}") for g in b.groups]
+    numbers = [(f"95 % band, {g.name}", f"± {to_digits(g.band95)} {g.unit}") for g in b.groups]
+    numbers += [(f"rms, {g.name}", f"{to_digits(g.combined_rms)} {g.unit}") for g in b.groups]
     steps = []
     if lost:
         told = ", ".join(dict.fromkeys(row.label for row in lost))
@@ -71,9 +72,9 @@ def first_screen(b: BudgetRecord, figure: PageFigure) -> FirstScreen:
             f"State `[robust]` in the scenario: the path is then solved so that {told} keeps its bound at a probability."
         )
     for c in b.contributors[:1]:
-        numbers.append((f"share of {c.called}", f"{100 * c.share:.3g} %"))
+        numbers.append((f"share of {c.called}", f"{to_digits(100 * c.share, 3)} %"))
         halved = ", ".join(
-            f"{e.combined_if_halved * b.coverage_factor:.4g} instead of {g.band95:.4g} {g.unit}"
+            f"{to_digits(e.combined_if_halved * b.coverage_factor)} instead of {to_digits(g.band95)} {g.unit}"
             for e, g in zip(c.effects, b.groups, strict=True)
         )
         steps.append(f"Measure or tighten `{c.called}` first (sd {c.sd}): with half of it the band is {halved}.")

@@ -10,7 +10,8 @@ from pydantic import Field
 from ctrlgen.budget.contributors import BudgetLine, Group
 from ctrlgen.budget.error_budget import TOLERANCE, Agreement, ErrorBudget
 from ctrlgen.budget.limits import Safety
-from ctrlgen.core.units import difference, from_si, shown_difference_unit
+from ctrlgen.core.to_digits import to_digits
+from ctrlgen.core.units import difference, from_si, show, shown_difference_unit
 from ctrlgen.reporting.result_file import ChannelGroup, Keys, Number, Origin, origin
 
 
@@ -267,11 +268,11 @@ def _safety(budget: ErrorBudget, s: Safety) -> SafetyEntry:
 
 
 def safety_sentence(s: Safety, probability: float) -> str:
-    """Such as 'actuator temperature keeps 550 degC with 99.9 %: margin 3.1 K'."""
+    """Such as 'actuator temperature keeps ≤ 550 degC with 99.9 %: margin 3.1 K'."""
     unit, likely = s.limit.unit, f"{100 * probability:.10g} %"
-    bound = f"{from_si(s.bound, unit):.5g} {unit}"
-    left = f"{abs(difference(s.kept, unit)):.3g} {shown_difference_unit(unit)}"
+    bound = f"{'≥' if s.side == 'lower' else '≤'} {show(s.bound, unit, 5)}"
+    left = f"{to_digits(abs(difference(s.kept, unit)), 3)} {shown_difference_unit(unit)}"
     if s.kept >= 0:
         return f"{s.limit.label} keeps {bound} with {likely}: margin {left}"
-    does = f"it does with {100 * s.probability:.3g} %"
+    does = f"it does with {to_digits(100 * s.probability, 3)} %"
     return f"{s.limit.label} does not keep {bound} with {likely}: short by {left}; {does}"

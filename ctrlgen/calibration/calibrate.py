@@ -21,6 +21,7 @@ from threadpoolctl import threadpool_limits
 from ctrlgen.calibration.sensor_share import by_held, sensor_covariance
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.tabular import Column, Reported, Tabular
+from ctrlgen.core.to_digits import to_digits
 from ctrlgen.core.units import difference, from_si, show_difference
 from ctrlgen.devices import Device, load_device
 from ctrlgen.devices.changed_numbers import changed
@@ -250,10 +251,10 @@ def _usable(device: Device, recording: Recording, settling: float) -> tuple[Reco
             continue
         rows = int(np.ceil(settling / record.sample_time))
         if rows >= len(record.time):
-            what = f"lasts no longer than {settling:.3g} s, in which its start is forgotten; record longer"
+            what = f"lasts no longer than {to_digits(settling, 3)} s, in which its start is forgotten; record longer"
             raise InputError(record.name, [Fault("record", what)])
         notes.append(
-            f"{record.name}: the first {settling:.3g} s are not used, because the state of rest depends on a constant"
+            f"{record.name}: the first {to_digits(settling, 3)} s are not used, because the state of rest depends on a constant"
         )
         valid = record.valid.copy()
         valid[:rows] = False
@@ -314,7 +315,7 @@ def _check_readings(fitter: Fitter, fit: Fit, errors: Sequence[ReadingError]) ->
     size = np.sqrt(np.mean(moved**2, axis=0))
     off = [(e, e.after / s) for e, s in zip(errors, size, strict=True) if e.after > FAR_READING * s > 0]
     what = "times as far from the model as the model moves; check its column, unit, sign and origin"
-    if faults := [Fault(e.channel, f"is {ratio:.2g} {what}") for e, ratio in off]:
+    if faults := [Fault(e.channel, f"is {to_digits(ratio, 2)} {what}") for e, ratio in off]:
         raise InputError(fitter.recording.title, [*faults, *suspected(fitter.recording.notes)])
 
 

@@ -11,6 +11,7 @@ from ctrlgen.calibration.calibration_record import Budgets, CalibrationRecord, c
 from ctrlgen.calibration.constants_files import write_constants
 from ctrlgen.core.counts import number_of
 from ctrlgen.core.files import write_text
+from ctrlgen.core.to_digits import to_digits
 from ctrlgen.reporting.html import render
 from ctrlgen.reporting.page_figure import FirstScreen, PageFigure
 from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
@@ -46,11 +47,17 @@ def first_screen(c: CalibrationRecord, figure: PageFigure) -> FirstScreen:
     """How many constants are determined, how much better the model is with them, how the firmware gets them."""
     known = sum(k.determined for k in c.constants)
     worst = max(c.channels, key=lambda e: e.before / (e.noise or 1.0), default=None)
-    better = "" if worst is None else f"; error of {worst.channel} {worst.before:.4g} -> {worst.after:.4g} {worst.unit}"
+    better = (
+        ""
+        if worst is None
+        else f"; error of {worst.channel} {to_digits(worst.before)} -> {to_digits(worst.after)} {worst.unit}"
+    )
     numbers = [(k.path, f"{k.value:.6g} {k.unit}" if k.determined else "not determined") for k in c.constants]
-    numbers += [(f"error of {e.channel}", f"{e.before:.4g} -> {e.after:.4g} {e.unit}") for e in c.channels]
-    numbers += [(f"noise of {e.channel}", f"{e.noise:.3g} {e.unit}") for e in c.channels]
-    numbers += [(f"budget, {g.group}", f"{g.before:.4g} -> {g.after:.4g} {g.unit}") for g in c.budget]
+    numbers += [
+        (f"error of {e.channel}", f"{to_digits(e.before)} -> {to_digits(e.after)} {e.unit}") for e in c.channels
+    ]
+    numbers += [(f"noise of {e.channel}", f"{to_digits(e.noise, 3)} {e.unit}") for e in c.channels]
+    numbers += [(f"budget, {g.group}", f"{to_digits(g.before)} -> {to_digits(g.after)} {g.unit}") for g in c.budget]
     steps = ["Give the controller `constants.h` or `constants.bin` when it starts; both belong to this device alone."]
     if missing := [k.path for k in c.constants if not k.determined]:
         told = ", ".join(f"`{path}`" for path in missing)

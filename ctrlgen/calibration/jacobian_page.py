@@ -12,6 +12,7 @@ from ctrlgen.calibration.jacobian_device import device_text
 from ctrlgen.calibration.jacobian_record import PARTS, drives_of, jacobian_record, norms_of, sets_of, units_of
 from ctrlgen.calibration.measured_jacobian import MeasuredJacobian
 from ctrlgen.core.files import write_text
+from ctrlgen.core.to_digits import to_digits
 from ctrlgen.core.units import from_si
 from ctrlgen.recordings.pose_errors import CHANNELS
 from ctrlgen.reporting.html import render
@@ -58,10 +59,10 @@ def _first_screen(found: MeasuredJacobian, figure: PageFigure) -> FirstScreen:
     told = []
     for part, unit in (("translation", "um"), ("rotation", "deg")):
         b, a = (norms_of(e, part, unit)[0] for e in (before, after))
-        told.append((f"mean {part} error, {which}", f"{b:.4g} -> {a:.4g} {unit}"))
+        told.append((f"mean {part} error, {which}", f"{to_digits(b)} -> {to_digits(a)} {unit}"))
     better = all(norms_of(after, p, u)[0] < norms_of(before, p, u)[0] for p, u in PARTS)
     answer = f"{found.numbers} numbers fitted to {int((~found.held_out).sum())} poses: {told[0][0]} {told[0][1]}."
-    numbers = (*told, ("condition of the drives", f"{found.condition:.3g}"))
+    numbers = (*told, ("condition of the drives", f"{to_digits(found.condition, 3)}"))
     steps = (
         f"Use `{NAME}` in place of the device file: its controller in C follows this Jacobian.",
         "Is one channel's error a function of the drives? `ctrlgen diagnose` says what the device file leaves out.",

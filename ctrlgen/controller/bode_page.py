@@ -9,6 +9,7 @@ import numpy as np
 
 from ctrlgen.controller.bode import FrequencyResponse, bode_figure, frequency_response, phase, strongest
 from ctrlgen.core.files import write_text
+from ctrlgen.core.to_digits import to_digits
 from ctrlgen.core.units import difference, from_si
 from ctrlgen.model.model import Model
 from ctrlgen.reporting.chart import Chart, Curve, Panel
@@ -85,7 +86,7 @@ def drive_rows(found: FrequencyResponse) -> list[dict[str, str]]:
                 "channel": signal.channels[i],
                 "gain": f"{number(difference(found.static[i, j], signal.units[i]), 4)} {signal.units[i]}/{drive.units[j]}",
                 "falls": f"{number(found.hertz[above[-1]], 3)} Hz" if falls else "beyond what is drawn",
-                "peak": f"{gain[peak]:.3g} times at {number(found.hertz[peak], 4)} Hz"
+                "peak": f"{to_digits(gain[peak], 3)} times at {number(found.hertz[peak], 4)} Hz"
                 if gain[peak] > RAISED
                 else "none",
             }
@@ -118,7 +119,7 @@ def bode_chart(found: FrequencyResponse, channels: Collection[int]) -> Chart:
 def _at(found: FrequencyResponse) -> str:
     signal = found.model.signals["pose"]
     named = zip(signal.channels, signal.units, found.pose, strict=True)
-    return ", ".join(f"{channel} = {from_si(value, unit):.4g} {unit}" for channel, unit, value in named)
+    return ", ".join(f"{channel} = {to_digits(from_si(value, unit))} {unit}" for channel, unit, value in named)
 
 
 def _first_screen(found: FrequencyResponse, rows: list[dict[str, str]], figure: PageFigure) -> FirstScreen:

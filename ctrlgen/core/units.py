@@ -18,6 +18,7 @@ from pydantic import BeforeValidator, PlainSerializer, WithJsonSchema
 
 from ctrlgen.core.errors import ExampleGiven, WrongUnit
 from ctrlgen.core.known_units import KNOWN, UNCLEAR, UNKNOWN
+from ctrlgen.core.to_digits import to_digits
 
 if TYPE_CHECKING:
     import pint
@@ -390,9 +391,7 @@ def read_probability(text: str) -> float:
 
 def show(si: float, unit: str, digits: int = 4) -> str:
     """The text of an SI number in `unit`, such as '31.53 um'; without a power of ten below a million: '15000 um'."""
-    text = f"{from_si(si, unit):.{digits}g}"
-    text = f"{float(text):.0f}" if "e+0" in text and abs(float(text)) < 1e6 else text
-    return f"{text} {unit if unit != '1' else ''}".strip()
+    return f"{to_digits(from_si(si, unit), digits)} {unit if unit != '1' else ''}".strip()
 
 
 def show_difference(si: float, unit: str, digits: int = 4) -> str:

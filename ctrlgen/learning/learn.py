@@ -22,6 +22,7 @@ from ctrlgen.core.errors import Fault, InputError, SolverError
 from ctrlgen.core.files import read_toml, validate
 from ctrlgen.core.one_or_several import several
 from ctrlgen.core.tabular import Column, Reported, Tabular
+from ctrlgen.core.to_digits import to_digits
 from ctrlgen.learning.implied_pose import ImpliedPose
 from ctrlgen.learning.learning_options import LearningOptions
 from ctrlgen.learning.lifted import Lifted
@@ -78,7 +79,7 @@ class Learning(Tabular, Reported):
         return {
             "scenario": self.solution.scenario.file.title,
             "runs": len(self.runs),
-            "next": self.stop or f"a step of {100 * self.step:.3g} %",
+            "next": self.stop or f"a step of {to_digits(100 * self.step, 3)} %",
         }
 
     def columns(self) -> tuple[Column, ...]:

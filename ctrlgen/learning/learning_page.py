@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ctrlgen.core.files import write_text
+from ctrlgen.core.to_digits import to_digits
 from ctrlgen.learning.learn import Learning
 from ctrlgen.learning.learning_plots import draw_learning, learning_charts
 from ctrlgen.learning.learning_record import learning_record
@@ -49,15 +50,18 @@ def first_screen(learning: Learning, figure: PageFigure) -> FirstScreen:
     best = learning.runs[learning.base]
     numbers = [(f"best run, {g.name}", f"{shown_error(learning, best, g.name)} {g.unit}") for g in learning.groups]
     numbers += [
-        (f"noise of its mean, {g.name}", f"{g.shown(best.noise[g.name]):.3g} {g.unit}") for g in learning.groups
+        (f"noise of its mean, {g.name}", f"{to_digits(g.shown(best.noise[g.name]), 3)} {g.unit}")
+        for g in learning.groups
     ]
     if not learning.stop:
         numbers += [
-            (f"predicted for the next, {g.name}", f"{g.shown(learning.predicted[g.name]):.3g} {g.unit}")
+            (f"predicted for the next, {g.name}", f"{to_digits(g.shown(learning.predicted[g.name]), 3)} {g.unit}")
             for g in learning.groups
         ]
     if learning.response is not None:
-        numbers.append(("unexplained of the change between runs", f"{100 * learning.response.unexplained:.2g} %"))
+        numbers.append(
+            ("unexplained of the change between runs", f"{to_digits(100 * learning.response.unexplained, 2)} %")
+        )
     if learning.stop:
         steps = [
             "Keep the drives of the best run (`drives.csv`).",
@@ -84,7 +88,7 @@ def verdict(learning: Learning) -> str:
     hidden = hidden_by_sensor(learning)
     if learning.stop:
         return f"Nothing more to learn: {learning.stop}. Best run: {best.name}, {now}.{hidden}"
-    then = ", ".join(f"{g.shown(learning.predicted[g.name]):.3g} {g.unit}" for g in learning.groups)
+    then = ", ".join(f"{to_digits(g.shown(learning.predicted[g.name]), 3)} {g.unit}" for g in learning.groups)
     return f"Best run: {best.name}, {now}. Predicted for the next run: {then}.{hidden}"
 
 
@@ -94,7 +98,7 @@ def hidden_by_sensor(learning: Learning) -> str:
     for g in learning.groups:
         may = learning.of_group(learning.sensor.may_feign(), g)
         if may > best.repeating[g.name]:
-            more.append(f"{g.shown(may):.3g} {g.unit} {g.name}")
+            more.append(f"{to_digits(g.shown(may), 3)} {g.unit} {g.name}")
     return f" The true error may be up to {', '.join(more)}, which the sensor may hide." if more else ""
 
 
@@ -102,5 +106,5 @@ def shown_error(learning: Learning, run: RunResult, group: str) -> str:
     """The repeating error of a run in a group's unit; '< 3' where it is not told from zero."""
     g = next(g for g in learning.groups if g.name == group)
     if run.least[group] == 0.0:
-        return f"< {g.shown(run.most[group]):.2g}"
-    return f"{g.shown(run.repeating[group]):.3g}"
+        return f"< {to_digits(g.shown(run.most[group]), 2)}"
+    return f"{to_digits(g.shown(run.repeating[group]), 3)}"

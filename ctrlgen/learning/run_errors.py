@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ctrlgen.budget.contributors import groups_of
+from ctrlgen.core.to_digits import to_digits
 from ctrlgen.learning.hidden_parts import along, orthonormal, told, without
 from ctrlgen.learning.learning_options import LearningOptions
 from ctrlgen.learning.lifted import Lifted
@@ -120,8 +121,8 @@ class RunErrors:
             return []
         size = "what repeats" if known else "the most that may repeat"
         return [
-            f"{self.runs[j].name}: the noise of its mean is {ratio:.2g} times {size}; about {int(np.ceil(r.repeats * times))} repetitions "
-            f"tell it ({r.repeats} so far)."
+            f"{self.runs[j].name}: the noise of its mean is {to_digits(ratio, 2)} times {size}; "
+            f"about {int(np.ceil(r.repeats * times))} repetitions tell it ({r.repeats} so far)."
         ]
 
     def result(self, j: int) -> RunResult:

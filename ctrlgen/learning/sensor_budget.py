@@ -21,6 +21,7 @@ import numpy as np
 from scipy.optimize import brentq, lsq_linear
 
 from ctrlgen.budget.sensor_statement import SensorStatement
+from ctrlgen.core.to_digits import to_digits
 from ctrlgen.core.units import show_difference
 from ctrlgen.learning.implied_pose import ImpliedPose
 from ctrlgen.learning.learning_options import LearningOptions
@@ -109,7 +110,7 @@ def sensor_budget(
             share = options.sensor_scale if scale is None else scale.sd
             source = ASSUMED if scale is None else scale.source
             if share:
-                lines.append(Feigned(f"scale of {channel}", f"{100 * share:.3g} %", source, share * y * unit))
+                lines.append(Feigned(f"scale of {channel}", f"{to_digits(100 * share, 3)} %", source, share * y * unit))
         zero = stated.zero.get(channel)
         if observed[i] and zero is not None:
             lines.append(Feigned(f"zero of {channel}", zero.text, zero.source, zero.sd * np.ones(y.shape) * unit))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ctrlgen.budget.contributors import Group
+from ctrlgen.core.to_digits import to_digits
 from ctrlgen.learning.learn import Learning
 from ctrlgen.learning.sensor_budget import ASSUMED
 
@@ -31,11 +32,11 @@ def sensor_words(learning: Learning) -> list[str]:
         large = sorted((pair for pair in sizes if pair[0] >= NAMED * may), key=lambda pair: -pair[0])
         by = ", ".join(f"{line.name} {line.sd}" for _, line in large)
         assumed |= any(line.source == ASSUMED for _, line in large)
-        text = f"budget of the sensor: up to {g.shown(may):.3g} {g.unit} of {g.name} may be its error ({by})"
+        text = f"budget of the sensor: up to {to_digits(g.shown(may), 3)} {g.unit} of {g.name} may be its error ({by})"
         left = left_to_sensor(learning, g)
         if left:
             told = True
-            text += f"; {g.shown(left):.3g} {g.unit} that were read are left to it, and the motion is not called better for them"
+            text += f"; {to_digits(g.shown(left), 3)} {g.unit} that were read are left to it, and the motion is not called better for them"
         words.append(f"{text}.")
     if assumed:
         words.append(

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ctrlgen.core.files import write_text
+from ctrlgen.core.to_digits import to_digits
 from ctrlgen.core.units import from_si, show
 from ctrlgen.path_timing.binding import Binding
 from ctrlgen.path_timing.fastest import FastestPath
@@ -110,13 +111,13 @@ def motions(motion: FastestPath) -> list[tuple[str, str, str]]:
         elif closed:
             shown.append((what, show(time, "s"), show(1 / time, "Hz")))
         else:
-            shown.append((what, show(time, "s"), "" if not motion.given else f"{motion.given / time:.3g} x"))
+            shown.append((what, show(time, "s"), "" if not motion.given else f"{to_digits(motion.given / time, 3)} x"))
     return shown
 
 
 def runs_text(binding: Binding) -> str:
     """Such as '3 … 18 %, 40 … 52 %': where along the path."""
-    runs = [f"{100 * a:.3g} … {100 * b:.3g} %" for a, b in binding.runs[:SHOWN_RUNS]]
+    runs = [f"{to_digits(100 * a, 3)} … {to_digits(100 * b, 3)} %" for a, b in binding.runs[:SHOWN_RUNS]]
     return ", ".join(runs) + (f", {len(binding.runs) - SHOWN_RUNS} more" if len(binding.runs) > SHOWN_RUNS else "")
 
 
@@ -137,7 +138,11 @@ def repetition_sentence(motion: FastestPath) -> str:
         if scale is None:
             return "none"
         diameter = r.size(scale)
-        return f"{100 * scale:.4g} %" if diameter is None else f"{diameter:.4g} {r.unit} ({100 * scale:.4g} %)"
+        return (
+            f"{to_digits(100 * scale)} %"
+            if diameter is None
+            else f"{to_digits(diameter)} {r.unit} ({to_digits(100 * scale)} %)"
+        )
 
     what = "largest path" if r.diameter is None else "largest circle"
     even = "" if not motion.curve.closed and motion.solution.model.inertial else f", at even speed {size(r.even)}"

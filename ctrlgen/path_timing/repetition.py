@@ -10,6 +10,7 @@ import scipy
 
 from ctrlgen.budget.robust import solve
 from ctrlgen.core.errors import Fault, InputError, SolverError
+from ctrlgen.core.to_digits import to_digits
 from ctrlgen.core.units import Quantity, from_si, written_unit
 from ctrlgen.path_timing.feasibility import Followed
 from ctrlgen.path_timing.optimum import Optimiser, Optimum
@@ -49,7 +50,7 @@ def check_frequency(rate: Quantity, frequency: Quantity) -> None:
     """Raises InputError for a frequency whose period has too few or too many samples at the sample `rate`."""
     samples = rate.si / frequency.si
     if samples < FEWEST:
-        what = f"leaves {samples:.3g} samples for a period at {rate.text}; give a higher --sample-rate or a lower frequency"
+        what = f"leaves {to_digits(samples, 3)} samples for a period at {rate.text}; give a higher --sample-rate or a lower frequency"
     elif samples > MOST:
         what = f"is {samples:.6g} samples for a period at {rate.text}, more than {MOST}; give a lower --sample-rate"
     else:
@@ -92,7 +93,7 @@ def at_frequency(
         sampled, share = even, followed.curve.scaled(even).evenly(n)
     solution = None
     if share is not None and sampled is not None:
-        title = f"{followed.curve.scenario.file.title}: {sampled:.4g} times as large, {frequency.text}"
+        title = f"{followed.curve.scenario.file.title}: {to_digits(sampled)} times as large, {frequency.text}"
         scaled = replace(followed, curve=followed.curve.scaled(sampled))
         solution = solve(scaled.scenario(share, title, "repeated"), followed.model, progress)
     return Repetition(frequency.si, best, even, diameter.si if diameter else None, unit, sampled, solution)

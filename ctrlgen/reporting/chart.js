@@ -3,6 +3,7 @@
 (() => {
   const FONT = "12px system-ui, sans-serif";
   const POINT = 6; // pixels across a point
+  const SCALE = 50; // pixels above and below a panel: the numbers of its scale, and what uPlot leaves free
   const groups = new Map(); // name -> {plots, range, whole}
 
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -25,6 +26,13 @@
     u.ctx.font = u.axes[axis].font[0];
     const longest = Math.max(0, ...(values || []).map((v) => u.ctx.measureText(v || "").width));
     return Math.max(70, Math.ceil(longest / devicePixelRatio + 16));
+  };
+
+  // The pixels that a panel needs so that its label, which runs along its axis, is not cut off.
+  const labelled = (label) => {
+    const pen = document.createElement("canvas").getContext("2d");
+    pen.font = FONT;
+    return Math.ceil(pen.measureText(label).width) + SCALE;
   };
 
   // The stretch that a group shows; every plot of it follows.
@@ -135,7 +143,7 @@
     };
     return {
       width: size,
-      height: panel.height + (last ? 20 : 0),
+      height: Math.max(panel.height, labelled(panel.label)) + (last ? 20 : 0),
       scales: { x: { time: false, distr: chart.logX ? 3 : 1, range: (u, min, max) => [min, max] }, y: panel.log ? { distr: 3 } : { range: reach } },
       axes: [
         { ...axis, label: last ? chart.x : undefined, labelSize: last ? 20 : 0, size: 30, values: ticks, incrs: chart.places.length ? [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000] : undefined },

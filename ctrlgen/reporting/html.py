@@ -17,6 +17,7 @@ from markupsafe import Markup, escape
 
 from ctrlgen.core.compiled_templates import environment as templates
 from ctrlgen.core.counts import number_of
+from ctrlgen.core.to_digits import to_digits
 
 SHARED = Path(__file__).resolve().parent  # what several pages include
 FOLDING = "page.js"
@@ -85,4 +86,5 @@ def render(template: Path, **values: Any) -> str:
     environment.globals["page"] = PageParts()
     environment.filters["coded"] = coded
     environment.filters["number_of"] = number_of
+    environment.filters["to_digits"] = to_digits
     return environment.get_template(template.name).render(**values)

@@ -8,6 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
+from ctrlgen.core.to_digits import to_digits
 from ctrlgen.core.units import from_si, show_difference
 from ctrlgen.reporting.line_patterns import dashes, mark
 from ctrlgen.reporting.plots import COLOURS, STYLE, legend_above, svg
@@ -70,7 +71,9 @@ def draw_path(solution: Solution) -> Figure:
     for k, (i, colour) in enumerate(zip(alike, (COLOURS[0], COLOURS[2], COLOURS[4]), strict=False)):
         off = from_si(reached[:, i] - command[:, i], fine)
         right.plot(time, off, color=colour, ls=dashes(k), lw=1, label=signal.channels[i])
-    right.axhspan(-tolerance, tolerance, color="#f0f0f0", zorder=0, label=f"tolerance of {tolerance:.3g} {fine}")
+    right.axhspan(
+        -tolerance, tolerance, color="#f0f0f0", zorder=0, label=f"tolerance of {to_digits(tolerance, 3)} {fine}"
+    )
     span = max(1.3 * tolerance, 1.1 * max(abs(limit) for limit in right.get_ylim()))
     right.set_ylim(-span, span)
     right.set_xlabel("time [s]")
@@ -118,7 +121,7 @@ def draw_margins(solution: Solution) -> Figure:
         axes.text(
             share + 1,
             row,
-            f"{share:.3g} %: {margin.channel} {value:.4g} of {bound:.4g} {unit}{reserved}",
+            f"{to_digits(share, 3)} %: {margin.channel} {to_digits(value)} {unit}, bound {to_digits(bound)} {unit}{reserved}",
             va="center",
             fontsize=8,
         )

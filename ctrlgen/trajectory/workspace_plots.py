@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
+from ctrlgen.core.to_digits import to_digits
 from ctrlgen.core.units import from_si
 from ctrlgen.reporting.line_patterns import mark
 from ctrlgen.reporting.plots import COLOURS
@@ -24,7 +25,7 @@ def draw_workspace(workspace: Workspace, bases: list[np.ndarray], ball: Ball) ->
     for base, colour in zip(bases, COLOURS[::2], strict=False):
         k = third[0] if third else x  # the channel that tells the slices apart
         at = base[k] if abs(base[k]) > ROUNDING * signal.scale[k] else 0.0
-        label = f"{signal.channels[k]} = {from_si(at, signal.units[k]):.4g} {signal.units[k]}"
+        label = f"{signal.channels[k]} = {to_digits(from_si(at, signal.units[k]))} {signal.units[k]}"
         _fill(panels[0][0], workspace, base, x, y, colour, label)
     for up in third:
         _fill(panels[0][1], workspace, ball.centre, x, up, COLOURS[0], "through the ball's centre")
@@ -47,7 +48,7 @@ def _outline_ball(panel: Axes, workspace: Workspace, ball: Ball, x: int, y: int)
     centre = [from_si(ball.centre[i], signal.units[i]) for i in (x, y)]
     radius = [from_si(ball.radius * signal.scale[i], signal.units[i]) for i in (x, y)]
     panel.add_patch(Ellipse((centre[0], centre[1]), 2 * radius[0], 2 * radius[1], fill=False, color=COLOURS[2], lw=1.5))
-    panel.plot([], [], color=COLOURS[2], label=f"largest ball, radius {radius[0]:.3g} {signal.units[x]}")
+    panel.plot([], [], color=COLOURS[2], label=f"largest ball, radius {to_digits(radius[0], 3)} {signal.units[x]}")
 
 
 def _draw_range(workspace: Workspace, base: np.ndarray) -> Figure:

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ctrlgen.core.to_digits import to_digits
 from ctrlgen.core.units import same_dimension
 from ctrlgen.firmware.c.real import Real
 from ctrlgen.reporting.line_patterns import dashes, mark
@@ -56,7 +57,7 @@ def draw_errors(build: Build, unit: str) -> Figure:
             style = {"ls": "", "marker": mark(k)} if static else {"ls": dashes(k)}
             panel.plot(time, values, ms=3, lw=0.9, color=COLOURS[2 * k % 6], label=signal.channels[i], **style)
         panel.axhline(limit, color="#222222", lw=1, ls="--")
-        told, across = f"tolerance {limit:.3g} {shown}", panel.get_yaxis_transform()
+        told, across = f"tolerance {to_digits(limit, 3)} {shown}", panel.get_yaxis_transform()
         panel.text(0.98, limit, told, ha="right", va="bottom", fontsize=7, transform=across)
         panel.set_title(f"{what}, {real.value}", fontsize=9)
         panel.set_xlabel("sample" if static else "time [s]")

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from ctrlgen.budget.budget_record import BudgetRecord
 from ctrlgen.budget.budget_section import BudgetSection
 from ctrlgen.core.counts import number_of
+from ctrlgen.core.to_digits import to_digits
 from ctrlgen.reporting.numbers import number
 from ctrlgen.reporting.page_figure import FirstScreen, PageFigure
 from ctrlgen.verification.summary import MarginRow, Summary
@@ -48,7 +49,7 @@ def _held(s: Summary) -> str:
 
 def _uncertain(budget: BudgetSection | None, record: BudgetRecord | None) -> list[str]:
     if record is not None:
-        bands = ", ".join(f"± {g.band95:.4g} {g.unit} ({g.name})" for g in record.groups)
+        bands = ", ".join(f"± {to_digits(g.band95)} {g.unit} ({g.name})" for g in record.groups)
         most = f", most by `{record.contributors[0].name}`" if record.contributors else ""
         return [
             "The checks compare drives and C with the model. What is not known exactly of the device moves the pose all the same, "
@@ -66,14 +67,14 @@ def _uncertain(budget: BudgetSection | None, record: BudgetRecord | None) -> lis
 def _numbers(s: Summary, record: BudgetRecord | None) -> tuple[tuple[str, str], ...]:
     told: list[tuple[str, str]] = []
     if (m := tightest(s)) is not None and m.share_left is not None:
-        told.append((f"tightest limit, {m.label}", f"{100 * m.share_left:.3g} % left"))
-        told.append((f"{m.channel} there, bound {m.bound:.4g} {m.unit}", f"{m.value:.4g} {m.unit}"))
+        told.append((f"tightest limit, {m.label}", f"{to_digits(100 * m.share_left, 3)} % left"))
+        told.append((f"{m.channel} there, bound {to_digits(m.bound)} {m.unit}", f"{to_digits(m.value)} {m.unit}"))
     worst = max(s.tracking_error.items(), key=lambda item: abs(item[1]), default=None)
     if worst is not None and s.sample_rate_Hz:
         channel, unit = worst[0].removesuffix("]").split(" [")
         told.append((f"largest distance from the path, {channel}", f"{number(worst[1], 3)} {unit}"))
     for g in record.groups if record is not None else ():
-        told.append((f"what is uncertain, {g.name}, 95 %", f"± {g.band95:.4g} {g.unit}"))
+        told.append((f"what is uncertain, {g.name}, 95 %", f"± {to_digits(g.band95)} {g.unit}"))
     if s.comparison:
         told.append(("C against model", f"{sum(r.passed for r in s.comparison)} of {len(s.comparison)}"))
     if s.c is not None:
@@ -93,7 +94,7 @@ def _steps(s: Summary, budget: BudgetSection | None, record: BudgetRecord | None
         first = record.contributors[0]
         most = max(first.effects, key=lambda effect: effect.share)
         steps.append(
-            f"Measure or tighten `{first.name}` first: it makes up {100 * most.share:.3g} % of the variance in {most.group} "
+            f"Measure or tighten `{first.name}` first: it makes up {to_digits(100 * most.share, 3)} % of the variance in {most.group} "
             "(`ctrlgen budget`)."
         )
     elif budget is None:

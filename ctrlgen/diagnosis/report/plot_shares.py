@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ctrlgen.core.to_digits import to_digits
 from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.shares.design import Columns, Kind
 from ctrlgen.diagnosis.shares.shares_table import ChannelShares, SharesTable
@@ -120,7 +121,7 @@ def _abscissa(table: SharesTable, channel: ChannelShares, kind: Kind) -> tuple[n
     if kind is Kind.LINE:
         period = channel.periods[kind]
         time = next(b for b in table.design.blocks if b.kind is Kind.TIME).abscissa
-        return (time / period) % 1.0, f"phase of {1 / period:.4g} Hz", "periods"
+        return (time / period) % 1.0, f"phase of {to_digits(1 / period)} Hz", "periods"
     stands_for = {Kind.PITCH: Kind.POSITION, Kind.RATE: Kind.SPEED}
     blocks = list(table.design.of_kind(stands_for.get(kind, kind), channel.axes))
     blocks = blocks or [b for b in table.design.blocks if b.kind is Kind.TIME]
