@@ -17,7 +17,7 @@ from ctrlgen.core.escaping import json_in_html
 from ctrlgen.diagnosis.report.narrative import rest_text
 from ctrlgen.reporting.chart import MOST_NUMBERS, Chart, Curve, Panel, kept_places
 from ctrlgen.reporting.html import coded, render
-from ctrlgen.reporting.numbers import shares_text, with_deviation
+from ctrlgen.reporting.numbers import shares_text, with_deviation, with_interval
 from ctrlgen.reporting.page_figure import FirstScreen, PageFigure
 from ctrlgen.reporting.plots import STYLE, plt, svg
 
@@ -144,3 +144,20 @@ def test_a_number_ends_with_the_digits_of_its_deviation():
     assert with_deviation(-1.508241, 0.00612) == "-1.5082 ± 0.0061"
     assert with_deviation(64291.0, 123.0) == "64291 ± 123"
     assert with_deviation(0.25, 0.0) == "0.25"
+
+
+def test_a_number_and_its_interval_end_with_the_digits_that_are_known():
+    assert with_interval(25.8111, (25.1775, 26.4447)) == ("25.81", "25.18", "26.44")
+    assert with_interval(4.40016, (4.39978, 4.40054)) == ("4.40016", "4.39978", "4.40054")
+    assert with_interval(1234.5, (1000.0, 1469.0)) == ("1234", "1000", "1469")
+    assert with_interval(3e-9, (2e-9, 4e-9)) == ("3.00000e-09", "2.00000e-09", "4.00000e-09")
+    assert with_interval(5.0, (5.0, 5.0)) == ("5", "5", "5")
+
+
+@pytest.mark.parametrize("made_by", sorted(Path("ctrlgen").glob("*/*_page.py")), ids=lambda path: path.stem)
+def test_the_figure_of_the_first_screen_is_not_drawn_again_below(made_by):
+    code = made_by.read_text(encoding="utf-8")
+    shown_first = set(re.findall(r"first=\w+\([^\n]*\w+\[\"(\w+)\"\]\)", code))
+    for template in re.findall(r'with_name\("(\w+\.html\.j2)"\)', code):
+        below = re.findall(r"figure\(figures\.(\w+)\)", made_by.with_name(template).read_text(encoding="utf-8"))
+        assert not shown_first & set(below)

@@ -24,9 +24,10 @@ def print_calibration(calibration: Calibration, budgets: tuple[ErrorBudget, Erro
     )
     for row in calibration.constants:
         c = row.constant
-        interval = " ... ".join(c.shown(v, 6) for v in row.interval) if row.determined else f"bounds {c.range_text}"
+        value, *ends = row.texts
+        interval = " ... ".join(ends) if row.determined else f"bounds {c.range_text}"
         remark = row.remark if row.determined else f"default kept: {row.remark}"
-        table.add_row(escape(c.path), c.shown(c.default), c.shown(row.value), interval, remark)
+        table.add_row(escape(c.path), c.shown(c.default), value, interval, remark)
     show_table(table)
     table = table_of(
         ("held-out error, rms", "left"), ("device file", "right"), ("specimen", "right"), ("noise", "right")

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ctrlgen.app.workspace_summary import WorkspaceSummary
+from ctrlgen.core.counts import listed
 from ctrlgen.core.to_digits import to_digits
 from ctrlgen.core.units import from_si
 from ctrlgen.reporting.html import render
@@ -48,7 +49,7 @@ def _first_screen(summary: WorkspaceSummary, figure: PageFigure) -> FirstScreen:
     signal, ball = summary.workspace.model.signals["pose"], summary.leading
     i = ball.channels[0]
     radius = f"{to_digits(from_si(ball.radius * signal.scale[i], signal.units[i]), 3)} {signal.units[i]}"
-    named = " and ".join(signal.channels[k] for k in ball.channels)
+    named = listed([signal.channels[k] for k in ball.channels])
     answer = (
         f"Every pose within {radius} of {_place(summary, ball.centre)} in {named} can be held under all limits."
         if len(ball.channels) > 1

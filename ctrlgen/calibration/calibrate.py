@@ -42,6 +42,7 @@ from ctrlgen.model.assembly import build_model, movable, symbolic_model
 from ctrlgen.recordings.plausibility import suspected, with_plausibility
 from ctrlgen.recordings.reader import load_recordings
 from ctrlgen.recordings.recording import Recording
+from ctrlgen.reporting.numbers import with_interval
 from ctrlgen.trajectory.scenario import Input, device_inputs
 
 TOLD = 0.5
@@ -89,6 +90,16 @@ class CalibratedConstant:
         if not self.determined:
             return c.low, c.high
         return max(self.value - reach, c.low), min(self.value + reach, c.high)
+
+    @property
+    def texts(self) -> tuple[str, str, str]:
+        """The value and the ends of its interval in the unit of the device file, to the digits that are known."""
+        c = self.constant
+        if not self.determined:
+            return c.shown(self.value), c.shown(c.low), c.shown(c.high)
+        value, low, high = (float(from_si(v, c.unit)) for v in (self.value, *self.interval))
+        first, *ends = (f"{text} {c.unit}".removesuffix(" 1") for text in with_interval(value, (low, high)))
+        return first, ends[0], ends[1]
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from ctrlgen.core.counts import number_of
 from ctrlgen.core.files import write_text
 from ctrlgen.core.to_digits import to_digits
 from ctrlgen.reporting.html import render
+from ctrlgen.reporting.numbers import with_interval
 from ctrlgen.reporting.page_figure import FirstScreen, PageFigure
 from ctrlgen.reporting.plots import COLOURS, STYLE, plt, svg
 from ctrlgen.reporting.result_file import json_text
@@ -52,11 +53,17 @@ def first_screen(c: CalibrationRecord, figure: PageFigure) -> FirstScreen:
         if worst is None
         else f"; error of {worst.channel} {to_digits(worst.before)} -> {to_digits(worst.after)} {worst.unit}"
     )
-    numbers = [(k.path, f"{k.value:.6g} {k.unit}" if k.determined else "not determined") for k in c.constants]
-    numbers += [
-        (f"error of {e.channel}", f"{to_digits(e.before)} -> {to_digits(e.after)} {e.unit}") for e in c.channels
+    numbers = [
+        (k.path, f"{with_interval(k.value, k.interval95)[0]} {k.unit}" if k.determined else "not determined")
+        for k in c.constants
     ]
-    numbers += [(f"noise of {e.channel}", f"{to_digits(e.noise, 3)} {e.unit}") for e in c.channels]
+    numbers += [
+        (
+            f"error of {e.channel}, noise {to_digits(e.noise, 3)} {e.unit}",
+            f"{to_digits(e.before)} -> {to_digits(e.after)} {e.unit}",
+        )
+        for e in c.channels
+    ]
     numbers += [(f"budget, {g.group}", f"{to_digits(g.before)} -> {to_digits(g.after)} {g.unit}") for g in c.budget]
     steps = ["Give the controller `constants.h` or `constants.bin` when it starts; both belong to this device alone."]
     if missing := [k.path for k in c.constants if not k.determined]:
@@ -84,7 +91,7 @@ def draw_constants(calibration: Calibration) -> Figure:
             ax.errorbar(
                 value, k, xerr=[[value - low], [high - value]], fmt="o", color=COLOURS[0], markersize=4, capsize=4
             )
-        text = c.shown(row.value) if row.determined else "not determined"
+        text = row.texts[0] if row.determined else "not determined"
         ax.text(1.03, k, text, va="center", fontsize=8)
     ax.plot([], [], "o", color=COLOURS[0], markersize=4, label="specimen, 95 %")
     ax.set_yticks(range(len(rows)), [row.constant.name for row in rows])

@@ -18,6 +18,7 @@ from markupsafe import Markup, escape
 from ctrlgen.core.compiled_templates import environment as templates
 from ctrlgen.core.counts import number_of
 from ctrlgen.core.to_digits import to_digits
+from ctrlgen.reporting.numbers import with_interval
 
 SHARED = Path(__file__).resolve().parent  # what several pages include
 FOLDING = "page.js"
@@ -87,4 +88,5 @@ def render(template: Path, **values: Any) -> str:
     environment.filters["coded"] = coded
     environment.filters["number_of"] = number_of
     environment.filters["to_digits"] = to_digits
+    environment.filters["with_interval"] = with_interval
     return environment.get_template(template.name).render(**values)

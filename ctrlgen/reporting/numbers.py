@@ -55,6 +55,17 @@ def with_deviation(value: float, sd: float) -> str:
     return f"{value:.{decimals}f} ± {sd:.{decimals}f}"
 
 
+def with_interval(value: float, ends: Sequence[float]) -> tuple[str, str, str]:
+    """A number and the two ends of its 95 % interval to the decimal of the second digit of its standard deviation (GUM 7.2.6):
+    ('25.81', '25.18', '26.44'); each by itself where the interval has no width."""
+    low, high = ends
+    sd = (high - low) / (2 * 1.96)
+    if not (math.isfinite(value) and math.isfinite(sd) and sd > 0) or "e" in number(value):
+        return number(value, 6), number(low, 6), number(high, 6)
+    decimals = max(0, 1 - math.floor(math.log10(sd)))
+    return f"{value:.{decimals}f}", f"{low:.{decimals}f}", f"{high:.{decimals}f}"
+
+
 def shares_text(shares: Sequence[float], decimals: int = 1) -> list[str]:
     """Shares as '12.3 %', rounded so that what is printed adds up to their sum as printed: 100 % where they are those of a whole.
 

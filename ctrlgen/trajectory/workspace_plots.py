@@ -5,12 +5,13 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
 from ctrlgen.core.to_digits import to_digits
 from ctrlgen.core.units import from_si
-from ctrlgen.reporting.line_patterns import mark
+from ctrlgen.reporting.line_patterns import dashes, mark
 from ctrlgen.reporting.plots import COLOURS
 from ctrlgen.trajectory.workspace import ROUNDING, Ball, Workspace
 
@@ -22,13 +23,13 @@ def draw_workspace(workspace: Workspace, bases: list[np.ndarray], ball: Ball) ->
         return _draw_range(workspace, bases[len(bases) // 2])
     x, y, *third = workspace.drawn
     figure, panels = plt.subplots(1, 1 + len(third), figsize=(8.6, 4.2) if third else (4.8, 4.2), squeeze=False)
-    for base, colour in zip(bases, COLOURS[::2], strict=False):
+    for j, (base, colour) in enumerate(zip(bases, COLOURS[::2], strict=False)):
         k = third[0] if third else x  # the channel that tells the slices apart
         at = base[k] if abs(base[k]) > ROUNDING * signal.scale[k] else 0.0
         label = f"{signal.channels[k]} = {to_digits(from_si(at, signal.units[k]))} {signal.units[k]}"
-        _fill(panels[0][0], workspace, base, x, y, colour, label)
+        _fill(panels[0][0], workspace, base, x, y, label, colour, j)
     for up in third:
-        _fill(panels[0][1], workspace, ball.centre, x, up, COLOURS[0], "through the ball's centre")
+        _fill(panels[0][1], workspace, ball.centre, x, up, "through the ball's centre", COLOURS[0], 0)
     for panel, up in reversed(list(zip(panels[0], (y, *third), strict=True))):
         if x in ball.channels and up in ball.channels:
             _outline_ball(panel, workspace, ball, x, up)
@@ -65,9 +66,9 @@ def _draw_range(workspace: Workspace, base: np.ndarray) -> Figure:
     return figure
 
 
-def _fill(panel: Axes, workspace: Workspace, base: np.ndarray, x: int, y: int, colour: str, label: str) -> None:
-    """The slice through `base` in channels `x` and `y`."""
+def _fill(panel: Axes, workspace: Workspace, base: np.ndarray, x: int, y: int, label: str, colour: str, k: int) -> None:
+    """The slice through `base` in channels `x` and `y`, the `k`-th of its panel: outlined so that no colour is needed."""
     units = workspace.model.signals["pose"].units
     edge = workspace.outline(base, x, y)
     shown = from_si(edge[:, 0], units[x]), from_si(edge[:, 1], units[y])
-    panel.fill(*shown, facecolor=colour, edgecolor=colour, alpha=0.25, lw=1.5, label=label)
+    panel.fill(*shown, facecolor=to_rgba(colour, 0.25), edgecolor=colour, ls=dashes(k), lw=1.3, label=label)
