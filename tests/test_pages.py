@@ -6,6 +6,7 @@ import base64
 import hashlib
 import json
 import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
