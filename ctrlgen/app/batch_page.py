@@ -157,7 +157,9 @@ def _first_screen(
     told = (
         "; ".join(p for p in parts if p)
         if judged
-        else "; ".join(p for p in (parts[1], parts[3], f"{LEAST} are needed to say which stand out or drift") if p)
+        else "; ".join(
+            p for p in (parts[1], parts[3], f"too few to say which stand out or drift: that takes {LEAST}") if p
+        )
     )
     verdicts = Counter(row.verdict for row in rows if row.verdict)
     numbers = [("recordings", str(len(rows))), ("machines", str(len(machines)))]

@@ -18,7 +18,8 @@ from rich.table import Table
 
 from ctrlgen.core.errors import CtrlgenError
 
-out = Console(highlight=False, width=None if sys.stdout.isatty() else 110)
+# lines are broken by the terminal alone: what reads them elsewhere, or copies them, gets them whole
+out = Console(highlight=False, width=None if sys.stdout.isatty() else 110, soft_wrap=True)
 err = Console(stderr=True, highlight=False)
 EVERY = 10.0  # seconds between two lines of long work
 Column = tuple[str, Literal["left", "right"]]  # of a table: its heading and how it is aligned
@@ -42,7 +43,7 @@ def show_table(table: Table) -> None:
     needed = sum((column.min_width or 0) + 1 for column in table.columns) - 1  # a space between columns
     if needed > out.width:
         table.width = needed
-    out.print(table, crop=False)
+    out.print(table, crop=False, soft_wrap=False)
 
 
 class Lines:

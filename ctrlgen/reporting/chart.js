@@ -3,6 +3,8 @@
 (() => {
   const FONT = "12px system-ui, sans-serif";
   const POINT = 6; // pixels across a point
+  const WHOLE = Array.from({ length: 7 }, (_, k) => [1, 2, 5].map((v) => v * 10 ** k)).flat(); // steps of what is counted
+  const RIM = 1.2; // pixels by which points stand out from under each row of points that is drawn over them
   const SCALE = 50; // pixels above and below a panel: the numbers of its scale, and what uPlot leaves free
   const groups = new Map(); // name -> {plots, range, whole}
 
@@ -14,12 +16,20 @@
     const size = Math.abs(value);
     return size && (size < 1e-4 || size >= 1e7) ? value.toExponential(4) : String(+value.toPrecision(6));
   };
+  // The digits after the point that tell multiples of `step` exactly: 2 for 0.25.
+  const decimals = (step) => {
+    let digits = Math.max(0, Math.ceil(-Math.log10(step) - 1e-9));
+    while (digits < 15 && Math.abs(step * 10 ** digits - Math.round(step * 10 ** digits)) > 1e-6) digits++;
+    return digits;
+  };
   const ticks = (u, splits, axis, space, step) =>
     splits.map((v) => {
       if (v == null) return "";
       if (u.scales[u.axes[axis].scale].distr === 3) return v >= 0.01 && v < 1e5 ? String(+v.toPrecision(3)) : v.toExponential(0);
-      const digits = Math.max(0, Math.ceil(-Math.log10(step) - 1e-9));
-      return digits > 6 || Math.abs(v) >= 1e7 ? (v === 0 ? "0" : v.toExponential(2)) : v.toFixed(digits);
+      const digits = decimals(step);
+      if (digits <= 6 && Math.abs(v) < 1e7) return v.toFixed(digits);
+      const shown = Math.floor(Math.log10(Math.abs(v))) + Math.max(digits, Math.ceil(-Math.log10(step)));
+      return v === 0 ? "0" : v.toExponential(Math.min(Math.max(shown, 0), 8)).replace(/\.?0+e/, "e");
     });
   const width = (u, values, axis, cycle) => {
     if (cycle > 1) return u.axes[axis]._size;
@@ -87,9 +97,10 @@
   const outline = (name, x, y, r) =>
     SHAPES[name] ? `${SHAPES[name].map(([a, b], k) => `${k ? "L" : "M"}${x + r * a} ${y + r * b}`).join("")}Z` : STROKES[name].map(([a, b, c, d]) => `M${x + r * a} ${y + r * b}L${x + r * c} ${y + r * d}`).join("");
 
-  function mark(u, i, from, to, curve) {
+  function mark(u, i, from, to, curve, above) {
     const path = new Path2D();
-    for (let k = from; k <= to; k++) if (u.data[i][k] != null) path.addPath(new Path2D(outline(curve.mark, u.valToPos(u.data[0][k], "x", true), u.valToPos(u.data[i][k], "y", true), (POINT / 2) * devicePixelRatio)));
+    const radius = (POINT / 2 + RIM * above) * devicePixelRatio;
+    for (let k = from; k <= to; k++) if (u.data[i][k] != null) path.addPath(new Path2D(outline(curve.mark, u.valToPos(u.data[0][k], "x", true), u.valToPos(u.data[i][k], "y", true), radius)));
     u.ctx.save();
     u.ctx.beginPath();
     u.ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
@@ -117,7 +128,7 @@
     });
   }
 
-  function series(curve) {
+  function series(curve, above) {
     const points = curve.mark !== "";
     const drawn = {
       label: curve.name,
@@ -125,12 +136,15 @@
       width: curve.width,
       dash: curve.dash,
       value: (u, v) => shown(v),
-      points: { show: points && ((u, i, from, to) => { mark(u, i, from, to, curve); return false; }), size: POINT },
+      points: { show: points && ((u, i, from, to) => { mark(u, i, from, to, curve, above); return false; }), size: POINT },
     };
     if (points) drawn.paths = () => null;
     else if (curve.held) drawn.paths = uPlot.paths.stepped({ align: 1 });
     return drawn;
   }
+
+  // Whether the abscissa counts things, such as poses or recordings, between which there is nothing.
+  const counted = (chart) => chart.places.length > 0 || (!chart.logX && !chart.x.includes("[") && chart.panels.every((p) => p.x.every((v) => v == null || Number.isInteger(v))));
 
   function options(chart, panel, group, size, last) {
     const place = chart.places.length ? (v) => (v == null ? "–" : (chart.places[Math.round(v) - 1] || "")) : shown;
@@ -146,10 +160,10 @@
       height: Math.max(panel.height, labelled(panel.label)) + (last ? 20 : 0),
       scales: { x: { time: false, distr: chart.logX ? 3 : 1, range: (u, min, max) => [min, max] }, y: panel.log ? { distr: 3 } : { range: reach } },
       axes: [
-        { ...axis, label: last ? chart.x : undefined, labelSize: last ? 20 : 0, size: 30, values: ticks, incrs: chart.places.length ? [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000] : undefined },
+        { ...axis, label: last ? chart.x : undefined, labelSize: last ? 20 : 0, size: 30, values: ticks, incrs: counted(chart) ? WHOLE : undefined },
         { ...axis, label: panel.label, labelSize: 18, size: width, values: ticks },
       ],
-      series: [{ label: "at", value: (u, v) => place(v) }, ...panel.curves.map(series)],
+      series: [{ label: "at", value: (u, v) => place(v) }, ...panel.curves.map((c, k) => series(c, panel.curves.slice(k + 1).filter((o) => o.mark).length))],
       legend: { live: true, markers: { width: 0 } },
       cursor: { sync: { key: group.name, scales: ["x", null], filters: { pub: (type) => type === "mousemove" || type === "mouseleave" } }, drag: { x: true, y: false, setScale: true }, bind: { mousedown: (u, t, handler) => (e) => (e.shiftKey ? null : handler(e)), dblclick: () => () => { show(group, ...group.whole); return null; } } },
       hooks: {
@@ -203,8 +217,11 @@
   function build(holder, box, size) {
     const chart = JSON.parse(holder.textContent);
     const at = chart.panels.flatMap((p) => [p.x[0], p.x[p.x.length - 1]]).filter((v) => v != null);
-    const pad = chart.places.length ? 0.5 : 0;
-    const whole = [Math.min(...at) - pad, Math.max(...at) + pad];
+    const ends = [Math.min(...at), Math.max(...at)];
+    // points at the ends are drawn whole
+    const pointed = !chart.logX && chart.panels.some((p) => p.curves.some((c) => c.mark));
+    const pad = chart.places.length ? 0.5 : pointed ? 0.02 * (ends[1] - ends[0]) : 0;
+    const whole = [ends[0] - pad, ends[1] + pad];
     if (whole[0] === whole[1]) whole[1] += 1;
     let group = groups.get(chart.group);
     if (!group) groups.set(chart.group, (group = { name: chart.group, plots: [], range: whole, whole, log: chart.logX, ready: false }));

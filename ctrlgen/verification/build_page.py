@@ -64,8 +64,8 @@ def first_screen(b: BuildRecord, figure: PageFigure | None) -> FirstScreen:
         numbers.append((f"{run.short_name}, instructions", f"{counts['scenario']} of {counts['worst']} at worst"))
     steps = [] if b.passed else ["Mend what failed: each line above names build, signal and tool."]
     if b.not_run:
-        told = ", ".join(f"`{row.remedy}`" for row in b.not_run[:REMEDIES])
-        steps.append(f"Run what did not run: {told}; the rest is listed below.")
+        told = "; ".join(dict.fromkeys(row.remedy for row in b.not_run[:REMEDIES]))
+        steps.append(f"Run what did not run: {told}{'; the rest is listed below' if b.not_run[REMEDIES:] else ''}.")
     steps.append(
         "Put `c/` into the firmware project: `c/README.md` says how, `c/manifest.json` has the hash of each file."
     )

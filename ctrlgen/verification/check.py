@@ -15,7 +15,7 @@ from ctrlgen.firmware.c.real import Arithmetic
 from ctrlgen.reporting.result_file import Keys
 
 PATIENCE = 900.0  # s; a tool that takes longer is stopped
-LEFT_OUT = "not run because of --quick; run without it"
+LEFT_OUT = "left out by --quick; call without it"
 
 
 class CheckState(StrEnum):

@@ -18,6 +18,7 @@ import numpy as np
 from pydantic import Field
 
 from ctrlgen.core.parallel import Failure, run_all, sendable
+from ctrlgen.core.percent import percent
 from ctrlgen.core.units import from_si
 from ctrlgen.diagnosis.selection.findings import Estimate
 from ctrlgen.diagnosis.selection.search_result import SearchResult
@@ -46,7 +47,7 @@ class Bootstrap(Keys):
 
     def sentences(self) -> list[str]:
         """How often each finding vanished, and why replicates failed."""
-        vanished = [f"{name} vanished in {share:.0%} of them" for name, share in self.vanished.items()]
+        vanished = [f"{name} vanished in {percent(share)} of them" for name, share in self.vanished.items()]
         return [*vanished, *(f"some failed: {reason}" for reason in self.failed)]
 
 

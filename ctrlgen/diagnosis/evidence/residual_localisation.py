@@ -12,6 +12,7 @@ from pathlib import PurePosixPath
 
 import numpy as np
 
+from ctrlgen.core.percent import percent
 from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.evidence.frequency_bands import frequency_bands
 from ctrlgen.diagnosis.evidence.ltv_linearisation import LtvModel
@@ -248,11 +249,11 @@ def _statements(located: ResidualLocationEntry) -> list[str]:
     if located.by_reading:
         most = max(located.by_reading, key=lambda s: s.share)
         if most.ci95[0] > 0:
-            sentences.append(f"{most.label} has {most.share:.0%} of the excess over the noise")
+            sentences.append(f"{most.label} has {percent(most.share)} of the excess over the noise")
     kind = located.coordinates.located_in
     if kind in (LocatedIn.ACTUATOR, LocatedIn.READING):
         name, share = max(located.coordinates.explained_by_one[kind].items(), key=lambda item: item[1])
-        sentences.append(f"{kind} {name} alone could explain {share:.0%} of it")
+        sentences.append(f"{kind} {name} alone could explain {percent(share)} of it")
     for axis, sides in located.by_direction.items():
         if len(sides) == 2:
             (a, b), (c, d) = sides[0].mean_ci95, sides[1].mean_ci95

@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ctrlgen.core.percent import percent
 from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.evidence.ltv_linearisation import LtvModel
 from ctrlgen.diagnosis.evidence.residual_localisation import equivalent_inputs
@@ -180,7 +181,7 @@ def _statement(axis: str, maps: tuple[DependenceMap, ...]) -> str:
     """What the input of one axis depends on; its maps are those of `_maps`, of which the position comes first."""
     single = [m for m in maps if m.coordinate not in ONE_SIDED]
     best = max(single, key=lambda m: m.variance_share)
-    text = f"{axis}: {best.coordinate} explains {best.variance_share:.0%} of the unknown input's variance"
+    text = f"{axis}: {best.coordinate} explains {percent(best.variance_share)} of the unknown input's variance"
     sides = {m.coordinate: m for m in maps if m.coordinate in ONE_SIDED}
     if len(sides) == 2:
         forward, backward = (sides[side] for side in ONE_SIDED)

@@ -8,7 +8,7 @@ from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.answer import answer, worst_channel
 from ctrlgen.diagnosis.report.luck_sentences import chance_text
 from ctrlgen.diagnosis.report.narrative import hard, interval, next_steps, share_text, short
-from ctrlgen.diagnosis.selection.cause_entry import cause_name
+from ctrlgen.diagnosis.selection.cause_entry import cause_noun
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.reporting.numbers import number
 from ctrlgen.reporting.page_figure import FirstScreen, PageFigure
@@ -37,7 +37,7 @@ def _numbers(diagnosis: Diagnosis) -> tuple[tuple[str, str], ...]:
         told.append(("with the findings", f"{number(e.rms_after, 3)} {e.unit}"))
     told.append(("noise", "not known" if e.noise_floor is None else f"{number(e.noise_floor, 3)} {e.unit}"))
     for main in diagnosis.findings[:1]:
-        told.append((f"share of {cause_name(main.cause)}", share_text(main)))
+        told.append((f"share of {cause_noun(main.cause)}", share_text(main)))
         told.append(("chance by luck", chance_text(main)))
         told += [(name, interval(one, name)) for name, one in main.numbers[:NUMBERS]]
     return tuple((name, hard(value)) for name, value in told)
