@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -10,9 +11,10 @@ from matplotlib.patches import Ellipse
 
 from ctrlgen import InputError, build_model, load_device, simulate
 from ctrlgen.app.scenario_pipeline import map_workspace
+from ctrlgen.app.workspace_summary import WorkspaceSummary
 from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.controller.motion_feedforward import controller_of
-from ctrlgen.trajectory.workspace import Workspace
+from ctrlgen.trajectory.workspace import Ball, Workspace
 from ctrlgen.trajectory.workspace_plots import draw_workspace
 
 UM = 1e-6
@@ -191,3 +193,13 @@ def test_a_platform_that_only_tilts_has_an_area_of_angles(tmp_path):
     J = ca.Function("J", [model.z], [ca.jacobian(model.signals["pose"].expr, model.z)])(0).full()
     assert summary.area == pytest.approx(4 * 400e-6**2 * abs(np.linalg.det(J)), rel=1e-4)
     assert "slice of theta_x and theta_y" in summary.shown_area and [what for what, _ in summary.balls] == ["rotations"]
+
+
+@pytest.mark.parametrize(
+    ("scale", "told"), [((1e-6, 1e-6), "15 um"), ((1e-6, 2e-6), "15 typical sizes"), ((1e-5, 1e-5), "150 um")]
+)
+def test_a_ball_has_its_radius_in_the_unit_of_its_channels_where_they_have_one(scale, told):
+    signal = SimpleNamespace(scale=np.array(scale), units=("um", "um"))
+    model = SimpleNamespace(signals={"pose": signal})
+    summary = WorkspaceSummary(SimpleNamespace(model=model), [], [], None, None, None, [], None)
+    assert summary.radius_of(Ball(np.zeros(2), 15.0, (0, 1))) == told

@@ -171,10 +171,7 @@ def print_workspace(summary: WorkspaceSummary) -> None:
     if summary.area is not None:
         out.print(summary.shown_area, markup=False)
     for what, ball in summary.balls:
-        out.print(
-            f"largest ball of {what}: radius {to_digits(ball.radius)} typical sizes around {place(ball.centre)}",
-            soft_wrap=True,
-        )
+        out.print(f"largest ball of {what}: radius {summary.radius_of(ball)} around {place(ball.centre)}")
     sizes = ", ".join(f"{show(v, u)}" for v, u in sorted(set(zip(signal_.scale, signal_.units, strict=True))))
     out.print(f"typical sizes: {sizes}")
 

@@ -30,7 +30,7 @@ def workspace_page(summary: WorkspaceSummary, drawn: str) -> str:
         ends = [_ends(summary, r, i) for r in (*summary.ranges, summary.extent)]
         size = f"{to_digits(from_si(signal.scale[i], unit))}"
         rows.append((f"{channel} [{unit}]", ends, size, " … ".join(dict.fromkeys(summary.bound_by[i]))))
-    balls = [(what, f"{to_digits(ball.radius)}", _place(summary, ball.centre)) for what, ball in summary.balls]
+    balls = [(what, summary.radius_of(ball), _place(summary, ball.centre)) for what, ball in summary.balls]
     device = summary.workspace.model.device
     return render(
         Path(__file__).with_name("workspace.html.j2"),

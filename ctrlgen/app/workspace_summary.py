@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ctrlgen.core.to_digits import to_digits
-from ctrlgen.core.units import from_si
+from ctrlgen.core.units import from_si, show
 from ctrlgen.trajectory.workspace import Ball, Workspace
 
 
@@ -36,6 +36,15 @@ class WorkspaceSummary:
         told = "translations" if self.workspace.translations else "rotations"
         every = [("all channels", self.everything)] if self.everything.channels != self.leading.channels else []
         return [(told, self.leading), *every]
+
+    def radius_of(self, ball: Ball) -> str:
+        """The radius in the unit of the channels, such as '15.44 um'; in their typical sizes where these or the units differ."""
+        signal = self.workspace.model.signals["pose"]
+        sizes = {(float(signal.scale[i]), signal.units[i]) for i in ball.channels}
+        if len(sizes) > 1:
+            return f"{to_digits(ball.radius)} typical sizes"
+        ((size, unit),) = sizes
+        return show(ball.radius * size, unit)
 
     @property
     def shown_area(self) -> str:
