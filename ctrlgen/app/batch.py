@@ -27,6 +27,7 @@ from ctrlgen.app.batch_page import batch_page
 from ctrlgen.app.batch_row import BatchRow
 from ctrlgen.app.batch_tables import BatchTables, write_parquet
 from ctrlgen.core.errors import Fault, InputError
+from ctrlgen.core.file_format import refuse_another_kind
 from ctrlgen.core.files import MARKER, read_toml, validate, whole_folder, write_text
 from ctrlgen.core.parallel import Failure, run_all
 from ctrlgen.devices.section import Section
@@ -102,7 +103,9 @@ class Task:
 def load_batch(path: Path | str, seed: int | None = None, replicates: int = 0) -> tuple[Task, ...]:
     """The diagnoses that the list at `path` asks for. Raises InputError with every fault of the list."""
     path = Path(path)
-    written = validate(BatchFile, read_toml(path), path)
+    table = read_toml(path)
+    refuse_another_kind(table, path, "jobs", "name a list of [[job]] tables (ctrlgen batch --help shows one)")
+    written = validate(BatchFile, table, path)
     tasks, faults = [], []
     for k, job in enumerate(written.job):
         device = path.parent / job.device

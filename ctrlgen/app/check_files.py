@@ -11,6 +11,7 @@ from ctrlgen.app.diagnosis_console import print_recording
 from ctrlgen.app.scenario_console import print_shaper
 from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault, InputError, Unreachable
+from ctrlgen.core.file_format import refuse_another_kind
 from ctrlgen.core.files import read_toml
 from ctrlgen.core.units import parse
 from ctrlgen.devices import Device, load_device
@@ -44,6 +45,8 @@ def check(file: Path, device: Path | None = None, figure: Path | None = None, po
             raise InputError(file, faults)
         out.print(f"{file}: every file is as it was generated", markup=False)
     elif file.is_dir() or (file.suffix != ".py" and "kind" not in read_toml(file)):
+        if not file.is_dir():
+            refuse_another_kind(read_toml(file), file, "scenario", "name a device file or a scenario")
         if not file.is_dir() and not {"device", "path", "record"} & read_toml(file).keys():
             what = 'is missing; a device file begins with kind = "axis" or another (ctrlgen new device begins one)'
             raise InputError(file, [Fault("kind", f"{what}, a scenario has device and path")])

@@ -125,7 +125,7 @@ def print_proposal(proposal: Proposal) -> None:
 
 def print_table(facts: TableFacts) -> None:
     """One table: its rows and rate, its columns, what was interpreted, what is odd."""
-    out.print(f"[bold]{escape(str(facts.table.path))}[/bold]: {_length(facts)}", soft_wrap=True)
+    out.print(f"[bold]{escape(str(facts.table.path))}[/bold]: {escape(_length(facts))}", soft_wrap=True)
     shown = table_of(("column", "left"), ("unit", "left"), ("smallest", "right"), ("largest", "right"), ("", "left"))
     for column in facts.columns[:MOST_COLUMNS]:
         shown.add_row(escape(column.name), escape(column.unit or "not stated"), *_numbers(facts, column))
@@ -147,7 +147,7 @@ def _length(facts: TableFacts) -> str:
     if facts.time is None and (step := facts.clock_step):
         return f"{number_of(facts.rows, 'row')}, {number(1 / step)} Hz, {number(facts.rows * step)} s, as the file states of its channels"
     if facts.time is None:
-        why = f"the time {facts.falls} falls: newest row first" if facts.falls else "no column is a time"
+        why = f"the time {facts.falls!r} falls: newest row first" if facts.falls else "no column is a time"
         return f"{number_of(facts.rows, 'row')}, {why}"
     step, gaps = facts.time.step, facts.time.gaps
     said = f"{number_of(facts.rows, 'row')}, {number(1 / step)} Hz, {number(facts.rows * step)} s"

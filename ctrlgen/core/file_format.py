@@ -12,6 +12,26 @@ FORMAT = 1
 words in `in_this_format` for what to change."""
 
 
+# what a file is by a key that only such a one has, and what is said of it where another was meant
+_KINDS = {
+    "record": ("recording", "describes a recording"),
+    "job": ("jobs", "is a list of diagnoses, for ctrlgen batch"),
+    "path": ("scenario", "is a scenario"),
+    "kind": ("device", "describes a device"),
+}
+# all that a statement of uncertainties may hold
+_UNCERTAIN = {"format", "title", "numbers", "surroundings", "drive", "sensor", "correlation"}
+
+
+def refuse_another_kind(table: dict[str, Any], path: Path | str, wanted: str, instead: str) -> None:
+    """Raises InputError for the `table` of a file that is of another kind than the `wanted` one, with what to name `instead`."""
+    found, said = next((_KINDS[key] for key in _KINDS if key in table), (wanted, ""))
+    if not said and table and table.keys() <= _UNCERTAIN:
+        found, said = "uncertainty", "states uncertainties, and stands beside a scenario"
+    if found != wanted:
+        raise InputError(path, [Fault("file", f"{said}; {instead}")])
+
+
 def in_this_format(table: dict[str, Any], path: Path | str) -> dict[str, Any]:
     """The `table` of a file without its `format`. Raises InputError for another one, with what to do."""
     found = table.get("format", FORMAT)

@@ -9,7 +9,7 @@ from pkgutil import walk_packages
 
 import ctrlgen.effects  # noqa: F401  fills Effect.library before a device file is read
 from ctrlgen.core.errors import Fault, InputError
-from ctrlgen.core.file_format import in_this_format
+from ctrlgen.core.file_format import in_this_format, refuse_another_kind
 from ctrlgen.core.files import read_toml, validate
 from ctrlgen.devices.base import Device
 from ctrlgen.devices.device_physics import BalancedPhysics, DevicePhysics, ImposedPhysics, InertialPhysics
@@ -32,14 +32,14 @@ def load_device(path: Path | str) -> Device:
     table = in_this_format(table, path)
     if "record" in table:
         raise InputError(path, [Fault("file", "describes a recording; name the device file that it was made on")])
+    refuse_another_kind(table, path, "device", "name a device file")
     kind = table.get("kind")
     if kind == KIND:
         return changed_device(table, Path(path))
     if not isinstance(kind, str) or kind not in Device.library:
         known = ", ".join(f'"{name}"' for name in sorted({*Device.library, KIND}))
-        raise InputError(
-            path, [Fault("kind", f"{reprlib.repr(kind)} is not a kind of device I know; write kind = one of {known}")]
-        )
+        what = "is missing" if kind is None else f"{reprlib.repr(kind)} is not a kind of device I know"
+        raise InputError(path, [Fault("kind", f"{what}; write kind = one of {known}")])
     return validate(Device.library[kind], Device.library[kind].with_named_files(table, Path(path)), path)
 
 

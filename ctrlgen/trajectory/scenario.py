@@ -13,7 +13,7 @@ import casadi as ca
 
 from ctrlgen.core.edited_toml import value_text
 from ctrlgen.core.errors import Fault, InputError
-from ctrlgen.core.file_format import in_this_format
+from ctrlgen.core.file_format import in_this_format, refuse_another_kind
 from ctrlgen.core.files import decoded, encoded, read_bytes, read_text, read_toml, validate
 from ctrlgen.core.names import C_NAME, checked
 from ctrlgen.core.shown import Shown
@@ -218,6 +218,7 @@ def load_scenario(path: Path | str, device: Device | Path | str | None = None) -
     if "kind" in table and "device" not in table:
         what = 'describes a device; name a scenario, or write one that has device = "..." with this file\'s path'
         raise InputError(file_path, [Fault("file", what)])
+    refuse_another_kind(table, file_path, "scenario", "name a scenario")
     file = validate(ScenarioFile, in_this_format(table, file_path), file_path)
     inputs = {"scenario": Input(file_path, read_text(file_path))}
     if not isinstance(device, Device):
