@@ -67,6 +67,7 @@ def test_the_table_holds_every_signal_with_its_unit():
         ("1 N", 1.0, "wrong unit"),
         ("2X=1V", 1.0, "is no drive; write axis=1V"),
         ("1V", 1e9, "samples at 1000 Hz; 10 to"),
+        ("1,5V", 1.0, "has a decimal comma; write a point"),
         (None, 1.0, "name a file of drives, or give --step"),
     ],
 )
@@ -109,3 +110,15 @@ def test_a_device_at_rest_is_within_its_limits(file):
     drive = build_model(load_device(file)).signals["drive"]
     step = f"{drive.channels[0]}=0 {drive.units[0]}"
     assert not simulate_device(file, None, step, 0.02, 1000.0).broken
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("bode", AXIS_FILE, "--out", "x.pdf"), "x.pdf: must end in .svg or .png, or in .html"),
+        (("check", AXIS_FILE, "--figure", "x.pdf"), "x.pdf: must end in .svg or .png"),
+    ],
+)
+def test_a_picture_of_another_ending_is_refused_with_all_that_the_option_takes(words, told):
+    done = ctrlgen(*words)
+    assert done.returncode == 1 and done.stderr.rstrip().endswith(told)

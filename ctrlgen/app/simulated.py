@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -77,7 +78,7 @@ def stepped(text: str, duration: float, rate: float, model: Model) -> DriveFile:
         what = f"gives {number_of(n, 'sample')} at {rate:g} Hz; 10 to {MOST_SAMPLES} are simulated"
         raise InputError("--duration", [Fault(f"{duration:g} s", what)])
     u = np.zeros((n, len(drive.channels)))
-    for part in text.split(","):
+    for part in re.split(r",(?=[^,=]*=)", text):  # a comma within a number is told by what reads it
         name, _, value = part.rpartition("=")
         name = name.strip() or (drive.channels[0] if len(drive.channels) == 1 else "")
         if name not in drive.channels:

@@ -79,8 +79,8 @@ JobCount = Annotated[
 ]
 
 
-def as_picture(option: str, path: Path) -> Path:
-    """`path`, if it is one of a picture. Raises InputError."""
+def as_picture(option: str, path: Path, beside: str = "") -> Path:
+    """`path`, if it is one of a picture; `beside` is another ending that the option takes. Raises InputError."""
     if path.suffix not in (".svg", ".png"):
-        raise InputError(option, [Fault(str(path), "must end in .svg or .png")])
+        raise InputError(option, [Fault(str(path), f"must end in .svg or .png{beside and f', or in {beside}'}")])
     return path

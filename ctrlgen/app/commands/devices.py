@@ -98,7 +98,7 @@ def bode(
 
         write_bode_page(model, pose, picture, of)
     else:
-        draw_bode(model, pose, as_picture("--out", picture), of)
+        draw_bode(model, pose, as_picture("--out", picture, ".html"), of)
     out.print(str(picture), soft_wrap=True, markup=False)
 
 
