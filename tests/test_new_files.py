@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
+from pathlib import Path
 
 import pytest
 from command_line import ctrlgen
@@ -138,3 +140,11 @@ def test_the_command_writes_a_file_and_says_what_comes_next(tmp_path):
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "stage.toml").is_file()
     assert "next:  ctrlgen check" in done.stdout
+
+
+@pytest.mark.parametrize(
+    "file", ["docs/tutorial/first_device.md", "ctrlgen/app/commands/new.py"], ids=["the tutorial", "the help"]
+)
+def test_every_kind_that_can_be_begun_is_named_where_a_reader_looks(file):
+    text = Path(file).read_text(encoding="utf-8")
+    assert all(re.search(rf"(?<![\w-]){kind}(?![\w-])", text) for kind in KINDS)
