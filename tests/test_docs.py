@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import html
 import importlib
 import os
 import re
@@ -93,6 +94,11 @@ def test_the_first_diagnosis_finds_what_the_page_says(tmp_path):
     shown = next(text for language, _, text in blocks("tutorial/first_diagnosis.md") if language == "text")
     found = (tmp_path / "diagnosis" / "diagnosis.json").read_text(encoding="utf-8")
     assert "stiffening" in shown and '"stiffening"' in found and '"explained"' in found
+    page = (tmp_path / "diagnosis" / "report.html").read_text(encoding="utf-8")
+    told = " ".join(html.unescape(page).split())
+    for line in shown.splitlines():
+        assert line.removesuffix(" …") in told
+        assert line in (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def test_every_page_is_in_the_contents():

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from ctrlgen.core.to_digits import to_digits
+from ctrlgen.reporting.numbers import number
 
 PRINTING = [
     *Path("ctrlgen").rglob("*.html.j2"),
@@ -28,7 +29,8 @@ def test_a_number_is_rounded_and_plain_from_a_ten_thousandth_to_a_million(power,
 
 
 def test_what_is_no_number_of_a_size_stays_as_it_is():
-    assert [to_digits(v, 3) for v in (0.0, float("inf"), 999_999.0, 999.9)] == ["0", "inf", "1e+06", "1000"]
+    assert [to_digits(v, 3) for v in (0.0, -0.0, float("inf"), 999_999.0, 999.9)] == ["0", "0", "inf", "1e+06", "1000"]
+    assert number(-0.0) == "0"
 
 
 @pytest.mark.parametrize("path", PRINTING, ids=lambda path: path.name)

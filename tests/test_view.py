@@ -13,6 +13,7 @@ from ctrlgen.app.viewer.compared_results import compared
 from ctrlgen.app.viewer.followed_jobs import followed_jobs
 from ctrlgen.app.viewer.found_results import found_results, result_at
 from ctrlgen.app.viewer.local_server import listen, serve
+from ctrlgen.app.viewer.result_answers import KINDS, answer_of
 from ctrlgen.app.viewer.viewed_folders import Absent, Place, ViewedFolders
 from ctrlgen.core.errors import InputError
 from ctrlgen.core.files import whole_folder
@@ -213,3 +214,11 @@ def test_without_its_packages_the_command_says_how_to_get_them(tmp_path, monkeyp
         serve([tmp_path], 0, print)
     with pytest.raises(InputError, match="is no folder"):
         serve([tmp_path / "nothing"], 0, print)
+
+
+def test_the_answer_of_learning_states_the_unit_of_each_group():
+    groups = [{"name": "translation", "unit": "nm"}, {"name": "rotation", "unit": "urad"}]
+    errors = [{"group": "translation", "repeating": 21.58}, {"group": "rotation", "repeating": 0.5}]
+    record = {"groups": groups, "runs": [{"best": True, "errors": errors}], "stop": ""}
+    kind = next(kind for kind in KINDS if kind.name == "learning")
+    assert answer_of(kind, record)[2].endswith("21.58 nm (translation), 0.5 urad (rotation).")

@@ -10,11 +10,12 @@ from conftest import DEVICES
 from matplotlib.patches import Ellipse
 
 from ctrlgen import InputError, build_model, load_device, simulate
+from ctrlgen.app.new_files.write import write_device
 from ctrlgen.app.scenario_pipeline import map_workspace
 from ctrlgen.app.workspace_summary import WorkspaceSummary
 from ctrlgen.controller.kernels import ControllerKernels
 from ctrlgen.controller.motion_feedforward import controller_of
-from ctrlgen.trajectory.workspace import Ball, Workspace
+from ctrlgen.trajectory.workspace import Ball, Workspace, middle_pose
 from ctrlgen.trajectory.workspace_plots import draw_workspace
 
 UM = 1e-6
@@ -203,3 +204,10 @@ def test_a_ball_has_its_radius_in_the_unit_of_its_channels_where_they_have_one(s
     model = SimpleNamespace(signals={"pose": signal})
     summary = WorkspaceSummary(SimpleNamespace(model=model), [], [], None, None, None, [], None)
     assert summary.radius_of(Ball(np.zeros(2), 15.0, (0, 1))) == told
+
+
+@pytest.mark.filterwarnings("error")
+def test_drives_without_bounds_have_no_middle_and_no_warning_beside_the_reason(tmp_path):
+    write_device(tmp_path / "axis.toml", "tested-axis")
+    with pytest.raises(InputError, match="some drive has no bounds"):
+        middle_pose(build_model(load_device(tmp_path / "axis.toml")))

@@ -25,7 +25,7 @@
   const ticks = (u, splits, axis, space, step) =>
     splits.map((v) => {
       if (v == null) return "";
-      if (u.scales[u.axes[axis].scale].distr === 3) return v >= 0.01 && v < 1e5 ? String(+v.toPrecision(3)) : v.toExponential(0);
+      if (u.scales[u.axes[axis].scale].distr === 3) return v >= 1e-4 && v < 1e5 ? String(+v.toPrecision(3)) : v.toExponential(0);
       const digits = decimals(step);
       if (digits <= 6 && Math.abs(v) < 1e7) return v.toFixed(digits);
       const shown = Math.floor(Math.log10(Math.abs(v))) + Math.max(digits, Math.ceil(-Math.log10(step)));

@@ -19,7 +19,7 @@ def number(value: float, digits: int = 4) -> str:
         return "not known"
     if value and (abs(value) >= 1e6 or abs(value) < 1e-4):
         return f"{value:.{digits - 1}e}"
-    exact = f"{value:.{digits}g}"
+    exact = f"{value + 0.0:.{digits}g}"  # no sign of a zero
     return f"{float(exact):.0f}" if "e" in exact else exact
 
 

@@ -53,7 +53,7 @@ def middle_pose(model: Model) -> np.ndarray:
     if len(translations(model)) >= 3:
         return _raised(model, HEIGHTS[len(HEIGHTS) // 2])
     low, high = model.u_bounds
-    if not np.isfinite(low + high).all():
+    if not (np.isfinite(low) & np.isfinite(high)).all():
         what = "is needed, for some drive has no bounds and so no middle; give a pose"
         raise InputError(model.name, [Fault("--at", what)])
     return np.asarray(simulate(model, (low + high)[None] / 2, SETTLED).signals["pose"][-1])

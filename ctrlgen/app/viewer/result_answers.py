@@ -82,7 +82,8 @@ def _fastest(record: Record) -> tuple[str, Mood, str]:
 
 def _learning(record: Record) -> tuple[str, Mood, str]:
     errors = next(run for run in record["runs"] if run["best"])["errors"]
-    left = ", ".join(f"{number(e['repeating'])} ({e['group']})" for e in errors)
+    units = {group["name"]: group["unit"] for group in record["groups"]}
+    left = ", ".join(f"{number(e['repeating'])} {units[e['group']]} ({e['group']})" for e in errors)
     stop = record["stop"]
     return (
         ("learnt" if stop else "goes on"),

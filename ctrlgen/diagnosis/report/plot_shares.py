@@ -25,10 +25,15 @@ SMALL = 0.01
 SELECTED, OTHER, PAST, ADDED, RESIDUAL = COLOURS[0], "#c4d7e6", "#d9d9d9", COLOURS[3], "#b0b0b0"
 
 
-def draw_shares(table: SharesTable, units: dict[str, str] | None = None) -> Figure:
+def draw_shares(table: SharesTable, units: dict[str, str] | None = None) -> Figure | None:
     """Bars of the shares by channel with their intervals and the total, and up to three panels of the residual over its best
-    regressors with what the smoother predicts out of block. `units` of the residuals by channel; SI without."""
+    regressors with what the smoother predicts out of block. `units` of the residuals by channel; SI without.
+
+    None where no kind of signal has a bar in any channel.
+    """
     rows = [_shown(c) for c in table.channels]
+    if not any(rows):
+        return None
     panels = _panels(table)
     heights = [0.5 + 0.19 * max(len(kinds), 1) for kinds in rows]
     below = 2.3 if panels else 0.0
