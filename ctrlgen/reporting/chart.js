@@ -4,7 +4,7 @@
   const FONT = "12px system-ui, sans-serif";
   const POINT = 6; // pixels across a point
   const WHOLE = Array.from({ length: 7 }, (_, k) => [1, 2, 5].map((v) => v * 10 ** k)).flat(); // steps of what is counted
-  const RIM = 1.2; // pixels by which points stand out from under each row of points that is drawn over them
+  const RIM = 1.2; // pixels by which a point stands out from under each other that is drawn over it
   const SCALE = 50; // pixels above and below a panel: the numbers of its scale, and what uPlot leaves free
   const groups = new Map(); // name -> {plots, range, whole}
 
@@ -99,8 +99,13 @@
 
   function mark(u, i, from, to, curve, above) {
     const path = new Path2D();
-    const radius = (POINT / 2 + RIM * above) * devicePixelRatio;
-    for (let k = from; k <= to; k++) if (u.data[i][k] != null) path.addPath(new Path2D(outline(curve.mark, u.valToPos(u.data[0][k], "x", true), u.valToPos(u.data[i][k], "y", true), radius)));
+    const y = (j, k) => u.valToPos(u.data[j][k], "y", true);
+    const covers = (j, k) => u.data[j][k] != null && Math.abs(y(j, k) - y(i, k)) < (POINT / 2) * devicePixelRatio;
+    for (let k = from; k <= to; k++) {
+      if (u.data[i][k] == null) continue;
+      const radius = POINT / 2 + RIM * above.filter((j) => covers(j, k)).length;
+      path.addPath(new Path2D(outline(curve.mark, u.valToPos(u.data[0][k], "x", true), y(i, k), radius * devicePixelRatio)));
+    }
     u.ctx.save();
     u.ctx.beginPath();
     u.ctx.rect(u.bbox.left, u.bbox.top, u.bbox.width, u.bbox.height);
@@ -163,7 +168,7 @@
         { ...axis, label: last ? chart.x : undefined, labelSize: last ? 20 : 0, size: 30, values: ticks, incrs: counted(chart) ? WHOLE : undefined },
         { ...axis, label: panel.label, labelSize: 18, size: width, values: ticks },
       ],
-      series: [{ label: "at", value: (u, v) => place(v) }, ...panel.curves.map((c, k) => series(c, panel.curves.slice(k + 1).filter((o) => o.mark).length))],
+      series: [{ label: "at", value: (u, v) => place(v) }, ...panel.curves.map((c, k) => series(c, panel.curves.flatMap((o, j) => (j > k && o.mark ? [j + 1] : []))))],
       legend: { live: true, markers: { width: 0 } },
       cursor: { sync: { key: group.name, scales: ["x", null], filters: { pub: (type) => type === "mousemove" || type === "mouseleave" } }, drag: { x: true, y: false, setScale: true }, bind: { mousedown: (u, t, handler) => (e) => (e.shiftKey ? null : handler(e)), dblclick: () => () => { show(group, ...group.whole); return null; } } },
       hooks: {
