@@ -27,6 +27,26 @@ def test_a_number_that_lies_about_its_slope_does_not_hold_the_others():
     assert levenberg_marquardt(Kinked(), np.zeros(2), 40)[0] == pytest.approx(7.0)
 
 
+class Still:
+    """No number at all: what is left is left."""
+
+    k, step_limit, bounds = 0, np.zeros(0), (np.zeros(0), np.zeros(0))
+
+    def residual(self, x: np.ndarray) -> np.ndarray:
+        return np.array([3.0])
+
+    def evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self.residual(x), np.zeros((1, 0))
+
+    def normal_matrix(self, J: np.ndarray) -> np.ndarray:
+        return J.T @ J
+
+
+@pytest.mark.parametrize("negligible", [0.0, 1e-6])
+def test_without_a_number_there_is_no_step(negligible):
+    assert levenberg_marquardt(Still(), np.zeros(0), 40, negligible=negligible).shape == (0,)
+
+
 class Linear:
     """A x - b, with what each number may step at once."""
 

@@ -47,12 +47,14 @@ def levenberg_marquardt(
 ) -> np.ndarray:
     """The x (n,) of least |residual|^2 within the bounds, from a starting `x`, in at most so many steps.
 
-    Marquardt's damping (D. W. Marquardt, J. SIAM 11 (1963) 431). A step that does not lower the objective is tried again:
-    first along the curved valley of the objective; then with the nuisance variables fixed, along which the residual may have
-    a kink; then, when the damping has already grown, without the parameter that promises most, for the derivative by the
-    moment of an event between two samples may be wrong. Ends when a step promises less than is `negligible`, and where all that are left,
+    Marquardt's damping (D. W. Marquardt, J. SIAM 11 (1963) 431). A step that does not lower the objective is tried again: first along the
+    curved valley of the objective; then with the nuisance variables fixed, along which the residual may have a kink; then, when the
+    damping has already grown, without the parameter that promises most, for the derivative by the moment of an event between two samples
+    may be wrong. Without a variable there is no step. Ends when a step promises less than is `negligible`, and where all that are left,
     each with `GENEROUS` times what the next one promises, would not bring |residual|^2 down to what is `enough`.
     """
+    if len(x) == 0:
+        return x
     low, high = problem.bounds
     parameters = np.arange(len(x)) < problem.k
     x, damping = np.clip(x, low, high), FIRST_DAMPING

@@ -16,6 +16,7 @@ from ctrlgen.recordings.plausible_order import column_notes, row_notes, speed_no
 from ctrlgen.recordings.plausible_rate import dynamics_notes
 from ctrlgen.recordings.plausible_reach import reach_notes
 from ctrlgen.recordings.plausible_scale import size_notes, zero_notes
+from ctrlgen.recordings.plausible_travel import travel_notes
 from ctrlgen.recordings.plausible_units import WRONG, unit_notes
 from ctrlgen.recordings.recording import Recording
 
@@ -38,7 +39,9 @@ def with_plausibility(recording: Recording, model: Model) -> Recording:
     seen = moved(recording, model)
     # a unit, a sign or an order that is wrong takes samples as far
     said = ([] if seen is None else implausible(seen)) or reach_notes(recording, model)
-    return replace(recording, notes=(*recording.notes, *map(Implausible, said))) if said else recording
+    if said:
+        return replace(recording, notes=(*recording.notes, *map(Implausible, said)))
+    return replace(recording, notes=(*recording.notes, *(travel_notes(recording, seen) if seen else ())))
 
 
 def suspected(notes: Sequence[str]) -> list[Fault]:
