@@ -70,6 +70,14 @@ def names_and_units(candidates: Sequence[tuple[int, list[str]]], numeric: Collec
     if not all(names) and _is_text(above) and all(a or n for a, n in zip(above, names, strict=True)):
         notes.append(f"columns without a name there are named by line {lines[names_at + 1]}")
         names, above = [name or other for name, other in zip(names, above, strict=True)], []
+    if (
+        units_at is not None
+        and units_at != names_at
+        and any(n and u for n, u in zip(names, rows[units_at], strict=True))
+    ):
+        names = [
+            name or ("" if is_number(unit) else unit) for name, unit in zip(names, rows[units_at], strict=True)
+        ]  # Date, Time
     if any(map(is_number, names)):
         notes = [f"line {lines[names_at]} ({', '.join(names)}) is taken as the columns' names"]
     units = units_behind(names)

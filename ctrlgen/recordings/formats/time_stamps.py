@@ -162,11 +162,11 @@ def _instants(instants: np.ndarray, said: str, notes: tuple[str, ...]) -> Stamps
     if not len(known):
         raise ValueError("holds no time at all")
     since = instants - known[0]
-    unit = np.timedelta64(1, "ns")
-    values = np.where(np.isnat(instants), np.nan, since.astype("timedelta64[ns]") / unit * 1e-9)
+    second = np.timedelta64(10**9, "ns")  # a quotient is rounded once: three seconds are three
+    values = np.where(np.isnat(instants), np.nan, since.astype("timedelta64[ns]") / second)
     whole, _, fraction = str(known[0]).partition(".")
     begin = f"{whole}.{fraction.rstrip('0')}".rstrip(".")
-    since_1970 = float((known[0] - np.datetime64(0, "s")) / unit) * 1e-9
+    since_1970 = float((known[0] - np.datetime64(0, "s")) / second)
     return Stamps(values, (f"{said}; seconds since {begin}", *notes), since_1970)
 
 
