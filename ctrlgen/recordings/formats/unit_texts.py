@@ -25,6 +25,8 @@ BEFORE = re.compile(r"^[\[({]\s*(?P<unit>[^\[\](){}]+?)\s*[\])}]\s*(?P<name>[^\W
 """A unit in brackets in front of its name: [ms] time."""
 SAID = re.compile(r"^(?P<name>.*?)(?:^|\s+)in\s+(?P<unit>[^\s()\[\]]{1,12})$")
 """A unit after a word: C1 in V, Zeit in s, and the `in s` of a column of time."""
+UNKNOWN = re.compile(r"[\[({]\s*([^\[\](){}]*[^\W\d_][^\[\](){}]*?)\s*[\])}]\s*$")
+"""What stands in brackets behind a name and is no unit, nor a number of a list."""
 WORDS = {
     "second": "s", "seconds": "s", "sec": "s", "secs": "s", "sekunde": "s", "sekunden": "s", "millisecond": "ms",
     "milliseconds": "ms", "msec": "ms", "microseconds": "us", "usec": "us", "volt": "V", "vdc": "V", "volts": "V", "millivolt": "mV",
@@ -189,3 +191,9 @@ def _is_of_a_node(name: str, unit: str) -> bool:
 def bare_name(name: str) -> str:
     """A column's name without the unit behind it."""
     return split_name(name)[0]
+
+
+def unit_lacks(name: str) -> str:
+    """Why the name of a column without a unit states none."""
+    behind = UNKNOWN.search(name)
+    return "the file states no unit" if behind is None else f"its unit {behind[1]!r} is not known"

@@ -13,7 +13,9 @@ from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import InputError
 from ctrlgen.core.units import same_dimension
 from ctrlgen.model.model import Model
+from ctrlgen.recordings.formats.formula_names import formula_of
 from ctrlgen.recordings.formats.number_cells import TIME
+from ctrlgen.recordings.formats.unit_texts import unit_lacks
 from ctrlgen.recordings.look.answers import Answers, layout_option
 from ctrlgen.recordings.look.column_facts import (
     NEWEST_FIRST,
@@ -105,6 +107,14 @@ def time_questions(facts: TableFacts, answers: Answers) -> list[str]:
         fits = stated is not None and abs(step * stated[1] - 1) < SAME_RATE
         why = f", as {stated[0]!r} says" if stated is not None and fits else ""
         answer = shlex.join(["--unit", f"{name}={unit}"])
-        assumed = f"the file states no unit, {unit} is assumed{why}, {step:g} s from row to row ({answer})"
+        assumed = f"{unit_lacks(name)}, {unit} is assumed{why}, {step:g} s from row to row ({answer})"
         return [f"time is column {name!r}: {assumed}" + (f"; but {says})" if says and not fits else "")]
+    if facts.time is not None and not known and not facts.time.stamps:
+        name, unit = facts.time.column, facts.time.unit
+        bare = facts.column(name).bare
+        if answers.unit(name, bare) is None and (formula := formula_of(name)):
+            answer = shlex.join(["--unit", f"{name}={unit}"])
+            return [
+                f"time is column {name!r}: {formula}: write what one of them is, {facts.time.step:g} s from row to row ({answer})"
+            ]
     return []

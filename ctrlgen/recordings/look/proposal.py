@@ -17,6 +17,8 @@ from ctrlgen.core.units import parse, same_dimension, to_si
 from ctrlgen.model.model import Model
 from ctrlgen.recordings.alike_units import size_of
 from ctrlgen.recordings.derived_drives import derived_drives
+from ctrlgen.recordings.formats.formula_names import formula_of
+from ctrlgen.recordings.formats.unit_texts import unit_lacks
 from ctrlgen.recordings.look.answers import NOTHING, Answers, layout_option
 from ctrlgen.recordings.look.column_facts import (
     ColumnFacts,
@@ -55,8 +57,6 @@ ALIKE = {
 UNIT, CHANNEL, ROLE, OTHER_ROLE, PLACE, POSSIBLE = 3.0, 4.0, 2.0, -2.0, 0.1, 0.5
 """Likeness of a unit of the right dimension, the channel's name, a word of the role, one of the other role, the place in the file, and of
 a column of which nothing speaks against it."""
-UNKNOWN_UNIT = re.compile(r"[\[({]\s*([^\[\](){}]*[^\W\d_][^\[\](){}]*?)\s*[\])}]\s*$")
-"""What stands in brackets behind a name and is no unit, nor a number of a list."""
 NAMED = 1.0
 """Likeness from which more than the want of another column speaks for one."""
 CLEAR = 1.0
@@ -248,9 +248,9 @@ def _match(model: Model, signal: str, column: ColumnFacts, unit: str | None, why
     assumed = [column.factor] if column.counted and stated is None else []
     if unit is None:
         unit = _plausible(model, signal, column, signal_units(model)[signal])
-        behind = UNKNOWN_UNIT.search(column.name)
-        lacks = "the file states no unit" if behind is None else f"its unit {behind[1]!r} is not known"
-        assumed = [f"{lacks}, {unit} is assumed", *assumed]
+        assumed = [f"{unit_lacks(column.name)}, {unit} is assumed", *assumed]
+    elif answers.unit(signal, column.name, column.bare) is None and (formula := formula_of(column.name)):
+        assumed = [f"{formula}: write what one of them is", *assumed]
     why = [*why, f"{'; '.join(assumed)}: {_range(column)} {unit}"] if assumed else why
     return Match(signal, column.name, unit, not assumed, tuple(why), scale)
 

@@ -6,7 +6,7 @@ import re
 
 COMMAND_WORDS = frozenset((
     "command", "commanded", "cmd", "ref", "reference", "set", "setpoint", "sp", "target", "demand", "desired", "soll",
-    "sollwert", "rpos", "apos",
+    "sollwert", "rpos", "apos", "tpos", "pcmd", "vcmd", "des", "nominal", "consigne", "f\u00fchrungsgr\u00f6\u00dfe",
 ))  # fmt: skip
 """Of columns that nobody measured: they stand at their limits because they are told to."""
 DRIVE_WORDS = COMMAND_WORDS | frozenset((
@@ -16,7 +16,8 @@ DRIVE_WORDS = COMMAND_WORDS | frozenset((
 READING_WORDS = frozenset((
     "reading", "read", "position", "pos", "actual", "act", "ist", "istwert", "fpos", "fb", "feedback", "sensor", "measured", "meas", "mess",
     "measurement", "enc", "encoder", "cap", "capacitive", "adc", "ai", "ad", "displacement", "disp", "distance", "dist", "weg",
-    "y", "response", "interferometer", "lvdt", "laser", "probe", "gauge",
+    "y", "response", "interferometer", "lvdt", "laser", "probe", "gauge", "epos", "pfbk", "fbk", "mesure", "observed",
+    "regelgr\u00f6\u00dfe",
 ))  # fmt: skip
 ERROR_WORDS = frozenset(
     ("error", "err", "pe", "deviation", "residual", "abweichung", "regelabweichung", "regeldifferenz")
