@@ -172,7 +172,7 @@ def test_a_short_row_is_refused_and_a_last_one_that_was_cut_is_left_out(written)
     table = written("t,u,x\n0,1,2\n1,2,3\n2,3,4\n3,4")
     assert (
         table.numbers("x").tolist() == [2, 3, 4]
-        and "line 5, the last, ends before its last cell; left out" in table.notes
+        and "line 5, the last, ends before its last cell does; left out" in table.notes
     )
 
 

@@ -12,11 +12,12 @@ from ctrlgen.recordings.formats.layout_question import Ambiguous
 
 HUGE = 9e29  # no reading in any unit: SCPI says 9.9e37 and 9.91e37, others 1e30, 1e31, 1e38, the largest float and infinity
 COUNTS = (-9999, 9999, -99999, 99999, -999, -9999.99, 99999.9, 999999, -999999, 9999999, -32768, 32767, 65535, -2147483648, 2147483647,
-          4294967295, 8388607, -8388608, 16777215, -999.25, -1e10, 1e10, -1e20, 1e20)  # fmt: skip
+          4294967295, 8388607, -8388608, 16777215, -999.25, -99.9, -999.9,
+          *(sign * 10.0**n for n in (6, 7, 8, 9, 10, 12, 15, 20) for sign in (1, -1)))  # fmt: skip
 """Numbers that loggers and converters write for none; some are readings, so they count only where they are far from all else."""
 LIMITS = frozenset(f"{2**bits - end}" for bits in (15, 16, 23, 24, 31, 32) for end in (0, 1))
 """Digits of the ends of a converter's counts: times a power of ten, as a logger writes them in a unit, they are marks as well."""
-NINES = re.compile(r"-?9+\.?9*")
+NINES = re.compile(r"-?(?:9+\.?9*|9{4,}0+)")
 FEWEST_NINES = 4  # of a number that fills the display of a sensor: 99.99
 NEAR = 0.25  # spans: one of `COUNTS` that repeats and stands between this and `FAR` beyond all others may be either, and is asked
 FAR = 10.0  # spans of all other readings between them and one of `COUNTS`: no motion leaves its range so far and returns at once
@@ -55,11 +56,16 @@ def without_marks(
         if spans > FAR:
             kept = _left_out(kept, chosen, "far from all others: a mark for none", marks)
         elif spans > NEAR and np.sum(chosen) > 1:
-            told = (
-                f"holds {number:g} {np.sum(chosen)} times, beyond all its other numbers: a reading, or a mark for none?"
-            )
-            raise Ambiguous(told, {f"missing = [{number:g}]": "if it is a mark", "missing = []": "if it is a reading"})
+            raise mark_or_reading(number, int(np.sum(chosen)), "beyond all its other numbers")
     return kept, marks
+
+
+def mark_or_reading(
+    number: float, times: int, how: str = "written without the digits of all its other numbers"
+) -> Ambiguous:
+    """The question whether a number is a mark for none."""
+    told = f"holds {number:g} {times} times, {how}: a reading, or a mark for none?"
+    return Ambiguous(told, {f"missing = [{number:g}]": "if it is a mark", "missing = []": "if it is a reading"})
 
 
 def _full_displays(values: np.ndarray) -> list[float]:

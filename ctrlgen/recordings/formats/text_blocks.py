@@ -17,6 +17,9 @@ from ctrlgen.recordings.formats.text_cells import cells_of, is_comment, width_of
 
 FEWEST_ROWS = 2  # of a table among other text
 FOOTED = 20  # rows before a footer that must begin with a number
+ALIKE = 30  # last rows whose last numbers have as many digits behind the point, or in the exponent, as all are written
+LAST_DIGITS = re.compile(r"(?:[.,]|[eEdD][+-]?)\d+$", re.ASCII)
+BEGUN = re.compile(r"[+-]?\d*(?:[.,]\d*)?(?:[eEdD][+-]?\d*)?(?<=.)", re.ASCII)
 MOST_LISTED = 5  # bad lines that a message lists
 STRICT = re.compile(
     r"(?:[\s\d.,;:|+\-\u2212/'\"]++|(?<=[\d.])[eEdD](?=[+\-\d])|(?<=\d)T(?=\d)|(?<=\d)Z(?![A-Za-z\d]))++"
@@ -132,7 +135,8 @@ def _block(lines: Sequence[str], run: list[int], above: list[int], separator: st
     run, below = _without_footer(lines, run, separator)
     widths = [width_of(lines[k], separator) for k in run]
     width = Counter(widths).most_common(1)[0][0]
-    cut = run[-1] if widths[-1] < width and run[-1] == len(lines) - 1 and len(run) > FEWEST_ROWS else None
+    ends = run[-1] == len(lines) - 1 and len(run) > FEWEST_ROWS
+    cut = run[-1] if ends and (widths[-1] < width or _ends_early([lines[k] for k in run], separator)) else None
     if cut is not None:
         run, widths = run[:-1], widths[:-1]
     usual = [k for k, w in zip(run, widths, strict=True) if w == width]
@@ -156,6 +160,19 @@ def _block(lines: Sequence[str], run: list[int], above: list[int], separator: st
         mend = "(for one) with the line of the names, if these stand above the table, or repair them"
         raise Ambiguous(f"line {usual[0] + 1} has {number_of(width, 'cell')}, but {listed}", {"header = 5": mend})
     return Block(tuple(run), width, max(widths), tuple(above), cut, below)
+
+
+def _ends_early(rows: Sequence[str], separator: str) -> bool:
+    """Whether the last number of a file that ends without an end of its line has fewer digits than every one above it, all of which are
+    written alike: it was not written to its end."""
+    *above, last = (cells_of(row, separator)[-1] for row in rows[-ALIKE:])
+    tails = [LAST_DIGITS.search(cell) for cell in above]
+    if len(above) < ALIKE - 1 or not all(tails) or len({match[0][0] + str(len(match[0])) for match in tails if match}) > 1:
+        return False
+    usual, tail = tails[0], LAST_DIGITS.search(last)
+    assert usual is not None  # all of them are
+    shorter = tail is None or tail[0][0].lower() != usual[0][0].lower() or len(tail[0]) < len(usual[0])
+    return shorter and BEGUN.fullmatch(last) is not None
 
 
 def _without_footer(lines: Sequence[str], run: list[int], separator: str) -> tuple[list[int], tuple[int, ...]]:

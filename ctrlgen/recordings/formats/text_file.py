@@ -21,6 +21,7 @@ from ctrlgen.recordings.formats.layout_question import Ambiguous, AmbiguousFile
 from ctrlgen.recordings.formats.measurement_table import Clock, MeasurementTable
 from ctrlgen.recordings.formats.named_lines import named_table
 from ctrlgen.recordings.formats.number_cells import TIME, NumberStyle
+from ctrlgen.recordings.formats.odd_writing import odd_number
 from ctrlgen.recordings.formats.pages import joined
 from ctrlgen.recordings.formats.rows_of_signals import lies_on_its_side, on_its_side
 from ctrlgen.recordings.formats.run_together import parted
@@ -141,7 +142,15 @@ def _table(
     beside = units_beside(names, texts, set(range(len(columns))) - set(units))
     units |= {k: next(cell for cell in texts[j] if cell) for k, j in beside.items()}
     unique = _unique(names)
-    cut = [f"line {block.cut + 1}, the last, ends before its last cell; left out"] if block.cut is not None else []
+    doubtful = {
+        unique[k]: number
+        for k, column in enumerate(columns)
+        if layout.missing is None
+        and k not in prefixes
+        and (number := odd_number(column, cells[k], lambda row, k=k: cells_of(lines[rows[row]], separator)[k]))
+        is not None
+    }
+    cut = [f"line {block.cut + 1}, the last, ends before its last cell does; left out"] if block.cut is not None else []
     cut += _between(lines, rows)
     cut += [f"line {k + 1}, below the table, is no row of it; left out" for k in block.below]
     times = header.times or _times_of(names, columns)
@@ -169,6 +178,7 @@ def _table(
         own_times={unique[k]: unique[time] for k, time in own.items()},
         style=style,
         missing=layout.missing,
+        doubtful=doubtful,
         stated_rate=stated_rate([*(lines[k] for k in block.above), *_entries(lines, block, separator)], style.decimal),
     )
 
