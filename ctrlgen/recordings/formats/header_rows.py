@@ -121,6 +121,32 @@ def _roles(rows: Sequence[list[str]], numeric: Collection[int]) -> tuple[int, in
     return (min(units + 1, last) if units is not None and rate_of_each else 0), units
 
 
+def without_labelled_numbers(
+    candidates: Sequence[tuple[int, list[str]]],
+) -> tuple[list[tuple[int, list[str]]], list[tuple[int, list[str]]]]:
+    """Rows above a table without those of a word and numbers alone, such as factors or the largest readings, where another holds names; and
+    these, as lines from 1."""
+    labelled = [
+        bool(cells[0]) and not is_reading(cells[0]) and not TIME_NAME.match(cells[0]) for _, cells in candidates
+    ]
+    numbers = [
+        has and len(filled := [c for c in cells[1:] if c]) > 0 and all(map(is_number, filled))
+        for has, (_, cells) in zip(labelled, candidates, strict=True)
+    ]
+    if not any(numbers) or not any(
+        all(cells[1:]) and not any(map(is_number, cells)) and not is_unit_row(cells) for _, cells in candidates
+    ):
+        return list(candidates), []
+    rows = list(zip(numbers, candidates, strict=True))
+    return [row for drop, row in rows if not drop], [(k + 1, cells) for drop, (k, cells) in rows if drop]
+
+
+def told_of(rows: Sequence[tuple[int, list[str]]], header: int) -> list[str]:
+    """Notes of rows of labelled numbers: (number of the line, cells), nearest first, of those that are factors or stand below the line
+    `header` from 0."""
+    return _passed([(line, cells) for line, cells in rows if of_factors(cells) or line > header + 1])
+
+
 def _passed(rows: Sequence[tuple[int, list[str]]]) -> list[str]:
     """What is told of lines between the table and its names and units: (number, cells), nearest first."""
     told = [

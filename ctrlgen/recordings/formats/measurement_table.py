@@ -53,6 +53,7 @@ class MeasurementTable:
     `style`: how numbers are written as text. `missing`: numbers and texts that the reader says are no reading,
     None where nothing is said. `stated_rate`: words of the file that state how often rows were read, and the rate [Hz].
     `doubtful`: numbers of columns that are written otherwise than all others there, and may be marks.
+    `factors`: what the file says of a column by a factor or an offset that nobody applied.
     `scales`: factors that stand beside columns of whole numbers, which lack them.
     """
 
@@ -71,6 +72,7 @@ class MeasurementTable:
     stated_rate: tuple[str, float] | None = None
     scales: Mapping[str, float] = field(default_factory=dict)
     doubtful: Mapping[str, float] = field(default_factory=dict)
+    factors: Mapping[str, str] = field(default_factory=dict)
 
     def find(self, wanted: str | int) -> str:
         """The full name of a column that is given by name, by number from 0, without its unit, or without its group.
@@ -135,8 +137,8 @@ class MeasurementTable:
             values, marks = over_range.without_marks(np.asarray(column, dtype=float), self.missing)
         except Ambiguous as error:
             raise AmbiguousFile(self.path, error.of_column(name)) from None
-        if (times := int(np.sum(values == self.doubtful.get(name)))) > 0:
-            raise AmbiguousFile(self.path, over_range.mark_or_reading(self.doubtful[name], times).of_column(name))
+        if (found := int(np.sum(values == self.doubtful.get(name, np.nan)))) > 0:
+            raise AmbiguousFile(self.path, over_range.mark_or_reading(self.doubtful[name], found).of_column(name))
         notes += [
             f"{name}: {number_of(m.readings, 'reading is', 'readings are')} {m.text} ({self._first(m.row)}), {m.meaning}; left out"
             for m in marks

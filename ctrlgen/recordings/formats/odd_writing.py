@@ -12,7 +12,9 @@ FEWEST = 20  # numbers written alike, from which another way to write is odd
 LONGEST = 3  # rows in which a mark stands at once: what stands longer is a rest
 SHARE = 0.2  # of the rows that marks may be
 ROUND = 1e-20  # a mark of 1e-30 is no whole number, and no reading
-APART = 0.1  # of the range of all others: a reading does not jump so far and back, and a motion through zero goes by steps
+APART = (
+    0.1  # of the range of all others: a reading does not jump so far and back, and a motion through zero goes by steps
+)
 
 
 def odd_number(values: np.ndarray, sample: Sequence[str], written: Callable[[int], str]) -> float | None:

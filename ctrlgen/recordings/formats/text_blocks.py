@@ -167,7 +167,11 @@ def _ends_early(rows: Sequence[str], separator: str) -> bool:
     written alike: it was not written to its end."""
     *above, last = (cells_of(row, separator)[-1] for row in rows[-ALIKE:])
     tails = [LAST_DIGITS.search(cell) for cell in above]
-    if len(above) < ALIKE - 1 or not all(tails) or len({match[0][0] + str(len(match[0])) for match in tails if match}) > 1:
+    if (
+        len(above) < ALIKE - 1
+        or not all(tails)
+        or len({match[0][0] + str(len(match[0])) for match in tails if match}) > 1
+    ):
         return False
     usual, tail = tails[0], LAST_DIGITS.search(last)
     assert usual is not None  # all of them are

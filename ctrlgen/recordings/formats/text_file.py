@@ -25,6 +25,7 @@ from ctrlgen.recordings.formats.odd_writing import odd_number
 from ctrlgen.recordings.formats.pages import joined
 from ctrlgen.recordings.formats.rows_of_signals import lies_on_its_side, on_its_side
 from ctrlgen.recordings.formats.run_together import parted
+from ctrlgen.recordings.formats.stated_factors import factors_of_columns, factors_said
 from ctrlgen.recordings.formats.stated_rate import stated_rate
 from ctrlgen.recordings.formats.text_blocks import MOST_LISTED, Block, blocks_of, kind_of
 from ctrlgen.recordings.formats.text_cells import cells_of, is_comment, separator_of, stray_quotes, whole_lines
@@ -122,6 +123,8 @@ def _table(
 ) -> MeasurementTable:
     header = header_of(lines, block, separator, layout)
     rows = [*header.more_rows, *block.rows][header.in_first_row :]
+    begun = rows[:1] if _are_dates(cells_of(lines[rows[0]], separator), cells_of(lines[rows[-1]], separator)) else []
+    rows = rows[len(begun) :]
     sample = [cells_of(lines[k], separator) for k in rows[: STYLED // 10] + rows[:: max(1, len(rows) // STYLED)]]
     cells = [[row[i] for row in sample if i < len(row)] for i in range(block.width)]
     style, notes = number_cells.style_of(cells, layout, separator)
@@ -147,10 +150,10 @@ def _table(
         for k, column in enumerate(columns)
         if layout.missing is None
         and k not in prefixes
-        and (number := odd_number(column, cells[k], lambda row, k=k: cells_of(lines[rows[row]], separator)[k]))
-        is not None
+        and (number := odd_number(column, cells[k], _Cells(lines, rows, separator, k))) is not None
     }
     cut = [f"line {block.cut + 1}, the last, ends before its last cell does; left out"] if block.cut is not None else []
+    cut += [f"line {k + 1} holds the dates at which columns of numbers begin; left out" for k in begun]
     cut += _between(lines, rows)
     cut += [f"line {k + 1}, below the table, is no row of it; left out" for k in block.below]
     times = header.times or _times_of(names, columns)
@@ -165,6 +168,7 @@ def _table(
         (
             *said,
             *header.notes,
+            *factors_said(lines, block, separator),
             *notes,
             *(f"{unique[k]}: its cells end in {unit}, its unit" for k, unit in of_cells.items()),
             *(f"{unique[k]}: its cells end in {', '.join(p)}, read as prefixes of SI" for k, p in prefixes.items()),
@@ -179,8 +183,15 @@ def _table(
         style=style,
         missing=layout.missing,
         doubtful=doubtful,
+        factors={unique[k]: said for k, said in factors_of_columns(lines, block, separator, style.decimal).items()},
         stated_rate=stated_rate([*(lines[k] for k in block.above), *_entries(lines, block, separator)], style.decimal),
     )
+
+
+def _are_dates(first: Sequence[str], last: Sequence[str]) -> bool:
+    """Whether a first row holds one date in every column, and the last one numbers: when each channel began, as DIAdem writes it."""
+    alike = len(set(first)) == 1 < len(first) and re.match(number_cells.DATE, first[0], re.ASCII) is not None
+    return alike and bool(TIME.fullmatch(first[0])) and all(map(number_cells.is_number, filter(None, last)))
 
 
 def _entries(lines: Sequence[str], block: Block, separator: str) -> list[str]:
@@ -261,6 +272,16 @@ def _clocks(times: dict[int, int], columns: list[np.ndarray], sample_times: dict
         own = own[np.isfinite(own)]
         clocks[k] = Clock(float(step * own[0] / (own[1] - own[0])) if len(own) > 1 and own[1] > own[0] else 0.0, step)
     return clocks
+
+
+class _Cells:
+    """The cells of one column as they are written, by row."""
+
+    def __init__(self, lines: Sequence[str], rows: Sequence[int], separator: str, column: int) -> None:
+        self.lines, self.rows, self.separator, self.column = lines, rows, separator, column
+
+    def __call__(self, row: int) -> str:
+        return cells_of(self.lines[self.rows[row]], self.separator)[self.column]
 
 
 class _Lines(Sequence[int]):

@@ -14,8 +14,10 @@ from ctrlgen.recordings.formats.header_rows import (
     Header,
     names_and_units,
     of_factors,
+    told_of,
     units_behind,
     with_units,
+    without_labelled_numbers,
 )
 from ctrlgen.recordings.formats.layout_question import Ambiguous
 from ctrlgen.recordings.formats.number_cells import is_number, is_reading
@@ -54,20 +56,21 @@ def header_of(lines: Sequence[str], block: Block, separator: str, layout: Layout
     if pairs := paired(candidates):
         return replace(pairs, more_rows=own)
     plain = [(k, cells) for k, cells in candidates if not is_comment(lines[k])]
+    plain, numbers = without_labelled_numbers(plain)
     nameless = plain and all(is_unit_row(cells) for _, cells in plain)  # and the names stand in a remark
     header = names_and_units(candidates if nameless else plain or candidates, _numeric(lines, block, separator))
     if not header.names:
         header = _numbered(lines, block, separator) or _short(lines, block, separator)
-    notes = header.notes
+    notes = (*header.notes, *told_of(numbers, plain[0][0] if plain else 0))
     names = header.names or ("",) * block.width
     return Header(names, header.units, own, notes, sample_times, {}, header.in_first_row)
 
 
 def _is_entry(cells: Sequence[str]) -> bool:
-    """Whether two cells are a key and what it says, as `Date:, 05 MAR 2024`, or what a program prints before a matrix, `data =`, and no
-    names of two columns."""
+    """Whether cells are a key and what it says, as `Date:, 05 MAR 2024`, or what a program prints before a matrix, `data =`, or
+    the formulas of Origin, `F(x)=`, and no names of columns."""
     label = cells[0].removesuffix(":").strip().lower()
-    return (len(cells) > 1 and cells[1] == "=") or (
+    return (len(cells) > 1 and (cells[1] == "=" or cells[0].endswith("="))) or (
         len(cells) == 2
         and cells[0].endswith(":")
         and not cells[1].endswith(":")

@@ -60,7 +60,7 @@ class ColumnFacts:
     """One column: `unit` as the file states it or its name ends, None where neither does; `values` (n,) in it, NaN where there is no
     number, None where the column is text or cannot be read before its `question` is answered; `notes`: what was interpreted; `scale`: of
     the file's numbers to `unit`, where it states a multiple of a unit, or `counted`: a factor beside whole numbers, which lack it;
-    `unread`: why the cells of a column of text are no numbers."""
+    `unread`: why the cells of a column of text are no numbers; `factor_said`: what the file says of it by a factor that is not applied."""
 
     name: str
     unit: str | None
@@ -70,6 +70,7 @@ class ColumnFacts:
     scale: float = 1.0
     unread: str = ""
     counted: bool = False
+    factor_said: str = ""
 
     @property
     def bare(self) -> str:
@@ -229,7 +230,8 @@ def _facts(table: MeasurementTable, name: str) -> ColumnFacts:
     except InputError as error:  # it holds text
         return ColumnFacts(name, unit, None, scale=scale, unread="; ".join(fault.what for fault in error.faults))
     values = read.values if scale == 1 else scale * read.values
-    return ColumnFacts(name, unit, values, read.notes, scale=scale, counted=counted)
+    said = table.factors.get(name, "")
+    return ColumnFacts(name, unit, values, read.notes, scale=scale, counted=counted, factor_said=said)
 
 
 def _suffix(name: str) -> str | None:

@@ -249,8 +249,10 @@ def _match(model: Model, signal: str, column: ColumnFacts, unit: str | None, why
     if unit is None:
         unit = _plausible(model, signal, column, signal_units(model)[signal])
         assumed = [f"{unit_lacks(column.name)}, {unit} is assumed", *assumed]
-    elif answers.unit(signal, column.name, column.bare) is None and (formula := formula_of(column.name)):
-        assumed = [f"{formula}: write what one of them is", *assumed]
+    elif answers.unit(signal, column.name, column.bare) is None:
+        factor = f"{column.factor_said}, which is not applied" if column.factor_said else ""
+        said = "; ".join(filter(None, (formula_of(column.name), factor)))
+        assumed = [f"{said}: write what one of them is", *assumed] if said else assumed
     why = [*why, f"{'; '.join(assumed)}: {_range(column)} {unit}"] if assumed else why
     return Match(signal, column.name, unit, not assumed, tuple(why), scale)
 
