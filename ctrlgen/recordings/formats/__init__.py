@@ -73,6 +73,7 @@ FOREIGN = {
     b"<?xml": "is XML, such as a header of DIAdem (.tdm); export it as TDMS or CSV",
 }
 """First bytes of files that no reader here takes, and what to do."""
+ARCHIVES = frozenset((".zip", ".7z", ".rar", ".tar", ".tgz"))
 
 
 def read_table(path: Path, which: int | str | None = None, layout: Layout | None = None) -> MeasurementTable:
@@ -119,6 +120,8 @@ def _module(path: Path) -> str:
 
 
 def _unknown(path: Path) -> str:
+    if path.suffix.lower() in ARCHIVES:
+        return "is an archive; unpack it"
     what = f"has the ending {path.suffix or 'none'!r}, which is no known format"
     return f"{what}; known are {', '.join(READERS)}: export it as one of these"
 

@@ -33,6 +33,14 @@ NAMED = re.compile(
 )
 """One number, or time, and its name."""
 BEFORE = re.compile(rf"^[\s(\[]*(?P<stamp>{STAMP}|\d{{9,19}}(?:\.\d+)?|\d+\.\d{{3,}})(?=[\s)\],;:|]|$)", re.ASCII)
+SYSLOG = re.compile(
+    r"^(?:<\d+>)?(?P<month>[A-Z][a-z]{2}) +(?P<day>\d{1,2}) (?P<clock>\d\d:\d\d:\d\d(?:\.\d+)?)(?=\s)", re.ASCII
+)
+"""A date without its year, as syslog writes it."""
+LEAP = 2000  # the year of a date without one, which may be 29 February; a time before and after New Year's Eve falls
+MONTHS = {
+    "Jan": 1, "Feb": 2, "Mar": 3, "Apr": 4, "May": 5, "Jun": 6, "Jul": 7, "Aug": 8, "Sep": 9, "Oct": 10, "Nov": 11, "Dec": 12,
+}  # fmt: skip
 SINCE_BOOT = re.compile(r"^\s*[EWIDV] \((?P<stamp>\d+)\)(?=\s)")
 """Of the ESP32 and its kin: milliseconds since it was switched on."""
 BEHIND = re.compile(r"\s(?P<stamp>\d{10,19})\s*$", re.ASCII)  # of the line protocol of InfluxDB
@@ -101,7 +109,9 @@ def named_table(path: Path, lines: Sequence[str], notes: Sequence[str], layout: 
 
 def _parsed(place: int, line: str) -> _Line:
     cells, twice, kept, last = dict[str, tuple[str, str]](), False, list[str](), 0
-    before = BEFORE.match(line) or SINCE_BOOT.match(line)
+    logged = SYSLOG.match(line)
+    logged = logged if logged is not None and logged["month"] in MONTHS else None
+    before = BEFORE.match(line) or SINCE_BOOT.match(line) or logged
     for m in NAMED.finditer(line):
         unit = m["unit"] or ""
         if unit and unit_of(unit) is None:
@@ -113,7 +123,11 @@ def _parsed(place: int, line: str) -> _Line:
     behind = BEHIND.search(line, last) if before is None and cells else None
     kept.append(line[last : behind.start() if behind else None])
     rest = "".join(kept)[before.end() if before else 0 :]
-    stamp = (before or behind or {"stamp": ""})["stamp"]
+    stamp = (
+        f"{LEAP}-{MONTHS[logged['month']]:02d}-{int(logged['day']):02d}T{logged['clock']}"
+        if logged is not None
+        else (before or behind or {"stamp": ""})["stamp"]
+    )
     return _Line(place, cells, stamp, " ".join(rest.split()), twice)
 
 

@@ -100,7 +100,10 @@ NO_READING = re.compile(
 )
 """The same within a column of numbers: nothing but signs, as in a display without a reading, and words that are names elsewhere."""
 WHOLE = re.compile(r"[+-]?\d{1,18}", re.ASCII)
-DATE = r"(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}|\d{1,2}[-./ ][A-Z][a-z]{2,8}[-./, ]+\d{4})"
+DATE = (
+    r"(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}|\d{1,2}[-./ ][A-Z](?:[a-z]{2,8}|[A-Z]{2})[-./, ]+\d{4}"
+    r"|\d{1,2}-[A-Z](?:[a-z]{2}|[A-Z]{2})-\d{2}(?!\d))"
+)
 CLOCK = r"(?:\d+ days? )?\d{1,3}:\d{2}(:\d{2})?([.,:;]\d+)?(\s*[AaPp]\.?[Mm]\.?)?"
 ZONES = "(?:UTC|GMT|WES?T|BST|CES?T|MEZ|MESZ|EES?T|[ECMP][SD]T|[JK]ST)"
 TIME = re.compile(

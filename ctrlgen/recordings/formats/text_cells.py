@@ -37,6 +37,7 @@ DRAWN = str.maketrans({**dict.fromkeys("\u2502\u2506\u2551", "|"), **dict.fromke
                        **dict.fromkeys("\u250c\u252c\u2510\u251c\u253c\u2524\u2514\u2534\u2518\u255e\u256a\u2561", "+")})  # fmt: skip
 """Signs of which tables are drawn."""
 ARROW = re.compile(r"^\s*(\d[\d:.,]*)\s*->\s*(?=\S)")  # of Arduino's monitor, behind the time at which a line came in
+STAMPED = re.compile(r"^(\s*\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d),(\d{3})(?=,)", re.ASCII)
 BRACKETS = {("[", "]"), ("(", ")"), ("{", "}")}
 NAMED = {"tab": "\t", "comma": ",", "semicolon": ";"}
 
@@ -79,10 +80,22 @@ def stray_quotes(lines: Sequence[str]) -> list[int]:
     return [k for k, line in enumerate(lines, 1) if '"' in line and line.count('"') % 2]
 
 
+def with_whole_stamps(lines: Sequence[str]) -> list[str]:
+    """Lines of which most begin with a date, a time and thousandths behind a comma, as Python's logging writes them, with a point there,
+    where the names are one fewer than the cells that commas part."""
+    stamped = [k for k, line in enumerate(lines) if STAMPED.match(line)]
+    if len(stamped) < 2 or 2 * len(stamped) <= sum(bool(line.strip()) for line in lines):
+        return list(lines)
+    head = next((lines[k] for k in range(stamped[0] - 1, -1, -1) if lines[k].strip()), "")
+    if head.count(",") != lines[stamped[0]].count(",") - 1:
+        return list(lines)
+    return [STAMPED.sub(r"\1.\2", line) for line in lines]
+
+
 def whole_lines(lines: Sequence[str]) -> list[str]:
     """Lines without what programs add to them: a name that goes on in the next lines of its quotes becomes one line, empty ones keep the
     numbers of the lines below; brackets around every row, the lines that a table is drawn with and the arrow behind a time are left out."""
-    whole = _undrawn(lines)
+    whole = _undrawn(with_whole_stamps(lines))
     stray = [k - 1 for k in stray_quotes(lines)]
     if len(stray) == 2 and stray[1] - stray[0] <= LONGEST_NAME:
         first, last = stray

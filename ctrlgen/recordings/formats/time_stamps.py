@@ -35,6 +35,7 @@ HOURS = re.compile(r"(?<=[T ,;])(\d{1,2}):\d", re.ASCII)
 STAMP = re.compile(rf"({DATE})?[T ,;]*({CLOCK})?\s*(Z|{ZONES}|[+-]\d{{2}}:?\d{{2}})?", re.ASCII)
 BASIC = re.compile(r"^(\d{4})(\d\d)(\d\d)T(\d\d)(\d\d)(\d\d)", re.ASCII)  # ISO 8601 without marks
 THOUSANDTHS = re.compile(r"(\d[T ]\d{1,2}:\d{2}:\d{2})[:;](\d{3})(?!\d)", re.ASCII)  # behind a date; of instruments
+SHORT_YEAR = re.compile(r"^(\d{1,2}-[A-Za-z]{3})-(\d{2})(?!\d)", re.ASCII)  # 28-Feb-25, of Oracle and historians
 ZONE = re.compile(rf"\s+({ZONES})$", re.ASCII)
 EAST = {
     "UTC": 0, "GMT": 0, "WET": 0, "WEST": 1, "BST": 1, "CET": 1, "MEZ": 1, "CEST": 2, "MESZ": 2, "EET": 2, "EEST": 3, "EST": -5, "EDT": -4,
@@ -85,6 +86,7 @@ def _dates(cells: list[str], first: str, dates: str | None) -> Stamps:
     )
     texts = [re.sub(r"(\d),(\d+)", r"\1.\2", re.sub(r"\s+(?=[+-]\d\d)", "", ZONE.sub(_offset, c))) for c in cells]
     notes: tuple[str, ...] = ()
+    texts = [SHORT_YEAR.sub(r"\1-20\2", c) for c in texts]
     if iso:
         texts = [re.sub(r"^(\d{4})[/.](\d{2})[/.](\d{2})[ T]?", r"\1-\2-\3T", c) for c in texts]
         instants = _parsed(texts, "ISO8601")
@@ -190,7 +192,7 @@ def _without_summer_time(stamps: Stamps) -> Stamps:
 def _times_of_day(cells: list[str]) -> Stamps:
     """Hours, minutes and seconds; midnight may pass. Raises ValueError for what is none, or two numbers that may be hours or minutes."""
     values, carried, last, notes = np.full(len(cells), np.nan), 0.0, -np.inf, list[str]()
-    hours = [0] * len(cells)
+    hours, hourless = [0] * len(cells), False
     for k, cell in enumerate(cells):
         if cell.lower() in MISSING:
             continue
@@ -206,6 +208,7 @@ def _times_of_day(cells: list[str]) -> Stamps:
                 f"holds {cell!r}, whose last part is no thousandths of a second; write hours:minutes:seconds.fraction"
             )
         days, first, second, third, fraction, half = match.groups()
+        hourless |= third is None
         if third is None and fraction is None:
             raise ValueError(
                 f"holds {cell!r}, which may be hours and minutes or minutes and seconds; write hours:minutes:seconds"
@@ -222,6 +225,11 @@ def _times_of_day(cells: list[str]) -> Stamps:
         hours[k] = high if third is not None and half is None and days is None else 0
     if not notes and (half_days := half_day_clock.of_whole_days(values, hours)) is not None:
         values, notes = half_days.values, [half_day_clock.told(half_days)]
+    if hourless and np.isfinite(values).all() and np.any(falls := np.diff(values) < 0):
+        usual = float(np.median(np.diff(values)))
+        if np.all(np.abs(np.diff(values)[falls] + HOUR - usual) < EVEN * usual):  # else another run may begin
+            values[1:] += HOUR * np.cumsum(falls)
+            notes.append(f"an hour passes before row {int(np.flatnonzero(falls)[0]) + 1}")
     known = values[np.isfinite(values)]
     begin = float(known[0]) if len(known) else 0.0
     return Stamps(np.round(values - begin, 12), ("time is a time of day; seconds since the first", *notes), begin)
