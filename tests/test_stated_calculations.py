@@ -45,6 +45,11 @@ def test_a_plain_name_states_no_calculation(way):
         assert not formula_of(shown), shown
 
 
+@pytest.mark.parametrize("behind", ["", "_mm", " / mm", " [mm]"])
+def test_a_stroke_parts_a_number_of_a_group_where_names_have_groups(behind):
+    assert formula_of(f"pos/10{behind}") and bool(formula_of(f"pos/10{behind}", grouped=True)) == (behind == " [mm]")
+
+
 def test_units_of_one_dimension_behind_one_name_are_told_apart():
     assert formula_of("x [um] [mm]") and formula_of("z (V) [mV]")
     assert not formula_of("Channel (A) (mV)") and not formula_of("m/s^2") and not formula_of("gauge (axis 1) (um)")

@@ -11,6 +11,7 @@ import numpy as np
 from ctrlgen.core.errors import Fault, InputError
 from ctrlgen.core.units import same_dimension, to_si
 from ctrlgen.recordings.formats.clock_numbers import clock_of
+from ctrlgen.recordings.formats.formula_names import formula_of
 from ctrlgen.recordings.formats.layout_question import Ambiguous, AmbiguousFile
 from ctrlgen.recordings.formats.measurement_table import MeasurementTable
 from ctrlgen.recordings.formats.time_stamps import EPOCHS, TIME_NAME, epoch_unit
@@ -60,7 +61,8 @@ class ColumnFacts:
     """One column: `unit` as the file states it or its name ends, None where neither does; `values` (n,) in it, NaN where there is no
     number, None where the column is text or cannot be read before its `question` is answered; `notes`: what was interpreted; `scale`: of
     the file's numbers to `unit`, where it states a multiple of a unit, or `counted`: a factor beside whole numbers, which lack it;
-    `unread`: why the cells of a column of text are no numbers; `factor_said`: what the file says of it by a factor that is not applied."""
+    `unread`: why the cells of a column of text are no numbers; `factor_said`: what the
+    file says of it by a factor that is not applied, or its name by a calculation."""
 
     name: str
     unit: str | None
@@ -230,7 +232,8 @@ def _facts(table: MeasurementTable, name: str) -> ColumnFacts:
     except InputError as error:  # it holds text
         return ColumnFacts(name, unit, None, scale=scale, unread="; ".join(fault.what for fault in error.faults))
     values = read.values if scale == 1 else scale * read.values
-    said = table.factors.get(name, "")
+    factor = f"{table.factors[name]}, which is not applied" if name in table.factors else ""
+    said = "; ".join(filter(None, (formula_of(name, grouped=not len(table.lines)), factor)))
     return ColumnFacts(name, unit, values, read.notes, scale=scale, counted=counted, factor_said=said)
 
 

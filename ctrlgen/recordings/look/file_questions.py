@@ -13,7 +13,6 @@ from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import InputError
 from ctrlgen.core.units import same_dimension
 from ctrlgen.model.model import Model
-from ctrlgen.recordings.formats.formula_names import formula_of
 from ctrlgen.recordings.formats.number_cells import TIME
 from ctrlgen.recordings.formats.unit_texts import unit_lacks
 from ctrlgen.recordings.look.answers import Answers, layout_option
@@ -111,8 +110,8 @@ def time_questions(facts: TableFacts, answers: Answers) -> list[str]:
         return [f"time is column {name!r}: {assumed}" + (f"; but {says})" if says and not fits else "")]
     if facts.time is not None and not known and not facts.time.stamps:
         name, unit = facts.time.column, facts.time.unit
-        bare = facts.column(name).bare
-        if answers.unit(name, bare) is None and (formula := formula_of(name)):
+        column = facts.column(name)
+        if answers.unit(name, column.bare) is None and (formula := column.factor_said):
             answer = shlex.join(["--unit", f"{name}={unit}"])
             return [
                 f"time is column {name!r}: {formula}: write what one of them is, {facts.time.step:g} s from row to row ({answer})"

@@ -17,7 +17,6 @@ from ctrlgen.core.units import parse, same_dimension, to_si
 from ctrlgen.model.model import Model
 from ctrlgen.recordings.alike_units import size_of
 from ctrlgen.recordings.derived_drives import derived_drives
-from ctrlgen.recordings.formats.formula_names import formula_of
 from ctrlgen.recordings.formats.unit_texts import unit_lacks
 from ctrlgen.recordings.look.answers import NOTHING, Answers, layout_option
 from ctrlgen.recordings.look.column_facts import (
@@ -249,10 +248,8 @@ def _match(model: Model, signal: str, column: ColumnFacts, unit: str | None, why
     if unit is None:
         unit = _plausible(model, signal, column, signal_units(model)[signal])
         assumed = [f"{unit_lacks(column.name)}, {unit} is assumed", *assumed]
-    elif answers.unit(signal, column.name, column.bare) is None:
-        factor = f"{column.factor_said}, which is not applied" if column.factor_said else ""
-        said = "; ".join(filter(None, (formula_of(column.name), factor)))
-        assumed = [f"{said}: write what one of them is", *assumed] if said else assumed
+    elif column.factor_said and answers.unit(signal, column.name, column.bare) is None:
+        assumed = [f"{column.factor_said}: write what one of them is", *assumed]
     why = [*why, f"{'; '.join(assumed)}: {_range(column)} {unit}"] if assumed else why
     return Match(signal, column.name, unit, not assumed, tuple(why), scale)
 
