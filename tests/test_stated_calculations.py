@@ -45,7 +45,7 @@ def test_a_plain_name_states_no_calculation(way):
         assert not formula_of(shown), shown
 
 
-@pytest.mark.parametrize("behind", ["", "_mm", " / mm", " [mm]"])
+@pytest.mark.parametrize("behind", ["", "_mm", "_m", " / mm", " [mm]"])
 def test_a_stroke_parts_a_number_of_a_group_where_names_have_groups(behind):
     assert formula_of(f"pos/10{behind}") and bool(formula_of(f"pos/10{behind}", grouped=True)) == (behind == " [mm]")
 

@@ -21,7 +21,7 @@ FACTORS = (
     re.compile(r"(?<![^\W_])(?P<said>(?:log|log10|log2|ln|lg|exp|sqrt|abs|sin|cos|tan|diff|fft)\s*\()", re.IGNORECASE),
 )
 """A factor behind or in front of what it multiplies, a sign, an inverse, an offset, a power, a function."""
-QUOTIENT = re.compile(rf"[^\s\d](?P<said>\s*/\s*(?!1$)(?=\d)(?:{NUMBER}))$")
+QUOTIENT = re.compile(rf"[^\s\d](?P<said>\s*/\s*(?!1$)(?=\d)(?:{NUMBER}))(?=$|_[A-Za-z]+$)")
 """Division by a number, or a number within a group."""
 
 
