@@ -6,7 +6,7 @@ import re
 
 COMMAND_WORDS = frozenset((
     "command", "commanded", "cmd", "ref", "reference", "set", "setpoint", "sp", "target", "demand", "desired", "soll",
-    "sollwert", "rpos", "apos", "tpos", "pcmd", "vcmd", "des", "nominal", "consigne", "f\u00fchrungsgr\u00f6\u00dfe",
+    "sollwert", "rpos", "apos", "tpos", "pcmd", "des", "nominal", "consigne", "f\u00fchrungsgr\u00f6\u00dfe",
 ))  # fmt: skip
 """Of columns that nobody measured: they stand at their limits because they are told to."""
 DRIVE_WORDS = COMMAND_WORDS | frozenset((
