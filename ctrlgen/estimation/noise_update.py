@@ -14,6 +14,7 @@ from ctrlgen.estimation.noise import (
     autoregression,
     cross_correlation,
     ljung_box,
+    stationary_deviation,
 )
 from ctrlgen.estimation.pose_noise import stated_pose_noise
 from ctrlgen.estimation.quiet_stretches import without_lines
@@ -76,26 +77,38 @@ def update_guessed_noise(fitter: Fitter, fit: Fit) -> Noise:
 
 
 def _of_longest_stretch(fitter: Fitter, fit: Fit, record: Record, i: int) -> tuple[float, np.ndarray, float] | None:
-    """`noise_from_residual` on the longest stretch of channel i whose gaps are short, with straight lines across them."""
+    """`noise_from_residual` on the longest stretch of channel i whose gaps are short, with straight lines across them. A channel that is
+    read in one row of several tells the size of its noise by these rows, and no colour from row to row."""
     y = fitter.predict(fit, record)[:, i]
     good = record.valid[:, i] & np.isfinite(y)
-    stretch = longest_stretch(good)
+    every = usual_spacing(good)
+    stretch = longest_stretch(good, every)
     if stretch is None:
         return None
     a, b = stretch
-    at, rows = a + np.flatnonzero(good[a:b]), np.arange(a, b)
+    at, rows = a + np.flatnonzero(good[a:b]), np.arange(a, b, every)
     residual = np.interp(rows, at, record.observed[at, i] - y[at])
-    highest = 2 * record.band * record.sample_time if record.band else 1.0
-    return noise_from_residual(residual, np.interp(rows, at, y[at]), highest)
+    highest = min(2 * record.band * record.sample_time * every, 1.0) if record.band else 1.0
+    found = noise_from_residual(residual, np.interp(rows, at, y[at]), highest)
+    if found is None or every == 1:
+        return found
+    sd, colour, count = found
+    return stationary_deviation(sd, colour), np.zeros(0), count
 
 
-def longest_stretch(good: np.ndarray) -> tuple[int, int] | None:
-    """The longest half-open range of `good` samples (n,) with no more than `NOISE_UPDATE.bridged` others in a row between; None where
-    none is good."""
+def usual_spacing(good: np.ndarray) -> int:
+    """Rows from one `good` sample (n,) to the next, in most cases; 1 where there are none."""
+    apart = np.diff(np.flatnonzero(good))
+    return int(np.bincount(apart).argmax()) if len(apart) else 1
+
+
+def longest_stretch(good: np.ndarray, every: int = 1) -> tuple[int, int] | None:
+    """The longest half-open range of `good` samples (n,), of which one row in `every` is one, with no more than `NOISE_UPDATE.bridged`
+    missing in a row between; None where none is good."""
     at = np.flatnonzero(good)
     if not len(at):
         return None
-    parts = np.split(at, np.flatnonzero(np.diff(at) > NOISE_UPDATE.bridged + 1) + 1)
+    parts = np.split(at, np.flatnonzero(np.diff(at) > every * (NOISE_UPDATE.bridged + 1)) + 1)
     longest = max(parts, key=lambda part: part[-1] - part[0])
     return int(longest[0]), int(longest[-1]) + 1
 

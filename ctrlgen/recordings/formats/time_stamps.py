@@ -164,12 +164,17 @@ def _instants(instants: np.ndarray, said: str, notes: tuple[str, ...]) -> Stamps
     if not len(known):
         raise ValueError("holds no time at all")
     since = instants - known[0]
-    second = np.timedelta64(10**9, "ns")  # a quotient is rounded once: three seconds are three
-    values = np.where(np.isnat(instants), np.nan, since.astype("timedelta64[ns]") / second)
+    values = np.where(np.isnat(instants), np.nan, _seconds_of(since))
     whole, _, fraction = str(known[0]).partition(".")
     begin = f"{whole}.{fraction.rstrip('0')}".rstrip(".")
-    since_1970 = float((known[0] - np.datetime64(0, "s")) / second)
+    since_1970 = float(_seconds_of(known[:1] - np.datetime64(0, "s"))[0])
     return Stamps(values, (f"{said}; seconds since {begin}", *notes), since_1970)
+
+
+def _seconds_of(spans: np.ndarray) -> np.ndarray:
+    """Spans of time (n,) in seconds: three seconds are three, and the nanoseconds since 1970, which no float holds, are rounded once."""
+    whole, rest = np.divmod(spans.astype("timedelta64[ns]").astype(np.int64), 10**9)
+    return np.asarray(whole + rest / 1e9)
 
 
 def _without_summer_time(stamps: Stamps) -> Stamps:
