@@ -60,7 +60,7 @@ def write_log(log: Log, folder):
         "[[record]]",
         'file = "log.csv"',
         'role = "fit"',
-        *([] if poses else [f'sample_rate = "{1 / log.step:g} Hz"']),
+        *([] if poses else [f'sample_rate = "{1 / log.step:g} Hz"', 'between_samples = "held"']),
     ]
     lines += ["[columns]"]
     lines += [f'"drive.{c}" = {{ column = "u{j}", unit = "{log.drive}" }}' for j, c in enumerate(drives.channels)]

@@ -17,7 +17,7 @@ from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.diagnosis.shares.design import Kind
 from ctrlgen.diagnosis.shares.shares_table import ChannelShares, KindShare, Share
 from ctrlgen.estimation.hypothesis import Hypothesis
-from ctrlgen.recordings.plausibility import Implausible
+from ctrlgen.recordings.implausible_note import Implausible
 
 
 def finding(cause, share: float | None, *alternatives, chance: ChanceEntry | None = None) -> Finding:

@@ -21,7 +21,7 @@ from ctrlgen.diagnosis.report.html_report import page
 from ctrlgen.diagnosis.report.narrative import channel_sentence
 from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry
 from ctrlgen.diagnosis.selection.verdict import Verdict
-from ctrlgen.recordings.plausibility import Implausible
+from ctrlgen.recordings.implausible_note import Implausible
 from ctrlgen.reporting.result_file import json_text
 
 

@@ -9,7 +9,8 @@ from conftest import ROOT
 from ctrlgen.devices import load_device
 from ctrlgen.model.assembly import build_model
 from ctrlgen.recordings.formats.wrapped_counters import wrapped
-from ctrlgen.recordings.plausibility import Implausible, suspected, with_plausibility
+from ctrlgen.recordings.implausible_note import Implausible
+from ctrlgen.recordings.plausibility import suspected, with_plausibility
 from ctrlgen.recordings.reader import load_recordings
 
 

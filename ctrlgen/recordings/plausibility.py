@@ -11,6 +11,7 @@ from ctrlgen.core.counts import number_of
 from ctrlgen.core.errors import Fault
 from ctrlgen.model.model import Model
 from ctrlgen.recordings.alike_units import alike, size_of
+from ctrlgen.recordings.implausible_note import Implausible
 from ctrlgen.recordings.moved import Moved, moved
 from ctrlgen.recordings.plausible_order import column_notes, row_notes, speed_notes
 from ctrlgen.recordings.plausible_rate import dynamics_notes
@@ -28,10 +29,6 @@ RATES = (
     ("position", "velocity"),
     ("velocity", "acceleration"),
 )  # of an imposed motion: each the slope of the one before
-
-
-class Implausible(str):
-    """A note on what cannot be of the device as it is stated, which a reader who refuses the recording tells as the likely reason."""
 
 
 def with_plausibility(recording: Recording, model: Model) -> Recording:

@@ -100,7 +100,7 @@ def thinnable(record: Record, least: int) -> Thinnable:
         return Thinnable(1, "rows are missing, or are not even in time")
     group, first = _held(record)
     tried = factors(len(record.time), least)
-    if record.linear or group == 1:
+    if _in_lines(record) or group == 1:
         return _smooth(record, tried)
     for m in (m for m in tried if group % m == 0):
         if all(_nothing_of_the_drive(record, i, m, first % m) for i in range(record.observed.shape[1])):
@@ -109,6 +109,11 @@ def thinnable(record: Record, least: int) -> Thinnable:
             return Thinnable(m, "", group, first, True)
     why = f"the drives are held over {group} rows, and within them the readings follow"
     return Thinnable(1, why if any(group % m == 0 for m in tried) else f"the drives are held over {group} rows only")
+
+
+def _in_lines(record: Record) -> bool:
+    """Whether the drives are stated to go in straight lines: of others, those that stand still for several rows were held."""
+    return record.linear and not record.either
 
 
 def _held(record: Record) -> tuple[int, int]:
@@ -275,7 +280,7 @@ def thinned(record: Record, m: int, can: Thinnable) -> Record:
         drive=drive,
         observed=np.where(valid, observed, np.nan),
         valid=valid,
-        linear=record.linear if held else True,
+        linear=_in_lines(record) if held else True,
         either=False,  # between rows that are an average of several, straight lines are right
         ambient=None if ambient is None else ambient[: len(rows)],
     )
@@ -299,7 +304,7 @@ def note(record: Record, m: int, rows: int, lost: int) -> str:
 
 
 def _because(record: Record) -> str:
-    return "straight lines between them give the drives" if record.linear else "the drives are held meanwhile"
+    return "straight lines between them give the drives" if _in_lines(record) else "the drives are held meanwhile"
 
 
 def not_thinned(record_name: str, rows: int, why: str) -> str:

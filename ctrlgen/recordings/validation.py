@@ -25,6 +25,7 @@ from ctrlgen.model.model import Model
 from ctrlgen.recordings.after_gaps import Described
 from ctrlgen.recordings.alike_units import unit_within
 from ctrlgen.recordings.gaps import SHORTEST, Gap, rows_between, stretches
+from ctrlgen.recordings.implausible_note import Implausible
 from ctrlgen.recordings.outliers import held_for, outliers, stuck_samples
 from ctrlgen.recordings.recording import Record
 from ctrlgen.recordings.usual_step import BREAK
@@ -244,7 +245,11 @@ def mark(record: Record, kind: str, names: ChannelNames, recorded: np.ndarray) -
             stuck = stuck_samples(y, record.drive)
             if (rows := held_for(y, record.drive)) > 1:
                 what = f"changes in one row of {rows} alone: it was read at a lower rate and held, by up to {rows - 1} rows too late"
-                notes.append(f"{title}: {what}; empty the rows that repeat it, and the others are used.")
+                notes.append(
+                    Implausible(
+                        f"{name} {what}; empty the rows of {record.name} that repeat it, and the others are used"
+                    )
+                )
             marks["in stretches that repeat one value to the last bit (stuck or clipped)"] = stuck
             marks["outliers"] = far = outliers(np.where(stuck, np.nan, y), record.drive)
             spikes += [(k, i, float(y[k] - chord)) for k, chord in _chords(y, far)]

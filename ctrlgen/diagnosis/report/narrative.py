@@ -11,6 +11,7 @@ from ctrlgen.diagnosis.report.history_table import dropped_beside, most_gained, 
 from ctrlgen.diagnosis.report.luck_sentences import luck_steps
 from ctrlgen.diagnosis.report.on_the_clock import used_for_another_run
 from ctrlgen.diagnosis.report.period_words import repeats
+from ctrlgen.diagnosis.report.refused_events import how_confirmed, moment_of
 from ctrlgen.diagnosis.report.smaller_causes import smaller_causes_step
 from ctrlgen.diagnosis.report.time_base import time_base_step
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
@@ -20,7 +21,7 @@ from ctrlgen.diagnosis.selection.not_taken import that_matter
 from ctrlgen.diagnosis.selection.verdict import Verdict
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.hypothesis import PARAMETER
-from ctrlgen.recordings.plausibility import Implausible
+from ctrlgen.recordings.implausible_note import Implausible
 from ctrlgen.reporting.numbers import number, sized
 
 # refusals that are told
@@ -263,8 +264,10 @@ def refusals(diagnosis: Diagnosis) -> list[str]:
         if gained := most_gained(search, refusal.candidate):
             channel, error, now = gained
             better = f"the held-out error of {short(channel)} would be {quantity(error)} instead of {quantity(now)}"
-        names = " and ".join(map(cause_name, refusal.causes)) + dropped_beside(search, refusal)
-        said.append(f"{names}, although {better}: {'; '.join(dict.fromkeys(refusal.reasons))}")
+        causes = (cause_name(c) + moment_of(refusal, c) for c in refusal.causes)
+        names = " and ".join(causes) + dropped_beside(search, refusal)
+        reasons = (*dict.fromkeys(refusal.reasons), *how_confirmed(search.fitter.recording, refusal))
+        said.append(f"{names}, although {better}: {'; '.join(reasons)}")
     return said
 
 
