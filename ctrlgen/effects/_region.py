@@ -73,6 +73,17 @@ def on_stretch(s: LawInputs, p: LawNumbers) -> Expression:
     return plateau(s.displacement - p.position, p.length, _over(s, p))
 
 
+def with_end(numbers: dict[str, float]) -> dict[str, float]:
+    """The numbers of a stretch one end of which is the `edge` of a law that has one end: that which is nearer to it moves there. As given
+    without an edge or a stretch, and where nothing would be left of the stretch."""
+    if not {"edge", "position", "length"} <= numbers.keys():
+        return numbers
+    edge, half = numbers["edge"], numbers["length"] / 2
+    low, high = numbers["position"] - half, numbers["position"] + half
+    low, high = (edge, high) if abs(edge - low) < abs(edge - high) else (low, edge)
+    return numbers | {"position": (low + high) / 2, "length": high - low} if high > low else numbers
+
+
 def plateau(x: Expression, length: Expression, width: Expression) -> Expression:
     """(tanh(2 (x + w/2)/W) - tanh(2 (x - w/2)/W))/2: one on the stretch w about zero, zero elsewhere, changing over W at both ends."""
     return (ca.tanh(2 * (x + length / 2) / width) - ca.tanh(2 * (x - length / 2) / width)) / 2

@@ -2,7 +2,7 @@
 
 from ctrlgen.effects import ActsIn, Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, Side, itself
 from ctrlgen.effects._bristles import CONTACT, CREEPS, RegionalFriction
-from ctrlgen.effects._region import STRETCH, on_stretch
+from ctrlgen.effects._region import STRETCH, on_stretch, with_end
 
 ENDS = itself("position", "length", "width")
 
@@ -15,6 +15,7 @@ class CoulombOnStretch(RegionalFriction):
     params = (*CONTACT, *STRETCH)
     at_bounds = CREEPS | ENDS
     acts_in = ActsIn("position", "position", Side.AROUND, "length", "width")
+    from_plainer = staticmethod(with_end)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.force * s.states.z * on_stretch(s, p)
@@ -32,6 +33,7 @@ class ViscousOnStretch(Effect):
     params = (Param("damping", "channel*s/travel", (0.0, 100.0), "c: damping on the stretch", off=0.0), *STRETCH)
     at_bounds = ENDS
     acts_in = ActsIn("position", "position", Side.AROUND, "length", "width")
+    from_plainer = staticmethod(with_end)
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return -p.damping * s.velocity * on_stretch(s, p)

@@ -124,8 +124,8 @@ class Hypothesis:
 
     @property
     def finer(self) -> tuple[Hypothesis, ...]:
-        """The finer forms of its law, at the same place."""
-        kinds = (kind for kind, law in sorted(laws().items()) if self.effect in prior_of(law).refines)
+        """The finer forms of its law, and those that may stand in its place, there."""
+        kinds = (kind for kind, law in sorted(laws().items()) if self.effect in prior_of(law).replaces)
         return tuple(replace(self, effect=kind) for kind in kinds)
 
     @property

@@ -85,6 +85,7 @@ class LawPrior:
     form_of: name of the physics of which laws are forms, finer than their `Effect.family`; a place has at most one form of it.
     refines: the plainer laws of which this is a finer form, with more numbers. It is never suspected itself, but tried in the place of
         one of them that is among the causes, where that leaves more than noise.
+    in_place_of: laws of which it is no form, that are nearly the same: it is tried in their place where more than noise is left with them.
     unless: what a device must not have (words of `Effect.requires`) for the law to be suspected there: another law says the same.
     suspected: False for what a device file may state, and no recording shows beside what else it shows.
     in_a_region: the law is another one in a part of the motion: it is tried beside the others and never takes their turn.
@@ -111,6 +112,7 @@ class LawPrior:
     model_form_error: float = 0.0
     form_of: str | None = None
     refines: frozenset[str] = frozenset()
+    in_place_of: frozenset[str] = frozenset()
     unless: frozenset[str] = frozenset()
     suspected: bool = True
     in_a_region: bool = False
@@ -130,6 +132,11 @@ class LawPrior:
         """Raises TypeError for what a law of another package states in another form than this."""
         if wrong := [name for name, value in self.parameters.items() if not isinstance(value, ParameterPrior)]:
             raise TypeError(f"{wrong[0]} must be stated as a {ParameterPrior.__name__}")
+
+    @property
+    def replaces(self) -> frozenset[str]:
+        """The laws in whose place it is tried where more than noise is left with them."""
+        return self.refines | self.in_place_of
 
     @property
     def is_pitch(self) -> bool:

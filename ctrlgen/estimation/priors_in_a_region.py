@@ -60,7 +60,11 @@ _FRICTIONS = {
     "coulomb_above": _friction(_edge("edges_above"), ONE_IN_TEN),
     "coulomb_below": _friction(_edge("edges_below"), ONE_IN_TEN),
     "coulomb_after": _friction(_FROM_A_MOMENT, ONE_IN_A_HUNDRED),
-    "coulomb_on_stretch": replace(_friction(_stretch(), ONE_IN_TEN), model_form_error=_TWO_ENDS),
+    "coulomb_on_stretch": replace(
+        _friction(_stretch(), ONE_IN_TEN),
+        model_form_error=_TWO_ENDS,
+        in_place_of=frozenset({"coulomb_above", "coulomb_below"}),
+    ),
 }
 
 
@@ -90,6 +94,8 @@ IN_A_REGION: Mapping[str, LawPrior] = {
     "temperature_sensitivity_above": _law(reference=_seen("warmer")),
     "viscous_above": _law(**_edge("edges_above")),
     "viscous_below": _law(**_edge("edges_below")),
-    "viscous_on_stretch": replace(_law(**_stretch()), model_form_error=_TWO_ENDS),
+    "viscous_on_stretch": replace(
+        _law(**_stretch()), model_form_error=_TWO_ENDS, in_place_of=frozenset({"viscous_above", "viscous_below"})
+    ),
     "viscous_at_speed": _law(speed=_seen("speeds")),
 }

@@ -10,12 +10,13 @@ from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import SEARCH
 from ctrlgen.estimation.hypothesis import DataHints, Hypothesis, nominal_physics
 from ctrlgen.estimation.settings import FIT
+from ctrlgen.estimation.structure import Structure
 from ctrlgen.model.effect_terms import available
 
 
 def finer_forms(trials: Trials, current: CandidateModel) -> tuple[CandidateModel, ...]:
-    """`current` with a finer form of one of its laws in that one's place, for each that has one, where more than noise is left, or where
-    what is left alone tells the noise."""
+    """`current` with a finer form of one of its laws in that one's place, or with a law that is suspected too and nearly the same
+    (`LawPrior.in_place_of`), for each that has one, where more than noise is left, or where what is left alone tells the noise."""
     if current.errors.is_noise and trials.fitter.noise.known.all():
         return ()
 
@@ -27,25 +28,38 @@ def finer_forms(trials: Trials, current: CandidateModel) -> tuple[CandidateModel
         def begun(shape: dict[str, float]) -> dict[str, float]:
             return {name: v for name, v in finer.law.from_plainer(values | shape).items() if name in names}
 
-        shapes = finer.shapes(finer.channel_on(others.device), peaks(finer), begun({}))
-        starts = [others.with_cause(finer, shape | begun(shape)) for shape in shapes]
         try:
+            shapes = finer.shapes(finer.channel_on(others.device), hints(branch, finer, others), begun({}))
+            starts = [others.with_cause(finer, shape | begun(shape)) for shape in shapes]
             starts = sorted(starts, key=branch.fitter.rough_objective)[: SEARCH.restarts] if len(starts) > 1 else starts
         except FAILURES as error:
             branch.note_failure(finer, error)
+            return []
+        if not starts:
             return []
         # a finer form that leaves more than the plain one is none
         fitted = branch.tried(starts[0], finer, steps=FIT.max_steps, enough=current.fit.objective)
         return [branch.begun_better(t, starts[1:]) for t in fitted]
 
-    def peaks(finer: Hypothesis) -> DataHints:
+    def hints(branch: Trials, finer: Hypothesis, others: Structure) -> DataHints:
         where = (finer.law.place, finer.acts_on(device)[0])
+        if finer.prior.in_place_of:  # another law, of what is left without this one
+            return branch.screen.data_hints(branch.fitter.fit(others, steps=SEARCH.candidate_steps))(*where)
         return DataHints((trials.screen.peaks or {}).get(where, {}))
 
     device = current.fit.restarted.device
-    forms = [(k, finer) for k, cause in enumerate(current.causes) for finer in cause.finer if can_have(device, finer)]
+    forms = [
+        (k, finer)
+        for k, cause in enumerate(current.causes)
+        for finer in cause.finer
+        if can_have(device, finer) and (finer.prior.refines or _is_suspected(trials, finer))
+    ]
     fits = trials.each(one, forms, lambda form: f"{trying(form[1])} instead")
     return tuple(t for fitted in fits for t in fitted)
+
+
+def _is_suspected(trials: Trials, law: Hypothesis) -> bool:
+    return any((h.effect, h.location) == (law.effect, law.location) for h in trials.screen.hypotheses)
 
 
 def can_have(device: Device, finer: Hypothesis) -> bool:
