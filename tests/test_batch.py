@@ -241,7 +241,7 @@ def test_the_command_prints_and_keeps_the_intervals(jobs, tmp_path, monkeypatch,
     monkeypatch.setattr(sys, "argv", command)
     assert execute() == 0
     printed = capsys.readouterr().out
-    assert "20 replicates" in printed and "effect[0].gain" in printed and "vanished in 0%" in printed
+    assert "20 replicates" in printed and "effect[0].gain" in printed and "vanished in 0 %" in printed
     found = json.loads((tmp_path / "out" / "bootstrap.json").read_text())
     low, high = found["values"]["effect[0].gain"]["ci95"]
     assert found["replicates"] == 20 and low < 1e-3 < high

@@ -64,7 +64,7 @@ def test_a_column_of_another_unit_is_no_agreement(clean, unit):
     found = ctrlgen.diagnose(AXIS_FILE, clean)
     first, _, answered = sentence(found).partition(" Unexplained: ")
     assert found.verdict == Verdict.UNEXPLAINED and answered
-    assert first.startswith("Check this first: reading.axis is ") and 'write unit = "nm"' in first
+    assert first.startswith("Check this first: reading.axis is ") and 'write unit = "nm"' in found.notes[0]
     assert "units" in " ".join(next_steps(found))
 
 
