@@ -307,7 +307,7 @@ def test_the_page_shows_whatever_evidence_there_is(found):
     )
     text = page(told, Provenance({}, 0))
     assert text.count("<figure>") == 10
-    for words in ("more below 1 Hz", "slow multisine", "added creep", "nm/s", "position explains 80%"):
+    for words in ("more below 1 Hz", "slow multisine", "added creep", "nm/s", "position explains 80 %"):
         assert words in text
 
 
