@@ -131,6 +131,18 @@ def test_what_is_stated_stands():
     assert told_of_reading(given, plain) == []
 
 
+@pytest.mark.parametrize("linear", [True, False])
+def test_a_held_out_drive_that_is_not_stated_goes_as_those_to_fit(linear):
+    fit, held_out = recorded("held").records
+    given = fitter(replace(recorded("held"), records=(replace(fit, linear=linear, either=False), held_out)))
+    read = as_described_fits(AXIS, given)
+    assert [r.linear for r in read.recording.records] == [linear, linear]
+    plain = read.fit(Structure(AXIS))
+    assert (
+        read_better(read, plain) is read and read_with_less(read, plain) is read and told_of_reading(read, plain) == []
+    )
+
+
 @pytest.mark.parametrize("way", WAYS)
 def test_a_law_by_which_a_reading_is_late_is_weighed_against_it(way):
     """Read as linear a held drive takes a delay; one that is linear does not, and stays."""

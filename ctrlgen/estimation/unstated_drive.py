@@ -31,8 +31,8 @@ TAKEN = (
 
 
 def is_open(recording: Recording) -> bool:
-    """Whether a record is moved of which nobody states how its drive goes on between samples."""
-    return any(r.either and r.role != "rest" for r in recording.records)
+    """Whether there is a record to fit of which nobody states how its drive goes on between samples."""
+    return any(r.either and r.role == "fit" for r in recording.records)
 
 
 def way_of(recording: Recording) -> str:
@@ -51,13 +51,21 @@ def read_as(recording: Recording, way: str) -> Recording:
 
 
 def as_described_fits(device: Device, fitter: Fitter) -> Fitter:
-    """The fitter with such drives read as the device as described fits the readings best; as linear where that makes no difference."""
+    """The fitter with such drives read as the device as described fits the readings best; as linear where that makes no difference, and
+    as those of the records to fit where these are all stated alike."""
     if not is_open(fitter.recording):
-        return fitter
+        return _as_those_to_fit(fitter)
     ways = {way: replace(fitter, recording=read_as(fitter.recording, way)) for way in WAYS}
     left = {way: _left(*described(read, device)) for way, read in ways.items()}
     best = min(WAYS, key=left.__getitem__)
     return ways[best if left[best] < (1 - BETTER) * left[LINEAR] else LINEAR]
+
+
+def _as_those_to_fit(fitter: Fitter) -> Fitter:
+    stated = {r.linear for r in fitter.recording.records if r.role == "fit"}
+    if len(stated) != 1 or not any(r.either for r in fitter.recording.records):
+        return fitter
+    return replace(fitter, recording=read_as(fitter.recording, LINEAR if stated.pop() else HELD))
 
 
 def read_better(fitter: Fitter, fit: Fit) -> Fitter:
@@ -73,14 +81,14 @@ def read_with_less(fitter: Fitter, fit: Fit) -> Fitter:
     that it needs as they are read now; otherwise as it leaves clearly less; as given where none does so."""
     if not is_open(fitter.recording):
         return fitter
-    now = _left(fitter, fit)
-    left, best = min(_left_in_other_ways(fitter, fit.restarted), key=itemgetter(0))
+    now, others = _left(fitter, fit), _left_in_other_ways(fitter, fit.restarted)
+    left, best = min(others, key=itemgetter(0))
+    enough = (1 + SAME) * min(now, left)
+    ways = [other for at_least, other in others if at_least < enough]  # with a law less no less is left
     simpler = []
-    for plain, timed in _with_less(fit.restarted):
-        most = (1 + SAME) * min(now, left)
-        if not timed:
-            most = min(most, (1 - SAME) * _left(fitter, fitter.fit(plain)))
-        simpler += [found for found in _left_in_other_ways(fitter, plain) if found[0] < most]
+    for plain, timed in _with_less(fit.restarted) if ways else ():
+        most = enough if timed else min(enough, (1 - SAME) * _left(fitter, fitter.fit(plain)))
+        simpler += [found for other in ways if (found := (_left(other, other.fit(plain)), other))[0] < most]
     if simpler:
         return min(simpler, key=itemgetter(0))[1]
     return best if left < (1 - SAME) * now else fitter
