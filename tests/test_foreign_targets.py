@@ -53,7 +53,7 @@ ARM = "apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm
 # Fused products where the options let a compiler fuse them are left out by -ffp-contract=off, as in FLAGS
 TARGETS = {
     "no optimisation": Target(("gcc", "-std=c99", "-O0", "-ffp-contract=off")),
-    "all optimisation": Target(("gcc", "-std=gnu11", "-O3", "-march=native", "-flto", "-ffp-contract=off")),
+    "all optimisation": Target(("gcc", "-std=gnu11", "-O3", "-flto", "-ffp-contract=off")),
     "small": Target(("gcc", "-std=c11", "-Os", "-ffp-contract=off", *SECTIONS)),
     "strange": Target(("gcc", *STRICT, *STRANGE)),
     "C23": Target(("gcc", "-std=c2x", "-O2", "-ffp-contract=off")),
