@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-MANY = 1e6  # from here on, as below 1e-4, a power of ten is read better than its zeros
+FEW, MANY = 1e-4, 1e6  # below the first, and from the second on, a power of ten is read better than its zeros
 
 
 def to_digits(value: float, digits: int = 4) -> str:

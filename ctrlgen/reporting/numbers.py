@@ -6,6 +6,8 @@ import math
 import re
 from collections.abc import Sequence
 
+from ctrlgen.core.to_digits import FEW, MANY, to_digits
+
 # seconds of the units of a time, the largest that is no larger than it is read best
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 3: "k", 6: "M", 9: "G"}
@@ -17,10 +19,12 @@ def number(value: float, digits: int = 4) -> str:
     """A number as text: '0.00412', '1.2e-07', '53800'."""
     if not math.isfinite(value):
         return "not known"
-    if value and (abs(value) >= 1e6 or abs(value) < 1e-4):
-        return f"{value:.{digits - 1}e}"
-    exact = f"{value + 0.0:.{digits}g}"  # no sign of a zero
-    return f"{float(exact):.0f}" if "e" in exact else exact
+    return f"{value:.{digits - 1}e}" if _with_power(value) else to_digits(value, digits)
+
+
+def _with_power(value: float) -> bool:
+    """Whether a number is read best with a power of ten."""
+    return value != 0 and not FEW <= abs(value) < MANY
 
 
 def sized(unit: str, size: float) -> tuple[str, float]:
@@ -60,7 +64,7 @@ def with_interval(value: float, ends: Sequence[float]) -> tuple[str, str, str]:
     ('25.81', '25.18', '26.44'); each by itself where the interval has no width."""
     low, high = ends
     sd = (high - low) / (2 * 1.96)
-    if not (math.isfinite(value) and math.isfinite(sd) and sd > 0) or "e" in number(value):
+    if not (math.isfinite(value) and math.isfinite(sd) and sd > 0) or _with_power(value):
         return number(value, 6), number(low, 6), number(high, 6)
     decimals = max(0, 1 - math.floor(math.log10(sd)))
     return f"{value:.{decimals}f}", f"{low:.{decimals}f}", f"{high:.{decimals}f}"
