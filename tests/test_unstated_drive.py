@@ -12,7 +12,9 @@ from scipy.interpolate import CubicSpline
 
 from ctrlgen import build_model, load_device, simulate
 from ctrlgen.diagnosis.diagnose import diagnose_recording
+from ctrlgen.diagnosis.selection.screen import Screen
 from ctrlgen.diagnosis.selection.verdict import Verdict
+from ctrlgen.estimation.checkpoint import Checkpoint
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.noise import estimate_noise
@@ -20,6 +22,7 @@ from ctrlgen.estimation.structure import Structure
 from ctrlgen.estimation.unstated_drive import (
     WAYS,
     as_described_fits,
+    read_as,
     read_better,
     read_with_less,
     told_of_reading,
@@ -202,3 +205,29 @@ def test_a_diagnosis_names_what_acts_and_no_stand_in(way, force, laws):
     assert found.verdict == (Verdict.EXPLAINED if laws else Verdict.CONSISTENT)
     assert way_of(found.recording) == way
     assert any(f"{way} is taken" in note for note in found.notes)
+
+
+def rough(smooth: bool) -> Fitter:
+    """Of a drive that is another value in each row, as a curve through these or in the lines that stand for it."""
+    u, records = np.random.default_rng(4).standard_normal(600), []
+    for role in ("fit", "hold_out"):
+        y = linear(u) + 3e-7 * u
+        made = replace(record(u, y, role), linear=True, smooth=True, either=True)
+        records.append(made if smooth else replace(made, drive=made.applied, smooth=False))
+    return fitter(Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (NOISE,), tuple(records), ()))
+
+
+def test_a_curve_is_simulated_and_screened_as_the_lines_that_stand_for_it():
+    laws = [PICKED_UP, Hypothesis("cubic_drive", "actuator:axis", "axis")]
+    seen = [Screen(f, laws).run(f.fit(Structure(AXIS))) for f in (rough(True), rough(False))]
+    curve, lines = ({s.hypothesis.effect: s.z for s in screened.suspects} for screened in seen)
+    assert curve.keys() == lines.keys() and len(curve) == 2
+    assert [curve[name] for name in lines] == pytest.approx(list(lines.values()), rel=1e-9)
+
+
+def test_a_checkpoint_tells_fits_of_a_curve_from_those_of_lines(tmp_path):
+    plain = fitter(recorded("smooth"))
+    kept = replace(plain, checkpoint=Checkpoint(tmp_path / "fits", {}))
+    for way in WAYS:
+        alone, again = (replace(f, recording=read_as(f.recording, way)).fit(Structure(AXIS)) for f in (plain, kept))
+        assert np.array_equal(alone.theta, again.theta)
