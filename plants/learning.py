@@ -103,7 +103,14 @@ def write_run(folder: Path, powers: Array, rate: float, poses: Array, seed: int)
         "",
         "[[record]]",
     ]
-    lines += ['file = "run.csv"', 'role = "fit"', f'sample_rate = "{rate:g} Hz"', 'between_samples = "held"', "", "[columns]"]
+    lines += [
+        'file = "run.csv"',
+        'role = "fit"',
+        f'sample_rate = "{rate:g} Hz"',
+        'between_samples = "held"',
+        "",
+        "[columns]",
+    ]
     lines += [f'"drive.{axis}" = {{ column = "P_{axis}", unit = "W" }}' for axis in AXES]
     lines += [f'"reading.{c}" = {{ column = "{c}", unit = "{("rad", "um")[k // 3]}" }}' for k, c in enumerate(CHANNELS)]
     (folder / "recording.toml").write_text("\n".join(lines) + "\n", encoding="utf-8")
