@@ -14,10 +14,12 @@ from battery.plant_hexapod import COMPONENTS
 ARTEFACTS = (
     "force_step",
     "sensor_step",
+    "sensor_step_per_record",
     "lost_beams",
     "stuck",
     "vibration",
     "drift",
+    "drift_per_record",
     "degradation",
     "cyclic",
     "raised_point",

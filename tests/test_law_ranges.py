@@ -135,5 +135,7 @@ def test_the_laws_of_two_channels_and_those_with_a_clock_are_these():
         "vibration",
         "vibration_per_record",
         "warm_up",
+        "drift_per_record",
+        "sensor_step_per_record",
     }
     assert {k for k, law in library if any(s.clock for s in law.states)} == clocked

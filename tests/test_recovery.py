@@ -273,12 +273,16 @@ def test_of_a_number_that_changes_with_the_warmth(law):
 
 
 STATED = {
-    "zero_per_record",
     "autocollimator",
     "face_tilt",
     "mirror_tilt",
     "plane_mirror",
 }  # the mirrors: tests/test_mirrors.py
+OF_EACH_RECORD = {
+    "zero_per_record",
+    "drift_per_record",
+    "sensor_step_per_record",
+}  # found in tests/test_of_each_record.py
 # found in tests/test_finer_forms.py
 FINER = {
     "bouc_wen_of_power",
@@ -344,4 +348,4 @@ def test_no_law_is_left_out():
         "temperature_sensitivity_above",
         *(f"{what}_of_temperature" for what in ("gain", "scale", "stiffness")),
     }
-    assert not set(Effect.library) - battery - here - STATED - FINER - IN_THE_LOOP - SMOOTHERS
+    assert not set(Effect.library) - battery - here - STATED - OF_EACH_RECORD - FINER - IN_THE_LOOP - SMOOTHERS

@@ -307,6 +307,7 @@ LAWS = {
     "second_pole": ({"tau": 0.3}, lambda s, p: p.share * (s.w - s.value), lambda s, p: {"w": (s.value - s.w) / 0.3}),
     "sensor_gain": ({}, lambda s, p: p.gain * s.value),
     "sensor_step": (EVENT, lambda s, p: p.offset * event(s, p)),
+    "sensor_step_per_record": (EVENT, lambda s, p: p.share * s.offset * event(s, p)),
     "square_drive": ({}, lambda s, p: p.curvature * s.value**2),
     "arcuate_motion": ({}, lambda s, p: p.rate * s.all[s.partner] ** 2),
     "cross_scale": ({}, lambda s, p: p.rate * s.value * s.all[s.partner]),
@@ -359,6 +360,7 @@ LAWS = {
     ),
     "worn_backlash": ({"wear": 0.4, "spread": 0.5}, lambda s, p: 0.999 * (s.w + s.start * p.gap / 2 - s.displacement)),
     "warm_up": ({"tau": 0.4}, lambda s, p: p.size * (1 - exp(-s.t / 0.4))),
+    "drift_per_record": ({}, lambda s, p: p.share * (s.zero + s.drift * s.t)),
     "zero_per_record": ({}, lambda s, p: p.share * s.zero),
     "vibration_per_record": (
         {"frequency": 3.0, "phase": 0.9},

@@ -1,6 +1,8 @@
 """A step at one moment: of a force or of a reading."""
 
-from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, itself
+from typing import ClassVar
+
+from ctrlgen.effects import Effect, Expression, Family, LawInputs, LawNumbers, Param, Place, State, itself
 from ctrlgen.effects._smooth_step import CLOCK, WHEN, smooth_step
 
 
@@ -10,7 +12,7 @@ class Step(Effect, listed=False):
     source = "definition"
     at_bounds = itself("moment", "rise")
     family = Family.EVENTS
-    states = CLOCK
+    states: ClassVar[tuple[State, ...]] = CLOCK
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return getattr(p, self.amplitude().name) * smooth_step(s, p)
@@ -34,3 +36,18 @@ class SensorStep(Step):
     title = "A reading that jumps at a moment: counts lost, a target touched"
     place = Place.SENSOR
     params = (Param("offset", "channel", (-1e3, 1e3), "after the step", off=0.0), *WHEN)
+
+
+class SensorStepPerRecord(Step):
+    """Delta y = g b e(t), db/dt = 0: b is constant within a record, another in each, and fitted there; g = 1.
+
+    Holds for one event in one of several runs, which begin on a clock of their own. Outside a diagnosis b = 0.
+    """
+
+    title = "A reading that jumps at a moment of one record: counts lost, a target touched"
+    place = Place.SENSOR
+    params = (Param("share", "1", (0.0, 2.0), "1: the offset is free", off=0.0), *WHEN)
+    states = (*CLOCK, State("offset", "channel", 1.0, per_record=True))
+
+    def term(self, s: LawInputs, p: LawNumbers) -> Expression:
+        return p.share * s.states.offset * smooth_step(s, p)

@@ -99,7 +99,7 @@ class LawPrior:
     constant: what it does is the same whatever the machine does: where it is needed beside a law that acts with the motion, it is part
         of that one.
     of_each_record: what it does is another constant in each record, of which no other record tells: it has no slope at zero by which a
-        screen would see it, and is tried where such constants are most of what is left (`selection.zeros_of_records`).
+        screen would see it, and is tried where such constants are most of what is left (`selection.of_each_record`).
     period_up_to: of a law that repeats along a reading, in typical sizes of that: the longest period that is looked for where the records
         do not show that a longer one repeats (`Hypothesis.longest_period`); an amplitude up to a quarter of either.
     once_a_turn: the law repeats with the turn of an axis: it is suspected where a good part of a turn is read.

@@ -27,6 +27,15 @@ _VIBRATION = LawPrior(
     },
 )
 
+_SENSOR_STEP = LawPrior(
+    EVENTS_ARE_RARE,
+    log_prior_odds=ONE_IN_A_HUNDRED,
+    form_of="sensor_step",
+    of_time=True,
+    domain="disturbance",
+    parameters=EVENT,
+)
+
 OF_TIME: Mapping[str, LawPrior] = {
     "degradation": LawPrior(
         "From a loss that ends within the recording to a steady one.",
@@ -39,12 +48,25 @@ OF_TIME: Mapping[str, LawPrior] = {
         form_of="drift",
         of_time=True,
     ),
+    "drift_per_record": LawPrior(
+        "As rare as one drift of all records, and a number for each of them. Rooms and amplifiers warm up anew: judgement.",
+        log_prior_odds=ONE_IN_A_HUNDRED,
+        model_form_error=0.1,
+        form_of="drift",
+        of_time=True,
+        of_each_record=True,
+        parameters={"share": ParameterPrior(fixed_range=(0.8, 1.2))},
+    ),
     "force_step": LawPrior(
         EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, of_time=True, domain="disturbance", parameters=EVENT
     ),
     "lost_beams": LawPrior(EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, of_time=True, parameters=EVENT),
-    "sensor_step": LawPrior(
-        EVENTS_ARE_RARE, log_prior_odds=ONE_IN_A_HUNDRED, of_time=True, domain="disturbance", parameters=EVENT
+    "sensor_step": _SENSOR_STEP,
+    "sensor_step_per_record": replace(
+        _SENSOR_STEP,
+        reason="Of one record, of which no other tells. " + EVENTS_ARE_RARE,
+        of_each_record=True,
+        parameters=EVENT | {"share": ParameterPrior(fixed_range=(0.8, 1.2))},
     ),
     "stiffness_drift": LawPrior(
         "As `degradation`, which it is in slow motion, and rarer: judgement. In balance both are one.",

@@ -5,11 +5,14 @@ min |W (y - y(p, s))|^2 + sum ((s_j - s0_j)/sd_j)^2 over the free initial states
 
 from __future__ import annotations
 
+import re
 from typing import NamedTuple
 
 import numpy as np
 
+from ctrlgen.effects import Effect, State
 from ctrlgen.estimation.error_model import ErrorModel
+from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.initial_memory import arbitrary_states
 from ctrlgen.estimation.least_squares import initial_state_sd, whiten_residual
 from ctrlgen.estimation.settings import FIT, HELD_OUT_REFIT
@@ -102,3 +105,16 @@ def begun_near(
     r = problem.residual(found)
     value = float(r @ r)
     return Begun(value, found, problem.readings(found)) if value < best.objective else best
+
+
+def told_state(law: type[Effect]) -> State:
+    """Of a law that is another in each record, the state that tells how: the rate of a drift rather than its zero."""
+    return [state for state in law.states if state.per_record][-1]
+
+
+def place_of_told(simulator: Simulator, cause: Hypothesis) -> int:
+    """The place of the `told_state` of a cause among the free initial states of a simulator."""
+    own = re.compile(rf"{cause.effect}_\d+_{told_state(cause.law).name}_{re.escape(cause.at)}")
+    names = simulator.model.x_names
+    (place,) = (k for k, x in enumerate(simulator.free_initial_states) if x < len(names) and own.fullmatch(names[x]))
+    return place

@@ -173,7 +173,7 @@ def _main(diagnosis: Diagnosis) -> list[Part]:
 def _numbers(main: Finding) -> list[Part]:
     """', gap = 4.1 um (4 ... 4.2 um), below a position of 3 mm (2.9 ... 3.1 mm)'; a period does not yield."""
     if main.in_each_record:
-        return [_zeros(main.in_each_record)]
+        return [_in_records(main.in_each_record), *_moments(main)]
     shown = _first_numbers(main)
     least = {name: e for k, (name, e) in enumerate(shown.items()) if k == 0 or name in PERIODS}
     bare = {name: replace(e, ci95=(e.value, e.value)) for name, e in least.items()}
@@ -184,7 +184,15 @@ def _numbers(main: Finding) -> list[Part]:
     return [numbers, *(Part(f", {text}") for text in where(main))]
 
 
-def _zeros(in_records: dict[str, Estimate]) -> Part:
+def _moments(finding: Finding) -> list[Part]:
+    """', at 3.41 s (3.4 ... 3.42 s)', when a law acts that is another in each record."""
+    law, prior = finding.cause.law, finding.cause.prior
+    moments = [p.name for p in law.params if prior.of(p).start_from_data == "moments"]
+    found = ((name, finding.parameters[name]) for name in moments)
+    return [Part(f", at {interval(e, name)}") for name, e in found]
+
+
+def _in_records(in_records: dict[str, Estimate]) -> Part:
     """': -0.3 um (-0.31 ... -0.29 um) in day2.csv to 0.4 um (0.39 ... 0.41 um) in day3.csv', the least and the largest."""
     ends = [f(in_records.items(), key=lambda row: row[1].value) for f in (min, max)]
     text, bare = (

@@ -150,7 +150,7 @@ def _score(diagnosis: Diagnosis, h: Hypothesis) -> str:
 def _never_fitted(diagnosis: Diagnosis, h: Hypothesis) -> str:
     """Why a hypothesis that was offered was never fitted."""
     if h.prior.of_each_record:
-        return f"never were such constants {per_cent(SEARCH.least_of_zeros)} of what was left of its reading"
+        return f"never could it take away {per_cent(SEARCH.least_of_each_record)} of what was left of its reading"
     for screened in _screens(diagnosis):
         for other, why in screened.dropped.items():
             if _key(other) == _key(h):

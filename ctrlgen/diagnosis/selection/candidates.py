@@ -13,11 +13,11 @@ from ctrlgen.diagnosis.selection.cause_entry import trying
 from ctrlgen.diagnosis.selection.failures import FAILURES
 from ctrlgen.diagnosis.selection.far_off import nearer_when_simulated
 from ctrlgen.diagnosis.selection.finer_forms import finer_forms
+from ctrlgen.diagnosis.selection.of_each_record import fit_of_each_record
 from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.diagnosis.selection.shifts import best_shift
 from ctrlgen.diagnosis.selection.subset_search import Suspect
 from ctrlgen.diagnosis.selection.trials import Trials
-from ctrlgen.diagnosis.selection.zeros_of_records import fit_own_zeros
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, REGIONS, SEARCH, SUBSETS
 from ctrlgen.effects import is_group
 from ctrlgen.estimation.fit import Fit
@@ -36,7 +36,7 @@ def fit_candidates(
         suspects = [s for s in suspects if s.z**2 >= much_of(current)]
     else:
         suspects = [*suspects, *nearer_when_simulated(trials, current, screened, suspects)]
-    candidates = (*fit_own_zeros(trials, current), *fit_each(trials, current.fit, suspects))
+    candidates = (*fit_of_each_record(trials, current), *fit_each(trials, current.fit, suspects))
     alone = leaves_noise_alone(trials, current, candidates)
     if not (plainly or current.errors.is_noise):
         begun = [t for t in candidates if not alone or takes_away_much(t, current)]

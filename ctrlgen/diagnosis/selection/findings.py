@@ -14,15 +14,16 @@ from ctrlgen.diagnosis.selection.attribution import Attribution, ShareEntry
 from ctrlgen.diagnosis.selection.edge_intervals import edge_intervals
 from ctrlgen.diagnosis.selection.finding_region import RegionEntry, region_of
 from ctrlgen.diagnosis.selection.law_titles import title
+from ctrlgen.diagnosis.selection.of_each_record import told_in_records
 from ctrlgen.diagnosis.selection.search_result import SearchResult
 from ctrlgen.diagnosis.selection.verdict import terms_of_findings, unconfirmed
 from ctrlgen.diagnosis.selection.way_covered import moves_one_way
-from ctrlgen.diagnosis.selection.zeros_of_records import zeros_in_records
 from ctrlgen.diagnosis.settings import ATTRIBUTION, LUCK
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, nominal_physics
 from ctrlgen.estimation.prediction_uncertainty import prediction_uncertainty
 from ctrlgen.estimation.profile_likelihood import Profile
+from ctrlgen.estimation.record_states import told_state
 from ctrlgen.estimation.residual_tests import ResidualTests
 from ctrlgen.estimation.robust_covariance import robust_deviations
 from ctrlgen.estimation.settings import STATISTICS
@@ -137,7 +138,8 @@ class Finding:
     def numbers(self) -> list[tuple[str, Estimate]]:
         """Its parameters and those of its further terms, and what it is in each record, with their names."""
         of_law = [(name, e) for numbers in (self.parameters, *self.terms) for name, e in numbers.items()]
-        return [*of_law, *((f"zero in {record}", e) for record, e in self.in_each_record.items())]
+        told = told_state(self.cause.law).name if self.in_each_record else ""
+        return [*of_law, *((f"{told} in {record}", e) for record, e in self.in_each_record.items())]
 
     @property
     def region(self) -> RegionEntry | None:
@@ -362,17 +364,17 @@ def size_untold(search: SearchResult, terms: Sequence[int], estimates: dict[str,
 
 
 def _in_each_record(search: SearchResult, cause: Hypothesis) -> dict[str, Estimate]:
-    """The zero of its reading in each record, of a cause that is another one there."""
+    """What a cause is in each record, such as the zero of its reading, of one that is another there."""
     if not cause.prior.of_each_record:
         return {}
-    recording = search.fitter.recording
-    unit = recording.units[recording.channels.index(f"reading.{cause.at}")]
-    zeros = zeros_in_records(search.fitter, search.chosen.fit, cause).items()
+    fit = search.chosen.fit
+    unit = cause.channel_on(fit.structure.device).unit_of(told_state(cause.law))
+    told = told_in_records(search.fitter, fit, cause).items()
     return {
         name: Estimate(
             difference(value, unit), (difference(value - reach, unit), difference(value + reach, unit)), unit
         )
-        for name, (value, reach) in zeros
+        for name, (value, reach) in told
     }
 
 

@@ -92,7 +92,13 @@ class ModelSelection:
         """T of a model under `errors`; smaller is better."""
         numbers = sum(u.cause is not None for u in t.fit.structure.free_parameters)
         price = numbers * np.log(max(self.samples(t.fitted, errors), 2)) - 2 * prior_odds(t.fit)
-        return self.fit_loss(t, errors) + self.held_out_loss(t, errors) + price
+        own = numbers_in_each_record(t.causes) * self._price_of_each_record(t, errors)
+        return self.fit_loss(t, errors) + self.held_out_loss(t, errors) + price + own
+
+    def _price_of_each_record(self, t: CandidateModel, errors: ErrorModel) -> float:
+        """What a number costs that is another one in each record, whether to fit or held out."""
+        n = self.samples(t.fitted, errors) + self.samples(t.held_out, errors)
+        return len(self.fitter.fit_records + self.fitter.held_out_records) * float(np.log(max(n, 2)))
 
     def reference(self, candidates: Sequence[CandidateModel]) -> ErrorModel:
         """The errors under which candidates are compared: those of the one that leaves least."""
@@ -164,11 +170,10 @@ class ModelSelection:
         n, n_held = (self.samples(m, errors) for m in (after.fitted, after.held_out))
         added = len(after.fit.structure.free_parameters) - len(before.fit.structure.free_parameters)
         needed = MODEL_SELECTION.least_gain + added * np.log(max(n, 2))
-        if each := _of_each_record(before, after):
+        new = [c for c in after.causes if c not in before.causes]
+        if new and all(c.prior.of_each_record for c in new):
             # no number is held to another record: all of them tell, and each has its price
-            runs = len(self.fitter.fit_records) + len(self.fitter.held_out_records)
-            price = each * runs * np.log(max(n + n_held, 2))
-            if gain + confirmed <= needed + price:
+            if gain + confirmed <= needed + numbers_in_each_record(new) * self._price_of_each_record(after, errors):
                 return Shortfall.GAIN
             return None if errors.is_noise or self.matters(before, after) else Shortfall.SMALL
         # parameters of the device masked it, so the readings hardly show it
@@ -320,7 +325,6 @@ def wins_by_block(before: Misfit, after: Misfit) -> bool:
     )
 
 
-def _of_each_record(before: CandidateModel, after: CandidateModel) -> int:
-    """How many causes `after` has more, where all of them are another number in each record; 0 otherwise."""
-    new = [c for c in after.causes if c not in before.causes]
-    return len(new) if all(c.prior.of_each_record for c in new) else 0
+def numbers_in_each_record(causes: Sequence[Hypothesis]) -> int:
+    """How many numbers some causes have that are others in each record."""
+    return sum(state.per_record for c in causes if c.prior.of_each_record for state in c.law.states)

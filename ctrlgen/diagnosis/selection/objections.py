@@ -6,7 +6,7 @@ is another cause under this law's name. A cause that meets an objection is taken
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -21,6 +21,7 @@ from ctrlgen.estimation.free_parameters import SHAPE_AT_BOUND
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, nominal_physics
 from ctrlgen.estimation.quiet_stretches import period_of
 from ctrlgen.estimation.raw_readings import detect_directly
+from ctrlgen.estimation.record_states import place_of_told
 from ctrlgen.estimation.settings import STATISTICS
 from ctrlgen.numerics.quantisation_step import quantisation_step
 from ctrlgen.recordings.recording import Record, Recording
@@ -260,12 +261,22 @@ def _no_drift(recording: Recording, fit: Fit, k: int) -> str | None:
     read = np.concatenate([r.observed[r.valid[:, i], i] for r in records])
     time = max((float(r.time[-1] - r.time[0]) for r in records), default=0.0)
     numbers = fit.values(k)
-    levels_off = numbers.get("tau")
-    most = numbers["rate"] * time if levels_off is None else numbers["size"] * -np.expm1(-time / levels_off)
+    if cause.prior.of_each_record:
+        most = max((abs(rate) for rate in _own_rates(recording, fit, cause)), default=0.0) * time
+    elif "tau" in numbers:
+        most = numbers["size"] * -np.expm1(-time / numbers["tau"])
+    else:
+        most = numbers["rate"] * time
     share = abs(most) / max(float(np.ptp(read)) if len(read) else 0.0, 1e-300)
     if share <= OBJECTIONS.largest_drift:
         return None
     return f"it would drift by {100 * share:.0f} % of the motion within a record"
+
+
+def _own_rates(recording: Recording, fit: Fit, cause: Hypothesis) -> Iterator[float]:
+    """The rate [SI] at which a reading drifts in each record to fit, of a drift of each."""
+    for record, states in zip((r for r in recording.records if r.role == "fit"), fit.initial_states, strict=True):
+        yield float(states[place_of_told(fit.structure.simulator(recording.channels, record.timing), cause)])
 
 
 def _onsets(record: Record) -> np.ndarray:

@@ -9,9 +9,9 @@ import numpy as np
 
 from ctrlgen.devices import Device
 from ctrlgen.devices.machine import MachineParts
+from ctrlgen.diagnosis.selection.of_each_record import has_several_runs
 from ctrlgen.diagnosis.selection.speeds import counted_in_speeds
 from ctrlgen.diagnosis.selection.way_covered import where_it_turns, with_longest_periods
-from ctrlgen.diagnosis.selection.zeros_of_records import has_several_runs
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, hypotheses, nominal_physics

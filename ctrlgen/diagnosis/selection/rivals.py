@@ -235,7 +235,7 @@ def beside_offsets(trials: Trials, current: CandidateModel, k: int) -> list[Cand
     begun = current.fit.restarted.without(k).with_cause(plain, plainer_start(current.fit, k, plain))
     there = {h.effect for h in current.causes}
     offsets = [h for h in trials.screen.hypotheses if h.effect != PARAMETER and h.prior.constant]
-    # the zero of each record is told apart from one zero where they differ (`zeros_of_records`)
+    # the zero of each record is told apart from one zero where they differ (`of_each_record`)
     offsets = [h for h in offsets if h.at == cause.at and h.effect not in there and not h.prior.of_each_record]
 
     def one(branch: Trials, offset: Hypothesis) -> list[CandidateModel]:

@@ -114,8 +114,14 @@ class SearchSettings:
     """Relative change of the noise below which it counts as unchanged."""
     same_noise_size: float = 0.02
     """The same of noise that only the misfit tells: it is the yardstick of everything else. Judgement."""
-    least_of_zeros: float = 0.5
-    """Share of what is left of a reading that zeros of its records must take away to be tried. Judgement: most of it."""
+    least_of_each_record: float = 0.5
+    """Share of what is left of a reading that zeros, drifts or a jump of its records must take away to be tried. Judgement: most of it."""
+    beside_jump: float = 0.02
+    """Share of a run before and after a jump in which its size shows at once. Judgement."""
+    fewest_beside_jump: int = 5
+    """Samples of them at least: they know a jump of the size of the noise to 60 %, and one that is most of what is left far better."""
+    sharp_jump: float = 0.7
+    """Of the size of a jump, over the whole run, that shows close to it. A sine of one period in the run shows a sixth. Judgement."""
     candidates_per_round: int = 6
     """Single candidates fitted a round, and as many sets of each size."""
     far_off: float = 0.1

@@ -1,4 +1,4 @@
-"""A reading whose zero is another in each record, as of a sensor that is zeroed anew before every run."""
+"""Readings whose zero or drift is another in each record, or that jump in one of them, as of a sensor that is zeroed before every run."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ctrlgen.diagnosis.diagnose import diagnose_recording
 from ctrlgen.diagnosis.report.answer import answer
 from ctrlgen.diagnosis.report.explain import explain
 from ctrlgen.diagnosis.report.luck_sentences import luck_text
-from ctrlgen.diagnosis.selection.zeros_of_records import has_several_runs, zeros_in_records
+from ctrlgen.diagnosis.selection.of_each_record import Left, has_several_runs, of_one_step, told_in_records
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.noise import estimate_noise
@@ -102,7 +102,7 @@ def test_a_zero_that_the_file_leaves_free_is_not_found_again():
 
 def test_it_is_told_why_such_zeros_were_not_tried():
     (said,) = explain(diagnosed(runs([0.2 * UM] * 2, ROLES[:2])), "zero_per_record")
-    assert said.endswith("never were such constants 50 % of what was left of its reading.")
+    assert said.endswith("never could it take away 50 % of what was left of its reading.")
 
 
 def test_readings_of_which_one_ends_in_the_name_of_the_other_keep_their_zeros_apart():
@@ -129,7 +129,7 @@ def test_readings_of_which_one_ends_in_the_name_of_the_other_keep_their_zeros_ap
     for cause in causes:
         structure = structure.with_cause(cause, {"share": 1.0})
     fit = fitter.fit(structure)
-    told = [zeros_in_records(fitter, fit, cause) for cause in causes]
+    told = [told_in_records(fitter, fit, cause) for cause in causes]
     assert [value for zeros in told for value, _ in zeros.values()] == pytest.approx([5.0, -3.0, 1.0, 2.0], abs=0.01)
 
 
@@ -142,3 +142,119 @@ def test_the_parts_of_one_file_have_one_zero():
     )
     assert not has_several_runs(one) and has_several_runs(two)
     assert "zero_per_record" not in effects(diagnosed(one)) and effects(diagnosed(two)) == ["zero_per_record"]
+
+
+RATES = (0.3, -0.5, 0.2, 0.7)  # um/s
+FOUR = ("fit", "fit", "hold_out", "hold_out")
+OWN = (
+    "drift_per_record",
+    "zero_per_record",
+    "sensor_step_per_record",
+    "sensor_step",
+    "drift",
+    "warm_up",
+    "home_offset",
+)
+OWN_AND_OTHERS = (*OWN, "cyclic", "creep", "coulomb", "stiffening", "thermal_lag")
+
+
+def in_run(k, change, else_=lambda y, s: y):
+    """A change of run k alone (all: None), by the position and the time since it began."""
+    return lambda y, t: (change if k is None or round(t[0] / 3.0) == k else else_)(y, t - t[0])
+
+
+def drifting(y, t):
+    k = round(t[0] / 3.0)
+    return y + UM * RATES[k] * (t - t[0])
+
+
+def on_their_own_clocks(recording):
+    """Files that begin at zero each, as most loggers write them."""
+    return replace(recording, records=tuple(replace(r, time=r.time - r.time[0]) for r in recording.records))
+
+
+def jump(at, size=0.4):
+    return lambda y, s: y + size * UM * (s > at)
+
+
+@pytest.mark.parametrize("clocks", [lambda r: r, on_their_own_clocks])
+def test_a_drift_that_is_another_in_each_record_is_found_with_its_rates(clocks):
+    found = diagnose_recording(
+        AXIS, clocks(runs([0.0, 0.1 * UM, -0.2 * UM, 0.0], FOUR, change=drifting)), jobs=0, laws=OWN
+    )
+    (finding,) = found.findings
+    assert finding.effect == "drift_per_record" and found.verdict == "explained"
+    for estimate, rate in zip(finding.in_each_record.values(), RATES, strict=True):
+        low, high = estimate.ci95
+        assert estimate.unit == "um/s" and low < rate < high and high - low < 0.01
+    assert found.held_out["reading.axis"].rms_after == pytest.approx(NOISE / UM, rel=0.1)
+    assert "drift in run_1.csv" in [name for name, _ in finding.numbers]
+
+
+@pytest.mark.parametrize("clocks", [lambda r: r, on_their_own_clocks])
+def test_a_jump_in_one_record_to_fit_is_found_with_its_moment_and_size(clocks):
+    recording = clocks(runs([0.0] * 4, FOUR, change=in_run(1, jump(0.4127))))
+    found = diagnose_recording(AXIS, recording, jobs=0, laws=OWN)
+    (finding,) = found.findings
+    assert finding.effect == "sensor_step_per_record" and found.verdict == "explained"
+    sizes = {name: e.value for name, e in finding.in_each_record.items()}
+    assert sizes["run_1.csv"] == pytest.approx(0.4, abs=0.002) and abs(sizes["run_0.csv"]) < 0.002
+    moment = finding.parameters["moment"]
+    begin = recording.records[1].time[0]
+    assert moment.value == pytest.approx(begin + 0.4127, abs=H)
+    assert "in run_1.csv, at " in answer(found)[0]
+
+
+def test_a_jump_in_a_held_out_record_is_found_with_its_size():
+    recording = on_their_own_clocks(runs([0.0] * 4, FOUR, change=in_run(2, jump(0.4127, -0.3))))
+    found = diagnose_recording(AXIS, recording, jobs=0, laws=OWN)
+    (finding,) = found.findings
+    assert finding.effect == "sensor_step_per_record"
+    assert finding.in_each_record["run_2.csv"].value == pytest.approx(-0.3, abs=0.002)
+    assert finding.parameters["moment"].value == pytest.approx(0.4127, abs=H)
+    assert found.held_out["reading.axis"].rms_after == pytest.approx(NOISE / UM, rel=0.1)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seen", [drifting, in_run(0, jump(0.31))])
+def test_a_pitch_beside_what_is_another_in_each_record_is_found(seen):
+    def change(y, t):
+        moved = seen(y, t)
+        return moved + 0.05 * UM * np.sin(2 * np.pi * (moved if seen is drifting else y) / (2.5 * UM))
+
+    found = diagnose_recording(
+        AXIS, on_their_own_clocks(runs([0.0] * 4, FOUR, change=change)), jobs=0, laws=OWN_AND_OTHERS
+    )
+    assert set(effects(found)) == {"cyclic", "drift_per_record" if seen is drifting else "sensor_step_per_record"}
+    (pitch,) = [f for f in found.findings if f.effect == "cyclic"]
+    assert pitch.parameters["period"].value == pytest.approx(2.5, rel=1e-3)
+
+
+def test_a_drift_or_a_jump_of_all_records_is_none_of_each():
+    steady = runs([0.0] * 4, FOUR, change=in_run(None, lambda y, s: y + 0.3 * UM * s))
+    assert effects(diagnose_recording(AXIS, on_their_own_clocks(steady), jobs=0, laws=OWN)) == ["drift"]
+    alike = runs([0.0] * 4, FOUR, change=in_run(None, jump(0.4127)))
+    assert effects(diagnose_recording(AXIS, on_their_own_clocks(alike), jobs=0, laws=OWN)) == ["sensor_step"]
+
+
+@pytest.mark.long
+def test_a_stage_that_creeps_is_no_drift_of_each_record():
+    """What creeps goes on in each record, at another rate in each."""
+
+    def change(y, t):
+        crept = np.zeros_like(y)
+        for k in range(1, len(y)):
+            crept[k] = crept[k - 1] + (y[k] - crept[k - 1]) * H / 0.8
+        return y + 0.1 * crept
+
+    found = diagnose_recording(AXIS, runs([0.0] * 4, FOUR, change=change), jobs=0, laws=OWN_AND_OTHERS)
+    assert not {"drift_per_record", "sensor_step_per_record", "zero_per_record"} & set(effects(found))
+
+
+def test_what_comes_slowly_is_no_jump():
+    """A sine of one period in a run is taken away by a step to four fifths, and shows a sixth of it at once."""
+    t = np.arange(1000) * H
+    for slow, jumps in ((np.sin(2 * np.pi * t), False), (np.sign(t - 0.4127), True), (np.tanh((t - 0.4) / 0.1), False)):
+        part = of_one_step([Left(t, 0 * t), Left(t, slow)])
+        assert (part.share > 0) is jumps
+    assert part.numbers == {}
