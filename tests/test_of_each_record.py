@@ -15,7 +15,7 @@ from ctrlgen.diagnosis.diagnose import diagnose_recording
 from ctrlgen.diagnosis.report.answer import answer
 from ctrlgen.diagnosis.report.explain import explain
 from ctrlgen.diagnosis.report.luck_sentences import luck_text
-from ctrlgen.diagnosis.selection.of_each_record import Left, has_several_runs, of_one_step, told_in_records
+from ctrlgen.diagnosis.selection.of_each_record import Left, may_differ, of_one_step, told_in_records
 from ctrlgen.estimation.fit import Fitter
 from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.estimation.noise import estimate_noise
@@ -140,7 +140,9 @@ def test_the_parts_of_one_file_have_one_zero():
         replace(whole, records=tuple(replace(r, file=file) for r, file in zip(whole.records, files, strict=True)))
         for files in (("day_1.csv", "day_1.csv"), ("day_1.csv", "day_2.csv"))
     )
-    assert not has_several_runs(one) and has_several_runs(two)
+    zero, jump = (Hypothesis(f"{law}_per_record", "sensor:axis", "axis") for law in ("zero", "sensor_step"))
+    assert not may_differ(zero, one) and may_differ(zero, two)
+    assert may_differ(jump, one)
     assert "zero_per_record" not in effects(diagnosed(one)) and effects(diagnosed(two)) == ["zero_per_record"]
 
 
@@ -198,7 +200,8 @@ def test_a_jump_in_one_record_to_fit_is_found_with_its_moment_and_size(clocks):
     (finding,) = found.findings
     assert finding.effect == "sensor_step_per_record" and found.verdict == "explained"
     sizes = {name: e.value for name, e in finding.in_each_record.items()}
-    assert sizes["run_1.csv"] == pytest.approx(0.4, abs=0.002) and abs(sizes["run_0.csv"]) < 0.002
+    assert sizes.pop("run_1.csv") == pytest.approx(0.4, abs=0.002)
+    assert np.max(np.abs(list(sizes.values()))) < 0.002
     moment = finding.parameters["moment"]
     begin = recording.records[1].time[0]
     assert moment.value == pytest.approx(begin + 0.4127, abs=H)
@@ -212,6 +215,35 @@ def test_a_jump_in_a_held_out_record_is_found_with_its_size():
     assert finding.effect == "sensor_step_per_record"
     assert finding.in_each_record["run_2.csv"].value == pytest.approx(-0.3, abs=0.002)
     assert finding.parameters["moment"].value == pytest.approx(0.4127, abs=H)
+    assert found.held_out["reading.axis"].rms_after == pytest.approx(NOISE / UM, rel=0.1)
+
+
+@pytest.mark.parametrize("where", ["fit", "hold_out", "both"])
+def test_jumps_in_parts_of_one_file_are_found_wherever_they_are(where):
+    """0.4 um in the part to fit go on in the other one, which tells them too; what jumps in the last part alone is fitted there."""
+    n, rng = 2000, np.random.default_rng(2)
+    t = np.arange(2 * n) * H
+    u = 1.2 * np.sin(2 * np.pi * 1.7 * t) + 0.4 * np.sin(2 * np.pi * 11 * t)
+    early, late = 0.4 * UM * (t > 0.9), -0.25 * UM * (t > 3.1)
+    y = move(u) + (where != "hold_out") * early + (where != "fit") * late + NOISE * rng.standard_normal(2 * n)
+    parts = [
+        replace(record(u[a:b], y[a:b], role, first=t[a]), file="log.csv", name=f"rows {a} to {b}", resumed=a > 0)
+        for a, b, role in ((0, n, "fit"), (n, 2 * n, "hold_out"))
+    ]
+    recording = Recording("t", AXIS.name, "series", ("reading.axis",), ("um",), (NOISE,), tuple(parts), ())
+    found = diagnose_recording(AXIS, recording, jobs=0, laws=OWN)
+    told = {f.effect: f for f in found.findings}
+    laws = {
+        "fit": {"sensor_step"},
+        "hold_out": {"sensor_step_per_record"},
+        "both": {"sensor_step", "sensor_step_per_record"},
+    }
+    assert set(told) == laws[where] and found.verdict == "explained"
+    if where != "fit":
+        ((record_name, size),) = told["sensor_step_per_record"].in_each_record.items()
+        assert record_name == "rows 2000 to 4000" and size.value == pytest.approx(-0.25, abs=0.002)
+    if where != "hold_out":
+        assert told["sensor_step"].parameters["offset"].value == pytest.approx(0.4, abs=0.002)
     assert found.held_out["reading.axis"].rms_after == pytest.approx(NOISE / UM, rel=0.1)
 
 
@@ -255,6 +287,6 @@ def test_what_comes_slowly_is_no_jump():
     """A sine of one period in a run is taken away by a step to four fifths, and shows a sixth of it at once."""
     t = np.arange(1000) * H
     for slow, jumps in ((np.sin(2 * np.pi * t), False), (np.sign(t - 0.4127), True), (np.tanh((t - 0.4) / 0.1), False)):
-        part = of_one_step([Left(t, 0 * t), Left(t, slow)])
+        part = of_one_step([Left(t, 0 * t, 0.0), Left(t, slow, 0.0)])
         assert (part.share > 0) is jumps
     assert part.numbers == {}

@@ -144,6 +144,11 @@ class LawPrior:
         return any(p.start_from_data == "spatial_periods" for p in self.parameters.values())
 
     @property
+    def acts_at_a_moment(self) -> bool:
+        """Whether the law is an event."""
+        return any(p.start_from_data == "moments" for p in self.parameters.values())
+
+    @property
     def in_time(self) -> bool:
         """Whether what the law does depends on the time at which it does it: a function of time, or one that begins at a moment."""
         return self.of_time or any(p.start_from_data in ("moments", "since") for p in self.parameters.values())

@@ -30,7 +30,6 @@ _VIBRATION = LawPrior(
 _SENSOR_STEP = LawPrior(
     EVENTS_ARE_RARE,
     log_prior_odds=ONE_IN_A_HUNDRED,
-    form_of="sensor_step",
     of_time=True,
     domain="disturbance",
     parameters=EVENT,
@@ -64,7 +63,9 @@ OF_TIME: Mapping[str, LawPrior] = {
     "sensor_step": _SENSOR_STEP,
     "sensor_step_per_record": replace(
         _SENSOR_STEP,
-        reason="Of one record, of which no other tells. " + EVENTS_ARE_RARE,
+        reason="Of one record, of which no other tells: where a step of all of them explains as much, it is that. "
+        + EVENTS_ARE_RARE,
+        log_prior_odds=ONE_IN_A_HUNDRED + ONE_IN_TEN,
         of_each_record=True,
         parameters=EVENT | {"share": ParameterPrior(fixed_range=(0.8, 1.2))},
     ),

@@ -194,7 +194,7 @@ def _moments(finding: Finding) -> list[Part]:
 
 def _in_records(in_records: dict[str, Estimate]) -> Part:
     """': -0.3 um (-0.31 ... -0.29 um) in day2.csv to 0.4 um (0.39 ... 0.41 um) in day3.csv', the least and the largest."""
-    ends = [f(in_records.items(), key=lambda row: row[1].value) for f in (min, max)]
+    ends = dict(f(in_records.items(), key=lambda row: row[1].value) for f in (min, max)).items()
     text, bare = (
         " to ".join(
             f"{interval(replace(e, ci95=e.ci95 if told else (e.value, e.value)))} in {record}" for record, e in ends

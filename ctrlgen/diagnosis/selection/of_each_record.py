@@ -24,10 +24,12 @@ from ctrlgen.recordings.recording import Record, Recording
 
 
 class Left(NamedTuple):
-    """What is left of a reading in one run: the `time` (n,) [s] and the residual `e` (n,) [SI] where it was read."""
+    """What is left of a reading in one run: the `time` (n,) [s] and the residual `e` (n,) [SI] where it was read, and when the last part of
+    its file begins [s]."""
 
     time: np.ndarray
     e: np.ndarray
+    last_part: float
 
     @property
     def off_mean(self) -> np.ndarray:
@@ -45,9 +47,12 @@ class Part(NamedTuple):
 NONE = Part(0.0, {})
 
 
-def has_several_runs(recording: Recording) -> bool:
-    """Whether readings in time are recorded in two runs or more: the parts of one file have one zero."""
-    return recording.kind == "series" and len({_file(r) for r in recording.records if r.role != "rest"}) > 1
+def may_differ(cause: Hypothesis, recording: Recording) -> bool:
+    """Whether the records of a recording may tell a cause that is another in each: of readings in time in two runs or more, as the parts
+    of one file have one zero and one drift; a jump may be in one part of a file."""
+    moved = [r for r in recording.records if r.role != "rest"]
+    several = len(moved) if cause.prior.acts_at_a_moment else len({_file(r) for r in moved})
+    return recording.kind == "series" and several > 1
 
 
 def _file(record: Record) -> str:
@@ -80,10 +85,15 @@ def left_in_runs(fitter: Fitter, fit: Fit) -> dict[str, list[Left]]:
         of_run: dict[str, list[Left]] = {}
         for e, r in zip(left, runs, strict=True):
             read = r.valid[:, i] & np.isfinite(e[:, i])
-            of_run.setdefault(_file(r), []).append(Left(r.time[read], e[read, i]))
-        joined = (Left(*map(np.concatenate, zip(*parts, strict=True))) for parts in of_run.values())
-        found[channel] = [run for run in joined if len(run.e)]
+            of_run.setdefault(_file(r), []).append(Left(r.time[read], e[read, i], float(r.time[0])))
+        found[channel] = [run for run in map(_joined, of_run.values()) if len(run.e)]
     return found
+
+
+def _joined(parts: Sequence[Left]) -> Left:
+    """The parts of one file as one run."""
+    time, e = (np.concatenate([getattr(part, name) for part in parts]) for name in ("time", "e"))
+    return Left(time, e, max(part.last_part for part in parts))
 
 
 def of_means(runs: Sequence[Left]) -> Part:
@@ -108,7 +118,7 @@ def of_lines(runs: Sequence[Left]) -> Part:
 
 def of_one_step(runs: Sequence[Left]) -> Part:
     """What a jump at one moment of one run takes away of the squares about the mean of each, and that moment; none where what is left comes
-    there slowly."""
+    there slowly, or goes on in a further part of the file, which tells the jump as well."""
     whole = sum(float(run.off_mean @ run.off_mean) for run in runs)
     best = NONE
     for run in runs:
@@ -122,7 +132,7 @@ def of_one_step(runs: Sequence[Left]) -> Part:
         jump = run.e[k:].mean() - run.e[:k].mean()
         close = run.e[k : k + near].mean() - run.e[max(k - near, 0) : k].mean()
         share = float(taken[k - 1]) / whole if whole > 0 else 0.0
-        if share > best.share and close / jump >= SEARCH.sharp_jump:
+        if share > best.share and close / jump >= SEARCH.sharp_jump and run.time[k] > run.last_part:
             best = Part(
                 share, {"moment": float(run.time[k - 1 : k + 1].mean()), "rise": float(run.time[k] - run.time[k - 1])}
             )
@@ -137,8 +147,8 @@ SHARES: Mapping[str, Callable[[Sequence[Left]], Part]] = {
 
 
 def told_in_records(fitter: Fitter, fit: Fit, cause: Hypothesis) -> dict[str, tuple[float, float]]:
-    """The `told_state` of a cause in each record that moves, by the record's name, and how far its 95 % interval reaches to either side
-    [SI] under the errors of the fit. Of records with one name also the time at which each begins."""
+    """The `told_state` of a cause in each record that moves and shows it, by the record's name, and how far its 95 % interval reaches to
+    either side [SI] under the errors of the fit. Of records with one name also the time at which each begins."""
     found = {}
     runs = [r for r in fitter.recording.records if r.role != "rest"]
     often = Counter(r.name for r in runs)
@@ -148,6 +158,8 @@ def told_in_records(fitter: Fitter, fit: Fit, cause: Hypothesis) -> dict[str, tu
         states = fitter.begun(fit, record)[0]
         problem = StatesProblem(simulator, fitter.error, fit.theta, record, np.zeros(len(states)))
         J = problem.evaluate(states / problem.sd)[1]
+        if not J[: -problem.k, place].any():  # it ends before the moment at which the law acts
+            continue
         reach = float(problem.sd[place] * np.sqrt(np.linalg.pinv(J.T @ J)[place, place]))
         begun = f" from {record.time[0]:g} s" if often[record.name] > 1 else ""
         found[record.name + begun] = float(states[place]), STATISTICS.z_95 * reach

@@ -9,7 +9,7 @@ import numpy as np
 
 from ctrlgen.devices import Device
 from ctrlgen.devices.machine import MachineParts
-from ctrlgen.diagnosis.selection.of_each_record import has_several_runs
+from ctrlgen.diagnosis.selection.of_each_record import may_differ
 from ctrlgen.diagnosis.selection.speeds import counted_in_speeds
 from ctrlgen.diagnosis.selection.way_covered import where_it_turns, with_longest_periods
 from ctrlgen.effects import Effect
@@ -76,6 +76,5 @@ def _testable(device: Device, recording: Recording, effects: Sequence[type[Effec
     ambient = any(r.ambient is not None for r in recording.records)
     offered = hypotheses(device, nominal_physics(device), recording.channels, sample_time, ambient, effects)
     offered = [h for h in offered if h.effect != PARAMETER or h.shifts or h.path in acting]
-    if not has_several_runs(recording):
-        offered = [h for h in offered if not h.prior.of_each_record]
+    offered = [h for h in offered if not h.prior.of_each_record or may_differ(h, recording)]
     return with_longest_periods(where_it_turns(offered, recording, device), recording, device)
