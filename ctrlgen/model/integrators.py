@@ -134,6 +134,7 @@ class ImplicitRadau(ExponentialIntegrator):
         self.velocities = [first + i for i in model.set_valued_axes]  # places in y
         self.velocity_rows = [self.acting.index(i) for i in self.velocities]  # rows of N
         self.bristle_rows = [self.acting.index(i) for i in self.bristles]  # rows of N
+        self._functions: dict[tuple[NonlinearRates, int], tuple[ca.Function, ca.Function, ca.SX]] = {}
 
     def points(self, N: NonlinearRates, y: ca.SX, u: ca.SX, u_end: ca.SX) -> tuple[ca.SX, list[tuple[ca.SX, ca.SX]]]:
         """y one step on, and the two (y, u) where N = N(y, u) was solved for."""
@@ -177,7 +178,19 @@ class ImplicitRadau(ExponentialIntegrator):
     def _sloped(self, N: NonlinearRates, base: ca.SX, M: ca.DM, Y: ca.SX, u: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
         """Y with the bristles where its velocities take them, N there, and the slope of each velocity's row of N by that
         velocity, through the bristles too."""
-        at = ca.SX.sym("Y", Y.numel())
+        sloped, bent, others = self._written_once(N, M, Y.numel(), u.numel())
+        if self.bristles:
+            Y = Y[:]
+            Y[self.bristles] = bent(Y, u, base, others)
+        return Y, *sloped(Y, u, base, others)
+
+    def _written_once(self, N: NonlinearRates, M: ca.DM, n: int, n_u: int) -> tuple[ca.Function, ca.Function, ca.SX]:
+        """N at Y with its slopes, and the bristles there, as functions of Y (n,), u (n_u,), base and what else N holds: they are
+        differentiated once and not at each of some hundred points of a sample."""
+        known = self._functions.get((N, id(M)))
+        if known is not None:
+            return known
+        at, u, base = ca.SX.sym("Y", n), ca.SX.sym("u", n_u), ca.SX.sym("base", n)
         value = N(at, u)
         slopes = [ca.jacobian(value[i], at[k]) for i, k in zip(self.velocity_rows, self.velocities, strict=True)]
         bristles = ca.SX(0, 1)
@@ -188,11 +201,16 @@ class ImplicitRadau(ExponentialIntegrator):
             for j, (row, place) in enumerate(zip(self.velocity_rows, self.velocities, strict=True)):
                 slopes[j] += ca.jacobian(value[row], at[k]) * m * ca.jacobian(value[i], at[place]) / stiff
         slope = ca.vertcat(*slopes)
-        if self.bristles:
-            Y = Y[:]
-            Y[self.bristles] = ca.substitute(bristles, at, Y)
-        value, slope = ca.substitute([value, slope], [at], [Y])
-        return Y, value, slope
+        own = {symbol.element_hash() for symbol in ca.symvar(ca.vertcat(at, u, base))}
+        held = [symbol for symbol in ca.symvar(ca.vertcat(value, slope, bristles)) if symbol.element_hash() not in own]
+        others = ca.vertcat(ca.SX(0, 1), *held)
+        given = [at, u, base, others]
+        self._functions[N, id(M)] = (
+            ca.Function("sloped", given, [value, slope]),
+            ca.Function("bent", given, [bristles]),
+            others,
+        )
+        return self._functions[N, id(M)]
 
 
 def _product(M: ca.DM, v: ca.SX | ca.MX) -> ca.SX | ca.MX:
