@@ -71,3 +71,8 @@ def test_the_example_is_told_and_can_be_written_as_it_stands():
     with pytest.raises(InputError, match=r'write for example tau = "0.1 s"'):
         validate(MODEL, AXIS | {"effect": [given]}, "device.toml")
     assert isinstance(validate(MODEL, AXIS | {"effect": [given | {"tau": "0.1 s"}]}, "device.toml"), Device)
+
+
+@every_choice
+def test_of_a_word_that_is_near_none_it_is_told_that_the_key_may_be_left_out(key):
+    assert faults(key, "magnetic spring")[0][1].endswith(f"; leave {key} out where none is meant")

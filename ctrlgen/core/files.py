@@ -203,7 +203,9 @@ def _fault(model: type[BaseModel], details: Any) -> Fault:
     elif details["type"] == "literal_error":
         known = str(details["ctx"]["expected"])
         near = difflib.get_close_matches(str(details["input"]), re.findall("'([^']*)'", known), n=1)
-        message = f"{reprlib.repr(details['input'])} must be {known}" + (f"; did you mean {near[0]!r}?" if near else "")
+        left_out = f"; leave {location[-1]} out where none is meant" if _may_be_left_out(model, location) else ""
+        hint = f"; did you mean {near[0]!r}?" if near else left_out
+        message = f"{reprlib.repr(details['input'])} must be {known}{hint}"
     elif details["type"] == "union_tag_invalid":
         where = f"{where}.kind" if where else "kind"
         message = f"{reprlib.repr(details['input']['kind'])} is not one I know; write {details['ctx']['expected_tags']}"
@@ -248,8 +250,20 @@ def _tags(model: type[BaseModel]) -> set[str]:
     return {kind for member in members for kind in _kinds(member)}
 
 
+def _may_be_left_out(model: type[BaseModel], location: Sequence[Any]) -> bool:
+    """Whether the value at `location` stands for nothing where it is left out: the key of a table without a default."""
+    tables = _tables(model, location[:-1])
+    return any(m.model_fields[location[-1]].default is None for m in tables if location[-1] in m.model_fields)
+
+
 def _keys(model: type[BaseModel], location: Sequence[Any]) -> list[str]:
     """What may stand in the table at `location`, a path of keys, indices and kinds."""
+    tables = _tables(model, location)
+    return list(dict.fromkeys(field.alias or key for m in tables for key, field in m.model_fields.items()))
+
+
+def _tables(model: type[BaseModel], location: Sequence[Any]) -> list[type[BaseModel]]:
+    """The tables that may stand at `location`."""
     models = [model]
     for part in location:
         fields = [m.model_fields[part] for m in models if part in m.model_fields]
@@ -257,7 +271,7 @@ def _keys(model: type[BaseModel], location: Sequence[Any]) -> list[str]:
             models = [member for field in fields for member in _models(field.annotation)]
         else:
             models = [m for m in models if part in _kinds(m)] or models
-    return list(dict.fromkeys(field.alias or key for m in models for key, field in m.model_fields.items()))
+    return models
 
 
 def read_bytes(path: Path) -> bytes:

@@ -49,6 +49,7 @@ SensorName = Literal[
     "tachometer",
     "camera",
     "autocollimator",
+    "laser triangulation",
     "accelerometer",
 ]
 # By what an actuator works. A servo, as a servo motor with its own controller is called for short, works as its motor does.

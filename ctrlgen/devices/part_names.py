@@ -67,6 +67,13 @@ OTHER_WORDS: Mapping[str, tuple[str, ...]] = {
     "tachometer": ("tacho", "speed sensor"),
     "camera": ("vision", "machine vision", "microscope", "video"),
     "autocollimator": ("electronic autocollimator",),
+    "laser triangulation": (
+        "triangulation sensor",
+        "laser displacement sensor",
+        "laser distance sensor",
+        "confocal sensor",
+        "chromatic confocal sensor",
+    ),
     "accelerometer": ("acceleration sensor", "accelerometers"),
 }
 """By the name of a part what else it is called; a word stands in one list."""
