@@ -119,7 +119,14 @@ def test_the_laws_of_two_channels_and_those_with_a_clock_are_these():
     assert {k for k, law in library if law.pairs} == two | mirrors
     finer = {"weighted_displacement_hysteresis", "weighted_drive_hysteresis"}
     finer |= {"power_creep", "bouc_wen_of_power", "displacement_bouc_wen_of_power"}
-    finer |= {"cogging_of_slots", "worn_backlash", "stribeck_above", "stribeck_after", "stribeck_below"}
+    finer |= {
+        "moving_average",
+        "cogging_of_slots",
+        "worn_backlash",
+        "stribeck_above",
+        "stribeck_after",
+        "stribeck_below",
+    }
     assert {k for k, law in library if not prior_of(law).suspected} == empirical | finer | mirrors | {
         "plane_mirror",
     }

@@ -106,6 +106,8 @@ def test_a_rise_is_half_over_at_its_moment(way):
         ("cyclic", "feedthrough", "what the fringes give is wired beside the drive"),
         ("feedthrough", "low_pass", "what is picked up is filtered with the rest"),
         ("low_pass", "delay", "a filtered reading is sent"),
+        ("low_pass", "moving_average", "what is filtered is sampled and averaged"),
+        ("moving_average", "delay", "a mean is sent"),
         ("delay", "quantisation", "digits are what arrives"),
         ("delay", "stuck", "what no longer changes is what arrives"),
     ],

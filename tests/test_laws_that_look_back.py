@@ -20,6 +20,7 @@ NUMBERS = {
     "asymmetric_slew_rate": 'at = "axis"\nshare = "1"\nrate = "250 V/s"\nexcess = "0.5"',
     "drive_quantisation": 'at = "axis"\nshare = "1"\nquantum = "2 mV"\ngrid = "0"\nrounding = "0.01"',
     "delay": 'at = "axis"\ndelay = "2 ms"',
+    "moving_average": 'at = "axis"\nwindow = "2 ms"',
     "slew_rate": 'at = "axis"\nshare = "1"\nrate = "250 V/s"',
     "warm_up": 'at = "axis"\nsize = "1 um"\ntau = "2 s"',
 }

@@ -283,9 +283,10 @@ OF_EACH_RECORD = {
     "drift_per_record",
     "sensor_step_per_record",
 }  # found in tests/test_of_each_record.py
-# found in tests/test_finer_forms.py
+# found in tests/test_finer_forms.py and tests/test_found_window.py
 FINER = {
     "bouc_wen_of_power",
+    "moving_average",
     "power_creep",
     "cogging_of_slots",
     "worn_backlash",

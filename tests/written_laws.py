@@ -180,6 +180,7 @@ LAWS = {
     "dead_zone": ({"rounding": 0.3}, dead),
     "degradation": ({"levels_off": 3.0}, lambda s, p: -p.rate * 3.0 * (1 - exp(-s.t / 3.0)) * s.value),
     "delay": None,  # below: exact for the polynomials that it interpolates by
+    "moving_average": None,  # tests/test_moving_average.py: exact for the polynomials whose mean it takes
     "drift": ({}, lambda s, p: p.rate * s.t),
     "drive_gain": ({}, lambda s, p: p.gain * s.value),
     "drive_hysteresis": ({"reach": 0.3, "taper": 0.5}, lambda s, p: -p.share * weighted(s, p, s.value)),

@@ -22,8 +22,9 @@ with an underscore are no laws: the law's interface, the reader of [[effect]] ta
 from importlib import import_module
 from pkgutil import iter_modules
 
+from ctrlgen.effects._between_samples import Between
 from ctrlgen.effects._channel_group import group, is_group, means, overlap
-from ctrlgen.effects._effect import Effect, Place
+from ctrlgen.effects._effect import Apart, Effect, Place
 from ctrlgen.effects._family import Family
 from ctrlgen.effects._installed import Installed, LeftOut, installed, law_of, laws, load_laws
 from ctrlgen.effects._law_inputs import Expression, LawInputs, LawNumbers
@@ -41,6 +42,8 @@ for _module in iter_modules(__path__):
 __all__ = [
     "REQUIREMENTS",
     "ActsIn",
+    "Apart",
+    "Between",
     "Channel",
     "Effect",
     "EffectTable",

@@ -29,6 +29,13 @@ class Place(Enum):
     SENSOR = "sensor"  # between the platform and the reported pose
 
 
+class Apart(Enum):
+    """How a law that remembers much is applied to a reading as a whole, with its amplitude [s]."""
+
+    LATE = "late"  # the reading of so long ago
+    MEAN = "mean"  # its mean over the time since
+
+
 class Effect:
     """Base of every effect: one law a file in `ctrlgen/effects/`, or in a package of its author. One that acts at several places or axes
     is named for each.
@@ -57,7 +64,7 @@ class Effect:
     acts_in: ClassVar[ActsIn | None] = None
     # Remembers so much that a simulation of a recording applies it to the simulated readings as a whole, where nothing follows it,
     # and leaves it out of the model: `estimation.late_readings`.
-    apart: ClassVar[bool] = False
+    apart: ClassVar[Apart | None] = None
     # Follows a reading in steps, between which it has no slope: where nothing follows it, a fit leaves it out and takes it as noise.
     in_steps: ClassVar[bool] = False
     # What the device must have: words of `_requirements`.
@@ -84,6 +91,8 @@ class Effect:
     limits_rate: ClassVar[str] = ""
     # Its amplitude [s] moves a signal in time, so far that no slope at zero tells what it would explain.
     moves_in_time: ClassVar[bool] = False
+    # Of a law that looks back, or shifts: by how much of its amplitude [s] a slow reading comes late.
+    late_by: ClassVar[float] = 0.0
     # Of a wave, with a `phase`: further numbers that change their sign with its amplitude, as those of even harmonics do half a turn later.
     of_even_harmonics: ClassVar[tuple[str, ...]] = ()
     # The force at standstill takes any value that holds the stage there (dry friction). The integrator must then be

@@ -19,6 +19,7 @@ class ClockOffset(Effect):
     params = (Param("offset", "ms", (0.0, 3.6e6), "how far the readings are ahead of the drive", off=0.0),)
     shifts_drive = True
     moves_in_time = True
+    late_by = -1.0
 
     def term(self, s: LawInputs, p: LawNumbers) -> Expression:
         return 0.0 * p.offset

@@ -14,7 +14,7 @@ class Quantisation(Effect):
 
     place = Place.SENSOR
     family = Family.PERIODIC
-    order = 4
+    order = 5
     source = "B. Widrow, I. Kollar, Quantization Noise (2008)"
     params = (
         Param("share", "1", (0.0, 1.5), "1: every reading is rounded", off=0.0),

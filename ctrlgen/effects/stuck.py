@@ -8,7 +8,7 @@ class Stuck(Effect):
 
     place = Place.SENSOR
     family = Family.GAIN
-    order = 4
+    order = 5
     source = "R. Isermann, Fault-Diagnosis Systems (2006): sensor faults"
     params = (
         Param("share", "1", (0.0, 1.2), "1: nothing of the motion is read", off=0.0),

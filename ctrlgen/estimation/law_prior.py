@@ -83,9 +83,11 @@ class LawPrior:
     log_prior_odds: ln of how many times commoner the law is than a wrong gain; decides among causes that explain alike.
     model_form_error: error of the law's form after its parameters are fitted, as a share of what the law explains.
     form_of: name of the physics of which laws are forms, finer than their `Effect.family`; a place has at most one form of it.
-    refines: the plainer laws of which this is a finer form, with more numbers. It is never suspected itself, but tried in the place of
-        one of them that is among the causes, where that leaves more than noise.
+    refines: the plainer laws of which this is a finer form, with more numbers or for signals that change faster. It is never suspected
+        itself, but tried in the place of one of them that is among the causes, where that leaves more than noise.
     in_place_of: laws of which it is no form, that are nearly the same: it is tried in their place where more than noise is left with them.
+    also_in_place_of: laws that stand beside one that it refines, at the same channel, where each is a part of what it does: it is tried in
+        the place of all of them too.
     unless: what a device must not have (words of `Effect.requires`) for the law to be suspected there: another law says the same.
     suspected: False for what a device file may state, and no recording shows beside what else it shows.
     in_a_region: the law is another one in a part of the motion: it is tried beside the others and never takes their turn.
@@ -113,6 +115,7 @@ class LawPrior:
     form_of: str | None = None
     refines: frozenset[str] = frozenset()
     in_place_of: frozenset[str] = frozenset()
+    also_in_place_of: frozenset[str] = frozenset()
     unless: frozenset[str] = frozenset()
     suspected: bool = True
     in_a_region: bool = False

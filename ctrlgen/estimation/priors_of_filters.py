@@ -21,6 +21,14 @@ OF_FILTERS: Mapping[str, LawPrior] = {
         model_form_error=0.005,
         parameters=SECOND_ORDER_FILTER,
     ),
+    "moving_average": LawPrior(
+        "To second order in the frequency it is a filter of two poles, or a delay, which are named where they are enough; error of the "
+        "interpolation between samples: 0.1 %, judgement, as of a delay.",
+        suspected=False,
+        refines=frozenset({"low_pass", "delay"}),
+        also_in_place_of=frozenset({"low_pass", "delay", "notch", "amplifier_lag"}),
+        model_form_error=0.001,
+    ),
     "soft_coupling": LawPrior(
         "A load has more than one mode; 1 %: judgement. Of an axis whose mass is described it is a resonance. Octaves, lightly and "
         "well damped.",

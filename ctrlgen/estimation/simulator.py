@@ -24,7 +24,7 @@ from ctrlgen.estimation.forward_sensitivities import (
     written_out,
 )
 from ctrlgen.estimation.hypothesis import nominal_physics
-from ctrlgen.estimation.late_readings import LateReading, effects_apart, late_readings, read_late, unknown_samples
+from ctrlgen.estimation.late_readings import effects_apart, late_readings, read_afterwards
 from ctrlgen.estimation.moved_drive import with_drive_at
 from ctrlgen.estimation.sample_equations import SampleEquations, build_sample_equations
 from ctrlgen.estimation.settings import SIMULATION
@@ -233,11 +233,8 @@ class Simulator:
         record = self.aligned(record, p)
         c = self._with_rates.constants(p)[0].full().T
         after, values = self._recursion.run(self.starting_state(record, p, start), *self.inputs(record), c)
-        y = values[:, : len(self.channels)]
-        for late in self.late:
-            read = read_late(late.signals(values), late.age(p), self.sample_time)[0]
-            y[:, late.row] = _with_unknown(read, record, late, late.age(p))
-        return after, y
+        read_afterwards(self.late, record, p, values)
+        return after, values[:, : len(self.channels)]
 
     def sensitivities(
         self, record: Record, p: np.ndarray, start: np.ndarray | None = None, by_free: bool = True
@@ -264,16 +261,8 @@ class Simulator:
         values = recursion.run(first, *self.inputs(record), *constant)[1]
         rows = n_y + self._rates.numel()
         values, Y = values[:, :rows], values[:, rows:].reshape(n, rows, k + n_i)
+        read_afterwards(self.late, record, p, values, Y, by_free)
         y, slopes = values[:, :n_y], Y[:, :n_y]
-        for late in self.late:
-            age = late.age(p)
-            read, by_age = read_late(late.signals(values), age, self.sample_time)
-            of_read = read_late(late.signals(Y), age, self.sample_time)[0]
-            if late.free is not None and by_free:
-                of_read[:, late.free] += by_age
-            unknown, behind = unknown_samples(age, self.sample_time, n)
-            of_read[unknown] = of_read[behind]
-            y[:, late.row], slopes[:, late.row] = _with_unknown(read, record, late, age), of_read
         if by_clock is not None:
             slopes[:, :, clock] = by_clock
         return y, slopes if asked else slopes[:, :, k:]
@@ -354,15 +343,6 @@ class Simulator:
         if not self.poses:
             return u, np.vstack([u[1:], u[-1:]]), ambient
         return np.vstack([u[:1], u[:-1]]), u, ambient
-
-
-def _with_unknown(read: np.ndarray, record: Record, late: LateReading, age: float) -> np.ndarray:
-    """A late reading (n,), as wrong where it shows what was before the record as it is just afterwards."""
-    unknown, behind = unknown_samples(age, record.sample_time, len(read))
-    observed, valid = record.observed[:, late.row], record.valid[:, late.row]
-    wrong = np.where(valid[behind], observed[behind] - read[behind], 0.0)
-    read[unknown] = np.where(valid[unknown], observed[unknown] - wrong, read[behind])
-    return read
 
 
 @lru_cache(maxsize=SIMULATION.kept)

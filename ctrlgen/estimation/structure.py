@@ -15,7 +15,7 @@ import numpy as np
 from ctrlgen.devices import Device
 from ctrlgen.estimation.device_with_causes import device_with_causes
 from ctrlgen.estimation.free_parameters import FreeParameter, free_parameters
-from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, nominal_physics
+from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis, is_of_effect, nominal_physics
 from ctrlgen.estimation.late_readings import effects_apart
 from ctrlgen.estimation.simulator import Simulator, compiled_simulator
 from ctrlgen.recordings.recording import Timing
@@ -143,17 +143,18 @@ class Structure:
     def _kept_shifts(self, found: Sequence[FreeParameter]) -> dict[int, float]:
         """How far each of the numbers `found`, by its place among them, may shift a reading [s] with the samples that a simulator keeps;
         those alone of which it keeps samples."""
-        shifts = [i for i, p in enumerate(found) if p.cause is not None and p.amplitude and self.causes[p.cause].shifts]
-        if not shifts:
-            return {}
         device = self.expanded_device
+        places = {
+            i: int(p.path.removeprefix("effect[").partition("]")[0])
+            for i, p in enumerate(found)
+            if p.cause is not None and p.amplitude and is_of_effect(p.path)
+        }
+        late = {i: k for i, k in places.items() if device.effect[k].late_by}
+        if not late:
+            return {}
         apart = effects_apart(device, nominal_physics(self.device), [p.path for p in found])
-        kept = {}
-        for i in shifts:
-            k = int(found[i].path.removeprefix("effect[").partition("]")[0])
-            if k not in apart:
-                kept[i] = device.effect[k].reaches(self.cause_of(found[i]).sample_time)
-        return kept
+        steps = {i: self.cause_of(found[i]).sample_time for i in late}
+        return {i: device.effect[k].reaches(steps[i]) for i, k in late.items() if k not in apart}
 
     def with_room(self, theta: np.ndarray | None = None) -> Structure:
         """The same with those delays begun, and expanded, where they start, or end at `theta` (k,), that are as long there as the samples

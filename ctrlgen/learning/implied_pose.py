@@ -163,12 +163,11 @@ class ImpliedPose:
 
 
 def _late(effects: tuple[Effect, ...], signal: Signal) -> np.ndarray:
-    """(n_y,) [s] by which stated delays let readings come late; clocks that run ahead count against it."""
+    """(n_y,) [s] by which stated delays, and means over a window, let readings come late; clocks that run ahead count against it."""
     late = np.zeros(len(signal.channels))
     for e in effects:
-        if e.place is Place.SENSOR and e.moves_in_time:
-            age = e.values[e.amplitude().name].si
-            late[_acted(e, signal)] += -age if e.shifts_drive else age
+        if e.place is Place.SENSOR and e.late_by:
+            late[_acted(e, signal)] += e.late_by * e.values[e.amplitude().name].si
     return late
 
 

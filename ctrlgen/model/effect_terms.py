@@ -166,12 +166,24 @@ class EffectTerms:
         )
 
     def _of_platform(self, value: ca.SX) -> dict[str, ca.SX]:
-        """The derivatives by time of a signal of the platform, where the motion gives them."""
+        """The derivatives by time of a signal of the platform, where the motion gives them, and the laws of the sensor that it has passed:
+        none of one that keeps samples does."""
         if not isinstance(self.physics, InertialPhysics):
             return {}
-        z, v = self.displacement, self.velocity
-        rate = ca.jtimes(value, z, v) + ca.jtimes(value, v, self.acceleration)
-        return {"rate": rate, "second_rate": ca.jtimes(rate, z, v) + ca.jtimes(rate, v, self.acceleration)}
+        sensor = [m for m in self.members if m.effect.place is Place.SENSOR and m.rates]
+        kept = [ca.vertcat(*m.states.values()) for m in sensor if LOOKS_BACK in m.effect.requires]
+        if any(ca.depends_on(value, states) for states in kept):
+            return {}
+        moved = [(self.displacement, self.velocity), (self.velocity, self.acceleration)]
+        moved += [
+            (m.states[name], rate) for m in sensor for name, rate in m.rates.items() if m.states[name].is_symbolic()
+        ]
+
+        def rate_of(signal: ca.SX) -> ca.SX:
+            return sum((ca.jtimes(signal, x, rate) for x, rate in moved), ca.SX(0))
+
+        rate = rate_of(value)
+        return {"rate": rate, "second_rate": rate_of(rate)}
 
     def _of_axis(self, i: int) -> dict[str, ca.SX]:
         """The motion, force and heater of axis i."""

@@ -181,10 +181,10 @@ def _linearised(
 
 
 def _ages(simulator: Simulator, record: Record, p: np.ndarray) -> tuple[int, ...]:
-    ages = [0] * len(simulator.channels)
+    ages = [0.0] * len(simulator.channels)
     for late in simulator.late:
-        ages[late.row] = min(round(late.age(p) / record.sample_time), len(record.time))
-    return tuple(ages)
+        ages[late.row] += late.age(p) / record.sample_time
+    return tuple(min(round(age), len(record.time)) for age in ages)
 
 
 def _velocity(r: Simulator, record: Record, at: np.ndarray, z: np.ndarray) -> np.ndarray:

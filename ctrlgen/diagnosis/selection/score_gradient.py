@@ -114,11 +114,11 @@ class ScoreGradient:
         total = Sums.none(U.shape[2], len(self.columns), each_alone)
         lost = np.zeros(len(self.laws.terms) + len(self.sizes), bool)
         h = self.record.sample_time
-        late = {r.row: LateSlopes(r.age(self.p), h) for r in self.simulator.late}
+        late = [(r.row, LateSlopes(r.reach(self.p), h, r.how)) for r in self.simulator.late]
         for a, b, readings in self.blocks(start, lost):
             for i, Y in enumerate(readings):
-                if i in late:
-                    Y = late[i].late(Y)
+                for row, slopes in late:
+                    Y = slopes.late(Y) if row == i else Y
                 if len(noise.ar[i]):
                     Y = np.vstack([tails[i], Y])
                     tails[i] = Y[len(Y) - len(tails[i]) :]
