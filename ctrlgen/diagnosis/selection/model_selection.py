@@ -293,10 +293,11 @@ class ModelSelection:
 
 
 def in_finer_form(before: Sequence[Hypothesis], after: Sequence[Hypothesis]) -> bool:
-    """Whether what is new in `after` are finer forms of the laws of `before` that are gone, and there is something new."""
+    """Whether what is new in `after` are finer forms of the laws of `before` that are gone, and there is something new, no more of
+    them than laws that are gone."""
     new = {c for c in after if c not in before}
     forms = [f for c in before if c not in after and c.effect != PARAMETER for f in c.finer]
-    return bool(new) and len(after) == len(before) and new <= set(forms)
+    return bool(new) and len(after) <= len(before) and new <= set(forms)
 
 
 def _lost(bare: CandidateModel, full: CandidateModel) -> float:

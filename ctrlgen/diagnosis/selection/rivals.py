@@ -12,6 +12,7 @@ from ctrlgen.diagnosis.selection.candidates import significant
 from ctrlgen.diagnosis.selection.cause_entry import trying
 from ctrlgen.diagnosis.selection.confusable import explains_alike, explains_better, is_commoner
 from ctrlgen.diagnosis.selection.failures import FAILURES
+from ctrlgen.diagnosis.selection.finer_forms import as_one_law
 from ctrlgen.diagnosis.selection.form_errors import follows_the_motion_as_well, hardly_told, hidden_rivals
 from ctrlgen.diagnosis.selection.model_selection import scored
 from ctrlgen.diagnosis.selection.other_laws import stands_for_another
@@ -45,7 +46,11 @@ def swapped(trials: Trials, current: CandidateModel, before: int) -> CandidateMo
 def simplified(trials: Trials, current: CandidateModel) -> CandidateModel:
     """The model with the plainer law in place of each one that generalises it, where the fit does not exclude that both are one and it
     explains alike: how the friction falls with speed, say, is then within what noise or discrepancy feigns. Likewise where what the law
-    has more is too little to name beside what is left anyway: a friction that differs by 2 % between the directions is dry friction."""
+    has more is too little to name beside what is left anyway: a friction that differs by 2 % between the directions is dry friction. And
+    with one law in the place of several that are parts of it (`as_one_law`)."""
+    for t in as_one_law(trials, current):
+        if explains_alike(trials.selection, t, current) and not trials.objections(t, current.causes):
+            return simplified(trials, t)
     for k in range(len(current.causes)):
         coarser = _coarser(trials, current, k)
         if coarser is not current:
