@@ -218,7 +218,8 @@ def test_where_what_is_left_alone_tells_the_noise_finer_forms_are_tried(source, 
         return []
 
     current.fit.values, current.fit.objective = (lambda k: {}), 1.0
-    finer_forms(SimpleNamespace(fitter=SimpleNamespace(noise=noise), each=each), current)
+    fitter = SimpleNamespace(noise=noise, recording=SimpleNamespace(channels=("reading.axis",)))
+    finer_forms(SimpleNamespace(fitter=fitter, each=each), current)
     assert [finer.effect for _, finer in forms] == (["bouc_wen_of_power"] if tried else [])
 
 

@@ -143,11 +143,12 @@ ELSEWHERE = replace(NOTCH, location="actuator:other", at="other")
     ("causes", "places"),
     [
         ((LOW_PASS,), []),
-        ((LOW_PASS, NOTCH), [{0, 1}]),
-        ((NOTCH, LOW_PASS), [{0, 1}]),
+        ((LOW_PASS, NOTCH), [{0, 1}, {1}]),
+        ((NOTCH, LOW_PASS), [{0, 1}, {0}]),
         ((LOW_PASS, DELAY), [{0, 1}]),
-        ((LAG, NOTCH), []),  # nothing that a mean is a finer form of
-        ((LAG, OFFSET, DELAY, NOTCH), [{0, 2, 3}]),
+        ((NOTCH,), [{0}]),
+        ((LAG, NOTCH), [{0, 1}, {0}, {1}]),
+        ((LAG, OFFSET, DELAY, NOTCH), [{0, 2, 3}, {0}, {3}]),
         ((LOW_PASS, ELSEWHERE, OFFSET), []),
     ],
 )
@@ -157,7 +158,11 @@ def test_a_mean_is_tried_in_the_place_of_all_that_may_be_its_parts(causes, place
     fit = SimpleNamespace(restarted=structure, values=lambda k: numbers[causes[k]])
     forms: list[tuple[tuple[int, ...], Hypothesis]] = []
     as_one_law(
-        SimpleNamespace(each=lambda one, found, told: forms.extend(found) or []),
+        SimpleNamespace(
+            each=lambda one, found, told: forms.extend(found) or [],
+            fitter=SimpleNamespace(recording=SimpleNamespace(channels=("reading.axis",))),
+            selection=SimpleNamespace(ranked=list),
+        ),
         SimpleNamespace(causes=causes, fit=fit),
     )
     assert [set(there) for there, _ in forms] == places and {law for _, law in forms} <= {MEAN}

@@ -86,8 +86,8 @@ class LawPrior:
     refines: the plainer laws of which this is a finer form, with more numbers or for signals that change faster. It is never suspected
         itself, but tried in the place of one of them that is among the causes, where that leaves more than noise.
     in_place_of: laws of which it is no form, that are nearly the same: it is tried in their place where more than noise is left with them.
-    also_in_place_of: laws that stand beside one that it refines, at the same channel, where each is a part of what it does: it is tried in
-        the place of all of them too.
+    also_in_place_of: laws at the same channel, of the drive too, that may each be a part of what it does: it is tried in the place of
+        them, and of them and those that it refines together.
     unless: what a device must not have (words of `Effect.requires`) for the law to be suspected there: another law says the same.
     suspected: False for what a device file may state, and no recording shows beside what else it shows.
     in_a_region: the law is another one in a part of the motion: it is tried beside the others and never takes their turn.

@@ -26,7 +26,7 @@ OF_FILTERS: Mapping[str, LawPrior] = {
         "interpolation between samples: 0.1 %, judgement, as of a delay.",
         suspected=False,
         refines=frozenset({"low_pass", "delay"}),
-        also_in_place_of=frozenset({"low_pass", "delay", "notch", "amplifier_lag"}),
+        also_in_place_of=frozenset({"notch", "amplifier_lag"}),
         model_form_error=0.001,
     ),
     "soft_coupling": LawPrior(

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel
 from ctrlgen.diagnosis.selection.cause_entry import trying
+from ctrlgen.diagnosis.selection.confusable import explains_alike
 from ctrlgen.diagnosis.selection.failures import FAILURES
 from ctrlgen.diagnosis.selection.trials import Trials
 from ctrlgen.diagnosis.settings import SEARCH
-from ctrlgen.effects import overlap
-from ctrlgen.estimation.hypothesis import DataHints, Hypothesis, nominal_physics
+from ctrlgen.effects import laws
+from ctrlgen.estimation.hypothesis import DOMAIN, DataHints, Hypothesis, nominal_physics
+from ctrlgen.estimation.priors import prior_of
 from ctrlgen.estimation.settings import FIT
 from ctrlgen.estimation.structure import Structure
-from ctrlgen.model.effect_terms import available
+from ctrlgen.model.effect_terms import available, channels
 
 Form = tuple[tuple[int, ...], Hypothesis]
 """The places, among the causes of a model, of the law that a finer form takes the place of, of those that it does the work of too, and the
@@ -25,17 +28,25 @@ finer form."""
 
 def finer_forms(trials: Trials, current: CandidateModel) -> tuple[CandidateModel, ...]:
     """`current` with a finer form of one of its laws in that one's place, or with a law that is suspected too and nearly the same
-    (`LawPrior.in_place_of`), for each that has one, where more than noise is left, or where what is left alone tells the noise."""
+    (`LawPrior.in_place_of`), or in the place of what may be its parts, for each that has one, where more than noise is left, or where what
+    is left alone tells the noise."""
     if current.errors.is_noise and trials.fitter.noise.known.all():
         return ()
-    return _fitted(trials, current, [*_of_one(trials, current), *_of_several(trials, current)], current.fit.objective)
+    return _fitted(trials, current, [*_of_one(trials, current), *_of_parts(trials, current)], current.fit.objective)
 
 
 def as_one_law(trials: Trials, current: CandidateModel) -> tuple[CandidateModel, ...]:
-    """`current` with a finer form of one of its laws in the place of that and of others that may be parts of it, as a filter and a notch
-    are of a mean over a window (`LawPrior.also_in_place_of`), fitted to its end."""
-    fits = _fitted(trials, current, _of_several(trials, current), np.inf)
-    return tuple(trials.converged(t) for t in fits)
+    """`current` with one law in the place of what may be its parts, as a filter and a notch are of a mean over a window
+    (`LawPrior.also_in_place_of`), fitted to its end: of several that explains alike, of one that leaves less on both kinds of records."""
+    compare = trials.selection
+    found: list[CandidateModel] = []
+    for form in _of_parts(trials, current):
+        for t in (trials.converged(t) for t in _fitted(trials, current, [form], np.inf)):
+            errors = compare.reference((current, t))
+            less = all(loss(t, errors) < loss(current, errors) for loss in (compare.fit_loss, compare.held_out_loss))
+            if less or (len(form[0]) > 1 and explains_alike(compare, t, current)):
+                found.append(t)
+    return tuple(compare.ranked(found))
 
 
 def _of_one(trials: Trials, current: CandidateModel) -> list[Form]:
@@ -47,18 +58,22 @@ def _of_one(trials: Trials, current: CandidateModel) -> list[Form]:
     ]
 
 
-def _of_several(trials: Trials, current: CandidateModel) -> list[Form]:
-    """The finer forms that may be what several causes are at one channel, each once."""
-    forms: dict[tuple[Hypothesis, frozenset[int]], Form] = {}
-    for (k,), finer in _of_one(trials, current):
-        parts = [
-            j
-            for j, c in enumerate(current.causes)
-            if j != k and c.effect in finer.prior.also_in_place_of and overlap(c.at, finer.at)
-        ]
-        if parts:
-            forms.setdefault((finer, frozenset((k, *parts))), ((k, *parts), finer))
-    return list(forms.values())
+def _of_parts(trials: Trials, current: CandidateModel) -> list[Form]:
+    """The laws that may be what causes at one channel are: all of them together, and each that the law does not refine."""
+    device = current.fit.restarted.device
+    forms: list[Form] = []
+    for kind, law in sorted(laws().items()):
+        also, refined = (getattr(prior_of(law), name) for name in ("also_in_place_of", "refines"))
+        own = channels(nominal_physics(device), law.place) if also else []
+        for at in [c.name for c in own if f"reading.{c.name}" in trials.fitter.recording.channels]:
+            parts = [k for k, c in enumerate(current.causes) if c.effect in also | refined and c.at == at]
+            wholes = [tuple(parts)] if len(parts) > 1 else []
+            for places in (*wholes, *((k,) for k in parts if current.causes[k].effect not in refined)):
+                first = current.causes[places[0]]
+                finer = replace(first, effect=kind, location=f"{DOMAIN[law.place]}:{at}", at=at, of=None, count=0)
+                if can_have(device, finer):
+                    forms.append((places, finer))
+    return forms
 
 
 def _fitted(

@@ -49,7 +49,7 @@ def simplified(trials: Trials, current: CandidateModel) -> CandidateModel:
     has more is too little to name beside what is left anyway: a friction that differs by 2 % between the directions is dry friction. And
     with one law in the place of several that are parts of it (`as_one_law`)."""
     for t in as_one_law(trials, current):
-        if explains_alike(trials.selection, t, current) and not trials.objections(t, current.causes):
+        if not trials.objections(t, current.causes):
             return simplified(trials, t)
     for k in range(len(current.causes)):
         coarser = _coarser(trials, current, k)
