@@ -17,6 +17,7 @@ for part in ("fmi1", "fmi2", "fmi3", "validation"):
     import_module(f"fmpy.{part}")
 
 CREEP = {"kind": "creep", "at": "all", "gain": "0.03", "tau": "20 ms", "slow": "0.3"}
+MEAN = {"kind": "moving_average", "at": "all", "window": "5.4 ms"}
 DELAY = {"kind": "delay", "at": "all", "delay": "2.5 ms"}
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import SCENARIOS, effect_device
-from fmu_units import CREEP, DELAY, apart, axis_scenario, fmpy, opened, run_plant
+from fmu_units import CREEP, DELAY, MEAN, apart, axis_scenario, fmpy, opened, run_plant
 
 from ctrlgen import build_model, load_scenario, simulate
 from ctrlgen.firmware.c.deviations import permits
@@ -36,7 +36,7 @@ def test_plants_without_memory_or_with_coupled_stages_move_as_the_model(name, co
     assert apart(ours["displacement"], expected.signals["displacement"]) < 1e-12
 
 
-@pytest.mark.parametrize("effect", [CREEP, DELAY], ids=["creep", "delay"])
+@pytest.mark.parametrize("effect", [CREEP, DELAY, MEAN], ids=["creep", "delay", "mean"])
 def test_memories_of_effects_are_in_the_plant(effect, circle, compiler, tmp_path):
     scenario = replace(load_scenario(SCENARIOS / "circle20"), device=effect_device(effect))
     plant = plant_of(scenario)

@@ -70,6 +70,8 @@ def test_a_stated_delay_and_a_filter_are_taken_out_of_the_readings(circle):
     lifted = Lifted(late)
     implied, k = ImpliedPose(lifted), np.arange(200)
     assert implied.late == pytest.approx(12.5e-3)
+    mean = with_laws(circle, {"kind": "moving_average", "at": "all", "window": "25 ms"})
+    assert ImpliedPose(Lifted(mean)).late == pytest.approx(implied.late)  # by half of its window
     y = np.sin(2 * np.pi * (k - 2.5) / 200)[None, :, None] * np.ones(6)
     moved = in_time(Run(("a",), late.drive, y), lifted, implied.late)
     assert moved[0, :, 0] == pytest.approx(np.sin(2 * np.pi * k / 200), abs=1e-7)  # the cubic between samples
