@@ -143,7 +143,9 @@ def test_the_parts_of_one_file_have_one_zero():
     zero, jump = (Hypothesis(f"{law}_per_record", "sensor:axis", "axis") for law in ("zero", "sensor_step"))
     assert not may_differ(zero, one) and may_differ(zero, two)
     assert may_differ(jump, one)
-    assert "zero_per_record" not in effects(diagnosed(one)) and effects(diagnosed(two)) == ["zero_per_record"]
+    of_one = diagnosed(one)
+    assert "zero_per_record" not in effects(of_one) and effects(diagnosed(two)) == ["zero_per_record"]
+    assert explain(of_one, "zero_per_record")[0].endswith("another one in each run, and one run alone was recorded.")
 
 
 RATES = (0.3, -0.5, 0.2, 0.7)  # um/s

@@ -335,7 +335,8 @@ def why_not_offered(
     there = available(physics, sample_time) - (frozenset() if ambient else {"ambient"})
     prior = prior_of(law)
     if prior.refines:
-        return f"it is tried in place of {' or '.join(sorted(prior.refines))} alone"
+        plainer = sorted(prior.refines | prior.also_in_place_of)
+        return f"it is tried in place of {' or '.join(plainer)} alone"
     if not prior.suspected:
         return f"it is never suspected: {prior.reason}"
     if there_already := prior.unless & there:

@@ -19,6 +19,7 @@ from ctrlgen.diagnosis.settings import SEARCH
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.hypothesis import Hypothesis, nominal_physics, selected_laws, why_not_offered
 from ctrlgen.estimation.law_needs import not_offered
+from ctrlgen.estimation.priors import prior_of
 from ctrlgen.reporting.numbers import number, with_unit
 
 # attempts of one cause that are listed, the best first
@@ -46,6 +47,8 @@ def _why_not_offered(diagnosis: Diagnosis, law: type[Effect]) -> str:
     recording, device = diagnosis.recording, diagnosis.device
     if why := not_offered([law.kind], device.parts(nominal_physics(device))).get(law.kind):
         return why
+    if prior_of(law).of_each_record and recording.kind == "series":
+        return "it is another one in each run, and one run alone was recorded"
     shortest = min(r.sample_time for r in recording.records)
     return (
         why_not_offered(
@@ -168,4 +171,6 @@ def _never_fitted(diagnosis: Diagnosis, h: Hypothesis) -> str:
                 names = [u.path for u in diagnosis.search.nominal.fit.structure.free_parameters]
                 like = f"its effect is that of {names[k]}" if 0 <= k < len(names) else "it does not reach the readings"
                 return f"this recording cannot show it: {like}"
+    if h.shifts:
+        return "no screen sees a shift of many samples, and the best of those looked at promised too little for a fit"
     return "never screened"
