@@ -118,6 +118,22 @@ def test_a_finding_tells_its_edge_no_more_narrowly_than_that():
         assert not unsure or by_form[1] > out_to_visited((0.0, 5.0 + unsure / 2), visited)[1]
 
 
+@pytest.mark.parametrize("level", [-0.8, -0.2, 0.2, 0.8])
+def test_a_limit_of_one_sign_has_its_edge_beside_drives_of_that_sign(level):
+    """Drives of both signs are recorded: the edge ends at the next of them, not across zero."""
+    fitter = fitter_of(n=400)
+    limit = Hypothesis("one_sided_saturation", "actuator:axis", "axis")
+    fit = fitter.fit(Structure(AXIS).with_cause(limit, {"level": level}), steps=0)
+    path = next(u.path for u in fit.structure.free_parameters if u.name == "level")
+    ends = edge_intervals(fitter, fit, {u.path: (level, level) for u in fit.structure.free_parameters})[path]
+    drives = np.concatenate([r.drive[:, 0] for r in fitter.fit_records])
+    within = np.abs(drives[(drives * level > 0) & (np.abs(drives) < 0.999 * abs(level))]).max()
+    inner, outer = sorted(map(abs, ends))
+    # the softness of the limit, a ten thousandth of it, is beside both
+    assert inner == pytest.approx(within, abs=2e-3 * abs(level)) and outer == pytest.approx(abs(level), rel=2e-3)
+    assert ends[0] <= level <= ends[1] and ends[0] * ends[1] > 0
+
+
 @pytest.mark.exhaustive
 def test_intervals_of_ends_hold_those_of_the_independent_plant():
     """One case of each law that is not of its own form there; docs/evidence/concealed_cases.md counts more of them."""

@@ -150,7 +150,8 @@ def _length(facts: TableFacts) -> str:
         why = f"the time {facts.falls!r} falls: newest row first" if facts.falls else "no column is a time"
         return f"{number_of(facts.rows, 'row')}, {why}"
     step, gaps = facts.time.step, facts.time.gaps
-    said = f"{number_of(facts.rows, 'row')}, {number(1 / step)} Hz, {number(facts.rows * step)} s"
+    lasts = (facts.rows + sum(missing for _, missing in gaps)) * step
+    said = f"{number_of(facts.rows, 'row')}, {number(1 / step)} Hz, {number(lasts)} s"
     if gaps:
         listed = ", ".join(f"{missing} after row {row}" for row, missing in gaps[:MOST_GAPS])
         more = f" and {number_of(len(gaps) - MOST_GAPS, 'more gap')}" if len(gaps) > MOST_GAPS else ""

@@ -16,7 +16,7 @@ import numpy as np
 from ctrlgen.core.units import difference, from_si
 from ctrlgen.diagnosis.selection.candidate_terms import signals_along
 from ctrlgen.diagnosis.selection.motion_regions import Along, along_region, motion_of
-from ctrlgen.effects import Side
+from ctrlgen.effects import Place, Side
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER
 from ctrlgen.estimation.settings import STATISTICS
@@ -29,14 +29,20 @@ def edge_intervals(fitter: Fitter, fit: Fit, intervals: dict[str, Ends]) -> dict
     """Of the 95 % `intervals` of the free numbers of a fit by path, in their units, those of edges, widened."""
     wide: dict[str, Ends] = {}
     motion: dict[Along, np.ndarray] | None = None
+    signals = None
     for u, edge in zip(fit.structure.free_parameters, fit.theta.tolist(), strict=True):
         if u.cause is None or (cause := fit.structure.causes[u.cause]).effect == PARAMETER:
             continue
         if (where := cause.law.acts_in) is None or u.name != where.at:
             continue
-        motion = motion_of(fitter, fit, signals_along(fitter, fit)) if motion is None else motion
+        signals = signals_along(fitter, fit) if signals is None else signals
+        motion = motion_of(fitter, fit, signals) if motion is None else motion
         if (x := along_region(motion, fit, u.cause)) is None:
             continue
+        if where.side is Side.OUTWARD and cause.law.place is Place.DRIVE:
+            # a level with a sign is beside drives with theirs, of which a motion keeps the size
+            i = cause.acts_on(fit.structure.device)[0]
+            x = np.concatenate([record[Place.DRIVE, i][0] for record in signals])
         x, ends = np.abs(x) if where.side is Side.BOTH else x, intervals[u.path]
         if not where.over:
             below = where.side is Side.BELOW or (where.side is Side.OUTWARD and edge < 0)
