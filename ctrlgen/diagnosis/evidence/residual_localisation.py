@@ -15,6 +15,7 @@ import numpy as np
 from ctrlgen.core.percent import percent
 from ctrlgen.core.units import difference
 from ctrlgen.diagnosis.evidence.frequency_bands import frequency_bands
+from ctrlgen.diagnosis.evidence.gathered_residual import gathered_residual
 from ctrlgen.diagnosis.evidence.ltv_linearisation import LtvModel
 from ctrlgen.diagnosis.evidence.residual_location import (
     CoordinatesEntry,
@@ -69,6 +70,7 @@ def localise_residual(
             for i, (name, unit) in enumerate(zip(channels, units, strict=True))
             if (row := spectral_lines(a.record, i, name, unit))
         ],
+        gathered=gathered_residual(models),
         statements=[],
     )
     return located.model_copy(update={"statements": _statements(located)})
@@ -250,6 +252,8 @@ def _statements(located: ResidualLocationEntry) -> list[str]:
         most = max(located.by_reading, key=lambda s: s.share)
         if most.ci95[0] > 0:
             sentences.append(f"{most.label} has {percent(most.share)} of the excess over the noise")
+    if there := located.gathered:
+        sentences.append(f"{percent(there.share)} of it lies in {there.place}, {there.n} of {there.of} samples")
     kind = located.coordinates.located_in
     if kind in (LocatedIn.ACTUATOR, LocatedIn.READING):
         name, share = max(located.coordinates.explained_by_one[kind].items(), key=lambda item: item[1])

@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from pydantic import Field, WithJsonSchema
 
+from ctrlgen.diagnosis.evidence.gathered_residual import GatheredEntry
 from ctrlgen.diagnosis.evidence.spectral_lines import SpectralLinesEntry
 from ctrlgen.reporting.numbers import number
 from ctrlgen.reporting.plots import COLOURS
@@ -97,6 +98,9 @@ class ResidualLocationEntry(Keys):
         description="The residual by temperature; empty where none is known."
     )
     spectral_lines: list[SpectralLinesEntry] = Field(description="Responses to periodic drives; empty without any.")
+    gathered: GatheredEntry | None = Field(
+        default=None, description="The stretch of one record that holds nearly all of it; null where none does."
+    )
     statements: list[str] = Field(description="What follows, in sentences.")
     unmodelled_force: UnmodelledForceEntry | None = Field(
         default=None, description="In `after`, where the findings do not explain all."

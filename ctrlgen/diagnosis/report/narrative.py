@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 
 from ctrlgen.diagnosis.evidence.diagnosis_result import Diagnosis
 from ctrlgen.diagnosis.report.experiment_sentences import experiment_sentence
@@ -14,11 +15,12 @@ from ctrlgen.diagnosis.report.period_words import repeats
 from ctrlgen.diagnosis.report.refused_events import how_confirmed, moment_of
 from ctrlgen.diagnosis.report.smaller_causes import smaller_causes_step
 from ctrlgen.diagnosis.report.time_base import time_base_step
+from ctrlgen.diagnosis.report.where_it_is_left import FIT_ALONE, held_out_agrees, more_left
 from ctrlgen.diagnosis.selection.attribution import ShareEntry
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.findings import ChannelErrorEntry, Estimate, Finding, Role
 from ctrlgen.diagnosis.selection.not_taken import that_matter
-from ctrlgen.diagnosis.selection.verdict import Verdict
+from ctrlgen.diagnosis.selection.verdict import Verdict, contradicts_datasheet
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.hypothesis import PARAMETER
 from ctrlgen.recordings.implausible_note import Implausible
@@ -192,12 +194,13 @@ def _steps(diagnosis: Diagnosis) -> list[str]:
     known = all(e.noise_floor is not None for e in errors)
     told = known and all(e.goes_with_motion is None for e in errors)
     rest = "" if told else " Record a period at rest (drive off), or repeat poses, so that the noise can be estimated."
+    gathered_somewhere = diagnosis.residual_location.after.gathered is not None
     if verdict == Verdict.CONSISTENT:
         return [
             f"Nothing to correct. Effects smaller than those listed in the report would not have been detected.{rest}"
         ]
     if verdict == Verdict.EXPLAINED:
-        return [use] if diagnosis.residual_tests.passed else [use, MORE_LEFT]
+        return [use] if diagnosis.residual_tests.passed else [use, more_left(diagnosis)]
     if verdict == Verdict.AMBIGUOUS:
         return [
             experiment_sentence(diagnosis.next_experiment),
@@ -206,23 +209,26 @@ def _steps(diagnosis: Diagnosis) -> list[str]:
                 "device.next.toml holds the best of them, which predicts recordings of this kind as well as the others do.",
             )
             + rest,
+            *([more_left(diagnosis)] if gathered_somewhere and not diagnosis.residual_tests.passed else []),
         ]
     steps = [_use(diagnosis)]
     if not known:
         steps.append(f"Whether a mismatch remains cannot be said, because the noise is not known.{rest}")
     elif not diagnosis.residual_tests.passed:
-        steps.append(MORE_LEFT)
+        steps.append(more_left(diagnosis))
     if diagnosis.unconfirmed:
         names = ", ".join(map(cause_name, diagnosis.unconfirmed))
         steps.append(
             f"No held-out record shows {names}: hold out a record that covers the same range as the records to fit."
         )
-    if verdict == Verdict.UNEXPLAINED:
+    agrees = known and held_out_agrees(diagnosis)
+    if agrees:
+        steps.append(FIT_ALONE)
+    if verdict == Verdict.UNEXPLAINED and not (agrees or gathered_somewhere):
         steps.append("Check wiring, units and clocks of the set-up: known effects do not explain the mismatch.")
     return steps
 
 
-MORE_LEFT = "More than noise is left: the report shows where it is and of what it is a function."
 BETTER = (
     "Use device.next.toml in place of the device file, solve and generate the C with it: it predicts the held-out recordings better. Its "
     "numbers hold for the range of travel, speed and temperature that was recorded."
@@ -244,7 +250,17 @@ def _use(diagnosis: Diagnosis) -> str:
     """What device.next.toml may be used for where the answer is not certain."""
     if not diagnosis.findings:
         return EMPIRICAL_ALONE if diagnosis.empirical_terms else NOTHING_FOUND
+    if far := contradicts_datasheet(diagnosis.search.chosen.fit):
+        return contradicted(far)
     return used_for_another_run(diagnosis.findings, BETTER) if predicts_better(diagnosis) else WORSE
+
+
+def contradicted(far: Iterable[str]) -> str:
+    """That the numbers of these paths are not what the file states of them, and what tells which of the two is wrong."""
+    return (
+        f"Do not use device.next.toml yet: it moves {' and '.join(far)} beyond what the device file allows, as a missing law may do. "
+        "Measure that by itself first, as a stiffness by a weight or a gain at rest."
+    )
 
 
 def predicts_better(diagnosis: Diagnosis) -> bool:

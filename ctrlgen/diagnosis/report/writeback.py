@@ -36,12 +36,13 @@ from ctrlgen.diagnosis.report.narrative import (
     HARD_SPACE,
     WORSE,
     channel_sentence,
+    contradicted,
     empirical_sentences,
     hard,
     predicts_better,
 )
 from ctrlgen.diagnosis.report.on_the_clock import used_for_another_run
-from ctrlgen.diagnosis.selection.verdict import Verdict
+from ctrlgen.diagnosis.selection.verdict import Verdict, contradicts_datasheet
 from ctrlgen.estimation.free_parameters import FreeParameter
 from ctrlgen.estimation.hypothesis import PARAMETER, numbers
 from ctrlgen.version import program
@@ -156,8 +157,9 @@ def _header(diagnosis: Diagnosis, changed: list[str]) -> str:
     if changed:
         lines.append(f"Parameters changed above: {', '.join(changed)}.")
     if diagnosis.findings:
-        better = predicts_better(diagnosis)
-        lines.append(used_for_another_run(diagnosis.findings, BETTER) if better else WORSE)
+        far, better = contradicts_datasheet(diagnosis.search.chosen.fit), predicts_better(diagnosis)
+        use = used_for_another_run(diagnosis.findings, BETTER) if better else WORSE
+        lines.append(contradicted(far) if far else use)
     if diagnosis.verdict == Verdict.UNEXPLAINED:
         lines.append("This does NOT explain the recording: the values are the best fit, not physical parameters.")
     kept = (hard(" ".join(line.split())) for line in lines)

@@ -37,6 +37,12 @@ class LocalisationSettings:
     """Standard deviations of chi-square of the whole excess, below which there is nothing to localise."""
     coherence_segments: int = 8
     """Segments of a record for the coherence with the drive, overlapping by half."""
+    gathered: float = 0.95
+    """Share of the squares of the residual that a stretch of one record must hold to be told. Judgement."""
+    gathered_in: float = 0.4
+    """Share of all samples above which such a stretch is none. Judgement."""
+    of_motion: float = 0.5
+    """Share of the motion's squares in such a stretch, above which the motion is why the residual lies there. Judgement."""
     stands_out: float = 0.1
     """Share of the excess by which one kind of coordinate must explain it better than the other. Judgement."""
 
