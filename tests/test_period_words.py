@@ -43,3 +43,12 @@ def test_the_period_of_a_law_is_told_with_how_often_it_repeats():
     assert interval(e, "period") == "5 deg (4.98 ... 5.02 deg), 72 a turn"
     assert interval(e, "phase") == interval(e) == "5 deg (4.98 ... 5.02 deg)"
     assert interval(Estimate(0.25, (0.24, 0.26), "s"), "period") == "250 ms (240 ... 260 ms)"
+
+
+@pytest.mark.parametrize(
+    ("half", "name", "told"), [(179.0, "phase", True), (180.0, "phase", False), (210.0, "angle", True)]
+)
+def test_a_phase_that_may_be_any_has_no_interval(half, name, told):
+    """After a turn it comes again: a wider interval says nothing. An angle that is no phase goes on."""
+    said, none = (interval(Estimate(2.0, (2.0 - w, 2.0 + w), "deg"), name) for w in (half, float("inf")))
+    assert (said != none) == told

@@ -53,6 +53,7 @@ OTHER_WORDS: Mapping[str, tuple[str, ...]] = {
     "interferometer": ("laser interferometer", "fibre interferometer", "fiber interferometer", "vibrometer"),
     "encoder": (
         "linear scale",
+        "optical scale",
         "glass scale",
         "linear encoder",
         "optical encoder",

@@ -36,6 +36,8 @@ WIDE = 1.0
 EXPONENTS = frozenset({"exponent", "power"})
 # numbers of laws after which their error or their force comes again
 PERIODS = frozenset({"period"})
+# numbers of laws that come again after a turn [deg]
+PHASES, TURN = frozenset({"phase"}), 360.0
 HARD_SPACE = "\u00a0"
 # share of its interval within which an estimate counts as on the interval's end
 EDGE = 1e-6
@@ -73,7 +75,8 @@ def _with_interval(e: Estimate, name: str) -> str:
     best, factor = ("%", 100.0) if percent else sized(e.unit, e.value)
     unit = "" if best == "1" else f" {best}"
     value, low, high = (factor * v for v in ends)
-    if not math.isfinite(high - low):
+    any_phase = name in PHASES and e.unit == "deg" and e.ci95[1] - e.ci95[0] >= TURN
+    if any_phase or not math.isfinite(high - low):
         return f"{number(value)}{unit} (this recording does not determine it)"
     # detected directly, or fixed by its definition
     if high == low:
