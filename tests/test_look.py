@@ -13,7 +13,7 @@ from command_line import ctrlgen
 from conftest import AXIS_FILE, DEVICES
 
 from ctrlgen import build_model, load_device
-from ctrlgen.app.look_console import described, look
+from ctrlgen.app.look_console import described, look, print_table
 from ctrlgen.core.errors import InputError
 from ctrlgen.recordings.derived_drives import derived_drives
 from ctrlgen.recordings.formats import read_table
@@ -350,3 +350,13 @@ def test_names_of_columns_are_no_lines_of_the_file(axis, tmp_path):
     read = tomllib.loads(recording_toml(proposal, tmp_path, 'a "title"\n[x]'))
     assert set(read) == {"format", "title", "device", "kind", "record", "columns"}
     assert read["columns"]["drive.axis"]["column"] == "drive"
+
+
+@pytest.mark.parametrize("lost", [(), (700,), (10, 11, 12, 700, 1200)])
+def test_rows_that_are_missing_last_too(tmp_path, capsys, lost):
+    """A log of 1500 rows at 1 kHz lasts 1.5 s, however many of them the logger lost."""
+    kept = np.setdiff1d(np.arange(N), lost)
+    (tmp_path / "log.csv").write_text("time [s],u [V],x [um]\n" + rows(T[kept], U[kept], Y[kept]))
+    print_table(table_facts(read_table(tmp_path / "log.csv")))
+    first = capsys.readouterr().out.partition("\n")[0]
+    assert f"{N - len(lost)} rows, 1000 Hz, 1.5 s" in first
