@@ -89,6 +89,7 @@ SUGGESTED = {
     "drive_levels": (0.05, 0.2),
     "moments": (0.3, 1.0, 3.0),
     "jump_positions": (-0.3, 0.1, 0.6),
+    "periods_across": (0.3, 0.7),
     "edges_above": (-0.3, 0.2),
     "edges_below": (-0.2, 0.3),
     "edges_beyond": (0.2, 0.5),

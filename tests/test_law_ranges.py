@@ -111,6 +111,7 @@ def test_the_laws_of_two_channels_and_those_with_a_clock_are_these():
             "link_compliance",
             "squareness",
             "swapped",
+            "waviness",
         }
         | couplings
         | empirical

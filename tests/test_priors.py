@@ -11,7 +11,7 @@ from ctrlgen.estimation.priors import DEFAULT, PRIORS, prior_of
 STARTS_FROM_DATA = (
     *("", "spatial_periods", "drive_levels", "jump_positions", "moments", "middles", "lengths"),
     *("edges_above", "edges_below", "edges_outward", "edges_beyond", "speeds", "drives", "since", "warmer"),
-    "reading_ends",
+    *("reading_ends", "periods_across"),
 )
 every_law = pytest.mark.parametrize("law", Effect.library.values(), ids=Effect.library)
 

@@ -283,6 +283,7 @@ OF_EACH_RECORD = {
     "drift_per_record",
     "sensor_step_per_record",
 }  # found in tests/test_of_each_record.py
+ACROSS = {"waviness"}  # found in tests/test_waviness.py
 # found in tests/test_finer_forms.py and tests/test_found_window.py
 FINER = {
     "bouc_wen_of_power",
@@ -349,4 +350,4 @@ def test_no_law_is_left_out():
         "temperature_sensitivity_above",
         *(f"{what}_of_temperature" for what in ("gain", "scale", "stiffness")),
     }
-    assert not set(Effect.library) - battery - here - STATED - OF_EACH_RECORD - FINER - IN_THE_LOOP - SMOOTHERS
+    assert not set(Effect.library) - battery - here - STATED - OF_EACH_RECORD - ACROSS - FINER - IN_THE_LOOP - SMOOTHERS

@@ -312,6 +312,10 @@ LAWS = {
     "square_drive": ({}, lambda s, p: p.curvature * s.value**2),
     "arcuate_motion": ({}, lambda s, p: p.rate * s.all[s.partner] ** 2),
     "cross_scale": ({}, lambda s, p: p.rate * s.value * s.all[s.partner]),
+    "waviness": (
+        {"period": 0.7, "phase": 0.4},
+        lambda s, p: p.amplitude * sin(TWO_PI * s.all[s.partner] / 0.7 + 0.4),
+    ),
     "squareness": ({}, lambda s, p: p.angle * s.all[s.partner]),
     "stiffening": ({}, lambda s, p: -p.k3 * s.displacement**3),
     "stiffness": ({}, lambda s, p: -p.stiffness * s.displacement),

@@ -180,7 +180,7 @@ class Hypothesis:
         low, high = self.bounds(p, channel)
         prior = self.prior.of(p)
         suggested = [
-            *hints.suggested.get(prior.start_from_data, ()),
+            *hints.suggested.get(prior.suggestion(channel.partner), ()),
             *(hints.suggested.get("lines", ()) if p.unit == "Hz" else ()),
         ]
         if prior.scales_with_peak and p.unit in hints.peaks:

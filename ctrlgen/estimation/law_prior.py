@@ -13,6 +13,7 @@ from ctrlgen.effects import Param
 
 ONE_IN_TEN = -2.3  # ln(1/10)
 ONE_IN_A_HUNDRED = -4.6
+ACROSS = "periods_across"
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,8 @@ class ParameterPrior:
         jumps), "moments" (times spread over the recording); where most of the residual is, by a test whose level holds:
         "edges_above", "edges_below", "edges_outward", "edges_beyond" (ways from home), "speeds", "drives", "since" (a time) and
         "warmer" (a temperature) beyond which it is, "middles" and "lengths" of stretches of the reading; "reading_ends", at which
-        readings pile up. Frequencies in Hz always take the lines of the residual's spectrum as well.
+        readings pile up; "periods_across", of a pair: periods along the reading of the other channel. Frequencies in Hz always take the
+        lines of the residual's spectrum as well.
     only_from_data: the law is not suspected where the recording suggests no start.
     plausible_range: of an amplitude: a fit that ends outside is another cause under this law's name, and is rejected.
     usual: of a shape: the value of the plain form of the law, which is taken where the fit does not exclude it: what the records to fit
@@ -50,6 +52,10 @@ class ParameterPrior:
     usual: float | None = None
     again_at_low: bool = False
     deviation: float | None = None
+
+    def suggestion(self, partner: str | None) -> str:
+        """The name of its starts among those that the recording suggests; of a pair with the `partner`."""
+        return f"{ACROSS} {partner}" if self.start_from_data == ACROSS else self.start_from_data
 
 
 def peaks(*multiples: float) -> ParameterPrior:

@@ -15,6 +15,7 @@ from types import MappingProxyType
 from ctrlgen.devices.usual_deviation import ASSUMED_SCALE
 from ctrlgen.effects import Effect
 from ctrlgen.estimation.law_prior import (
+    ACROSS,
     CREEPING,
     LEVELLING_OFF,
     ONE_IN_TEN,
@@ -339,6 +340,16 @@ PRIORS: Mapping[str, LawPrior] = MappingProxyType(
         "arcuate_motion": LawPrior(
             "Every guide on leaf springs has it. Of a pose of six components the mechanism's own kinematics say as much.",
             unless=frozenset({"spatial"}),
+        ),
+        "waviness": LawPrior(
+            "Guides of balls and screws have it. Harmonics: several at one place. Not of a pose of six components. Judgement.",
+            log_prior_odds=ONE_IN_TEN,
+            repeatable=True,
+            unless=frozenset({"spatial"}),
+            parameters={
+                "period": ParameterPrior(start_from_data=ACROSS, only_from_data=True),
+                "phase": _starts((0.0, 90.0)),
+            },
         ),
         "cross_scale": LawPrior(
             "Rarer than axes that are not square: judgement. Of a pose of six components finite rotations say as much.",

@@ -82,7 +82,7 @@ def _rest(diagnosis: Diagnosis) -> list[Part]:
         return [Part("; the numbers are too uncertain to predict the held-out records better")]
     if channel in _untold_noise(diagnosis):
         return [Part(f"; left: {number(e.rms_after, 3)} {e.unit} in {short(channel)}"), *untold(diagnosis)]
-    return [Part(f"{size}, which may be chance")] if ratio > CHANCE else []
+    return [Part(f"{size}, which chance allows")] if ratio > CHANCE else []
 
 
 def of_what_kind(diagnosis: Diagnosis, channel: str) -> Part:

@@ -30,6 +30,7 @@ from ctrlgen.diagnosis.settings import CONFUSABLE, SCREEN
 from ctrlgen.effects import Place
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, DataHints, Hypothesis
+from ctrlgen.estimation.law_prior import ACROSS
 from ctrlgen.recordings.recording import Timing
 
 Subsets = tuple[tuple[float, tuple[Suspect, ...]], ...]
@@ -192,7 +193,8 @@ class Screen:
         """What the records show at each place, after what `fit` explains; `regions` of what is left, where they are known already."""
         regions = self._regions(fit) if regions is None else regions
         most = self._follow(fit)
-        along = shown_along_path(self.fitter, fit, steps=self._begins_at("drive_levels", fit))
+        steps, across = (self._begins_at(hint, fit) for hint in ("drive_levels", ACROSS))
+        along = shown_along_path(self.fitter, fit, steps=steps, across=across)
         ends = ends_of_readings(self.fitter, fit)
         moments, part = moments_of(self.fitter.recording)
         common = {"lines": spectral_peaks(self.fitter, fit), "moments": moments}

@@ -18,6 +18,7 @@ from ctrlgen.diagnosis.settings import SCREEN
 from ctrlgen.effects import Place
 from ctrlgen.estimation.fit import Fit, Fitter
 from ctrlgen.estimation.hypothesis import PARAMETER, nominal_physics
+from ctrlgen.estimation.law_prior import ACROSS
 from ctrlgen.model.effect_terms import channels
 from ctrlgen.numerics.spectral_peaks import highest_peaks, periodogram
 from ctrlgen.recordings.recording import Record, Recording
@@ -45,9 +46,12 @@ def spectral_peaks(fitter: Fitter, fit: Fit) -> tuple[float, ...]:
     return tuple(float(f) for f in np.sort(best) / (SCREEN.spectrum_padding * len(residual) * records[k].sample_time))
 
 
-def shown_along_path(fitter: Fitter, fit: Fit, *, steps: bool) -> dict[tuple[Place, int], dict[str, tuple[float, ...]]]:
+def shown_along_path(
+    fitter: Fitter, fit: Fit, *, steps: bool, across: bool
+) -> dict[tuple[Place, int], dict[str, tuple[float, ...]]]:
     """Of each sensor, the paths after which what is left of the longest record repeats, where it surely does, and the
-    places at which it jumps most; of each force the ways of its axis; and where asked for, the `steps` of each drive."""
+    places at which it jumps most; of each force the ways of its axis; and where asked for, the `steps` of each drive, and of each
+    sensor the paths of the others, `across` it."""
     records = fitter.fit_records
     if fitter.recording.kind == "poses" or not records:
         return {}
@@ -57,15 +61,25 @@ def shown_along_path(fitter: Fitter, fit: Fit, *, steps: bool) -> dict[tuple[Pla
     sensors = channels(nominal_physics(fit.structure.device), Place.SENSOR)
     names, sizes = [c.name for c in sensors], {c.name: c.scale for c in sensors}
     read = [(i, c.removeprefix("reading.")) for i, c in enumerate(fitter.recording.channels)]
-    paths = (record.observed, foreseen, behind)
+    paths, units = (record.observed, foreseen, behind), fitter.recording.units
 
     def periods(i: int, good: np.ndarray) -> tuple[float, ...]:
         # what is read may be evenly sampled, and bent
         shortest = max(resolved_way(y[good, i]) for y in paths)
         return merged_periods(spatial_periods(y[good, i], residual[good, i], shortest) for y in paths)
 
+    def beside(i: int, good: np.ndarray) -> dict[str, tuple[float, ...]]:
+        others = [(j, name) for j, name in read if across and j != i and units[j] == units[i]]
+        seen = {name: good & record.valid[:, j] for j, name in others}
+        return {
+            f"{ACROSS} {name}": periods_across(record.observed[seen[name], j], residual[seen[name], i])
+            for j, name in others
+            if seen[name].any()
+        }
+
     by_sensor = {
-        (Place.SENSOR, names.index(name)): {
+        (Place.SENSOR, names.index(name)): beside(i, good)
+        | {
             "spatial_periods": (
                 *periods(i, good),
                 *slowest_periods(foreseen[good, i], residual[good, i], sizes[name]),
@@ -77,6 +91,12 @@ def shown_along_path(fitter: Fitter, fit: Fit, *, steps: bool) -> dict[tuple[Pla
     }
     drives = steps_of_drives(fitter, fit, record) if steps else {}
     return by_sensor | _along_axes(fitter, fit, record, residual) | drives
+
+
+def periods_across(path: np.ndarray, left: np.ndarray) -> tuple[float, ...]:
+    """The ways after which what is `left` of one reading (n,) repeats along that of another axis, `path` (n,): where it surely does, and
+    the longest that suits it."""
+    return (*spatial_periods(path, left, resolved_way(path)), *slowest_periods(path, left, np.inf))
 
 
 def _along_axes(
