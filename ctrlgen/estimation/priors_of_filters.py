@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ctrlgen.estimation.law_prior import SECOND_ORDER_FILTER, LawPrior, ParameterPrior
+from ctrlgen.estimation.law_prior import ONE_IN_TEN, SECOND_ORDER_FILTER, LawPrior, ParameterPrior
 
 OF_FILTERS: Mapping[str, LawPrior] = {
     "high_pass": LawPrior(
@@ -22,8 +22,9 @@ OF_FILTERS: Mapping[str, LawPrior] = {
         parameters=SECOND_ORDER_FILTER,
     ),
     "moving_average": LawPrior(
-        "To second order in the frequency it is a filter of two poles, or a delay, which are named where they are enough; error of the "
-        "interpolation between samples: 0.1 %, judgement, as of a delay.",
+        "To second order in the frequency it is a filter of two poles, or a delay, which are commoner and are named where they are enough: "
+        "judgement. Error of the interpolation between samples: 0.1 %, judgement, as of a delay.",
+        log_prior_odds=ONE_IN_TEN,
         suspected=False,
         refines=frozenset({"low_pass", "delay"}),
         also_in_place_of=frozenset({"notch", "amplifier_lag"}),

@@ -29,10 +29,14 @@ finer form."""
 def finer_forms(trials: Trials, current: CandidateModel) -> tuple[CandidateModel, ...]:
     """`current` with a finer form of one of its laws in that one's place, or with a law that is suspected too and nearly the same
     (`LawPrior.in_place_of`), or in the place of what may be its parts, for each that has one, where more than noise is left, or where what
-    is left alone tells the noise."""
+    is left alone tells the noise. A law that is none of theirs with a number more, as a mean over a window is no filter, must take away as
+    much as a further term."""
     if current.errors.is_noise and trials.fitter.noise.known.all():
         return ()
-    return _fitted(trials, current, [*_of_one(trials, current), *_of_parts(trials, current)], current.fit.objective)
+    forms = [*_of_one(trials, current), *_of_parts(trials, current)]
+    fitted, compare = _fitted(trials, current, forms, current.fit.objective), trials.selection
+    other = [t for t in fitted if t.cause is not None and t.cause.prior.also_in_place_of]
+    return tuple(t for t in fitted if t not in other or compare.worth_its_form(current, t))
 
 
 def as_one_law(trials: Trials, current: CandidateModel) -> tuple[CandidateModel, ...]:
@@ -44,7 +48,9 @@ def as_one_law(trials: Trials, current: CandidateModel) -> tuple[CandidateModel,
         for t in (trials.converged(t) for t in _fitted(trials, current, [form], np.inf)):
             errors = compare.reference((current, t))
             less = all(loss(t, errors) < loss(current, errors) for loss in (compare.fit_loss, compare.held_out_loss))
-            if less or (len(form[0]) > 1 and explains_alike(compare, t, current)):
+            if (less and compare.worth_its_form(current, t)) or (
+                len(form[0]) > 1 and explains_alike(compare, t, current)
+            ):
                 found.append(t)
     return tuple(compare.ranked(found))
 

@@ -17,6 +17,7 @@ from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal
 from ctrlgen.diagnosis.selection.failures import FAILURES
 from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.diagnosis.selection.trials import Trials
+from ctrlgen.diagnosis.selection.verdict import contradicts_datasheet
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 from ctrlgen.estimation.structure import Structure
@@ -137,15 +138,20 @@ def without_needless(trials: Trials, current: CandidateModel) -> CandidateModel:
 
 def is_needed(trials: Trials, bare: CandidateModel, current: CandidateModel) -> bool:
     """Whether `current` is worth its further cause. Where more than noise is left, what was chosen among many before need only
-    keep its advantage, and matter beside the others that came later."""
+    keep its advantage, and matter beside the others that came later, or keep the device's numbers from bending to do its part."""
     compare = trials.selection
     if current.errors.is_noise:
         return compare.improves_enough(bare, current)
     return (
         compare.advantage(current, bare) > 0
-        and compare.matters(bare, current)
+        and (compare.matters(bare, current) or _bends_without(bare, current))
         and not compare.contradicted(bare, current)
     )
+
+
+def _bends_without(bare: CandidateModel, current: CandidateModel) -> bool:
+    """Whether the device's numbers contradict its file without a cause, and do not with it."""
+    return bool(contradicts_datasheet(bare.fit)) and not contradicts_datasheet(current.fit)
 
 
 def _far_worse(bare: CandidateModel, current: CandidateModel) -> bool:

@@ -19,7 +19,6 @@ from ctrlgen.core.counts import number_of
 from ctrlgen.devices import Device
 from ctrlgen.diagnosis.selection.attribution import Attribution, attribute
 from ctrlgen.diagnosis.selection.begun_again import begun_again
-from ctrlgen.diagnosis.selection.bent_numbers import not_bent_away
 from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Round
 from ctrlgen.diagnosis.selection.candidates import fit_candidates, restart_elsewhere, takes_away_much
 from ctrlgen.diagnosis.selection.confusable import explains_alike
@@ -62,15 +61,14 @@ class Searcher:
         rounds: list[Round] = []
         current = trials.with_noise_update(trials.fit(nominal_fit.restarted, steps=FIT.max_steps))
         learn_mismatch(trials, current)
-        accepted = current
         for _ in range(SEARCH.most_noise_updates):
-            accepted = current = self.forward_rounds(current, rounds)
+            current = self.forward_rounds(current, rounds)
             before = trials.fitter.noise.floor
             current = self._under_its_noise(current)
             if np.allclose(trials.fitter.noise.floor, before, rtol=SEARCH.same_noise, atol=0):
                 break
         current = self.beside_limits(current, rounds)
-        accepted, trials = current if current.causes else accepted, self.trials
+        trials = self.trials
         # in the steps and on the clock in which it is told: its rivals, which the report lists, are fitted once
         current = self._under_its_noise(self._finely_timed(self.settled(current)))
         better = self._compared(current)
@@ -84,9 +82,7 @@ class Searcher:
         nominal = scored(trials.fitter, trials.fitter.described(device)[1])
         current, account = supported(trials, nominal, current, trials.screen.seed)
         found = current
-        current = (
-            no_worse(trials, nominal, current) if current.causes else not_bent_away(trials, nominal, found, accepted)
-        )
+        current = no_worse(trials, nominal, current) if current.causes else nominal
         if current is not found:
             account = attribute(trials.fitter, nominal, current, trials.screen.seed, trials.jobs)
         withdrawn = tuple(c for c in found.causes if c not in current.causes)
