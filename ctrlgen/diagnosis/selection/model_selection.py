@@ -92,7 +92,7 @@ class ModelSelection:
         """T of a model under `errors`; smaller is better."""
         numbers = sum(u.cause is not None for u in t.fit.structure.free_parameters)
         price = numbers * np.log(max(self.samples(t.fitted, errors), 2)) - 2 * prior_odds(t.fit)
-        own = numbers_in_each_record(t.causes) * self._price_of_each_record(t, errors)
+        own = self._price_of_each_record(t, errors) * each if (each := numbers_in_each_record(t.causes)) else 0.0
         return self.fit_loss(t, errors) + self.held_out_loss(t, errors) + price + own
 
     def _price_of_each_record(self, t: CandidateModel, errors: ErrorModel) -> float:
