@@ -211,7 +211,7 @@ def test_a_size_is_judged_by_what_is_stated_or_usual(fits):
     assert known_deviation(EVERY, calibrated).sd == 0.005
     compare = ModelSelection(fitter, lambda *_: [])
     for fit in (ours, theirs):  # -2 ln of the odds is in the criterion
-        left = SimpleNamespace(fit=fit)
+        left = SimpleNamespace(fit=fit, causes=())
         compare.fit_loss = compare.held_out_loss = lambda *_: 0.0
         compare.samples = lambda *_: 1.0
         left.fitted = None
