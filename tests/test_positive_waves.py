@@ -26,7 +26,7 @@ def test_a_law_with_a_phase_is_a_wave(kind):
     given = {
         name: rng.uniform(0.1, 1.0) for name in ("value", "displacement", "position", "travel", "angle", "t", "theta")
     }
-    s = law_inputs(**given)
+    s = law_inputs(**given, all=[0.4], partner=0)
     for phase in rng.uniform(-3, 3, 5):
         numbers = {p.name: rng.uniform(0.5, 2.0) for p in law.params} | {PHASE: phase}
         size = law.amplitude().name

@@ -34,9 +34,12 @@ def finer_forms(trials: Trials, current: CandidateModel) -> tuple[CandidateModel
     if current.errors.is_noise and trials.fitter.noise.known.all():
         return ()
     forms = [*_of_one(trials, current), *_of_parts(trials, current)]
-    fitted, compare = _fitted(trials, current, forms, current.fit.objective), trials.selection
-    other = [t for t in fitted if t.cause is not None and t.cause.prior.also_in_place_of]
-    return tuple(t for t in fitted if t not in other or compare.worth_its_form(current, t))
+
+    def is_worth(t: CandidateModel) -> bool:
+        of_another_form = t.cause is not None and bool(t.cause.prior.also_in_place_of)
+        return not of_another_form or trials.selection.worth_its_form(current, t)
+
+    return tuple(t for t in _fitted(trials, current, forms, current.fit.objective) if is_worth(t))
 
 
 def as_one_law(trials: Trials, current: CandidateModel) -> tuple[CandidateModel, ...]:
