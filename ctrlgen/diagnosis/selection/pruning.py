@@ -17,7 +17,7 @@ from ctrlgen.diagnosis.selection.candidate_model import CandidateModel, Refusal
 from ctrlgen.diagnosis.selection.failures import FAILURES
 from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.diagnosis.selection.trials import Trials
-from ctrlgen.diagnosis.selection.verdict import contradicts_datasheet
+from ctrlgen.diagnosis.selection.verdict import contradicts_datasheet, moved_numbers
 from ctrlgen.diagnosis.settings import MODEL_SELECTION, SEARCH
 from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
 from ctrlgen.estimation.structure import Structure
@@ -150,8 +150,8 @@ def is_needed(trials: Trials, bare: CandidateModel, current: CandidateModel) -> 
 
 
 def _bends_without(bare: CandidateModel, current: CandidateModel) -> bool:
-    """Whether the device's numbers contradict its file without a cause, and do not with it."""
-    return bool(contradicts_datasheet(bare.fit)) and not contradicts_datasheet(current.fit)
+    """Whether numbers of the device lie far from its file without a cause, and none contradicts it with that one."""
+    return bool(moved_numbers(bare.fit, MODEL_SELECTION.bent)) and not contradicts_datasheet(current.fit)
 
 
 def _far_worse(bare: CandidateModel, current: CandidateModel) -> bool:

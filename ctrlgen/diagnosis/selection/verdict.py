@@ -187,9 +187,9 @@ def contradicts_datasheet(fit: Fit) -> dict[str, float]:
     return {path: z for path, z in off.items() if abs(z) >= least}
 
 
-def moved_numbers(fit: Fit) -> dict[str, float]:
-    """Deviations of the device's numbers that lie at least `VERDICT.far` stated standard deviations from the file, by path."""
-    return {path: z for path, z in _deviations(fit).items() if abs(z) >= VERDICT.far}
+def moved_numbers(fit: Fit, far: float = VERDICT.far) -> dict[str, float]:
+    """Deviations of the device's numbers that lie at least `far` stated standard deviations from the file, by path."""
+    return {path: z for path, z in _deviations(fit).items() if abs(z) >= far}
 
 
 def _deviations(fit: Fit) -> dict[str, float]:

@@ -231,6 +231,9 @@ class ModelSelectionSettings:
     """Share of the held-out excess over the noise that a further cause must explain: less is of no use to anyone. Judgement."""
     above_discrepancy: float = 0.05
     """The same where more than noise is left: less is within what the discrepancy of the other laws may feign. Judgement."""
+    bent: float = 10.0
+    """Stated standard deviations from which on a number of the device does the part of a cause that is missing. Judgement: those of data
+    sheets are guesses, and one that is five off is common."""
     least_share: float = 0.01
     """Share of the whole mismatch of a channel, of energy on the held-out records, that a further cause must explain where more
     than noise is left: a tenth of the error. Judgement."""
