@@ -235,6 +235,11 @@ def _numbers(d: dict[str, Any]) -> Iterator[str]:
                     yield f"{_name(f)}: {name} = {e['value']} {e['unit']} is above {high}"
                 read = d["held_out"].get(f"reading.{f['location'].removeprefix('sensor:')}")
                 both = {e["unit"], read["unit"]} if read and name != "phase" else set()
+                along = (
+                    d["held_out"].get(f"reading.{f['of']}") if f.get("of") else None
+                )  # a way of the other axis of a pair
+                if along and e["unit"] == along["unit"]:
+                    continue
                 if len(both) > 1 and any(both <= alike for alike in ALIKE):
                     yield f"{_name(f)}: {name} in {e['unit']}, which is read in {read['unit']}"
     for channel, s in d["spikes"].items():

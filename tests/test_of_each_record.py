@@ -98,6 +98,7 @@ def test_a_zero_that_the_file_leaves_free_is_not_found_again():
     )
     found = diagnosed(runs(UM * np.array([0.2, -0.3, 0.4])), loose)
     assert found.verdict == "consistent" and not found.findings
+    assert explain(found, "zero_per_record")[0].endswith("the device file has it wherever it was recorded.")
 
 
 def test_it_is_told_why_such_zeros_were_not_tried():

@@ -13,6 +13,7 @@ from planted_axis import ON_AXIS, asymmetric_hysteresis, bouc_wen, drive_hystere
 from planted_poses import FAR_OFF, IN_ORDER, ON_HEXAPOD, payload, warmed
 from planted_regions import IN_A_REGION
 from recovery import N, Planted, fitter_of, recover
+from xy_stage import xy_stage
 
 import ctrlgen.effects  # noqa: F401
 from battery import laws
@@ -161,17 +162,7 @@ def test_of_poses_one_after_the_other(effect):
 )
 def test_of_two_axes_of_a_sensor(law, truth, of_x):
     """A grid plate that is not square; an axis that reads 0.4 permille more for each micrometre of the other; leaf springs of 3.75 mm."""
-    table = {
-        "kind": "matrix",
-        "name": "stage",
-        "title": "an X-Y stage",
-        "source": "round numbers",
-        "directions": ["delta_x", "delta_y"],
-        "channels": ["delta_x", "delta_y"],
-        "jacobian": [["0.2 um/V", "0 um/V"], ["0 um/V", "0.2 um/V"]],
-        "actuator": [{"name": name, "low": "0 V", "high": "100 V"} for name in ("x", "y")],
-    }
-    rng, device, parts = np.random.default_rng(10), validate(Device.library["matrix"], table, "device"), []
+    rng, device, parts = np.random.default_rng(10), xy_stage("0.2", "100 V"), []
     for n, role in ((60, "fit"), (30, "hold_out")):
         u = rng.uniform(0, 100, (n, 2))
         y = 2e-7 * u + np.outer(of_x(*(2e-7 * u).T), [1, 0]) + SHIFTED * rng.standard_normal((n, 2))

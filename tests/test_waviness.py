@@ -7,28 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from axis_records import record
+from xy_stage import xy_stage
 
-from ctrlgen.core.files import validate
-from ctrlgen.devices import Device
 from ctrlgen.diagnosis.diagnose import diagnose_recording
 from ctrlgen.recordings.recording import Recording
 
 UM, H, N = 1e-6, 1e-3, 3000
 NOISE = 5e-9
-STAGE = validate(
-    Device.library["matrix"],
-    {
-        "kind": "matrix",
-        "name": "stage",
-        "title": "an X-Y stage",
-        "source": "round numbers",
-        "directions": ["delta_x", "delta_y"],
-        "channels": ["delta_x", "delta_y"],
-        "jacobian": [["0.5 um/V", "0 um/V"], ["0 um/V", "0.5 um/V"]],
-        "actuator": [{"name": name, "low": "0 V", "high": "200 V"} for name in ("x", "y")],
-    },
-    "device",
-)
+STAGE = xy_stage("0.5", "200 V")
 NAMES = ("reading.delta_x", "reading.delta_y")
 
 
@@ -63,6 +49,17 @@ def test_a_wave_along_the_other_axis_is_found_with_its_period(period, size, bent
     assert abs(finding.parameters["amplitude"].value) == pytest.approx(size, rel=0.02)
     assert found.verdict == "explained"
     assert all(e.rms_after == pytest.approx(NOISE / UM, rel=0.1) for e in found.held_out.values())
+
+
+def test_readings_in_units_of_their_own_show_the_wave_too():
+    along = recorded(lambda x, y: (0 * x, wave(x, 0.35, 40.0)))
+    (finding,) = diagnose_recording(STAGE, replace(along, units=("um", "nm")), jobs=0).findings
+    assert finding.effect == "waviness"
+    assert {name: e.unit for name, e in finding.parameters.items()} == {
+        "amplitude": "nm",
+        "period": "um",
+        "phase": "deg",
+    }
 
 
 @pytest.mark.long

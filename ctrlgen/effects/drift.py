@@ -22,7 +22,7 @@ class Drift(Effect):
 class DriftPerRecord(Drift):
     """Delta y = g (b + r t), db/dt = dr/dt = 0: b and r are constant within a record, others in each, and fitted there; g = 1.
 
-    A laboratory that is another temperature in each run. Holds as `drift`; outside a diagnosis b = r = 0.
+    So drifts what warms up anew before each run. Holds as `drift`; outside a diagnosis b = r = 0.
     """
 
     title = "A reading that drifts with time, at another rate in each record"

@@ -106,8 +106,8 @@ class LawPrior:
         the motion comes first where it explains nearly as much.
     constant: what it does is the same whatever the machine does: where it is needed beside a law that acts with the motion, it is part
         of that one.
-    of_each_record: what it does is another constant in each record, of which no other record tells: it has no slope at zero by which a
-        screen would see it, and is tried where such constants are most of what is left (`selection.of_each_record`).
+    of_each_record: what it does is told by numbers that are others in each record, of which no other record tells: it has no slope at zero
+        by which a screen would see it, and is tried where it takes away most of what is left (`selection.of_each_record`).
     period_up_to: of a law that repeats along a reading, in typical sizes of that: the longest period that is looked for where the records
         do not show that a longer one repeats (`Hypothesis.longest_period`); an amplitude up to a quarter of either.
     once_a_turn: the law repeats with the turn of an axis: it is suspected where a good part of a turn is read.
@@ -153,9 +153,9 @@ class LawPrior:
         return any(p.start_from_data == "spatial_periods" for p in self.parameters.values())
 
     @property
-    def acts_at_a_moment(self) -> bool:
-        """Whether the law is an event."""
-        return any(p.start_from_data == "moments" for p in self.parameters.values())
+    def moments(self) -> tuple[str, ...]:
+        """The numbers of an event that tell when it was; none of another law."""
+        return tuple(name for name, p in self.parameters.items() if p.start_from_data == "moments")
 
     @property
     def in_time(self) -> bool:

@@ -186,10 +186,7 @@ def _numbers(main: Finding) -> list[Part]:
 
 def _moments(finding: Finding) -> list[Part]:
     """', at 3.41 s (3.4 ... 3.42 s)', when a law acts that is another in each record."""
-    law, prior = finding.cause.law, finding.cause.prior
-    moments = [p.name for p in law.params if prior.of(p).start_from_data == "moments"]
-    found = ((name, finding.parameters[name]) for name in moments)
-    return [Part(f", at {interval(e, name)}") for name, e in found]
+    return [Part(f", at {interval(finding.parameters[name], name)}") for name in finding.cause.prior.moments]
 
 
 def _in_records(in_records: dict[str, Estimate]) -> Part:

@@ -12,6 +12,7 @@ from ctrlgen.diagnosis.selection.candidate_model import Attempt
 from ctrlgen.diagnosis.selection.cause_entry import cause_name
 from ctrlgen.diagnosis.selection.confusable import likeness, look_alike
 from ctrlgen.diagnosis.selection.not_taken import compared
+from ctrlgen.diagnosis.selection.of_each_record import may_differ
 from ctrlgen.diagnosis.selection.screen import Screened
 from ctrlgen.diagnosis.selection.search_history import held_out_error, numbers_of_cause
 from ctrlgen.diagnosis.selection.subset_search import Suspect
@@ -47,7 +48,8 @@ def _why_not_offered(diagnosis: Diagnosis, law: type[Effect]) -> str:
     recording, device = diagnosis.recording, diagnosis.device
     if why := not_offered([law.kind], device.parts(nominal_physics(device))).get(law.kind):
         return why
-    if prior_of(law).of_each_record and recording.kind == "series":
+    alone = prior_of(law).of_each_record and not may_differ(Hypothesis(law.kind, ""), recording)
+    if alone and recording.kind == "series":
         return "it is another one in each run, and one run alone was recorded"
     shortest = min(r.sample_time for r in recording.records)
     return (

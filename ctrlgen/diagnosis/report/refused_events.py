@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from ctrlgen.diagnosis.selection.candidate_model import Refusal
 from ctrlgen.diagnosis.selection.model_selection import Shortfall
-from ctrlgen.estimation.hypothesis import PARAMETER, Hypothesis
+from ctrlgen.estimation.hypothesis import Hypothesis
 from ctrlgen.recordings.recording import Recording
 from ctrlgen.reporting.numbers import number
 
@@ -16,7 +16,7 @@ ITS_OWN_FILE = "what happened once in one file shows in the later rows of that f
 
 def moment_of(refusal: Refusal, cause: Hypothesis) -> str:
     """', at 31.4 s' of an event; empty of any other cause."""
-    names = _moments(cause)
+    names = cause.prior.moments
     causes = refusal.candidate.fit.structure.causes
     if not names or cause not in causes:
         return ""
@@ -28,13 +28,7 @@ def how_confirmed(recording: Recording, refusal: Refusal) -> list[str]:
     """What would confirm an event that the held-out records do not, as they are of other files than those to fit; nothing otherwise."""
     files = {role: {r.file for r in recording.records if r.role == role} for role in ("fit", "hold_out")}
     refused = any(
-        _moments(cause) and reason == Shortfall.UNCONFIRMED
+        cause.prior.moments and reason == Shortfall.UNCONFIRMED
         for cause, reason in zip(refusal.causes, refusal.reasons, strict=True)
     )
     return [ITS_OWN_FILE] if refused and not files["fit"] & files["hold_out"] else []
-
-
-def _moments(cause: Hypothesis) -> list[str]:
-    if cause.effect == PARAMETER:
-        return []
-    return [p.name for p in cause.law.params if cause.prior.of(p).start_from_data == "moments"]

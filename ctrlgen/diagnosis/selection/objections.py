@@ -236,7 +236,7 @@ def _no_event(recording: Recording, fit: Fit, k: int) -> str | None:
     cause = fit.structure.causes[k]
     if cause.effect == PARAMETER or recording.kind != "series":
         return None
-    moments = [p.name for p in cause.law.params if cause.prior.of(p).start_from_data == "moments"]
+    moments = cause.prior.moments
     values = fit.values(k)
     for record in (r for r in recording.records if r.role == "fit" and moments):
         near = OBJECTIONS.onset_samples * record.sample_time

@@ -51,7 +51,7 @@ def may_differ(cause: Hypothesis, recording: Recording) -> bool:
     """Whether the records of a recording may tell a cause that is another in each: of readings in time in two runs or more, as the parts
     of one file have one zero and one drift; a jump may be in one part of a file."""
     moved = [r for r in recording.records if r.role != "rest"]
-    several = len(moved) if cause.prior.acts_at_a_moment else len({_file(r) for r in moved})
+    several = len(moved) if cause.prior.moments else len({_file(r) for r in moved})
     return recording.kind == "series" and several > 1
 
 
@@ -68,8 +68,8 @@ def fit_of_each_record(trials: Trials, current: CandidateModel) -> tuple[Candida
     left = left_in_runs(trials.fitter, current.fit)
     sets: list[list[tuple[Hypothesis, Part]]] = []
     for effect in dict.fromkeys(h.effect for h in open_):
-        share = SHARES.get(effect, of_means)
-        parts = [(h, share(left.get(f"reading.{h.at}", []))) for h in open_ if h.effect == effect]
+        part_of = PARTS.get(effect, of_means)
+        parts = [(h, part_of(left.get(f"reading.{h.at}", []))) for h in open_ if h.effect == effect]
         apart = [(h, part) for h, part in parts if part.share >= SEARCH.least_of_each_record]
         sets += [[one] for one in apart] + ([apart] if len(apart) > 1 else [])
     fitted = trials.each(lambda branch, causes: branch.tried(_with(current.fit, causes), causes[-1][0]), sets)
@@ -139,7 +139,7 @@ def of_one_step(runs: Sequence[Left]) -> Part:
     return best
 
 
-SHARES: Mapping[str, Callable[[Sequence[Left]], Part]] = {
+PARTS: Mapping[str, Callable[[Sequence[Left]], Part]] = {
     "drift_per_record": of_lines,
     "sensor_step_per_record": of_one_step,
 }

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ctrlgen.core.units import same_dimension
 from ctrlgen.diagnosis.selection.drive_levels import steps_of_drives
 from ctrlgen.diagnosis.selection.spatial_periods import (
     jump_positions,
@@ -69,7 +70,7 @@ def shown_along_path(
         return merged_periods(spatial_periods(y[good, i], residual[good, i], shortest) for y in paths)
 
     def beside(i: int, good: np.ndarray) -> dict[str, tuple[float, ...]]:
-        others = [(j, name) for j, name in read if across and j != i and units[j] == units[i]]
+        others = [(j, name) for j, name in read if across and j != i and same_dimension(units[j], units[i])]
         seen = {name: good & record.valid[:, j] for j, name in others}
         return {
             f"{ACROSS} {name}": periods_across(record.observed[seen[name], j], residual[seen[name], i])
